@@ -1,0 +1,1 @@
+"""Questions asked of both solvers: scenes, runs, metrics, results and charts."""

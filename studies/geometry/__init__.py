@@ -1,0 +1,22 @@
+"""Meshes of organs: gmsh and meshio live here only. Lengths in metres, surface nodes numbered first."""
+
+from studies.geometry.api import ball, ball_octant, fill, organ
+from studies.geometry.checks import check_surface, check_tetrahedra
+from studies.geometry.mesh import OrganMesh
+from studies.geometry.organs.ball import project_ball
+from studies.geometry.regions import BallRegion, EllipsoidRegion, HalfSpace, Region
+
+__all__ = [
+    "BallRegion",
+    "EllipsoidRegion",
+    "HalfSpace",
+    "OrganMesh",
+    "Region",
+    "ball",
+    "ball_octant",
+    "check_surface",
+    "check_tetrahedra",
+    "fill",
+    "organ",
+    "project_ball",
+]

@@ -1,0 +1,87 @@
+"""The meshes of the project by name: what scenes ask for."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from studies.errors import StudyError
+from studies.geometry.checks import check_surface
+from studies.geometry.jobs import TIME_LIMIT, mesh_from
+from studies.geometry.mesh import OrganMesh
+from studies.geometry.regions import Region, region_to_dict
+
+
+def organ(
+    name: str,
+    nodes: int,
+    regions: Mapping[str, Region],
+    fill: bool = True,
+    parameters: Mapping[str, Any] | None = None,
+) -> OrganMesh:
+    """The organ `name` of SHAPES with `nodes` surface nodes (exactly or within 2 %), outlines of regions on its edges.
+
+    Raises StudyError when the mesher cannot do it.
+    """
+    if isinstance(nodes, bool) or int(nodes) != nodes:
+        raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
+    recipe = {
+        "kind": "organ",
+        "name": name,
+        "organ": name,
+        "nodes": int(nodes),
+        "parameters": dict(parameters or {}),
+        "regions": {key: region_to_dict(region) for key, region in regions.items()},
+        "fill": bool(fill),
+    }
+    return mesh_from(recipe)
+
+
+def ball(
+    nodes: int = 550, radius: float = 0.05, regions: Mapping[str, Region] | None = None, fill: bool = True
+) -> OrganMesh:
+    """Ball of `radius` [m] around the origin; surface nodes lie exactly on the sphere, so the volume is a little small
+    (1 % at 550 nodes); raises StudyError for a radius or node count that cannot be meshed."""
+    return organ("ball", nodes, regions or {}, fill, {"radius": float(radius)})
+
+
+def ball_octant(radius: float, h: float, h_pole: float) -> OrganMesh:
+    """Octant x, y, z >= 0 of a ball [m], element size `h_pole` [m] at the pole (0, 0, radius) growing to `h` [m] one
+    radius away. Patches: "x0", "y0", "z0" (exactly coordinate 0) and "sphere". Raises StudyError for sizes outside
+    0.005 to 1 of the radius."""
+    for name, size in (("h", h), ("h_pole", h_pole)):
+        if not 0.005 * radius <= size <= radius:
+            raise StudyError(
+                f"the octant's {name} = {size} m is outside 0.005 to 1 of its radius {radius} m; choose one inside"
+            )
+    recipe = {
+        "kind": "ball_octant",
+        "name": "ball_octant",
+        "radius": float(radius),
+        "h": float(h),
+        "h_pole": float(h_pole),
+    }
+    mesh = mesh_from(recipe)
+    surface = mesh.points[: mesh.surface_count]
+    patches = {f"{axis}0": np.flatnonzero(surface[:, k] == 0.0) for k, axis in enumerate("xyz")}
+    patches["sphere"] = np.flatnonzero(np.abs(np.linalg.norm(surface, axis=1) - radius) < 1e-12 * radius)
+    return replace(mesh, patches=patches)
+
+
+def fill(surface: OrganMesh, limit: float = TIME_LIMIT) -> OrganMesh:
+    """The given closed surface filled with tetrahedra, its nodes kept bit for bit and numbered first.
+
+    Gives up after `limit` seconds. Raises StudyError for a surface that is not closed, outward and well shaped, or that
+    cannot be filled (it cuts itself).
+    """
+    points = np.ascontiguousarray(surface.points[: surface.surface_count], dtype=float)
+    triangles = np.ascontiguousarray(surface.triangles, dtype=np.int64)
+    check_surface(points, triangles, surface.name)
+    recipe = {
+        "kind": "fill",
+        "name": surface.name,
+        "regions": surface.recipe.get("regions", {}),
+        "source": surface.recipe,
+    }
+    return mesh_from(recipe, {"points": points, "triangles": triangles}, limit)

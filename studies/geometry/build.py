@@ -1,0 +1,76 @@
+"""Making a mesh from its recipe, inside the worker process. The same recipe gives the same mesh bit for bit."""
+
+from typing import Any
+
+import numpy as np
+
+from studies.errors import StudyError
+from studies.geometry.checks import check_surface
+from studies.geometry.count import surface_with
+from studies.geometry.fill import fill_surface
+from studies.geometry.gmsh_session import Remesher, fresh_model
+from studies.geometry.levelset import Shape
+from studies.geometry.mesh import triangle_areas
+from studies.geometry.octant import build_octant
+from studies.geometry.organs import SHAPES
+from studies.geometry.regions import region_from_dict
+from studies.geometry.snap import relax, snap_region
+from studies.geometry.surface import first_surface
+
+Arrays = dict[str, np.ndarray]
+
+
+def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
+    """points, triangles, tetrahedra, surface_count for a recipe; `arrays` holds a given surface for kind "fill".
+
+    Raises StudyError when the recipe cannot be made.
+    """
+    return {"organ": build_organ, "fill": build_fill, "ball_octant": build_octant}[recipe["kind"]](
+        recipe, arrays
+    )
+
+
+def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
+    """An organ of SHAPES with `nodes` surface nodes, its outlines of regions snapped, filled when asked."""
+    shape = SHAPES[recipe["organ"]](**recipe["parameters"])
+    start_points, start_triangles = first_surface(shape)
+    area = float(triangle_areas(start_points, start_triangles).sum())
+    with fresh_model():
+        remesher = Remesher(start_points, start_triangles)
+        points, triangles = surface_with(recipe["nodes"], area, remesher.mesh, shape)
+    points = snap_all(shape, points, triangles, recipe["regions"])
+    return finish(points, triangles, recipe["fill"])
+
+
+def snap_all(
+    shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: dict[str, dict[str, Any]]
+) -> np.ndarray:
+    """Even out the surface, then give every region its outline; earlier outlines stay where they are."""
+    fixed = np.zeros(len(points), bool)
+    points = relax(shape, points, triangles, None, fixed, fixed)
+    for data in regions.values():
+        points, on_curve = snap_region(shape, points, triangles, region_from_dict(data), fixed)
+        fixed |= on_curve
+    return points
+
+
+def build_fill(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
+    """A given surface, filled."""
+    return finish(arrays["points"], arrays["triangles"], fill=True)
+
+
+def finish(points: np.ndarray, triangles: np.ndarray, fill: bool) -> Arrays:
+    """Check the surface, fill it when asked."""
+    check_surface(points, triangles)
+    count = len(points)
+    tetrahedra = np.empty((0, 4), np.int64)
+    if fill:
+        points, tetrahedra = fill_surface(points, triangles)
+    if not np.isfinite(points).all():
+        raise StudyError("the mesher returned coordinates that are not finite; try another node count")
+    return {
+        "points": points,
+        "triangles": triangles,
+        "tetrahedra": tetrahedra,
+        "surface_count": np.int64(count),
+    }

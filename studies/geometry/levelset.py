@@ -1,0 +1,69 @@
+"""An organ as a function: f(x) < 0 inside, f(x) = 0 its surface; and the way onto that surface."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from studies.errors import StudyError
+from studies.geometry.regions import Region, Vector
+
+Level = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """An organ's true shape.
+
+    level: f(points (n, 3) [m]) -> (n,) [m], negative inside, smooth near its zero set, |grad f| of order 1
+    low, high: corners of a box that holds the organ with at least two cells to spare [m]
+    cell: edge of the grid on which f is first sampled [m]; finer than the thinnest part
+    regions: the attachments it has by default
+    """
+
+    name: str
+    level: Level
+    low: Vector
+    high: Vector
+    cell: float
+    regions: Mapping[str, Region] = field(default_factory=dict)
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the box [m]."""
+        return float(np.linalg.norm(np.subtract(self.high, self.low)))
+
+
+def gradient(level: Level, points: np.ndarray, step: float) -> np.ndarray:
+    """Central difference of f, shape (n, 3), with the given step [m]."""
+    count = len(points)
+    shifts = step * np.vstack([np.eye(3), -np.eye(3)])
+    values = level((points[None, :, :] + shifts[:, None, :]).reshape(-1, 3)).reshape(6, count)
+    return (values[:3] - values[3:]).T / (2.0 * step)
+
+
+def project(shape: Shape, points: np.ndarray, constraints: tuple[Level, ...] = ()) -> np.ndarray:
+    """Move points (n, 3) [m] onto f = 0, and onto g = 0 for every further constraint g.
+
+    Newton's method with the smallest correction, d = -A^T (A A^T)^-1 r with the gradients as rows of A. Raises StudyError
+    where it does not converge, which happens only far from the surface or where the constraints do not meet.
+    """
+    x = np.array(points, float)
+    levels = (shape.level, *constraints)
+    # The step of the difference only changes the rate of convergence; the residual decides where the points end.
+    step, tolerance = 1e-6 * shape.size, 1e-13 * shape.size
+    for _ in range(60):
+        residual = np.stack([level(x) for level in levels], axis=1)
+        moving = np.abs(residual).max(axis=1, initial=0.0) > tolerance
+        if not moving.any():
+            return x
+        rows = np.stack([gradient(level, x[moving], step) for level in levels], axis=1)
+        gram = rows @ rows.transpose(0, 2, 1) + 1e-12 * np.eye(len(levels))
+        d = -(rows.transpose(0, 2, 1) @ np.linalg.solve(gram, residual[moving][:, :, None]))[:, :, 0]
+        # A step longer than a cell leaves the neighbourhood in which the gradient means anything.
+        d *= np.minimum(1.0, shape.cell / np.maximum(np.linalg.norm(d, axis=1), 1e-300))[:, None]
+        x[moving] += d
+    worst = np.abs(np.stack([level(x) for level in levels])).max()
+    raise StudyError(
+        f"{shape.name}: points could not be brought onto the surface (still {worst:.2g} m away); start nearer to it"
+    )

@@ -1,0 +1,51 @@
+"""One eighth of a ball, fine where it will be touched: what three planes of symmetry leave to compute."""
+
+from typing import Any
+
+import gmsh
+import numpy as np
+
+from studies.geometry.gmsh_session import TETRAHEDRON, fresh_model, read_elements
+from studies.geometry.mesh import boundary_triangles, tetrahedron_volumes
+
+
+def build_octant(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Octant x, y, z >= 0 of the ball of `radius` [m]: element size `h_pole` [m] at (0, 0, radius), growing to `h` [m].
+
+    Planes of symmetry are exactly at coordinate 0 and nodes of the sphere at distance `radius` to rounding.
+    """
+    radius, h, h_pole = recipe["radius"], recipe["h"], recipe["h_pole"]
+    with fresh_model(
+        Mesh_Algorithm3D=1, Mesh_Optimize=1, Mesh_OptimizeNetgen=1, Mesh_MeshSizeExtendFromBoundary=0
+    ):
+        # Unit radius inside gmsh: its geometric tolerances are absolute.
+        gmsh.model.occ.addSphere(0, 0, 0, 1.0, angle1=0, angle2=np.pi / 2, angle3=np.pi / 2)
+        gmsh.model.occ.synchronize()
+        size = f"{h_pole / radius!r} + {(h - h_pole) / radius!r} * Min(1, Sqrt(x*x + y*y + (z - 1)*(z - 1)))"
+        field = gmsh.model.mesh.field.add("MathEval")
+        gmsh.model.mesh.field.setString(field, "F", size)
+        gmsh.model.mesh.field.setAsBackgroundMesh(field)
+        gmsh.model.mesh.generate(3)
+        _, points, tetrahedra = read_elements(TETRAHEDRON)
+    points[np.abs(points) < 1e-9] = 0.0
+    distance = np.linalg.norm(points, axis=1)
+    on_sphere = np.abs(distance - 1.0) < 1e-9
+    points[on_sphere] /= distance[on_sphere][:, None]
+    inverted = tetrahedron_volumes(points, tetrahedra) < 0
+    tetrahedra[inverted] = tetrahedra[inverted][:, [0, 2, 1, 3]]
+    return surface_first(radius * points, tetrahedra)
+
+
+def surface_first(points: np.ndarray, tetrahedra: np.ndarray) -> dict[str, np.ndarray]:
+    """The same mesh with the boundary nodes numbered first."""
+    triangles = boundary_triangles(tetrahedra)
+    surface = np.unique(triangles)
+    order = np.concatenate([surface, np.setdiff1d(np.arange(len(points)), surface)])
+    new = np.empty(len(points), np.int64)
+    new[order] = np.arange(len(points))
+    return {
+        "points": points[order],
+        "triangles": new[triangles],
+        "tetrahedra": new[tetrahedra],
+        "surface_count": np.int64(len(surface)),
+    }

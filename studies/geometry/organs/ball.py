@@ -1,0 +1,25 @@
+"""Ball: the shape with closed forms."""
+
+import numpy as np
+
+from studies.errors import StudyError
+from studies.geometry.levelset import Shape
+
+
+def ball_shape(radius: float = 0.05) -> Shape:
+    """Ball of the given radius [m] around the origin; raises StudyError unless 0 < radius < inf."""
+    if not 0 < radius < np.inf:
+        raise StudyError(f"a ball of radius {radius} m cannot be meshed; give a radius above 0")
+    reach = 1.2 * radius
+    return Shape(
+        name="ball",
+        level=lambda points: np.linalg.norm(points, axis=1) - radius,
+        low=(-reach, -reach, -reach),
+        high=(reach, reach, reach),
+        cell=radius / 8.0,
+    )
+
+
+def project_ball(points: np.ndarray, radius: float = 0.05) -> np.ndarray:
+    """Nearest points, shape (n, 3), on the sphere of the given radius [m] around the origin."""
+    return points * (radius / np.linalg.norm(points, axis=1, keepdims=True))
