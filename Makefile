@@ -1,0 +1,66 @@
+# `make` alone prints this list. Every target does its own set-up (.ci/setup), instant when nothing changed.
+BIN := .venv/bin
+STUDIES := volume_loss frame_rate work_precision stability_map
+PYTEST := $(BIN)/python -m pytest -q -n 2
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help study smoke test check lint figures bench clean distclean setup-run setup-test setup-dev FORCE
+
+help: ## this list
+	@echo "make TARGET"
+	@awk -F ':.*## ' '/^[a-z%\/.-]+:.*## / {printf "  %-22s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@echo "Studies: $(STUDIES)"
+
+study: setup-run ## run every study, then the charts and tables (the main job; minutes)
+	$(BIN)/organbench run $(STUDIES)
+	$(BIN)/organbench report
+
+study-%: setup-run ## run one study and draw it: make study-volume_loss
+	$(BIN)/organbench run $*
+	$(BIN)/organbench plot $*
+
+smoke: setup-run ## every study with its smallest settings: does it all hang together?
+	$(BIN)/organbench run --smoke $(STUDIES)
+
+test: setup-test ## every test
+	$(PYTEST)
+
+check: lint setup-dev ## lint, types, import contracts and the fast tests
+	$(PYTEST) -m "not slow"
+
+lint: setup-dev ## ruff, pyright and the import contracts alone
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python
+	$(BIN)/lint-imports
+
+figures: setup-run ## draw the charts again from the stored results
+	$(BIN)/organbench report --figures
+
+bench: setup-run ## measure the numbers that the README promises (quiet machine, please)
+	$(BIN)/python -m studies.bench
+
+# A chart or table by its file name: results/STUDY/NAME.png, results/STUDY/NAME.csv
+results/%.png: setup-run FORCE ## one chart by its file name: make results/volume_loss/volume.png
+	$(BIN)/organbench run $(firstword $(subst /, ,$*))
+	$(BIN)/organbench plot $(firstword $(subst /, ,$*))
+	@test -f $@ || { echo "$@: this study draws no such chart; it has: $$(ls $(@D)/*.png)"; exit 2; }
+
+results/%.csv: setup-run FORCE ## one table by its file name: make results/volume_loss/volume_loss.csv
+	$(BIN)/organbench run $(firstword $(subst /, ,$*))
+	$(BIN)/organbench table $(firstword $(subst /, ,$*)) --csv $@
+
+clean: ## remove caches and unfinished files; results and .venv stay
+	find . \( -name .venv -o -name .git \) -prune -o \( -name __pycache__ -o -name '*.egg-info' \) -type d -prune -exec rm -rf {} +
+	rm -rf build dist .pytest_cache .hypothesis .ruff_cache .import_linter_cache .numba_cache results/cache
+	find . \( -name .venv -o -name .git \) -prune -o -name '*.part' -type f -exec rm -f {} +
+
+distclean: clean ## clean, and remove .venv and the raw results too (charts and tables stay)
+	rm -rf .venv
+	test ! -d results || find results -name '*.h5' -type f -exec rm -f {} +
+
+setup-run setup-test setup-dev: setup-%:
+	@.ci/setup $*
+
+FORCE:
