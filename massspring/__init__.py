@@ -1,0 +1,35 @@
+"""Mass-spring bodies that keep their volume: Jung, Hong, Choi (2005) and relatives. Knows no file, no plot, no scene."""
+
+from massspring.body import Body, Material, surface_body, tetrahedral_body
+from massspring.clock import Clock, make_clock
+from massspring.errors import MassSpringError
+from massspring.history import History
+from massspring.methods import METHODS, Free, ImplicitVolume, Method, State
+from massspring.obstacles import Attachment, Obstacle, Path, Plane, Sphere
+from massspring.simulation import Setup, simulate
+from massspring.stability import StepLimit, step_limit
+
+__all__ = [
+    "METHODS",
+    "Attachment",
+    "Body",
+    "Clock",
+    "Free",
+    "History",
+    "ImplicitVolume",
+    "MassSpringError",
+    "Material",
+    "Method",
+    "Obstacle",
+    "Path",
+    "Plane",
+    "Setup",
+    "Sphere",
+    "State",
+    "StepLimit",
+    "make_clock",
+    "simulate",
+    "step_limit",
+    "surface_body",
+    "tetrahedral_body",
+]

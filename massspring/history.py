@@ -1,0 +1,115 @@
+"""What a run leaves behind, frame by frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from massspring.body import Body
+from massspring.clock import Clock
+from massspring.kernels.deformation import smallest_ratio, tetrahedron_volumes_into
+from massspring.kernels.springs import spring_energy
+from massspring.kernels.volume import enclosed_volume
+from massspring.methods.base import State
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """F frames; entries after a divergence are NaN."""
+
+    t: np.ndarray
+    """End of each frame [s], (F,)."""
+    volume: np.ndarray
+    """[m³], (F, 1)."""
+    pressure: np.ndarray
+    """lam of the last step of the frame [Pa], (F, 1)."""
+    kinetic: np.ndarray
+    """[J], (F,)."""
+    elastic: np.ndarray
+    """[J], (F,)."""
+    contact_force: np.ndarray
+    """Mean force of each obstacle on the body during the frame [N], (F, o, 3)."""
+    held_force: np.ndarray
+    """Mean force of each attachment on the body during the frame [N], (F, g, 3)."""
+    min_j: np.ndarray
+    """Smallest tetrahedron volume ratio [1], (F,); NaN for a surface body."""
+    snapshot_frames: np.ndarray
+    """Frame numbers, 1 … F, (s,)."""
+    snapshots: np.ndarray
+    """Positions after those frames [m], (s, n, 3)."""
+    final: np.ndarray
+    """Positions after the last good frame [m], (n, 3)."""
+    frame_ns: np.ndarray
+    """Wall time of each frame's steps [ns], (F,); 0 after a divergence."""
+    diverged_at: int | None
+    """Number (1 … F) of the frame that diverged."""
+    message: str
+    """Why it stopped; empty when it did not."""
+    skipped_steps: int
+    """Steps without a volume gradient to push on."""
+
+
+class Recorder:
+    """Fills the arrays of a History; a minimum J is only looked for where there are tetrahedra."""
+
+    def __init__(self, body: Body, clock: Clock, obstacles: int, attachments: int, keep: frozenset[int]) -> None:
+        frames = clock.frames
+        self.body = body
+        self.clock = clock
+        self.rest_volumes = body.tetrahedron_volumes
+        self.volumes = np.empty_like(self.rest_volumes)
+        self.t = clock.frame * np.arange(1, frames + 1)
+        self.scalars = {name: np.full(frames, np.nan) for name in ("volume", "pressure", "kinetic", "elastic", "min_j")}
+        self.contact_force = np.full((frames, obstacles, 3), np.nan)
+        self.held_force = np.full((frames, attachments, 3), np.nan)
+        self.frame_ns = np.zeros(frames, dtype=np.int64)
+        self.keep = keep
+        self.kept: dict[int, np.ndarray] = {}
+        self.final = body.rest
+        self.skipped = 0
+
+    def record(self, frame: int, state: State, elapsed_ns: int) -> None:
+        """Reads the state after frame number `frame` (0, 1, …)."""
+        net, x, v = state.network, state.x, state.v
+        self.scalars["volume"][frame] = enclosed_volume(x, net.triangles)
+        self.scalars["pressure"][frame] = state.lam
+        self.scalars["kinetic"][frame] = 0.5 * float(net.mass @ np.einsum("ij,ij->i", v, v))
+        self.scalars["elastic"][frame] = spring_energy(x, net.ends, net.rest_length, net.stiffness)
+        if len(self.rest_volumes):
+            tetrahedron_volumes_into(x, self.body.tetrahedra, self.volumes)
+            self.scalars["min_j"][frame] = smallest_ratio(self.volumes, self.rest_volumes)
+        self.contact_force[frame] = state.tally.contact_impulse / self.clock.frame
+        self.held_force[frame] = state.tally.held_impulse / self.clock.frame
+        self.frame_ns[frame] = elapsed_ns
+        self.skipped += int(state.tally.skipped[0])
+        self.final = x
+        if frame + 1 in self.keep:
+            self.kept[frame + 1] = x
+
+    def finished(self) -> History:
+        """All frames ran."""
+        return self._history(None, "")
+
+    def stopped(self, frame: int, reason: str) -> History:
+        """Frame number `frame` (0, 1, …) was no good."""
+        return self._history(frame + 1, f"diverged in frame {frame + 1} at {self.t[frame]:.4g} s: {reason}")
+
+    def _history(self, diverged_at: int | None, message: str) -> History:
+        frames = sorted(self.kept)
+        shape = (len(frames), self.body.node_count, 3)
+        return History(
+            t=self.t,
+            volume=self.scalars["volume"][:, None],
+            pressure=self.scalars["pressure"][:, None],
+            kinetic=self.scalars["kinetic"],
+            elastic=self.scalars["elastic"],
+            contact_force=self.contact_force,
+            held_force=self.held_force,
+            min_j=self.scalars["min_j"],
+            snapshot_frames=np.array(frames, dtype=np.int64),
+            snapshots=np.array([self.kept[f] for f in frames]).reshape(shape),
+            final=self.final,
+            frame_ns=self.frame_ns,
+            diverged_at=diverged_at,
+            message=message,
+            skipped_steps=self.skipped,
+        )

@@ -1,0 +1,77 @@
+"""Which surface nodes lie on which obstacle during this step."""
+
+import math
+
+from massspring.kernels.compiled import compiled
+
+
+@compiled
+def touch(motion, drive, step, node, u0, u1, u2):
+    """Puts the node on the obstacle it would enter deepest when moving with u [m/s]; True when there is one (eq. 12).
+
+    Plane: gap = n·(x + dt u − p). Sphere: gap = |x + dt u − c| − R, n towards the node.
+    `approach` a = n·(target − x)/dt ends the step exactly on the tangent plane, so never inside.
+    """
+    deepest = 0.0
+    dt = drive.dt
+    x0, x1, x2 = motion.x[node, 0], motion.x[node, 1], motion.x[node, 2]
+    for o in range(drive.radius.shape[0]):
+        p0, p1, p2 = drive.position[step, o, 0], drive.position[step, o, 1], drive.position[step, o, 2]
+        r0, r1, r2 = x0 + dt * u0 - p0, x1 + dt * u1 - p1, x2 + dt * u2 - p2
+        if drive.is_plane[o]:
+            n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
+            gap = n0 * r0 + n1 * r1 + n2 * r2
+        else:
+            distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+            gap = distance - drive.radius[o]
+            if not (gap < deepest and distance > 0.0):
+                continue
+            n0, n1, n2 = r0 / distance, r1 / distance, r2 / distance
+        if gap < deepest:
+            deepest = gap
+            motion.touched[node] = o + 1
+            motion.normal[node, 0], motion.normal[node, 1], motion.normal[node, 2] = n0, n1, n2
+            along = n0 * (p0 - x0) + n1 * (p1 - x1) + n2 * (p2 - x2)
+            motion.approach[node] = (along + drive.radius[o]) / dt
+    return deepest < 0.0
+
+
+@compiled
+def find_contacts(network, motion, drive, step, lam):
+    """Touched nodes of the step when the last pressure acts as a force: u = v* + dt lam W G (eq. 12)."""
+    for c in range(network.surface_nodes.shape[0]):
+        i = network.surface_nodes[c]
+        motion.touched[i] = 0
+        if network.inverse_mass[i] > 0.0:
+            push = drive.dt * lam * network.inverse_mass[i]
+            touch(
+                motion,
+                drive,
+                step,
+                i,
+                motion.v_star[i, 0] + push * motion.gradient[i, 0],
+                motion.v_star[i, 1] + push * motion.gradient[i, 1],
+                motion.v_star[i, 2] + push * motion.gradient[i, 2],
+            )
+
+
+@compiled
+def revise_contacts(network, motion, drive, step, lam):
+    """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 13)."""
+    changes = 0
+    for c in range(network.surface_nodes.shape[0]):
+        i = network.surface_nodes[c]
+        if network.inverse_mass[i] == 0.0:
+            continue
+        push = drive.dt * lam * network.inverse_mass[i]
+        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
+        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
+        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+        if motion.touched[i] > 0:
+            along = u0 * motion.normal[i, 0] + u1 * motion.normal[i, 1] + u2 * motion.normal[i, 2]
+            if motion.approach[i] < along:
+                motion.touched[i] = 0
+                changes += 1
+        elif touch(motion, drive, step, i, u0, u1, u2):
+            changes += 1
+    return changes

@@ -1,0 +1,107 @@
+"""What a method is: settings (a frozen dataclass), claims (class variables), and one compiled loop over a frame's steps."""
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from massspring.body import Body
+from massspring.errors import MassSpringError
+from massspring.kernels.layout import Drive, Motion, Network, Tally
+from massspring.obstacles import Attachment
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A body in motion. `advance` returns a new one and leaves the old as it was."""
+
+    network: Network
+    motion: Motion
+    rest_volume: float
+    """V0 [m³]."""
+    lam: float = 0.0
+    """Interior gauge pressure of the last step [Pa]; 0 for methods that keep no volume."""
+    tally: Tally = field(default_factory=lambda: new_tally(0, 0))
+    """What the last frame measured of itself."""
+
+    @property
+    def x(self) -> np.ndarray:
+        """Positions [m], (n, 3)."""
+        return self.motion.x
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocities [m/s], (n, 3)."""
+        return self.motion.v
+
+
+def new_tally(obstacles: int, attachments: int) -> Tally:
+    """A tally at zero."""
+    return Tally(np.zeros((obstacles, 3)), np.zeros((attachments, 3)), np.zeros(1, dtype=np.int64))
+
+
+class Method(Protocol):
+    """One way to advance time. A new one: a file, and a line in METHODS."""
+
+    name: ClassVar[str]
+    """Word on the command line."""
+    order: ClassVar[int]
+    """Claim: global error of the trajectory ~ dt^order."""
+    volume_tol: ClassVar[float | None]
+    """Claim: |V/V0 − 1| after a quiet step at half the stability limit; None where no volume is kept."""
+
+    def advance(self, state: State, drive: Drive) -> State:
+        """One frame: as many steps as `drive.position` has rows."""
+        ...
+
+
+def start(body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
+    """The body at rest, or with velocities `v` (n, 3) [m/s]. Raises MassSpringError for attachments that overlap or miss."""
+    network = _network(body, attachments)
+    n = body.node_count
+    velocity = np.zeros((n, 3)) if v is None else np.array(v, dtype=np.float64)
+    if velocity.shape != (n, 3):
+        raise MassSpringError(f"velocities have shape {velocity.shape}; the body has {n} nodes, give ({n}, 3)")
+    motion = Motion(
+        x=body.rest.copy(),
+        v=velocity,
+        v_star=np.zeros((n, 3)),
+        force=np.zeros((n, 3)),
+        gradient=np.zeros((n, 3)),
+        touched=np.zeros(n, dtype=np.uint32),
+        normal=np.zeros((n, 3)),
+        approach=np.zeros(n),
+    )
+    return State(network, motion, body.volume)
+
+
+def _network(body: Body, attachments: tuple[Attachment, ...]) -> Network:
+    nodes = [np.asarray(a.nodes, dtype=np.int64) for a in attachments]
+    for number, held in enumerate(nodes):
+        if not len(held):
+            raise MassSpringError(f"attachment {number} holds no node; widen its region or refine the mesh")
+        if held.min() < 0 or held.max() >= body.node_count:
+            raise MassSpringError(f"attachment {number} names node {held.max()}; the body has {body.node_count} nodes")
+    held_nodes = np.concatenate(nodes) if nodes else np.empty(0, dtype=np.int64)
+    if len(np.unique(held_nodes)) != len(held_nodes):
+        raise MassSpringError("two attachments hold the same node; their motions could contradict each other")
+    inverse_mass = 1.0 / body.mass
+    inverse_mass[held_nodes] = 0.0
+    return Network(
+        ends=body.springs.ends,
+        rest_length=body.springs.rest_length,
+        stiffness=body.springs.stiffness,
+        triangles=body.triangles,
+        mass=body.mass,
+        inverse_mass=inverse_mass,
+        surface_nodes=body.surface_nodes,
+        held_nodes=held_nodes.astype(np.uint32),
+        held_group=np.repeat(np.arange(len(nodes)), [len(h) for h in nodes]).astype(np.uint32),
+        held_rest=body.rest[held_nodes],
+    )
+
+
+def begin_frame(state: State, drive: Drive) -> State:
+    """A copy to advance in place, so that the caller's state stays what it was."""
+    motion = state.motion._replace(x=state.motion.x.copy(), v=state.motion.v.copy())
+    return replace(state, motion=motion, tally=new_tally(len(drive.radius), drive.held_displacement.shape[1]))

@@ -1,0 +1,45 @@
+"""Springs only: nothing keeps the volume. What the paper compares itself with."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from massspring.kernels.compiled import compiled
+from massspring.kernels.contact import find_contacts
+from massspring.kernels.layout import Drive
+from massspring.kernels.motion import add_held_impulse, advance, predict_velocity_into, prescribe_velocity_into
+from massspring.kernels.springs import spring_forces_into
+from massspring.methods.base import State, begin_frame
+
+
+@compiled
+def free_frame(network, motion, drive, tally):
+    """One frame of symplectic Euler with contact (eq. 6, 7, 10, 12)."""
+    dt = drive.dt
+    for step in range(drive.position.shape[0]):
+        spring_forces_into(motion.x, network.ends, network.rest_length, network.stiffness, motion.force)
+        predict_velocity_into(
+            motion.v, motion.force, network.inverse_mass, dt, drive.damping, drive.gravity, motion.v_star
+        )
+        held = drive.held_displacement[step]
+        prescribe_velocity_into(
+            motion.x, network.held_nodes, network.held_group, network.held_rest, held, dt, motion.v_star
+        )
+        if drive.radius.shape[0] > 0:
+            find_contacts(network, motion, drive, step, 0.0)
+        add_held_impulse(network, motion, 0.0, dt, drive.gravity, tally.held_impulse)
+        advance(motion, network.mass, network.inverse_mass, 0.0, dt, tally.contact_impulse)
+
+
+@dataclass(frozen=True)
+class Free:
+    """Symplectic Euler, no volume kept."""
+
+    name: ClassVar[str] = "free"
+    order: ClassVar[int] = 1
+    volume_tol: ClassVar[float | None] = None
+
+    def advance(self, state: State, drive: Drive) -> State:
+        """One frame."""
+        after = begin_frame(state, drive)
+        free_frame(after.network, after.motion, drive, after.tally)
+        return after

@@ -1,0 +1,112 @@
+"""Frame by frame: moves the obstacles, advances the method, records. The only Python in the loop is once per frame."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from time import perf_counter_ns
+
+import numpy as np
+
+from massspring.body import Body
+from massspring.clock import Clock
+from massspring.errors import MassSpringError
+from massspring.history import History, Recorder
+from massspring.kernels.layout import Drive
+from massspring.methods.base import Method, State, start
+from massspring.obstacles import Attachment, Obstacle, Plane
+
+ESCAPED = 20.0
+"""A node this many body sizes from rest, beyond any obstacle's push, has left: the run has diverged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """A body in its surroundings."""
+
+    body: Body
+    method: Method
+    clock: Clock
+    obstacles: tuple[Obstacle, ...] = ()
+    attachments: tuple[Attachment, ...] = ()
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """[m/s²]."""
+    damping: float = 0.0
+    """Mass-proportional damping [1/s]."""
+    velocity: np.ndarray | None = None
+    """Initial velocities [m/s], (n, 3); None: at rest."""
+
+    def __post_init__(self) -> None:
+        for number, obstacle in enumerate(self.obstacles):
+            depth = -float(obstacle.gap(self.body.rest[self.body.surface_nodes], 0.0).min())
+            if depth > 1e-6 * self.body.size:
+                raise MassSpringError(
+                    f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
+                )
+        if not (np.isfinite(self.damping) and self.damping >= 0):
+            raise MassSpringError(f"damping is {self.damping} 1/s; it must be zero or positive")
+        if self.damping * self.clock.dt >= 1:
+            raise MassSpringError(
+                f"damping {self.damping:g} 1/s turns velocities round within dt = {self.clock.dt:.3g} s; "
+                f"keep dt below {1 / self.damping:.3g} s"
+            )
+
+    def start(self) -> State:
+        """The state at t = 0."""
+        return start(self.body, self.attachments, self.velocity)
+
+    def drive(self, frame: int) -> Drive:
+        """The outside world during frame number `frame` (0, 1, …): positions at the end of each of its steps."""
+        t = frame * self.clock.frame + self.clock.dt * np.arange(1, self.clock.steps + 1)
+        return Drive(
+            dt=self.clock.dt,
+            damping=float(self.damping),
+            gravity=np.asarray(self.gravity, dtype=np.float64),
+            is_plane=np.array([isinstance(o, Plane) for o in self.obstacles], dtype=np.bool_),
+            plane_normal=_rows([o.unit_normal if isinstance(o, Plane) else np.zeros(3) for o in self.obstacles]),
+            radius=np.array([0.0 if isinstance(o, Plane) else o.radius for o in self.obstacles]),
+            position=_tracks([np.asarray(_anchor(o)) + o.path(t) for o in self.obstacles], len(t)),
+            held_displacement=_tracks([a.path(t) for a in self.attachments], len(t)),
+        )
+
+
+def _anchor(obstacle: Obstacle) -> tuple[float, float, float]:
+    return obstacle.point if isinstance(obstacle, Plane) else obstacle.centre
+
+
+def _rows(vectors: list[np.ndarray]) -> np.ndarray:
+    return np.array(vectors, dtype=np.float64).reshape(-1, 3)
+
+
+def _tracks(tracks: list[np.ndarray], steps: int) -> np.ndarray:
+    """(q, o, 3), contiguous, also when there is nothing to track."""
+    return np.ascontiguousarray(np.array(tracks, dtype=np.float64).reshape(-1, steps, 3).transpose(1, 0, 2))
+
+
+def trouble(state: State, body: Body) -> str | None:
+    """Why the run cannot go on, or None: values that are not finite, or nodes that have left."""
+    far = float(np.abs(state.x - body.rest).max())
+    if np.isfinite(far) and np.isfinite(state.lam) and far < ESCAPED * body.size:
+        return None
+    return "positions are no longer finite" if not np.isfinite(far) else f"a node has moved {far:.3g} m from rest"
+
+
+def simulate(setup: Setup, snapshots: Iterable[int] = (), on_frame: Callable[[int], object] | None = None) -> History:
+    """Runs all frames, or up to the first that diverges, and returns what happened.
+
+    `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is told after each.
+    Frame times are those of `advance` alone, measured with perf_counter_ns.
+    """
+    recorder = Recorder(setup.body, setup.clock, len(setup.obstacles), len(setup.attachments), frozenset(snapshots))
+    state = setup.start()
+    advance = setup.method.advance
+    for frame in range(setup.clock.frames):
+        drive = setup.drive(frame)
+        begin = perf_counter_ns()
+        state = advance(state, drive)
+        elapsed = perf_counter_ns() - begin
+        reason = trouble(state, setup.body)
+        if reason is not None:
+            return recorder.stopped(frame, reason)
+        recorder.record(frame, state, elapsed)
+        if on_frame is not None:
+            on_frame(frame + 1)
+    return recorder.finished()
