@@ -1,12 +1,23 @@
 """Meshes of organs: gmsh and meshio live here only. Lengths in metres, surface nodes numbered first."""
 
-from studies.geometry.api import ball, ball_octant, fill, organ
+from studies.geometry.api import ball, ball_octant, fill, liver, organ
 from studies.geometry.checks import check_surface, check_tetrahedra
 from studies.geometry.mesh import OrganMesh
 from studies.geometry.organs.ball import project_ball
+from studies.geometry.organs.liver import (
+    LIVER_PRESS_DIRECTION,
+    LIVER_PROBE_NORMAL,
+    LIVER_PROBE_POINT,
+    LIVER_REGIONS,
+    project_liver,
+)
 from studies.geometry.regions import BallRegion, EllipsoidRegion, HalfSpace, Region
 
 __all__ = [
+    "LIVER_PRESS_DIRECTION",
+    "LIVER_PROBE_NORMAL",
+    "LIVER_PROBE_POINT",
+    "LIVER_REGIONS",
     "BallRegion",
     "EllipsoidRegion",
     "HalfSpace",
@@ -17,6 +28,8 @@ __all__ = [
     "check_surface",
     "check_tetrahedra",
     "fill",
+    "liver",
     "organ",
     "project_ball",
+    "project_liver",
 ]

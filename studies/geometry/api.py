@@ -10,6 +10,7 @@ from studies.errors import StudyError
 from studies.geometry.checks import check_surface
 from studies.geometry.jobs import TIME_LIMIT, mesh_from
 from studies.geometry.mesh import OrganMesh
+from studies.geometry.organs.liver import LIVER_REGIONS
 from studies.geometry.regions import Region, region_to_dict
 
 
@@ -44,6 +45,14 @@ def ball(
     """Ball of `radius` [m] around the origin; surface nodes lie exactly on the sphere, so the volume is a little small
     (1 % at 550 nodes); raises StudyError for a radius or node count that cannot be meshed."""
     return organ("ball", nodes, regions or {}, fill, {"radius": float(radius)})
+
+
+def liver(
+    nodes: int = 550, regions: Mapping[str, Region] | None = None, fill: bool = True
+) -> OrganMesh:
+    """Liver of about 1,500 mL, x to the patient's left, y to the back, z to the head; attached at LIVER_REGIONS unless
+    other regions are given; raises StudyError for a node count that cannot be meshed."""
+    return organ("liver", nodes, LIVER_REGIONS if regions is None else regions, fill)
 
 
 def ball_octant(radius: float, h: float, h_pole: float) -> OrganMesh:

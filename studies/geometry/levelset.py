@@ -42,6 +42,12 @@ def gradient(level: Level, points: np.ndarray, step: float) -> np.ndarray:
     return (values[:3] - values[3:]).T / (2.0 * step)
 
 
+def normals(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """Outward unit normals, shape (n, 3), of the level surfaces at points (n, 3) [m]."""
+    rows = gradient(shape.level, points, 1e-6 * shape.size)
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+
+
 def project(shape: Shape, points: np.ndarray, constraints: tuple[Level, ...] = ()) -> np.ndarray:
     """Move points (n, 3) [m] onto f = 0, and onto g = 0 for every further constraint g.
 
