@@ -1,0 +1,52 @@
+"""Nearly incompressible finite elements: the reference that the mass-spring models are judged by."""
+
+import hashlib
+import os
+from pathlib import Path
+
+import numba
+
+
+def cache_folder() -> Path:
+    """Where compiled kernels are kept: numba does not notice edits in imported files, so the name hashes them all."""
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.name.encode() + source.read_bytes())
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "organbench" / f"numba-{digest.hexdigest()[:16]}"
+
+
+# numba reads the folder when a function is decorated, so it is set around the imports and given back afterwards;
+# a folder that the user chose stays.
+_folder_before = numba.config.CACHE_DIR
+if "NUMBA_CACHE_DIR" not in os.environ:
+    numba.config.CACHE_DIR = str(cache_folder())
+
+from reference_fem.contact import RigidPlane, RigidSphere  # noqa: E402
+from reference_fem.elements import nodes, surface_triangles  # noqa: E402
+from reference_fem.equilibrium import Equilibrium, equilibrium_path  # noqa: E402
+from reference_fem.errors import ReferenceProblem, SlowSolverWarning  # noqa: E402
+from reference_fem.evaluate import Evaluator  # noqa: E402
+from reference_fem.material import NeoHookean  # noqa: E402
+from reference_fem.mesh import curve  # noqa: E402
+from reference_fem.newton import NewtonSettings  # noqa: E402
+from reference_fem.problem import Held, Problem  # noqa: E402
+
+numba.config.CACHE_DIR = _folder_before
+
+__all__ = [
+    "Equilibrium",
+    "Evaluator",
+    "Held",
+    "NeoHookean",
+    "NewtonSettings",
+    "Problem",
+    "ReferenceProblem",
+    "RigidPlane",
+    "RigidSphere",
+    "SlowSolverWarning",
+    "curve",
+    "equilibrium_path",
+    "nodes",
+    "surface_triangles",
+]

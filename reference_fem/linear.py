@@ -1,0 +1,147 @@
+"""Symmetric indefinite sparse systems: MKL Pardiso when it is there, SciPy's SuperLU otherwise."""
+
+import warnings
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from reference_fem.errors import ReferenceProblem, SlowSolverWarning
+
+RESIDUAL_LIMIT = 1e-6
+"""Largest relative residual of a solve (max norm) before the factors are rejected: Newton only needs a direction,
+good factors leave 1e-10."""
+
+# Pardiso's control vector, numbered as in its manual minus one: own values on; nested dissection; two refinement
+# sweeps; pivots perturbed below 1e-8; scaling and weighted matching, both advised for saddle points; 2x2 pivots.
+PARDISO_CONTROL = {0: 1, 1: 2, 7: 2, 9: 8, 10: 1, 12: 1, 20: 1}
+
+
+class SlowSolverState:
+    """Whether the missing fast solver has been mentioned in this process."""
+
+    told = False
+
+
+def load_pardiso():
+    """The optional wrapper module, or None after one SlowSolverWarning."""
+    try:
+        import pypardiso
+
+        pypardiso.PyPardisoSolver()  # ImportError when the MKL library itself is missing
+    except ImportError as problem:
+        if not SlowSolverState.told:
+            SlowSolverState.told = True
+            warnings.warn(
+                f"pypardiso is not usable ({problem}): SciPy's solver gives the same answers, five to twenty times "
+                f"slower; install the package pypardiso for speed",
+                SlowSolverWarning,
+                stacklevel=3,
+            )
+        return None
+    return pypardiso
+
+
+class PardisoFactors:
+    """LDLᵀ of an upper triangle (CSR, sorted, full diagonal); the analysis is done once per pattern."""
+
+    def __init__(self, pypardiso):
+        self.solver = pypardiso.PyPardisoSolver(mtype=-2)
+        self.error = pypardiso.PyPardisoError if hasattr(pypardiso, "PyPardisoError") else RuntimeError
+        for index, value in PARDISO_CONTROL.items():
+            self.solver.iparm[index] = value
+        self.analysed = False
+        self.upper = sp.csr_matrix((0, 0))
+
+    def call(self, phase, b):
+        self.solver.set_phase(phase)
+        return self.solver._call_pardiso(self.upper, b)
+
+    def factor(self, upper, afresh=False):
+        """Factorise; the matching and ordering of the first matrix serve its successors unless afresh."""
+        self.upper = upper
+        nothing = np.zeros(upper.shape[0])
+        if afresh or not self.analysed:
+            self.release()
+            self.upper = upper
+            self.call(11, nothing)
+            self.analysed = True
+        self.call(22, nothing)
+
+    def solve(self, b):
+        return self.call(33, np.ascontiguousarray(b))
+
+    def release(self):
+        """Give MKL's memory back: it is invisible to Python's collector."""
+        if self.analysed:
+            self.call(-1, np.zeros(self.upper.shape[0]))
+            self.analysed = False
+
+
+class ScipyFactors:
+    """SuperLU of the whole matrix, ordered for symmetric patterns, with mild pivoting."""
+
+    def factor(self, upper, afresh=False):
+        """Factorise; afresh asks for full partial pivoting."""
+        whole = (upper + sp.triu(upper, 1).T).tocsc()
+        threshold = 1.0 if afresh else 0.01
+        options = {"SymmetricMode": not afresh}
+        self.lu = splu(whole, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=threshold, options=options)
+
+    def solve(self, b):
+        return self.lu.solve(b)
+
+    def release(self):
+        self.lu = None
+
+
+class SymmetricSolver:
+    """Solves K x = b for a K given by its upper triangle; checks every answer by its residual.
+
+    Raises ReferenceProblem when K is singular to working precision.
+    """
+
+    def __init__(self, backend="auto"):
+        pypardiso = load_pardiso() if backend in ("auto", "pardiso") else None
+        if backend == "pardiso" and pypardiso is None:
+            raise ReferenceProblem("the solver 'pardiso' was asked for but pypardiso is not installed: use 'auto'")
+        self.factors = PardisoFactors(pypardiso) if pypardiso else ScipyFactors()
+        self.upper = sp.csr_matrix((0, 0))
+        self.failure = (RuntimeError, getattr(self.factors, "error", RuntimeError))
+
+    def factor(self, upper):
+        self.upper = upper
+        self.try_factor(afresh=False)
+
+    def try_factor(self, afresh):
+        try:
+            self.factors.factor(self.upper, afresh)
+        except self.failure as problem:
+            raise ReferenceProblem(
+                f"the tangent matrix of {self.upper.shape[0]} unknowns cannot be factorised ({problem}): "
+                f"part of the body may be free to move, hold it"
+            ) from problem
+
+    def solve(self, b):
+        """x with |K x - b| <= RESIDUAL_LIMIT |b|; one fresh analysis is tried before giving up."""
+        x = self.factors.solve(b)
+        if self.misfit(x, b) > RESIDUAL_LIMIT:
+            self.try_factor(afresh=True)
+            x = self.factors.solve(b)
+        misfit = self.misfit(x, b)
+        if not misfit <= RESIDUAL_LIMIT:
+            raise ReferenceProblem(
+                f"the tangent matrix of {self.upper.shape[0]} unknowns is singular to working precision (relative "
+                f"residual {misfit:.1e}, limit {RESIDUAL_LIMIT:.0e}): part of the body may be free to move, hold it"
+            )
+        return x
+
+    def misfit(self, x, b):
+        Kx = self.upper @ x + self.upper.T @ x - self.upper.diagonal() * x
+        size = np.abs(b).max()
+        with np.errstate(invalid="ignore"):
+            gap = np.abs(Kx - b).max()
+        return gap / size if size > 0.0 else gap
+
+    def release(self):
+        self.factors.release()

@@ -1,0 +1,95 @@
+"""What is solved: a body, its material, what holds it and what presses it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from skfem import MeshTet
+from skfem.quadrature import get_quadrature
+from skfem.refdom import RefTet
+
+from reference_fem.contact import RigidPlane, RigidSphere, finite_vector
+from reference_fem.elements import ElementTetP2, basis_table, element_nodes, facet_nodes, nodes
+from reference_fem.errors import ReferenceProblem
+from reference_fem.material import NeoHookean
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Displacement components prescribed at boundary nodes.
+
+    where: (3, N) rest positions -> bool (N,), asked at the P2 nodes of the boundary.
+    motion: t [s] -> (3,) displacement [m], None = stays. shape: (3, N) rest positions -> (3, N) factors that the
+    displacement is multiplied with, component by component, None = 1 (for radial or affine motions).
+    """
+
+    where: Callable
+    components: Sequence[int] = (0, 1, 2)
+    motion: Callable | None = None
+    shape: Callable | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A quasi-static problem in SI units; the body is stress-free on its mesh.
+
+    mesh: MeshTet (straight) or MeshTet2 (curved, see curve). gravity [m/s²], density [kg/m³].
+    order: degree integrated exactly; 5 is the lowest with positive weights at or above what p J needs (4).
+    """
+
+    mesh: MeshTet
+    material: NeoHookean
+    held: Sequence[Held]
+    obstacles: Sequence[RigidPlane | RigidSphere] = ()
+    gravity: Sequence[float] = (0.0, 0.0, 0.0)
+    density: float = 0.0
+    order: int = 5
+    contact_order: int = 5
+
+
+@dataclass(frozen=True, eq=False)
+class HeldNodes:
+    """One Held on one mesh: its nodes, its unknowns, and the displacement factors."""
+
+    nodes: np.ndarray
+    dofs: np.ndarray
+    """Unknowns, component by component, (k, len(nodes))."""
+    components: tuple
+    factors: np.ndarray
+    """(k, len(nodes))."""
+    motion: Callable | None = field(default=None)
+
+    def displacement(self, t):
+        """Prescribed displacement of `dofs` at time t [m]."""
+        if self.motion is None:
+            return np.zeros_like(self.factors)
+        moved = finite_vector(self.motion(t), f"the motion of a held region at t = {t:g} s")
+        return moved[list(self.components), None] * self.factors
+
+
+def find_held(problem: Problem) -> list[HeldNodes]:
+    """Held regions as unknowns; raises ReferenceProblem when a region finds no node or names a wrong component."""
+    x = nodes(problem.mesh)
+    boundary = np.unique(facet_nodes(problem.mesh))
+    found = []
+    for k, held in enumerate(problem.held):
+        components = tuple(held.components)
+        if not components or not set(components) <= {0, 1, 2}:
+            raise ReferenceProblem(f"held region {k} names components {components}: give some of 0, 1, 2")
+        chosen = boundary[np.asarray(held.where(x[boundary].T), dtype=bool)]
+        if chosen.size == 0:
+            low, high = x.min(axis=0), x.max(axis=0)
+            raise ReferenceProblem(
+                f"held region {k} contains no boundary node: the body fills {np.array2string(low, precision=4)} to "
+                f"{np.array2string(high, precision=4)} m, choose a region that touches its surface"
+            )
+        factors = np.ones((3, chosen.size)) if held.shape is None else np.asarray(held.shape(x[chosen].T), dtype=float)
+        dofs = np.stack([3 * chosen + c for c in components])
+        found.append(HeldNodes(chosen, dofs, components, factors[list(components)], held.motion))
+    return found
+
+
+def nodal_volumes(mesh, weights, order):
+    """Rest volume that belongs to each P2 node, the integral of its function, (N2,) [m³] (negative at vertices)."""
+    values, _ = basis_table(ElementTetP2(), get_quadrature(RefTet, order)[0])
+    return np.bincount(element_nodes(mesh).ravel(), (weights @ values).ravel(), minlength=len(nodes(mesh)))
