@@ -1,6 +1,6 @@
 """Meshes of organs: gmsh and meshio live here only. Lengths in metres, surface nodes numbered first."""
 
-from studies.geometry.api import ball, ball_octant, fill, liver, organ
+from studies.geometry.api import attach, ball, ball_octant, fill, liver, organ
 from studies.geometry.checks import check_surface, check_tetrahedra
 from studies.geometry.mesh import OrganMesh
 from studies.geometry.organs.ball import project_ball
@@ -11,6 +11,7 @@ from studies.geometry.organs.liver import (
     LIVER_REGIONS,
     project_liver,
 )
+from studies.geometry.reading import read_mesh
 from studies.geometry.regions import BallRegion, EllipsoidRegion, HalfSpace, Region
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "HalfSpace",
     "OrganMesh",
     "Region",
+    "attach",
     "ball",
     "ball_octant",
     "check_surface",
@@ -32,4 +34,5 @@ __all__ = [
     "organ",
     "project_ball",
     "project_liver",
+    "read_mesh",
 ]

@@ -1,5 +1,6 @@
 """The meshes of the project by name: what scenes ask for."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -7,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from studies.errors import StudyError
-from studies.geometry.checks import check_surface
-from studies.geometry.jobs import TIME_LIMIT, mesh_from
+from studies.geometry.checks import check_one_part, check_surface
+from studies.geometry.jobs import TIME_LIMIT, mesh_from, patches_of
 from studies.geometry.mesh import OrganMesh
 from studies.geometry.organs.liver import LIVER_REGIONS
+from studies.geometry.quality import MIN_DIHEDRAL, dihedral_angles
 from studies.geometry.regions import Region, region_to_dict
 
 
@@ -25,7 +27,7 @@ def organ(
 
     Raises StudyError when the mesher cannot do it.
     """
-    if isinstance(nodes, bool) or int(nodes) != nodes:
+    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
     recipe = {
         "kind": "organ",
@@ -47,9 +49,7 @@ def ball(
     return organ("ball", nodes, regions or {}, fill, {"radius": float(radius)})
 
 
-def liver(
-    nodes: int = 550, regions: Mapping[str, Region] | None = None, fill: bool = True
-) -> OrganMesh:
+def liver(nodes: int = 550, regions: Mapping[str, Region] | None = None, fill: bool = True) -> OrganMesh:
     """Liver of about 1,500 mL, x to the patient's left, y to the back, z to the head; attached at LIVER_REGIONS unless
     other regions are given; raises StudyError for a node count that cannot be meshed."""
     return organ("liver", nodes, LIVER_REGIONS if regions is None else regions, fill)
@@ -87,10 +87,28 @@ def fill(surface: OrganMesh, limit: float = TIME_LIMIT) -> OrganMesh:
     points = np.ascontiguousarray(surface.points[: surface.surface_count], dtype=float)
     triangles = np.ascontiguousarray(surface.triangles, dtype=np.int64)
     check_surface(points, triangles, surface.name)
+    check_one_part(triangles, surface.name)
     recipe = {
         "kind": "fill",
         "name": surface.name,
         "regions": surface.recipe.get("regions", {}),
         "source": surface.recipe,
     }
-    return mesh_from(recipe, {"points": points, "triangles": triangles}, limit)
+    mesh = mesh_from(recipe, {"points": points, "triangles": triangles}, limit)
+    angle = float(dihedral_angles(mesh.points, mesh.tetrahedra).min())
+    if angle < MIN_DIHEDRAL:
+        warnings.warn(
+            f"{surface.name}: the flattest tetrahedron has a dihedral angle of {angle:.2g} degrees "
+            f"(under {MIN_DIHEDRAL:g}); remesh the surface more evenly",
+            stacklevel=2,
+        )
+    return mesh
+
+
+def attach(mesh: OrganMesh, regions: Mapping[str, Region]) -> OrganMesh:
+    """The mesh with the surface nodes inside the regions as patches, for a mesh that came from a file.
+
+    No node moves, so the outline is a staircase of its edges. Raises StudyError for a region without nodes.
+    """
+    data = {key: region_to_dict(region) for key, region in regions.items()}
+    return replace(mesh, patches=patches_of(mesh, data), recipe=mesh.recipe | {"regions": data})

@@ -14,7 +14,7 @@ def smooth_max(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
 
 
 def ellipsoid(x: np.ndarray, center: tuple[float, ...], semi_axes: tuple[float, ...]) -> np.ndarray:
-    """Level, shape (n,), of an ellipsoid along the axes, with gradient 1 on its surface: k (k - 1) / |x / a^2|, k = |x / a|."""
+    """Level, shape (n,), of an ellipsoid along the axes, slope 1 on its surface: k (k - 1) / |x / a^2|, k = |x / a|."""
     scaled = (x - np.asarray(center, float)) / np.asarray(semi_axes, float)
     k = np.linalg.norm(scaled, axis=1)
     # The level is 0/0 in the very centre, where its limit is finite and negative.
@@ -22,10 +22,8 @@ def ellipsoid(x: np.ndarray, center: tuple[float, ...], semi_axes: tuple[float, 
     return k * (k - 1.0) / np.maximum(slope, 1e-9 / max(semi_axes))
 
 
-def groove(
-    x: np.ndarray, start: tuple[float, ...], end: tuple[float, ...], width: float, depth: float
-) -> np.ndarray:
-    """What to add to a level to press a groove of the given depth along a segment, a Gaussian of that width across it."""
+def groove(x: np.ndarray, start: tuple[float, ...], end: tuple[float, ...], width: float, depth: float) -> np.ndarray:
+    """What to add to a level to press a groove along a segment: `depth` deep, a Gaussian of `width` across."""
     a, along = np.asarray(start, float), np.subtract(end, start).astype(float)
     t = (x - a) @ along / (along @ along)
     # The clip makes only a second derivative jump, far weaker than the grooves themselves.

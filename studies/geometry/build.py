@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from studies.errors import StudyError
 from studies.geometry.checks import check_surface
 from studies.geometry.count import surface_with
 from studies.geometry.fill import fill_surface
@@ -25,9 +24,7 @@ def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
     Raises StudyError when the recipe cannot be made.
     """
-    return {"organ": build_organ, "fill": build_fill, "ball_octant": build_octant}[recipe["kind"]](
-        recipe, arrays
-    )
+    return {"organ": build_organ, "fill": build_fill, "ball_octant": build_octant}[recipe["kind"]](recipe, arrays)
 
 
 def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
@@ -39,12 +36,11 @@ def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
         remesher = Remesher(start_points, start_triangles)
         points, triangles = surface_with(recipe["nodes"], area, remesher.mesh, shape)
     points = snap_all(shape, points, triangles, recipe["regions"])
-    return finish(points, triangles, recipe["fill"])
+    check_surface(points, triangles, shape.name)
+    return finish(points, triangles, recipe["fill"], strict=True)
 
 
-def snap_all(
-    shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: dict[str, dict[str, Any]]
-) -> np.ndarray:
+def snap_all(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: dict[str, dict[str, Any]]) -> np.ndarray:
     """Even out the surface, then give every region its outline; earlier outlines stay where they are."""
     fixed = np.zeros(len(points), bool)
     points = relax(shape, points, triangles, None, fixed, fixed)
@@ -55,22 +51,19 @@ def snap_all(
 
 
 def build_fill(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """A given surface, filled."""
-    return finish(arrays["points"], arrays["triangles"], fill=True)
+    """A given surface, filled as well as its triangles allow."""
+    return finish(arrays["points"], arrays["triangles"], fill=True, strict=False)
 
 
-def finish(points: np.ndarray, triangles: np.ndarray, fill: bool) -> Arrays:
-    """Check the surface, fill it when asked."""
-    check_surface(points, triangles)
+def finish(points: np.ndarray, triangles: np.ndarray, fill: bool, strict: bool) -> Arrays:
+    """A checked surface, filled when asked; `strict` insists on good elements."""
     count = len(points)
     tetrahedra = np.empty((0, 4), np.int64)
     if fill:
-        points, tetrahedra = fill_surface(points, triangles)
-    if not np.isfinite(points).all():
-        raise StudyError("the mesher returned coordinates that are not finite; try another node count")
+        points, tetrahedra = fill_surface(points, triangles, strict)
     return {
         "points": points,
         "triangles": triangles,
         "tetrahedra": tetrahedra,
-        "surface_count": np.int64(count),
+        "surface_count": np.array(count),
     }

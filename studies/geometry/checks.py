@@ -1,9 +1,11 @@
 """What a mesh must be before anybody computes with it. Each fault found is one StudyError of one sentence."""
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from studies.errors import StudyError
-from studies.geometry.mesh import boundary_triangles, signed_volume, tetrahedron_volumes, triangle_areas
+from studies.geometry.mesh import boundary_triangles, signed_volume, tetrahedron_volumes, triangle_areas, unique_edges
 from studies.geometry.quality import tetrahedron_radius_ratio, triangle_radius_ratio
 
 SLIVER = 1e-4
@@ -30,17 +32,11 @@ def check_indices(points: np.ndarray, cells: np.ndarray, corners: int, name: str
     kind = "triangle" if corners == 3 else "tetrahedron"
     if points.ndim != 2 or points.shape[1] != 3:
         raise StudyError(f"{name}: points have shape {points.shape}, expected (n, 3)")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if len(bad):
-        raise StudyError(
-            f"{name}: {len(bad)} points are not finite, the first is number {bad[0]}; remove or repair them"
-        )
+    check_finite(points, name)
     if cells.ndim != 2 or cells.shape[1] != corners or not len(cells):
         raise StudyError(f"{name}: no {kind} found (shape {cells.shape}, expected (k, {corners}) with k > 0)")
     if cells.min() < 0 or cells.max() >= len(points):
-        raise StudyError(
-            f"{name}: a {kind} uses point {cells.max()}, but there are only {len(points)} points"
-        )
+        raise StudyError(f"{name}: a {kind} uses point {cells.max()}, but there are only {len(points)} points")
     rows = np.sort(cells, axis=1)
     repeated = np.flatnonzero((rows[:, 1:] == rows[:, :-1]).any(axis=1))
     if len(repeated):
@@ -54,6 +50,15 @@ def check_indices(points: np.ndarray, cells: np.ndarray, corners: int, name: str
     unused = len(points) - len(np.unique(cells))
     if unused:
         raise StudyError(f"{name}: {unused} points belong to no {kind} and would have no mass; remove them")
+
+
+def check_finite(points: np.ndarray, name: str) -> None:
+    """Raise StudyError unless all coordinates are finite numbers."""
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        raise StudyError(
+            f"{name}: {len(bad)} points are not finite, the first is number {bad[0]}; repair or remove them"
+        )
 
 
 def check_edges(triangles: np.ndarray, name: str) -> None:
@@ -75,16 +80,14 @@ def check_edges(triangles: np.ndarray, name: str) -> None:
         )
     pinched = pinched_nodes(triangles)
     if len(pinched):
-        raise StudyError(
-            f"{name}: the surface is not manifold, it is pinched at point {pinched[0]}; split that point"
-        )
+        raise StudyError(f"{name}: the surface is not manifold, it is pinched at point {pinched[0]}; split that point")
 
 
 def pinched_nodes(triangles: np.ndarray) -> np.ndarray:
     """Nodes whose triangles form more than one closed fan.
 
-    Every corner (triangle, node) is joined to the corner of the neighbour across the edge that leaves the node; going round
-    visits one fan, so the number of cycles at a node is its number of fans. Expects closed, oriented triangles.
+    Every corner (triangle, node) is joined to the corner of the neighbour across the edge that leaves the node; going
+    round visits one fan, so the number of cycles at a node is its number of fans. Expects closed, oriented triangles.
     """
     count = len(triangles)
     key = triangles.ravel()
@@ -104,6 +107,16 @@ def pinched_nodes(triangles: np.ndarray) -> np.ndarray:
     fans = np.unique(np.stack([key, label], axis=1), axis=0)[:, 0]
     nodes, counts = np.unique(fans, return_counts=True)
     return nodes[counts > 1]
+
+
+def check_one_part(triangles: np.ndarray, name: str) -> None:
+    """Raise StudyError unless the triangles hang together."""
+    edges = unique_edges(triangles)
+    count = int(triangles.max()) + 1
+    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
+    parts = connected_components(graph, directed=False)[0]
+    if parts > 1:
+        raise StudyError(f"{name}: the surface has {parts} separate parts; keep one of them")
 
 
 def check_volume(points: np.ndarray, triangles: np.ndarray, name: str) -> None:
@@ -131,6 +144,7 @@ def check_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray, name: str = "th
     worst = int(ratio.argmin())
     if ratio[worst] < SLIVER:
         raise StudyError(
-            f"{name}: tetrahedron {worst} is a sliver without volume (radius ratio {ratio[worst]:.2g} under {SLIVER:g}); mesh again"
+            f"{name}: tetrahedron {worst} is a sliver without volume "
+            f"(radius ratio {ratio[worst]:.2g} under {SLIVER:g}); mesh again"
         )
     check_edges(boundary_triangles(tetrahedra), name)

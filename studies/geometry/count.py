@@ -29,9 +29,7 @@ def surface_with(nodes: int, area: float, mesh_at: Callable[[float], Surface], s
     Raises StudyError when no try within TOLERANCE is closed, unfolded and well shaped.
     """
     if not FEWEST <= nodes <= MOST:
-        raise StudyError(
-            f"{shape.name}: {nodes} surface nodes asked for, but the mesher offers {FEWEST} to {MOST}"
-        )
+        raise StudyError(f"{shape.name}: {nodes} surface nodes asked for, but the mesher offers {FEWEST} to {MOST}")
     size = 1.06 * np.sqrt(2.0 * area / (np.sqrt(3.0) * nodes))
     found: list[tuple[float, Surface]] = []
     for attempt in range(TRIES):
@@ -56,9 +54,6 @@ def surface_with(nodes: int, area: float, mesh_at: Callable[[float], Surface], s
 
 def is_good(points: np.ndarray, triangles: np.ndarray) -> bool:
     """Whether a surface is one closed sphere-like sheet, outward, and without slivers."""
-    if (
-        len(points) - len(unique_edges(triangles)) + len(triangles) != 2
-        or signed_volume(points, triangles) <= 0
-    ):
+    if len(points) - len(unique_edges(triangles)) + len(triangles) != 2 or signed_volume(points, triangles) <= 0:
         return False
     return bool(triangle_radius_ratio(points, triangles).min() > QUALITY)

@@ -26,10 +26,8 @@ def with_node_count(points: np.ndarray, triangles: np.ndarray, nodes: int) -> tu
     return points, triangles
 
 
-def pick_edge(
-    points: np.ndarray, triangles: np.ndarray, touched: np.ndarray, split: bool
-) -> np.ndarray | None:
-    """The longest edge to split or the shortest to collapse whose neighbourhood ends with 4 to 7 edges at every node."""
+def pick_edge(points: np.ndarray, triangles: np.ndarray, touched: np.ndarray, split: bool) -> np.ndarray | None:
+    """The longest edge to split or the shortest to collapse that leaves 4 to 7 edges at every node around."""
     edges = unique_edges(triangles)
     valence = np.bincount(edges.ravel(), minlength=len(points))
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
@@ -42,9 +40,9 @@ def pick_edge(
             if (valence[opposite] <= 6).all():
                 return edge
             continue
-        rings = [np.unique(triangles[(triangles == node).any(axis=1)]) for node in edge]
+        one, other = (np.unique(triangles[(triangles == node).any(axis=1)]) for node in edge)
         # A collapse keeps the surface a manifold only where the ends share exactly the two opposite nodes.
-        shared = np.intersect1d(*rings)
+        shared = np.intersect1d(one, other)
         if len(shared) == 4 and valence[edge].sum() - 4 <= 7 and (valence[opposite] >= 5).all():
             return edge
     return None
@@ -58,9 +56,7 @@ def split_edge(points: np.ndarray, triangles: np.ndarray, edge: np.ndarray) -> t
     return np.vstack([points, points[edge].mean(axis=0)]), np.vstack([triangles[~both], *halves])
 
 
-def collapse_edge(
-    points: np.ndarray, triangles: np.ndarray, edge: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def collapse_edge(points: np.ndarray, triangles: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The edge's ends become one node in its middle; its two triangles vanish."""
     keep, drop = edge
     points = points.copy()

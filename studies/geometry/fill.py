@@ -4,25 +4,20 @@ import numpy as np
 
 from studies.errors import StudyError
 from studies.geometry.gmsh_session import fill_once
-from studies.geometry.quality import dihedral_angles, tetrahedron_radius_ratio
-
-MIN_DIHEDRAL, MIN_RATIO = 8.0, 0.1
-"""Below 8 degrees or a radius ratio of 0.1 an element stiffens the body and forces a small time step."""
+from studies.geometry.quality import MIN_DIHEDRAL, MIN_RATIO, dihedral_angles, tetrahedron_radius_ratio
 
 DELAUNAY, FRONTAL, HXT = 1, 4, 10
 
 
-def fill_surface(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def fill_surface(points: np.ndarray, triangles: np.ndarray, strict: bool = True) -> tuple[np.ndarray, np.ndarray]:
     """All points (n, 3) [m], the surface's first, and good tetrahedra (k, 4) inside a closed surface.
 
-    Several algorithms are tried in a fixed order until the worst element is good enough. Raises StudyError when all fail,
-    or the best is still worse than MIN_DIHEDRAL or MIN_RATIO.
+    Several algorithms are tried in a fixed order until the worst element is good enough. Raises StudyError when all
+    fail, or, when strict, the best is still worse than MIN_DIHEDRAL or MIN_RATIO.
     """
     # Netgen's optimiser doubles the worst angle but takes seconds where there are many elements.
     attempts = (
-        [(DELAUNAY, True), (FRONTAL, True), (HXT, False)]
-        if len(points) <= 3000
-        else [(HXT, False), (DELAUNAY, False)]
+        [(DELAUNAY, True), (FRONTAL, True), (HXT, False)] if len(points) <= 3000 else [(HXT, False), (DELAUNAY, False)]
     )
     best: tuple[float, np.ndarray, np.ndarray] | None = None
     failures: list[str] = []
@@ -38,13 +33,12 @@ def fill_surface(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray,
         if score >= 1.5:
             break
     if best is None:
+        raise StudyError(f"the surface of {len(points)} nodes could not be filled with tetrahedra: {failures[-1]}")
+    if strict and best[0] < 1.0:
         raise StudyError(
-            f"the surface of {len(points)} nodes could not be filled with tetrahedra: {failures[-1]}"
-        )
-    if best[0] < 1.0:
-        raise StudyError(
-            f"the best fill of the surface of {len(points)} nodes has an element with a dihedral angle under {MIN_DIHEDRAL:g} "
-            f"degrees or a radius ratio under {MIN_RATIO:g}; use more nodes where it is thin, or a smoother surface"
+            f"the best fill of the surface of {len(points)} nodes has an element with a dihedral angle under "
+            f"{MIN_DIHEDRAL:g} degrees or a radius ratio under {MIN_RATIO:g}; "
+            "use more nodes where it is thin, or a smoother surface"
         )
     return best[1], best[2]
 

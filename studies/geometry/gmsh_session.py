@@ -33,9 +33,7 @@ def fresh_model(seed: int = 1, **options: float) -> Iterator[None]:
     except Exception as error:
         # gmsh raises bare Exception; our own sentences pass unchanged.
         if type(error) is Exception:
-            raise StudyError(
-                f"gmsh gave up: {error}; try another node count, or smooth the surface"
-            ) from error
+            raise StudyError(f"gmsh gave up: {error}; try another node count, or smooth the surface") from error
         raise
     finally:
         gmsh.finalize()
@@ -56,7 +54,7 @@ def read_elements(kind: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     width = 3 if kind == TRIANGLE else 4
     order = np.argsort(tags)
     used = np.unique(corners)
-    points = coordinates.reshape(-1, 3)[order][np.searchsorted(tags[order], used)]
+    points = np.asarray(coordinates).reshape(-1, 3)[order][np.searchsorted(tags[order], used)]
     return used, points, np.searchsorted(used, corners).reshape(-1, width).astype(np.int64)
 
 

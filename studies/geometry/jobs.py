@@ -8,6 +8,7 @@ import sys
 import tempfile
 import warnings
 import zipfile
+from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -28,7 +29,10 @@ HERE = Path(__file__).parent
 def mesh_from(
     recipe: dict[str, Any], arrays: dict[str, np.ndarray] | None = None, limit: float = TIME_LIMIT
 ) -> OrganMesh:
-    """The mesh of a JSON-able recipe (and the arrays it refers to), cached; raises StudyError when it cannot be made."""
+    """The mesh of a JSON-able recipe (and the arrays it refers to), cached.
+
+    limit: seconds the worker may take. Raises StudyError when the mesh cannot be made.
+    """
     arrays = arrays or {}
     path = cache_folder() / f"{recipe['name']}-{recipe_hash(recipe, arrays)}.npz"
     result = read_cached(path)
@@ -39,20 +43,25 @@ def mesh_from(
 
 
 def to_mesh(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> OrganMesh:
-    """The mesh with its patches: surface nodes inside or on the outline of each region."""
+    """The mesh with its patches."""
     count = int(arrays["surface_count"])
-    surface = arrays["points"][:count]
+    mesh = OrganMesh(recipe["name"], arrays["points"], arrays["triangles"], arrays["tetrahedra"], count, recipe=recipe)
+    return replace(mesh, patches=patches_of(mesh, recipe.get("regions", {})))
+
+
+def patches_of(mesh: OrganMesh, regions: dict[str, dict[str, Any]]) -> dict[str, np.ndarray]:
+    """Surface nodes inside or on the outline of each region; raises StudyError for a region without nodes."""
+    surface = mesh.points[: mesh.surface_count]
+    # Outlines are met to ON_CURVE of the size of the box of the shape, which is somewhat larger than the mesh.
     tolerance = 10 * ON_CURVE * float(np.linalg.norm(np.ptp(surface, axis=0)))
     patches = {}
-    for name, data in recipe.get("regions", {}).items():
+    for name, data in regions.items():
         patches[name] = np.flatnonzero(region_from_dict(data).level(surface) <= tolerance)
         if not len(patches[name]):
             raise StudyError(
-                f"{recipe['name']}: region {name!r} does not touch the surface; move or enlarge it"
+                f"{mesh.name}: region {name!r} holds no surface node; move or enlarge it, or use more nodes"
             )
-    return OrganMesh(
-        recipe["name"], arrays["points"], arrays["triangles"], arrays["tetrahedra"], count, patches, recipe
-    )
+    return patches
 
 
 def cache_folder() -> Path:
@@ -66,8 +75,7 @@ def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:
     digest.update(json.dumps(recipe, sort_keys=True).encode())
     for key in sorted(arrays):
         digest.update(
-            f"{key} {arrays[key].dtype} {arrays[key].shape}".encode()
-            + np.ascontiguousarray(arrays[key]).tobytes()
+            f"{key} {arrays[key].dtype} {arrays[key].shape}".encode() + np.ascontiguousarray(arrays[key]).tobytes()
         )
     return digest.hexdigest()[:16]
 
@@ -98,14 +106,13 @@ def write_cached(path: Path, arrays: dict[str, np.ndarray]) -> None:
     """Store under a name of its own, then rename: another process sees the whole file or none."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(
-            dir=path.parent, prefix=path.stem, suffix=".part", delete=False
-        ) as part:
-            np.savez(part, **arrays)
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as part:
+            np.savez(part, allow_pickle=False, **arrays)
         os.replace(part.name, path)
     except OSError as error:
         raise StudyError(
-            f"the mesh cannot be stored in {path.parent} ({error.strerror}); set ORGANBENCH_CACHE to a folder you may write"
+            f"the mesh cannot be stored in {path.parent} ({error.strerror}); "
+            "set ORGANBENCH_CACHE to a folder that can be written"
         ) from error
 
 
@@ -113,7 +120,7 @@ def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: flo
     """Run the worker on a job and read what it made; raises StudyError for its sentence, a crash or a time-out."""
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder, "job.npz"), Path(folder, "out.npz")
-        np.savez(job, recipe=np.array(json.dumps(recipe)), **arrays)
+        np.savez(job, allow_pickle=False, recipe=np.array(json.dumps(recipe)), **arrays)
         root = str(HERE.parents[1])
         paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
         environment = os.environ | {
@@ -123,12 +130,11 @@ def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: flo
         }
         command = [sys.executable, "-m", "studies.geometry.worker", str(job), str(out)]
         try:
-            done = subprocess.run(
-                command, env=environment, capture_output=True, text=True, timeout=limit, check=False
-            )
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit, check=False)
         except subprocess.TimeoutExpired as error:
             raise StudyError(
-                f"{recipe['name']}: the mesher did not finish within {limit:g} s and was stopped; try another node count"
+                f"{recipe['name']}: the mesher did not finish within {limit:g} s and was stopped; "
+                "try another node count"
             ) from error
         if not out.exists():
             last = (done.stderr.strip().splitlines() or ["no message"])[-1]

@@ -51,8 +51,8 @@ def normals(shape: Shape, points: np.ndarray) -> np.ndarray:
 def project(shape: Shape, points: np.ndarray, constraints: tuple[Level, ...] = ()) -> np.ndarray:
     """Move points (n, 3) [m] onto f = 0, and onto g = 0 for every further constraint g.
 
-    Newton's method with the smallest correction, d = -A^T (A A^T)^-1 r with the gradients as rows of A. Raises StudyError
-    where it does not converge, which happens only far from the surface or where the constraints do not meet.
+    Newton's method with the smallest correction, d = -A^T (A A^T)^-1 r with the gradients as rows of A. Raises
+    StudyError where it does not converge, which happens only far from the surface or where the constraints do not meet.
     """
     x = np.array(points, float)
     levels = (shape.level, *constraints)

@@ -78,3 +78,13 @@ def tetrahedron_volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarra
     """Signed volumes [m^3], shape (k,)."""
     a, b, c, d = points[tetrahedra].transpose(1, 0, 2)
     return np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6.0
+
+
+def surface_first(points: np.ndarray, tetrahedra: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """The same body with its boundary nodes first: points, outward triangles, tetrahedra, number of boundary nodes."""
+    triangles = boundary_triangles(tetrahedra)
+    surface = np.unique(triangles)
+    order = np.concatenate([surface, np.setdiff1d(np.arange(len(points)), surface)])
+    new = np.empty(len(points), np.int64)
+    new[order] = np.arange(len(points))
+    return points[order], new[triangles], new[tetrahedra], len(surface)

@@ -6,7 +6,7 @@ import gmsh
 import numpy as np
 
 from studies.geometry.gmsh_session import TETRAHEDRON, fresh_model, read_elements
-from studies.geometry.mesh import boundary_triangles, tetrahedron_volumes
+from studies.geometry.mesh import surface_first, tetrahedron_volumes
 
 
 def build_octant(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -15,9 +15,7 @@ def build_octant(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[
     Planes of symmetry are exactly at coordinate 0 and nodes of the sphere at distance `radius` to rounding.
     """
     radius, h, h_pole = recipe["radius"], recipe["h"], recipe["h_pole"]
-    with fresh_model(
-        Mesh_Algorithm3D=1, Mesh_Optimize=1, Mesh_OptimizeNetgen=1, Mesh_MeshSizeExtendFromBoundary=0
-    ):
+    with fresh_model(Mesh_Algorithm3D=1, Mesh_Optimize=1, Mesh_OptimizeNetgen=1, Mesh_MeshSizeExtendFromBoundary=0):
         # Unit radius inside gmsh: its geometric tolerances are absolute.
         gmsh.model.occ.addSphere(0, 0, 0, 1.0, angle1=0, angle2=np.pi / 2, angle3=np.pi / 2)
         gmsh.model.occ.synchronize()
@@ -33,19 +31,5 @@ def build_octant(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[
     points[on_sphere] /= distance[on_sphere][:, None]
     inverted = tetrahedron_volumes(points, tetrahedra) < 0
     tetrahedra[inverted] = tetrahedra[inverted][:, [0, 2, 1, 3]]
-    return surface_first(radius * points, tetrahedra)
-
-
-def surface_first(points: np.ndarray, tetrahedra: np.ndarray) -> dict[str, np.ndarray]:
-    """The same mesh with the boundary nodes numbered first."""
-    triangles = boundary_triangles(tetrahedra)
-    surface = np.unique(triangles)
-    order = np.concatenate([surface, np.setdiff1d(np.arange(len(points)), surface)])
-    new = np.empty(len(points), np.int64)
-    new[order] = np.arange(len(points))
-    return {
-        "points": points[order],
-        "triangles": new[triangles],
-        "tetrahedra": new[tetrahedra],
-        "surface_count": np.int64(len(surface)),
-    }
+    points, triangles, tetrahedra, count = surface_first(radius * points, tetrahedra)
+    return {"points": points, "triangles": triangles, "tetrahedra": tetrahedra, "surface_count": np.array(count)}

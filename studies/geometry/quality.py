@@ -4,6 +4,9 @@ import numpy as np
 
 from studies.geometry.mesh import tetrahedron_volumes, triangle_areas
 
+MIN_DIHEDRAL, MIN_RATIO = 8.0, 0.1
+"""Below 8 degrees or a radius ratio of 0.1 an element stiffens the body and forces a small time step."""
+
 
 def triangle_radius_ratio(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """2 r_in / r_circum = 16 A^2 / (a b c (a + b + c)), shape (t,): 1 for equilateral, 0 for flat."""
@@ -21,8 +24,7 @@ def tetrahedron_radius_ratio(points: np.ndarray, tetrahedra: np.ndarray) -> np.n
     x = points[tetrahedra]
     volume = tetrahedron_volumes(points, tetrahedra)
     area = sum(
-        triangle_areas(points, tetrahedra[:, list(face)])
-        for face in ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))
+        triangle_areas(points, tetrahedra[:, list(face)]) for face in ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))
     )
     edge = {(i, j): np.linalg.norm(x[:, j] - x[:, i], axis=1) for i in range(4) for j in range(i + 1, 4)}
     p, q, r = edge[0, 1] * edge[2, 3], edge[0, 2] * edge[1, 3], edge[0, 3] * edge[1, 2]

@@ -1,7 +1,7 @@
 """Where an organ is attached, said by geometry: the same place on a mesh of any size.
 
-A region is a part of space with a signed level, negative inside. The patch of a surface that lies in it is bounded by the
-curve level = 0, onto which the mesher moves nodes (snap.py), so the patch does not depend on the mesh.
+A region is a part of space with a signed level, negative inside. The patch of a surface that lies in it is bounded
+by the curve level = 0, onto which the mesher moves nodes (snap.py), so the patch does not depend on the mesh.
 """
 
 from dataclasses import asdict, dataclass
@@ -14,7 +14,7 @@ from studies.errors import StudyError
 Vector = tuple[float, float, float]
 
 ON_CURVE = 1e-10
-"""A node counts as on the outline within this fraction of the size of the organ: far above rounding, far below an edge."""
+"""A node counts as on the outline within this fraction of the size of the box: far above rounding, far below edges."""
 
 
 class Region(Protocol):
@@ -66,9 +66,7 @@ class EllipsoidRegion:
         """Scaled level [m], shape (n,): zero on the ellipsoid, not a distance away from it."""
         axes = np.asarray(self.semi_axes, float)
         if not (axes > 0).all():
-            raise StudyError(
-                f"an ellipsoid region with semi-axes {self.semi_axes} m is empty; give lengths above 0"
-            )
+            raise StudyError(f"an ellipsoid region with semi-axes {self.semi_axes} m is empty; give lengths above 0")
         scaled = (np.asarray(points, float) - self.center) / axes
         return (np.linalg.norm(scaled, axis=1) - 1.0) * axes.min()
 
@@ -87,9 +85,5 @@ def region_to_dict(region: Any) -> dict[str, Any]:
 
 def region_from_dict(data: dict[str, Any]) -> Region:
     """The region of which `data` is the JSON-able form."""
-    fields = {
-        key: tuple(value) if isinstance(value, list) else value
-        for key, value in data.items()
-        if key != "kind"
-    }
+    fields = {key: tuple(value) if isinstance(value, list) else value for key, value in data.items() if key != "kind"}
     return KINDS[data["kind"]](**fields)

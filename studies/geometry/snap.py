@@ -1,6 +1,6 @@
 """Attachments with the same outline on every mesh: nodes near the curve f = g = 0 are moved onto it.
 
-Without this a held patch is bounded by a staircase of facets, which moves a reference force by 15 per cent between meshes.
+Without this a held patch is bounded by a staircase of facets; the force on it differed by 15 per cent between meshes.
 """
 
 import numpy as np
@@ -71,12 +71,10 @@ def move_to_curve(
     return without_spoilers(points, moved, triangles, floor)
 
 
-def without_spoilers(
-    before: np.ndarray, after: np.ndarray, triangles: np.ndarray, floor: float
-) -> np.ndarray:
+def without_spoilers(before: np.ndarray, after: np.ndarray, triangles: np.ndarray, floor: float) -> np.ndarray:
     """`after`, but with nodes put back, the farthest-moved of each bad triangle first, until no move spoils a triangle.
 
-    A triangle is bad when its radius ratio falls below both `floor` and what it was, or its normal turns by over 60 degrees.
+    Bad: the radius ratio falls below both `floor` and what it was, or the normal turns by over 60 degrees.
     """
     limit = np.minimum(floor, triangle_radius_ratio(before, triangles) - 1e-12)
     old_normals = triangle_normals(before, triangles)
@@ -86,9 +84,7 @@ def without_spoilers(
         cosine = np.einsum("ij,ij->i", normals, old_normals)
         turned = cosine < 0.5 * np.linalg.norm(normals, axis=1) * np.linalg.norm(old_normals, axis=1)
         distance = np.linalg.norm(after - before, axis=1)
-        bad = ((triangle_radius_ratio(after, triangles) < limit) | turned) & (
-            distance[triangles].max(axis=1) > 0
-        )
+        bad = ((triangle_radius_ratio(after, triangles) < limit) | turned) & (distance[triangles].max(axis=1) > 0)
         if not bad.any():
             return after
         corners = triangles[bad]
@@ -107,7 +103,7 @@ def relax(
 ) -> np.ndarray:
     """Even out the surface: nodes half way to their neighbours' mean and back onto f = 0, those on a curve along it.
 
-    Moves that make a triangle worse than it was (and worse than 0.6) are taken back, so the worst triangle only improves.
+    Moves that make a triangle worse than it was and than 0.6 are taken back, so the worst triangle only improves.
     Nodes do not change sides of the region.
     """
     edges = unique_edges(triangles)

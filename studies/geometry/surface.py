@@ -8,7 +8,7 @@ from studies.geometry.levelset import Shape, project
 from studies.geometry.mesh import signed_volume, unique_edges
 
 SWEEPS = 8
-"""Without the sweeps gmsh's reparametrisation hangs or crashes on two shapes of three: marching cubes leaves slivers."""
+"""Without the sweeps gmsh's reparametrisation hangs or crashes on two shapes of three: the cubes leave slivers."""
 
 
 def first_surface(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
@@ -16,18 +16,14 @@ def first_surface(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
 
     Raises StudyError when f has no zero set in the box, or one that reaches its walls.
     """
-    counts = [
-        max(4, int(np.ceil((b - a) / shape.cell)) + 1) for a, b in zip(shape.low, shape.high, strict=True)
-    ]
+    counts = [max(4, int(np.ceil((b - a) / shape.cell)) + 1) for a, b in zip(shape.low, shape.high, strict=True)]
     axes = [np.linspace(a, b, n) for a, b, n in zip(shape.low, shape.high, counts, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     values = shape.level(grid.reshape(-1, 3)).reshape(counts)
-    walls = np.concatenate(
-        [values[[0, -1]].ravel(), values[:, [0, -1]].ravel(), values[:, :, [0, -1]].ravel()]
-    )
+    walls = np.concatenate([values[[0, -1]].ravel(), values[:, [0, -1]].ravel(), values[:, :, [0, -1]].ravel()])
     if values.min() >= 0 or walls.min() <= 0:
         raise StudyError(
-            f"{shape.name}: the surface is not inside its box ({shape.low} to {shape.high} m); correct the box or the size"
+            f"{shape.name}: the surface is not inside its box ({shape.low} to {shape.high} m); correct the box"
         )
     spacing = tuple(float(axis[1] - axis[0]) for axis in axes)
     points, triangles, _, _ = marching_cubes(values, 0.0, spacing=spacing, allow_degenerate=False)
@@ -49,7 +45,5 @@ def neighbour_mean(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Mean position of the nodes that share an edge with each node, shape (n, 3)."""
     here, there = np.concatenate([edges, edges[:, ::-1]]).T
     count = np.bincount(here, minlength=len(points))
-    total = np.stack(
-        [np.bincount(here, weights=points[there, k], minlength=len(points)) for k in range(3)], axis=1
-    )
+    total = np.stack([np.bincount(here, weights=points[there, k], minlength=len(points)) for k in range(3)], axis=1)
     return total / np.maximum(count, 1)[:, None]

@@ -22,7 +22,7 @@ def main(job_path: str, out_path: str) -> int:
     except StudyError as error:
         np.savez(out_path, error=np.array(str(error)))
         return 2
-    np.savez(out_path, **result)
+    np.savez(out_path, allow_pickle=False, **result)
     return 0
 
 

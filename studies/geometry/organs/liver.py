@@ -17,7 +17,7 @@ LIVER_REGIONS: dict[str, Region] = {"bare_area": BARE_AREA}
 
 
 def liver_level(points: np.ndarray) -> np.ndarray:
-    """Level [m], shape (n,), of points [m], shape (n, 3): the space under the diaphragm without what presses from below."""
+    """Level [m], shape (n,), of points [m], shape (n, 3): the space under the diaphragm less what presses up."""
     x = points / MM
     right = ellipsoid(x, (-38, 4, -7), (73, 64, 84))
     left = ellipsoid(x, (38, -17, 28), (80, 43, 32))
@@ -48,9 +48,9 @@ def _vector(row: np.ndarray) -> Vector:
 
 
 LIVER_PROBE_POINT: Vector = _vector(project_liver(np.array([[-45.0, -57.0, -33.0]]) * MM)[0])
-"""Point of the surface, low on the front of the right lobe, where an instrument palpates [m]; smooth over 3 cm around."""
+"""Point of the surface, low on the front of the right lobe, where an instrument palpates [m]; smooth 3 cm around."""
 LIVER_PROBE_NORMAL: Vector = _vector(normals(liver_shape(), np.array([LIVER_PROBE_POINT]))[0])
 """Outward normal there; a probe moves against it."""
 LIVER_PRESS_DIRECTION: Vector = (0.0, 0.9, 0.19**0.5)
-"""Unit vector, to the back and up: a plane with this normal, moving along it from the front, meets the smooth front of the
-right lobe first, away from the thin margin, and presses the liver against its bare area."""
+"""Unit vector, to the back and up: a plane with this normal, moving along it from the front, meets the smooth front of
+the right lobe first, away from the thin margin, and presses the liver against its bare area."""
