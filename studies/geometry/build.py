@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from studies.geometry.checks import check_surface
-from studies.geometry.count import surface_with
+from studies.geometry.count import Surface, surface_with
 from studies.geometry.fill import fill_surface
 from studies.geometry.gmsh_session import Remesher, fresh_model
 from studies.geometry.levelset import Shape
@@ -35,19 +35,19 @@ def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     with fresh_model():
         remesher = Remesher(start_points, start_triangles)
         points, triangles = surface_with(recipe["nodes"], area, remesher.mesh, shape)
-    points = snap_all(shape, points, triangles, recipe["regions"])
+    points, triangles = snap_all(shape, points, triangles, recipe["regions"])
     check_surface(points, triangles, shape.name)
     return finish(points, triangles, recipe["fill"], strict=True)
 
 
-def snap_all(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: dict[str, dict[str, Any]]) -> np.ndarray:
+def snap_all(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: dict[str, dict[str, Any]]) -> Surface:
     """Even out the surface, then give every region its outline; earlier outlines stay where they are."""
     fixed = np.zeros(len(points), bool)
     points = relax(shape, points, triangles, None, fixed, fixed)
     for data in regions.values():
-        points, on_curve = snap_region(shape, points, triangles, region_from_dict(data), fixed)
+        points, triangles, on_curve = snap_region(shape, points, triangles, region_from_dict(data), fixed)
         fixed |= on_curve
-    return points
+    return points, triangles
 
 
 def build_fill(recipe: dict[str, Any], arrays: Arrays) -> Arrays:

@@ -1,8 +1,11 @@
-"""Adding and removing single nodes of a closed triangulation: the last step to an exact node count."""
+"""Small edits of a closed triangulation: nodes added, removed, edges turned."""
+
+from collections.abc import Callable
 
 import numpy as np
 
-from studies.geometry.mesh import unique_edges
+from studies.geometry.mesh import triangle_normals, unique_edges
+from studies.geometry.quality import triangle_radius_ratio
 
 
 def with_node_count(points: np.ndarray, triangles: np.ndarray, nodes: int) -> tuple[np.ndarray, np.ndarray]:
@@ -64,3 +67,32 @@ def collapse_edge(points: np.ndarray, triangles: np.ndarray, edge: np.ndarray) -
     left = triangles[np.isin(triangles, edge).sum(axis=1) < 2]
     left = np.where(left == drop, keep, left)
     return np.delete(points, drop, axis=0), left - (left > drop)
+
+
+def flip_edges(
+    points: np.ndarray, triangles: np.ndarray, edges: np.ndarray, allowed: Callable[[int, int], bool], floor: float
+) -> np.ndarray:
+    """The triangles with each of the edges (e, 2) turned in its quadrilateral, where that helps.
+
+    It helps when the new edge is new and `allowed(k, l)`, when the two new triangles are better than the worse old one or
+    than `floor`, and when they look the same way (within 60 degrees of the old ones together).
+    """
+    triangles = triangles.copy()
+    for i, j in edges:
+        rows = np.flatnonzero(np.isin(triangles, (i, j)).sum(axis=1) == 2)
+        if len(rows) != 2:
+            continue
+        old = triangles[rows]
+        # The triangle that runs along i -> j comes first.
+        forward = [(np.roll(row, -1) == j)[row == i].any() for row in old]
+        k, m = (np.setdiff1d(row, (i, j))[0] for row in (old if forward[0] else old[::-1]))
+        if not allowed(k, m) or (np.isin(triangles, (k, m)).sum(axis=1) == 2).any():
+            continue
+        new = np.array([[i, m, k], [m, j, k]])
+        outward = triangle_normals(points, old).sum(axis=0)
+        normals = triangle_normals(points, new)
+        same_way = normals @ outward > 0.5 * np.linalg.norm(normals, axis=1) * np.linalg.norm(outward)
+        target = min(floor, triangle_radius_ratio(points, old).min() + 0.01)
+        if same_way.all() and triangle_radius_ratio(points, new).min() >= target:
+            triangles[rows] = new
+    return triangles

@@ -6,6 +6,7 @@ Without this a held patch is bounded by a staircase of facets; the force on it d
 import numpy as np
 
 from studies.errors import StudyError
+from studies.geometry.edit import flip_edges
 from studies.geometry.levelset import Level, Shape, project
 from studies.geometry.mesh import triangle_normals, unique_edges
 from studies.geometry.quality import triangle_radius_ratio
@@ -14,34 +15,51 @@ from studies.geometry.surface import neighbour_mean
 
 FLOORS = (0.35, 0.2, 0.1, 0.05)
 """Smallest triangle radius ratio accepted in successive rounds: the good moves first, relaxation between rounds."""
+POOR = 0.4
+"""Triangles below this radius ratio are worth turning an edge for."""
 
 
 def snap_region(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, region: Region, fixed: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Move the nearer end of each edge that crosses level = 0 along the surface onto the curve.
 
-    points (n, 3) [m] on f = 0; fixed (n,) bool, nodes that belong to another region's curve. Returns the points and the
-    mask of nodes now on the curve. Raises StudyError when edges still cross the curve at the end: the mesh is then too
-    coarse for the region.
+    points (n, 3) [m] on f = 0; fixed (n,) bool, nodes that belong to another region's curve. An edge of which neither
+    end can go is turned in its quadrilateral. Returns the points, the triangles and the mask of nodes now on the curve.
+    Raises StudyError when edges still cross the curve at the end: the mesh is then too coarse for the region.
     """
     tolerance = ON_CURVE * shape.size
-    edges = unique_edges(triangles)
     for floor in FLOORS:
         for pick in range(4):
-            crossing = crossing_edges(region, points, edges, tolerance)
+            crossing = crossing_edges(region, points, unique_edges(triangles), tolerance)
             if not len(crossing):
                 break
             chosen = choose_ends(points, crossing, region.level(points), fixed, other=pick % 2 == 1)
             points = move_to_curve(shape, points, triangles, region, chosen, floor)
+        triangles = turn_edges(points, triangles, region, fixed, tolerance, floor)
         on_curve = np.abs(region.level(points)) <= tolerance
         points = relax(shape, points, triangles, region, on_curve, fixed)
-    left = len(crossing_edges(region, points, edges, tolerance))
+    left = len(crossing_edges(region, points, unique_edges(triangles), tolerance))
     if left:
         raise StudyError(
             f"{shape.name}: {left} edges still cross the outline of {region}; use more nodes or a larger region"
         )
-    return points, np.abs(region.level(points)) <= tolerance
+    return points, triangles, np.abs(region.level(points)) <= tolerance
+
+
+def turn_edges(
+    points: np.ndarray, triangles: np.ndarray, region: Region, fixed: np.ndarray, tolerance: float, floor: float
+) -> np.ndarray:
+    """The triangles after turning edges that cross the curve, then those of poor triangles, none across a curve."""
+    level = region.level(points)
+    side = np.sign(np.where(np.abs(level) <= tolerance, 0.0, level))
+    crossing = crossing_edges(region, points, unique_edges(triangles), tolerance)
+    poor = unique_edges(triangles[triangle_radius_ratio(points, triangles) < POOR])
+    for edges, least in ((crossing, floor), (poor, 1.0)):
+        # An edge between two fixed nodes may be part of another region's outline.
+        edges = edges[~fixed[edges].all(axis=1)]
+        triangles = flip_edges(points, triangles, edges, lambda k, m: side[k] * side[m] >= 0, least)
+    return triangles
 
 
 def crossing_edges(region: Region, points: np.ndarray, edges: np.ndarray, tolerance: float) -> np.ndarray:
