@@ -1,0 +1,132 @@
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+from rich.console import Console
+
+from studies.describe import describe
+from studies.errors import StudyError
+from studies.links import link_study
+from studies.paths import index_path, key_hash, readable, record_files, record_path, timing_files, timing_path
+from studies.store import SCHEMA, Field, Record, Status, read_record, write_record
+
+
+def store(root, name, key, status=Status.OK, message=""):
+    record = Record(SCHEMA, "run", key, name, status, message, "c0de" * 16, "01234567", {"worst": 1.25e-4})
+    record.fields["volume"] = Field(np.array([1.0, 0.5, np.nan]), "m^3", "enclosed volume")
+    path = record_path(root, "volume_loss", name, key)
+    write_record(path, record)
+    return path
+
+
+def shown(tree) -> str:
+    console = Console(width=160, color_system=None)
+    with console.capture() as capture:
+        console.print(tree)
+    return capture.get()
+
+
+def test_paths_are_readable_and_told_apart_by_the_case(tmp_path):
+    path = record_path(tmp_path, "volume_loss", "ball / free, dt=0.5·dt_c", '{"dt": 1, "m": 2}')
+    assert path.parent == tmp_path / "volume_loss"
+    other_order = '{"m": 2, "dt": 1}'
+    assert path.name == f"ball-free-dt=0.5-dt_c-{key_hash(other_order)}.h5"
+    assert record_path(tmp_path, "volume_loss", "x", '{"dt": 1}') != record_path(
+        tmp_path, "volume_loss", "x", '{"dt": 2}'
+    )
+    assert readable("x" * 300 + "!") == "x" * 100
+    assert readable("../..") == "case"
+
+
+def test_a_hash_does_not_change_between_versions():
+    # printf '{"dt":1}' | sha256sum
+    assert key_hash('{ "dt" : 1 }') == "f8cd3b88"
+
+
+@pytest.mark.parametrize("study", ["../elsewhere", "a/b", "", ".hidden"])
+def test_a_study_stays_in_its_folder(tmp_path, study):
+    with pytest.raises(StudyError, match="cannot name a study"):
+        record_path(tmp_path, study, "x", "{}")
+
+
+def test_timing_files_are_siblings_and_no_records(tmp_path):
+    path = store(tmp_path, "ball/free", '{"a": 1}')
+    timing = timing_path(path, "89abcdef")
+    assert timing.name == path.name.replace(".h5", ".timing.89abcdef.h5")
+    shutil.copy(path, timing)
+    path.with_name(path.name + ".77.part").write_bytes(b"")
+    link_study(tmp_path, "volume_loss")
+    assert record_files(tmp_path, "volume_loss") == [path]
+    assert timing_files(tmp_path, "volume_loss") == [timing]
+    with pytest.raises(StudyError, match="cannot be a machine id"):
+        timing_path(path, "../x")
+
+
+def test_the_index_opens_every_case_by_its_name_and_can_be_moved(tmp_path):
+    one, two = store(tmp_path, "ball/free", '{"a": 1}'), store(tmp_path, "ball/implicit", '{"a": 2}')
+    shutil.copy(one, timing_path(one, "01234567"))
+    assert link_study(tmp_path, "volume_loss") == []
+    (tmp_path / "volume_loss").rename(tmp_path / "moved")
+    with h5py.File(tmp_path / "moved" / "volume_loss.h5") as file:
+        assert sorted(file["ball"]) == ["free", "implicit"]
+        assert file["ball/free"].attrs["key"] == '{"a": 1}'
+        np.testing.assert_array_equal(file["ball/implicit/volume"], [1.0, 0.5, np.nan])
+        assert file["timing/01234567/ball/free"].attrs["name"] == "ball/free"
+    assert two.parent == tmp_path / "volume_loss"
+
+
+def test_names_that_clash_get_their_hash(tmp_path):
+    names = ["ball", "ball", "ball/free", "timing", "/", "../x"]
+    paths = [store(tmp_path, name, f'{{"a": {i}}}') for i, name in enumerate(names)]
+    assert link_study(tmp_path, "volume_loss") == []
+    with h5py.File(index_path(tmp_path, "volume_loss")) as file:
+        hashes = [key_hash(f'{{"a": {i}}}') for i in range(6)]
+        assert {*file} == {
+            f"ball-{hashes[0]}", f"ball-{hashes[1]}", "ball", f"timing-{hashes[3]}", paths[4].stem, "x",
+        }  # fmt: skip
+        assert file[f"ball-{hashes[1]}"].attrs["key"] == '{"a": 1}'
+
+
+def test_an_unreadable_case_is_reported_and_left_out(tmp_path):
+    store(tmp_path, "ball/free", '{"a": 1}')
+    bad = store(tmp_path, "ball/implicit", '{"a": 2}')
+    bad.write_bytes(bad.read_bytes()[:900])
+    problems = link_study(tmp_path, "volume_loss")
+    assert len(problems) == 1
+    assert bad.name in problems[0]
+    with h5py.File(index_path(tmp_path, "volume_loss")) as file:
+        assert list(file["ball"]) == ["free"]
+
+
+def test_show_tells_status_units_and_numbers(tmp_path):
+    path = store(tmp_path, "ball/free", '{"a": 1}', Status.DIVERGED, "at t = 0.2 s [m]")
+    text = shown(describe(path))
+    for part in (
+        "ball/free",
+        "diverged: at t = 0.2 s [m]",
+        "worst = 0.000125",
+        "m^3",
+        "enclosed volume",
+        "0.5 (1 not finite)",
+    ):
+        assert part in text, part
+
+
+def test_show_an_index(tmp_path):
+    store(tmp_path, "ball/free", '{"a": 1}')
+    gone = store(tmp_path, "ball/implicit", '{"a": 2}', Status.TIMED_OUT, "after 60 s")
+    link_study(tmp_path, "volume_loss")
+    text = shown(describe(index_path(tmp_path, "volume_loss")))
+    assert "index of 2 files" in text
+    assert "free  status ok" in text
+    assert "implicit  status timed-out: after 60 s" in text
+    gone.unlink()
+    assert "there is no results file" in shown(describe(index_path(tmp_path, "volume_loss")))
+
+
+def test_an_index_is_no_record(tmp_path):
+    store(tmp_path, "ball/free", '{"a": 1}')
+    link_study(tmp_path, "volume_loss")
+    with pytest.raises(StudyError, match="is the index of a study"):
+        read_record(index_path(tmp_path, "volume_loss"))
