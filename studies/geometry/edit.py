@@ -74,8 +74,8 @@ def flip_edges(
 ) -> np.ndarray:
     """The triangles with each of the edges (e, 2) turned in its quadrilateral, where that helps.
 
-    It helps when the new edge is new and `allowed(k, l)`, when the two new triangles are better than the worse old one or
-    than `floor`, and when they look the same way (within 60 degrees of the old ones together).
+    It helps when the new edge is new and `allowed(k, l)`, when the two new triangles are better than the worse old one
+    or than `floor`, and when they look the same way (within 60 degrees of the old ones together).
     """
     triangles = triangles.copy()
     for i, j in edges:

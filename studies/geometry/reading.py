@@ -40,13 +40,14 @@ def read_mesh(path: str | Path, unit: str | None = None, flip: bool = False) -> 
     if points.ndim != 2 or points.shape[1] != 3:
         raise StudyError(f"{name}: points have shape {points.shape}; a body needs three coordinates per point")
     check_finite(points, name)
-    warn_about_unit(points, name)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     recipe = {"kind": "file", "name": path.stem, "file": name, "sha256": digest, "unit": unit or "m", "flip": flip}
     tetrahedra, triangles = cells_of(raw, name)
+    points, cells = weld(points, tetrahedra if len(tetrahedra) else triangles)
+    warn_about_unit(points, name)
     if len(tetrahedra):
-        return tetrahedral(*weld(points, tetrahedra), flip, recipe)
-    points, triangles = weld(points, triangles)
+        return tetrahedral(points, cells, flip, recipe)
+    triangles = cells
     if flip and signed_volume(points, triangles) < 0:
         triangles = triangles[:, ::-1].copy()
     check_surface(points, triangles, name)
@@ -59,7 +60,8 @@ def parse(path: Path) -> meshio.Mesh:
         raise StudyError(f"there is no mesh file {path}; check the name")
     said = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             return meshio.read(path)
     # Foreign parsers raise whatever a broken file makes them trip over, and meshio even exits the process.
     except (Exception, SystemExit) as error:

@@ -1,0 +1,41 @@
+"""Meshes shared by the geometry tests, made from nothing in a cache of their own."""
+
+import pytest
+
+from studies.geometry import HalfSpace, ball, liver
+
+RADIUS = 0.05
+CAP = 0.035
+"""Height [m] of the planes that cut the held caps off the ball."""
+CAPS = {
+    "top": HalfSpace((0.0, 0.0, CAP), (0.0, 0.0, -1.0)),
+    "bottom": HalfSpace((0.0, 0.0, -CAP), (0.0, 0.0, 1.0)),
+}
+COUNTS = (150, 300, 550, 1100)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def mesh_cache(tmp_path_factory):
+    """A fresh cache, so that every run of the tests really makes the meshes."""
+    folder = tmp_path_factory.mktemp("meshes")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ORGANBENCH_CACHE", str(folder))
+        yield folder
+
+
+@pytest.fixture(scope="session")
+def balls(mesh_cache):
+    """Balls with two caps by node count."""
+    return {nodes: ball(nodes, RADIUS, CAPS) for nodes in COUNTS}
+
+
+@pytest.fixture(scope="session")
+def livers(mesh_cache):
+    """Livers with their bare area by node count."""
+    return {nodes: liver(nodes) for nodes in COUNTS}
+
+
+@pytest.fixture(scope="session")
+def bodies(balls, livers):
+    """All of them by name and node count."""
+    return {"ball": balls, "liver": livers}

@@ -1,0 +1,91 @@
+"""Meshes are made in a process of their own, once, and the same every time."""
+
+import numpy as np
+import pytest
+
+from studies.errors import StudyError
+from studies.geometry import HalfSpace, ball, fill, jobs
+from studies.geometry.jobs import mesh_from, recipe_hash
+
+RECIPE = {"kind": "organ", "name": "ball", "organ": "ball", "nodes": 150, "parameters": {}, "regions": {}, "fill": True}
+
+
+@pytest.fixture
+def own_cache(tmp_path, monkeypatch):
+    """A cache of this test's own."""
+    monkeypatch.setenv("ORGANBENCH_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def same(one, other):
+    return all((getattr(one, key) == getattr(other, key)).all() for key in ("points", "triangles", "tetrahedra"))
+
+
+def test_same_recipe_gives_the_same_mesh_bit_for_bit(bodies, own_cache):
+    for name, mesh in (("ball", bodies["ball"][300]), ("liver", bodies["liver"][300])):
+        again = mesh_from(mesh.recipe)
+        assert again is not mesh and same(again, mesh), name
+    assert len(list(own_cache.glob("*.npz"))) == 2 and not list(own_cache.glob("*.part"))
+
+
+def test_the_second_time_nothing_is_made(own_cache, monkeypatch):
+    first = ball(150)
+    monkeypatch.setattr(jobs, "run_worker", lambda *_: pytest.fail("meshed again"))
+    assert same(ball(150), first)
+
+
+def test_a_damaged_cache_file_is_made_again_and_said(own_cache):
+    first = ball(150)
+    (path,) = own_cache.glob("*.npz")
+    whole = path.read_bytes()
+    middle = len(whole) // 2
+    flipped = whole[:middle] + bytes([whole[middle] ^ 255]) + whole[middle + 1 :]
+    for broken in (whole[:1000], b"", flipped):
+        path.write_bytes(broken)
+        with pytest.warns(UserWarning, match="is damaged .* made again"):
+            assert same(ball(150), first)
+        assert path.read_bytes() != broken
+
+
+def test_every_part_of_the_recipe_counts(monkeypatch):
+    cap = {"kind": "HalfSpace", "point": [0, 0, 0.03], "normal": [0, 0, -1]}
+    changes = [{}, {"nodes": 151}, {"parameters": {"radius": 0.04}}, {"regions": {"top": cap}}, {"fill": False}]
+    names = [recipe_hash(RECIPE | change, {}) for change in changes]
+    points = np.zeros((4, 3))
+    names += [recipe_hash(RECIPE, {"points": points}), recipe_hash(RECIPE, {"points": points + 1e-16})]
+    monkeypatch.setattr(jobs, "code_hash", lambda: "other code")
+    names.append(recipe_hash(RECIPE, {}))
+    assert len(set(names)) == len(names)
+
+
+def test_a_mesher_that_hangs_is_stopped(own_cache):
+    with pytest.raises(StudyError, match=r"ball: the mesher did not finish within 0\.05 s and was stopped"):
+        mesh_from(RECIPE, limit=0.05)
+    assert not list(own_cache.glob("*"))
+
+
+def test_a_mesher_that_dies_is_reported(own_cache):
+    with pytest.raises(StudyError, match=r"ball: the mesher ended with code 1 \(KeyError: 'nonsense'\)"):
+        mesh_from(RECIPE | {"kind": "nonsense"})
+
+
+def test_a_cache_that_cannot_be_written_gets_a_sentence(tmp_path, monkeypatch):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    monkeypatch.setenv("ORGANBENCH_CACHE", str(blocked / "meshes"))
+    with pytest.raises(StudyError, match="set ORGANBENCH_CACHE to a folder that can be written"):
+        ball(150)
+
+
+def test_the_default_cache_lies_under_results(tmp_path, monkeypatch):
+    monkeypatch.delenv("ORGANBENCH_CACHE")
+    monkeypatch.chdir(tmp_path)
+    assert jobs.cache_folder() == tmp_path / "results" / "cache" / "meshes"
+
+
+def test_fill_keeps_surface_and_patches(balls):
+    bare = ball(300, regions={"top": HalfSpace((0, 0, 0.035), (0, 0, -1))}, fill=False)
+    assert not len(bare.tetrahedra) and len(bare.points) == 300
+    body = fill(bare)
+    assert (body.points[:300] == bare.points).all() and (body.triangles == bare.triangles).all()
+    assert len(body.tetrahedra) > 1000 and (body.patches["top"] == bare.patches["top"]).all()

@@ -1,0 +1,111 @@
+"""The pieces of the mesher, each against a closed form."""
+
+import numpy as np
+import pytest
+
+from studies.errors import StudyError
+from studies.geometry import ball, check_surface
+from studies.geometry.blends import ellipsoid, groove, smooth_max, smooth_min
+from studies.geometry.count import surface_with
+from studies.geometry.edit import collapse_edge, flip_edges, split_edge, with_node_count
+from studies.geometry.levelset import Shape, gradient, normals, project
+from studies.geometry.mesh import triangle_areas, unique_edges
+from studies.geometry.organs import SHAPES
+from studies.geometry.surface import first_surface
+
+BALL = SHAPES["ball"](0.05)
+
+
+@pytest.fixture(scope="module")
+def net():
+    """A closed net of 150 nodes on the ball."""
+    mesh = ball(150, fill=False)
+    return mesh.points, mesh.triangles
+
+
+@pytest.mark.parametrize("name", sorted(SHAPES))
+def test_first_surface_is_closed_smooth_and_on_the_shape(name):
+    shape = SHAPES[name]()
+    points, triangles = first_surface(shape)
+    check_surface(points, triangles)
+    assert np.abs(shape.level(points)).max() < 1e-12 * shape.size
+    assert len(points) - len(unique_edges(triangles)) + len(triangles) == 2
+
+
+def test_first_surface_of_the_ball_has_its_area():
+    area = triangle_areas(*first_surface(BALL)).sum()
+    assert area == pytest.approx(4 * np.pi * 0.05**2, rel=0.01)  # 1,300 facets lose 0.4 per cent
+
+
+def test_a_shape_outside_its_box_is_refused():
+    for low, high in (((-0.04,) * 3, (0.04,) * 3), ((0.1,) * 3, (0.2,) * 3)):
+        with pytest.raises(StudyError, match="not inside its box"):
+            first_surface(Shape("egg", BALL.level, low, high, cell=0.01))
+
+
+def test_gradient_and_normals_are_those_of_the_ball():
+    x = np.random.default_rng(0).normal(size=(30, 3))
+    radial = x / np.linalg.norm(x, axis=1, keepdims=True)
+    assert gradient(BALL.level, 0.05 * radial, 1e-7) == pytest.approx(radial, abs=1e-8)
+    assert normals(BALL, 0.05 * radial) == pytest.approx(radial, abs=1e-8)
+
+
+def test_projection_meets_two_surfaces_at_once():
+    x = np.random.default_rng(1).uniform(-0.03, 0.03, size=(40, 3)) + np.array([0.04, 0.04, 0.0])
+    on = project(BALL, x, (lambda p: p[:, 2] - 0.01,))
+    assert np.abs(np.linalg.norm(on, axis=1) - 0.05).max() < 1e-13 and np.abs(on[:, 2] - 0.01).max() < 1e-13
+    with pytest.raises(StudyError, match="could not be brought onto the surface"):
+        project(BALL, x, (lambda p: p[:, 2] - 0.2,))  # a plane that misses the ball
+
+
+def test_blends_have_their_limits():
+    a, b = np.array([-3.0, 1.0, 50.0]), np.array([2.0, 1.0, -50.0])
+    assert smooth_min(a, b, 0.0) == pytest.approx(np.minimum(a, b))
+    assert smooth_max(a, b, 0.0) == pytest.approx(np.maximum(a, b))
+    assert smooth_min(a, b, 2.0)[1] == pytest.approx(0.0) and smooth_max(a, b, 2.0)[1] == pytest.approx(2.0)
+    x = np.random.default_rng(2).normal(size=(20, 3))
+    assert ellipsoid(x, (0, 0, 0), (2, 2, 2)) == pytest.approx(np.linalg.norm(x, axis=1) - 2, rel=1e-12)
+    tip = np.array([[3.0, 0, 0], [0, 0, 0]])
+    level = ellipsoid(tip, (0, 0, 0), (3, 1, 2))
+    assert level[0] == pytest.approx(0.0, abs=1e-12) and np.isfinite(level[1])
+    press = groove(np.array([[0.0, 0, 0], [0.5, 2, 0], [9, 0, 0]]), (0, 0, 0), (1, 0, 0), width=2.0, depth=5.0)
+    assert press == pytest.approx([5.0, 5.0 / np.e, 5.0 * np.exp(-16)])
+
+
+@pytest.mark.parametrize("change", [1, 4, -1, -4])
+def test_single_nodes_come_and_go(net, change):
+    points, triangles = with_node_count(*net, 150 + change)
+    points = project(BALL, points)
+    check_surface(points, triangles)
+    assert len(points) == 150 + change and len(triangles) == 296 + 2 * change
+
+
+def test_split_and_collapse_undo_each_other(net):
+    points, triangles = net
+    edge = unique_edges(triangles)[7]
+    more, faces = split_edge(points, triangles, edge)
+    check_surface(more, faces)
+    fewer, back = collapse_edge(more, faces, np.array([edge[0], 150]))
+    check_surface(fewer, back)
+    assert {frozenset(row) for row in back.tolist()} == {frozenset(row) for row in triangles.tolist()}
+
+
+def test_turning_an_edge_mends_a_bad_quadrilateral_only(net):
+    points, triangles = net
+    edges = unique_edges(triangles)
+    assert (flip_edges(points, triangles, edges, lambda k, m: False, 1.0) == triangles).all()
+    # Turn one edge for the worse (any quality allowed), then ask for the better: the first net comes back.
+    worse = flip_edges(points, triangles, edges[:1], lambda k, m: True, 0.0)
+    check_surface(points, worse)
+    assert (worse != triangles).any()
+    changed = np.setdiff1d(worse[(worse != triangles).any(axis=1)], edges[0])
+    better = flip_edges(points, worse, changed[None], lambda k, m: True, 1.0)
+    assert {frozenset(row) for row in better.tolist()} == {frozenset(row) for row in triangles.tolist()}
+
+
+def test_a_search_that_cannot_succeed_ends_with_a_sentence(net):
+    with pytest.raises(StudyError, match="no well-shaped surface with 400 nodes in 12 tries"):
+        surface_with(400, 0.03, lambda size: net, BALL)
+    folded = net[0], net[1][:, ::-1]
+    with pytest.raises(StudyError, match="no well-shaped surface with 150 nodes"):
+        surface_with(150, 0.03, lambda size: folded, BALL)
