@@ -23,7 +23,7 @@ if "NUMBA_CACHE_DIR" not in os.environ:
     numba.config.CACHE_DIR = str(cache_folder())
 
 from reference_fem.contact import RigidPlane, RigidSphere  # noqa: E402
-from reference_fem.elements import nodes, surface_triangles  # noqa: E402
+from reference_fem.elements import facet_nodes, nodes, surface_triangles  # noqa: E402
 from reference_fem.equilibrium import Equilibrium, equilibrium_path  # noqa: E402
 from reference_fem.errors import ReferenceProblem, SlowSolverWarning  # noqa: E402
 from reference_fem.evaluate import Evaluator  # noqa: E402
@@ -47,6 +47,7 @@ __all__ = [
     "SlowSolverWarning",
     "curve",
     "equilibrium_path",
+    "facet_nodes",
     "nodes",
     "surface_triangles",
 ]

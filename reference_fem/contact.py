@@ -3,6 +3,10 @@
 Augmented Lagrangian (Alart & Curnier 1991; Wriggers, Computational Contact Mechanics, 2006, ch. 6): the nominal
 pressure is t = max(0, m - eps g), m the multiplier [Pa], g the gap [m], eps the penalty [Pa/m], and the potential
 sum w (t² - m²) / (2 eps). Never at the vertices of a six-node facet: an even pressure loads them with zero.
+
+Order 4 has as many points to a facet as nodes. More points ask for more than the nodes can give where a facet is
+partly in contact: active points flicker and Newton needs longer (order 8: half as many iterations again). Three
+averages to a facet need fewer, but let points sink ten times deeper than the thousandth that is allowed.
 """
 
 from collections.abc import Callable
@@ -187,13 +191,14 @@ def scatter(K, positions, values):
 
 def potential(x, surface: Surface, touch: Touch):
     """sum w (t² - m²) / (2 eps) [J] in plain NumPy, apart from the kernel, to check it."""
-    y = np.einsum("qa,fia->fqi", surface.values, (surface.rest + x[: len(surface.rest)])[surface.dofs].reshape(-1, 3, 6))
-    total = 0.0
+    moved = (surface.rest + x[: len(surface.rest)])[surface.dofs].reshape(-1, 3, 6)
+    y = np.einsum("qa,fia->fqi", surface.values, moved)
+    total, eps = 0.0, touch.penalty[:, None]
     for row, m in zip(touch.rows, touch.multiplier, strict=True):
         g = (y - row[1:4]) @ row[4:7] if row[0] == PLANE else np.linalg.norm(y - row[1:4], axis=2) - row[7]
-        t = np.maximum(0.0, m - touch.penalty[:, None] * g)
-        total += np.sum(surface.weights * (t**2 - m**2) / (2.0 * touch.penalty[:, None]))
-    return total
+        t = np.maximum(0.0, m - eps * g)
+        total += np.sum(surface.weights * (t**2 - m**2) / (2.0 * eps))
+    return float(total)
 
 
 def penetration(touch: Touch):

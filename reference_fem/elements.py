@@ -137,8 +137,10 @@ def edge_index(mesh, pairs):
 
 
 def build_facets(mesh: MeshTet, order: int) -> Facets:
-    """Quadrature on the boundary; positive weights only, for a contact law lives at these points."""
+    """Quadrature on the boundary. Raises ReferenceProblem when the order has a rule with negative weights."""
     points, w = get_quadrature(RefTri, order)
+    if w.min() <= 0.0:
+        raise ReferenceProblem(f"the contact order {order} has a rule with negative weights: use 4, 5, 6 or 8")
     values, local = basis_table(ElementTriP2(), points)
     table = facet_nodes(mesh)
     tangents = np.einsum("fni,qJn->fqJi", nodes(mesh)[table], local)

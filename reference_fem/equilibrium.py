@@ -108,8 +108,8 @@ def stuck(state: State, t, failure, path):
     """The exception for a path that cannot go on."""
     gravity = f" under {100 * state.load:.3g} % of gravity" if state.load < 1.0 else ""
     return ReferenceProblem(
-        f"no equilibrium found between t = {state.t:g} s{gravity} (the last that converged) and t = {t:g} s: {failure}; "
-        f"refine the mesh where it folds, or ask for less",
+        f"no equilibrium found between t = {state.t:g} s{gravity} (the last that converged) and t = {t:g} s: "
+        f"{failure}; refine the mesh where it folds, or ask for less",
         converged=path,
     )
 

@@ -24,13 +24,13 @@ MERIT_GROWTH = 5.0
 class NewtonSettings:
     """How hard to try. Tolerances are relative: force to the largest of reactions, contact and weight; volume to V0."""
 
-    force_tol: float = 1e-7
-    volume_tol: float = 1e-9
+    force_tol: float = 1e-6
+    volume_tol: float = 1e-8
     penetration_tol: float = 1e-3
     """Deepest contact penetration over the largest displacement; more than that and the multiplier is updated."""
-    penalty: float = 300.0
+    penalty: float = 1000.0
     """Contact penalty times facet size over mu."""
-    max_iterations: int = 20
+    max_iterations: int = 25
     smallest_step: float = 1.0 / 1024.0
     """Smallest sub-step, as a fraction of the interval between two wanted times."""
     start: float = 0.0

@@ -44,7 +44,7 @@ class Problem:
     gravity: Sequence[float] = (0.0, 0.0, 0.0)
     density: float = 0.0
     order: int = 5
-    contact_order: int = 5
+    contact_order: int = 4
 
 
 @dataclass(frozen=True, eq=False)
