@@ -44,6 +44,14 @@ def test_points_keep_their_order_and_unused_ones_go(tmp_path, surface):
     assert (mesh.points == points).all() and (mesh.triangles == triangles).all()
 
 
+def test_points_within_rounding_of_each_other_are_one(tmp_path, surface):
+    points, triangles = surface
+    corners = points[triangles].reshape(-1, 3)
+    corners += np.random.default_rng(3).uniform(-2e-10, 2e-10, corners.shape)  # size 0.17 m, single precision 1e-8 m
+    loose = write(tmp_path / "loose.vtu", corners, triangle=np.arange(len(corners)).reshape(-1, 3))
+    assert read_mesh(loose).surface_count == 150
+
+
 def test_quadrilaterals_are_cut_in_two(tmp_path):
     points = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float) * 0.1
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
