@@ -4,7 +4,7 @@ import hashlib
 import os
 from pathlib import Path
 
-import numba
+from numba.core import config
 
 
 def cache_folder() -> Path:
@@ -18,9 +18,9 @@ def cache_folder() -> Path:
 
 # numba reads the folder when a function is decorated, so it is set around the imports and given back afterwards;
 # a folder that the user chose stays.
-_folder_before = numba.config.CACHE_DIR
+_folder_before = config.CACHE_DIR  # pyright: ignore[reportAttributeAccessIssue]
 if "NUMBA_CACHE_DIR" not in os.environ:
-    numba.config.CACHE_DIR = str(cache_folder())
+    config.CACHE_DIR = str(cache_folder())  # pyright: ignore[reportAttributeAccessIssue]
 
 from reference_fem.contact import RigidPlane, RigidSphere  # noqa: E402
 from reference_fem.elements import facet_nodes, nodes, surface_triangles  # noqa: E402
@@ -32,7 +32,7 @@ from reference_fem.mesh import curve  # noqa: E402
 from reference_fem.newton import NewtonSettings  # noqa: E402
 from reference_fem.problem import Held, Problem  # noqa: E402
 
-numba.config.CACHE_DIR = _folder_before
+config.CACHE_DIR = _folder_before  # pyright: ignore[reportAttributeAccessIssue]
 
 __all__ = [
     "Equilibrium",

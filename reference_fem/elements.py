@@ -117,8 +117,8 @@ def check_neighbours(mesh):
 def facet_nodes(mesh: MeshTet) -> np.ndarray:
     """Six nodes of every boundary facet, outward, (nf, 6)."""
     index = mesh.boundary_facets()
-    corners = mesh.facets[:, index].T.copy()
-    owner = mesh.t[:4, mesh.f2t[0, index]].T
+    corners = np.asarray(mesh.facets)[:, index].T.copy()
+    owner = mesh.t[:4, np.asarray(mesh.f2t)[0, index]].T
     opposite = owner.sum(axis=1) - corners.sum(axis=1)
     a, b, c, d = (mesh.p[:, i].T for i in (*corners.T, opposite))
     inward = np.einsum("fi,fi->f", np.cross(b - a, c - a), d - a) > 0.0

@@ -1,7 +1,7 @@
 """Displacement at any material point."""
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from skfem import ElementTetP2, MeshTet
 
 from reference_fem.elements import basis_table, element_nodes, nodes
@@ -22,7 +22,7 @@ class Evaluator:
     def __init__(self, mesh: MeshTet, max_outside=None):
         self.x, self.table = nodes(mesh), element_nodes(mesh)
         self.corners = self.x[self.table[:, :4]]
-        self.tree = cKDTree(self.corners.mean(axis=1))
+        self.tree = KDTree(self.corners.mean(axis=1))
         size = np.linalg.norm(np.ptp(self.x, axis=0))
         self.max_outside = 0.05 * size if max_outside is None else max_outside
         self.outside = np.zeros(0)

@@ -1,6 +1,9 @@
 """Symmetric indefinite sparse systems: MKL Pardiso when it is there, SciPy's SuperLU otherwise."""
 
+import sys
 import warnings
+from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,32 +15,26 @@ RESIDUAL_LIMIT = 1e-6
 """Largest relative residual of a solve (max norm) before the factors are rejected: Newton only needs a direction,
 good factors leave 1e-10."""
 
-# Pardiso's control vector, numbered as in its manual minus one: own values on; nested dissection; two refinement
-# sweeps; pivots perturbed below 1e-8; scaling and weighted matching, both advised for saddle points; 2x2 pivots.
-PARDISO_CONTROL = {0: 1, 1: 2, 7: 2, 9: 8, 10: 1, 12: 1, 20: 1}
+# Pardiso's control vector, numbered as in its manual minus one: own values on; nested dissection; refinement only
+# after perturbed pivots; pivots perturbed below 1e-8; scaling and weighted matching, both advised for saddle points;
+# 2x2 pivots.
+PARDISO_CONTROL = {0: 1, 1: 2, 7: 0, 9: 8, 10: 1, 12: 1, 20: 1}
 
 
-class SlowSolverState:
-    """Whether the missing fast solver has been mentioned in this process."""
-
-    told = False
-
-
+@cache
 def load_pardiso():
-    """The optional wrapper module, or None after one SlowSolverWarning."""
+    """The optional wrapper module, or None after one SlowSolverWarning in the life of the process."""
     try:
         import pypardiso
 
         pypardiso.PyPardisoSolver()  # ImportError when the MKL library itself is missing
     except ImportError as problem:
-        if not SlowSolverState.told:
-            SlowSolverState.told = True
-            warnings.warn(
-                f"pypardiso is not usable ({problem}): SciPy's solver gives the same answers, five to twenty times "
-                f"slower; install the package pypardiso for speed",
-                SlowSolverWarning,
-                stacklevel=3,
-            )
+        warnings.warn(
+            f"pypardiso is not usable ({problem}): SciPy's solver gives the same answers, five to twenty times "
+            f"slower; install the package pypardiso for speed",
+            SlowSolverWarning,
+            stacklevel=3,
+        )
         return None
     return pypardiso
 
@@ -47,11 +44,11 @@ class PardisoFactors:
 
     def __init__(self, pypardiso):
         self.solver = pypardiso.PyPardisoSolver(mtype=-2)
-        self.error = pypardiso.PyPardisoError if hasattr(pypardiso, "PyPardisoError") else RuntimeError
+        self.failure = sys.modules[pypardiso.PyPardisoSolver.__module__].PyPardisoError
         for index, value in PARDISO_CONTROL.items():
             self.solver.iparm[index] = value
         self.analysed = False
-        self.upper = sp.csr_matrix((0, 0))
+        self.upper = sp.csr_matrix((1, 1))
 
     def call(self, phase, b):
         self.solver.set_phase(phase)
@@ -60,7 +57,7 @@ class PardisoFactors:
     def factor(self, upper, afresh=False):
         """Factorise; the matching and ordering of the first matrix serve its successors unless afresh."""
         self.upper = upper
-        nothing = np.zeros(upper.shape[0])
+        nothing = np.zeros(len(upper.indptr) - 1)
         if afresh or not self.analysed:
             self.release()
             self.upper = upper
@@ -74,25 +71,31 @@ class PardisoFactors:
     def release(self):
         """Give MKL's memory back: it is invisible to Python's collector."""
         if self.analysed:
-            self.call(-1, np.zeros(self.upper.shape[0]))
+            self.call(-1, np.zeros(len(self.upper.indptr) - 1))
             self.analysed = False
 
 
 class ScipyFactors:
     """SuperLU of the whole matrix, ordered for symmetric patterns, with mild pivoting."""
 
+    failure = RuntimeError
+
+    def __init__(self):
+        self.solve_with: Callable = np.asarray
+
     def factor(self, upper, afresh=False):
         """Factorise; afresh asks for full partial pivoting."""
         whole = (upper + sp.triu(upper, 1).T).tocsc()
         threshold = 1.0 if afresh else 0.01
         options = {"SymmetricMode": not afresh}
-        self.lu = splu(whole, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=threshold, options=options)
+        lu = splu(whole, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=threshold, options=options)
+        self.solve_with = lu.solve
 
     def solve(self, b):
-        return self.lu.solve(b)
+        return self.solve_with(b)
 
     def release(self):
-        self.lu = None
+        self.solve_with = np.asarray
 
 
 class SymmetricSolver:
@@ -106,8 +109,7 @@ class SymmetricSolver:
         if backend == "pardiso" and pypardiso is None:
             raise ReferenceProblem("the solver 'pardiso' was asked for but pypardiso is not installed: use 'auto'")
         self.factors = PardisoFactors(pypardiso) if pypardiso else ScipyFactors()
-        self.upper = sp.csr_matrix((0, 0))
-        self.failure = (RuntimeError, getattr(self.factors, "error", RuntimeError))
+        self.upper = sp.csr_matrix((1, 1))
 
     def factor(self, upper):
         self.upper = upper
@@ -116,9 +118,9 @@ class SymmetricSolver:
     def try_factor(self, afresh):
         try:
             self.factors.factor(self.upper, afresh)
-        except self.failure as problem:
+        except self.factors.failure as problem:
             raise ReferenceProblem(
-                f"the tangent matrix of {self.upper.shape[0]} unknowns cannot be factorised ({problem}): "
+                f"the tangent matrix of {len(self.upper.indptr) - 1} unknowns cannot be factorised ({problem}): "
                 f"part of the body may be free to move, hold it"
             ) from problem
 
@@ -131,7 +133,7 @@ class SymmetricSolver:
         misfit = self.misfit(x, b)
         if not misfit <= RESIDUAL_LIMIT:
             raise ReferenceProblem(
-                f"the tangent matrix of {self.upper.shape[0]} unknowns is singular to working precision (relative "
+                f"the tangent matrix of {len(self.upper.indptr) - 1} unknowns is singular to working precision (relative "
                 f"residual {misfit:.1e}, limit {RESIDUAL_LIMIT:.0e}): part of the body may be free to move, hold it"
             )
         return x

@@ -1,0 +1,66 @@
+"""Closed forms and converged tables that the solver is held against (docs/theory.md, oracles). SI units throughout."""
+
+import numpy as np
+
+BALL_BETWEEN_PLANES = {
+    0.05: (0.06463, 1.00446),
+    0.10: (0.19197, 1.01325),
+    0.15: (0.37058, 1.02550),
+    0.20: (0.60204, 1.04117),
+    0.25: (0.89384, 1.06043),
+    0.30: (1.25968, 1.08359),
+    0.35: (1.72174, 1.11112),
+}
+"""Incompressible neo-Hookean ball of radius R between frictionless planes, mesh-converged axisymmetric P2/P1: approach
+over 2R -> (force / (mu R²), equator radius / R); two meshes agree to 1e-4."""
+
+
+def uniaxial_force(mu, area, stretch):
+    """Force [N] on an incompressible block of rest cross-section `area` [m²]: mu A (s - s^-2)."""
+    return mu * area * (stretch - stretch**-2)
+
+
+def uniaxial_lateral_stretch(mu, kappa, stretch):
+    """Lateral stretch b of the nearly incompressible block: root of W's lateral stress, by Newton from s^-1/2.
+
+    With p = kappa (J - 1) and J = s b²: mu J^-2/3 (b - I1 / (3 b)) + kappa (J - 1) J / b = 0.
+    """
+    b = stretch**-0.5
+    for _ in range(50):
+        move = lateral_stress(mu, kappa, stretch, b) * 2e-6 * b
+        slope = lateral_stress(mu, kappa, stretch, b * (1 + 1e-6)) - lateral_stress(mu, kappa, stretch, b * (1 - 1e-6))
+        b -= move / slope
+        if abs(move / slope) < 1e-15 * b:
+            break
+    return b
+
+
+def lateral_stress(mu, kappa, stretch, b):
+    """Nominal lateral stress [Pa] of a block stretched by `stretch` and b, b."""
+    J = stretch * b**2
+    I1 = stretch**2 + 2.0 * b**2
+    return mu * J ** (-2.0 / 3.0) * (b - I1 / (3.0 * b)) + kappa * (J - 1.0) * J / b
+
+
+def uniaxial_stress(mu, kappa, stretch):
+    """Nominal axial stress [Pa] of the nearly incompressible block with free sides."""
+    b = uniaxial_lateral_stretch(mu, kappa, stretch)
+    J = stretch * b**2
+    I1 = stretch**2 + 2.0 * b**2
+    return mu * J ** (-2.0 / 3.0) * (stretch - I1 / (3.0 * stretch)) + kappa * (J - 1.0) * J / stretch
+
+
+def thick_sphere_pressure(mu, inner, outer, inner_stretch):
+    """Pressure [Pa] inside an incompressible thick sphere of rest radii inner, outer [m], inner radius stretched."""
+    outer_stretch = np.cbrt(1.0 + (inner / outer) ** 3 * (inner_stretch**3 - 1.0))
+
+    def branch(s):
+        return 4.0 / s + s**-4.0
+
+    return 0.5 * mu * (branch(outer_stretch) - branch(inner_stretch))
+
+
+def hertz_plane_force(mu, radius, share):
+    """Small-approach force [N] of an incompressible ball between two planes, share = approach / 2R: 4/3 E* R² d^1.5,
+    E* = 4 mu."""
+    return 16.0 / 3.0 * mu * radius**2 * share**1.5

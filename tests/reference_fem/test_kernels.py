@@ -1,0 +1,125 @@
+"""Energy -> residual -> tangent by finite differences, for elements and contact, and mutants that must fail."""
+
+import numpy as np
+import pytest
+
+from reference_fem import Held, NeoHookean, NewtonSettings, Problem, RigidPlane, RigidSphere, assembly, contact, curve
+from reference_fem.newton import Loads, System
+from tests.reference_fem.bodies import block
+
+STEP = 1e-6
+"""Central differences: truncation about STEP² and round-off about 1e-16 / STEP, both near 1e-10 of the values."""
+AGREES = 1e-7
+"""A hundred times the error of the differences; a wrong factor or sign shows at 1e-2 or more."""
+
+
+def bumpy():
+    """A cube whose top is domed: curved elements of unequal shape."""
+
+    def dome(x):
+        return x + np.array([[0.0], [0.0], [0.1]]) * np.sin(np.pi * x[0]) * np.sin(np.pi * x[1])
+
+    return curve(block((2, 2, 2), skew=0.1), dome, lambda x: x[2] > 1 - 1e-9)
+
+
+@pytest.fixture(scope="module")
+def system():
+    obstacles = [RigidPlane((0.0, 0.0, 1.2), (0.1, 0.0, -1.0)), RigidSphere((1.55, 0.5, 0.5), 0.55)]
+    problem = Problem(bumpy(), NeoHookean(2.0, 50.0), [Held(lambda x: x[2] < 1e-9)], obstacles)
+    return System(problem, NewtonSettings(penalty=20.0))
+
+
+@pytest.fixture(scope="module")
+def state(system):
+    """A deformed state, a direction with held unknowns too, and multipliers that keep every contact point pressed."""
+    rng = np.random.default_rng(0)
+    x, direction = np.zeros(system.total), rng.standard_normal(system.total)
+    x[: system.displacement_count] = 0.01 * rng.standard_normal(system.displacement_count)
+    x[system.displacement_count :] = rng.standard_normal(system.total - system.displacement_count)
+    multiplier = 300.0 + rng.uniform(0.0, 1.0, system.rest().multiplier.shape)
+    return x, direction, Loads(0.0, system.rows, multiplier)
+
+
+def potential(system, x, loads):
+    touch = contact.touch(loads.rows, np.zeros((2, 3)), loads.multiplier, system.surface.penalty)
+    own = assembly.energy(x, system.elements, system.problem.material)
+    return own + contact.potential(x, system.surface, touch)
+
+
+def whole_product(system, values, direction):
+    """Tangent times direction, in the free rows."""
+    free, held = direction[system.pattern.free], direction[system.pattern.held]
+    upper = system.pattern.upper(values)
+    return upper @ free + upper.T @ free - upper.diagonal() * free + system.pattern.lifting(values) @ held
+
+
+def tangent_misfit(system, state, values):
+    x, direction, loads = state
+    after = system.evaluate(x + STEP * direction, loads, tangent=False).residual
+    before = system.evaluate(x - STEP * direction, loads, tangent=False).residual
+    expected = ((after - before) / (2 * STEP))[system.pattern.free]
+    return np.abs(whole_product(system, values, direction) - expected).max() / np.abs(expected).max()
+
+
+def test_residual_is_the_gradient_of_the_potential(system, state):
+    x, direction, loads = state
+    found = system.evaluate(x, loads)
+    assert (found.touch.pressure > 0).all()
+    slope = (potential(system, x + STEP * direction, loads) - potential(system, x - STEP * direction, loads)) / (
+        2 * STEP
+    )
+    assert found.residual @ direction == pytest.approx(slope, rel=AGREES)
+
+
+def test_tangent_is_the_gradient_of_the_residual(system, state):
+    x, _, loads = state
+    assert tangent_misfit(system, state, system.evaluate(x, loads).values) < AGREES
+
+
+@pytest.mark.parametrize("rows, columns", [("u", "p"), ("p", "p"), ("u", "u")])
+def test_a_wrong_factor_on_any_block_is_noticed(system, state, rows, columns):
+    x, _, loads = state
+    values = system.evaluate(x, loads).values
+    upper, kind = system.pattern.upper(values).tocoo(), np.array(["u", "p"])
+    is_pressure = (system.pattern.free >= system.displacement_count).astype(int)
+    wrong = (kind[is_pressure[upper.row]] == rows) & (kind[is_pressure[upper.col]] == columns)
+    assert wrong.any()
+    values[: len(upper.data)][wrong] *= 1.01
+    assert tangent_misfit(system, state, values) > 10 * AGREES
+
+
+def test_predictor_linearises_the_move_of_the_obstacles(system, state):
+    x, _, loads = state
+    move = np.random.default_rng(1).standard_normal(loads.rows[:, 1:4].shape)
+
+    def residual(step):
+        rows = loads.rows.copy()
+        rows[:, 1:4] += step * move
+        return system.evaluate(x, loads._replace(rows=rows), tangent=False).residual
+
+    lifted = system.evaluate(x, loads._replace(shift=move), tangent=False).residual - residual(0.0)
+    expected = (residual(STEP) - residual(-STEP)) / (2 * STEP)
+    np.testing.assert_allclose(lifted, expected, rtol=0.0, atol=AGREES * np.abs(expected).max())
+
+
+def test_rest_is_stress_free(system):
+    problem = Problem(bumpy(), NeoHookean(2.0, 50.0), [Held(lambda x: x[2] < 1e-9)])
+    bare = System(problem, NewtonSettings())
+    found = bare.evaluate(np.zeros(bare.total), Loads(0.0, bare.rows, bare.rest().multiplier))
+    assert np.abs(found.residual).max() < 1e-15  # mu is 2 Pa, areas about 0.1 m²: round-off
+
+
+def test_an_inverted_element_stops_the_kernel(system, state):
+    x, _, loads = state
+    flat = x.copy()
+    flat[0 : system.displacement_count : 3] = -2.0 * system.nodes[:, 0]
+    found = system.evaluate(flat, loads)
+    assert found.smallest_J < 0.0
+    assert not found.usable
+
+
+def test_two_evaluations_are_bitwise_equal(system, state):
+    x, _, loads = state
+    first, second = system.evaluate(x, loads), system.evaluate(x, loads)
+    assert np.array_equal(first.values, second.values)
+    assert np.array_equal(first.residual, second.residual)
