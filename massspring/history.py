@@ -14,7 +14,7 @@ from massspring.methods.base import State
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """F frames; entries after a divergence are NaN."""
+    """F frames; entries after an early end are NaN."""
 
     t: np.ndarray
     """End of each frame [s], (F,)."""
@@ -39,9 +39,11 @@ class History:
     final: np.ndarray
     """Positions after the last good frame [m], (n, 3)."""
     frame_ns: np.ndarray
-    """Wall time of each frame's steps [ns], (F,); 0 after a divergence."""
-    diverged_at: int | None
-    """Number (1 … F) of the frame that diverged."""
+    """Wall time of each frame's steps [ns], (F,); 0 after an early end."""
+    outcome: str
+    """"finished", "diverged" or "timed-out"."""
+    good_frames: int
+    """Frames before the early end, F when there was none."""
     message: str
     """Why it stopped; empty when it did not."""
     skipped_steps: int
@@ -87,13 +89,13 @@ class Recorder:
 
     def finished(self) -> History:
         """All frames ran."""
-        return self._history(None, "")
+        return self._history("finished", self.clock.frames, "")
 
-    def stopped(self, frame: int, reason: str) -> History:
-        """Frame number `frame` (0, 1, …) was no good."""
-        return self._history(frame + 1, f"diverged in frame {frame + 1} at {self.t[frame]:.4g} s: {reason}")
+    def stopped(self, frame: int, outcome: str, reason: str) -> History:
+        """The run ends before frame number `frame` (0, 1, …)."""
+        return self._history(outcome, frame, f"{outcome} in frame {frame + 1} at {self.t[frame]:.4g} s: {reason}")
 
-    def _history(self, diverged_at: int | None, message: str) -> History:
+    def _history(self, outcome: str, good_frames: int, message: str) -> History:
         frames = sorted(self.kept)
         shape = (len(frames), self.body.node_count, 3)
         return History(
@@ -109,7 +111,8 @@ class Recorder:
             snapshots=np.array([self.kept[f] for f in frames]).reshape(shape),
             final=self.final,
             frame_ns=self.frame_ns,
-            diverged_at=diverged_at,
+            outcome=outcome,
+            good_frames=good_frames,
             message=message,
             skipped_steps=self.skipped,
         )

@@ -1,5 +1,6 @@
 """Frame by frame: moves the obstacles, advances the method, records. The only Python in the loop is once per frame."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from time import perf_counter_ns
@@ -89,15 +90,21 @@ def trouble(state: State, body: Body) -> str | None:
     return "positions are no longer finite" if not np.isfinite(far) else f"a node has moved {far:.3g} m from rest"
 
 
-def simulate(setup: Setup, snapshots: Iterable[int] = (), on_frame: Callable[[int], object] | None = None) -> History:
+def simulate(
+    setup: Setup,
+    snapshots: Iterable[int] = (),
+    on_frame: Callable[[int], object] | None = None,
+    time_limit: float = math.inf,
+) -> History:
     """Runs all frames, or up to the first that diverges, and returns what happened.
 
     `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is told after each.
-    Frame times are those of `advance` alone, measured with perf_counter_ns.
+    A run longer than `time_limit` [s] of wall time ends early. Frame times are those of `advance` alone.
     """
     recorder = Recorder(setup.body, setup.clock, len(setup.obstacles), len(setup.attachments), frozenset(snapshots))
     state = setup.start()
     advance = setup.method.advance
+    begun = perf_counter_ns()
     for frame in range(setup.clock.frames):
         drive = setup.drive(frame)
         begin = perf_counter_ns()
@@ -105,8 +112,10 @@ def simulate(setup: Setup, snapshots: Iterable[int] = (), on_frame: Callable[[in
         elapsed = perf_counter_ns() - begin
         reason = trouble(state, setup.body)
         if reason is not None:
-            return recorder.stopped(frame, reason)
+            return recorder.stopped(frame, "diverged", reason)
         recorder.record(frame, state, elapsed)
         if on_frame is not None:
             on_frame(frame + 1)
+        if perf_counter_ns() - begun > 1e9 * time_limit and frame + 1 < setup.clock.frames:
+            return recorder.stopped(frame + 1, "timed-out", f"the time limit of {time_limit:g} s was reached")
     return recorder.finished()

@@ -20,6 +20,7 @@ def smallest_ratio(volume, rest_volume):
     smallest = volume[0] / rest_volume[0]
     for t in range(volume.shape[0]):
         ratio = volume[t] / rest_volume[t]
-        if not ratio >= smallest:
-            smallest = ratio
+        if ratio != ratio:
+            return ratio
+        smallest = min(smallest, ratio)
     return smallest

@@ -1,0 +1,70 @@
+"""Bodies made without a mesher: a distorted block of tetrahedra and an icosphere."""
+
+import numpy as np
+import pytest
+
+from massspring import Body, Material, surface_body, tetrahedral_body
+
+SOFT = Material(shear_modulus=1800.0, density=1060.0)
+CUBE_TETRAHEDRA = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
+"""Kuhn's six tetrahedra of a cube whose corner (x, y, z) has number x + 2 y + 4 z; neighbours match."""
+
+
+def block(cells: tuple[int, int, int], edge: float = 0.02, distortion: float = 0.15) -> tuple[np.ndarray, ...]:
+    """Points, outward boundary triangles and tetrahedra of a block with moved interior and surface nodes."""
+    shape = tuple(c + 1 for c in cells)
+    grid = np.stack(np.meshgrid(*(np.arange(s) for s in shape), indexing="ij"), axis=-1).reshape(-1, 3)
+    number = np.arange(len(grid)).reshape(shape)
+    corners = [
+        number[x : x + cells[0], y : y + cells[1], z : z + cells[2]].ravel()
+        for z in (0, 1)
+        for y in (0, 1)
+        for x in (0, 1)
+    ]
+    tetrahedra = np.stack(corners, axis=1)[:, CUBE_TETRAHEDRA].reshape(-1, 4)
+    random = np.random.default_rng(7)
+    points = edge * (grid + distortion * random.uniform(-1, 1, grid.shape))
+    faces = tetrahedra[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    return points, faces[first[count == 1]], tetrahedra
+
+
+def icosphere(levels: int, radius: float = 0.05) -> tuple[np.ndarray, np.ndarray]:
+    """Points and outward triangles of an icosahedron split `levels` times: 10 · 4^levels + 2 nodes."""
+    golden = (1 + 5**0.5) / 2
+    points = [(0, s, t * golden) for s in (-1, 1) for t in (-1, 1)]
+    points = np.array(points + [(y, z, x) for x, y, z in points] + [(z, x, y) for x, y, z in points], dtype=float)
+    near = np.linalg.norm(points[:, None] - points[None], axis=2) < 2.1
+    triples = [(i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[k, i]]
+    triangles = np.array(triples)
+    for _ in range(levels):
+        edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        unique, inverse = np.unique(edges, axis=0, return_inverse=True)
+        middle = len(points) + inverse.reshape(-1, 3)
+        points = np.vstack([points, points[unique].mean(axis=1)])
+        a, b, c = triangles.T
+        ab, bc, ca = middle.T
+        triangles = np.vstack([np.column_stack(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    points *= radius / np.linalg.norm(points, axis=1)[:, None]
+    p, q, r = points[triangles].transpose(1, 0, 2)
+    inward = np.einsum("ij,ij->i", np.cross(q - p, r - p), p) < 0
+    triangles[inward] = triangles[inward][:, [0, 2, 1]]
+    return points, triangles
+
+
+@pytest.fixture(scope="session")
+def block_body() -> Body:
+    """3 × 3 × 2 cells, 162 tetrahedra, distorted by 15 %."""
+    return tetrahedral_body(*block((3, 3, 2)), SOFT)
+
+
+@pytest.fixture(scope="session")
+def ball_body() -> Body:
+    """Surface body of 162 nodes and its virtual nodes."""
+    return surface_body(*icosphere(2), SOFT)
+
+
+@pytest.fixture(params=["block", "ball"])
+def body(request: pytest.FixtureRequest) -> Body:
+    """Either kind of body."""
+    return request.getfixturevalue(f"{request.param}_body")

@@ -1,0 +1,151 @@
+"""Bodies: mass, springs, stiffness laws, and what is refused."""
+
+import numpy as np
+import pytest
+
+from massspring import Body, MassSpringError, Material, surface_body, tetrahedral_body
+from massspring.axis import principal_axis
+from massspring.springs import SpringKind
+from tests.massspring.conftest import SOFT, block, icosphere
+
+EXACT = 1e-12
+
+
+def test_the_mass_is_density_times_volume(body):
+    assert body.mass.sum() == pytest.approx(SOFT.density * body.volume, rel=EXACT)
+    # Mutant: inverse masses summed instead of masses.
+    assert (1 / body.mass).sum() != pytest.approx(SOFT.density * body.volume, rel=0.5)
+
+
+def test_the_stiffness_matches_the_shear_modulus(body):
+    """Σ k L² = 15 V mu: affine homogenisation of central forces (eq. 14)."""
+    k, length = body.springs.stiffness, body.springs.rest_length
+    assert float(k @ length**2) / (15 * body.volume) == pytest.approx(SOFT.shear_modulus, rel=EXACT)
+
+
+@pytest.mark.parametrize("law", ["van_gelder", "uniform"])
+def test_affine_shear_costs_half_mu_gamma_squared(law):
+    """Outside truth: ½ mu gamma² V, the energy of simple shear of an isotropic solid, on average over shear planes.
+
+    300 random planes leave a standard error of about 1.5 %; three of them are allowed.
+    """
+    body = tetrahedral_body(*block((3, 3, 3)), SOFT, law)
+    random, gamma, moduli = np.random.default_rng(4), 1e-3, []
+    for _ in range(300):
+        frame, _ = np.linalg.qr(random.normal(size=(3, 3)))
+        x = body.rest + gamma * np.outer(body.rest @ frame[:, 1], frame[:, 0])
+        stretch = np.linalg.norm(x[body.springs.ends[:, 1]] - x[body.springs.ends[:, 0]], axis=1)
+        energy = 0.5 * float(body.springs.stiffness @ (stretch - body.springs.rest_length) ** 2)
+        moduli.append(energy / (0.5 * gamma**2 * body.volume))
+    assert np.mean(moduli) == pytest.approx(SOFT.shear_modulus, rel=0.045)
+
+
+def test_van_gelder_is_trace_exact_for_uniform_dilatation():
+    """U = ½ Σ k (ε L)² = ½ ε² · 6 V E/… : Σ k L² = E Σ_t 6 V_t, whatever the mesh."""
+    body = tetrahedral_body(*block((3, 2, 2)), SOFT, "van_gelder")
+    volumes = np.zeros(body.springs.count)
+    edges = {tuple(sorted(e)): n for n, e in enumerate(body.springs.ends.tolist())}
+    for nodes, volume in zip(body.tetrahedra.tolist(), body.tetrahedron_volumes, strict=True):
+        for a in range(4):
+            for b in range(a):
+                volumes[edges[tuple(sorted((nodes[a], nodes[b])))]] += volume
+    young = body.springs.stiffness * body.springs.rest_length**2 / volumes
+    assert np.ptp(young) < 1e-9 * young.mean()
+    assert young.mean() == pytest.approx(2.5 * SOFT.shear_modulus, rel=EXACT)
+
+
+def test_a_surface_body_is_built_as_in_the_paper(ball_body):
+    """Euler: 3(n − 2) edges; a bending spring per edge but for those that are edges; one inner spring per node."""
+    surface = len(ball_body.surface_nodes)
+    kinds = np.bincount(ball_body.springs.kind, minlength=len(SpringKind))
+    virtual = ball_body.node_count - surface
+    assert len(ball_body.triangles) == 2 * surface - 4
+    assert kinds[SpringKind.STRUCTURAL] == 3 * (surface - 2)
+    assert 0.9 * kinds[SpringKind.STRUCTURAL] < kinds[SpringKind.BENDING] <= kinds[SpringKind.STRUCTURAL]
+    assert kinds[SpringKind.INNER] == surface
+    assert kinds[SpringKind.AXIAL] == virtual - 1
+    assert len(np.unique(np.sort(ball_body.springs.ends, axis=1), axis=0)) == ball_body.springs.count
+
+
+def test_inner_springs_go_to_the_closest_virtual_node(ball_body):
+    inner = ball_body.springs.ends[ball_body.springs.kind == SpringKind.INNER].astype(int)
+    virtual = ball_body.rest[len(ball_body.surface_nodes) :]
+    distance = np.linalg.norm(ball_body.rest[inner[:, 0], None] - virtual[None], axis=2)
+    assert np.allclose(distance.min(axis=1), np.linalg.norm(ball_body.rest[inner[:, 0]] - ball_body.rest[inner[:, 1]], axis=1))
+
+
+def test_the_dominant_axis_is_the_long_one():
+    points, triangles = icosphere(2)
+    turn, _ = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))
+    stretched = (points * [1.0, 1.0, 2.5]) @ turn.T
+    _, direction = principal_axis(stretched)
+    assert abs(direction @ turn[:, 2]) == pytest.approx(1.0, abs=1e-6)
+    body = surface_body(stretched, triangles if np.linalg.det(turn) > 0 else triangles[:, ::-1], SOFT)
+    virtual = body.rest[len(points) :]
+    assert np.linalg.norm(np.cross(virtual - virtual[0], turn[:, 2]), axis=1).max() < 1e-6 * body.size
+
+
+def changed(body: Body, **parts: object) -> Body:
+    fields = {"rest": body.rest, "mass": body.mass, "springs": body.springs, "triangles": body.triangles}
+    return Body(**{**fields, "tetrahedra": body.tetrahedra, **parts})  # type: ignore[arg-type]
+
+
+def with_nan(body: Body) -> np.ndarray:
+    rest = body.rest.copy()
+    rest[3, 1] = np.nan
+    return rest
+
+
+REFUSED = {
+    "open": (lambda b: {"triangles": b.triangles[1:]}, "open at 3 edges"),
+    "inside-out": (lambda b: {"triangles": b.triangles[:, ::-1].copy()}, "inside-out"),
+    "one triangle turned": (lambda b: {"triangles": turned(b)}, "not consistently oriented"),
+    "doubled": (lambda b: {"triangles": np.vstack([b.triangles, b.triangles])}, "not manifold"),
+    "nan": (lambda b: {"rest": with_nan(b)}, "not finite"),
+    "massless": (lambda b: {"mass": np.where(np.arange(b.node_count) == 2, 0.0, b.mass)}, "node 2 has mass 0"),
+    "too few masses": (lambda b: {"mass": b.mass[:-1]}, "one mass per node"),
+    "flat": (lambda b: {"rest": b.rest * [1, 1, 0]}, "flat or inside-out"),
+    "missing node": (lambda b: {"triangles": b.triangles + 10}, "names node"),
+    "one triangle": (lambda b: {"triangles": b.triangles[:1]}, "at least 4"),
+}
+
+
+def turned(body: Body) -> np.ndarray:
+    triangles = body.triangles.copy()
+    triangles[0] = triangles[0, ::-1]
+    return triangles
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_bodies_are_refused_in_one_sentence(ball_body, name):
+    parts, words = REFUSED[name]
+    with pytest.raises(MassSpringError, match=words) as caught:
+        changed(ball_body, **parts(ball_body))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_negative_tetrahedron_is_refused(block_body):
+    with pytest.raises(MassSpringError, match="tetrahedron 4 has volume -"):
+        cells = block_body.tetrahedra.copy()
+        cells[4] = cells[4, [1, 0, 2, 3]]
+        changed(block_body, tetrahedra=cells)
+
+
+def test_a_spring_without_length_is_refused(block_body):
+    from dataclasses import replace
+
+    length = block_body.springs.rest_length.copy()
+    length[7] = 0.0
+    with pytest.raises(MassSpringError, match="spring 7 has rest length 0"):
+        changed(block_body, springs=replace(block_body.springs, rest_length=length))
+
+
+@pytest.mark.parametrize("values", [{"shear_modulus": -1.0, "density": 1000.0}, {"shear_modulus": 1.0, "density": np.nan}])
+def test_bad_materials_are_refused(values):
+    with pytest.raises(MassSpringError, match="positive finite"):
+        Material(**values)
+
+
+def test_an_unknown_law_is_refused():
+    with pytest.raises(MassSpringError, match="unknown stiffness law"):
+        tetrahedral_body(*block((1, 1, 1)), SOFT, "stiff")

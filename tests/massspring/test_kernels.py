@@ -1,0 +1,141 @@
+"""Every derivative against finite differences, every identity of docs/theory.md section 1."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from massspring import Body
+from massspring.kernels.deformation import smallest_ratio, tetrahedron_volumes_into
+from massspring.kernels.springs import spring_energy, spring_forces_into
+from massspring.kernels.volume import enclosed_volume, volume_gradient_into
+
+ROUND_OFF = 1e-13  # relative; sums of a few thousand doubles
+STEP = 1e-6  # relative central differences: error ~ 1e-12 truncation + 1e-10 round-off
+DIFFERENCE = 1e-8
+
+
+def moved(body: Body, seed: int = 3, by: float = 0.2) -> np.ndarray:
+    """Positions away from rest, by a fraction of the mean spring length."""
+    amount = by * body.springs.rest_length.mean()
+    return body.rest + amount * np.random.default_rng(seed).uniform(-1, 1, body.rest.shape)
+
+
+def gradient(body: Body, x: np.ndarray) -> np.ndarray:
+    g = np.empty_like(x)
+    volume_gradient_into(x, body.triangles, g)
+    return g
+
+
+def forces(body: Body, x: np.ndarray) -> np.ndarray:
+    f = np.empty_like(x)
+    spring_forces_into(x, body.springs.ends, body.springs.rest_length, body.springs.stiffness, f)
+    return f
+
+
+def energy(body: Body, x: np.ndarray) -> float:
+    return spring_energy(x, body.springs.ends, body.springs.rest_length, body.springs.stiffness)
+
+
+def directional(function, x: np.ndarray, direction: np.ndarray) -> float:
+    """Central difference along a direction of unit maximum norm."""
+    step = STEP * np.abs(x).max()
+    return (function(x + step * direction) - function(x - step * direction)) / (2 * step)
+
+
+@pytest.fixture
+def direction(body: Body) -> np.ndarray:
+    return np.random.default_rng(5).uniform(-1, 1, body.rest.shape)
+
+
+def test_the_volume_gradient_is_the_derivative_of_the_volume(body, direction):
+    x = moved(body)
+    exact = float((gradient(body, x) * direction).sum())
+    assert directional(lambda y: enclosed_volume(y, body.triangles), x, direction) == pytest.approx(exact, rel=DIFFERENCE)
+    # The mutant this must catch: the tetrahedron gradient without its 1/6.
+    assert directional(lambda y: enclosed_volume(y, body.triangles), x, direction) != pytest.approx(6 * exact, rel=0.1)
+
+
+def test_the_gradient_kernel_returns_the_volume_too(body):
+    x = moved(body)
+    assert volume_gradient_into(x, body.triangles, np.empty_like(x)) == pytest.approx(
+        enclosed_volume(x, body.triangles), rel=ROUND_OFF
+    )
+
+
+def test_spring_forces_are_minus_the_derivative_of_the_energy(body, direction):
+    x = moved(body)
+    exact = -float((forces(body, x) * direction).sum())
+    assert directional(lambda y: energy(body, y), x, direction) == pytest.approx(exact, rel=DIFFERENCE)
+
+
+def test_spring_forces_are_internal(body):
+    x = moved(body)
+    f = forces(body, x)
+    scale = np.abs(f).sum()
+    assert np.abs(f.sum(axis=0)).max() < ROUND_OFF * scale
+    assert np.abs(np.cross(x, f).sum(axis=0)).max() < ROUND_OFF * scale
+
+
+def test_springs_at_rest_pull_with_nothing(body):
+    assert np.abs(forces(body, body.rest)).max() < 1e-12 * body.springs.stiffness.max() * body.size
+
+
+def test_a_collapsed_spring_gives_no_nan(body):
+    x = body.rest.copy()
+    x[body.springs.ends[0, 1]] = x[body.springs.ends[0, 0]]
+    assert np.isfinite(forces(body, x)).all()
+
+
+@pytest.mark.parametrize("far", [0.0, 1e3])
+def test_identities_of_the_volume_gradient(body, far):
+    """Σ G = 0, Σ x × G = 0, Σ x·G = 3 V; 1,000 m from the origin as well, less the digits of the positions."""
+    x = moved(body) + far
+    g, volume = gradient(body, x), enclosed_volume(x, body.triangles)
+    scale = np.abs(g).sum() * body.size
+    lost = ROUND_OFF + np.finfo(float).eps * far / body.size
+    assert np.abs(g.sum(axis=0)).max() < lost * scale / body.size
+    centred = x - x.mean(axis=0)
+    assert np.abs(np.cross(centred, g).sum(axis=0)).max() < 10 * lost * scale
+    assert float((centred * g).sum()) == pytest.approx(3 * volume, rel=100 * lost)
+
+
+@given(step=st.floats(-2.0, 2.0))
+@settings(max_examples=25, deadline=None)
+def test_the_volume_along_a_line_is_an_exact_cubic(ball_body, step):
+    """V(x + a d) = V + a G·d + a² Σ x·g(d) + a³ V[d]."""
+    x = moved(ball_body)
+    d = 0.3 * ball_body.size * np.random.default_rng(11).uniform(-1, 1, x.shape)
+    triangles = ball_body.triangles
+    cubic = (
+        enclosed_volume(x, triangles)
+        + step * float((gradient(ball_body, x) * d).sum())
+        + step**2 * float((x * gradient(ball_body, d)).sum())
+        + step**3 * enclosed_volume(d, triangles)
+    )
+    scale = abs(enclosed_volume(x, triangles)) + abs(step) ** 3 * abs(enclosed_volume(d, triangles)) + ball_body.size**3
+    assert abs(enclosed_volume(x + step * d, triangles) - cubic) < 1e-12 * scale
+
+
+def test_the_ball_has_the_volume_of_its_polyhedron(ball_body):
+    """Outside truth: a sum of signed tetrahedra by determinants; and the sphere from below."""
+    x = ball_body.rest
+    determinants = np.linalg.det(x[ball_body.triangles]).sum() / 6
+    assert ball_body.volume == pytest.approx(determinants, rel=1e-12)
+    assert 0.93 < ball_body.volume / (4 / 3 * np.pi * 0.05**3) < 1
+
+
+def test_tetrahedron_volumes_add_up_and_turn_negative_when_turned_over(block_body):
+    volumes = block_body.tetrahedron_volumes
+    assert volumes.sum() == pytest.approx(block_body.volume, rel=ROUND_OFF)
+    mirrored = block_body.rest * np.array([-1.0, 1.0, 1.0])
+    after = np.empty_like(volumes)
+    tetrahedron_volumes_into(mirrored, block_body.tetrahedra, after)
+    assert smallest_ratio(after, volumes) == pytest.approx(-1.0, rel=1e-12)
+
+
+def test_the_smallest_ratio_shows_a_nan(block_body):
+    volumes = block_body.tetrahedron_volumes
+    broken = volumes.copy()
+    broken[5] = np.nan
+    assert np.isnan(smallest_ratio(broken, volumes))

@@ -1,0 +1,282 @@
+"""One contract for every method, and a deliberately wrong method that the contract must reject."""
+
+from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import massspring.kernels.motion as motion_kernels
+from massspring import METHODS, Attachment, Body, Clock, Free, ImplicitVolume, Path, Plane, Setup, Sphere, simulate, step_limit
+from massspring.kernels.volume import enclosed_volume, volume_gradient_into
+from massspring.methods.base import State, begin_frame, start
+
+MOMENTUM_TOL = 1e-12  # relative: round-off of some thousand additions per step, over 40 steps
+
+
+def clock_for(body: Body, frames: int, steps: int, fraction: float = 0.5) -> Clock:
+    dt = fraction * step_limit(body).undamped
+    return Clock(frame=steps * dt, frames=frames, steps=steps)
+
+
+def squeeze(body: Body, depth: float, duration: float) -> tuple[Plane, Plane]:
+    low, high = body.rest[:, 2].min(), body.rest[:, 2].max()
+    down = Path((0.0, duration), ((0, 0, 0), (0, 0, -depth)))
+    up = Path((0.0, duration), ((0, 0, 0), (0, 0, depth)))
+    return Plane((0, 0, high), (0, 0, -1), down), Plane((0, 0, low), (0, 0, 1), up)
+
+
+def thrown(body: Body, seed: int = 1) -> np.ndarray:
+    """Translation, spin and a little noise [m/s]."""
+    spin = np.cross([3.0, -2.0, 1.0], body.rest - body.rest.mean(axis=0))
+    return np.array([0.3, 0.1, -0.2]) + spin + 0.01 * np.random.default_rng(seed).normal(size=body.rest.shape)
+
+
+def momentum(mass, x, v):
+    return mass @ v, np.cross(x, mass[:, None] * v).sum(axis=0)
+
+
+@pytest.fixture(params=METHODS, ids=lambda method: method.name)
+def method(request):
+    return request.param()
+
+
+def test_rest_stays_at_rest(body, method):
+    history = simulate(Setup(body, method, clock_for(body, 5, 20)))
+    assert np.abs(history.final - body.rest).max() < 1e-13 * body.size
+    assert np.abs(history.volume / body.volume - 1).max() < 1e-13
+
+
+def test_free_flight_keeps_momentum_and_spin(body, method):
+    v = thrown(body)
+    setup = Setup(body, method, clock_for(body, 2, 20), velocity=v)
+    state = setup.start()
+    before = momentum(body.mass, state.x, state.v)
+    state = method.advance(state, setup.drive(0))
+    after = momentum(body.mass, state.x, state.v)
+    scale = np.abs(body.mass[:, None] * v).sum()
+    assert np.abs(after[0] - before[0]).max() < MOMENTUM_TOL * scale
+    assert np.abs(after[1] - before[1]).max() < MOMENTUM_TOL * scale * body.size
+
+
+def test_a_fall_is_a_parabola(body, method):
+    """Symplectic Euler falls by g t (t + dt)/2 exactly."""
+    setup = Setup(body, method, clock_for(body, 3, 10), gravity=(0.0, 0.0, -9.81))
+    history = simulate(setup)
+    t = setup.clock.duration
+    drop = 9.81 * t * (t + setup.clock.dt) / 2
+    assert np.allclose(history.final - body.rest, [0, 0, -drop], atol=1e-12)
+
+
+def test_moving_and_turning_the_scene_moves_and_turns_the_answer(block_body, method):
+    turn, _ = np.linalg.qr(np.random.default_rng(8).normal(size=(3, 3)))
+    turn *= np.sign(np.linalg.det(turn))
+    shift = np.array([0.3, -0.2, 0.5])
+    clock = clock_for(block_body, 10, 10)
+    planes = squeeze(block_body, 0.004, clock.duration)
+    here = simulate(Setup(block_body, method, clock, planes, damping=20.0, gravity=(0.0, 0.0, -9.81)))
+    there_body = replace(block_body, rest=block_body.rest @ turn.T + shift)
+    moved = tuple(
+        Plane(
+            tuple(turn @ np.array(p.point) + shift),
+            tuple(turn @ np.array(p.normal)),
+            Path(p.path.times, tuple(tuple(turn @ np.array(d)) for d in p.path.displacements)),
+        )
+        for p in planes
+    )
+    there = simulate(Setup(there_body, method, clock, moved, damping=20.0, gravity=tuple(turn @ [0, 0, -9.81])))
+    # Contact switches amplify round-off a little: 1e-9 of the body, a millionth of the squeeze.
+    assert np.abs(there.final - (here.final @ turn.T + shift)).max() < 1e-9 * block_body.size
+    assert np.allclose(there.contact_force, here.contact_force @ turn.T, atol=1e-6 * np.abs(here.contact_force).max())
+
+
+def test_two_runs_are_bitwise_equal_and_leave_their_input_alone(body, method):
+    clock = clock_for(body, 5, 10)
+    setup = Setup(body, method, clock, squeeze(body, 0.004, clock.duration), damping=20.0)
+    rest, mass = body.rest.copy(), body.mass.copy()
+    state = setup.start()
+    x = state.x.copy()
+    method.advance(state, setup.drive(0))
+    assert np.array_equal(state.x, x)
+    first, second = simulate(setup), simulate(setup)
+    for name in ("volume", "pressure", "contact_force", "final", "kinetic"):
+        assert np.array_equal(getattr(first, name), getattr(second, name))
+    assert np.array_equal(body.rest, rest) and np.array_equal(body.mass, mass)
+
+
+def test_frames_are_only_a_way_of_counting(block_body, method):
+    """40 steps in one frame or in eight: the same bits."""
+    one, many = clock_for(block_body, 1, 40), clock_for(block_body, 8, 5)
+    v = thrown(block_body)
+    assert np.array_equal(
+        simulate(Setup(block_body, method, one, velocity=v)).final,
+        simulate(Setup(block_body, method, many, velocity=v)).final,
+    )
+
+
+def test_settings_survive_json(method):
+    assert type(method)(**asdict(method)) == method
+
+
+def test_the_order_is_the_one_claimed(ball_body, method):
+    """Error at a fixed time against a run with steps 64 times smaller, under halving: slope within 0.25 of the claim.
+
+    Gravity and damping act from the start: without them symplectic Euler is leapfrog in disguise and shows order 2.
+    """
+    v = 0.2 * thrown(ball_body)
+    base = clock_for(ball_body, 1, 8, fraction=0.2)
+
+    def at(factor: int) -> np.ndarray:
+        clock = Clock(base.frame, 1, 8 * factor)
+        return simulate(Setup(ball_body, method, clock, gravity=(0, 0, -9.81), damping=20.0, velocity=v)).final
+
+    truth = at(64)
+    errors = [np.abs(at(factor) - truth).max() for factor in (1, 2, 4)]
+    slope = np.polyfit(np.log([1, 2, 4]), np.log(errors), 1)[0]
+    assert -slope == pytest.approx(method.order, abs=0.25)
+
+
+def volume_claim_holds(method, body) -> bool:
+    """Whether a body blown up by 0.9 % of its volume has it back, as closely as claimed, after each of 20 steps."""
+    setup = Setup(body, method, clock_for(body, 20, 1), damping=30.0)
+    state = setup.start()
+    state.motion.x[:] = 1.003 * body.rest - 0.003 * body.rest.mean(axis=0)
+    worst = 0.0
+    for frame in range(20):
+        state = method.advance(state, setup.drive(frame))
+        worst = max(worst, abs(enclosed_volume(state.x, body.triangles) / body.volume - 1))
+    return worst <= method.volume_tol
+
+
+def test_the_volume_claim(body, method):
+    if method.volume_tol is None:
+        assert not volume_claim_holds(replace_claim(method), body), "a method that claims nothing kept the volume"
+    else:
+        assert volume_claim_holds(method, body)
+
+
+def replace_claim(method):
+    return type("Claimed", (type(method),), {"volume_tol": ImplicitVolume.volume_tol})()
+
+
+@dataclass(frozen=True)
+class SixfoldGradient:
+    """Deliberately wrong: the volume gradient without its 1/6."""
+
+    name: ClassVar[str] = "sixfold_gradient"
+    order: ClassVar[int] = 1
+    volume_tol: ClassVar[float | None] = ImplicitVolume.volume_tol
+
+    def advance(self, state: State, drive) -> State:
+        after = begin_frame(state, drive)
+        net, mo = after.network, after.motion
+        for step in range(len(drive.position)):
+            from massspring.kernels.contact import find_contacts
+            from massspring.kernels.springs import spring_forces_into
+
+            spring_forces_into(mo.x, net.ends, net.rest_length, net.stiffness, mo.force)
+            motion_kernels.predict_velocity_into(
+                mo.v, mo.force, net.inverse_mass, drive.dt, drive.damping, drive.gravity, mo.v_star
+            )
+            error = after.rest_volume - volume_gradient_into(mo.x, net.triangles, mo.gradient)
+            mo.gradient[:] *= 6
+            find_contacts(net, mo, drive, step, 0.0)
+            lam, _ = motion_kernels.volume_multiplier(mo, net.inverse_mass, error, drive.dt)
+            motion_kernels.advance(mo, net.mass, net.inverse_mass, lam, drive.dt, after.tally.contact_impulse)
+        return after
+
+
+def test_the_contract_rejects_the_wrong_method(body):
+    assert not volume_claim_holds(SixfoldGradient(), body)
+
+
+def test_the_one_step_residual_is_exact(body):
+    """V after a step is V0 + ½ Δxᵀ H Δx + V[Δx], that is V0 + Σ x·g(Δx) + V[Δx]: second order in this step only."""
+    setup = Setup(body, ImplicitVolume(), clock_for(body, 1, 1), velocity=thrown(body))
+    state = setup.start()
+    for _ in range(5):  # the residual of earlier steps must not appear
+        before = state.x
+        state = setup.method.advance(state, setup.drive(0))
+        step = state.x - before
+        gradient = np.empty_like(step)
+        cubic = volume_gradient_into(step, body.triangles, gradient)
+        expected = body.volume + float((before * gradient).sum()) + cubic
+        assert enclosed_volume(state.x, body.triangles) == pytest.approx(expected, rel=1e-12)
+        assert abs(expected / body.volume - 1) > 1e-9, "the residual is too small to be seen"
+
+
+def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
+    """Outside truth: [M/dt², −Gᵀ; G, 0] with held nodes and touched nodes as further constraints, solved densely."""
+    body = ball_body
+    rng = np.random.default_rng(0)
+    state = start(body, (Attachment(np.array([5, 17])),), v=0.1 * rng.normal(size=body.rest.shape))
+    net, mo, dt = state.network, state.motion, 1e-3
+    mo.v_star[:] = state.v
+    mo.v_star[net.held_nodes] = [0.02, 0.0, -0.01]
+    touched = np.array([40, 41, 90])
+    normals = rng.normal(size=(3, 3))
+    mo.normal[touched] = normals / np.linalg.norm(normals, axis=1)[:, None]
+    mo.touched[touched] = 1
+    mo.approach[touched] = 0.05 * rng.normal(size=3)
+    wanted = 1.02 * body.volume
+    error = wanted - volume_gradient_into(mo.x, net.triangles, mo.gradient)
+    lam, _ = motion_kernels.volume_multiplier(mo, net.inverse_mass, error, dt)
+
+    n = 3 * body.node_count
+    rows = [dt * mo.gradient.ravel()]
+    right = [error]
+    for i in touched:
+        row = np.zeros((body.node_count, 3))
+        row[i] = mo.normal[i]
+        rows.append(row.ravel())
+        right.append(mo.approach[i])
+    for i in net.held_nodes:
+        for axis in range(3):
+            row = np.zeros((body.node_count, 3))
+            row[i, axis] = 1.0
+            rows.append(row.ravel())
+            right.append(mo.v_star[i, axis])
+    constraints = np.array(rows)
+    mass = np.repeat(body.mass, 3)
+    system = np.block([[np.diag(mass), -constraints.T], [constraints, np.zeros((len(rows), len(rows)))]])
+    solution = np.linalg.solve(system, np.concatenate([mass * mo.v_star.ravel(), right]))
+    assert lam == pytest.approx(solution[n], rel=1e-9)  # the row is dt G, so its multiplier is the pressure
+
+    x = mo.x.copy()
+    motion_kernels.advance(mo, net.mass, net.inverse_mass, lam, dt, np.zeros((1, 3)))
+    assert np.allclose(mo.v.ravel(), solution[:n], atol=1e-12)
+    assert np.allclose(mo.x, x + dt * mo.v)
+
+
+def test_a_body_without_a_volume_gradient_is_counted_not_crashed(ball_body):
+    setup = Setup(ball_body, ImplicitVolume(), clock_for(ball_body, 1, 1))
+    state = setup.start()
+    state.motion.x[:] = np.outer(np.linspace(0, 0.1, ball_body.node_count), [1.0, 0.0, 0.0])
+    after = setup.method.advance(state, setup.drive(0))
+    assert after.tally.skipped[0] == 1
+    assert after.lam == 0.0 and np.isfinite(after.x).all()
+
+
+def test_damping_does_not_bias_the_balance_of_springs_and_pressure(block_body):
+    """Squeezed and at rest, the pressure must not depend on the damping: damping first, forces after.
+
+    The other way round would make it smaller by c dt, here 5 and 25 %.
+    """
+    pressures = []
+    for damping in (20.0, 100.0):
+        clock = clock_for(block_body, 300, 20)
+        obstacles = squeeze(block_body, 0.004, 0.2 * clock.duration)
+        history = simulate(Setup(block_body, ImplicitVolume(), clock, obstacles, damping=damping))
+        pressures.append(history.pressure[-1, 0])
+    assert pressures[0] == pytest.approx(pressures[1], rel=1e-3)
+
+
+def test_free_is_implicit_volume_without_its_volume(ball_body):
+    """A sphere far away changes no bit: the contact stage is skipped by emptiness, not by luck."""
+    clock = clock_for(ball_body, 4, 10)
+    v = thrown(ball_body)
+    far = (Sphere((10.0, 0.0, 0.0), 0.01),)
+    for method in (Free(), ImplicitVolume()):
+        with_sphere = simulate(Setup(ball_body, method, clock, far, velocity=v))
+        without = simulate(Setup(ball_body, method, clock, velocity=v))
+        assert np.array_equal(with_sphere.final, without.final)
