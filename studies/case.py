@@ -1,0 +1,127 @@
+"""A case: scene × body recipe × method × time step, and its form as JSON, under which it is stored and found again."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
+from typing import Any, Literal
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
+
+from massspring import METHODS, ImplicitVolume, Method
+from studies.errors import StudyError
+from studies.scenes.base import Scene
+from studies.suggest import choose
+
+Seconds = float | Literal["auto"]
+
+
+@dataclass(frozen=True)
+class BodyRecipe:
+    """How the mass-spring body is made from the scene's organ."""
+
+    kind: Literal["tetrahedral", "surface"] = "tetrahedral"
+    """"surface": the paper's (JHC05); "tetrahedral": springs on the edges of the filled mesh."""
+    nodes: int = 550
+    """Surface nodes."""
+    law: Literal["van_gelder", "uniform"] = "van_gelder"
+    """Stiffness law of a tetrahedral body."""
+    stiffness: float = 1.0
+    """Factor on every spring; 1 matches the tissue's shear modulus."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One point of a study."""
+
+    scene: Scene
+    body: BodyRecipe = field(default_factory=BodyRecipe)
+    method: Method = field(default_factory=ImplicitVolume)
+    dt: Seconds = "auto"
+    """Time step [s], or "auto": `dt_fraction` of the stability limit."""
+    dt_fraction: float = 0.5
+    frames: int | None = None
+    """Instead of the scene's number of frames; the duration stays."""
+    timed: bool = False
+    """Whether frame times are measured by the timing protocol."""
+
+    @property
+    def name(self) -> str:
+        """Readable; unique within a study together with the hash of the whole case."""
+        step = f"dt{self.dt_fraction:g}" if self.dt == "auto" else f"dt{1e3 * float(self.dt):.4g}ms"
+        parts = [self.scene.name, self.body.kind, str(self.body.nodes), self.method.name, step]
+        if self.body.kind == "tetrahedral" and self.body.law != "van_gelder":
+            parts.append(self.body.law)
+        if self.body.stiffness != 1.0:
+            parts.append(f"k{self.body.stiffness:g}")
+        return "-".join(parts)
+
+    @property
+    def key(self) -> str:
+        """Canonical JSON; equal text means equal case."""
+        return json.dumps(case_to_dict(self), sort_keys=True, ensure_ascii=False)
+
+    def replaced(self, **changes: Any) -> "Case":
+        """A copy with some fields changed."""
+        return replace(self, **changes)
+
+
+def case_to_dict(case: Case) -> dict[str, Any]:
+    """JSON-able form, without `timed`: measuring time changes no physics."""
+    return {
+        "scene": _scene_adapter().dump_python(case.scene, mode="json"),
+        "body": asdict(case.body),
+        "method": {"name": case.method.name, "settings": asdict(case.method)},  # pyright: ignore[reportArgumentType]
+        "dt": case.dt,
+        "dt_fraction": case.dt_fraction,
+        "frames": case.frames,
+    }
+
+
+def case_from_json(text: str) -> Case:
+    """The case of which `text` is the key. Raises StudyError when it is none."""
+    try:
+        data = json.loads(text)
+        return Case(
+            scene=scene_from_dict(data["scene"]),
+            body=_strict(BodyRecipe).validate_python(data["body"]),
+            method=method_from_dict(data["method"]),
+            dt=data["dt"],
+            dt_fraction=data["dt_fraction"],
+            frames=data["frames"],
+        )
+    except (json.JSONDecodeError, KeyError, TypeError, ValidationError) as error:
+        raise StudyError(f"the text is no stored case: {_first_line(error)}") from error
+
+
+def method_from_dict(data: Mapping[str, Any]) -> Method:
+    """The method of {"name": …, "settings": {…}}; a setting that no one reads is an error. Raises StudyError."""
+    kind = choose(data["name"], {method.name: method for method in METHODS}, "method")
+    unknown = set(data["settings"]) - set(kind.__dataclass_fields__)  # pyright: ignore[reportAttributeAccessIssue]
+    if unknown:
+        raise StudyError(f"method '{kind.name}' has no setting {', '.join(sorted(unknown))}")
+    return _strict(kind).validate_python(dict(data["settings"]))
+
+
+def scene_to_json(scene: Scene) -> str:
+    """Canonical JSON of a scene."""
+    return json.dumps(_scene_adapter().dump_python(scene, mode="json"), sort_keys=True, ensure_ascii=False)
+
+
+def scene_from_dict(data: Mapping[str, Any]) -> Scene:
+    """The scene of a JSON-able form; pydantic checks every type."""
+    return _scene_adapter().validate_python(data)
+
+
+@cache
+def _scene_adapter() -> TypeAdapter[Scene]:
+    return TypeAdapter(Scene)
+
+
+@cache
+def _strict(kind: type) -> TypeAdapter[Any]:
+    return TypeAdapter(with_config(ConfigDict(extra="forbid"))(kind))
+
+
+def _first_line(error: Exception) -> str:
+    return " ".join(str(error).split("\n")[:3])

@@ -1,0 +1,11 @@
+"""The studies, one file each. Adding one: a file and a line in STUDIES."""
+
+from studies.catalog.base import Chart, Study
+from studies.catalog.frame_rate import FRAME_RATE
+from studies.catalog.stability_map import STABILITY_MAP
+from studies.catalog.volume_loss import VOLUME_LOSS
+from studies.catalog.work_precision import WORK_PRECISION
+
+STUDIES: tuple[Study, ...] = (VOLUME_LOSS, FRAME_RATE, WORK_PRECISION, STABILITY_MAP)
+
+__all__ = ["STUDIES", "Chart", "Study"]

@@ -1,0 +1,27 @@
+"""What does a frame cost, with and without the constraint, and which deadlines does it meet?"""
+
+from massspring import Free, ImplicitVolume
+from studies.case import BodyRecipe, Case
+from studies.catalog.base import Chart, Study
+from studies.plots import cost_ratio, frame_time
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scenes.liver_probe import LIVER_PROBE
+
+BODIES = (
+    (BALL_SQUEEZE, BodyRecipe("surface", 550)),
+    (BALL_SQUEEZE, BodyRecipe("tetrahedral", 550)),
+    (LIVER_PROBE, BodyRecipe("surface", 550)),
+    (LIVER_PROBE, BodyRecipe("tetrahedral", 550)),
+    (BALL_SQUEEZE, BodyRecipe("surface", 2200)),
+    (BALL_SQUEEZE, BodyRecipe("tetrahedral", 2200)),
+)
+
+FRAME_RATE = Study(
+    name="frame_rate",
+    question=__doc__ or "",
+    cases=tuple(
+        Case(scene, body, method, timed=True) for scene, body in BODIES for method in (Free(), ImplicitVolume())
+    ),
+    charts=(Chart("frame_time.png", frame_time.draw), Chart("cost_ratio.png", cost_ratio.draw)),
+    columns=("step_time", "frame_time", "frame_time_p99", "real_time", "volume_worst"),
+)

@@ -1,0 +1,34 @@
+"""How much volume does each model lose, and how far is it from the reference? (The paper's Figure 3.)"""
+
+from studies.case import BodyRecipe, Case
+from massspring import Free, ImplicitVolume
+from studies.catalog.base import Chart, Study
+from studies.plots import force_path, volume_history
+from studies.scenes import SCENES
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+
+TETRAHEDRAL, SURFACE = BodyRecipe("tetrahedral"), BodyRecipe("surface")
+FINE_STEP = 0.05
+"""The headline is repeated at a tenth of the step, so that it is seen not to depend on it."""
+
+VOLUME_LOSS = Study(
+    name="volume_loss",
+    question=__doc__ or "",
+    cases=(
+        *(Case(scene, body, method) for scene in SCENES for body in (TETRAHEDRAL, SURFACE) for method in (Free(), ImplicitVolume())),
+        *(Case(BALL_SQUEEZE, body, ImplicitVolume(), dt_fraction=FINE_STEP) for body in (TETRAHEDRAL, SURFACE)),
+    ),
+    charts=(Chart("volume.png", volume_history.draw), Chart("force.png", force_path.draw)),
+    columns=(
+        "volume_worst",
+        "volume_end",
+        "force_error",
+        "force_end",
+        "surface_error",
+        "interior_error",
+        "mean_error",
+        "silhouette_error",
+        "pressure_error",
+        "min_j",
+    ),
+)

@@ -1,0 +1,225 @@
+"""Numbers read off a run: functions Run -> float, each with its unit, direction and the floor of its reference."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from studies.case import Case
+from studies.distance import hausdorff
+from studies.geometry.mesh import tetrahedron_volumes, triangle_areas
+from studies.reference import Reference
+from studies.store import Record, Status
+from studies.timing import FrameTiming
+
+PERCENT = 100.0
+ALWAYS = ("volume",)
+"""Quantities with a truth of their own: a volume is compared with the body's own rest volume."""
+COMPARABLE = (Status.OK, Status.INVERTED, Status.DRIFTED)
+"""A run that ended early has no last checkpoint."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A measured case, beside its reference and its frame times where there are any."""
+
+    case: Case
+    record: Record
+    reference: Reference | None = None
+    timing: FrameTiming | None = None
+
+    def field(self, name: str) -> np.ndarray:
+        """Stored values by name."""
+        return self.record.fields[name].values
+
+    @cached_property
+    def checkpoint_frames(self) -> np.ndarray:
+        """Index of the frame that ends at each checkpoint, (K,)."""
+        return np.array([int(np.argmin(np.abs(self.field("t") - t))) for t in self.case.scene.checkpoints])
+
+    @cached_property
+    def force(self) -> np.ndarray:
+        """The probed force of every frame [N], (F,)."""
+        return self.case.scene.probe(self.field("contact_force"), self.field("held_force"))
+
+    @cached_property
+    def volume_ratio(self) -> np.ndarray:
+        """V/V0 of every frame [1], (F,)."""
+        return self.field("volume")[:, 0] / self.record.attributes["rest_volume"]
+
+    @cached_property
+    def displacement_error(self) -> tuple[np.ndarray, np.ndarray]:
+        """Displacements of the material nodes at the last checkpoint and their error [m], both (n, 3)."""
+        assert self.reference is not None  # _against checked it
+        rest = self.field("rest")[self.material_nodes]
+        truth = self.reference.displacement(rest)
+        return truth, self.field("snapshots")[-1][self.material_nodes] - rest - truth
+
+    @cached_property
+    def material_nodes(self) -> np.ndarray:
+        """Nodes that are points of the organ: virtual nodes on an axis are none."""
+        if len(self.field("tetrahedra")):
+            return np.arange(len(self.field("rest")))
+        return np.unique(self.field("triangles"))
+
+    @cached_property
+    def surface_weights(self) -> np.ndarray:
+        """Rest area of each material node [m²], 0 inside."""
+        triangles = self.field("triangles")
+        area = triangle_areas(self.field("rest"), triangles)
+        share = np.bincount(triangles.ravel(), weights=np.repeat(area / 3, 3), minlength=len(self.field("rest")))
+        return share[self.material_nodes]
+
+
+@dataclass(frozen=True)
+class Metric:
+    """How a number is called, what it means, and what it may be compared with."""
+
+    name: str
+    unit: str
+    better: str
+    """"lower", "higher", or "-" where the sign says which way it is off."""
+    of: Callable[[Run], float]
+    quantity: str | None = None
+    """Of the reference: the name of its floor, and what the scene must allow to be compared."""
+
+    @property
+    def description(self) -> str:
+        """First line of the function's docstring."""
+        return (self.of.__doc__ or "").strip().split("\n")[0]
+
+    def __call__(self, run: Run) -> float:
+        """The number; NaN where the run ended early, or its reference or timing is missing."""
+        if self.quantity is not None and self.quantity not in ALWAYS:
+            allowed = self.quantity.split("_")[0] in run.case.scene.quantities
+            if run.reference is None or not allowed:
+                return float("nan")
+        if run.record.status not in COMPARABLE:
+            return float("nan")
+        return float(self.of(run))
+
+    def floor(self, run: Run) -> float:
+        """Uncertainty of the reference in the metric's unit; NaN without one."""
+        if self.quantity is None or run.reference is None:
+            return float("nan")
+        return PERCENT * run.reference.floor[self.quantity]
+
+
+def volume_worst(run: Run) -> float:
+    """100 max |V/V0 − 1| over all frames [%]."""
+    return PERCENT * float(np.max(np.abs(run.volume_ratio - 1)))
+
+
+def volume_end(run: Run) -> float:
+    """100 (V/V0 − 1) after the last frame [%]."""
+    return PERCENT * float(run.volume_ratio[-1] - 1)
+
+
+def force_error(run: Run) -> float:
+    """100 ‖F − F_ref‖/‖F_ref‖ over the checkpoints [%]."""
+    assert run.reference is not None
+    truth = run.reference.force
+    return PERCENT * float(np.linalg.norm(run.force[run.checkpoint_frames] - truth) / np.linalg.norm(truth))
+
+
+def force_end(run: Run) -> float:
+    """100 (F/F_ref − 1) at the last checkpoint [%]."""
+    assert run.reference is not None
+    return PERCENT * float(run.force[run.checkpoint_frames[-1]] / run.reference.force[-1] - 1)
+
+
+def _relative(run: Run, weights: np.ndarray) -> float:
+    truth, error = run.displacement_error
+    return PERCENT * float(np.sqrt((weights @ (error**2).sum(axis=1)) / (weights @ (truth**2).sum(axis=1))))
+
+
+def surface_error(run: Run) -> float:
+    """Area-weighted relative L2 error of the displacement of the surface at the last checkpoint [%]."""
+    return _relative(run, run.surface_weights)
+
+
+def interior_error(run: Run) -> float:
+    """Volume-weighted relative L2 error of the displacement at the last checkpoint [%]; NaN without an interior."""
+    if not len(run.field("tetrahedra")):
+        return float("nan")
+    return _relative(run, run.field("mass"))
+
+
+def mean_error(run: Run) -> float:
+    """Area-weighted mean error over the largest displacement [%], the measure of Duan et al. 2016."""
+    truth, error = run.displacement_error
+    weights = run.surface_weights
+    mean = float(weights @ np.linalg.norm(error, axis=1) / weights.sum())
+    return PERCENT * mean / float(np.linalg.norm(truth, axis=1).max())
+
+
+def silhouette_error(run: Run) -> float:
+    """Symmetric Hausdorff distance of the deformed surfaces over the body's size at the last checkpoint [%]."""
+    assert run.reference is not None
+    points, triangles = run.field("snapshots")[-1], run.field("triangles")
+    size = float(np.linalg.norm(np.ptp(run.field("rest"), axis=0)))
+    return PERCENT * hausdorff(points, triangles, *run.reference.surface()) / size
+
+
+def min_j(run: Run) -> float:
+    """Smallest tetrahedron volume ratio over all frames [1]; NaN for a surface body."""
+    return float(np.min(run.field("min_j")))
+
+
+def inverted_share(run: Run) -> float:
+    """Share of tetrahedra turned inside out at the last checkpoint [%]; NaN for a surface body."""
+    cells = run.field("tetrahedra")
+    if not len(cells):
+        return float("nan")
+    return PERCENT * float((tetrahedron_volumes(run.field("snapshots")[-1], cells) <= 0).mean())
+
+
+def pressure_error(run: Run) -> float:
+    """100 (lam/p_ref − 1) at the last checkpoint [%]; NaN for a method without a pressure."""
+    assert run.reference is not None
+    lam = float(run.field("pressure")[run.checkpoint_frames[-1], 0])
+    return PERCENT * (lam / float(run.reference.field("pressure")[-1]) - 1) if lam else float("nan")
+
+
+def _timing(run: Run, quantile: float) -> float:
+    return float("nan") if run.timing is None else float(np.quantile(run.timing.frame_ns, quantile))
+
+
+def step_time(run: Run) -> float:
+    """Median frame time over the steps in a frame [µs]."""
+    return 1e-3 * _timing(run, 0.5) / run.record.attributes["steps"]
+
+
+def frame_time(run: Run) -> float:
+    """Median frame time [ms]."""
+    return 1e-6 * _timing(run, 0.5)
+
+
+def frame_time_p99(run: Run) -> float:
+    """99th percentile of the frame time [ms]."""
+    return 1e-6 * _timing(run, 0.99)
+
+
+def real_time(run: Run) -> float:
+    """Simulated seconds per second of computing [1]: what explicit steps of different size are compared by."""
+    return float(run.record.attributes["frame"]) / (1e-9 * _timing(run, 0.5))
+
+
+METRICS: tuple[Metric, ...] = (
+    Metric("volume_worst", "%", "lower", volume_worst, "volume"),
+    Metric("volume_end", "%", "-", volume_end, "volume"),
+    Metric("force_error", "%", "lower", force_error, "force"),
+    Metric("force_end", "%", "-", force_end, "force_end"),
+    Metric("surface_error", "%", "lower", surface_error, "surface"),
+    Metric("interior_error", "%", "lower", interior_error, "interior"),
+    Metric("mean_error", "%", "lower", mean_error, "surface"),
+    Metric("silhouette_error", "%", "lower", silhouette_error, "silhouette"),
+    Metric("pressure_error", "%", "-", pressure_error, "pressure"),
+    Metric("min_j", "1", "higher", min_j),
+    Metric("inverted_share", "%", "lower", inverted_share),
+    Metric("step_time", "µs", "lower", step_time),
+    Metric("frame_time", "ms", "lower", frame_time),
+    Metric("frame_time_p99", "ms", "lower", frame_time_p99),
+    Metric("real_time", "s/s", "higher", real_time),
+)

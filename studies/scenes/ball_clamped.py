@@ -1,0 +1,32 @@
+"""A ball whose two polar caps are held, the upper one pushed down: no gauge freedom, displacements are comparable."""
+
+from massspring import Path
+from studies.geometry import HalfSpace
+from studies.scenes.base import LIVER, Held, Organ, Probed, ReferencePlan, Scene, press_times
+
+RADIUS = 0.05  # m
+CAP = 0.8  # the caps are |z| > CAP · RADIUS
+PUSH = 0.25  # of the radius
+PRESS_END = 3.0  # s
+DURATION = 4.0  # s
+
+BALL_CLAMPED = Scene(
+    name="ball_clamped",
+    title="Ball held at both caps, the upper one pushed down by a quarter of the radius",
+    organ=Organ("ball", {"radius": RADIUS}),
+    tissue=LIVER,
+    duration=DURATION,
+    frames=200,
+    checkpoints=press_times(0.0, PRESS_END, 5, DURATION),
+    held=(
+        Held("bottom", HalfSpace((0.0, 0.0, -CAP * RADIUS), (0.0, 0.0, 1.0))),
+        Held(
+            "top",
+            HalfSpace((0.0, 0.0, CAP * RADIUS), (0.0, 0.0, -1.0)),
+            Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), (0.0, 0.0, -PUSH * RADIUS))),
+        ),
+    ),
+    probed=Probed("held", 1, (0.0, 0.0, -1.0)),
+    damping=40.0,
+    reference=ReferencePlan("solid", (200, 350, 600)),
+)

@@ -1,0 +1,28 @@
+"""The paper's Figure 2: a ball between two frictionless planes, squeezed by 30 % of its diameter, 800 recorded frames."""
+
+from massspring import Path, Plane
+from studies.scenes.base import LIVER, Organ, Probed, ReferencePlan, Scene, press_times
+
+RADIUS = 0.05  # m
+DEPTH = 0.30  # of the diameter; each plane does half of it
+PRESS_END = 3.0  # s: 5 mm/s a plane, a twentieth of the speed of a shear wave across the ball in its slowest ringing period
+DURATION = 4.0  # s
+
+BALL_SQUEEZE = Scene(
+    name="ball_squeeze",
+    title="Ball squeezed by 30 % of its diameter between two frictionless planes",
+    organ=Organ("ball", {"radius": RADIUS}),
+    tissue=LIVER,
+    duration=DURATION,
+    frames=800,
+    checkpoints=press_times(0.0, PRESS_END, 6, DURATION),
+    obstacles=(
+        Plane((0.0, 0.0, RADIUS), (0.0, 0.0, -1.0), Path((0.0, PRESS_END), ((0, 0, 0), (0, 0, -DEPTH * RADIUS)))),
+        Plane((0.0, 0.0, -RADIUS), (0.0, 0.0, 1.0), Path((0.0, PRESS_END), ((0, 0, 0), (0, 0, DEPTH * RADIUS)))),
+    ),
+    probed=Probed("obstacle", 0, (0.0, 0.0, -1.0)),
+    damping=40.0,
+    reference=ReferencePlan("octant", (0.30, 0.22, 0.16)),
+    # The ball may turn about any axis at no energy: displacements of material points are not comparable.
+    quantities=("force", "silhouette", "volume"),
+)

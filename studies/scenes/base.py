@@ -1,0 +1,142 @@
+"""A scene: what happens to which organ. Both solvers read the same one, so load, contact and clock agree by construction."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from massspring import Method, Obstacle, Path
+from studies.errors import StudyError
+from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace
+
+Region = HalfSpace | BallRegion | EllipsoidRegion
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Tissue:
+    """Nearly incompressible soft tissue; the mass-spring body matches mu, its volume constraint stands for kappa."""
+
+    shear_modulus: float
+    """mu [Pa]."""
+    density: float
+    """rho [kg/m³]."""
+    source: str
+    """Where the numbers come from."""
+    bulk_over_shear: float = 5000.0
+    """kappa/mu of the reference [1]."""
+
+
+@dataclass(frozen=True)
+class Organ:
+    """A shape the mesher knows, or a mesh file."""
+
+    shape: str
+    """A name of `studies.geometry`, or "file"."""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    """Of the shape; for "file": {"path": …, "unit": "m" or "mm"}."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """A region whose surface nodes follow a path."""
+
+    name: str
+    region: Region
+    path: Path = field(default_factory=Path)
+
+
+@dataclass(frozen=True)
+class Probed:
+    """The force a scene is about: what an obstacle, or an attachment, feels of the body."""
+
+    what: str
+    """"obstacle" or "held"."""
+    number: int
+    direction: Vector
+    """Unit vector of the force on the body, so that a press counts as positive."""
+
+    def __post_init__(self) -> None:
+        if self.what not in ("obstacle", "held"):
+            raise StudyError(f"a force is probed at an 'obstacle' or a 'held' region, not at '{self.what}'")
+
+
+@dataclass(frozen=True)
+class ReferencePlan:
+    """The family of meshes the reference is computed on, coarse to fine; the last one is the reference."""
+
+    mesh: str
+    """"solid": the scene's organ with so many surface nodes; "octant": an eighth of a ball (three symmetry planes)."""
+    levels: tuple[float, ...]
+    """Surface nodes ("solid"), or element size over radius away from the contact ("octant")."""
+
+    def __post_init__(self) -> None:
+        if self.mesh not in ("solid", "octant") or len(self.levels) < 2:
+            raise StudyError("a reference needs a 'solid' or 'octant' mesh and at least two levels, or it has no error bar")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Load, clock and material; immutable and JSON-able."""
+
+    name: str
+    title: str
+    organ: Organ
+    tissue: Tissue
+    duration: float
+    """[s]."""
+    frames: int
+    checkpoints: tuple[float, ...]
+    """Times at which the reference is known [s], ascending; the last one is the scene at its deepest, come to rest."""
+    probed: Probed
+    reference: ReferencePlan | None
+    obstacles: tuple[Obstacle, ...] = ()
+    held: tuple[Held, ...] = ()
+    gravity: Vector = (0.0, 0.0, 0.0)
+    """[m/s²]."""
+    damping: float = 0.0
+    """Mass-proportional [1/s]; both models have the same."""
+    quantities: tuple[str, ...] = ("force", "surface", "interior", "silhouette", "volume")
+    """What may be compared; a scene that leaves a rigid turn free drops "surface" and "interior" (gauge freedom)."""
+    not_for: tuple[tuple[str, str], ...] = ()
+    """(method, reason): combinations that make no sense."""
+
+    def skip(self, method: Method) -> str | None:
+        """Why `method` does not apply here; None when it does."""
+        return dict(self.not_for).get(method.name)
+
+    @property
+    def regions(self) -> dict[str, Region]:
+        """Attachment regions by name, as the mesher wants them."""
+        return {held.name: held.region for held in self.held}
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the reference is an octant, mirrored at the three coordinate planes."""
+        return self.reference is not None and self.reference.mesh == "octant"
+
+    def probe(self, contact_force: np.ndarray, held_force: np.ndarray) -> np.ndarray:
+        """The probed force [N], (…,), of forces on the body (…, o, 3) and (…, g, 3): positive for a press."""
+        force = contact_force if self.probed.what == "obstacle" else held_force
+        return force[..., self.probed.number, :] @ np.asarray(self.probed.direction)
+
+
+LIVER = Tissue(1800.0, 1060.0, "liver, MR elastography: 1.8 ± 0.4 kPa; density 1,060 kg/m³")
+
+
+def press_times(start: float, end: float, steps: int, rest: float) -> tuple[float, ...]:
+    """`steps` evenly spaced times up to the end of a press [s], the last one moved to `rest`, when all has come to rest."""
+    times = np.linspace(start, end, steps + 1)[1:]
+    return (*times[:-1].tolist(), rest)
+
+
+def scaled(direction: Vector, length: float) -> Vector:
+    """length · direction."""
+    return (length * direction[0], length * direction[1], length * direction[2])
+
+
+def along(point: Vector, direction: Vector, length: float) -> Vector:
+    """point + length · direction."""
+    step = scaled(direction, length)
+    return (point[0] + step[0], point[1] + step[1], point[2] + step[2])

@@ -1,0 +1,31 @@
+"""A liver held at its bare area and pressed from the front by a frictionless plane, as by the flat of a hand."""
+
+from massspring import Path, Plane
+from studies.geometry import LIVER_PRESS_DIRECTION, LIVER_REGIONS
+from studies.scenes.base import LIVER, Held, Organ, Probed, ReferencePlan, Scene, press_times, scaled
+
+FRONT = -0.0690  # m: the liver begins at -0.0686 along the press direction
+DEPTH = 0.020  # m, a sixth of the liver's depth
+PRESS_END = 3.0  # s
+DURATION = 4.0  # s
+
+LIVER_PRESS = Scene(
+    name="liver_press",
+    title="Liver held at its bare area, pressed 20 mm by a frictionless plane from the front",
+    organ=Organ("liver"),
+    tissue=LIVER,
+    duration=DURATION,
+    frames=200,
+    checkpoints=press_times(0.0, PRESS_END, 5, DURATION),
+    obstacles=(
+        Plane(
+            scaled(LIVER_PRESS_DIRECTION, FRONT),
+            LIVER_PRESS_DIRECTION,
+            Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(LIVER_PRESS_DIRECTION, DEPTH))),
+        ),
+    ),
+    held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),
+    probed=Probed("obstacle", 0, LIVER_PRESS_DIRECTION),
+    damping=15.0,
+    reference=ReferencePlan("solid", (250, 400, 650)),
+)

@@ -1,0 +1,33 @@
+"""A liver held at its bare area, palpated by a spherical probe low on the front of the right lobe."""
+
+from massspring import Path, Sphere
+from studies.geometry import LIVER_PROBE_NORMAL, LIVER_PROBE_POINT, LIVER_REGIONS
+from studies.scenes.base import LIVER, Held, Organ, Probed, ReferencePlan, Scene, along, press_times, scaled
+
+RADIUS = 0.020  # m, a thumb; twice the edge of the coarsest reference mesh, so that the contact is resolved
+DEPTH = 0.010  # m
+GAP = 0.0005  # m between probe and surface at the start
+PRESS_END = 3.0  # s
+DURATION = 4.0  # s
+INWARD = scaled(LIVER_PROBE_NORMAL, -1.0)
+
+LIVER_PROBE = Scene(
+    name="liver_probe",
+    title="Liver held at its bare area, a spherical probe of 20 mm radius pushed in by 10 mm",
+    organ=Organ("liver"),
+    tissue=LIVER,
+    duration=DURATION,
+    frames=200,
+    checkpoints=press_times(0.0, PRESS_END, 5, DURATION),
+    obstacles=(
+        Sphere(
+            along(LIVER_PROBE_POINT, LIVER_PROBE_NORMAL, RADIUS + GAP),
+            RADIUS,
+            Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(INWARD, DEPTH + GAP))),
+        ),
+    ),
+    held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),
+    probed=Probed("obstacle", 0, INWARD),
+    damping=15.0,
+    reference=ReferencePlan("solid", (250, 400, 650)),
+)

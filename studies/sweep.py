@@ -1,0 +1,185 @@
+"""A study from start to end: what is stale runs, the rest stays; references and physics in parallel, timing alone."""
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from studies.case import Case
+from studies.catalog import Study
+from studies.errors import StudyError
+from studies.metrics import Run
+from studies.reference import Reference, load_reference, reference_is_current, reference_path, solve_reference
+from studies.run import case_is_current, case_path, run_case
+from studies.scenes import Scene
+from studies.store import Status, peek, read_record
+from studies.timed import read_timing, time_cases, timing_is_current
+
+ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+"""Every process computes on one core: the cores are shared out by cases, not inside them."""
+
+
+class Progress(Protocol):
+    """Who wants to know how far a sweep is."""
+
+    def begin(self, what: str, total: int) -> None:
+        """A stage of `total` pieces begins."""
+        ...
+
+    def advance(self, what: str, note: str) -> None:
+        """One piece is done."""
+        ...
+
+
+@dataclass(frozen=True)
+class Task:
+    """One piece of work that can run in any process: a reference on one mesh, or a case."""
+
+    root: Path
+    study: str
+    case: Case | None = None
+    scene: Scene | None = None
+    level: float = 0.0
+
+    @property
+    def weight(self) -> float:
+        """Longest first keeps both cores busy to the end: references by mesh, then cases by size over step."""
+        if self.case is None:
+            return 1e9 + (self.level if self.level > 1 else 1e3 / self.level)
+        return self.case.body.nodes / self.case.dt_fraction
+
+    @property
+    def label(self) -> str:
+        """For progress and messages."""
+        return self.case.name if self.case is not None else f"reference {self.scene.name if self.scene else ''} {self.level:g}"
+
+    def is_current(self) -> bool:
+        """Whether it need not run."""
+        if self.case is not None:
+            return case_is_current(self.root, self.study, self.case)
+        assert self.scene is not None
+        return reference_is_current(self.root, self.scene, self.level)
+
+    def path(self) -> Path:
+        """Where its record lies."""
+        if self.case is not None:
+            return case_path(self.root, self.study, self.case)
+        assert self.scene is not None
+        return reference_path(self.root, self.scene, self.level)
+
+    def perform(self) -> Path:
+        """Does it."""
+        if self.case is not None:
+            return run_case(self.root, self.study, self.case)
+        assert self.scene is not None
+        return solve_reference(self.root, self.scene, self.level)
+
+
+def tasks_of(root: Path, studies: Iterable[Study]) -> list[Task]:
+    """Everything the studies need, each piece once, longest first."""
+    tasks: dict[Path, Task] = {}
+    for study in studies:
+        for scene in study.scenes:
+            for level in scene.reference.levels[-2:] if scene.reference is not None else ():
+                task = Task(root, study.name, scene=scene, level=level)
+                tasks[task.path()] = task
+        for case in study.cases:
+            task = Task(root, study.name, case=case)
+            tasks[task.path()] = task
+    return sorted(tasks.values(), key=lambda task: -task.weight)
+
+
+def perform(tasks: list[Task], jobs: int, progress: Progress) -> None:
+    """Runs the tasks in `jobs` processes. Ctrl-C keeps what is stored; a process that dies is reported by name."""
+    if not tasks:
+        return
+    progress.begin("physics", len(tasks))
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # read by the libraries when a worker loads them
+    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+    try:
+        futures: dict[Future[Path], Task] = {pool.submit(task.perform): task for task in tasks}
+        for future in as_completed(futures):
+            future.result()
+            progress.advance("physics", futures[future].label)
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def run_studies(
+    root: Path, studies: list[Study], jobs: int, progress: Progress, wanted: Callable[[Task], bool] | None = None
+) -> int:
+    """Brings the studies up to date below `root`; the number of pieces that had to run.
+
+    `wanted` replaces the rule "what is not current". Raises StudyError when results cannot be written.
+    """
+    rule = wanted or (lambda task: not task.is_current())
+    todo = [task for task in tasks_of(root, studies) if rule(task)]
+    perform(todo, jobs, progress)
+    measured = 0
+    for study in studies:
+        pending = [case for case in study.cases if case.timed and not timing_is_current(root, study.name, case)]
+        measured += len(pending)
+        if pending:
+            progress.begin("timing", len(pending))
+            time_cases(root, study.name, pending, lambda name: progress.advance("timing", name))
+    return len(todo) + measured
+
+
+def load_runs(root: Path, study: Study) -> tuple[list[Run], list[str]]:
+    """The stored runs of a study with references and timings, and what is missing, a sentence each."""
+    references: dict[str, Reference | None] = {}
+    remarks: list[str] = []
+    for scene in study.scenes:
+        try:
+            references[scene.name] = load_reference(root, scene)
+        except StudyError as error:
+            references[scene.name] = None
+            remarks.append(str(error))
+    runs = []
+    for case in study.cases:
+        path = case_path(root, study.name, case)
+        if not path.exists():
+            remarks.append(f"case {case.name} has not run")
+            continue
+        timing = read_timing(root, study.name, case) if case.timed else None
+        runs.append(Run(case, read_record(path), references[case.scene.name], timing))
+    return runs, remarks
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a piece of work stands."""
+
+    task: Task
+    status: str
+    """A Status, "stale" or "missing"."""
+    message: str
+
+
+def standings(root: Path, study: Study) -> list[Standing]:
+    """Every piece of a study: ok, failed in some way, stale or missing."""
+    found = []
+    for task in tasks_of(root, [study]):
+        path = task.path()
+        if not path.exists():
+            found.append(Standing(task, "missing", "has not run"))
+        elif not task.is_current():
+            found.append(Standing(task, "stale", "the code or the case has changed since"))
+        else:
+            record = peek(path)
+            found.append(Standing(task, str(record.status), record.message))
+    return found
+
+
+def failed(task: Task) -> bool:
+    """Whether the stored result of a task is no success."""
+    return task.path().exists() and peek(task.path()).status in (Status.FAILED, Status.NOT_CONVERGED, Status.TIMED_OUT)

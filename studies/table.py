@@ -1,0 +1,38 @@
+"""One row per case: what it was, how it ended, and the study's metrics beside the floor of their reference."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from studies.metrics import METRICS, Metric, Run
+from studies.suggest import choose
+
+
+def metric(name: str) -> Metric:
+    """The metric called `name`. Raises StudyError with the nearest match."""
+    return choose(name, {m.name: m for m in METRICS}, "metric")
+
+
+def study_table(runs: Sequence[Run], columns: Sequence[str]) -> pd.DataFrame:
+    """Metrics `columns` of `runs`; a column "… floor" follows where the reference has an uncertainty of its own."""
+    return pd.DataFrame([_row(run, [metric(name) for name in columns]) for run in runs])
+
+
+def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
+    case, attributes = run.case, run.record.attributes
+    row: dict[str, object] = {
+        "scene": case.scene.name,
+        "body": case.body.kind,
+        "nodes": case.body.nodes,
+        "stiffness": case.body.stiffness,
+        "method": case.method.name,
+        "dt [ms]": 1e3 * attributes["dt"] if "dt" in attributes else float("nan"),
+        "dt/dt_c": attributes["dt"] / attributes["dt_limit"] if "dt" in attributes else float("nan"),
+        "status": str(run.record.status),
+    }
+    for entry in metrics:
+        row[f"{entry.name} [{entry.unit}]"] = entry(run)
+        floor = entry.floor(run)
+        if floor == floor:
+            row[f"{entry.name} floor [{entry.unit}]"] = floor
+    return row
