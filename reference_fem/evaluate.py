@@ -15,8 +15,8 @@ class Evaluator:
     """Finds rest points in a mesh once per call and interpolates P2 fields there.
 
     A point outside is extrapolated from the nearest element; `outside` holds the distances of the last call (M,) [m],
-    zero for points inside. Raises ReferenceProblem for a point farther out than max_outside [m] (default: 5 % of the
-    diagonal of the body's box).
+    zero for points inside (measured along the element's own axes: in a skew element more than the true distance).
+    Raises ReferenceProblem for a point farther out than max_outside [m] (default: 5 % of the diagonal of the box).
     """
 
     def __init__(self, mesh: MeshTet, max_outside=None):
@@ -39,15 +39,14 @@ class Evaluator:
         if points.shape[1:] != (3,) or not np.isfinite(points).all():
             raise ReferenceProblem(f"points of shape {points.shape} are to be evaluated: give finite (M, 3) values [m]")
         element, local = np.zeros(len(points), dtype=np.int64), np.zeros((len(points), 3))
-        inside, open_ = np.full(len(points), -np.inf), np.arange(len(points))
+        self.outside, open_ = np.full(len(points), np.inf), np.arange(len(points))
         for count in (8, 32, 128):
-            self.improve(points, open_, count, (element, local, inside))
-            open_ = np.flatnonzero(inside < INSIDE)
+            self.improve(points, open_, count, (element, local))
+            open_ = np.flatnonzero(self.outside > 0.0)
             if open_.size == 0:
-                break
-        self.outside = self.distances(points, element, local, inside)
-        worst = int(np.argmax(self.outside)) if len(points) else 0
-        if len(points) and self.outside[worst] > self.max_outside:
+                return element, local
+        worst = int(np.argmax(self.outside))
+        if self.outside[worst] > self.max_outside:
             raise ReferenceProblem(
                 f"point {worst} at {points[worst]} lies {self.outside[worst]:.3g} m outside the mesh (limit "
                 f"{self.max_outside:.3g} m): give rest positions in metres, inside the body"
@@ -55,40 +54,43 @@ class Evaluator:
         return element, local
 
     def improve(self, points, open_, count, found):
-        """Try the `count` elements with the nearest centroids for the open points, keep the best of each."""
-        element, local, inside = found
+        """Try the `count` elements with the nearest centroids for the open points, keep the closest of each."""
+        element, local = found
         count = min(count, len(self.table))
         _, near = self.tree.query(points[open_], k=count)
-        near = near.reshape(len(open_), count)
-        for candidate in near.T:
+        for candidate in near.reshape(len(open_), count).T:
             reference = self.invert(candidate, points[open_])
-            depth = np.minimum(reference.min(axis=1), 1.0 - reference.sum(axis=1))
-            better = depth > inside[open_]
+            distance = self.distances(points[open_], candidate, reference)
+            better = distance < self.outside[open_]
             where = open_[better]
-            element[where], local[where], inside[where] = candidate[better], reference[better], depth[better]
+            element[where], local[where], self.outside[where] = candidate[better], reference[better], distance[better]
 
     def invert(self, element, points):
-        """Reference coordinates of points in the (curved) elements, by Newton from the straight map."""
+        """Reference coordinates of points in the (curved) elements, by Newton from the straight map.
+
+        Points farther than one element's size keep the straight map's: their element is not the nearest.
+        """
         corners = self.corners[element]
         edges = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
         local = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
-        reach = np.clip(local, -1.0, 2.0)
-        nearby = (reach == local).all(axis=1)
+        near = np.flatnonzero((np.abs(local - 0.5) <= 1.5).all(axis=1))
+        reach, x, wanted = local[near], self.x[self.table[element[near]]], points[near]
         for _ in range(8):
             values, gradients = basis_table(ElementTetP2(), reach.T)
-            x = self.x[self.table[element]]
-            gap = points - np.einsum("ma,mai->mi", values, x)
+            gap = wanted - np.einsum("ma,mai->mi", values, x)
             slope = np.einsum("mai,mJa->miJ", x, gradients)
             move = np.linalg.solve(slope, gap[:, :, None])[:, :, 0]
             reach = np.clip(reach + move, -1.0, 2.0)
-            if np.abs(move[nearby]).max(initial=0.0) < 1e-13:
+            if np.abs(move).max(initial=0.0) < 1e-13:
                 break
-        return reach
+        local[near] = reach
+        return local
 
-    def distances(self, points, element, local, inside):
-        """Distance from each point to its element, over the clipped reference coordinates [m]."""
+    def distances(self, points, element, local):
+        """Distance from each point to where its clipped reference coordinates lead [m]; zero inside."""
+        inside = np.minimum(local.min(axis=1), 1.0 - local.sum(axis=1)) >= INSIDE
         clipped = np.clip(local, 0.0, 1.0)
         clipped /= np.maximum(1.0, clipped.sum(axis=1))[:, None]
         values, _ = basis_table(ElementTetP2(), clipped.T)
         near = np.einsum("ma,mai->mi", values, self.x[self.table[element]])
-        return np.where(inside < INSIDE, np.linalg.norm(points - near, axis=1), 0.0)
+        return np.where(inside, 0.0, np.linalg.norm(points - near, axis=1))

@@ -133,8 +133,9 @@ class SymmetricSolver:
         misfit = self.misfit(x, b)
         if not misfit <= RESIDUAL_LIMIT:
             raise ReferenceProblem(
-                f"the tangent matrix of {len(self.upper.indptr) - 1} unknowns is singular to working precision (relative "
-                f"residual {misfit:.1e}, limit {RESIDUAL_LIMIT:.0e}): part of the body may be free to move, hold it"
+                f"the tangent matrix of {len(self.upper.indptr) - 1} unknowns is singular to working precision "
+                f"(relative residual {misfit:.1e}, limit {RESIDUAL_LIMIT:.0e}): part of the body may be free to move, "
+                f"hold it"
             )
         return x
 

@@ -1,0 +1,105 @@
+"""The sparse solver: both backends, refusal of singular matrices, one warning."""
+
+import builtins
+import importlib.util
+import warnings
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from reference_fem import (
+    Held,
+    NeoHookean,
+    NewtonSettings,
+    Problem,
+    ReferenceProblem,
+    SlowSolverWarning,
+    equilibrium_path,
+    linear,
+)
+from tests.reference_fem.bodies import block, symmetry
+
+BACKENDS = ["scipy"] + (["pardiso"] if importlib.util.find_spec("pypardiso") else [])
+
+
+def saddle_matrix(n=40, seed=0):
+    """Symmetric indefinite, with a tiny lower-right block like that of a nearly incompressible solid."""
+    rng = np.random.default_rng(seed)
+    B = rng.standard_normal((n // 4, n))
+    K = rng.standard_normal((n, n))
+    return np.block([[K @ K.T + n * np.eye(n), B.T], [B, -1e-6 * np.eye(n // 4)]])
+
+
+def upper(matrix):
+    return sp.csr_matrix(np.triu(matrix))
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_solution_solves_the_whole_symmetric_system(backend):
+    solver = linear.SymmetricSolver(backend)
+    for seed in (0, 1):  # the second matrix reuses the analysis of the first
+        A = saddle_matrix(seed=seed)
+        b = np.arange(len(A), dtype=float)
+        solver.factor(upper(A))
+        assert np.abs(A @ solver.solve(b) - b).max() <= linear.RESIDUAL_LIMIT * b.max()
+    solver.release()
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_singular_matrix_is_refused(backend):
+    A = saddle_matrix()
+    A[3, :] = A[2, :]
+    A[:, 3] = A[:, 2]
+    A[2, 2] = A[2, 3] = A[3, 2] = A[3, 3]
+    solver = linear.SymmetricSolver(backend)
+    with pytest.raises(ReferenceProblem, match="free to move"):
+        solver.factor(upper(A))
+        solver.solve(np.arange(len(A), dtype=float))
+    solver.release()
+
+
+def test_a_stale_factorisation_is_noticed():
+    """The check of every answer by its residual: factors of another matrix do not pass."""
+    solver = linear.SymmetricSolver("scipy")
+    solver.factor(upper(saddle_matrix()))
+    b = np.arange(50, dtype=float)
+    stale = solver.factors.solve(b)
+    solver.upper = upper(saddle_matrix(seed=1))
+    assert solver.misfit(stale, b) > linear.RESIDUAL_LIMIT
+
+
+@pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
+def test_both_backends_give_the_same_equilibrium():
+    held = [*symmetry(), Held(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.0, 0.1 * t, -0.2 * t))]
+    problem = Problem(block(skew=0.1), NeoHookean(1.0, 1000.0), held[2:])
+    states = [equilibrium_path(problem, [1.0], NewtonSettings(solver=backend))[0] for backend in BACKENDS]
+    np.testing.assert_allclose(states[0].u, states[1].u, atol=1e-9)
+    np.testing.assert_allclose(states[0].held_force, states[1].held_force, atol=1e-7)
+
+
+def test_missing_fast_solver_is_mentioned_once(monkeypatch):
+    usual = builtins.__import__
+
+    def without_pardiso(name, *args, **kwargs):
+        if name == "pypardiso":
+            raise ImportError("not here")
+        return usual(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without_pardiso)
+    linear.load_pardiso.cache_clear()
+    try:
+        with pytest.warns(SlowSolverWarning, match="pypardiso") as told:
+            assert isinstance(linear.SymmetricSolver().factors, linear.ScipyFactors)
+            linear.SymmetricSolver()
+        assert len(told) == 1
+        with pytest.raises(ReferenceProblem, match="use 'auto'"):
+            linear.SymmetricSolver("pardiso")
+    finally:
+        linear.load_pardiso.cache_clear()
+
+
+def test_the_scipy_backend_never_warns():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        linear.SymmetricSolver("scipy")
