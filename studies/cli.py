@@ -1,0 +1,234 @@
+"""The command line: reads words, calls the library, prints. Bad input ends in one sentence and exit code 2."""
+
+import importlib.util
+import sys
+import warnings
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from massspring import METHODS, MassSpringError
+from reference_fem import ReferenceProblem
+from studies import report as reports
+from studies.case import BodyRecipe, Case
+from studies.catalog import STUDIES, Study
+from studies.describe import describe
+from studies.errors import StudyError
+from studies.geometry.organs import SHAPES
+from studies.links import link_study
+from studies.metrics import METRICS
+from studies.paths import study_folder
+from studies.progress import TerminalProgress
+from studies.run import replay as replay_run
+from studies.safe_dt import safe_step
+from studies.scenes import SCENES
+from studies.suggest import choose
+from studies.sweep import Task, failed, load_runs, run_studies, standings
+from studies.table import study_table
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="How accurate, how fast and how stable are volume-preserving mass-spring organs, against finite elements.",
+)
+console = Console(soft_wrap=True)
+errors = Console(stderr=True, soft_wrap=True)
+Results = Annotated[Path, typer.Option("--results", envvar="ORGANBENCH_RESULTS", help="folder of the results")]
+StudyName = Annotated[str, typer.Argument(help="a study (see `organbench list`), or a FILE.py that defines STUDY")]
+SMOKE = "smoke"
+
+
+def main() -> None:
+    """Entry point: exit code 0 done, 2 bad input, 130 interrupted."""
+    warnings.showwarning = lambda message, *_: errors.print(f"warning: {message}", markup=False, highlight=False)  # type: ignore[assignment]
+    try:
+        app()
+    except (StudyError, MassSpringError, ReferenceProblem) as error:
+        errors.print(f"organbench: {error}", markup=False, highlight=False)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        errors.print("organbench: interrupted; what is finished is stored, the same command goes on from there")
+        sys.exit(130)
+
+
+def find_study(name: str) -> Study:
+    """A study of the catalogue, or STUDY of a Python file. Raises StudyError."""
+    if not name.endswith(".py"):
+        return choose(name, {study.name: study for study in STUDIES}, "study")
+    spec = importlib.util.spec_from_file_location("organbench_user_study", name)
+    if spec is None or spec.loader is None or not Path(name).is_file():
+        raise StudyError(f"there is no study file {name}; give a Python file that defines STUDY")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    study = getattr(module, "STUDY", None)
+    if not isinstance(study, Study):
+        raise StudyError(f"{name} defines no STUDY of type studies.catalog.Study; see CONTRIBUTING.md")
+    return study
+
+
+@app.command("list")
+def list_all() -> None:
+    """Studies, scenes, organs, methods and metrics, a line each."""
+    groups = {
+        "studies": [(s.name, s.question.strip().split("\n")[0]) for s in STUDIES],
+        "scenes": [(s.name, s.title) for s in SCENES],
+        "organs": [(name, (make.__doc__ or "").strip().split("\n")[0]) for name, make in SHAPES.items()],
+        "methods": [(m.name, (m.__doc__ or "").strip().split("\n")[0]) for m in METHODS],
+        "metrics": [(m.name, m.description) for m in METRICS],
+    }
+    for title, rows in groups.items():
+        table = Table(title=title, title_justify="left", show_header=False, box=None)
+        for row in rows:
+            table.add_row(*map(escape, row))
+        console.print(table)
+
+
+@app.command()
+def run(
+    studies: Annotated[list[str], typer.Argument(help="studies of the catalogue, or a FILE.py that defines STUDY")],
+    results: Results = Path("results"),
+    smoke: Annotated[bool, typer.Option(help="small meshes, few frames; kept apart in results/smoke")] = False,
+    only: Annotated[str, typer.Option(help="failed, stale, or both with a comma: nothing else runs")] = "",
+    jobs: Annotated[int, typer.Option(min=1, help="processes for the physics; timing always runs alone")] = 2,
+) -> None:
+    """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
+    wanted = _filter(only)
+    root = results / SMOKE if smoke else results
+    for name in studies:
+        study = find_study(name).smoke() if smoke else find_study(name)
+        with TerminalProgress(console) as progress:
+            count = run_studies(root, [study], jobs, progress, wanted)
+        for sentence in link_study(root, study.name):
+            errors.print(f"warning: {sentence}", markup=False)
+        charts = [study_folder(root, study.name) / chart.file for chart in study.charts]
+        if count or not all(chart.exists() for chart in charts):
+            _draw(root, study)
+        console.print(f"{study.name}: {count} pieces ran, charts in {study_folder(root, study.name)}", highlight=False)
+
+
+def _filter(only: str):  # noqa: ANN202
+    if not only:
+        return None
+    rules = {"failed": failed, "stale": lambda task: task.path().exists() and not task.is_current()}
+    chosen = [choose(word.strip(), rules, "filter") for word in only.split(",")]
+    return lambda task: any(rule(task) for rule in chosen)
+
+
+def _draw(root: Path, study: Study) -> list[Path]:
+    runs, remarks = load_runs(root, study)
+    for sentence in remarks:
+        errors.print(f"warning: {sentence}", markup=False, highlight=False)
+    return reports.draw_charts(root, study, runs)
+
+
+@app.command()
+def status(study: Annotated[str, typer.Argument()] = "", results: Results = Path("results")) -> None:
+    """How many cases are ok, failed, stale or missing, and why."""
+    chosen = [find_study(study)] if study else list(STUDIES)
+    for entry in chosen:
+        found = standings(results, entry)
+        counts: dict[str, int] = {}
+        for standing in found:
+            counts[standing.status] = counts.get(standing.status, 0) + 1
+        console.print(f"{entry.name}: " + ", ".join(f"{n} {word}" for word, n in counts.items()), highlight=False)
+        if study:
+            for standing in found:
+                if standing.status != "ok":
+                    console.print(f"  {standing.status:13} {standing.task.label}: {standing.message}", markup=False)
+
+
+@app.command()
+def show(path: Path) -> None:
+    """What is in a results file: tree, units, status, key numbers."""
+    console.print(describe(path))
+
+
+@app.command()
+def table(
+    study: StudyName,
+    results: Results = Path("results"),
+    csv: Annotated[Path | None, typer.Option(help="write it there instead of printing it")] = None,
+) -> None:
+    """One row per case, with the metrics of the study."""
+    entry = find_study(study)
+    runs, remarks = load_runs(results, entry)
+    for sentence in remarks:
+        errors.print(f"warning: {sentence}", markup=False, highlight=False)
+    frame = study_table(runs, entry.columns)
+    if csv is not None:
+        console.print(str(reports.write_table(csv, frame)))
+        return
+    console.print(frame.to_string(index=False, float_format=lambda v: f"{v:.4g}"), markup=False, highlight=False)
+
+
+@app.command()
+def plot(study: StudyName, results: Results = Path("results")) -> None:
+    """Draws the charts of a study from what is stored."""
+    for chart in _draw(results, find_study(study)):
+        console.print(str(chart))
+
+
+@app.command()
+def report(
+    results: Results = Path("results"),
+    figures: Annotated[bool, typer.Option(help="also the pictures of organs and of the squeezed ball")] = False,
+    readme: Annotated[bool, typer.Option(help="also put the summary into README.md")] = False,
+) -> None:
+    """All charts and tables, and the summary; names what it wrote."""
+    written, remarks = reports.report(results, STUDIES)
+    if figures:
+        written += reports.draw_figures(results)
+    if readme:
+        reports.write_readme(Path("README.md"), (results / "summary.md").read_text(encoding="utf-8"))
+    for sentence in remarks:
+        errors.print(f"warning: {sentence}", markup=False, highlight=False)
+    for path in written:
+        console.print(str(path), highlight=False)
+
+
+@app.command()
+def replay(path: Path) -> None:
+    """Runs exactly that case again, and says whether it came out the same (exit code 1: it did not)."""
+    stored, new, difference = replay_run(path)
+    if difference is None:
+        console.print(f"{stored.name}: the same, bit for bit ({new.status})", highlight=False)
+        return
+    console.print(f"{stored.name}: {difference}", highlight=False)
+    if stored.fingerprint != new.fingerprint:
+        console.print("the code has changed since it was stored")
+    if stored.machine != new.machine:
+        console.print("it was stored on another machine")
+    raise typer.Exit(1)
+
+
+@app.command("safe-dt")
+def safe_dt(
+    scene: str,
+    method: Annotated[str, typer.Option(help="see `organbench list`")] = "implicit_volume",
+    body: Annotated[str, typer.Option(help="tetrahedral or surface")] = "tetrahedral",
+    nodes: Annotated[int, typer.Option(help="surface nodes")] = 550,
+) -> None:
+    """The stability limit of a scene, predicted and then verified by running just below and just above it."""
+    kind = choose(body, ("tetrahedral", "surface"), "body")
+    case = Case(
+        scene=choose(scene, {s.name: s for s in SCENES}, "scene"),
+        body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
+        method=choose(method, {m.name: m for m in METHODS}, "method")(),
+    )
+    found = safe_step(case)
+    limit = found.limit
+    console.print(f"largest frequency  {limit.frequency:.4g} 1/s")
+    console.print(f"stability limit    {1e3 * limit.damped:.4g} ms  (without damping {1e3 * limit.undamped:.4g} ms)")
+    console.print(f"dt = auto          {1e3 * found.auto:.4g} ms  (margin {limit.damped / found.auto:.3g})")
+    for dt, outcome in found.tried:
+        console.print(f"run at             {1e3 * dt:.4g} ms  ({dt / limit.damped:.3g} of the limit): {outcome}")
+    console.print("verified" if found.verified else "not verified: the limit of this scene is not where it was predicted")
+
+
+if __name__ == "__main__":
+    main()

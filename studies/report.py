@@ -1,0 +1,106 @@
+"""What people look at: charts, tables as CSV, the summary of results that README shows."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from studies.atomic import write_whole
+from studies.catalog import Study
+from studies.errors import StudyError
+from studies.machine import write_machine
+from studies.metrics import Run
+from studies.paths import study_folder
+from studies.sweep import load_runs
+from studies.table import study_table
+
+BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
+"""Between these lines of README.md stands the summary; `organbench report --readme` writes it."""
+
+
+def draw_charts(root: Path, study: Study, runs: Sequence[Run]) -> list[Path]:
+    """Draws all charts of a study; their paths."""
+    folder = study_folder(root, study.name)
+    folder.mkdir(parents=True, exist_ok=True)
+    drawn = []
+    for chart in study.charts:
+        chart.draw(runs, folder / chart.file)
+        drawn.append(folder / chart.file)
+    return drawn
+
+
+def write_table(path: Path, table: pd.DataFrame) -> Path:
+    """A table as CSV with six significant digits; whole or not at all."""
+    write_whole(path, table.to_csv(index=False, float_format="%.6g").encode())
+    return path
+
+
+def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
+    """Charts and tables of all studies, the summary and machine.json; paths, and what is missing in sentences."""
+    written, remarks, runs_of = [], [], {}
+    for study in studies:
+        runs, missing = load_runs(root, study)
+        runs_of[study.name] = runs
+        remarks += [f"{study.name}: {sentence}" for sentence in missing]
+        written += draw_charts(root, study, runs)
+        written.append(write_table(study_folder(root, study.name) / f"{study.name}.csv", study_table(runs, study.columns)))
+    write_machine(root / "machine.json")
+    summary = root / "summary.md"
+    write_whole(summary, (summary_of(runs_of) + "\n").encode())
+    return [*written, summary], remarks
+
+
+def summary_of(runs_of: dict[str, list[Run]]) -> str:
+    """The headline table in Markdown: accuracy of each scene, body and method, beside the floor of the reference."""
+    rows = study_table(runs_of.get("volume_loss", []), SUMMARY_METRICS)
+    if rows.empty:
+        return "No results yet: run `make study`."
+    rows = rows[rows["dt/dt_c"] > 0.25]
+    lines = ["| scene | body | method | " + " | ".join(SUMMARY_HEADS) + " |", "|---|---|---|" + "---|" * len(SUMMARY_HEADS)]
+    for _, row in rows.iterrows():
+        cells = [_cell(row, name) for name in SUMMARY_COLUMNS]
+        lines.append(f"| {row['scene']} | {row['body']} | {row['method']} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+SUMMARY_METRICS = ("volume_worst", "force_end", "interior_error", "mean_error", "silhouette_error", "min_j")
+SUMMARY_COLUMNS = (
+    "volume_worst [%]",
+    "force_end [%]",
+    "interior_error [%]",
+    "mean_error [%]",
+    "silhouette_error [%]",
+    "min_j [1]",
+)
+SUMMARY_HEADS = (
+    "worst \\|V/V0 − 1\\| [%]",
+    "force [%]",
+    "interior rel. L2 [%]",
+    "surface mean / max u [%]",
+    "silhouette / size [%]",
+    "min J",
+)
+
+
+def _cell(row: pd.Series, column: str) -> str:
+    """A value with the uncertainty of its reference, or a dash."""
+    value = row[column]
+    if value != value:
+        return "–"
+    if column.startswith("min_j"):
+        return f"{value:.2f}"
+    if column.startswith("volume"):
+        return f"{value:.2g}"
+    floor = row.get(column.replace(" [", " floor ["), float("nan"))
+    sign = "+" if column.startswith("force") else ""
+    return f"{value:{sign}.3g} ± {floor:.1g}" if floor == floor else f"{value:{sign}.3g}"
+
+
+def write_readme(readme: Path, summary: str) -> None:
+    """Replaces what stands between the marks in README.md. Raises StudyError when the marks are missing."""
+    text = readme.read_text(encoding="utf-8")
+    if BEGIN not in text or END not in text:
+        raise StudyError(f"{readme} has no lines '{BEGIN}' and '{END}' to put the table between")
+    head, rest = text.split(BEGIN, 1)
+    tail = rest.split(END, 1)[1]
+    write_whole(readme, f"{head}{BEGIN}\n{summary.strip()}\n{END}{tail}".encode())
