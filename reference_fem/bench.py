@@ -43,12 +43,12 @@ def iteration_costs(cells=7, repeats=7, solver="auto"):
     solve = fastest(lambda: system.solver.solve(right), repeats)
     system.solver.release()
     return {
-        "unknowns": system.total,
+        "unknowns": int(system.total),
         "assembly_s": assembly,
         "factor_s": factor,
         "solve_s": solve,
         "iteration_s": assembly + factor + solve,
-        "assembled_per_s": system.total / assembly,
+        "assembled_per_s": int(system.total) / assembly,
     }
 
 
