@@ -7,12 +7,12 @@ from massspring.kernels.compiled import compiled
 
 @compiled
 def touch(motion, drive, step, node, u0, u1, u2):
-    """Puts the node on the obstacle it would enter deepest when moving with u [m/s]; True when there is one (eq. 12).
+    """Puts the node on the obstacle it would enter deepest when moving with u [m/s]; the smallest gap [m] (eq. 12).
 
     Plane: gap = n·(x + dt u − p). Sphere: gap = |x + dt u − c| − R, n towards the node.
     `approach` a = n·(target − x)/dt ends the step exactly on the tangent plane, so never inside.
     """
-    deepest = 0.0
+    nearest = math.inf
     dt = drive.dt
     x0, x1, x2 = motion.x[node, 0], motion.x[node, 1], motion.x[node, 2]
     for o in range(drive.radius.shape[0]):
@@ -24,16 +24,17 @@ def touch(motion, drive, step, node, u0, u1, u2):
         else:
             distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
             gap = distance - drive.radius[o]
-            if not (gap < deepest and distance > 0.0):
+            if not distance > 0.0:
                 continue
             n0, n1, n2 = r0 / distance, r1 / distance, r2 / distance
-        if gap < deepest:
-            deepest = gap
-            motion.touched[node] = o + 1
-            motion.normal[node, 0], motion.normal[node, 1], motion.normal[node, 2] = n0, n1, n2
-            along = n0 * (p0 - x0) + n1 * (p1 - x1) + n2 * (p2 - x2)
-            motion.approach[node] = (along + drive.radius[o]) / dt
-    return deepest < 0.0
+        if gap < nearest:
+            nearest = gap
+            if gap < 0.0:
+                motion.touched[node] = o + 1
+                motion.normal[node, 0], motion.normal[node, 1], motion.normal[node, 2] = n0, n1, n2
+                along = n0 * (p0 - x0) + n1 * (p1 - x1) + n2 * (p2 - x2)
+                motion.approach[node] = (along + drive.radius[o]) / dt
+    return nearest
 
 
 @compiled
@@ -44,7 +45,7 @@ def find_contacts(network, motion, drive, step, lam):
         motion.touched[i] = 0
         if network.inverse_mass[i] > 0.0:
             push = drive.dt * lam * network.inverse_mass[i]
-            touch(
+            motion.clearance[i] = touch(
                 motion,
                 drive,
                 step,
@@ -56,12 +57,16 @@ def find_contacts(network, motion, drive, step, lam):
 
 
 @compiled
-def revise_contacts(network, motion, drive, step, lam):
-    """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 13)."""
+def revise_contacts(network, motion, drive, step, lam, reach):
+    """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 13).
+
+    `reach` [m] is how far the new pressure can have moved a node from where `clearance` was measured: distances to
+    planes and spheres change by no more, so a free node farther away need not be looked at.
+    """
     changes = 0
     for c in range(network.surface_nodes.shape[0]):
         i = network.surface_nodes[c]
-        if network.inverse_mass[i] == 0.0:
+        if network.inverse_mass[i] == 0.0 or (motion.touched[i] == 0 and motion.clearance[i] > reach):
             continue
         push = drive.dt * lam * network.inverse_mass[i]
         u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
@@ -71,7 +76,15 @@ def revise_contacts(network, motion, drive, step, lam):
             along = u0 * motion.normal[i, 0] + u1 * motion.normal[i, 1] + u2 * motion.normal[i, 2]
             if motion.approach[i] < along:
                 motion.touched[i] = 0
+                # A released node is looked at again, whatever the pressure becomes.
+                motion.clearance[i] = 0.0
                 changes += 1
-        elif touch(motion, drive, step, i, u0, u1, u2):
+        elif touch(motion, drive, step, i, u0, u1, u2) < 0.0:
             changes += 1
     return changes
+
+
+@compiled
+def pressure_reach(lam_change, mobility, lightest, dt):
+    """dt² |Δlam| √(max w · Σ w |G|²) ≥ dt² |Δlam| w_i |G_i| [m]: how far a change of pressure moves any free node."""
+    return 1.0001 * dt * dt * abs(lam_change) * math.sqrt(max(lightest * mobility, 0.0))

@@ -49,6 +49,8 @@ class Motion(NamedTuple):
     """Unit normal of the touched obstacle, towards the body, (n, 3)."""
     approach: np.ndarray
     """Normal velocity that ends the step on the obstacle [m/s], (n,)."""
+    clearance: np.ndarray
+    """Distance to the nearest obstacle at the end of the predicted step [m], (n,)."""
 
 
 class Drive(NamedTuple):

@@ -19,28 +19,29 @@ def enclosed_volume(x, triangles):
 
 @compiled
 def volume_gradient_into(x, triangles, gradient):
-    """G_i = dV/dx_i = (1/6) Σ_f∋i x_j × x_k [m²], (n, 3); returns V [m³] (eq. 3, 4).
+    """G_i = dV/dx_i = (1/6) Σ_f∋i (x_j - x_i) × (x_k - x_i) [m²], (n, 3); returns V [m³] (eq. 3, 4).
 
+    Around a node of a closed surface this is the sum of x_j × x_k: one area vector a triangle serves all three nodes.
     Identities: Σ G = 0, Σ x × G = 0, Σ x·G = 3 V.
     """
     gradient[:] = 0.0
     o0, o1, o2 = x[triangles[0, 0], 0], x[triangles[0, 0], 1], x[triangles[0, 0], 2]
-    six = 0.0
+    volume = 0.0
     sixth = 1.0 / 6.0
     for f in range(triangles.shape[0]):
         i, j, k = triangles[f, 0], triangles[f, 1], triangles[f, 2]
-        a0, a1, a2 = x[i, 0] - o0, x[i, 1] - o1, x[i, 2] - o2
-        b0, b1, b2 = x[j, 0] - o0, x[j, 1] - o1, x[j, 2] - o2
-        c0, c1, c2 = x[k, 0] - o0, x[k, 1] - o1, x[k, 2] - o2
-        p0, p1, p2 = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
-        six += a0 * p0 + a1 * p1 + a2 * p2
-        gradient[i, 0] += sixth * p0
-        gradient[i, 1] += sixth * p1
-        gradient[i, 2] += sixth * p2
-        gradient[j, 0] += sixth * (c1 * a2 - c2 * a1)
-        gradient[j, 1] += sixth * (c2 * a0 - c0 * a2)
-        gradient[j, 2] += sixth * (c0 * a1 - c1 * a0)
-        gradient[k, 0] += sixth * (a1 * b2 - a2 * b1)
-        gradient[k, 1] += sixth * (a2 * b0 - a0 * b2)
-        gradient[k, 2] += sixth * (a0 * b1 - a1 * b0)
-    return six / 6.0
+        a0, a1, a2 = x[i, 0], x[i, 1], x[i, 2]
+        b0, b1, b2 = x[j, 0] - a0, x[j, 1] - a1, x[j, 2] - a2
+        c0, c1, c2 = x[k, 0] - a0, x[k, 1] - a1, x[k, 2] - a2
+        n0, n1, n2 = sixth * (b1 * c2 - b2 * c1), sixth * (b2 * c0 - b0 * c2), sixth * (b0 * c1 - b1 * c0)
+        volume += (a0 - o0) * n0 + (a1 - o1) * n1 + (a2 - o2) * n2
+        gradient[i, 0] += n0
+        gradient[i, 1] += n1
+        gradient[i, 2] += n2
+        gradient[j, 0] += n0
+        gradient[j, 1] += n1
+        gradient[j, 2] += n2
+        gradient[k, 0] += n0
+        gradient[k, 1] += n1
+        gradient[k, 2] += n2
+    return volume

@@ -71,6 +71,7 @@ def start(body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | 
         touched=np.zeros(n, dtype=np.uint32),
         normal=np.zeros((n, 3)),
         approach=np.zeros(n),
+        clearance=np.zeros(n),
     )
     return State(network, motion, body.volume)
 

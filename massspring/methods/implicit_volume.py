@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from massspring.kernels.compiled import compiled
-from massspring.kernels.contact import find_contacts, revise_contacts
+from massspring.kernels.contact import find_contacts, pressure_reach, revise_contacts
 from massspring.kernels.layout import Drive
 from massspring.kernels.motion import (
     add_held_impulse,
@@ -34,6 +34,7 @@ CONTACT_PASSES = 3
 def implicit_volume_frame(network, motion, drive, tally, rest_volume, lam):
     """One frame of HCJ05 with contact inside the multiplier (eq. 6–13); returns the last lam [Pa]."""
     dt = drive.dt
+    lightest = network.inverse_mass.max()
     for step in range(drive.position.shape[0]):
         spring_forces_into(motion.x, network.ends, network.rest_length, network.stiffness, motion.force)
         predict_velocity_into(
@@ -44,13 +45,15 @@ def implicit_volume_frame(network, motion, drive, tally, rest_volume, lam):
             motion.x, network.held_nodes, network.held_group, network.held_rest, held, dt, motion.v_star
         )
         error = rest_volume - volume_gradient_into(motion.x, network.triangles, motion.gradient)
+        predicted = lam
         passes = 1
         if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, lam)
+            find_contacts(network, motion, drive, step, predicted)
             passes = CONTACT_PASSES
         for sweep in range(passes):
             lam, mobility = volume_multiplier(motion, network.inverse_mass, error, dt)
-            if sweep + 1 < passes and revise_contacts(network, motion, drive, step, lam) == 0:
+            reach = pressure_reach(lam - predicted, mobility, lightest, dt)
+            if sweep + 1 < passes and revise_contacts(network, motion, drive, step, lam, reach) == 0:
                 break
         if not mobility > 0.0:
             tally.skipped[0] += 1

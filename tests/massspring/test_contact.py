@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from massspring import Attachment, Clock, Free, ImplicitVolume, MassSpringError, Path, Plane, Setup, Sphere, simulate
+from massspring.kernels.contact import find_contacts, pressure_reach, revise_contacts
 from tests.massspring.test_methods import clock_for, squeeze
 
 INSIDE = 1e-12  # m: round-off of positions of some centimetres
@@ -112,3 +113,33 @@ def test_bad_attachments_are_refused(ball_body, nodes, words):
     setup = Setup(ball_body, Free(), Clock(0.01, 1, 10), attachments=(Attachment(np.array(nodes, dtype=int)),))
     with pytest.raises(MassSpringError, match=words):
         setup.start()
+
+
+def test_looking_only_at_near_nodes_changes_no_bit(ball_body):
+    """The skip of the contact revision: with the bound on the motion, or looking at every node, the same contacts."""
+    clock = clock_for(ball_body, 30, 10)
+    planes = squeeze(ball_body, 0.01, clock.duration)
+    setup = Setup(ball_body, ImplicitVolume(), clock, planes, damping=30.0)
+    state, changes, skipped = setup.start(), 0, 0
+    for frame in range(30):
+        state = setup.method.advance(state, setup.drive(frame))
+        drive, net, dt = setup.drive(frame), state.network, clock.dt
+        lightest = net.inverse_mass.max()
+        for factor in (-3.0, 0.5, 1.0, 5.0):
+            near, far = (_copied(state.motion) for _ in range(2))
+            for motion in (near, far):
+                find_contacts(net, motion, drive, 0, state.lam)
+            lam = factor * state.lam
+            mobility = float((net.inverse_mass[:, None] * near.gradient**2).sum())
+            reach = pressure_reach(lam - state.lam, mobility, lightest, dt)
+            changed = revise_contacts(net, near, drive, 0, lam, reach)
+            assert changed == revise_contacts(net, far, drive, 0, lam, np.inf)
+            for name in ("touched", "normal", "approach"):
+                assert np.array_equal(getattr(near, name), getattr(far, name))
+            changes += changed
+            skipped += int((near.clearance[ball_body.surface_nodes] > reach).sum())
+    assert changes > 0 and skipped > 0, "the test saw no change of contact, or nothing to skip"
+
+
+def _copied(motion):
+    return motion._replace(**{name: getattr(motion, name).copy() for name in motion._fields})

@@ -1,0 +1,139 @@
+"""The numbers this project promises, measured: `make bench` on a quiet machine. Prints a table, writes results/bench.csv."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from rich.console import Console
+
+from massspring import Attachment, Clock, Free, ImplicitVolume, Material, Method, Path as Motion
+from massspring import Plane, Setup, simulate, step_limit, surface_body
+from reference_fem import bench as reference_bench
+from reference_fem import equilibrium_path
+from studies.adapt_reference import reference_problem, whole_forces
+from studies.case import BodyRecipe, Case
+from studies.geometry import ball
+from studies.report import write_table
+from studies.run import measure
+from studies.scenes.ball_squeeze import BALL_SQUEEZE, PRESS_END, RADIUS
+from studies.spread import kernel_ns, ratio_with_spread
+from studies.timing import interleave, pinned
+
+FRAMES, STEPS, REPEATS = 200, 20, 7
+ORACLE_5 = {0.10: (0.19197, 1.01325), 0.20: (0.60204, 1.04117), 0.30: (1.25968, 1.08359)}
+"""Approach over diameter -> (force over mu R², equator radius over R): incompressible neo-Hookean ball between
+frictionless planes, axisymmetric P2/P1 solution converged to 1e-4 (docs/theory.md, oracle 5)."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A promised number beside the measured one."""
+
+    what: str
+    measured: float
+    unit: str
+    target: float
+    at_most: bool = True
+    note: str = ""
+
+    @property
+    def met(self) -> bool:
+        """Whether the target is reached."""
+        return self.measured <= self.target if self.at_most else self.measured >= self.target
+
+
+def squeezed_setup(method: Method) -> Setup:
+    """The paper's 550-node surface body, held below and pressed by one plane from above; frames of 20 steps."""
+    mesh = ball(550, fill=False)
+    body = surface_body(mesh.points, mesh.triangles, Material(1800.0, 1060.0))
+    clock = Clock(STEPS * 0.5 * step_limit(body).undamped, FRAMES, STEPS)
+    press = Motion((0.0, 0.5 * clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.3 * RADIUS)))
+    plane = Plane((0.0, 0.0, RADIUS), (0.0, 0.0, -1.0), press)
+    held = Attachment(np.flatnonzero(mesh.points[:, 2] < -0.8 * RADIUS))
+    return Setup(body, method, clock, (plane,), (held,), damping=40.0)
+
+
+def step_lines() -> list[Line]:
+    """Cost of a step of the 550-node surface body, and of its volume constraint, by turns in one run."""
+    setups = {method.name: squeezed_setup(method) for method in (Free(), ImplicitVolume())}
+    with pinned(threads=1):
+        times = interleave({name: (lambda s=s: simulate(s).frame_ns) for name, s in setups.items()}, REPEATS)
+    pressed = {name: ns[:, FRAMES // 4 :] for name, ns in times.items()}
+    cost = {name: 1e-3 * kernel_ns(ns) / STEPS for name, ns in pressed.items()}
+    ratio = ratio_with_spread(pressed["implicit_volume"], pressed["free"])
+    springs = setups["free"].body.springs.count
+    return [
+        Line("step, 550 surface nodes, m = 1, one plane", cost["implicit_volume"], "µs", 40.0, note=f"{springs} springs"),
+        Line("the same without the constraint", cost["free"], "µs", 40.0),
+        Line("constraint on / off", ratio.median, "1", 1.35, note=f"interval {ratio.low:.3g} to {ratio.high:.3g}"),
+    ]
+
+
+def volume_lines() -> list[Line]:
+    """Worst volume error of ball_squeeze with the constraint, at two time steps; and what is lost without it."""
+    lines = []
+    for kind in ("tetrahedral", "surface"):
+        for fraction, target in ((0.5, 3e-4), (0.05, 1e-5)):
+            case = Case(BALL_SQUEEZE, BodyRecipe(kind), ImplicitVolume(), dt_fraction=fraction)
+            lines.append(Line(f"ball_squeeze {kind}, |V/V0 - 1| at {fraction:g} dt_c", _worst(case), "1", target))
+    free = Case(BALL_SQUEEZE, BodyRecipe("tetrahedral"), Free())
+    lines.append(Line("ball_squeeze tetrahedral, free: loss", _worst(free), "1", 0.05, at_most=False))
+    return lines
+
+
+def _worst(case: Case) -> float:
+    record = measure(case)
+    return float(np.max(np.abs(record.fields["volume"].values / record.attributes["rest_volume"] - 1)))
+
+
+def reference_lines() -> list[Line]:
+    """The reference on ball_squeeze against oracle 5."""
+    assert BALL_SQUEEZE.reference is not None
+    level = BALL_SQUEEZE.reference.levels[-1]
+    problem = reference_problem(BALL_SQUEEZE, level)
+    times = [PRESS_END * share / 0.30 for share in ORACLE_5]
+    path = equilibrium_path(problem, times)
+    scale = BALL_SQUEEZE.tissue.shear_modulus * RADIUS**2
+    lines = []
+    for (share, (force, equator)), found in zip(ORACLE_5.items(), path, strict=True):
+        got = float(-whole_forces(BALL_SQUEEZE, found.obstacle_force[None])[0, 0, 2]) / scale
+        radius = float(np.hypot(*(problem.mesh.doflocs[:2] + found.u.T[:2])).max()) / RADIUS
+        lines.append(Line(f"reference force at d = {share:.2f}, deviation", abs(got / force - 1), "1", 0.01))
+        lines.append(Line(f"reference equator at d = {share:.2f}, deviation", abs(radius / equator - 1), "1", 1e-3))
+    lines.append(Line("reference volume change", abs(path[-1].volume / path[-1].volume0 - 1), "1", 5e-4))
+    return lines
+
+
+def speed_lines() -> list[Line]:
+    """Assembly and a Newton iteration of the reference on one pinned core."""
+    with pinned(threads=1):
+        cost = reference_bench.iteration_costs(cells=7)
+    note = f"{cost['unknowns']:.0f} unknowns"
+    return [
+        Line("assembly of tangent and residual", cost["assembled_per_s"], "unknowns/s", 250e3, at_most=False, note=note),
+        Line("Newton iteration", cost["iteration_s"], "s", 0.2, note=note),
+    ]
+
+
+def main() -> None:
+    """Measures everything; the table says for each number whether it is met."""
+    stages: tuple[Callable[[], list[Line]], ...] = (step_lines, volume_lines, reference_lines, speed_lines)
+    lines = [line for stage in stages for line in stage()]
+    table = pd.DataFrame(
+        {
+            "what": [line.what for line in lines],
+            "measured": [line.measured for line in lines],
+            "unit": [line.unit for line in lines],
+            "target": [f"{'<=' if line.at_most else '>='} {line.target:g}" for line in lines],
+            "met": ["yes" if line.met else "NO" for line in lines],
+            "note": [line.note for line in lines],
+        }
+    )
+    Console(soft_wrap=True).print(table.to_string(index=False, float_format=lambda v: f"{v:.4g}"), markup=False)
+    write_table(Path("results") / "bench.csv", table)
+
+
+if __name__ == "__main__":
+    main()
