@@ -1,6 +1,6 @@
 """Implicit constraint enforcement for one enclosed volume.
 
-Hong, Jung, Choi, Welch, "Fast volume preservation for realistic muscle deformation" (2005) and Jung, Hong, Choi (2005).
+Hong, Jung, Choi, Welch (2005; IEEE Computer Graphics and Applications 26(5), 2006) and Jung, Hong, Choi (2005).
 The constraint is linearised at the old positions and must hold at the end of the step; with contact inside:
 
     lam = [(V0 − V) − dt G·ṽ] / (dt² G·W̃·G)      v⁺ = ṽ + dt lam W̃ G      x⁺ = x + dt v⁺

@@ -1,0 +1,125 @@
+"""README and CONTRIBUTING say what is true: their code runs, their recipes satisfy the contracts, their table is the stored one."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from massspring import Body, Clock, Material, Setup, simulate, surface_body
+from studies.case import BodyRecipe, Case
+from studies.catalog import STUDIES
+from studies.report import BEGIN, END
+from studies.run import measure
+from studies.store import Status
+from studies.sweep import load_runs, run_studies
+
+ROOT = Path(__file__).parent.parent
+FENCE = re.compile(r"```python\n(.*?)```", re.DOTALL)
+
+
+def code(document: str, heading: str) -> str:
+    """The Python block under a heading."""
+    text = (ROOT / document).read_text(encoding="utf-8")
+    section = text.split(f"## {heading}\n", 1)[1].split("\n## ", 1)[0]
+    found = FENCE.findall(section)
+    assert len(found) == 1, f"{document}, '{heading}': one block of Python expected"
+    return found[0]
+
+
+def executed(document: str, heading: str) -> dict:
+    """What the block under a heading defines."""
+    scope: dict = {"__name__": "recipe"}
+    exec(compile(code(document, heading), f"{document}#{heading}", "exec"), scope)
+    return scope
+
+
+@pytest.mark.parametrize("heading", ["metric", "scene", "method", "study", "organ"])
+def test_recipes_are_short(heading):
+    lines = [line for line in code("CONTRIBUTING.md", f"Add a{'n' if heading == 'organ' else ''} {heading}").split("\n") if line]
+    assert len(lines) <= 8
+
+
+def test_the_example_of_readme_runs(capsys):
+    executed("README.md", "In Python")
+    free, kept = capsys.readouterr().out.strip().split("\n")
+    assert float(free.split()[-1]) < 0.95
+    assert float(kept.split()[-1]) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_an_added_metric_reads_a_run(tmp_path):
+    added = executed("CONTRIBUTING.md", "Add a metric")["ADDED"]
+    study = executed("CONTRIBUTING.md", "Add a study")["STUDY"]
+    plain = Case(study.cases[0].scene.__class__(**{**vars(study.cases[0].scene), "reference": None}), BodyRecipe(nodes=100), frames=5)
+    from studies.metrics import Run
+
+    assert 0 <= added(Run(plain, measure(plain))) < 1e-3
+    assert added.description.startswith("100 mean")
+
+
+def test_an_added_scene_runs():
+    scene = executed("CONTRIBUTING.md", "Add a scene")["ADDED"]
+    record = measure(Case(scene, BodyRecipe(nodes=100), frames=10))
+    assert record.status == Status.OK
+    weight = scene.tissue.density * record.attributes["rest_volume"] * 9.81
+    lift = record.fields["contact_force"].values[-1].sum(axis=0)[2]
+    assert lift == pytest.approx(weight, rel=0.02)
+
+
+def test_an_added_method_runs():
+    method = executed("CONTRIBUTING.md", "Add a method")["Added"]()
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    body: Body = surface_body(points, faces, Material(1000.0, 1000.0))
+    assert simulate(Setup(body, method, Clock(0.01, 2, 10))).outcome == "finished"
+
+
+@pytest.mark.slow
+def test_an_added_study_runs_and_goes_on_where_it_was(tmp_path):
+    from dataclasses import replace
+
+    study = executed("CONTRIBUTING.md", "Add a study")["STUDY"]
+    cases = tuple(replace(case, scene=replace(case.scene, reference=None)) for case in study.cases)
+    study = replace(study, cases=cases)
+
+    class Silent:
+        def begin(self, what, total): ...
+        def advance(self, what, note): ...
+
+    assert run_studies(tmp_path, [study], 1, Silent()) == 2
+    assert run_studies(tmp_path, [study], 1, Silent()) == 0
+    runs, remarks = load_runs(tmp_path, study)
+    assert len(runs) == 2 and not remarks
+
+
+def test_an_added_organ_has_the_volume_of_its_formula():
+    from studies.geometry.levelset import Shape
+
+    shape = executed("CONTRIBUTING.md", "Add an organ")["egg"]()
+    assert isinstance(shape, Shape)
+    samples = np.random.default_rng(0).uniform(shape.low, shape.high, (200_000, 3))
+    volume = (shape.level(samples) < 0).mean() * np.prod(np.subtract(shape.high, shape.low))
+    # 200,000 samples: standard error 0.3 %
+    assert volume == pytest.approx(4 / 3 * np.pi * 0.02 * 0.02 * 0.03, rel=0.015)
+
+
+def test_the_table_of_readme_is_the_stored_one():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = text.split(BEGIN)[1].split(END)[0].strip()
+    assert shown == (ROOT / "results" / "summary.md").read_text(encoding="utf-8").strip()
+
+
+def test_readme_names_only_charts_that_are_made():
+    linked = set(re.findall(r"\(results/(\w+)/(\w+\.png)\)", (ROOT / "README.md").read_text(encoding="utf-8")))
+    made = {(study.name, chart.file) for study in STUDIES for chart in study.charts}
+    assert linked - made <= {("figures", "squeeze.png")}
+    for folder, file in linked:
+        assert (ROOT / "results" / folder / file).is_file()
+
+
+def test_every_equation_the_code_cites_is_in_the_theory():
+    known = set(re.findall(r"\*\*\((\d+)\)\*\*", (ROOT / "docs/theory.md").read_text(encoding="utf-8")))
+    for source in [*ROOT.glob("massspring/**/*.py"), *ROOT.glob("studies/**/*.py")]:
+        for group in re.findall(r"eq\. ([\d, –]+)", source.read_text(encoding="utf-8")):
+            for number in re.findall(r"\d+", group):
+                assert number in known, f"{source.name} cites equation {number}"
