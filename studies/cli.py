@@ -153,13 +153,14 @@ def table(
     study: StudyName,
     results: Results = Path("results"),
     csv: Annotated[Path | None, typer.Option(help="write it there instead of printing it")] = None,
+    metrics: Annotated[str, typer.Option(help="names with commas, instead of the study's own")] = "",
 ) -> None:
     """One row per case, with the metrics of the study."""
     entry = find_study(study)
     runs, remarks = load_runs(results, entry)
     for sentence in remarks:
         errors.print(f"warning: {sentence}", markup=False, highlight=False)
-    frame = study_table(runs, entry.columns)
+    frame = study_table(runs, [name.strip() for name in metrics.split(",")] if metrics else entry.columns)
     if csv is not None:
         console.print(str(reports.write_table(csv, frame)))
         return
