@@ -1,0 +1,78 @@
+"""What the project promises about itself: pinned versions, who imports whom, the list of make targets."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import PackageNotFoundError, requires
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+PINS = {
+    canonicalize_name(name): version
+    for name, version in re.findall(r"^([\w.-]+)==(\S+)$", (ROOT / "constraints.txt").read_text(), re.MULTILINE)
+}
+
+
+def asked_for() -> list[Requirement]:
+    extras = PROJECT["optional-dependencies"]
+    texts = PROJECT["dependencies"] + [text for name in extras for text in extras[name]]
+    return [r for r in map(Requirement, texts) if r.name != PROJECT["name"]]
+
+
+def test_the_constraints_hold_nothing_but_pins():
+    lines = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if not line.startswith("#")]
+    assert len(lines) == len(PINS)
+
+
+@pytest.mark.parametrize("requirement", asked_for(), ids=lambda r: r.name)
+def test_each_requirement_is_pinned_within_its_range(requirement):
+    assert requirement.specifier.contains(PINS[canonicalize_name(requirement.name)])
+
+
+def test_what_the_requirements_require_is_pinned_too():
+    open_ends, seen = asked_for(), set()
+    while open_ends:
+        requirement = open_ends.pop()
+        extra = next(iter(requirement.extras), "")
+        name = canonicalize_name(requirement.name)
+        if (name, extra) in seen or (requirement.marker and not requirement.marker.evaluate({"extra": ""})):
+            continue
+        seen.add((name, extra))
+        assert name in PINS, f"{name} is installed unpinned"
+        try:
+            needs = map(Requirement, requires(name) or [])
+        except PackageNotFoundError:  # an extra that is not installed here
+            continue
+        open_ends += [r for r in needs if r.marker is None or r.marker.evaluate({"extra": extra})]
+    assert len(seen) > 20
+
+
+@pytest.mark.parametrize(
+    ("package", "allowed"),
+    [
+        ("massspring", {"massspring", "numpy", "scipy", "numba"}),
+        ("reference_fem", {"reference_fem", "numpy", "scipy", "numba", "skfem", "pypardiso"}),
+    ],
+)
+def test_the_solvers_import_little(package, allowed):
+    files = sorted((ROOT / package).rglob("*.py"))
+    assert files
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text())):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module else []
+            foreign = {name.split(".")[0] for name in names} - allowed - sys.stdlib_module_names
+            assert not foreign, f"{file.relative_to(ROOT)} imports {foreign}"
+
+
+def test_make_alone_lists_the_targets():
+    text = subprocess.run(["make", "-s"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for target in ("study", "study-%", "smoke", "test", "check", "figures", "bench", "clean", "results/%.png"):
+        assert re.search(rf"^  {re.escape(target)} +\S", text, re.MULTILINE), target
