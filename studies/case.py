@@ -1,6 +1,7 @@
 """A case: scene × body recipe × method × time step, and its form as JSON, under which it is stored and found again."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
@@ -45,6 +46,18 @@ class Case:
     timed: bool = False
     """Whether frame times are measured by the timing protocol."""
 
+    def __post_init__(self) -> None:
+        if self.dt != "auto" and not _positive(self.dt):
+            raise StudyError(
+                f"dt is {self.dt!r} s; it must be positive, or 'auto' for a fraction of the stability limit"
+            )
+        if not _positive(self.dt_fraction):
+            raise StudyError(
+                f"dt_fraction is {self.dt_fraction!r}; it must be positive, 1 is the stability limit itself"
+            )
+        if self.frames is not None and (type(self.frames) is not int or self.frames < 1):
+            raise StudyError(f"frames is {self.frames!r}; give a whole number from 1 on, or None for the scene's own")
+
     @property
     def name(self) -> str:
         """Readable; unique within a study together with the hash of the whole case."""
@@ -82,7 +95,7 @@ def case_from_json(text: str) -> Case:
     """The case of which `text` is the key. Raises StudyError when it is none."""
     try:
         data = json.loads(text)
-        return Case(
+        case = Case(
             scene=scene_from_dict(data["scene"]),
             body=_strict(BodyRecipe).validate_python(data["body"]),
             method=method_from_dict(data["method"]),
@@ -92,6 +105,10 @@ def case_from_json(text: str) -> Case:
         )
     except (json.JSONDecodeError, KeyError, TypeError, ValidationError) as error:
         raise StudyError(f"the text is no stored case: {_first_line(error)}") from error
+    unread = _unread(data, case_to_dict(case))
+    if unread:
+        raise StudyError(f"the text is no stored case: nothing reads {', '.join(unread)}; correct or remove it")
+    return case
 
 
 def method_from_dict(data: Mapping[str, Any]) -> Method:
@@ -121,6 +138,24 @@ def _scene_adapter() -> TypeAdapter[Scene]:
 @cache
 def _strict(kind: type) -> TypeAdapter[Any]:
     return TypeAdapter(with_config(ConfigDict(extra="forbid"))(kind))
+
+
+def _unread(given: Any, understood: Any, where: str = "") -> list[str]:
+    """Names of the settings in `given` that did not arrive in `understood`."""
+    if isinstance(given, dict) and isinstance(understood, dict):
+        names = [(f"{where}.{name}" if where else name, name) for name in given]
+        lost = [path for path, name in names if name not in understood]
+        return lost + [
+            u for path, name in names if name in understood for u in _unread(given[name], understood[name], path)
+        ]
+    if isinstance(given, list) and isinstance(understood, list):
+        pairs = enumerate(zip(given, understood, strict=False))
+        return [u for number, (g, known) in pairs for u in _unread(g, known, f"{where}[{number}]")]
+    return []
+
+
+def _positive(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0 < value < math.inf
 
 
 def _first_line(error: Exception) -> str:
