@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from skfem import MeshTet, MeshTet2
 
 from massspring import Obstacle, Plane
@@ -104,7 +104,7 @@ def _held(scene: Scene, organ_mesh: OrganMesh, mesh: MeshTet2) -> list[HeldPatch
     for held in scene.held:
         inside = np.zeros(len(points), dtype=bool)
         inside[patch_nodes(organ_mesh, held.name, held.region)] = True
-        tree = cKDTree(points[np.unique(table[inside[table[:, :3]].all(axis=1)])])
+        tree = KDTree(points[np.unique(table[inside[table[:, :3]].all(axis=1)])])
         patches.append(HeldPatch(where=lambda x, tree=tree: tree.query(x.T)[0] < reach, motion=held.path))
     return patches
 
