@@ -1,0 +1,115 @@
+"""A case is its key: what is stored is what was meant, and no typo is read as something else."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from massspring import METHODS, Free, ImplicitVolume
+from studies.case import BodyRecipe, Case, case_from_json, case_to_dict
+from studies.catalog import STUDIES
+from studies.errors import StudyError
+from studies.scenes import SCENES
+from tests.studies.tiny import tiny_case
+
+CHANGES = {
+    "scene": {"scene": SCENES[1]},
+    "damping": {"scene": replace(SCENES[0], damping=41.0)},
+    "tissue": {"scene": replace(SCENES[0], tissue=replace(SCENES[0].tissue, shear_modulus=1801.0))},
+    "obstacle": {"scene": replace(SCENES[0], obstacles=SCENES[0].obstacles[:1])},
+    "checkpoint": {"scene": replace(SCENES[0], checkpoints=(1.0, 4.0))},
+    "kind": {"body": BodyRecipe("surface")},
+    "nodes": {"body": BodyRecipe(nodes=551)},
+    "law": {"body": BodyRecipe(law="uniform")},
+    "stiffness": {"body": BodyRecipe(stiffness=1.01)},
+    "method": {"method": Free()},
+    "dt": {"dt": 1e-4},
+    "dt_fraction": {"dt_fraction": 0.51},
+    "frames": {"frames": 801},
+}
+ALL_CASES = [case for study in STUDIES for case in study.cases]
+
+
+def changed(edit) -> str:
+    """The key of a case after `edit` of its JSON-able form."""
+    data = case_to_dict(tiny_case())
+    edit(data)
+    return json.dumps(data)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+def test_key_read_back_is_the_same_case(scene, method):
+    for case in (
+        Case(scene, method=method()),
+        Case(scene, BodyRecipe("surface", 80, stiffness=2.5), method(), 1e-3, 0.7, 12),
+    ):
+        again = case_from_json(case.key)
+        assert again == case
+        assert again.key == case.key
+
+
+def test_every_case_of_the_catalogue_can_be_replayed():
+    assert all(case_from_json(case.key) == case.replaced(timed=False) for case in ALL_CASES)
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_any_change_changes_the_key(change):
+    case = Case(SCENES[0])
+    assert case.replaced(**change).key != case.key
+    assert case_from_json(case.replaced(**change).key) == case.replaced(**change)
+
+
+def test_measuring_time_changes_no_physics():
+    assert tiny_case(timed=True).key == tiny_case(timed=False).key
+
+
+def test_names_are_readable_and_distinct_within_a_study():
+    for study in STUDIES:
+        names = [case.name for case in study.cases]
+        assert len(set(names)) == len(names)
+    assert Case(SCENES[0]).name == "ball_squeeze-tetrahedral-550-implicit_volume-dt0.5"
+    other = Case(SCENES[0], BodyRecipe(law="uniform", stiffness=4.0), Free(), dt=2e-3)
+    assert other.name == "ball_squeeze-tetrahedral-550-free-dt2ms-uniform-k4"
+
+
+UNREADABLE = {
+    "method": (lambda d: d["method"].update(name="implicit_volumes"), "did you mean 'implicit_volume'"),
+    "setting": (lambda d: d["method"]["settings"].update(alpha=1.0), "no setting alpha"),
+    "recipe": (lambda d: d["body"].update(noodles=3), "noodles"),
+    "kind": (lambda d: d["body"].update(kind="jelly"), "kind"),
+    "scene": (lambda d: d["scene"].update(dampping=3.0), "dampping"),
+    "tissue": (lambda d: d["scene"]["tissue"].update(viscosity=3.0), "scene.tissue.viscosity"),
+    "obstacle": (lambda d: d["scene"]["obstacles"][1].update(friction=0.3), "friction"),
+    "organ missing": (lambda d: d["scene"].pop("organ"), "organ"),
+    "normal": (lambda d: d["scene"]["obstacles"][0].update(normal=[0, 0, 0]), "direction"),
+    "dt missing": (lambda d: d.pop("dt"), "dt"),
+    "dt word": (lambda d: d.update(dt="fast"), "dt is 'fast'"),
+    "dt negative": (lambda d: d.update(dt=-1e-3), "dt is -0.001"),
+    "dt NaN": (lambda d: d.update(dt=float("nan")), "dt is nan"),
+    "fraction": (lambda d: d.update(dt_fraction=0.0), "dt_fraction is 0.0"),
+    "frames": (lambda d: d.update(frames=0), "frames is 0"),
+    "extra": (lambda d: d.update(colour="red"), "nothing reads colour"),
+}
+
+
+@pytest.mark.parametrize(("edit", "named"), UNREADABLE.values(), ids=UNREADABLE)
+def test_what_no_one_would_read_is_refused_by_name(edit, named):
+    with pytest.raises(StudyError, match=named) as caught:
+        case_from_json(changed(edit))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", "null", '"case"', "{}", '{"scene": 3}'])
+def test_malformed_text_is_refused(text):
+    with pytest.raises(StudyError, match="no stored case"):
+        case_from_json(text)
+
+
+@pytest.mark.parametrize(
+    "bad", [{"dt": 0.0}, {"dt": -1e-3}, {"dt": float("nan")}, {"dt": "fast"}, {"dt_fraction": -0.5}, {"frames": 0}]
+)
+def test_a_case_without_a_clock_cannot_be_made(bad):
+    (name,) = bad
+    with pytest.raises(StudyError, match=rf"{name} is .*; "):
+        Case(SCENES[0], method=ImplicitVolume(), **bad)

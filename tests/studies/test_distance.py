@@ -1,0 +1,98 @@
+"""Distances between surfaces, against closed forms and against dense sampling."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import KDTree
+
+from studies.distance import distance_to_surface, hausdorff
+from studies.geometry import ball
+from tests.studies.tiny import cube
+
+TRIANGLE = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]])
+ONE = np.array([[0, 1, 2]])
+REGIONS = {
+    "face": ((1.0, 1.0, 2.0), 2.0),
+    "inside": ((1.0, 1.0, 0.0), 0.0),
+    "edge ab": ((2.0, -3.0, 4.0), 5.0),
+    "edge ca": ((-3.0, 1.0, -4.0), 5.0),
+    "edge bc": ((2.0 + 3.0, 1.5 + 4.0, 0.0), 5.0),
+    "vertex a": ((-2.0, -1.0, 2.0), 3.0),
+    "vertex b": ((5.0, -2.0, 2.0), 3.0),
+    "vertex c": ((-1.0, 5.0, -2.0), 3.0),
+}
+unit = st.floats(-1.0, 1.0, allow_subnormal=False, width=32)
+point = st.tuples(unit, unit, unit)
+
+
+def dense(a, b, c, count=60):
+    """Points all over a triangle, ((count + 1)(count + 2)/2, 3)."""
+    i, j = np.meshgrid(np.arange(count + 1), np.arange(count + 1))
+    s, t = (w[i + j <= count] / count for w in (i, j))
+    return a + s[:, None] * (b - a) + t[:, None] * (c - a)
+
+
+def nearest_vertex(queries, points, triangles):
+    """The mutant: as if a surface were its nodes."""
+    return KDTree(points[np.unique(triangles)]).query(queries)[0]
+
+
+@pytest.mark.parametrize(("query", "distance"), REGIONS.values(), ids=REGIONS)
+def test_each_region_of_a_triangle(query, distance):
+    found = distance_to_surface(np.array([query]), TRIANGLE, ONE)
+    assert found == pytest.approx([distance], abs=1e-14)
+
+
+def test_nearest_vertex_would_be_noticed():
+    inner = [name for name in REGIONS if "vertex" not in name]
+    for name in inner:
+        query, distance = REGIONS[name]
+        assert nearest_vertex(np.array([query]), TRIANGLE, ONE)[0] > distance + 0.05
+
+
+@settings(deadline=None, max_examples=100)
+@given(point, point, point, point)
+def test_a_triangle_is_all_its_points(p, a, b, c):
+    p, a, b, c = map(np.array, (p, a, b, c))
+    sides = [np.linalg.norm(v) for v in (b - a, c - b, a - c)]
+    found = distance_to_surface(p[None], np.array([a, b, c]), ONE)[0]
+    sampled = float(np.linalg.norm(dense(a, b, c) - p, axis=1).min())
+    # A point of a triangle is at most one spacing of the samples away from one of them.
+    assert found - 1e-7 <= sampled <= found + max(sides) / 60 + 1e-7
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.integers(0, 2**32 - 1))
+def test_a_soup_is_all_its_triangles(seed):
+    """Long triangles among short ones: the nearest one need not have a near centroid."""
+    random = np.random.default_rng(seed)
+    centres = random.uniform(-1, 1, (80, 1, 3))
+    corners = centres + random.uniform(-1, 1, (80, 3, 3)) * 10.0 ** random.uniform(-2, 0.5, (80, 1, 1))
+    queries = random.uniform(-1, 1, (20, 3))
+    triangles = np.arange(240).reshape(80, 3)
+    found = distance_to_surface(queries, corners.reshape(-1, 3), triangles)
+    single = [distance_to_surface(queries, c, ONE) for c in corners]
+    np.testing.assert_allclose(found, np.min(single, axis=0), rtol=1e-12, atol=1e-14)
+
+
+def test_concentric_spheres():
+    mesh = ball(300, 0.05, fill=False)
+    points, triangles = mesh.points, mesh.triangles
+    outer = 1.2 * points
+    # Chords lie inside the sphere: seen from outside, the other surface is farther by their sag, edge²/8R ≈ 1.2 % of R.
+    found = hausdorff(points, triangles, outer, triangles)
+    assert 0.2 * 0.05 * (1 - 1e-12) <= found <= 0.2 * 0.05 + 0.012 * 0.05
+    assert hausdorff(points, triangles, points, triangles) < 1e-12
+
+
+def test_shifted_planes_and_symmetry():
+    points, triangles, _ = cube(3)
+    shift = np.array([0.0, 0.0, 0.013])
+    assert hausdorff(points, triangles, points + shift, triangles) == pytest.approx(0.013, rel=1e-12)
+    spike = points.copy()
+    spike[np.argmax(points @ np.array([1.0, 1.1, 1.2]))] *= 1.5
+    ways = hausdorff(points, triangles, spike, triangles), hausdorff(spike, triangles, points, triangles)
+    # Seen from one side alone the spike would be missed: its length is what both orders must give.
+    assert ways[0] == ways[1] == pytest.approx(0.5 * np.linalg.norm([0.05] * 3), rel=1e-12)
+    assert distance_to_surface(points[np.unique(triangles)], spike, triangles).max() < 0.5 * ways[0]

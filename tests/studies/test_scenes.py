@@ -1,0 +1,171 @@
+"""Every scene is held to this: stored and read back equal, the same load for both solvers, and something happens."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import METHODS, Path, Plane, simulate
+from reference_fem import NewtonSettings
+from reference_fem.newton import System
+from reference_fem.problem import find_held
+from studies.adapt import mesh_for, patch_nodes, prepare
+from studies.adapt_reference import anchor, kept_obstacles, reference_problem
+from studies.case import BodyRecipe, Case, scene_from_dict, scene_to_json
+from studies.errors import StudyError
+from studies.run import checkpoint_frames
+from studies.scenes import SCENES
+
+SMALL = 150
+KINDS = ("tetrahedral", "surface")
+
+
+@pytest.fixture(params=SCENES, ids=lambda scene: scene.name)
+def scene(request):
+    return request.param
+
+
+def small(scene, kind="tetrahedral", **changes) -> Case:
+    return Case(scene, BodyRecipe(kind, SMALL), frames=20).replaced(**changes)
+
+
+def test_names_are_words_for_the_command_line():
+    names = [scene.name for scene in SCENES]
+    assert len(set(names)) == len(names)
+    assert all(name.isidentifier() for name in names)
+    assert all(scene.title and "\n" not in scene.title for scene in SCENES)
+
+
+def test_stored_and_read_back_it_is_the_same_scene(scene):
+    assert scene_from_dict(json.loads(scene_to_json(scene))) == scene
+
+
+def test_checkpoints_ascend_within_the_duration(scene):
+    times = np.array(scene.checkpoints)
+    assert (np.diff(times) > 0).all()
+    assert times[0] > 0
+    assert times[-1] <= scene.duration
+
+
+def test_what_is_deepest_at_the_last_checkpoint_has_stopped_before(scene):
+    """Otherwise the last checkpoint would show ringing instead of equilibrium."""
+    paths = [o.path for o in scene.obstacles] + [h.path for h in scene.held]
+    assert max(path.times[-1] for path in paths) < scene.checkpoints[-1]
+
+
+def test_a_free_turn_leaves_no_displacement_to_compare(scene):
+    if not scene.held:
+        assert not {"surface", "interior"} & set(scene.quantities)
+
+
+def test_every_method_applies_or_says_why_not(scene):
+    for method in METHODS:
+        reason = scene.skip(method())
+        assert reason is None or (isinstance(reason, str) and reason)
+
+
+def test_a_skipped_method_is_refused_with_the_reason(scene):
+    skipping = replace(scene, not_for=(("free", "it needs a volume"),))
+    with pytest.raises(StudyError, match=r"'free' does not apply .* it needs a volume"):
+        prepare(small(skipping, method=METHODS[0]()))
+    assert METHODS[0].name == "free"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_body_weighs_what_the_tissue_weighs(scene, kind):
+    prepared = prepare(small(scene, kind))
+    body = prepared.setup.body
+    # Sums of a few hundred terms: rounding stays far below 1e-12.
+    assert body.mass.sum() == pytest.approx(scene.tissue.density * prepared.mesh.volume, rel=1e-12)
+    assert body.volume == pytest.approx(prepared.mesh.volume, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_obstacles_start_outside(scene, kind):
+    body = prepare(small(scene, kind)).setup.body
+    for obstacle in scene.obstacles:
+        assert obstacle.gap(body.rest, 0.0).min() >= -1e-9 * body.size
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_something_is_felt(scene, kind):
+    """Every obstacle reaches the body, and the probed force is a press at the deepest point."""
+    case = small(scene, kind)
+    prepared = prepare(case)
+    history = simulate(prepared.setup, checkpoint_frames(case, prepared))
+    assert history.outcome == "finished"
+    last = checkpoint_frames(case, prepared)[-1] - 1
+    assert (np.linalg.norm(history.contact_force[last], axis=1) > 0).all()
+    # Far above what rounding leaves of balanced forces: a thousandth of mu times a square centimetre.
+    assert scene.probe(history.contact_force, history.held_force)[last] > 1e-3 * scene.tissue.shear_modulus * 1e-4
+
+
+def test_reference_can_be_set_up_on_its_coarsest_mesh(scene):
+    problem = reference_problem(scene, scene.reference.levels[0])
+    System(problem, NewtonSettings()).solver.release()
+    assert problem.material.mu == scene.tissue.shear_modulus
+    assert problem.material.kappa == scene.tissue.shear_modulus * scene.tissue.bulk_over_shear
+    assert problem.density == scene.tissue.density
+    assert tuple(problem.gravity) == scene.gravity
+
+
+def load_gap(drive_scene, problem_scene) -> float:
+    """Largest distance [m] between where the two solvers put their obstacles and held regions, over the whole clock."""
+    setup = prepare(small(drive_scene)).setup
+    problem = reference_problem(problem_scene, problem_scene.reference.levels[0])
+    kept = [drive_scene.obstacles.index(o) for o in kept_obstacles(drive_scene)]
+    gaps = []
+    for frame in range(setup.clock.frames):
+        drive, t = setup.drive(frame), (frame + 1) * setup.clock.frame
+        for number, rigid in zip(kept, problem.obstacles, strict=True):
+            start = rigid.point if hasattr(rigid, "normal") else rigid.center
+            gaps.append(drive.position[-1, number] - (np.asarray(start) + rigid.motion(t)))
+        if not drive_scene.symmetric:
+            for number, held in enumerate(problem.held):
+                gaps.append(drive.held_displacement[-1, number] - held.motion(t))
+    return float(np.abs(gaps).max())
+
+
+def test_both_solvers_see_the_same_load_at_the_same_time(scene):
+    size = float(np.ptp(prepare(small(scene)).setup.body.rest))
+    # Times and positions agree to rounding.
+    assert load_gap(scene, scene) < 1e-12 * size
+    assert load_gap(scene, _later(scene)) > 1e-4 * size
+
+
+def _later(scene):
+    """A mutant whose paths lag a tenth of a second behind."""
+    late = lambda path: Path(tuple(t + 0.1 for t in path.times), path.displacements)  # noqa: E731
+    return replace(
+        scene,
+        obstacles=tuple(replace(o, path=late(o.path)) for o in scene.obstacles),
+        held=tuple(replace(h, path=late(h.path)) for h in scene.held),
+    )
+
+
+def test_both_solvers_see_the_same_obstacles(scene):
+    problem = reference_problem(scene, scene.reference.levels[0])
+    for obstacle, rigid in zip(kept_obstacles(scene), problem.obstacles, strict=True):
+        if isinstance(obstacle, Plane):
+            np.testing.assert_allclose(rigid.normal, obstacle.unit_normal, rtol=0, atol=1e-15)
+        else:
+            assert rigid.radius == obstacle.radius
+    # An octant keeps one of two mirrored obstacles; nothing else is left out.
+    dropped = [o for o in scene.obstacles if o not in kept_obstacles(scene)]
+    mirrored = [np.abs(anchor(o)).tolist() for o in dropped]
+    assert all(any(np.allclose(m, anchor(k)) for k in kept_obstacles(scene)) for m in mirrored)
+
+
+def test_both_solvers_hold_the_same_region(scene):
+    if scene.symmetric or not scene.held:
+        return
+    level = int(scene.reference.levels[0])
+    mesh, problem = mesh_for(scene, level), reference_problem(scene, level)
+    for held, found in zip(scene.held, find_held(problem), strict=True):
+        corners = found.nodes[found.nodes < len(mesh.points)]
+        patch = patch_nodes(mesh, held.name, held.region)
+        # The reference may leave out a node of the outline that no whole facet of the region reaches.
+        assert set(corners) <= set(patch)
+        assert len(corners) >= 0.95 * len(patch)
+        assert (held.region.level(mesh.points[patch]) <= 1e-3 * np.ptp(mesh.points)).all()

@@ -1,0 +1,82 @@
+"""The smallest scenes, cases and studies that still do what the real ones do."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from massspring import Free, ImplicitVolume
+from studies.case import BodyRecipe, Case
+from studies.catalog import Study
+from studies.geometry.mesh import boundary_triangles
+from studies.scenes import Organ, Scene
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+
+NODES, FRAMES = 60, 5
+SQUEEZE = replace(BALL_SQUEEZE, name="tiny_squeeze", reference=None)
+CUBE = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
+"""Kuhn's six tetrahedra of a cube whose corner (x, y, z) has number x + 2 y + 4 z; neighbours match."""
+
+
+class Silent:
+    """Progress that no one watches; remembers what was told."""
+
+    def __init__(self):
+        self.begun: list[tuple[str, int]] = []
+        self.done: list[tuple[str, str]] = []
+
+    def begin(self, what, total):
+        self.begun.append((what, total))
+
+    def advance(self, what, note):
+        self.done.append((what, note))
+
+
+def tiny_case(**changes) -> Case:
+    """60 surface nodes, 5 frames, no reference."""
+    return Case(SQUEEZE, BodyRecipe("tetrahedral", NODES), ImplicitVolume(), frames=FRAMES).replaced(**changes)
+
+
+def tiny_study(**changes) -> Study:
+    """Both methods timed, and one case that diverges."""
+    cases = (tiny_case(timed=True), tiny_case(method=Free(), timed=True), diverging_case())
+    return replace(Study("tiny", "Does it run?", cases, (), ("volume_worst", "step_time")), **changes)
+
+
+def diverging_case() -> Case:
+    """Three times the stability limit, in single steps of 50 frames a second."""
+    return tiny_case(dt_fraction=3.0, timed=True)
+
+
+def cube(cells: int = 2, edge: float = 0.1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (n, 3) [m], outward triangles, tetrahedra of a cube around the origin."""
+    side = cells + 1
+    z, y, x = np.meshgrid(*(np.arange(side),) * 3, indexing="ij")
+    points = edge * (np.stack([x, y, z], axis=-1).reshape(-1, 3) / cells - 0.5)
+    number = np.arange(side**3).reshape(side, side, side)
+    corners = [
+        number[k : k + cells, j : j + cells, i : i + cells].ravel() for k in (0, 1) for j in (0, 1) for i in (0, 1)
+    ]
+    tetrahedra = np.stack(corners, axis=1)[:, CUBE].reshape(-1, 4)
+    return points, boundary_triangles(tetrahedra), tetrahedra
+
+
+def write_obj(path, points, triangles):
+    """A surface as Wavefront OBJ, digit for digit."""
+    lines = ["v " + " ".join(repr(float(c)) for c in p) for p in points]
+    lines += ["f " + " ".join(str(int(i) + 1) for i in t) for t in triangles]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def file_scene(path, unit: str = "m", **changes) -> Scene:
+    """A body from a mesh file that falls for a moment: nothing about it but the mesh can go wrong."""
+    scene = replace(
+        SQUEEZE,
+        name="from_file",
+        organ=Organ("file", {"path": str(path), "unit": unit}),
+        obstacles=(),
+        duration=0.01,
+        checkpoints=(0.01,),
+        gravity=(0.0, 0.0, -9.81),
+    )
+    return replace(scene, **changes)
