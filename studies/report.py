@@ -5,17 +5,22 @@ from pathlib import Path
 
 import pandas as pd
 
+from studies.adapt import mesh_for
 from studies.atomic import write_whole
 from studies.catalog import Study
 from studies.errors import StudyError
 from studies.machine import write_machine
 from studies.metrics import Run
 from studies.paths import study_folder
+from studies.plots.organs import draw_organs
+from studies.scenes import SCENES
 from studies.sweep import load_runs
 from studies.table import study_table
 
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 """Between these lines of README.md stands the summary; `organbench report --readme` writes it."""
+
+FIGURE_NODES = 550
 
 
 def draw_charts(root: Path, study: Study, runs: Sequence[Run]) -> list[Path]:
@@ -48,6 +53,15 @@ def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]
     summary = root / "summary.md"
     write_whole(summary, (summary_of(runs_of) + "\n").encode())
     return [*written, summary], remarks
+
+
+def draw_figures(root: Path) -> list[Path]:
+    """The organs of the scenes with their attachments, each once; the path of the picture."""
+    meshes = {scene.organ.shape: mesh_for(scene, FIGURE_NODES) for scene in SCENES}  # later scenes have attachments
+    path = root / "figures" / "organs.png"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draw_organs(meshes, path)
+    return [path]
 
 
 def summary_of(runs_of: dict[str, list[Run]]) -> str:

@@ -3,7 +3,7 @@
 from studies.case import BodyRecipe, Case
 from massspring import Free, ImplicitVolume
 from studies.catalog.base import Chart, Study
-from studies.plots import force_path, volume_history
+from studies.plots import accuracy, force_path, squeeze, volume_history
 from studies.scenes import SCENES
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 
@@ -18,7 +18,12 @@ VOLUME_LOSS = Study(
         *(Case(scene, body, method) for scene in SCENES for body in (TETRAHEDRAL, SURFACE) for method in (Free(), ImplicitVolume())),
         *(Case(BALL_SQUEEZE, body, ImplicitVolume(), dt_fraction=FINE_STEP) for body in (TETRAHEDRAL, SURFACE)),
     ),
-    charts=(Chart("volume.png", volume_history.draw), Chart("force.png", force_path.draw)),
+    charts=(
+        Chart("volume.png", volume_history.draw),
+        Chart("force.png", force_path.draw),
+        Chart("accuracy.png", accuracy.draw),
+        Chart("squeeze.png", squeeze.draw),
+    ),
     columns=(
         "volume_worst",
         "volume_end",

@@ -7,8 +7,8 @@ from studies.scenes.base import LIVER, Held, Organ, Probed, ReferencePlan, Scene
 RADIUS = 0.020  # m, a thumb; twice the edge of the coarsest reference mesh, so that the contact is resolved
 DEPTH = 0.010  # m
 GAP = 0.0005  # m between probe and surface at the start
-PRESS_END = 3.0  # s
-DURATION = 4.0  # s
+PRESS_END = 6.0  # s: slow enough that damping drags with less than 3 % of the force
+DURATION = 8.0  # s
 INWARD = scaled(LIVER_PROBE_NORMAL, -1.0)
 
 LIVER_PROBE = Scene(
@@ -17,7 +17,7 @@ LIVER_PROBE = Scene(
     organ=Organ("liver"),
     tissue=LIVER,
     duration=DURATION,
-    frames=200,
+    frames=240,
     checkpoints=press_times(0.0, PRESS_END, 5, DURATION),
     obstacles=(
         Sphere(
@@ -28,6 +28,6 @@ LIVER_PROBE = Scene(
     ),
     held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),
     probed=Probed("obstacle", 0, INWARD),
-    damping=15.0,
+    damping=8.0,
     reference=ReferencePlan("solid", (250, 400, 650)),
 )
