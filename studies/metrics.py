@@ -16,6 +16,8 @@ from studies.timing import FrameTiming
 PERCENT = 100.0
 ALWAYS = ("volume",)
 """Quantities with a truth of their own: a volume is compared with the body's own rest volume."""
+GAUGE_FREE = ("pressure",)
+"""Quantities that every scene with a reference allows: a rigid turn does not change them."""
 COMPARABLE = (Status.OK, Status.INVERTED, Status.DRIFTED)
 """A run that ended early has no last checkpoint."""
 
@@ -91,19 +93,22 @@ class Metric:
 
     def __call__(self, run: Run) -> float:
         """The number; NaN where the run ended early, or its reference or timing is missing."""
-        if self.quantity is not None and self.quantity not in ALWAYS:
-            allowed = self.quantity.split("_")[0] in run.case.scene.quantities
-            if run.reference is None or not allowed:
-                return float("nan")
-        if run.record.status not in COMPARABLE:
+        if run.record.status not in COMPARABLE or not self._allowed(run):
             return float("nan")
         return float(self.of(run))
 
     def floor(self, run: Run) -> float:
-        """Uncertainty of the reference in the metric's unit; NaN without one."""
-        if self.quantity is None or run.reference is None:
+        """Uncertainty of the reference in the metric's unit; NaN without one or where nothing may be compared."""
+        if self.quantity is None or run.reference is None or not self._allowed(run):
             return float("nan")
         return PERCENT * run.reference.floor[self.quantity]
+
+    def _allowed(self, run: Run) -> bool:
+        """Whether there is something to compare with, and the scene says that it may be."""
+        if self.quantity is None or self.quantity in ALWAYS:
+            return True
+        word = self.quantity.split("_")[0]
+        return run.reference is not None and (word in GAUGE_FREE or word in run.case.scene.quantities)
 
 
 def volume_worst(run: Run) -> float:
@@ -155,11 +160,15 @@ def mean_error(run: Run) -> float:
 
 
 def silhouette_error(run: Run) -> float:
-    """Symmetric Hausdorff distance of the deformed surfaces over the body's size at the last checkpoint [%]."""
+    """Symmetric Hausdorff distance of the deformed surface to its deformation by the reference, over the body's size [%]."""
     assert run.reference is not None
-    points, triangles = run.field("snapshots")[-1], run.field("triangles")
-    size = float(np.linalg.norm(np.ptp(run.field("rest"), axis=0)))
-    return PERCENT * hausdorff(points, triangles, *run.reference.surface()) / size
+    rest, triangles = run.field("rest"), run.field("triangles")
+    surface = np.unique(triangles)
+    # The same polyhedron, moved by the reference: what the facets cut off the true organ is no error of the model.
+    truth = rest.copy()
+    truth[surface] += run.reference.displacement(rest[surface])
+    size = float(np.linalg.norm(np.ptp(rest, axis=0)))
+    return PERCENT * hausdorff(run.field("snapshots")[-1], triangles, truth, triangles) / size
 
 
 def min_j(run: Run) -> float:

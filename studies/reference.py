@@ -1,4 +1,4 @@
-"""The finite-element reference of a scene: solved once per mesh of its family, stored, read back with its own error bar."""
+"""The finite-element reference of a scene: solved once per mesh, stored, read back with its own error bar."""
 
 import json
 from collections.abc import Callable
@@ -16,9 +16,9 @@ from studies.case import scene_to_json
 from studies.distance import hausdorff
 from studies.errors import StudyError
 from studies.fingerprint import source_fingerprint
-from studies.scenes.base import Scene
 from studies.paths import record_path
 from studies.records import new_record
+from studies.scenes.base import Scene
 from studies.store import Field, Record, Status, is_current, read_record, write_record
 
 STUDY = "reference"
@@ -45,7 +45,9 @@ def reference_key(scene: Scene, level: float) -> str:
 
 def reference_fingerprint() -> str:
     """Hash of all code that a reference depends on."""
-    return source_fingerprint("reference_fem", "studies.geometry", "studies.adapt_reference", "studies.reference")
+    return source_fingerprint(
+        "reference_fem", "studies.geometry", "studies.adapt", "studies.adapt_reference", "studies.reference"
+    )
 
 
 def reference_path(root: Path, scene: Scene, level: float) -> Path:
@@ -59,7 +61,9 @@ def reference_is_current(root: Path, scene: Scene, level: float) -> bool:
     return is_current(path, reference_key(scene, level), reference_fingerprint())
 
 
-def solve_reference(root: Path, scene: Scene, level: float, on_step: Callable[[Equilibrium], None] | None = None) -> Path:
+def solve_reference(
+    root: Path, scene: Scene, level: float, on_step: Callable[[Equilibrium], None] | None = None
+) -> Path:
     """Solves the scene's load path on one mesh and stores it; a path that breaks off is stored up to there."""
     problem = reference_problem(scene, level)
     status, message = Status.OK, ""
@@ -89,7 +93,7 @@ def _unknowns(problem: Problem) -> int:
 
 def _fields(scene: Scene, problem: Problem, found: list[Equilibrium]) -> dict[str, Field]:
     count = len(scene.checkpoints)
-    x = nodes(problem.mesh)
+    x, tetrahedra = nodes(problem.mesh), problem.mesh.t.T.astype(np.int64)
 
     def series(values: list, unit: str, description: str) -> Field:
         """One row per checkpoint; NaN where the path did not get there."""
@@ -105,20 +109,23 @@ def _fields(scene: Scene, problem: Problem, found: list[Equilibrium]) -> dict[st
         "contact_force": series(contact, "N", "force of each obstacle on the body"),
         "held_force": series([e.held_force for e in found], "N", "force of each held region on the body"),
         "volume": series([e.volume / e.volume0 for e in found], "1", "volume over rest volume"),
-        "pressure": series([mean_pressure(e) for e in found], "Pa", "volume mean of the pressure, compression positive"),
+        "pressure": series(
+            [mean_pressure(tetrahedra, e) for e in found], "Pa", "volume mean of the pressure, compression positive"
+        ),
         "min_j": series([e.min_J for e in found], "1", "smallest J at a quadrature point"),
         "max_j": series([e.max_J for e in found], "1", "largest J at a quadrature point"),
         "penetration": series([e.penetration for e in found], "m", "deepest penetration of an obstacle"),
         "newton": series([float(e.newton_iterations) for e in found], "1", "Newton iterations"),
         "displacement": series([e.u for e in found], "m", "displacement of the second-order nodes"),
         "nodes": Field(x, "m", "rest positions of the second-order nodes"),
-        "tetrahedra": Field(problem.mesh.t.T.astype(np.int64), "1", "vertices of each tetrahedron"),
+        "tetrahedra": Field(tetrahedra, "1", "vertices of each tetrahedron"),
     }
 
 
-def mean_pressure(equilibrium: Equilibrium) -> float:
-    """Nodal mean of −p [Pa]: p of the solver is positive in tension, the multiplier of the springs in compression."""
-    return -float(np.mean(equilibrium.p))
+def mean_pressure(tetrahedra: np.ndarray, equilibrium: Equilibrium) -> float:
+    """Volume mean of −p [Pa]: p of the solver is positive in tension, the multiplier of the springs in compression."""
+    volume = equilibrium.weights.sum(axis=1)
+    return -float(volume @ equilibrium.p[tetrahedra].mean(axis=1) / volume.sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +151,11 @@ class Reference:
         return MeshTet2(np.ascontiguousarray(self.field("nodes").T), np.ascontiguousarray(self.field("tetrahedra").T))
 
     @cached_property
+    def size(self) -> float:
+        """Diagonal of the whole body at rest [m]."""
+        return (2.0 if self.scene.symmetric else 1.0) * float(np.linalg.norm(np.ptp(self.field("nodes"), axis=0)))
+
+    @cached_property
     def _evaluator(self) -> Evaluator:
         return Evaluator(self.mesh)
 
@@ -165,25 +177,27 @@ class Reference:
         on_cut = (np.abs(self.field("nodes")[self.triangles]) < 1e-12).all(axis=1).any(axis=1)
         part = self.triangles[~on_cut]
         signs = np.array(list(product((1.0, -1.0), repeat=3)))
-        faces = [part + k * len(points) if s.prod() > 0 else part[:, ::-1] + k * len(points) for k, s in enumerate(signs)]
+        faces = [
+            part + k * len(points) if s.prod() > 0 else part[:, ::-1] + k * len(points) for k, s in enumerate(signs)
+        ]
         return (signs[:, None, :] * points).reshape(-1, 3), np.vstack(faces)
 
     @cached_property
     def floor(self) -> dict[str, float]:
-        """Uncertainty of each quantity [1]: its relative change from the next coarser mesh to this one (docs, eq. 20)."""
+        """Uncertainty of each quantity [1]: its relative change from the next coarser mesh (docs, eq. 20)."""
         if self.coarser is None:
             raise StudyError(f"the reference of '{self.scene.name}' has one mesh only, so no error bar; solve two")
         points = self.coarser.field("nodes")
         here, there = self.displacement(points), self.coarser.field("displacement")[-1]
         reached = np.linalg.norm(here - there, axis=1) / np.sqrt((here**2).sum(axis=1).mean())
-        surface = np.unique(self.coarser.triangles)
-        size = float(np.linalg.norm(np.ptp(self.surface()[0], axis=0)))
+        outside = self.coarser.triangles
+        surface = np.unique(outside)
         return {
             "force": float(np.linalg.norm(self.force - self.coarser.force) / np.linalg.norm(self.force)),
             "force_end": float(abs(self.force[-1] - self.coarser.force[-1]) / abs(self.force[-1])),
             "surface": float(np.sqrt((reached[surface] ** 2).mean())),
             "interior": float(np.sqrt((reached**2).mean())),
-            "silhouette": hausdorff(*self.surface(), *self.coarser.surface()) / size,
+            "silhouette": hausdorff(points + here, outside, points + there, outside) / self.size,
             "volume": float(np.abs(self.field("volume") - 1).max()),
             "pressure": float(abs(self.field("pressure")[-1] / self.coarser.field("pressure")[-1] - 1)),
         }

@@ -15,7 +15,9 @@ def metric(name: str) -> Metric:
 
 def study_table(runs: Sequence[Run], columns: Sequence[str]) -> pd.DataFrame:
     """Metrics `columns` of `runs`; a column "… floor" follows where the reference has an uncertainty of its own."""
-    return pd.DataFrame([_row(run, [metric(name) for name in columns]) for run in runs])
+    rows = [_row(run, [metric(name) for name in columns]) for run in runs]
+    known = {name for row in rows for name, value in row.items() if " floor [" not in name or value == value}
+    return pd.DataFrame([{name: value for name, value in row.items() if name in known} for row in rows])
 
 
 def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
@@ -32,7 +34,5 @@ def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
     }
     for entry in metrics:
         row[f"{entry.name} [{entry.unit}]"] = entry(run)
-        floor = entry.floor(run)
-        if floor == floor:
-            row[f"{entry.name} floor [{entry.unit}]"] = floor
+        row[f"{entry.name} floor [{entry.unit}]"] = entry.floor(run)
     return row
