@@ -1,0 +1,179 @@
+"""The reference, from an octant solved on two very coarse meshes: right, whole, with an error bar."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference_fem import ReferenceProblem
+from studies import reference as module
+from studies.adapt_reference import whole_forces
+from studies.distance import hausdorff
+from studies.errors import StudyError
+from studies.geometry.mesh import signed_volume
+from studies.reference import load_reference, reference_is_current, reference_key, reference_path, solve_reference
+from studies.scenes import ReferencePlan
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.store import Status, read_record
+from studies.sweep import load_runs
+from tests.studies.tiny import tiny_case, tiny_study
+
+LEVELS = (0.5, 0.4)
+SCENE = replace(BALL_SQUEEZE, reference=ReferencePlan("octant", LEVELS), checkpoints=(1.0, 4.0))
+RADIUS, SHEAR = 0.05, SCENE.tissue.shear_modulus
+DEPTH = (0.10, 0.30)
+"""Of the diameter, at the two checkpoints."""
+FORCE = (0.19197, 1.25968)
+EQUATOR = (1.01325, 1.08359)
+"""F/(mu R²) and equator radius over R: docs, oracle of the squeezed ball (axisymmetric finite elements, to 1e-4)."""
+
+
+@pytest.fixture(scope="module")
+def solved(mesh_cache, tmp_path_factory):
+    root = tmp_path_factory.mktemp("reference")
+    for level in LEVELS:
+        solve_reference(root, SCENE, level)
+    return root
+
+
+@pytest.fixture(scope="module")
+def found(solved):
+    return load_reference(solved, SCENE)
+
+
+def test_force_and_equator(found):
+    # Some fifty curved quadratic tetrahedra: the force is then 1 % off, a plane too many or an octant too few 50 %.
+    np.testing.assert_allclose(found.force / (SHEAR * RADIUS**2), FORCE, rtol=0.05)
+    for checkpoint, radius in enumerate(EQUATOR):
+        points, triangles = found.surface(checkpoint)
+        used = points[np.unique(triangles)]
+        assert np.linalg.norm(used[:, :2], axis=1).max() == pytest.approx(radius * RADIUS, rel=0.005)
+        assert np.ptp(used[:, 2]) == pytest.approx(2 * RADIUS * (1 - DEPTH[checkpoint]), rel=2e-3)
+
+
+def test_pressure_is_the_one_that_balances_the_planes(found):
+    """Σ f·x = ∫ tr σ dv, and tr σ/3 is the pressure: two planes F at ± h press 2 F h/(3 V) into the ball on average."""
+    height = RADIUS * (1 - np.array(DEPTH))
+    volume = found.field("volume") * 4 / 3 * np.pi * RADIUS**3
+    # 0.2 % is what this mesh leaves; a mean over nodes, most of which are near the pole, is three times too large.
+    np.testing.assert_allclose(found.field("pressure"), 2 * found.force * height / (3 * volume), rtol=0.01)
+
+
+def test_every_quantity_has_a_positive_floor(found):
+    assert set(found.floor) >= {"force", "force_end", "surface", "interior", "silhouette", "volume", "pressure"}
+    for name, floor in found.floor.items():
+        # Coarse, but two neighbours: more than a tenth apart they would not describe the same thing.
+        assert 0 < floor < 0.1, name
+    force, coarse = found.force, found.coarser.force
+    assert found.floor["force_end"] == pytest.approx(abs(force[-1] / coarse[-1] - 1) * coarse[-1] / force[-1], rel=1e-9)
+
+
+def test_one_mesh_has_no_error_bar(found):
+    with pytest.raises(StudyError, match="one mesh only"):
+        _ = found.coarser.floor
+
+
+def test_displacement_is_mirrored(found):
+    points = RADIUS * np.random.default_rng(3).uniform(0.05, 0.55, (40, 3))
+    truth = found.displacement(points)
+    assert np.abs(truth).max() > 0.05 * RADIUS
+    for sign in ([-1, 1, 1], [1, 1, -1], [-1, -1, -1]):
+        np.testing.assert_array_equal(found.displacement(points * sign), truth * sign)
+    axis = found.displacement(np.array([[0.0, 0.0, 0.5 * RADIUS]]))
+    assert np.abs(axis[0, :2]).max() < 1e-9
+    assert axis[0, 2] < 0
+
+
+def test_displacement_at_a_node_is_the_stored_one(found):
+    np.testing.assert_allclose(
+        found.displacement(found.field("nodes")[:50]), found.field("displacement")[-1][:50], rtol=0, atol=1e-9 * RADIUS
+    )
+
+
+def test_surface_is_whole_and_outward(found):
+    points, triangles = found.surface()
+    used, inverse = np.unique(np.round(points / (1e-6 * RADIUS)), axis=0, return_inverse=True)
+    welded = inverse.reshape(-1)[triangles]
+    edges, count = np.unique(
+        np.sort(welded[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0, return_counts=True
+    )
+    assert (count == 2).all()
+    assert len(np.unique(welded)) - len(edges) + len(welded) == 2
+    # Flat facets of a coarse mesh cut a little off the ball, whose volume is kept.
+    assert signed_volume(points, triangles) == pytest.approx(4 / 3 * np.pi * RADIUS**3, rel=0.04)
+    assert len(used) < len(points)
+    mirrored = points * [1, -1, 1], triangles
+    assert hausdorff(points, triangles, *mirrored) < 1e-9 * RADIUS
+
+
+def test_whole_forces_mirror_and_multiply(found):
+    octant = np.array([[[0.1, -0.2, -3.0]], [[0.0, 0.0, -5.0]]])
+    whole = whole_forces(SCENE, octant)
+    np.testing.assert_array_equal(whole[:, 0], [[0, 0, -12], [0, 0, -20]])
+    np.testing.assert_array_equal(whole[:, 1], [[0, 0, 12], [0, 0, 20]])
+    solid = replace(SCENE, reference=ReferencePlan("solid", (100, 200)))
+    np.testing.assert_array_equal(whole_forces(solid, octant), octant)
+
+
+def test_both_planes_are_felt(found):
+    contact = found.field("contact_force")
+    np.testing.assert_array_equal(contact[:, 0], -contact[:, 1])
+    np.testing.assert_array_equal(found.force, -contact[:, 0, 2])
+
+
+def test_current_until_the_load_or_the_code_changes(solved, monkeypatch):
+    assert reference_is_current(solved, SCENE, LEVELS[0])
+    renamed_metric = replace(SCENE, damping=1.0, frames=7, title="another", quantities=("volume",))
+    assert reference_is_current(solved, renamed_metric, LEVELS[0])
+    assert reference_key(replace(SCENE, gravity=(0.0, 0.0, -9.81)), 0.5) != reference_key(SCENE, 0.5)
+    assert not reference_is_current(solved, replace(SCENE, checkpoints=(1.0, 3.9)), LEVELS[0])
+    monkeypatch.setattr(module, "reference_fingerprint", lambda: "other")
+    assert not reference_is_current(solved, SCENE, LEVELS[0])
+
+
+def broken(problem, times, **_):
+    raise ReferenceProblem("no equilibrium found between t = 1 s and t = 4 s: the mesh folds; refine it", converged=[])
+
+
+def test_a_path_that_breaks_off_is_stored_and_not_believed(solved, tmp_path, monkeypatch):
+    root = shutil.copytree(solved, tmp_path / "results")
+    true_path = module.equilibrium_path
+
+    def half(problem, times, **settings):
+        raise ReferenceProblem("the mesh folds; refine it", converged=true_path(problem, times[:1], **settings))
+
+    monkeypatch.setattr(module, "equilibrium_path", half)
+    record = read_record(solve_reference(root, SCENE, LEVELS[1]))
+    assert record.status == Status.NOT_CONVERGED
+    assert "mesh folds" in record.message
+    force = record.fields["contact_force"].values
+    assert np.isfinite(force[0]).all()
+    assert np.isnan(force[1]).all()
+    with pytest.raises(StudyError, match="not-converged: the mesh folds; refine it"):
+        load_reference(root, SCENE)
+
+
+def test_runs_are_loaded_without_a_reference_that_failed(solved, tmp_path, monkeypatch, mesh_cache):
+    from studies.run import run_case
+
+    root = shutil.copytree(solved, tmp_path / "results")
+    study = tiny_study(cases=(tiny_case(scene=SCENE),))
+    run_case(root, study.name, study.cases[0])
+    runs, remarks = load_runs(root, study)
+    assert remarks == []
+    assert runs[0].reference.force[-1] > 0
+    monkeypatch.setattr(module, "equilibrium_path", broken)
+    solve_reference(root, SCENE, LEVELS[1])
+    runs, remarks = load_runs(root, study)
+    assert runs[0].reference is None
+    assert len(remarks) == 1
+    assert "not-converged" in remarks[0]
+    reference_path(root, SCENE, LEVELS[0]).unlink()
+    assert "no results file" in load_runs(root, study)[1][0]
+
+
+def test_no_plan_no_reference(tmp_path):
+    assert load_reference(tmp_path, replace(SCENE, reference=None)) is None
+    with pytest.raises(StudyError, match="two levels"):
+        ReferencePlan("octant", (0.5,))
