@@ -27,7 +27,7 @@ from studies.run import replay as replay_run
 from studies.safe_dt import safe_step
 from studies.scenes import SCENES
 from studies.suggest import choose
-from studies.sweep import Task, failed, load_runs, run_studies, standings
+from studies.sweep import failed, load_runs, run_studies, standings, warnings_of
 from studies.table import study_table
 
 app = typer.Typer(
@@ -105,13 +105,17 @@ def run(
             count = run_studies(root, [study], jobs, progress, wanted)
         for sentence in link_study(root, study.name):
             errors.print(f"warning: {sentence}", markup=False)
+        said = warnings_of(root, study) if count else []
+        if said:
+            more = f" (and {len(said) - 1} more cases warn; `organbench show` prints them)" if len(said) > 1 else ""
+            errors.print(f"warning: {said[0]}{more}", markup=False, highlight=False)
         charts = [study_folder(root, study.name) / chart.file for chart in study.charts]
         if count or not all(chart.exists() for chart in charts):
             _draw(root, study)
         console.print(f"{study.name}: {count} pieces ran, charts in {study_folder(root, study.name)}", highlight=False)
 
 
-def _filter(only: str):  # noqa: ANN202
+def _filter(only: str):
     if not only:
         return None
     rules = {"failed": failed, "stale": lambda task: task.path().exists() and not task.is_current()}
@@ -228,7 +232,9 @@ def safe_dt(
     console.print(f"dt = auto          {1e3 * found.auto:.4g} ms  (margin {limit.damped / found.auto:.3g})")
     for dt, outcome in found.tried:
         console.print(f"run at             {1e3 * dt:.4g} ms  ({dt / limit.damped:.3g} of the limit): {outcome}")
-    console.print("verified" if found.verified else "not verified: the limit of this scene is not where it was predicted")
+    console.print(
+        "verified" if found.verified else "not verified: the limit of this scene is not where it was predicted"
+    )
 
 
 if __name__ == "__main__":

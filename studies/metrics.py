@@ -222,7 +222,7 @@ METRICS: tuple[Metric, ...] = (
     Metric("force_end", "%", "-", force_end, "force_end"),
     Metric("surface_error", "%", "lower", surface_error, "surface"),
     Metric("interior_error", "%", "lower", interior_error, "interior"),
-    Metric("mean_error", "%", "lower", mean_error, "surface"),
+    Metric("mean_error", "%", "lower", mean_error, "surface_mean"),
     Metric("silhouette_error", "%", "lower", silhouette_error, "silhouette"),
     Metric("pressure_error", "%", "-", pressure_error, "pressure"),
     Metric("min_j", "1", "higher", min_j),

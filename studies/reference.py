@@ -174,7 +174,7 @@ class Reference:
         points = self.field("nodes") + self.field("displacement")[checkpoint]
         if not self.scene.symmetric:
             return points, self.triangles
-        on_cut = (np.abs(self.field("nodes")[self.triangles]) < 1e-12).all(axis=1).any(axis=1)
+        on_cut = np.any(np.all(np.abs(self.field("nodes")[self.triangles]) < 1e-12, axis=1), axis=1)
         part = self.triangles[~on_cut]
         signs = np.array(list(product((1.0, -1.0), repeat=3)))
         faces = [
@@ -189,13 +189,15 @@ class Reference:
             raise StudyError(f"the reference of '{self.scene.name}' has one mesh only, so no error bar; solve two")
         points = self.coarser.field("nodes")
         here, there = self.displacement(points), self.coarser.field("displacement")[-1]
-        reached = np.linalg.norm(here - there, axis=1) / np.sqrt((here**2).sum(axis=1).mean())
+        gap = np.linalg.norm(here - there, axis=1)
+        reached = gap / np.sqrt((here**2).sum(axis=1).mean())
         outside = self.coarser.triangles
         surface = np.unique(outside)
         return {
             "force": float(np.linalg.norm(self.force - self.coarser.force) / np.linalg.norm(self.force)),
             "force_end": float(abs(self.force[-1] - self.coarser.force[-1]) / abs(self.force[-1])),
             "surface": float(np.sqrt((reached[surface] ** 2).mean())),
+            "surface_mean": float(gap[surface].mean() / np.linalg.norm(here[surface], axis=1).max()),
             "interior": float(np.sqrt((reached**2).mean())),
             "silhouette": hausdorff(points + here, outside, points + there, outside) / self.size,
             "volume": float(np.abs(self.field("volume") - 1).max()),

@@ -48,7 +48,9 @@ def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]
         runs_of[study.name] = runs
         remarks += [f"{study.name}: {sentence}" for sentence in missing]
         written += draw_charts(root, study, runs)
-        written.append(write_table(study_folder(root, study.name) / f"{study.name}.csv", study_table(runs, study.columns)))
+        written.append(
+            write_table(study_folder(root, study.name) / f"{study.name}.csv", study_table(runs, study.columns))
+        )
     write_machine(root / "machine.json")
     summary = root / "summary.md"
     write_whole(summary, (summary_of(runs_of) + "\n").encode())
@@ -70,7 +72,10 @@ def summary_of(runs_of: dict[str, list[Run]]) -> str:
     if rows.empty:
         return "No results yet: run `make study`."
     rows = rows[rows["dt/dt_c"] > 0.25]
-    lines = ["| scene | body | method | " + " | ".join(SUMMARY_HEADS) + " |", "|---|---|---|" + "---|" * len(SUMMARY_HEADS)]
+    lines = [
+        "| scene | body | method | " + " | ".join(SUMMARY_HEADS) + " |",
+        "|---|---|---|" + "---|" * len(SUMMARY_HEADS),
+    ]
     for _, row in rows.iterrows():
         cells = [_cell(row, name) for name in SUMMARY_COLUMNS]
         lines.append(f"| {row['scene']} | {row['body']} | {row['method']} | " + " | ".join(cells) + " |")

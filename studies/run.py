@@ -1,5 +1,6 @@
 """One case: prepared, simulated, judged, stored. Whatever happens is a result; only a full disk is not."""
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -43,14 +44,18 @@ def run_case(root: Path, study: str, case: Case, on_frame: Callable[[int], objec
 
 
 def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Record:
-    """The record of a case."""
-    try:
-        prepared = prepare(case)
-    except (StudyError, MassSpringError) as error:
-        return _record(case, Status.FAILED, str(error), {}, {})
+    """The record of a case; what preparing it warned of is its attribute `warnings`."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        try:
+            prepared = prepare(case)
+        except (StudyError, MassSpringError) as error:
+            return _record(case, Status.FAILED, str(error), {}, {})
+    said = "; ".join(dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, UserWarning)))
     history = simulate(prepared.setup, checkpoint_frames(case, prepared), on_frame, TIME_LIMIT)
     status, message = judge(case, prepared, history)
-    return _record(case, status, message, _attributes(prepared, history), _fields(prepared, history))
+    attributes = {**_attributes(prepared, history), "warnings": said}
+    return _record(case, status, message, attributes, _fields(prepared, history))
 
 
 def checkpoint_frames(case: Case, prepared: Prepared) -> list[int]:
@@ -68,7 +73,10 @@ def judge(case: Case, prepared: Prepared, history: History) -> tuple[Status, str
         return Status.INVERTED, f"a tetrahedron ends inside out (smallest volume ratio {smallest:.3g})"
     drift = float(np.max(np.abs(history.volume[:, 0] / prepared.setup.body.volume - 1)))
     if case.method.volume_tol is not None and drift > DRIFT:
-        return Status.DRIFTED, f"the volume was off by {100 * drift:.3g} %, a kept volume may be off by {100 * DRIFT:g} %"
+        return (
+            Status.DRIFTED,
+            f"the volume was off by {100 * drift:.3g} %, a kept volume may be off by {100 * DRIFT:g} %",
+        )
     return Status.OK, ""
 
 
@@ -114,7 +122,9 @@ def _fields(prepared: Prepared, history: History) -> dict[str, Field]:
         "contact_force": Field(history.contact_force, "N", "force of each obstacle on the body, mean of the frame"),
         "held_force": Field(history.held_force, "N", "force of each held region on the body, mean of the frame"),
         "min_j": Field(history.min_j, "1", "smallest tetrahedron volume ratio; NaN without tetrahedra"),
-        "snapshot_frame": Field(history.snapshot_frames, "1", "number of the frame after which each snapshot was taken"),
+        "snapshot_frame": Field(
+            history.snapshot_frames, "1", "number of the frame after which each snapshot was taken"
+        ),
         "snapshots": Field(history.snapshots, "m", "positions at the scene's checkpoints"),
         "rest": Field(body.rest, "m", "rest positions"),
         "mass": Field(body.mass, "kg", "mass of each node"),

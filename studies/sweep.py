@@ -2,8 +2,10 @@
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -54,7 +56,11 @@ class Task:
     @property
     def label(self) -> str:
         """For progress and messages."""
-        return self.case.name if self.case is not None else f"reference {self.scene.name if self.scene else ''} {self.level:g}"
+        return (
+            self.case.name
+            if self.case is not None
+            else f"reference {self.scene.name if self.scene else ''} {self.level:g}"
+        )
 
     def is_current(self) -> bool:
         """Whether it need not run."""
@@ -99,12 +105,17 @@ def perform(tasks: list[Task], jobs: int, progress: Progress) -> None:
     progress.begin("physics", len(tasks))
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # read by the libraries when a worker loads them
-    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_die_quietly)
     try:
         futures: dict[Future[Path], Task] = {pool.submit(task.perform): task for task in tasks}
         for future in as_completed(futures):
             future.result()
             progress.advance("physics", futures[future].label)
+    except BrokenProcessPool as error:
+        raise StudyError(
+            "a computing process died (out of memory, or killed); what is finished is stored, run the command again"
+        ) from error
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         for name, value in before.items():
@@ -112,6 +123,11 @@ def perform(tasks: list[Task], jobs: int, progress: Progress) -> None:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+def _die_quietly() -> None:
+    """A worker ends at once at Ctrl-C, without a traceback: the case it was at runs again next time."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def run_studies(
@@ -153,6 +169,13 @@ def load_runs(root: Path, study: Study) -> tuple[list[Run], list[str]]:
         timing = read_timing(root, study.name, case) if case.timed else None
         runs.append(Run(case, read_record(path), references[case.scene.name], timing))
     return runs, remarks
+
+
+def warnings_of(root: Path, study: Study) -> list[str]:
+    """What the cases of a study warned of when they were prepared, a sentence each."""
+    paths = [case_path(root, study.name, case) for case in study.cases]
+    said = [peek(path).attributes.get("warnings", "") for path in paths if path.exists()]
+    return [str(sentence) for sentence in said if sentence]
 
 
 @dataclass(frozen=True)
