@@ -1,4 +1,4 @@
-"""Mass-spring bodies that keep their volume: Jung, Hong, Choi (2005) and relatives. Knows no file, no plot, no scene."""
+"""Mass-spring bodies that keep their volume: Jung, Hong, Choi (2005). Knows no file, no plot, no scene."""
 
 from massspring.body import Body, Material, surface_body, tetrahedral_body
 from massspring.clock import Clock, make_clock

@@ -1,4 +1,4 @@
-"""The dominant axis of a surface and the virtual nodes on it, which carry the paper's inner springs (JHC05, section 3)."""
+"""The dominant axis of a surface and the virtual nodes on it, ends of the inner springs (JHC05, section 3)."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ def principal_axis(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def virtual_nodes(points: np.ndarray, spacing: float) -> np.ndarray:
-    """Nodes [m], (a, 3), evenly on the principal axis of the surface nodes `points` (n, 3) [m], about `spacing` [m] apart.
+    """Nodes [m], (a, 3), evenly on the principal axis of `points` (n, 3) [m], about `spacing` [m] apart.
 
     The axis ends half a spacing inside the surface nodes' extent. The paper's axis follows "the organ's topology":
     a straight one serves a compact organ (ball, liver, spleen), not a bent one.

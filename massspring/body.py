@@ -23,7 +23,7 @@ from massspring.springs import (
 AXIS_MASS_SHARE = 0.25
 """A pyramid over the axis has a quarter of its mass at the apex (linear shape functions)."""
 SURFACE_WEIGHTS = {SpringKind.STRUCTURAL: 1.0, SpringKind.BENDING: 0.5, SpringKind.INNER: 0.5, SpringKind.AXIAL: 1.0}
-"""Relative stiffness of the kinds of a surface body; their sum is scaled to the shear modulus. The paper names no values."""
+"""Relative stiffness of the kinds; their sum is scaled to the shear modulus. The paper names no values."""
 STIFFNESS_LAWS = ("van_gelder", "uniform")
 NO_TETRAHEDRA = np.empty((0, 4), dtype=np.uint32)
 

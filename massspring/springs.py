@@ -77,7 +77,7 @@ def matched_scale(shear_modulus: float, volume: float, weight: np.ndarray, lengt
 def van_gelder_weights(
     tetrahedra: np.ndarray, volumes: np.ndarray, edges: np.ndarray, length: np.ndarray
 ) -> np.ndarray:
-    """k_e ∝ Σ_t∋e V_t / L_e² for the `edges` (s, 2) of `tetrahedra` (k, 4) of volumes (k,) [m³] (Van Gelder 1998, eq. 15)."""
+    """k_e ∝ Σ_t∋e V_t/L_e² for `edges` (s, 2) of `tetrahedra` (k, 4), volumes (k,) [m³] (Van Gelder 1998, eq. 15)."""
     local = np.sort(tetrahedra[:, EDGES_OF_TETRAHEDRON], axis=2).reshape(-1, 2)
     size = int(tetrahedra.max()) + 1
     index = np.searchsorted(

@@ -36,9 +36,9 @@ def largest_frequency(body: Body, held_nodes: np.ndarray | None = None) -> float
     """ω_max [1/s] of small oscillations about rest, by Lanczos iteration from a fixed start. Raises MassSpringError."""
     held = np.empty(0, dtype=np.int64) if held_nodes is None else held_nodes
     matrix = scaled_stiffness(body, held)
-    start = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    start = np.random.default_rng(0).standard_normal(3 * body.node_count)
     try:
-        largest = eigsh(matrix, k=1, which="LA", v0=start, tol=LANCZOS_TOLERANCE, return_eigenvectors=False)[0]
+        largest = eigsh(matrix, 1, which="LA", v0=start, tol=LANCZOS_TOLERANCE, return_eigenvectors=False)[0]  # pyright: ignore[reportArgumentType]
     except ArpackError as error:
         raise MassSpringError(f"the largest frequency of the network did not converge: {error}") from error
     return math.sqrt(max(float(largest), 0.0))
@@ -66,7 +66,7 @@ class StepLimit:
 
 
 def step_limit(body: Body, damping: float = 0.0, held_nodes: np.ndarray | None = None) -> StepLimit:
-    """Stability limit of a body with mass-proportional `damping` [1/s]. Raises MassSpringError for a body without springs."""
+    """Limit of a body with mass-proportional `damping` [1/s]. Raises MassSpringError for a body without springs."""
     frequency = largest_frequency(body, held_nodes) if body.springs.count else 0.0
     if not frequency > 0:
         raise MassSpringError("the body has no stiffness, so no largest frequency; give it springs or a dt in seconds")

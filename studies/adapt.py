@@ -4,7 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from massspring import Attachment, Body, Material, Setup, StepLimit, make_clock, step_limit, surface_body, tetrahedral_body
+from massspring import (
+    Attachment,
+    Body,
+    Material,
+    Setup,
+    StepLimit,
+    make_clock,
+    step_limit,
+    surface_body,
+    tetrahedral_body,
+)
 from studies.case import BodyRecipe, Case
 from studies.errors import StudyError
 from studies.geometry import OrganMesh, fill, organ, read_mesh
@@ -26,7 +36,9 @@ def mesh_for(scene: Scene, nodes: int, filled: bool = True) -> OrganMesh:
         return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters)
     parameters = scene.organ.parameters
     if "path" not in parameters or "unit" not in parameters:
-        raise StudyError(f"scene '{scene.name}': an organ from a file needs a path and a unit, it has {dict(parameters)}")
+        raise StudyError(
+            f"scene '{scene.name}': an organ from a file needs a path and a unit, it has {dict(parameters)}"
+        )
     mesh = read_mesh(parameters["path"], unit=parameters["unit"])
     return fill(mesh) if filled and not len(mesh.tetrahedra) else mesh
 
@@ -56,7 +68,7 @@ def patch_nodes(mesh: OrganMesh, name: str, region: object) -> np.ndarray:
 
 
 def prepare(case: Case) -> Prepared:
-    """Mesh, body, clock and surroundings of a case. Raises StudyError or MassSpringError; warns of a dt above the limit."""
+    """Mesh, body, clock, surroundings of a case. Raises StudyError, MassSpringError; warns of dt above the limit."""
     scene = case.scene
     reason = scene.skip(case.method)
     if reason is not None:

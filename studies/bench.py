@@ -1,4 +1,4 @@
-"""The numbers this project promises, measured: `make bench` on a quiet machine. Prints a table, writes results/bench.csv."""
+"""The promised numbers, measured: `make bench` on a quiet machine. Prints a table, writes results/bench.csv."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,8 +8,20 @@ import numpy as np
 import pandas as pd
 from rich.console import Console
 
-from massspring import Attachment, Clock, Free, ImplicitVolume, Material, Method, Path as Motion
-from massspring import Plane, Setup, simulate, step_limit, surface_body
+from massspring import (
+    Attachment,
+    Clock,
+    Free,
+    ImplicitVolume,
+    Material,
+    Method,
+    Plane,
+    Setup,
+    simulate,
+    step_limit,
+    surface_body,
+)
+from massspring import Path as Motion
 from reference_fem import bench as reference_bench
 from reference_fem import equilibrium_path
 from studies.adapt_reference import reference_problem, whole_forces
@@ -65,7 +77,9 @@ def step_lines() -> list[Line]:
     ratio = ratio_with_spread(pressed["implicit_volume"], pressed["free"])
     springs = setups["free"].body.springs.count
     return [
-        Line("step, 550 surface nodes, m = 1, one plane", cost["implicit_volume"], "µs", 40.0, note=f"{springs} springs"),
+        Line(
+            "step, 550 surface nodes, m = 1, one plane", cost["implicit_volume"], "µs", 40.0, note=f"{springs} springs"
+        ),
         Line("the same without the constraint", cost["free"], "µs", 40.0),
         Line("constraint on / off", ratio.median, "1", 1.35, note=f"interval {ratio.low:.3g} to {ratio.high:.3g}"),
     ]
@@ -112,7 +126,9 @@ def speed_lines() -> list[Line]:
         cost = reference_bench.iteration_costs(cells=7)
     note = f"{cost['unknowns']:.0f} unknowns"
     return [
-        Line("assembly of tangent and residual", cost["assembled_per_s"], "unknowns/s", 250e3, at_most=False, note=note),
+        Line(
+            "assembly of tangent and residual", cost["assembled_per_s"], "unknowns/s", 250e3, at_most=False, note=note
+        ),
         Line("Newton iteration", cost["iteration_s"], "s", 0.2, note=note),
     ]
 

@@ -160,7 +160,7 @@ def mean_error(run: Run) -> float:
 
 
 def silhouette_error(run: Run) -> float:
-    """Symmetric Hausdorff distance of the deformed surface to its deformation by the reference, over the body's size [%]."""
+    """Hausdorff distance of the deformed surface to its deformation by the reference, over the body's size [%]."""
     assert run.reference is not None
     rest, triangles = run.field("rest"), run.field("triangles")
     surface = np.unique(triangles)

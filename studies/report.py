@@ -1,5 +1,6 @@
 """What people look at: charts, tables as CSV, the summary of results that README shows."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -103,16 +104,19 @@ SUMMARY_HEADS = (
 
 def _cell(row: pd.Series, column: str) -> str:
     """A value with the uncertainty of its reference, or a dash."""
-    value = row[column]
+    value = float(row[column])
     if value != value:
         return "–"
     if column.startswith("min_j"):
         return f"{value:.2f}"
     if column.startswith("volume"):
         return f"{value:.2g}"
-    floor = row.get(column.replace(" [", " floor ["), float("nan"))
+    floor = float(row.get(column.replace(" [", " floor ["), float("nan")))
     sign = "+" if column.startswith("force") else ""
-    return f"{value:{sign}.3g} ± {floor:.1g}" if floor == floor else f"{value:{sign}.3g}"
+    if not floor > 0:
+        return f"{value:{sign}.3g}"
+    digits = max(0, -math.floor(math.log10(floor)))  # as many as the uncertainty has
+    return f"{value:{sign}.{digits}f} ± {floor:.{digits}f}".replace("-", "−")
 
 
 def write_readme(readme: Path, summary: str) -> None:

@@ -49,13 +49,17 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
         warnings.simplefilter("always", UserWarning)
         try:
             prepared = prepare(case)
+            # Attachments that overlap, or hold no node, show only when the run starts.
+            history = simulate(prepared.setup, checkpoint_frames(case, prepared), on_frame, TIME_LIMIT)
         except (StudyError, MassSpringError) as error:
-            return _record(case, Status.FAILED, str(error), {}, {})
-    said = "; ".join(dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, UserWarning)))
-    history = simulate(prepared.setup, checkpoint_frames(case, prepared), on_frame, TIME_LIMIT)
+            return _record(case, Status.FAILED, str(error), {"warnings": _said(caught)}, {})
     status, message = judge(case, prepared, history)
-    attributes = {**_attributes(prepared, history), "warnings": said}
+    attributes = {**_attributes(prepared, history), "warnings": _said(caught)}
     return _record(case, status, message, attributes, _fields(prepared, history))
+
+
+def _said(caught: list[warnings.WarningMessage]) -> str:
+    return "; ".join(dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, UserWarning)))
 
 
 def checkpoint_frames(case: Case, prepared: Prepared) -> list[int]:
@@ -145,10 +149,14 @@ def replay(path: Path) -> tuple[Record, Record, str | None]:
 def _difference(stored: Record, new: Record) -> str | None:
     if stored.status != new.status:
         return f"it was {stored.status}, now it is {new.status}: {new.message}"
+    odd = set(stored.fields) ^ set(new.fields)
+    if odd:
+        return f"'{min(odd)}' is {'not stored' if min(odd) in new.fields else 'no longer computed'}"
     for name, field in stored.fields.items():
-        if name not in new.fields or new.fields[name].values.shape != field.values.shape:
+        if new.fields[name].values.shape != field.values.shape:
             return f"'{name}' has another shape"
         if not np.array_equal(field.values, new.fields[name].values, equal_nan=field.values.dtype.kind == "f"):
-            gap = float(np.nanmax(np.abs(field.values - new.fields[name].values)))
+            # As numbers with a sign: indices are stored without one.
+            gap = float(np.nanmax(np.abs(field.values - new.fields[name].values.astype(float))))
             return f"'{name}' differs by up to {gap:.3g} {field.unit}"
     return None

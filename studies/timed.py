@@ -1,4 +1,4 @@
-"""Frame times of stored cases, by the protocol of studies.timing, in files of their own: re-timing never touches physics."""
+"""Frame times of stored cases (protocol: studies.timing) in files of their own: re-timing never touches physics."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path

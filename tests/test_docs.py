@@ -1,4 +1,4 @@
-"""README and CONTRIBUTING say what is true: their code runs, their recipes satisfy the contracts, their table is the stored one."""
+"""README and CONTRIBUTING say what is true: code runs, recipes satisfy the contracts, the table is the stored one."""
 
 import re
 from pathlib import Path
@@ -36,7 +36,11 @@ def executed(document: str, heading: str) -> dict:
 
 @pytest.mark.parametrize("heading", ["metric", "scene", "method", "study", "organ"])
 def test_recipes_are_short(heading):
-    lines = [line for line in code("CONTRIBUTING.md", f"Add a{'n' if heading == 'organ' else ''} {heading}").split("\n") if line]
+    lines = [
+        line
+        for line in code("CONTRIBUTING.md", f"Add a{'n' if heading == 'organ' else ''} {heading}").split("\n")
+        if line
+    ]
     assert len(lines) <= 8
 
 
@@ -50,7 +54,11 @@ def test_the_example_of_readme_runs(capsys):
 def test_an_added_metric_reads_a_run(tmp_path):
     added = executed("CONTRIBUTING.md", "Add a metric")["ADDED"]
     study = executed("CONTRIBUTING.md", "Add a study")["STUDY"]
-    plain = Case(study.cases[0].scene.__class__(**{**vars(study.cases[0].scene), "reference": None}), BodyRecipe(nodes=100), frames=5)
+    plain = Case(
+        study.cases[0].scene.__class__(**{**vars(study.cases[0].scene), "reference": None}),
+        BodyRecipe(nodes=100),
+        frames=5,
+    )
     from studies.metrics import Run
 
     assert 0 <= added(Run(plain, measure(plain))) < 1e-3

@@ -46,6 +46,6 @@ def _keyed_cache() -> Iterator[None]:
 
 
 def compiled(function: Function) -> Function:
-    """Compile on first call, keep on disk. Division follows IEEE: a zero gives inf, which the run reports as diverged."""
+    """Compile on first call, keep on disk. Division follows IEEE: a zero gives inf, and the run has diverged."""
     with _keyed_cache():
-        return numba.njit(cache=True, error_model="numpy")(function)
+        return numba.njit(cache=True, error_model="numpy")(function)  # pyright: ignore[reportReturnType]

@@ -54,7 +54,10 @@ def volume_multiplier(motion, inverse_mass, volume_error, dt):
 
 @compiled
 def advance(motion, mass, inverse_mass, lam, dt, contact_impulse):
-    """v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺ (eq. 10); adds what each obstacle gave, n (m (a − n·v*) − dt lam n·G) [N s]."""
+    """v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺ (eq. 10).
+
+    Adds the impulse of each obstacle, n (m (a − n·v*) − dt lam n·G) [N s].
+    """
     for i in range(mass.shape[0]):
         push = dt * lam * inverse_mass[i]
         u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]

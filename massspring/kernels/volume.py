@@ -5,7 +5,10 @@ from massspring.kernels.compiled import compiled
 
 @compiled
 def enclosed_volume(x, triangles):
-    """V = (1/6) Σ_f x_i · (x_j × x_k) [m³] (eq. 3), seen from a node of the surface so that no digits are lost far from the origin."""
+    """V = (1/6) Σ_f x_i · (x_j × x_k) [m³] (eq. 3).
+
+    Seen from a node of the surface, so that no digits are lost far from the origin.
+    """
     o0, o1, o2 = x[triangles[0, 0], 0], x[triangles[0, 0], 1], x[triangles[0, 0], 2]
     six = 0.0
     for f in range(triangles.shape[0]):

@@ -1,4 +1,4 @@
-"""What a method is: settings (a frozen dataclass), claims (class variables), and one compiled loop over a frame's steps."""
+"""What a method is: settings (a frozen dataclass), claims (class variables), one compiled loop over the steps."""
 
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Protocol
@@ -56,7 +56,7 @@ class Method(Protocol):
 
 
 def start(body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
-    """The body at rest, or with velocities `v` (n, 3) [m/s]. Raises MassSpringError for attachments that overlap or miss."""
+    """The body at rest, or with velocities `v` (n, 3) [m/s]. Raises MassSpringError for bad attachments."""
     network = _network(body, attachments)
     n = body.node_count
     velocity = np.zeros((n, 3)) if v is None else np.array(v, dtype=np.float64)

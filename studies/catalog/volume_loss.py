@@ -1,7 +1,7 @@
 """How much volume does each model lose, and how far is it from the reference? (The paper's Figure 3.)"""
 
-from studies.case import BodyRecipe, Case
 from massspring import Free, ImplicitVolume
+from studies.case import BodyRecipe, Case
 from studies.catalog.base import Chart, Study
 from studies.plots import accuracy, force_path, squeeze, volume_history
 from studies.scenes import SCENES
@@ -15,7 +15,12 @@ VOLUME_LOSS = Study(
     name="volume_loss",
     question=__doc__ or "",
     cases=(
-        *(Case(scene, body, method) for scene in SCENES for body in (TETRAHEDRAL, SURFACE) for method in (Free(), ImplicitVolume())),
+        *(
+            Case(scene, body, method)
+            for scene in SCENES
+            for body in (TETRAHEDRAL, SURFACE)
+            for method in (Free(), ImplicitVolume())
+        ),
         *(Case(BALL_SQUEEZE, body, ImplicitVolume(), dt_fraction=FINE_STEP) for body in (TETRAHEDRAL, SURFACE)),
     ),
     charts=(

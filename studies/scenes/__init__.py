@@ -1,4 +1,4 @@
-"""The scenes, one file each. Adding one: a file and a line in SCENES; tests, `organbench list` and charts find it there."""
+"""The scenes, one file each. Adding one: a file and a line in SCENES, where tests, commands and charts find it."""
 
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE

@@ -1,11 +1,13 @@
-"""The paper's Figure 2: a ball between two frictionless planes, squeezed by 30 % of its diameter, 800 recorded frames."""
+"""The paper's Figure 2: a ball squeezed by 30 % of its diameter between two frictionless planes, 800 frames."""
 
 from massspring import Path, Plane
 from studies.scenes.base import LIVER, Organ, Probed, ReferencePlan, Scene, press_times
 
 RADIUS = 0.05  # m
 DEPTH = 0.30  # of the diameter; each plane does half of it
-PRESS_END = 3.0  # s: 5 mm/s a plane, a twentieth of the speed of a shear wave across the ball in its slowest ringing period
+PRESS_END = (
+    3.0  # s: 5 mm/s a plane, a twentieth of the speed of a shear wave across the ball in its slowest ringing period
+)
 DURATION = 4.0  # s
 
 BALL_SQUEEZE = Scene(

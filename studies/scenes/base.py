@@ -1,4 +1,4 @@
-"""A scene: what happens to which organ. Both solvers read the same one, so load, contact and clock agree by construction."""
+"""A scene: what happens to which organ. Both solvers read the same one: load, contact and clock agree."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -73,7 +73,9 @@ class ReferencePlan:
 
     def __post_init__(self) -> None:
         if self.mesh not in ("solid", "octant") or len(self.levels) < 2:
-            raise StudyError("a reference needs a 'solid' or 'octant' mesh and at least two levels, or it has no error bar")
+            raise StudyError(
+                "a reference needs a 'solid' or 'octant' mesh and at least two levels, or it has no error bar"
+            )
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ LIVER = Tissue(1800.0, 1060.0, "liver, MR elastography: 1.8 ± 0.4 kPa; density 
 
 
 def press_times(start: float, end: float, steps: int, rest: float) -> tuple[float, ...]:
-    """`steps` evenly spaced times up to the end of a press [s], the last one moved to `rest`, when all has come to rest."""
+    """`steps` evenly spaced times up to the end of a press [s], the last moved to `rest`, when all is still."""
     times = np.linspace(start, end, steps + 1)[1:]
     return (*times[:-1].tolist(), rest)
 

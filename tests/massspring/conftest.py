@@ -35,7 +35,9 @@ def icosphere(levels: int, radius: float = 0.05) -> tuple[np.ndarray, np.ndarray
     points = [(0, s, t * golden) for s in (-1, 1) for t in (-1, 1)]
     points = np.array(points + [(y, z, x) for x, y, z in points] + [(z, x, y) for x, y, z in points], dtype=float)
     near = np.linalg.norm(points[:, None] - points[None], axis=2) < 2.1
-    triples = [(i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[k, i]]
+    triples = [
+        (i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[k, i]
+    ]
     triangles = np.array(triples)
     for _ in range(levels):
         edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)

@@ -71,7 +71,9 @@ def test_inner_springs_go_to_the_closest_virtual_node(ball_body):
     inner = ball_body.springs.ends[ball_body.springs.kind == SpringKind.INNER].astype(int)
     virtual = ball_body.rest[len(ball_body.surface_nodes) :]
     distance = np.linalg.norm(ball_body.rest[inner[:, 0], None] - virtual[None], axis=2)
-    assert np.allclose(distance.min(axis=1), np.linalg.norm(ball_body.rest[inner[:, 0]] - ball_body.rest[inner[:, 1]], axis=1))
+    assert np.allclose(
+        distance.min(axis=1), np.linalg.norm(ball_body.rest[inner[:, 0]] - ball_body.rest[inner[:, 1]], axis=1)
+    )
 
 
 def test_the_dominant_axis_is_the_long_one():
@@ -140,7 +142,9 @@ def test_a_spring_without_length_is_refused(block_body):
         changed(block_body, springs=replace(block_body.springs, rest_length=length))
 
 
-@pytest.mark.parametrize("values", [{"shear_modulus": -1.0, "density": 1000.0}, {"shear_modulus": 1.0, "density": np.nan}])
+@pytest.mark.parametrize(
+    "values", [{"shear_modulus": -1.0, "density": 1000.0}, {"shear_modulus": 1.0, "density": np.nan}]
+)
 def test_bad_materials_are_refused(values):
     with pytest.raises(MassSpringError, match="positive finite"):
         Material(**values)

@@ -61,7 +61,7 @@ def test_an_obstacle_only_pushes(ball_body):
 
 
 def test_clamps_lose_no_volume_when_contact_is_inside_the_multiplier(block_body):
-    """Contact after the correction would lose 0.05 to 0.64 % (theory); inside it loses what one step's square leaves."""
+    """Contact after the correction would lose 0.05 to 0.64 % (theory); inside it loses one step's square."""
     clock = clock_for(block_body, 300, 20)
     planes = squeeze(block_body, 0.004, 0.2 * clock.duration)
     history = simulate(Setup(block_body, ImplicitVolume(), clock, planes, damping=60.0))

@@ -51,7 +51,9 @@ def direction(body: Body) -> np.ndarray:
 def test_the_volume_gradient_is_the_derivative_of_the_volume(body, direction):
     x = moved(body)
     exact = float((gradient(body, x) * direction).sum())
-    assert directional(lambda y: enclosed_volume(y, body.triangles), x, direction) == pytest.approx(exact, rel=DIFFERENCE)
+    assert directional(lambda y: enclosed_volume(y, body.triangles), x, direction) == pytest.approx(
+        exact, rel=DIFFERENCE
+    )
     # The mutant this must catch: the tetrahedron gradient without its 1/6.
     assert directional(lambda y: enclosed_volume(y, body.triangles), x, direction) != pytest.approx(6 * exact, rel=0.1)
 

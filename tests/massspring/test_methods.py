@@ -7,7 +7,20 @@ import numpy as np
 import pytest
 
 import massspring.kernels.motion as motion_kernels
-from massspring import METHODS, Attachment, Body, Clock, Free, ImplicitVolume, Path, Plane, Setup, Sphere, simulate, step_limit
+from massspring import (
+    METHODS,
+    Attachment,
+    Body,
+    Clock,
+    Free,
+    ImplicitVolume,
+    Path,
+    Plane,
+    Setup,
+    Sphere,
+    simulate,
+    step_limit,
+)
 from massspring.kernels.volume import enclosed_volume, volume_gradient_into
 from massspring.methods.base import State, begin_frame, start
 

@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh
 
-from massspring import Body, Clock, Free, ImplicitVolume, MassSpringError, Setup, StepLimit, make_clock, simulate, step_limit
+from massspring import (
+    Body,
+    Clock,
+    Free,
+    ImplicitVolume,
+    MassSpringError,
+    Setup,
+    StepLimit,
+    make_clock,
+    simulate,
+    step_limit,
+)
 from massspring.springs import Springs
 from massspring.stability import largest_frequency, scaled_stiffness
 from tests.massspring.test_kernels import forces

@@ -8,12 +8,12 @@ import numpy as np
 
 from studies.geometry.blends import ellipsoid, groove, smooth_max, smooth_min
 from studies.geometry.levelset import Shape, normals, project
-from studies.geometry.regions import EllipsoidRegion, Region, Vector
+from studies.geometry.regions import EllipsoidRegion, Vector
 
 MM = 1e-3
 BARE_AREA = EllipsoidRegion(center=(-0.035, 0.053, 0.043), semi_axes=(0.045, 0.040, 0.026))
 """Where the liver grows to the diaphragm, behind and above the right lobe: about 41 cm² of its surface."""
-LIVER_REGIONS: dict[str, Region] = {"bare_area": BARE_AREA}
+LIVER_REGIONS: dict[str, EllipsoidRegion] = {"bare_area": BARE_AREA}
 
 
 def liver_level(points: np.ndarray) -> np.ndarray:
