@@ -17,7 +17,7 @@ from studies.scenes.base import Organ, Scene
 from studies.suggest import choose
 
 POLE_REFINEMENT = 0.35
-"""Element size at the contact of an octant, over that elsewhere: at 10 % the contact radius is a third of the ball's."""
+"""Element size at the contact of an octant, over that elsewhere: at 10 % the contact is a third of the ball's."""
 SAME_POINT = 1e-9
 """Two nodes closer than this fraction of the body are one: far above rounding, far below an edge."""
 
