@@ -18,7 +18,9 @@ from massspring import (
 from studies.case import BodyRecipe, Case
 from studies.errors import StudyError
 from studies.geometry import OrganMesh, fill, organ, read_mesh
+from studies.geometry.organs import SHAPES
 from studies.scenes.base import Scene
+from studies.suggest import choose
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class Prepared:
 
 def mesh_for(scene: Scene, nodes: int, filled: bool = True) -> OrganMesh:
     """The scene's organ with `nodes` surface nodes; a mesh file comes as it is. Raises StudyError."""
-    if scene.organ.shape != "file":
+    if choose(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
         return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters)
     parameters = scene.organ.parameters
     if "path" not in parameters or "unit" not in parameters:
