@@ -78,5 +78,6 @@ def file_scene(path, unit: str = "m", **changes) -> Scene:
         duration=0.01,
         checkpoints=(0.01,),
         gravity=(0.0, 0.0, -9.81),
+        damping=0.0,
     )
     return replace(scene, **changes)
