@@ -1,4 +1,77 @@
-from pathlib import Path
+"""How much longer a frame takes with the constraint than without, and whether that can be told at all."""
+
 from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from massspring import Free
 from studies.metrics import Run
-def draw(runs: Sequence[Run], path: Path) -> None: ...
+from studies.plots.page import blank, finish, grouped, page
+from studies.plots.style import BLACK, GREY, NORMAL, heading, method_colour, readable, save, styled
+from studies.spread import Ratio, ratio_with_spread
+
+TITLE = "Cost of keeping the volume"
+Row = tuple[str, str, Ratio]
+"""Body, method, and how many times longer its frame takes than the free one's."""
+
+
+@styled
+def figure(runs: Sequence[Run]) -> Figure:
+    """One row per body and method."""
+    rows = ratios(runs)
+    if not rows:
+        return blank(TITLE, "no body has been timed with and without a constraint by this machine and this code yet")
+    sheet = page(9.5, 0.5 * len(rows) + 1.3)
+    axes = sheet.subplots()
+    for place, row in enumerate(rows):
+        _draw_row(axes, place, row)
+    axes.axvline(1.0, color=BLACK, linewidth=1.2)
+    axes.set_yticks(range(len(rows)), [body for body, _, _ in rows])
+    axes.tick_params(axis="y", length=0, labelsize=NORMAL)
+    axes.grid(visible=False, axis="y")
+    low, high = min(ratio.low for _, _, ratio in rows), max(ratio.high for _, _, ratio in rows)
+    axes.set(xlim=(min(0.95, 0.97 * low), max(1.1, 1.03 * high)), ylim=(len(rows) - 0.4, -0.6))
+    axes.set_xlabel("frame time with the constraint over frame time without [1]")
+    methods = dict.fromkeys(method for _, method, _ in rows)
+    handles = [Line2D([], [], color=method_colour(m), marker="o", label=f"{readable(m)} / free") for m in methods]
+    unclear = "not resolvable: too few repeats, or 1 inside the interval"
+    handles.append(Line2D([], [], color=GREY, marker="o", markerfacecolor="white", label=unclear))
+    confidence = ", ".join(sorted({f"{100 * ratio.confidence:.0f} %" for _, _, ratio in rows}))
+    notes = [
+        f"Bar: interval of the median ratio over the repeats, confidence {confidence}. "
+        "Number after a body: its surface nodes."
+    ]
+    return finish(sheet, TITLE, handles, notes, columns=3)
+
+
+def ratios(runs: Sequence[Run]) -> list[Row]:
+    """Every timed method over the free one on the same body in the same scene, with its interval."""
+    rows: list[Row] = []
+    for body in grouped([run for run in runs if run.timing], lambda run: run.case.replaced(method=Free()).key):
+        free = next((run.timing for run in body if run.case.method.name == Free.name), None)
+        for run in body:
+            if free is None or run.timing is None or run.case.method.name == Free.name:
+                continue
+            case = run.case
+            name = f"{heading(case.scene.name)}, {case.body.kind}, {case.body.nodes:,}"
+            rows.append((name, case.method.name, ratio_with_spread(run.timing.frame_ns, free.frame_ns)))
+    return rows
+
+
+def _draw_row(axes: Axes, place: int, row: Row) -> None:
+    _, method, ratio = row
+    clear = ratio.resolvable
+    colour = method_colour(method) if clear else GREY
+    axes.plot([ratio.low, ratio.high], [place, place], color=colour, linewidth=3.5, alpha=0.45, solid_capstyle="butt")
+    axes.plot(ratio.median, place, marker="o", color=colour, markersize=8, markerfacecolor=colour if clear else "white")
+    words = f"{ratio.median:.2f}  ({ratio.low:.2f} to {ratio.high:.2f})"
+    words = words if clear else f"not resolvable  ({ratio.low:.2f} to {ratio.high:.2f})"
+    axes.text(1.02, place, words, transform=axes.get_yaxis_transform(), color=colour, va="center", size=NORMAL)
+
+
+def draw(runs: Sequence[Run], path: Path) -> None:
+    """Writes the chart as PNG."""
+    save(figure(runs), path)

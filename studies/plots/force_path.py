@@ -1,4 +1,122 @@
-from pathlib import Path
+"""The probed force while a scene is pressed and then held, beside the reference at its checkpoints."""
+
 from collections.abc import Sequence
-from studies.metrics import Run
-def draw(runs: Sequence[Run], path: Path) -> None: ...
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from massspring import Path as Motion
+from studies.metrics import COMPARABLE, Run, force_end
+from studies.plots.page import (
+    band_handle,
+    blank,
+    body_method_handles,
+    by_scene,
+    finish,
+    good_frames,
+    grouped,
+    has_frames,
+    page,
+    panels,
+    reference_handle,
+    remarks,
+    spread_out,
+)
+from studies.plots.style import BLACK, BODY_LINES, GREY, SMALL, heading, method_colour, save, styled
+from studies.scenes import Scene
+
+TITLE = "Force of the press against the reference"
+ROOM = 1.06
+"""Top of the axis over the largest force."""
+LABEL_GAP = 0.085
+"""Least distance of two labels over the height of the axis: one line of type."""
+
+
+@styled
+def figure(runs: Sequence[Run]) -> Figure:
+    """One panel per scene, the error at the last checkpoint at the end of each line."""
+    shown = [run for run in runs if has_frames(run)]
+    if not shown:
+        return blank(TITLE, "no run has recorded a frame yet")
+    scenes = by_scene(shown)
+    columns = min(2, len(scenes))
+    sheet = page(5.2 * columns, 3.0 * -(-len(scenes) // columns) + 0.4)
+    axes = panels(sheet, -(-len(scenes) // columns), columns)
+    for spare in axes.flat[len(scenes) :]:
+        spare.set_axis_off()
+    for panel, group in zip(axes.flat, scenes.values(), strict=False):
+        _draw_scene(panel, group)
+    reference = reference_handle(linestyle="-", linewidth=1)
+    handles = [*body_method_handles(shown), reference, band_handle("± its uncertainty")]
+    notes = ["At the end of each line: its error there, after all has come to rest. Dotted: the press stops."]
+    return finish(sheet, TITLE, handles, [*notes, *remarks(runs)], columns=3)
+
+
+def _draw_scene(axes: Axes, group: Sequence[Run]) -> None:
+    ends = []
+    for same in grouped(group, lambda run: (run.case.body, run.case.method.name)):
+        run = same[0]  # another time step lies on the same line; the table shows by how much it does not
+        good = slice(0, good_frames(run))
+        colour = method_colour(run.case.method.name)
+        axes.plot(run.field("t")[good], run.force[good], color=colour, linestyle=BODY_LINES[run.case.body.kind])
+        ends.append((float(run.force[good][-1]), _error(run), colour))
+    top = ROOM * _largest(group)
+    motion = _motion(group[0].case.scene)
+    _draw_reference(axes, group[0], motion.times[-1])
+    axes.axvline(motion.times[-1], color=GREY, linewidth=1, linestyle=":")
+    _label(axes, ends, top)
+    axes.set(xlim=(0, 1.015 * group[0].case.scene.duration), ylim=(0, top), xlabel="time [s]", ylabel="force [N]")
+    axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+    deep = 1e3 * float(np.linalg.norm(motion.displacements[-1]))
+    axes.set_title(f"{heading(group[0].case.scene.name)}, {deep:.3g} mm in {motion.times[-1]:g} s")
+
+
+def _motion(scene: Scene) -> Motion:
+    bodies = scene.obstacles if scene.probed.what == "obstacle" else scene.held
+    return bodies[scene.probed.number].path
+
+
+def _error(run: Run) -> str:
+    """What stands at the end of a line."""
+    if run.record.status not in COMPARABLE:
+        return str(run.record.status)
+    if run.reference is None:
+        return f"{run.force[run.checkpoint_frames[-1]]:.2g} N"
+    return f"{force_end(run):+.0f} %".replace("-", "−")
+
+
+def _label(axes: Axes, ends: Sequence[tuple[float, str, str]], top: float) -> None:
+    """Errors to the right of the axis, one under the other where lines end close together."""
+    # A line on its way to infinity ends outside the axis; its label stays at the border.
+    heights = np.array([min(max(force, 0.0), top) if np.isfinite(force) else top for force, _, _ in ends]) / top
+    for at, (_, text, colour) in zip(spread_out(heights, LABEL_GAP), ends, strict=True):
+        axes.text(1.015, at, text, transform=axes.transAxes, color=colour, size=SMALL, va="center", ha="left")
+
+
+def _draw_reference(axes: Axes, run: Run, stop: float) -> None:
+    """The path of equilibria: as the press rests from `stop` on, so does the last of them."""
+    if run.reference is None:
+        return
+    t, force = run.reference.field("t"), run.reference.force
+    path_t = np.append(t[t < stop], (stop, max(t[-1], stop)))
+    path = np.append(force[t < stop], (force[-1], force[-1]))
+    # The floor is relative to the norm over all checkpoints, so one of them carries this much of it.
+    spread = run.reference.floor["force"] * np.linalg.norm(force) / np.sqrt(len(force))
+    axes.fill_between(path_t, path - spread, path + spread, color=GREY, alpha=0.3, linewidth=0)
+    axes.plot(path_t, path, color=BLACK, linewidth=1)
+    axes.plot(t, force, color=BLACK, marker="o", linestyle="", markersize=5.5, markeredgecolor="white", zorder=5)
+
+
+def _largest(group: Sequence[Run]) -> float:
+    """Largest force [N] that is worth room: of the reference and of runs that ended well."""
+    forces = [run.force for run in group if run.record.status in COMPARABLE]
+    forces += [run.reference.force for run in group[:1] if run.reference is not None]
+    return max((float(force.max()) for force in forces), default=0.0) or 1.0
+
+
+def draw(runs: Sequence[Run], path: Path) -> None:
+    """Writes the chart as PNG."""
+    save(figure(runs), path)

@@ -1,4 +1,4 @@
-"""The paper's Figure 2: the ball at rest, squeezed with springs alone, with its volume kept, and the reference."""
+"""The paper's Figure 2 as a picture: a ball at rest, squeezed without and with the constraint, and the reference."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,96 +6,139 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+from scipy.spatial import ConvexHull
 
 from massspring import Plane
-from studies.metrics import Run, force_end, volume_end
-from studies.plots.solid import camera, draw_solid, frame
-from studies.plots.style import BLACK, GREY, LARGE, LIGHT, SMALL, method_colour, remark, save, styled
-from studies.store import Status
+from studies.metrics import COMPARABLE, Run, force_end, volume_end, volume_worst
+from studies.plots.page import blank, finish, page, panels
+from studies.plots.render import Camera, draw_surface, frame, scale_bar, uniform
+from studies.plots.style import BLACK, GREY, NORMAL, SMALL, method_colour, readable, save, styled
 
+TITLE = "A soft ball between two planes"
 SCENE, BODY = "ball_squeeze", "tetrahedral"
-VIEW = camera(azimuth=-70.0, elevation=9.0)
-TISSUE = "#C98A7B"
-REFERENCE = "#9AA0A6"
+CAMERA = Camera(azimuth=-62.0, elevation=9.0)
+PLATE, THICK = 1.40, 0.05
+"""Radius and thickness of a plane as drawn, over the ball's radius."""
+PALER = 0.22
+REST, STEEL, GLASS = "#E8DCC8", "#8C8C8C", "#BFD3DC"
+NAMES = {"free": "Springs alone", "implicit_volume": "Volume kept"}
+KEPT = 0.05
+"""A change of the volume smaller than this [%] is given as a power of ten."""
+DPI = 150
 
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """Four balls between their planes on one scale."""
-    chosen = _chosen(runs)
-    page = Figure(figsize=(11.0, 3.7))
-    panels = page.subplots(1, 4)
-    page.subplots_adjust(left=0.01, right=0.99, top=0.80, bottom=0.20, wspace=0.04)
-    page.suptitle("A ball squeezed by 30 % of its diameter", y=0.97)
-    if not chosen:
-        for axes in panels:
-            axes.axis("off")
-        remark(panels[1], f"no finished runs of {SCENE} with a {BODY} body")
-        return page
-    any_run = next(iter(chosen.values()))
-    rest = any_run.field("rest")
-    widest = np.vstack([rest, *(run.field("snapshots")[-1] for run in chosen.values())])
-    entries = [("at rest", rest, any_run.field("triangles"), TISSUE, None, "")]
-    for name, words in (("free", "springs alone"), ("implicit_volume", "volume kept")):
-        if name in chosen:
-            run = chosen[name]
-            shape, cells = run.field("snapshots")[-1], run.field("triangles")
-            entries.append((words, shape, cells, TISSUE, method_colour(name), _numbers(run)))
-    if any_run.reference is not None:
-        points, triangles = any_run.reference.surface()
-        ratio = any_run.reference.field("volume")[-1] - 1
-        said = f"V/V0 − 1 = {_signed(100 * ratio)} %\nforce {any_run.reference.force[-1]:.3g} N"
-        entries.append(("finite elements", points, triangles, REFERENCE, BLACK, said))
-    for axes, (title, points, triangles, colour, ink, words) in zip(panels, entries, strict=False):
-        draw_solid(axes, points, triangles, colour, VIEW)
-        for z in _planes(any_run, pressed=title != "at rest"):
-            _draw_plane(axes, _slab(z, widest))
-        frame(axes, np.vstack([_slab(z, widest) for z in _planes(any_run, pressed=False)]), VIEW, margin=0.01)
-        axes.set_title(title, color=ink or BLACK, size=LARGE - 1)
-        axes.text(0.5, -0.04, words, transform=axes.transAxes, ha="center", va="top", size=SMALL + 1, color=ink or BLACK)
-    for axes in panels[len(entries) :]:
-        axes.axis("off")
-    return page
+    """Four pictures in a row, one scale and one camera."""
+    squeezed = _chosen(runs)
+    if not squeezed:
+        return blank(TITLE, f"no run of {readable(SCENE)} has come to its end yet")
+    some = squeezed[0]
+    reference = some.reference
+    sheet = page(3.0 * (len(squeezed) + (2 if reference else 1)), 3.75)
+    axes = panels(sheet, 1, len(squeezed) + (2 if reference else 1))[0]
+    outline = CAMERA.see(reference.surface()[0])[:, :2] if reference else None
+    rest, triangles = some.field("rest"), some.field("triangles")
+    volume = 1e6 * some.record.attributes["rest_volume"]
+    _draw_ball(axes[0], some, rest, triangles, REST, at_rest=True)
+    _caption(axes[0], "At rest", [f"volume {volume:.0f} mL"], BLACK)
+    for panel, run in zip(axes[1:], squeezed, strict=False):
+        colour = method_colour(run.case.method.name)
+        _draw_ball(panel, run, run.field("snapshots")[-1], run.field("triangles"), colour)
+        if outline is not None:
+            _draw_outline(panel, outline)
+        _caption(panel, *_words(run), colour)
+    if reference:
+        _draw_ball(axes[-1], some, *reference.surface(), STEEL)
+        change = 100 * float(reference.field("volume")[-1] - 1)
+        spread = 100 * reference.floor["force_end"]
+        words = [f"volume {change:+.3f} %".replace("-", "−"), f"force {reference.force[-1]:.2f} N (± {spread:.1g} %)"]
+        _caption(axes[-1], "Finite-element reference", words, BLACK)
+    size = _radius(some)
+    scale_bar(axes[0], -PLATE * size, -1.33 * size, 0.05, "50 mm", size=SMALL)
+    notes = _notes(some, outline is not None)
+    return finish(sheet, TITLE, [], notes)
+
+
+def _chosen(runs: Sequence[Run]) -> list[Run]:
+    """The scene's run of each method with this body that has a last checkpoint; of several, the largest step."""
+    found: dict[str, Run] = {}
+    for run in sorted(runs, key=lambda run: -run.record.attributes.get("dt", 0.0)):
+        case = run.case
+        if case.scene.name == SCENE and case.body.kind == BODY and run.record.status in COMPARABLE:
+            found.setdefault(case.method.name, run)
+    return [found[name] for name in sorted(found, key=lambda name: (name not in NAMES, name))]
+
+
+def _radius(run: Run) -> float:
+    return float(np.ptp(run.field("rest"), axis=0).max()) / 2
+
+
+def _words(run: Run) -> tuple[str, list[str]]:
+    force = float(run.force[run.checkpoint_frames[-1]])
+    error = "" if run.reference is None else f" ({force_end(run):+.0f} %)".replace("-", "−")
+    lines = [_volume(volume_end(run), volume_worst(run)), f"force {force:.2f} N{error}"]
+    return NAMES.get(run.case.method.name, readable(run.case.method.name)), lines
+
+
+def _volume(end: float, worst: float) -> str:
+    """Change at the end [%], or where that shows no digit, the worst on the way."""
+    if worst >= KEPT:
+        return f"volume {end:+.1f} %".replace("-", "−")
+    power = int(np.floor(np.log10(worst))) if worst > 0 else -16
+    exponent = str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"volume kept within {np.ceil(worst / 10.0**power):.0f} × 10{exponent} %"
+
+
+def _draw_ball(
+    axes: Axes, run: Run, points: np.ndarray, triangles: np.ndarray, colour: str, at_rest: bool = False
+) -> None:
+    """Plane below, body, plane above: with a low camera nothing else hides anything."""
+    size = _radius(run)
+    t = 0.0 if at_rest else run.case.scene.checkpoints[-1]
+    planes = [plane for plane in run.case.scene.obstacles if isinstance(plane, Plane)]
+    planes.sort(key=lambda plane: plane.point[2])
+    for plane in [plane for plane in planes if plane.unit_normal[2] > 0]:
+        _draw_plane(axes, plane, t, size)
+    draw_surface(axes, points, triangles, uniform(colour, len(triangles), PALER), CAMERA)
+    for plane in [plane for plane in planes if plane.unit_normal[2] <= 0]:
+        _draw_plane(axes, plane, t, size)
+    frame(axes, np.array([-1.5, -1.5]) * size, np.array([1.5, 1.25]) * size)
+
+
+def _draw_plane(axes: Axes, plane: Plane, t: float, size: float) -> None:
+    """A disc of glass that ends at the plane."""
+    middle = np.asarray(plane.point) + plane.path(t)
+    turn = np.linspace(0, 2 * np.pi, 181)
+    rim = PLATE * size * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    near = CAMERA.see(middle + rim)[:, :2]
+    far = CAMERA.see(middle + rim - THICK * size * plane.unit_normal)[:, :2]
+    both = np.vstack([near, far])
+    axes.add_patch(Polygon(both[ConvexHull(both).vertices], facecolor=GLASS, edgecolor=GREY, linewidth=0.8, alpha=0.30))
+    axes.add_patch(Polygon(near, fill=False, edgecolor=GREY, linewidth=0.8, alpha=0.8))
+
+
+def _draw_outline(axes: Axes, seen: np.ndarray) -> None:
+    """Where the reference ends: its shape is convex, so that is the hull of its points."""
+    hull = seen[ConvexHull(seen).vertices]
+    axes.add_patch(Polygon(hull, fill=False, edgecolor=BLACK, linewidth=1.3, linestyle=(0, (4, 2)), joinstyle="round"))
+
+
+def _caption(axes: Axes, title: str, lines: Sequence[str], colour: str) -> None:
+    axes.set_title(title, size=NORMAL + 1, color=colour)
+    axes.text(
+        0.5, -0.02, "\n".join(lines), transform=axes.transAxes, ha="center", va="top", size=NORMAL, linespacing=1.45
+    )
+
+
+def _notes(run: Run, outlined: bool) -> list[str]:
+    scene = run.case.scene
+    spread = f"{scene.title}; shear modulus {scene.tissue.shear_modulus / 1e3:g} kPa, "
+    spread += f"{run.record.attributes['nodes']:,} nodes, {run.record.attributes['springs']:,} springs."
+    return [spread + (" Dashed: outline of the reference." if outlined else " There is no reference yet.")]
 
 
 def draw(runs: Sequence[Run], path: Path) -> None:
-    """Draws the figure as a PNG."""
-    save(figure(runs), path)
-
-
-def _chosen(runs: Sequence[Run]) -> dict[str, Run]:
-    """The runs of the scene and body at the largest step, by method."""
-    fit = [r for r in runs if r.case.scene.name == SCENE and r.case.body.kind == BODY and r.record.status in DRAWABLE]
-    fit.sort(key=lambda run: run.record.attributes["dt"])
-    return {run.case.method.name: run for run in fit}
-
-
-DRAWABLE = (Status.OK, Status.INVERTED, Status.DRIFTED)
-
-
-def _numbers(run: Run) -> str:
-    force = f"\nforce {_signed(force_end(run))} %" if run.reference is not None else ""
-    return f"V/V0 − 1 = {_signed(volume_end(run))} %{force}"
-
-
-def _signed(value: float) -> str:
-    return "0.00" if abs(value) < 0.005 else f"{value:+.2g}".replace("-", "−") if abs(value) < 10 else f"{value:+.0f}".replace("-", "−")
-
-
-def _planes(run: Run, pressed: bool) -> list[float]:
-    t = run.case.scene.duration if pressed else 0.0
-    planes = [o for o in run.case.scene.obstacles if isinstance(o, Plane)]
-    return [float(o.point[2] + o.path(t)[2]) for o in planes]
-
-
-def _slab(height: float, points: np.ndarray) -> np.ndarray:
-    """Corners of a piece of plane a little wider than the widest ball [m], (4, 3)."""
-    reach = 1.02 * float(np.abs(points[:, :2]).max())
-    return np.array([[x, y, height] for x, y in ((-reach, -reach), (reach, -reach), (reach, reach), (-reach, reach))])
-
-
-def _draw_plane(axes: Axes, corners: np.ndarray) -> None:
-    """The upper plane lies before the ball, the lower one behind it."""
-    seen = corners @ VIEW.T
-    behind = corners[0, 2] < 0
-    axes.fill(seen[:, 0], seen[:, 1], facecolor=LIGHT, alpha=0.5, zorder=0 if behind else 3, lw=0.8, ec=GREY)
+    """Writes the picture as PNG."""
+    save(figure(runs), path, DPI)

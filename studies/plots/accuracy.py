@@ -1,0 +1,121 @@
+"""How far each model is from the reference in four quantities, and how well the reference itself is known."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from studies.metrics import METRICS, Metric, Run
+from studies.plots.page import (
+    band_handle,
+    blank,
+    body_method_handles,
+    by_scene,
+    finish,
+    grouped,
+    has_frames,
+    log_axis,
+    page,
+    panels,
+    remarks,
+)
+from studies.plots.style import BLACK, BODY_MARKERS, GREY, SMALL, heading, method_colour, remark, save, styled
+
+TITLE = "Error against the reference"
+QUANTITIES = {
+    "force_error": "force",
+    "surface_error": "surface",
+    "interior_error": "interior",
+    "silhouette_error": "silhouette",
+}
+SHARE = 0.1
+"""A floor above this share of the error makes the error doubtful (docs/theory.md, Judging)."""
+ROOM = 1.7
+"""Top of the axis over the largest value: so much that its marker is whole."""
+REACH = 0.38
+"""Half the width of a group of points; groups are 1 apart."""
+
+
+@styled
+def figure(runs: Sequence[Run]) -> Figure:
+    """One panel per scene, one group of points per quantity."""
+    shown = [run for run in runs if has_frames(run)]
+    if not shown:
+        return blank(TITLE, "no run has recorded a frame yet")
+    metrics = [metric for metric in METRICS if metric.name in QUANTITIES]
+    scenes = by_scene(shown)
+    columns = min(2, len(scenes))
+    rows = -(-len(scenes) // columns)
+    sheet = page(5.2 * columns, 3.0 * rows + 0.4)
+    axes = panels(sheet, rows, columns, sharey=True)
+    for spare in axes.flat[len(scenes) :]:
+        spare.set_axis_off()
+    values = [0.1, 100.0]
+    for panel, (name, group) in zip(axes.flat, scenes.items(), strict=False):
+        panel.set_title(heading(name))
+        values += _draw_scene(panel, group, metrics)
+    for panel in axes[:, 0]:
+        log_axis(panel.yaxis)
+        panel.set_ylim(min(values) / ROOM, ROOM * max(values))
+        panel.set_ylabel("relative error [%]")
+    return finish(sheet, TITLE, _handles(shown), [*_notes(), *remarks(runs)], columns=3)
+
+
+def _draw_scene(axes: Axes, group: Sequence[Run], metrics: Sequence[Metric]) -> list[float]:
+    """The values drawn, errors and floors."""
+    series = grouped(group, lambda run: (run.case.body.kind, run.case.method.name))
+    offsets = np.linspace(-REACH, REACH, len(series) + 2)[1:-1]
+    drawn: list[float] = []
+    for place, metric in enumerate(metrics):
+        floor = metric.floor(group[0])
+        if metric.quantity in group[0].case.scene.quantities and floor == floor:
+            axes.fill_between([place - REACH, place + REACH], 0, floor, color=GREY, alpha=0.3, linewidth=0)
+            drawn.append(floor)
+        points = [(place + off, run) for off, same in zip(offsets, series, strict=True) for run in same]
+        drawn += [_draw_point(axes, x, metric(run), floor, run) for x, run in points if metric(run) == metric(run)]
+        if group[0].reference is not None and all(metric(run) != metric(run) for _, run in points):
+            axes.text(
+                place, 0.1, "not\ncompared", transform=axes.get_xaxis_transform(), ha="center", color=GREY, size=SMALL
+            )
+    if not drawn:
+        remark(axes, "no reference, no error" if group[0].reference is None else "no run to compare")
+    axes.set_xticks(range(len(metrics)), [QUANTITIES[metric.name] for metric in metrics])
+    axes.tick_params(axis="x", length=0, labelsize=SMALL)
+    axes.grid(visible=False, axis="x")
+    axes.set_xlim(-0.5, len(metrics) - 0.5)
+    return drawn
+
+
+def _draw_point(axes: Axes, x: float, error: float, floor: float, run: Run) -> float:
+    """A filled marker where the floor is small beside the error, else a hollow one; never below the floor."""
+    height = max(error, floor)
+    colour = method_colour(run.case.method.name)
+    face = colour if floor <= SHARE * error else "white"
+    marker = BODY_MARKERS[run.case.body.kind] if error > floor else "_"
+    axes.plot(x, height, marker=marker, color=colour, markerfacecolor=face, markersize=7.5, markeredgewidth=1.6)
+    return height
+
+
+def _handles(shown: Sequence[Run]) -> list:
+    hollow = {"marker": "o", "linestyle": "", "markersize": 7, "markerfacecolor": "white", "color": BLACK}
+    return [
+        *body_method_handles(shown, markers=True),
+        Line2D([], [], label="hollow: the reference is not ten times better", **hollow),
+        band_handle("reference's own uncertainty"),
+    ]
+
+
+def _notes() -> list[str]:
+    return [
+        "Force: over all checkpoints. Surface, interior: displacement, relative L2; not compared where a rigid turn is "
+        "free. Silhouette: Hausdorff distance over body size. Nothing is drawn below the uncertainty of the reference: "
+        "a bar on it means no more than that."
+    ]
+
+
+def draw(runs: Sequence[Run], path: Path) -> None:
+    """Writes the chart as PNG."""
+    save(figure(runs), path)
