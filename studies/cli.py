@@ -1,6 +1,5 @@
 """The command line: reads words, calls the library, prints. Bad input ends in one sentence and exit code 2."""
 
-import importlib.util
 import sys
 import warnings
 from pathlib import Path
@@ -18,6 +17,7 @@ from studies.case import BodyRecipe, Case
 from studies.catalog import STUDIES, Study
 from studies.describe import describe
 from studies.errors import StudyError
+from studies.find import find_study
 from studies.geometry.organs import SHAPES
 from studies.links import link_study
 from studies.metrics import METRICS
@@ -41,6 +41,7 @@ errors = Console(stderr=True, soft_wrap=True)
 Results = Annotated[Path, typer.Option("--results", envvar="ORGANBENCH_RESULTS", help="folder of the results")]
 StudyName = Annotated[str, typer.Argument(help="a study (see `organbench list`), or a FILE.py that defines STUDY")]
 SMOKE = "smoke"
+INTERRUPTED = 130
 
 
 def main() -> None:
@@ -51,24 +52,10 @@ def main() -> None:
     except (StudyError, MassSpringError, ReferenceProblem) as error:
         errors.print(f"organbench: {error}", markup=False, highlight=False)
         sys.exit(2)
-    except KeyboardInterrupt:
-        errors.print("organbench: interrupted; what is finished is stored, the same command goes on from there")
-        sys.exit(130)
-
-
-def find_study(name: str) -> Study:
-    """A study of the catalogue, or STUDY of a Python file. Raises StudyError."""
-    if not name.endswith(".py"):
-        return choose(name, {study.name: study for study in STUDIES}, "study")
-    spec = importlib.util.spec_from_file_location("organbench_user_study", name)
-    if spec is None or spec.loader is None or not Path(name).is_file():
-        raise StudyError(f"there is no study file {name}; give a Python file that defines STUDY")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    study = getattr(module, "STUDY", None)
-    if not isinstance(study, Study):
-        raise StudyError(f"{name} defines no STUDY of type studies.catalog.Study; see CONTRIBUTING.md")
-    return study
+    except SystemExit as stop:
+        if stop.code == INTERRUPTED:  # typer turns KeyboardInterrupt into this code
+            errors.print("organbench: interrupted; what is finished is stored, the same command goes on from there")
+        raise
 
 
 @app.command("list")
@@ -99,8 +86,8 @@ def run(
     """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
     wanted = _filter(only)
     root = results / SMOKE if smoke else results
-    for name in studies:
-        study = find_study(name).smoke() if smoke else find_study(name)
+    for found in [find_study(name) for name in studies]:
+        study = found.smoke() if smoke else found
         with TerminalProgress(console) as progress:
             count = run_studies(root, [study], jobs, progress, wanted)
         for sentence in link_study(root, study.name):

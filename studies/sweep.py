@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from studies.atomic import write_whole
 from studies.case import Case
 from studies.catalog import Study
 from studies.errors import StudyError
@@ -17,7 +18,7 @@ from studies.metrics import Run
 from studies.reference import Reference, load_reference, reference_is_current, reference_path, solve_reference
 from studies.run import case_is_current, case_path, run_case
 from studies.scenes import Scene
-from studies.store import Status, peek, read_record
+from studies.store import Record, Status, peek, read_record
 from studies.timed import read_timing, time_cases, timing_is_current
 
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -139,15 +140,29 @@ def run_studies(
     """
     rule = wanted or (lambda task: not task.is_current())
     todo = [task for task in tasks_of(root, studies) if rule(task)]
+    if todo:
+        check_writable(root)
     perform(todo, jobs, progress)
-    measured = 0
+    measured, ran = 0, {task.path() for task in todo}
     for study in studies:
-        pending = [case for case in study.cases if case.timed and not timing_is_current(root, study.name, case)]
+        pending = [
+            case
+            for case in study.cases
+            if case.timed and not timing_is_current(root, study.name, case)
+            if wanted is None or case_path(root, study.name, case) in ran
+        ]
         measured += len(pending)
         if pending:
             progress.begin("timing", len(pending))
             time_cases(root, study.name, pending, lambda name: progress.advance("timing", name))
     return len(todo) + measured
+
+
+def check_writable(root: Path) -> None:
+    """Raises StudyError before minutes are spent on results that could not be stored."""
+    trial = root / ".trial"
+    write_whole(trial, b"")
+    trial.unlink(missing_ok=True)  # another run of this command may have been faster
 
 
 def load_runs(root: Path, study: Study) -> tuple[list[Run], list[str]]:
@@ -166,16 +181,27 @@ def load_runs(root: Path, study: Study) -> tuple[list[Run], list[str]]:
         if not path.exists():
             remarks.append(f"case {case.name} has not run")
             continue
-        timing = read_timing(root, study.name, case) if case.timed else None
-        runs.append(Run(case, read_record(path), references[case.scene.name], timing))
+        try:
+            timing = read_timing(root, study.name, case) if case.timed else None
+            runs.append(Run(case, read_record(path), references[case.scene.name], timing))
+        except StudyError as error:
+            remarks.append(str(error))
     return runs, remarks
 
 
 def warnings_of(root: Path, study: Study) -> list[str]:
     """What the cases of a study warned of when they were prepared, a sentence each."""
-    paths = [case_path(root, study.name, case) for case in study.cases]
-    said = [peek(path).attributes.get("warnings", "") for path in paths if path.exists()]
+    records = [stored(case_path(root, study.name, case)) for case in study.cases]
+    said = [record.attributes.get("warnings", "") for record in records if record is not None]
     return [str(sentence) for sentence in said if sentence]
+
+
+def stored(path: Path) -> Record | None:
+    """The header of a stored result; None where there is none, or none that can be read."""
+    try:
+        return peek(path)
+    except StudyError:
+        return None
 
 
 @dataclass(frozen=True)
@@ -196,7 +222,8 @@ def standings(root: Path, study: Study) -> list[Standing]:
         if not path.exists():
             found.append(Standing(task, "missing", "has not run"))
         elif not task.is_current():
-            found.append(Standing(task, "stale", "the code or the case has changed since"))
+            damaged = "its file is damaged" if stored(path) is None else "the code or the case has changed since"
+            found.append(Standing(task, "stale", damaged))
         else:
             record = peek(path)
             found.append(Standing(task, str(record.status), record.message))
@@ -204,5 +231,6 @@ def standings(root: Path, study: Study) -> list[Standing]:
 
 
 def failed(task: Task) -> bool:
-    """Whether the stored result of a task is no success."""
-    return task.path().exists() and peek(task.path()).status in (Status.FAILED, Status.NOT_CONVERGED, Status.TIMED_OUT)
+    """Whether the stored result of a task is no success; a damaged file is stale instead."""
+    record = stored(task.path())
+    return record is not None and record.status in (Status.FAILED, Status.NOT_CONVERGED, Status.TIMED_OUT)
