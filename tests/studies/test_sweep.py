@@ -1,0 +1,210 @@
+"""A sweep does what is missing or stale, once; what is finished stays, whatever happens to the rest."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from studies import sweep as module
+from studies import timed
+from studies.errors import StudyError
+from studies.paths import record_files
+from studies.run import case_path
+from studies.scenes import ReferencePlan
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.store import Status, peek, read_record, write_record
+from studies.sweep import Task, failed, load_runs, perform, run_studies, standings, tasks_of
+from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
+
+REPOSITORY = Path(__file__).parents[2]
+SLOW_STUDY = """
+from tests.studies.tiny import tiny_case, tiny_study
+
+STUDY = tiny_study(name="slow", cases=tuple(tiny_case(dt_fraction=0.004 + 1e-5 * k) for k in range(5)))
+"""
+"""Five cases of about half a second: time enough to be interrupted between the first and the last."""
+
+
+def content(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def counts(root, study):
+    found = [standing.status for standing in standings(root, study)]
+    return {status: found.count(status) for status in found}
+
+
+def test_everything_once(finished_sweep):
+    study = tiny_study()
+    assert counts(finished_sweep, study) == {"ok": 2, "diverged": 1}
+    runs, remarks = load_runs(finished_sweep, study)
+    assert remarks == []
+    assert [run.record.key for run in runs] == [case.key for case in study.cases]
+    assert [run.timing is not None for run in runs] == [True, True, False]
+
+
+def test_a_second_sweep_does_nothing(results):
+    before, watched = content(results / "tiny"), Silent()
+    assert run_studies(results, [tiny_study()], 1, watched) == 0
+    assert watched.begun == []
+    assert content(results / "tiny") == before
+
+
+def test_one_new_case_is_one_piece(results):
+    before = content(results / "tiny")
+    study, watched = tiny_study(), Silent()
+    more = replace(study, cases=(*study.cases, tiny_case(dt_fraction=0.4)))
+    assert run_studies(results, [more], 1, watched) == 1
+    assert watched.begun == [("physics", 1)]
+    assert watched.done == [("physics", tiny_case(dt_fraction=0.4).name)]
+    assert before.items() <= content(results / "tiny").items()
+
+
+def age(root, case):
+    """Makes the record of a case one of older code."""
+    path = case_path(root, "tiny", case)
+    write_record(path, replace(read_record(path), fingerprint="0" * 64))
+
+
+def test_older_code_is_stale_and_runs_again(results):
+    study = tiny_study()
+    fresh = content(results / "tiny")
+    age(results, diverging_case())
+    assert counts(results, study) == {"ok": 2, "stale": 1}
+    assert run_studies(results, [study], 1, Silent()) == 1
+    assert counts(results, study) == {"ok": 2, "diverged": 1}
+    assert content(results / "tiny").keys() == fresh.keys()
+
+
+def test_a_damaged_file_is_stale_and_runs_again(results):
+    study = tiny_study()
+    path = case_path(results, "tiny", diverging_case())
+    path.write_bytes(path.read_bytes()[:1000])
+    assert [s.message for s in standings(results, study) if s.status == "stale"] == ["its file is damaged"]
+    runs, remarks = load_runs(results, study)
+    assert len(runs) == 2
+    assert len(remarks) == 1
+    assert "damaged" in remarks[0] or "cut off" in remarks[0]
+    assert module.warnings_of(results, study) == []
+    assert not failed(Task(results, "tiny", case=diverging_case()))
+    assert run_studies(results, [study], 1, Silent()) == 1
+    assert load_runs(results, study)[1] == []
+
+
+def test_only_what_is_asked_for(results):
+    study = tiny_study()
+    age(results, tiny_case())
+    path = case_path(results, "tiny", diverging_case())
+    write_record(path, replace(read_record(path), status=Status.TIMED_OUT))
+    timed.timing_file(results, "tiny", tiny_case(timed=True)).unlink()
+    watched = Silent()
+    assert run_studies(results, [study], 1, watched, wanted=failed) == 1
+    assert watched.done == [("physics", diverging_case().name)]
+    assert counts(results, study) == {"ok": 1, "stale": 1, "diverged": 1}
+
+
+def test_missing_is_told(tmp_path):
+    study = tiny_study()
+    assert counts(tmp_path, study) == {"missing": 3}
+    runs, remarks = load_runs(tmp_path, study)
+    assert runs == []
+    assert remarks == [f"case {case.name} has not run" for case in study.cases]
+
+
+def test_references_are_shared_and_come_first(tmp_path):
+    scene = replace(BALL_SQUEEZE, reference=ReferencePlan("octant", (0.9, 0.5, 0.4)))
+    one, two = (tiny_study(name=name, cases=(tiny_case(scene=scene),)) for name in ("one", "two"))
+    tasks = tasks_of(tmp_path, [one, two])
+    assert [task.label for task in tasks[:2]] == ["reference ball_squeeze 0.4", "reference ball_squeeze 0.5"]
+    assert len(tasks) == 4
+    assert len({task.path() for task in tasks}) == 4
+
+
+def test_results_that_cannot_be_written_are_told_before_anything_runs(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setattr(module, "perform", lambda *_: pytest.fail("nothing may run"))
+    with pytest.raises(StudyError, match="choose a results folder that can be written to"):
+        run_studies(tmp_path / "file", [tiny_study()], 1, Silent())
+
+
+class Doomed:
+    """A task whose process is killed, as by a system out of memory."""
+
+    label = "doomed"
+
+    def perform(self):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_process_that_dies_is_one_sentence(tmp_path):
+    with pytest.raises(StudyError, match=r"process died .* what is finished is stored"):
+        perform([Doomed()], 1, Silent())
+
+
+def test_the_number_of_threads_is_given_back(monkeypatch, tmp_path):
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    perform([Task(tmp_path, "tiny", case=tiny_case(body=replace(tiny_case().body, stiffness=-1.0)))], 1, Silent())
+    assert os.environ["OMP_NUM_THREADS"] == "7"
+    assert "MKL_NUM_THREADS" not in os.environ
+
+
+def interrupted(tmp_path, number) -> subprocess.Popen:
+    """`organbench run` of five slow cases, sent signal `number` after the first is stored; results below tmp_path."""
+    file = tmp_path / "slow_study.py"
+    file.write_text(SLOW_STUDY)
+    command = [
+        sys.executable,
+        "-m",
+        "studies.cli",
+        "run",
+        str(file),
+        "--results",
+        str(tmp_path / "results"),
+        "--jobs",
+        "1",
+    ]
+    process = subprocess.Popen(
+        command, cwd=REPOSITORY, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+    )
+    until = time.monotonic() + 60  # only a sweep that is stuck needs so long
+    while not record_files(tmp_path / "results", "slow") and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.02)
+    os.killpg(process.pid, number)
+    return process
+
+
+def finish(tmp_path):
+    """What was stored by then, byte for byte; the second run does exactly the rest."""
+    folder, total = tmp_path / "results" / "slow", 5
+    kept = {path.name: path.read_bytes() for path in record_files(tmp_path / "results", "slow")}
+    assert 1 <= len(kept) < total
+    assert {peek(folder / name).status for name in kept} == {Status.OK}
+    study = tiny_study(name="slow", cases=tuple(tiny_case(dt_fraction=0.004 + 1e-5 * k) for k in range(5)))
+    assert run_studies(tmp_path / "results", [study], 1, Silent()) == total - len(kept)
+    assert kept.items() <= content(folder).items()
+    assert counts(tmp_path / "results", study) == {"ok": total}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="process groups")
+def test_killed_half_way_goes_on_where_it_was(tmp_path):
+    process = interrupted(tmp_path, signal.SIGKILL)
+    process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGKILL
+    finish(tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="process groups")
+def test_ctrl_c_half_way_goes_on_where_it_was(tmp_path):
+    process = interrupted(tmp_path, signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said.strip() == "organbench: interrupted; what is finished is stored, the same command goes on from there"
+    finish(tmp_path)
