@@ -33,7 +33,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     bodies = grouped([run for run, _ in timed], lambda run: (run.case.scene.name, run.case.body))
     rows, strip = -(-len(bodies) // COLUMNS), 0.27 * len(timed) + 1.1
     sheet = page(11, 2.6 * rows + strip)
-    above, below = np.ravel(sheet.subfigures(2, 1, height_ratios=[2.6 * rows, strip]))
+    above, below = sheet.subfigures(2, 1, height_ratios=[2.6 * rows, strip])  # pyright: ignore[reportGeneralTypeIssues]
     axes = panels(above, rows, COLUMNS, sharey=True)
     span = _span([timing for _, timing in timed])
     for panel, body in zip(axes.flat, bodies, strict=False):

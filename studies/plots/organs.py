@@ -44,7 +44,7 @@ def figure(meshes: Mapping[str, OrganMesh]) -> Figure:
     """One column per mesh, seen from two sides, each filling its frame; the bar says how large it is."""
     if not meshes:
         return blank(TITLE, "no organ given")
-    sheet = page(max(7.0, WIDTH * len(meshes)), 7.4)
+    sheet = page(WIDTH * len(meshes), 7.4)
     axes = panels(sheet, len(VIEWS), len(meshes))
     names = dict.fromkeys(patch for mesh in meshes.values() for patch in mesh.patches)
     colours = {patch: PATCH_COLOURS[k % len(PATCH_COLOURS)] for k, patch in enumerate(names)}

@@ -26,16 +26,18 @@ from studies.plots.style import (
 
 ROW, LINE, MARGIN = 0.25, 0.19, 0.12
 """Heights of a legend row, of a line of notes, and of the space around them [inch]."""
-LETTERS = 13.5
-"""Letters of a note to the inch."""
+LETTERS = 12.8
+"""Letters of a note to the inch: a wide line of them still fits."""
+NARROWEST = 8.0
+"""Width of a page with one panel [inch]."""
 MOST_NOTES = 6
 SHORT = 200.0
 """A logarithmic axis from one end to the other of which values grow less than this has numbers between the decades."""
 
 
 def page(width: float, height: float) -> Figure:
-    """An empty page [inch]; `finish` adds the room for what stands below the panels."""
-    figure = Figure(figsize=(width, height), layout="constrained")
+    """An empty page [inch], wide enough for words; `finish` adds the room for what stands below the panels."""
+    figure = Figure(figsize=(max(width, NARROWEST), height), layout="constrained")
     engine = figure.get_layout_engine()
     assert engine is not None  # asked for in the line above
     engine.set(w_pad=0.06, h_pad=0.07, wspace=0.03, hspace=0.04)  # pyright: ignore[reportCallIssue]

@@ -37,7 +37,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     if not shown:
         return blank(TITLE, "no run has recorded a frame yet")
     scenes = by_scene(shown)
-    sheet = page(max(8.0, 2.7 * len(scenes) + 0.9), 6.0)
+    sheet = page(2.7 * len(scenes) + 0.9, 6.0)
     axes = panels(sheet, 2, len(scenes), sharex="col", sharey="row")
     for (name, group), (upper, lower) in zip(scenes.items(), axes.T, strict=True):
         upper.set_title(heading(name))

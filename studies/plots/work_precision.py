@@ -27,7 +27,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         return blank(TITLE, "no frame times from this machine and this code yet")
     scenes = by_scene(timed)
     metrics = [metric for name in ROWS for metric in METRICS if metric.name == name]
-    sheet = page(max(8.0, 4.6 * len(scenes) + 0.8), 6.4)
+    sheet = page(4.6 * len(scenes) + 0.8, 6.4)
     axes = panels(sheet, len(metrics), len(scenes), sharex="col", sharey=True)
     steps = sorted({_step(run) for run in timed}, reverse=True)
     values = [1.0, 100.0]

@@ -1,0 +1,124 @@
+"""The camera, the lamp, what hides what; styles, labels and organs."""
+
+from io import BytesIO
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+
+from massspring import METHODS
+from studies.geometry import OrganMesh
+from studies.plots import organs
+from studies.plots.page import spread_out
+from studies.plots.render import LIGHT, Camera, draw_surface, shade, uniform, vertex_normals
+from studies.plots.style import method_colour, save
+from tests.plots.made_up import CELLS, POINTS, RADIUS, TRIANGLES
+
+FRONT = Camera(azimuth=-90.0, elevation=0.0)
+
+
+def test_camera_is_a_rotation_that_looks_along_y():
+    turned = Camera(33.0, 21.0).frame
+    assert turned @ turned.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.det(turned) == pytest.approx(1.0)
+    assert FRONT.see(np.array([1.0, 2.0, 3.0])) == pytest.approx([1.0, 3.0, -2.0])
+
+
+def test_normals_of_an_octahedron_point_outward():
+    normals = vertex_normals(POINTS, TRIANGLES)
+    assert normals[:6] == pytest.approx(POINTS[:6] / RADIUS)
+    assert normals[6] == pytest.approx(0.0)  # the node inside is on no triangle
+
+
+def test_towards_the_lamp_is_brighter_and_hue_stays():
+    towards = LIGHT / np.linalg.norm(LIGHT)
+    bright, side, dark = shade(np.stack([towards, [0.0, 0.0, 1.0], -towards]), uniform("#404040", 3))[:, 0]
+    assert bright > side > dark > 0
+
+
+def drawn(points, triangles, camera=FRONT):
+    axes = Figure().subplots()
+    draw_surface(axes, points, triangles, uniform("#808080", len(triangles)), camera)
+    (collection,) = axes.collections
+    assert isinstance(collection, PolyCollection)
+    return [path.vertices[:3] for path in collection.get_paths()]
+
+
+def test_triangles_that_look_away_are_left_out():
+    assert len(drawn(POINTS, TRIANGLES)) == 4
+    assert len(drawn(POINTS, TRIANGLES[:, ::-1])) == 4
+    front = [set(map(tuple, np.round(corners, 9))) for corners in drawn(POINTS, TRIANGLES)]
+    assert all((0.0, 0.0) in corners for corners in front)  # node 3 at y = -r is the nearest one
+
+
+def test_far_triangles_come_first():
+    near, far = np.array([[0, -1, 0], [1, -1, 0], [0, -1, 1.0]]), np.array([[0, 5, 0], [2, 5, 0], [0, 5, 2.0]])
+    sizes = [np.ptp(c[:, 0]) for c in drawn(np.vstack([near, far]), np.array([[0, 1, 2], [3, 4, 5]]))]
+    assert sizes == [2.0, 1.0]
+
+
+def test_labels_keep_their_order_and_their_distance():
+    placed = spread_out(np.array([0.5, 0.1, 0.5, 0.52, 0.9]), 0.1)
+    assert np.diff(np.sort(placed)).min() >= 0.1 - 1e-12
+    assert placed[[1, 4]] == pytest.approx([0.1, 0.9])  # nothing near: not moved
+    assert placed[[0, 2, 3]].mean() == pytest.approx(np.mean([0.5, 0.5, 0.52]))
+    assert list(np.argsort(placed)) == [1, 0, 2, 3, 4]
+    assert len(spread_out(np.array([]), 0.1)) == 0
+
+
+def test_every_method_has_its_own_colour():
+    assert len({method_colour(method.name) for method in METHODS}) == len(METHODS)
+
+
+def test_the_users_own_settings_change_nothing(tmp_path):
+    organs.draw_organs({"ball": octahedron()}, tmp_path / "a.png")
+    with matplotlib.rc_context({"font.size": 30, "axes.facecolor": "red", "savefig.dpi": 20}):
+        organs.draw_organs({"ball": octahedron()}, tmp_path / "b.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_saved_size_is_inches_times_dpi(tmp_path):
+    save(Figure(figsize=(2, 1)), tmp_path / "a.png", dpi=100)
+    assert imread(BytesIO((tmp_path / "a.png").read_bytes())).shape[:2] == (100, 200)
+
+
+def octahedron(**changes):
+    """An organ of six surface nodes whose upper four are held."""
+    values = {
+        "name": "octahedron",
+        "points": POINTS,
+        "triangles": TRIANGLES,
+        "tetrahedra": CELLS,
+        "surface_count": 6,
+        "patches": {"top_cap": np.array([0, 2, 4])},
+    }
+    return OrganMesh(**(values | changes))
+
+
+def test_organs_show_their_patch_in_its_colour_from_the_side_it_is_on():
+    figure = organs.figure({"ball": octahedron()})
+    colour = np.array(to_rgb(organs.PATCH_COLOURS[0]))
+    painted = []
+    for axes in figure.axes:
+        faces = np.asarray(axes.collections[0].get_facecolor())[:, :3]
+        tissue = np.array(to_rgb(organs.TISSUE))
+        painted.append(sum(np.argmax(face) == np.argmax(colour) != np.argmax(tissue) for face in faces))
+    assert sorted(painted) == [0, 1]  # one triangle, seen from one of two sides
+    assert figure.legends[0].get_texts()[0].get_text() == "held: top cap"
+
+
+@pytest.mark.parametrize("meshes", [{}, {"a": octahedron(tetrahedra=np.zeros((0, 4), int), patches={})}])
+def test_organs_without_filling_or_patches_or_organs(meshes, tmp_path):
+    organs.draw_organs(meshes, tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 2000
+
+
+def test_organs_say_volume_and_size():
+    said = "\n".join(text.get_text() for axes in organs.figure({"ball": octahedron()}).axes for text in axes.texts)
+    assert "167 mL" in said  # 4/3 r³
+    assert "6 surface nodes, 8 triangles, 8 tetrahedra" in said
+    assert "20 mm" in said
