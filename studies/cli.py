@@ -99,7 +99,8 @@ def run(
         charts = [study_folder(root, study.name) / chart.file for chart in study.charts]
         if count or not all(chart.exists() for chart in charts):
             _draw(root, study)
-        console.print(f"{study.name}: {count} pieces ran, charts in {study_folder(root, study.name)}", highlight=False)
+        done = f"{study.name}: {count} pieces ran, charts in {study_folder(root, study.name)}"
+        console.print(done, markup=False, highlight=False)
 
 
 def _filter(only: str):
@@ -153,7 +154,7 @@ def table(
         errors.print(f"warning: {sentence}", markup=False, highlight=False)
     frame = study_table(runs, [name.strip() for name in metrics.split(",")] if metrics else entry.columns)
     if csv is not None:
-        console.print(str(reports.write_table(csv, frame)))
+        console.print(str(reports.write_table(csv, frame)), markup=False, highlight=False)
         return
     console.print(frame.to_string(index=False, float_format=lambda v: f"{v:.4g}"), markup=False, highlight=False)
 
@@ -162,7 +163,7 @@ def table(
 def plot(study: StudyName, results: Results = Path("results")) -> None:
     """Draws the charts of a study from what is stored."""
     for chart in _draw(results, find_study(study)):
-        console.print(str(chart))
+        console.print(str(chart), markup=False, highlight=False)
 
 
 @app.command()
@@ -180,7 +181,7 @@ def report(
     for sentence in remarks:
         errors.print(f"warning: {sentence}", markup=False, highlight=False)
     for path in written:
-        console.print(str(path), highlight=False)
+        console.print(str(path), markup=False, highlight=False)
 
 
 @app.command()

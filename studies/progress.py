@@ -27,7 +27,8 @@ class TerminalProgress:
         return self
 
     def __exit__(self, kind: type | None, value: BaseException | None, trace: TracebackType | None) -> None:
-        self.bars.stop()
+        if self.console.is_terminal:  # elsewhere stopping would print an empty line
+            self.bars.stop()
 
     def begin(self, what: str, total: int) -> None:
         """A stage of `total` pieces begins."""

@@ -1,8 +1,9 @@
 """What people look at: charts, tables as CSV, the summary of results that README shows."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -27,12 +28,22 @@ FIGURE_NODES = 550
 def draw_charts(root: Path, study: Study, runs: Sequence[Run]) -> list[Path]:
     """Draws all charts of a study; their paths."""
     folder = study_folder(root, study.name)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     drawn = []
     for chart in study.charts:
         chart.draw(runs, folder / chart.file)
         drawn.append(folder / chart.file)
     return drawn
+
+
+def make_folder(folder: Path) -> None:
+    """The folder, when it is not there yet. Raises StudyError when it cannot be made."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StudyError(
+            f"{folder} cannot be made ({error.strerror}); choose a folder that can be written to"
+        ) from error
 
 
 def write_table(path: Path, table: pd.DataFrame) -> Path:
@@ -62,7 +73,7 @@ def draw_figures(root: Path) -> list[Path]:
     """The organs of the scenes with their attachments, each once; the path of the picture."""
     meshes = {scene.organ.shape: mesh_for(scene, FIGURE_NODES) for scene in SCENES}  # later scenes have attachments
     path = root / "figures" / "organs.png"
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     draw_organs(meshes, path)
     return [path]
 
@@ -72,12 +83,12 @@ def summary_of(runs_of: dict[str, list[Run]]) -> str:
     rows = study_table(runs_of.get("volume_loss", []), SUMMARY_METRICS)
     if rows.empty:
         return "No results yet: run `make study`."
-    rows = rows[rows["dt/dt_c"] > 0.25]
+    rows = rows.loc[~(rows["dt/dt_c"] <= 0.25)]  # a case that failed has no step, and stays
     lines = [
         "| scene | body | method | " + " | ".join(SUMMARY_HEADS) + " |",
         "|---|---|---|" + "---|" * len(SUMMARY_HEADS),
     ]
-    for _, row in rows.iterrows():
+    for row in rows.to_dict("records"):
         cells = [_cell(row, name) for name in SUMMARY_COLUMNS]
         lines.append(f"| {row['scene']} | {row['body']} | {row['method']} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
@@ -102,7 +113,7 @@ SUMMARY_HEADS = (
 )
 
 
-def _cell(row: pd.Series, column: str) -> str:
+def _cell(row: Mapping[Hashable, Any], column: str) -> str:
     """A value with the uncertainty of its reference, or a dash."""
     value = float(row[column])
     if value != value:
@@ -121,6 +132,8 @@ def _cell(row: pd.Series, column: str) -> str:
 
 def write_readme(readme: Path, summary: str) -> None:
     """Replaces what stands between the marks in README.md. Raises StudyError when the marks are missing."""
+    if not readme.is_file():
+        raise StudyError(f"there is no file {readme} to put the table into; run the command where it lies")
     text = readme.read_text(encoding="utf-8")
     if BEGIN not in text or END not in text:
         raise StudyError(f"{readme} has no lines '{BEGIN}' and '{END}' to put the table between")

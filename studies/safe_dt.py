@@ -42,5 +42,5 @@ def safe_step(case: Case) -> SafeStep:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # above the limit is the point of the second run
             record = measure(case.replaced(dt=wanted, frames=frames))
-        tried.append((float(record.attributes["dt"]), record.status))
+        tried.append((float(record.attributes.get("dt", wanted)), record.status))
     return SafeStep(limit, auto, tuple(tried))

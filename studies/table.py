@@ -15,7 +15,8 @@ def metric(name: str) -> Metric:
 
 def study_table(runs: Sequence[Run], columns: Sequence[str]) -> pd.DataFrame:
     """Metrics `columns` of `runs`; a column "… floor" follows where the reference has an uncertainty of its own."""
-    rows = [_row(run, [metric(name) for name in columns]) for run in runs]
+    metrics = [metric(name) for name in columns]
+    rows = [_row(run, metrics) for run in runs]
     known = {name for row in rows for name, value in row.items() if " floor [" not in name or value == value}
     return pd.DataFrame([{name: value for name, value in row.items() if name in known} for row in rows])
 
