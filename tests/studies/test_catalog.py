@@ -1,0 +1,81 @@
+"""Every study is held to this: a question, cases that can be made, names that exist, and a smoke version."""
+
+import pytest
+
+from studies.adapt import prepare
+from studies.catalog import STUDIES
+from studies.catalog.base import SMOKE_FRAMES, SMOKE_NODES
+from studies.paths import readable
+from studies.table import metric
+from tests.studies.tiny import tiny_case, tiny_study
+
+TIMES = {"step_time", "frame_time", "frame_time_p99", "real_time"}
+
+
+@pytest.fixture(params=STUDIES, ids=lambda study: study.name)
+def study(request):
+    return request.param
+
+
+def test_names_can_be_folders_and_are_unique():
+    names = [study.name for study in STUDIES]
+    assert len(set(names)) == len(names)
+    assert [readable(name) for name in names] == names
+
+
+def test_it_asks_a_question(study):
+    first = study.question.strip().split("\n")[0]
+    assert "?" in first
+    assert len(first) <= 120
+
+
+def test_cases_are_distinct_and_scenes_of_one_name_are_one(study):
+    assert study.cases
+    assert len({case.key for case in study.cases}) == len(study.cases)
+    assert all(case.scene == scene for scene in study.scenes for case in study.cases if case.scene.name == scene.name)
+
+
+def test_columns_are_metrics_and_times_are_measured(study):
+    assert [metric(name).name for name in study.columns] == list(study.columns)
+    if TIMES & set(study.columns):
+        assert any(case.timed for case in study.cases)
+
+
+def test_charts_have_files_of_their_own(study):
+    files = [chart.file for chart in study.charts]
+    assert files
+    assert len(set(files)) == len(files)
+    assert all(file.endswith(".png") and callable(chart.draw) for file, chart in zip(files, study.charts, strict=True))
+
+
+def test_no_case_uses_a_method_that_its_scene_skips(study):
+    assert [case.scene.skip(case.method) for case in study.cases] == [None] * len(study.cases)
+
+
+def test_smoke_is_small_and_still_the_same_question(study):
+    smoke = study.smoke()
+    assert smoke.name == study.name
+    assert {case.method for case in smoke.cases} == {case.method for case in study.cases}
+    assert {case.scene.name for case in smoke.cases} == {case.scene.name for case in study.cases}
+    assert {case.timed for case in smoke.cases} == {case.timed for case in study.cases}
+    for case in smoke.cases:
+        assert case.body.nodes <= SMOKE_NODES
+        assert case.frames <= SMOKE_FRAMES
+        assert len(case.scene.reference.levels) == 2
+    assert smoke.smoke() == smoke
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:dt = .* lies above the stability limit:UserWarning")
+def test_every_kind_of_case_can_be_prepared(study):
+    kinds = {(c.scene.name, c.body.kind, c.body.law, c.method): c for c in study.smoke().cases}
+    for case in kinds.values():
+        prepared = prepare(case)
+        assert prepared.setup.clock.frames == case.frames
+        assert prepared.setup.clock.duration == pytest.approx(case.scene.duration, rel=1e-12)
+
+
+def test_smoke_drops_what_becomes_the_same():
+    """Two mesh sizes above the smoke size are one smoke case, or the same file would be written twice."""
+    fine, finer = (tiny_case(body=tiny_case().body.__class__("surface", nodes)) for nodes in (550, 1100))
+    assert len(tiny_study(cases=(fine, finer)).smoke().cases) == 1

@@ -1,0 +1,108 @@
+"""Charts, tables and the summary: what people look at says what is stored, and what is missing."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from studies.catalog import Chart
+from studies.errors import StudyError
+from studies.machine import machine_id
+from studies.report import BEGIN, END, draw_charts, report, summary_of, write_readme, write_table
+from studies.store import Status
+from studies.sweep import load_runs
+from tests.studies.tiny import tiny_case, tiny_study
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+def headline(runs) -> list[list[str]]:
+    """Rows of the summary, cell by cell, without the two lines of its head."""
+    lines = summary_of({"volume_loss": runs}).splitlines()
+    assert all(line.count("|") - line.count("\\|") == lines[1].count("|") for line in lines)
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines[2:]]
+
+
+def test_charts_get_the_runs_and_their_path(finished_sweep, tmp_path):
+    drawn = []
+    chart = Chart("one.png", lambda runs, path: drawn.append((len(runs), path)))
+    study = tiny_study(charts=(chart,))
+    paths = draw_charts(tmp_path, study, load_runs(finished_sweep, study)[0])
+    assert paths == [tmp_path / "tiny" / "one.png"]
+    assert drawn == [(3, paths[0])]
+    assert paths[0].parent.is_dir()
+
+
+def test_a_table_is_read_back_as_it_was(tmp_path):
+    table = pd.DataFrame({"status": ["ok", "diverged"], "force [%]": [1.0 / 3.0, math.nan], "nodes": [150, 2200]})
+    again = pd.read_csv(write_table(tmp_path / "new" / "t.csv", table))
+    assert again["status"].tolist() == ["ok", "diverged"]
+    assert again["nodes"].tolist() == [150, 2200]
+    assert again["force [%]"][0] == pytest.approx(1 / 3, rel=1e-6)
+    assert math.isnan(again["force [%]"][1])
+
+
+def test_report_writes_everything_and_names_what_is_missing(results):
+    more = tiny_case(dt_fraction=0.4)
+    study = tiny_study(cases=(*tiny_study().cases, more))
+    written, remarks = report(results, [study])
+    assert written == [results / "tiny" / "tiny.csv", results / "summary.md"]
+    assert remarks == [f"tiny: case {more.name} has not run"]
+    assert len(pd.read_csv(results / "tiny" / "tiny.csv")) == 3
+    assert json.loads((results / "machine.json").read_text())["id"] == machine_id()
+    before = {path: path.read_bytes() for path in results.rglob("*.*")}
+    report(results, [study])
+    assert {path: path.read_bytes() for path in results.rglob("*.*")} == before
+
+
+def test_summary_without_results():
+    assert "make study" in summary_of({})
+
+
+def test_summary_shows_numbers_or_a_dash(finished_sweep):
+    runs, _ = load_runs(finished_sweep, tiny_study())
+    kept, free, lost = headline(runs)
+    assert kept[:3] == ["tiny_squeeze", "tetrahedral", "implicit_volume"]
+    assert float(kept[3]) < float(free[3])
+    assert kept[4] == "–"  # no reference, no force error
+    assert lost[3:] == ["–"] * 6
+
+
+def test_fine_steps_are_no_headline(finished_sweep):
+    runs, _ = load_runs(finished_sweep, tiny_study())
+    record = runs[0].record
+    fine = replace(record, attributes=record.attributes | {"dt": 0.05 * record.attributes["dt_limit"]})
+    assert headline([replace(runs[0], record=fine), runs[1]]) == headline([runs[1]])
+
+
+def test_a_case_that_failed_is_not_left_out(finished_sweep):
+    runs, _ = load_runs(finished_sweep, tiny_study())
+    failed = replace(runs[0].record, attributes={}, fields={}, status=Status.FAILED)
+    assert headline([replace(runs[0], record=failed)])[0][3:] == ["–"] * 6
+
+
+def test_readme_takes_the_summary_between_its_marks(tmp_path):
+    readme = tmp_path / "README.md"
+    readme.write_text(f"# Title\n{BEGIN}\nold\n{END}\ntail\n")
+    write_readme(readme, "\n| new |\n")
+    assert readme.read_text() == f"# Title\n{BEGIN}\n| new |\n{END}\ntail\n"
+    write_readme(readme, "| new |")
+    assert readme.read_text().count("new") == 1
+
+
+def test_readme_without_marks_or_missing_is_left_alone(tmp_path):
+    readme = tmp_path / "README.md"
+    with pytest.raises(StudyError, match="there is no file"):
+        write_readme(readme, "| new |")
+    readme.write_text("# Title\n")
+    with pytest.raises(StudyError, match="has no lines"):
+        write_readme(readme, "| new |")
+    assert readme.read_text() == "# Title\n"
+
+
+def test_the_readme_of_the_project_has_the_marks():
+    text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+    assert text.index(BEGIN) < text.index(END)
