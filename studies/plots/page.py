@@ -30,6 +30,8 @@ LETTERS = 12.8
 """Letters of a note to the inch: a wide line of them still fits."""
 NARROWEST = 8.0
 """Width of a page with one panel [inch]."""
+HANDLE = 0.62
+"""Width of a legend entry besides its words [inch]."""
 MOST_NOTES = 6
 SHORT = 200.0
 """A logarithmic axis from one end to the other of which values grow less than this has numbers between the decades."""
@@ -57,7 +59,7 @@ def finish(
     width, height = (float(size) for size in figure.get_size_inches())
     shown = [*notes[:MOST_NOTES], f"… and {len(notes) - MOST_NOTES} more remarks"] if len(notes) > MOST_NOTES else notes
     lines = [line for note in shown for line in textwrap.wrap(note, int(LETTERS * width))]
-    columns = max(1, min(columns, len(handles)))
+    columns = _fitting(columns, [str(handle.get_label()) for handle in handles], width)
     rows = -(-len(handles) // columns)
     foot = rows * ROW + len(lines) * LINE + 2 * MARGIN * bool(rows or lines)
     total = height + foot
@@ -73,6 +75,17 @@ def finish(
         low = 0.6 * MARGIN / total
         figure.text(0.012, low, "\n".join(lines), color=GREY, size=SMALL, va="bottom", ha="left", linespacing=1.25)
     return figure
+
+
+def _fitting(columns: int, labels: Sequence[str], width: float) -> int:
+    """The largest number of legend columns up to `columns` that the page is wide enough for [inch]."""
+    columns = max(1, min(columns, len(labels)))
+    while columns > 1:
+        longest = [max(map(len, part)) for part in np.array_split(np.array(labels, dtype=object), columns)]
+        if sum(longest) / LETTERS + columns * HANDLE <= width:
+            break
+        columns -= 1
+    return columns
 
 
 @styled

@@ -86,9 +86,13 @@ def _volume(end: float, worst: float) -> str:
     """Change at the end [%], or where that shows no digit, the worst on the way."""
     if worst >= KEPT:
         return f"volume {end:+.1f} %".replace("-", "−")
-    power = int(np.floor(np.log10(worst))) if worst > 0 else -16
+    worst = max(worst, 1e-14)  # what double precision resolves of a per cent
+    power = int(np.floor(np.log10(worst)))
+    digit = int(np.ceil(worst / 10.0**power))
+    if digit == 10:
+        digit, power = 1, power + 1
     exponent = str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"volume kept within {np.ceil(worst / 10.0**power):.0f} × 10{exponent} %"
+    return f"volume kept within {digit} × 10{exponent} %"
 
 
 def _draw_ball(

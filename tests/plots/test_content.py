@@ -210,6 +210,13 @@ def test_squeeze_shows_rest_both_methods_and_the_reference_with_their_numbers():
     assert len(windows) == 1  # one scale
 
 
+@pytest.mark.parametrize(
+    ("worst", "said"), [(9.6e-9, "1 × 10⁻⁶"), (8.5e-9, "9 × 10⁻⁷"), (0.0, "1 × 10⁻¹⁴"), (3.5e-4, "4 × 10⁻²")]
+)
+def test_squeeze_rounds_a_kept_volume_up(worst, said):
+    assert f"volume kept within {said} %" in words(squeeze.figure([run(volume_end=worst)]))
+
+
 def test_squeeze_takes_the_larger_of_two_steps():
     figure = squeeze.figure([run(dt=1e-4, volume_end=-0.02), run(dt=1e-3, volume_end=-0.03)])
     assert "−3.0 %" in words(figure)

@@ -5,18 +5,20 @@ from io import BytesIO
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+from matplotlib.patches import Patch
 
 from massspring import METHODS
 from studies.geometry import OrganMesh
-from studies.plots import organs
-from studies.plots.page import spread_out
+from studies.plots import organs, volume_history
+from studies.plots.page import finish, page, spread_out
 from studies.plots.render import LIGHT, Camera, draw_surface, shade, uniform, vertex_normals
-from studies.plots.style import method_colour, save
-from tests.plots.made_up import CELLS, POINTS, RADIUS, TRIANGLES
+from studies.plots.style import method_colour, save, styled
+from tests.plots.made_up import CELLS, POINTS, RADIUS, TRIANGLES, run
 
 FRONT = Camera(azimuth=-90.0, elevation=0.0)
 
@@ -70,14 +72,36 @@ def test_labels_keep_their_order_and_their_distance():
     assert len(spread_out(np.array([]), 0.1)) == 0
 
 
+@styled
+@pytest.mark.parametrize("letters", [5, 30, 60])
+def test_a_legend_stays_on_the_page_and_over_its_notes(letters):
+    figure = page(8.0, 3.0)
+    figure.subplots()
+    finish(figure, "Title", [Patch(label="w" * letters) for _ in range(7)], ["n" * 400], columns=4)
+    FigureCanvasAgg(figure).draw()
+    box, note = figure.legends[0].get_window_extent(), figure.texts[-1].get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.width
+    assert note.y1 <= box.y0
+    assert note.y0 >= 0
+
+
+def test_many_notes_are_cut_short():
+    figure = finish(page(8.0, 3.0), "Title", [], [f"note {k}" for k in range(50)])
+    said = figure.texts[-1].get_text()
+    assert "note 5" in said
+    assert "44 more" in said
+    assert figure.get_figheight() < 5
+
+
 def test_every_method_has_its_own_colour():
     assert len({method_colour(method.name) for method in METHODS}) == len(METHODS)
 
 
 def test_the_users_own_settings_change_nothing(tmp_path):
-    organs.draw_organs({"ball": octahedron()}, tmp_path / "a.png")
-    with matplotlib.rc_context({"font.size": 30, "axes.facecolor": "red", "savefig.dpi": 20}):
-        organs.draw_organs({"ball": octahedron()}, tmp_path / "b.png")
+    volume_history.draw([run()], tmp_path / "a.png")
+    with matplotlib.rc_context({"font.size": 30, "axes.facecolor": "red", "savefig.dpi": 20, "lines.marker": "x"}):
+        volume_history.draw([run()], tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
