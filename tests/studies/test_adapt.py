@@ -1,0 +1,99 @@
+"""From a scene to the mass-spring set-up: mesh, body, attachments, clock."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import Path
+from studies.adapt import attachments_for, body_for, mesh_for, patch_nodes, prepare
+from studies.case import BodyRecipe
+from studies.errors import StudyError
+from studies.geometry import HalfSpace
+from studies.scenes import Held
+from studies.scenes.ball_clamped import BALL_CLAMPED
+from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
+
+CLAMPED = replace(BALL_CLAMPED, reference=None)
+
+
+@pytest.fixture(scope="module")
+def ball_mesh(mesh_cache):
+    return mesh_for(CLAMPED, NODES)
+
+
+def test_only_a_tetrahedral_body_is_filled():
+    filled, hollow = (prepare(tiny_case(body=BodyRecipe(kind, NODES))) for kind in ("tetrahedral", "surface"))
+    assert len(filled.mesh.tetrahedra) == len(filled.setup.body.tetrahedra) > 0
+    assert len(hollow.mesh.tetrahedra) == len(hollow.setup.body.tetrahedra) == 0
+    assert abs(hollow.mesh.surface_count - NODES) <= 0.02 * NODES + 1
+    # The paper's body has virtual nodes on its axis on top of the mesh.
+    assert hollow.setup.body.node_count > len(hollow.mesh.points)
+
+
+def test_stiffness_multiplies_every_spring(ball_mesh):
+    soft, stiff = (body_for(CLAMPED, BodyRecipe(nodes=NODES, stiffness=k), ball_mesh) for k in (1.0, 4.0))
+    np.testing.assert_allclose(stiff.springs.stiffness, 4.0 * soft.springs.stiffness, rtol=1e-15)
+    np.testing.assert_array_equal(stiff.mass, soft.mass)
+
+
+def test_the_laws_differ_and_match_the_tissue(ball_mesh):
+    """Both have Σ k L² = 15 μ V, so that they mean the same tissue (docs: stiffness laws)."""
+    volume, shear = ball_mesh.volume, CLAMPED.tissue.shear_modulus
+    springs = [
+        body_for(CLAMPED, BodyRecipe(nodes=NODES, law=law), ball_mesh).springs for law in ("van_gelder", "uniform")
+    ]
+    for network in springs:
+        assert network.stiffness @ network.rest_length**2 == pytest.approx(15 * shear * volume, rel=1e-9)
+    assert not np.allclose(springs[0].stiffness, springs[1].stiffness, rtol=0.01)
+
+
+def test_attachments_are_the_caps_with_their_paths(ball_mesh):
+    bottom, top = attachments_for(CLAMPED, ball_mesh)
+    height = ball_mesh.points[:, 2]
+    cap = 0.8 * 0.05
+    # The outline of a cap is an edge of the mesh: all nodes beyond it, and those on it to the mesher's tolerance.
+    assert set(np.flatnonzero(height[: ball_mesh.surface_count] > cap * (1 + 1e-6))) <= set(top.nodes)
+    assert (height[top.nodes] > cap * (1 - 1e-6)).all()
+    assert (height[bottom.nodes] < -cap * (1 - 1e-6)).all()
+    assert top.path == CLAMPED.held[1].path
+    assert bottom.path == Path()
+
+
+def test_a_mesh_from_a_file_is_attached_where_the_region_is(tmp_path):
+    points, triangles, _ = cube(2)
+    outer = np.unique(triangles)
+    top = HalfSpace((0.0, 0.0, 0.04), (0.0, 0.0, -1.0))
+    scene = file_scene(write_obj(tmp_path / "box.obj", points[outer], np.searchsorted(outer, triangles)))
+    mesh = mesh_for(replace(scene, held=(Held("top", top),)), 0, filled=True)
+    assert len(mesh.tetrahedra)
+    found = patch_nodes(mesh, "top", top)
+    assert len(found) == 9
+    assert (mesh.points[found, 2] == 0.05).all()
+
+
+def test_dt_auto_is_the_fraction_of_the_limit_of_the_held_body():
+    case = tiny_case(scene=CLAMPED)
+    half, tenth = prepare(case), prepare(case.replaced(dt_fraction=0.1))
+    for prepared, fraction in ((half, 0.5), (tenth, 0.1)):
+        clock = prepared.setup.clock
+        wanted = fraction * prepared.limit.damped
+        assert wanted * clock.steps / (clock.steps + 1) < clock.dt <= wanted
+    fixed = prepare(case.replaced(dt=1e-3)).setup.clock
+    assert fixed.dt == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_frames_of_the_case_come_before_those_of_the_scene():
+    assert prepare(tiny_case(frames=7)).setup.clock.frames == 7
+    assert prepare(tiny_case(frames=None)).setup.clock.frames == SQUEEZE.frames
+
+
+def test_a_dt_above_the_limit_is_obeyed_with_a_warning_that_names_the_limit():
+    limit = prepare(tiny_case()).limit.damped
+    with pytest.warns(UserWarning, match=f"above the stability limit of {limit:.3g} s"):
+        assert prepare(tiny_case(dt=2 * limit, frames=100)).setup.clock.dt > limit
+
+
+def test_an_unknown_shape_gets_the_nearest_match():
+    with pytest.raises(StudyError, match="unknown organ 'livver'; did you mean 'liver'"):
+        mesh_for(replace(SQUEEZE, organ=replace(SQUEEZE.organ, shape="livver")), NODES)
