@@ -1,11 +1,14 @@
-"""A mesh cache of its own for the whole session, and one finished sweep that tests may copy."""
+"""A mesh cache of its own for the whole session, one finished sweep that tests may copy, and the command line."""
 
 import shutil
+import sys
+import warnings
 
 import pytest
 
+from studies import cli
 from studies.sweep import run_studies
-from tests.studies.tiny import Silent, tiny_study
+from tests.studies.tiny import TINY, Silent, tiny_study
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -29,3 +32,40 @@ def finished_sweep(mesh_cache, tmp_path_factory):
 def results(finished_sweep, tmp_path):
     """A copy of the finished results that a test may spoil."""
     return shutil.copytree(finished_sweep, tmp_path / "results")
+
+
+@pytest.fixture
+def organbench(monkeypatch, capsys):
+    """Calls the command line as the shell does: (exit code, standard output, standard error)."""
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # main() sets it; give it back afterwards
+
+    def call(*words):
+        monkeypatch.setattr(sys, "argv", ["organbench", *map(str, words)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        out, err = capsys.readouterr()
+        return stop.value.code, out, err
+
+    return call
+
+
+@pytest.fixture
+def refused(organbench):
+    """Calls with bad input: checks code and form of the complaint, gives the sentence."""
+
+    def call(*words) -> str:
+        code, out, err = organbench(*words)
+        assert code == 2
+        assert out == ""
+        (sentence,) = err.splitlines()
+        assert sentence.startswith("organbench: ")
+        return sentence
+
+    return call
+
+
+@pytest.fixture
+def tiny_file(tmp_path):
+    path = tmp_path / "tiny_file.py"
+    path.write_text(TINY)
+    return path

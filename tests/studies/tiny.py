@@ -15,6 +15,16 @@ NODES, FRAMES = 60, 5
 SQUEEZE = replace(BALL_SQUEEZE, name="tiny_squeeze", reference=None)
 CUBE = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
 """Kuhn's six tetrahedra of a cube whose corner (x, y, z) has number x + 2 y + 4 z; neighbours match."""
+TINY = """
+from studies.catalog import Chart
+from tests.studies.tiny import tiny_study
+
+def draw(runs, path):
+    path.write_text(f"{len(runs)} runs")
+
+STUDY = tiny_study(charts=(Chart("picture.txt", draw),))
+"""
+"""A study file as somebody would write it."""
 
 
 class Silent:
@@ -43,7 +53,7 @@ def tiny_study(**changes) -> Study:
 
 
 def diverging_case() -> Case:
-    """Three times the stability limit, in single steps of 50 frames a second."""
+    """Three times the stability limit."""
     return tiny_case(dt_fraction=3.0, timed=True)
 
 
@@ -81,3 +91,8 @@ def file_scene(path, unit: str = "m", **changes) -> Scene:
         damping=0.0,
     )
     return replace(scene, **changes)
+
+
+def content(folder) -> dict:
+    """Every file below a folder, by relative path, byte for byte."""
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
