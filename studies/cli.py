@@ -96,9 +96,7 @@ def run(
         if said:
             more = f" (and {len(said) - 1} more cases warn; `organbench show` prints them)" if len(said) > 1 else ""
             errors.print(f"warning: {said[0]}{more}", markup=False, highlight=False)
-        charts = [study_folder(root, study.name) / chart.file for chart in study.charts]
-        if count or not all(chart.exists() for chart in charts):
-            _draw(root, study)
+        _draw(root, study)
         done = f"{study.name}: {count} pieces ran, charts in {study_folder(root, study.name)}"
         console.print(done, markup=False, highlight=False)
 
@@ -112,10 +110,10 @@ def _filter(only: str):
 
 
 def _draw(root: Path, study: Study) -> list[Path]:
-    runs, remarks = load_runs(root, study)
+    paths, remarks = reports.refresh(root, study)
     for sentence in remarks:
         errors.print(f"warning: {sentence}", markup=False, highlight=False)
-    return reports.draw_charts(root, study, runs)
+    return paths
 
 
 @app.command()
@@ -161,7 +159,7 @@ def table(
 
 @app.command()
 def plot(study: StudyName, results: Results = Path("results")) -> None:
-    """Draws the charts of a study from what is stored."""
+    """Draws the charts and the table of a study from what is stored; names them."""
     for chart in _draw(results, find_study(study)):
         console.print(str(chart), markup=False, highlight=False)
 

@@ -1,5 +1,7 @@
 """What people look at: charts, tables as CSV, the summary of results that README shows."""
 
+import hashlib
+import json
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
@@ -11,18 +13,24 @@ from studies.adapt import mesh_for
 from studies.atomic import write_whole
 from studies.catalog import Study
 from studies.errors import StudyError
+from studies.fingerprint import source_fingerprint
 from studies.machine import write_machine
 from studies.metrics import Run
 from studies.paths import study_folder
 from studies.plots.organs import draw_organs
+from studies.reference import reference_path
+from studies.run import case_path
 from studies.scenes import SCENES
 from studies.sweep import load_runs
 from studies.table import study_table
+from studies.timed import timing_file
 
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 """Between these lines of README.md stands the summary; `organbench report --readme` writes it."""
 
 FIGURE_NODES = 550
+HEADLINE = "volume_loss"
+"""The study that the summary is read off."""
 
 
 def draw_charts(root: Path, study: Study, runs: Sequence[Run]) -> list[Path]:
@@ -54,19 +62,52 @@ def write_table(path: Path, table: pd.DataFrame) -> Path:
 
 def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
     """Charts and tables of all studies, the summary and machine.json; paths, and what is missing in sentences."""
-    written, remarks, runs_of = [], [], {}
+    written, remarks = [], []
     for study in studies:
-        runs, missing = load_runs(root, study)
-        runs_of[study.name] = runs
+        paths, missing = refresh(root, study)
+        written += paths
         remarks += [f"{study.name}: {sentence}" for sentence in missing]
-        written += draw_charts(root, study, runs)
-        written.append(
-            write_table(study_folder(root, study.name) / f"{study.name}.csv", study_table(runs, study.columns))
-        )
     write_machine(root / "machine.json")
-    summary = root / "summary.md"
-    write_whole(summary, (summary_of(runs_of) + "\n").encode())
-    return [*written, summary], remarks
+    return written, remarks
+
+
+def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
+    """Draws the charts and writes the tables of a study, unless they show what is stored already.
+
+    Their paths, and what is missing in sentences.
+    """
+    folder = study_folder(root, study.name)
+    table = folder / f"{study.name}.csv"
+    paths = [*(folder / chart.file for chart in study.charts), table]
+    if study.name == HEADLINE:
+        paths.append(root / "summary.md")
+    stamp = root / "cache" / f"{study.name}.drawn.json"
+    shown = {"inputs": inputs_of(root, study), "remarks": []}
+    if all(path.exists() for path in paths) and stamp.exists():
+        before = json.loads(stamp.read_text(encoding="utf-8"))
+        if before["inputs"] == shown["inputs"]:
+            return paths, before["remarks"]
+    runs, shown["remarks"] = load_runs(root, study)
+    draw_charts(root, study, runs)
+    write_table(table, study_table(runs, study.columns))
+    if study.name == HEADLINE:
+        write_whole(root / "summary.md", (summary_of({HEADLINE: runs}) + "\n").encode())
+    write_whole(stamp, json.dumps(shown).encode())
+    return paths, shown["remarks"]
+
+
+def inputs_of(root: Path, study: Study) -> str:
+    """Hash of all that charts and tables are made from: result files with their sizes and times, and the code."""
+    digest = hashlib.sha256(source_fingerprint("studies", "massspring", "reference_fem").encode())
+    files = [case_path(root, study.name, case) for case in study.cases]
+    files += [timing_file(root, study.name, case) for case in study.cases if case.timed]
+    for scene in study.scenes:
+        levels = scene.reference.levels[-2:] if scene.reference is not None else ()
+        files += [reference_path(root, scene, level) for level in levels]
+    for file in files:
+        state = file.stat() if file.exists() else None
+        digest.update(f"{file.name} {state and (state.st_mtime_ns, state.st_size)}\n".encode())
+    return digest.hexdigest()
 
 
 def draw_figures(root: Path) -> list[Path]:

@@ -117,7 +117,7 @@ def test_table_of_chosen_metrics(organbench, tiny_file, results):
 
 def test_plot_names_what_it_drew(organbench, tiny_file, results):
     code, out, _ = organbench("plot", tiny_file, "--results", results)
-    assert (code, out.strip()) == (0, str(results / "tiny" / "picture.txt"))
+    assert (code, out.split()) == (0, [str(results / "tiny" / name) for name in ("picture.txt", "tiny.csv")])
     assert (results / "tiny" / "picture.txt").read_text() == "3 runs"
 
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import pytest
 from studies.catalog import Chart
 from studies.errors import StudyError
 from studies.machine import machine_id
-from studies.report import BEGIN, END, draw_charts, report, summary_of, write_readme, write_table
+from studies.report import BEGIN, END, draw_charts, refresh, report, summary_of, write_readme, write_table
+from studies.run import case_path
 from studies.store import Status
 from studies.sweep import load_runs
 from tests.studies.tiny import tiny_case, tiny_study
@@ -49,7 +51,7 @@ def test_report_writes_everything_and_names_what_is_missing(results):
     more = tiny_case(dt_fraction=0.4)
     study = tiny_study(cases=(*tiny_study().cases, more))
     written, remarks = report(results, [study])
-    assert written == [results / "tiny" / "tiny.csv", results / "summary.md"]
+    assert written == [results / "tiny" / "tiny.csv"]
     assert remarks == [f"tiny: case {more.name} has not run"]
     assert len(pd.read_csv(results / "tiny" / "tiny.csv")) == 3
     assert json.loads((results / "machine.json").read_text())["id"] == machine_id()
@@ -106,3 +108,30 @@ def test_readme_without_marks_or_missing_is_left_alone(tmp_path):
 def test_the_readme_of_the_project_has_the_marks():
     text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
     assert text.index(BEGIN) < text.index(END)
+
+
+def test_what_is_shown_already_is_not_drawn_again(results):
+    """The skip of the second `make study`: nothing is drawn until a result, or a picture, is no longer the same."""
+    drawn = []
+
+    def draw(runs, path):
+        drawn.append(len(runs))
+        path.write_bytes(b"picture")
+
+    study = tiny_study(charts=(Chart("one.png", draw),))
+    paths, _ = refresh(results, study)
+    assert [path.name for path in paths] == ["one.png", f"{study.name}.csv"] and len(drawn) == 1
+    before = [path.read_bytes() for path in paths]
+    assert refresh(results, study)[0] == paths and len(drawn) == 1
+    paths[0].unlink()
+    refresh(results, study)
+    assert len(drawn) == 2 and [path.read_bytes() for path in paths] == before
+    os.utime(case_path(results, study.name, study.cases[0]), ns=(1, 1))
+    refresh(results, study)
+    assert len(drawn) == 3
+
+
+def test_the_headline_study_writes_the_summary_too(results):
+    paths, remarks = refresh(results, replace(tiny_study(), name="volume_loss"))
+    assert paths[-1] == results / "summary.md" and paths[-1].is_file()
+    assert len(remarks) == 3, "none of its cases has run under this name"
