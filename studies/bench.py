@@ -24,6 +24,7 @@ from massspring import (
 from massspring import Path as Motion
 from reference_fem import bench as reference_bench
 from reference_fem import equilibrium_path
+from reference_fem.exact import BALL_BETWEEN_PLANES
 from studies.adapt_reference import reference_problem, whole_forces
 from studies.case import BodyRecipe, Case
 from studies.geometry import ball
@@ -34,9 +35,8 @@ from studies.spread import kernel_ns, ratio_with_spread
 from studies.timing import interleave, pinned
 
 FRAMES, STEPS, REPEATS = 200, 20, 7
-ORACLE_5 = {0.10: (0.19197, 1.01325), 0.20: (0.60204, 1.04117), 0.30: (1.25968, 1.08359)}
-"""Approach over diameter -> (force over mu R², equator radius over R): incompressible neo-Hookean ball between
-frictionless planes, axisymmetric P2/P1 solution converged to 1e-4 (docs/theory.md, oracle 5)."""
+APPROACHES = (0.10, 0.20, 0.30)
+"""Of the planes over the diameter, at which the reference is held against the converged solution."""
 
 
 @dataclass(frozen=True)
@@ -107,11 +107,12 @@ def reference_lines() -> list[Line]:
     assert BALL_SQUEEZE.reference is not None
     level = BALL_SQUEEZE.reference.levels[-1]
     problem = reference_problem(BALL_SQUEEZE, level)
-    times = [PRESS_END * share / 0.30 for share in ORACLE_5]
+    times = [PRESS_END * share / 0.30 for share in APPROACHES]
     path = equilibrium_path(problem, times)
     scale = BALL_SQUEEZE.tissue.shear_modulus * RADIUS**2
     lines = []
-    for (share, (force, equator)), found in zip(ORACLE_5.items(), path, strict=True):
+    for share, found in zip(APPROACHES, path, strict=True):
+        force, equator = BALL_BETWEEN_PLANES[share]
         got = float(-whole_forces(BALL_SQUEEZE, found.obstacle_force[None])[0, 0, 2]) / scale
         radius = float(np.hypot(*(problem.mesh.doflocs[:2] + found.u.T[:2])).max()) / RADIUS
         lines.append(Line(f"reference force at d = {share:.2f}, deviation", abs(got / force - 1), "1", 0.01))

@@ -1,7 +1,6 @@
 """The finite-element reference of a scene: solved once per mesh, stored, read back with its own error bar."""
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -61,14 +60,12 @@ def reference_is_current(root: Path, scene: Scene, level: float) -> bool:
     return is_current(path, reference_key(scene, level), reference_fingerprint())
 
 
-def solve_reference(
-    root: Path, scene: Scene, level: float, on_step: Callable[[Equilibrium], None] | None = None
-) -> Path:
+def solve_reference(root: Path, scene: Scene, level: float) -> Path:
     """Solves the scene's load path on one mesh and stores it; a path that breaks off is stored up to there."""
     problem = reference_problem(scene, level)
     status, message = Status.OK, ""
     try:
-        found = equilibrium_path(problem, scene.checkpoints, on_step=on_step)
+        found = equilibrium_path(problem, scene.checkpoints)
     except ReferenceProblem as error:
         found = [e for e in getattr(error, "converged", []) if e.t in scene.checkpoints]
         status, message = Status.NOT_CONVERGED, str(error)
