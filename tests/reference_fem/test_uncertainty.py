@@ -1,0 +1,100 @@
+"""The error bar: exact on exact power laws, honest where there is none, and large enough on a body that is known."""
+
+import numpy as np
+import pytest
+
+from reference_fem import ReferenceProblem
+from reference_fem.uncertainty import (
+    FASTEST,
+    SAFETY,
+    SLOWEST,
+    changes_error,
+    combined,
+    mesh_error,
+    observed_order,
+    setting_error,
+)
+
+SIZES = (1.0, 1.3, 1.9)
+"""Of different ratio: formulas for a constant ratio fail."""
+
+
+def law(order, limit=7.0, slope=0.3):
+    return [limit + slope * h**order for h in SIZES]
+
+
+@pytest.mark.parametrize("order", [1.0, 1.7, 2.0, 2.9])
+@pytest.mark.parametrize("slope", [0.3, -0.02])
+def test_a_power_law_is_extrapolated_to_its_limit(order, slope):
+    values = law(order, slope=slope)
+    error = mesh_error(SIZES, values)
+    assert error.order == pytest.approx(order, rel=1e-9)
+    assert values[0] + error.shift == pytest.approx(7.0, rel=1e-12)
+    assert error.uncertainty == pytest.approx(SAFETY * abs(slope), rel=1e-9)
+
+
+@pytest.mark.parametrize(("order", "believed"), [(0.2, SLOWEST), (6.0, FASTEST)])
+def test_orders_that_are_not_plausible_are_not_believed(order, believed):
+    error = mesh_error(SIZES, law(order))
+    assert error.order == believed
+    gap = abs(law(order)[1] - law(order)[0])
+    assert error.uncertainty == pytest.approx(SAFETY * gap / (1.3**believed - 1), rel=1e-12)
+
+
+def test_a_field_has_the_order_of_its_size():
+    """Each point has a slope of its own; the points' weights decide what its size is."""
+    slopes, weights = np.array([[0.3, -0.1], [0.2, 0.5], [0.0, 0.1]]), np.array([1.0, 4.0, 0.5])
+    fields = [2.0 + slopes * h**2 for h in SIZES]
+    error = mesh_error(SIZES, fields, weights)
+    assert error.order == pytest.approx(2.0, rel=1e-9)
+    assert error.shift == pytest.approx(np.sqrt(weights @ (slopes**2).sum(axis=1)), rel=1e-9)
+
+
+def test_values_that_go_to_and_fro_have_the_spread():
+    error = mesh_error(SIZES, [3.0, 3.4, 2.9])
+    assert not error.monotone
+    assert error.shift == 0.0
+    assert error.uncertainty == pytest.approx(0.5, rel=1e-12)
+    assert mesh_error(SIZES, [3.0, 2.9, 3.4]).uncertainty == pytest.approx(0.5, rel=1e-12)
+    # Two changes of a field at right angles are no approach either; the ends are then farthest apart.
+    turned = mesh_error(SIZES, [np.array([0.0, 0.0]), np.array([3.0, 0.0]), np.array([3.0, 4.0])])
+    assert not turned.monotone
+    assert turned.uncertainty == pytest.approx(5.0, rel=1e-12)
+
+
+def test_sizes_of_changes_are_enough():
+    values = law(2.0)
+    changes = values[2] - values[1], values[1] - values[0]
+    assert changes_error(SIZES, *changes, alike=True).uncertainty == mesh_error(SIZES, values).uncertainty
+    assert changes_error(SIZES, 0.2, 0.3, alike=False).uncertainty == 0.3
+
+
+def test_no_change_is_no_error():
+    assert mesh_error(SIZES, [2.0, 2.0, 2.0]).uncertainty == 0.0
+    assert observed_order(SIZES, 0.1, 0.0) == FASTEST
+    assert observed_order(SIZES, 0.0, 0.1) == SLOWEST
+
+
+@pytest.mark.parametrize("sizes", [(1.0, 1.0, 2.0), (2.0, 1.5, 1.0), (1.0, 2.0), (0.0, 1.0, 2.0)])
+def test_sizes_that_are_no_family_are_refused(sizes):
+    with pytest.raises(ReferenceProblem, match="three meshes of different size"):
+        mesh_error(sizes, [1.0, 2.0, 3.0])
+
+
+def test_broken_values_are_refused():
+    with pytest.raises(ReferenceProblem, match="not finite"):
+        mesh_error(SIZES, [1.0, 2.0, np.nan])
+
+
+@pytest.mark.parametrize("factor", [2.0, 3.0, 10.0])
+def test_a_setting_of_order_one_is_extrapolated_exactly(factor):
+    """f = 5 + a/s: the change from s to factor s tells all of a/s."""
+    left = 0.3
+    assert setting_error(-(left - left / factor), factor) == pytest.approx(left, rel=1e-12)
+    with pytest.raises(ReferenceProblem, match="above 1"):
+        setting_error(0.1, 1.0)
+
+
+def test_shares_add_as_independent_ones():
+    assert combined({"mesh": 3.0, "contact": 4.0, "steps": 0.0}) == pytest.approx(5.0, rel=1e-15)
+    assert combined({}) == 0.0
