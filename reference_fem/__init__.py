@@ -29,8 +29,8 @@ from reference_fem.errors import ReferenceProblem, SlowSolverWarning  # noqa: E4
 from reference_fem.evaluate import Evaluator  # noqa: E402
 from reference_fem.material import NeoHookean  # noqa: E402
 from reference_fem.mesh import curve  # noqa: E402
-from reference_fem.newton import NewtonSettings  # noqa: E402
 from reference_fem.problem import Held, Problem  # noqa: E402
+from reference_fem.system import NewtonSettings  # noqa: E402
 
 config.CACHE_DIR = _folder_before  # pyright: ignore[reportAttributeAccessIssue]
 

@@ -8,8 +8,8 @@ from skfem import MeshTet
 from reference_fem.contact import RigidPlane
 from reference_fem.equilibrium import equilibrium_path
 from reference_fem.material import NeoHookean
-from reference_fem.newton import Loads, NewtonSettings, System
 from reference_fem.problem import Held, Problem
+from reference_fem.system import Loads, NewtonSettings, System
 
 
 def slab(cells, obstacles=()):

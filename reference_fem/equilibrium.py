@@ -8,8 +8,9 @@ import numpy as np
 from reference_fem import assembly, contact
 from reference_fem.checks import check_times
 from reference_fem.errors import ReferenceProblem
-from reference_fem.newton import Loads, NewtonSettings, State, StepFailed, System, solve_step
+from reference_fem.newton import StepFailed, solve_step
 from reference_fem.problem import Problem
+from reference_fem.system import Loads, NewtonSettings, State, System
 
 EASY = 8
 """Newton iterations below which the next sub-step may be twice as long."""

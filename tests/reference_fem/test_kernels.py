@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference_fem import Held, NeoHookean, NewtonSettings, Problem, RigidPlane, RigidSphere, assembly, contact, curve
-from reference_fem.newton import Loads, System
+from reference_fem.system import Loads, System
 from tests.reference_fem.bodies import block
 
 STEP = 1e-6

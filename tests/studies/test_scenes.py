@@ -8,8 +8,8 @@ import pytest
 
 from massspring import METHODS, Path, Plane, simulate
 from reference_fem import NewtonSettings
-from reference_fem.newton import System
 from reference_fem.problem import find_held
+from reference_fem.system import System
 from studies.adapt import mesh_for, patch_nodes, prepare
 from studies.adapt_reference import anchor, kept_obstacles, reference_problem
 from studies.case import BodyRecipe, Case, scene_from_dict, scene_to_json
