@@ -11,33 +11,42 @@ from studies.errors import StudyError
 from studies.geometry.checks import check_one_part, check_surface
 from studies.geometry.jobs import TIME_LIMIT, mesh_from, patches_of
 from studies.geometry.mesh import OrganMesh
-from studies.geometry.organs.liver import LIVER_REGIONS
 from studies.geometry.quality import MIN_DIHEDRAL, dihedral_angles
 from studies.geometry.regions import Region, region_to_dict
+from studies.geometry.shapes import make_shape
 
 
 def organ(
     name: str,
     nodes: int,
-    regions: Mapping[str, Region],
+    regions: Mapping[str, Region] | None = None,
     fill: bool = True,
     parameters: Mapping[str, Any] | None = None,
+    layers: int | None = None,
 ) -> OrganMesh:
-    """The organ `name` of SHAPES with `nodes` surface nodes (exactly or within 2 %), outlines of regions on its edges.
+    """The organ `name` of SHAPES with `nodes` nodes on its outer surface (exactly or within 2 %).
 
-    Raises StudyError when the mesher cannot do it.
+    Outlines of the regions (None: the organ's own) lie on edges. A hollow organ is filled between its surface and its
+    lumen, in `layers` of prisms (None: as many as make them as high as long); with fill=False only the outer surface
+    is made. Raises StudyError when the mesher cannot do it.
     """
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
+    shape = make_shape(name, parameters or {})
+    own = shape.regions if regions is None else regions
     recipe = {
         "kind": "organ",
         "name": name,
         "organ": name,
         "nodes": int(nodes),
         "parameters": dict(parameters or {}),
-        "regions": {key: region_to_dict(region) for key, region in regions.items()},
+        "regions": {key: region_to_dict(region) for key, region in own.items()},
         "fill": bool(fill),
     }
+    if layers is not None:
+        if shape.wall is None:
+            raise StudyError(f"{name}: {layers} layers asked for, but it is solid; only a hollow organ has layers")
+        recipe["layers"] = int(layers)
     return mesh_from(recipe)
 
 
@@ -52,7 +61,7 @@ def ball(
 def liver(nodes: int = 550, regions: Mapping[str, Region] | None = None, fill: bool = True) -> OrganMesh:
     """Liver of about 1,500 mL, x to the patient's left, y to the back, z to the head; attached at LIVER_REGIONS unless
     other regions are given; raises StudyError for a node count that cannot be meshed."""
-    return organ("liver", nodes, LIVER_REGIONS if regions is None else regions, fill)
+    return organ("liver", nodes, regions, fill)
 
 
 def ball_octant(radius: float, h: float, h_pole: float) -> OrganMesh:

@@ -11,8 +11,9 @@ from studies.geometry.gmsh_session import Remesher, fresh_model
 from studies.geometry.levelset import Shape
 from studies.geometry.mesh import triangle_areas
 from studies.geometry.octant import build_octant
-from studies.geometry.organs import SHAPES
 from studies.geometry.regions import region_from_dict
+from studies.geometry.shapes import make_shape
+from studies.geometry.shell import fill_wall
 from studies.geometry.snap import relax, snap_region
 from studies.geometry.surface import first_surface
 
@@ -20,7 +21,7 @@ Arrays = dict[str, np.ndarray]
 
 
 def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """points, triangles, tetrahedra, surface_count for a recipe; `arrays` holds a given surface for kind "fill".
+    """The arrays of jobs.PARTS for a recipe; `arrays` holds a given surface for kind "fill".
 
     Raises StudyError when the recipe cannot be made.
     """
@@ -29,7 +30,11 @@ def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
 def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     """An organ of SHAPES with `nodes` surface nodes, its outlines of regions snapped, filled when asked."""
-    shape = SHAPES[recipe["organ"]](**recipe["parameters"])
+    return mesh_shape(make_shape(recipe["organ"], recipe["parameters"]), recipe)
+
+
+def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:
+    """Any shape by the `nodes`, `regions`, `fill` and `layers` of a recipe; hollow when the shape has a wall."""
     start_points, start_triangles = first_surface(shape)
     area = float(triangle_areas(start_points, start_triangles).sum())
     with fresh_model():
@@ -37,7 +42,12 @@ def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
         points, triangles = surface_with(recipe["nodes"], area, remesher.mesh, shape)
     points, triangles = snap_all(shape, points, triangles, recipe["regions"])
     check_surface(points, triangles, shape.name)
-    return finish(points, triangles, recipe["fill"], strict=True)
+    if not recipe["fill"]:
+        return arrays_of(points, triangles, np.empty((0, 4), np.int64), len(points), len(points))
+    if shape.wall is not None:
+        return arrays_of(*fill_wall(shape, points, triangles, recipe.get("layers")), 2 * len(points), len(points))
+    all_points, tetrahedra = fill_surface(points, triangles)
+    return arrays_of(all_points, triangles, tetrahedra, len(points), len(points))
 
 
 def snap_all(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: dict[str, dict[str, Any]]) -> Surface:
@@ -52,18 +62,14 @@ def snap_all(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: d
 
 def build_fill(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     """A given surface, filled as well as its triangles allow."""
-    return finish(arrays["points"], arrays["triangles"], fill=True, strict=False)
+    points, triangles = arrays["points"], arrays["triangles"]
+    all_points, tetrahedra = fill_surface(points, triangles, strict=False)
+    return arrays_of(all_points, triangles, tetrahedra, len(points), len(points))
 
 
-def finish(points: np.ndarray, triangles: np.ndarray, fill: bool, strict: bool) -> Arrays:
-    """A checked surface, filled when asked; `strict` insists on good elements."""
-    count = len(points)
-    tetrahedra = np.empty((0, 4), np.int64)
-    if fill:
-        points, tetrahedra = fill_surface(points, triangles, strict)
-    return {
-        "points": points,
-        "triangles": triangles,
-        "tetrahedra": tetrahedra,
-        "surface_count": np.array(count),
-    }
+def arrays_of(
+    points: np.ndarray, triangles: np.ndarray, tetrahedra: np.ndarray, surface_count: int, outer_count: int
+) -> Arrays:
+    """What the worker hands over, by the names of jobs.PARTS."""
+    counts = {"surface_count": np.array(surface_count), "outer_count": np.array(outer_count)}
+    return {"points": points, "triangles": triangles, "tetrahedra": tetrahedra, **counts}

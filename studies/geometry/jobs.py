@@ -23,6 +23,9 @@ from studies.geometry.regions import ON_CURVE, region_from_dict
 TIME_LIMIT = 120.0
 """Seconds after which a meshing job is given up: 20 times what the largest one takes; gmsh hangs without a word."""
 
+PARTS = ("points", "triangles", "tetrahedra", "surface_count", "outer_count")
+"""What the worker makes and the cache keeps."""
+
 HERE = Path(__file__).parent
 
 
@@ -44,14 +47,15 @@ def mesh_from(
 
 def to_mesh(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> OrganMesh:
     """The mesh with its patches."""
-    count = int(arrays["surface_count"])
-    mesh = OrganMesh(recipe["name"], arrays["points"], arrays["triangles"], arrays["tetrahedra"], count, recipe=recipe)
+    count, outer = int(arrays["surface_count"]), int(arrays["outer_count"])
+    cells = arrays["triangles"], arrays["tetrahedra"]
+    mesh = OrganMesh(recipe["name"], arrays["points"], *cells, count, recipe=recipe, outer_count=outer)
     return replace(mesh, patches=patches_of(mesh, recipe.get("regions", {})))
 
 
 def patches_of(mesh: OrganMesh, regions: dict[str, dict[str, Any]]) -> dict[str, np.ndarray]:
-    """Surface nodes inside or on the outline of each region; raises StudyError for a region without nodes."""
-    surface = mesh.points[: mesh.surface_count]
+    """Outer nodes inside or on the outline of each region; raises StudyError for a region without nodes."""
+    surface = mesh.points[: mesh.outer_count]
     # Outlines are met to ON_CURVE of the size of the box of the shape, which is somewhat larger than the mesh.
     tolerance = 10 * ON_CURVE * float(np.linalg.norm(np.ptp(surface, axis=0)))
     patches = {}
@@ -96,7 +100,7 @@ def read_cached(path: Path) -> dict[str, np.ndarray] | None:
         return None
     try:
         with np.load(path, allow_pickle=False) as data:
-            return {key: data[key] for key in ("points", "triangles", "tetrahedra", "surface_count")}
+            return {key: data[key] for key in PARTS}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         warnings.warn(f"the cached mesh {path} is damaged ({error}); it is made again", stacklevel=3)
         return None

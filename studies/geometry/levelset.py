@@ -1,7 +1,7 @@
 """An organ as a function: f(x) < 0 inside, f(x) = 0 its surface; and the way onto that surface."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -9,6 +9,22 @@ from studies.errors import StudyError
 from studies.geometry.regions import Region, Vector
 
 Level = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Literature:
+    """What textbooks or series of patients say: the volume [mL] of an adult's organ, of a hollow one its content."""
+
+    volume_ml: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A smooth, freely reachable surface point [m] and the outward unit normal there; a probe moves against it."""
+
+    point: Vector
+    normal: Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,6 +35,9 @@ class Shape:
     low, high: corners of a box that holds the organ with at least two cells to spare [m]
     cell: edge of the grid on which f is first sampled [m]; finer than the thinnest part
     regions: the attachments it has by default
+    wall: thickness of the wall of a hollow organ, whose lumen is f = -wall [m]; None for a solid one
+    literature: the volume that the default parameters are held to
+    probe, press: where an instrument palpates, and the unit vector along which a plane presses; None when not said
     """
 
     name: str
@@ -27,11 +46,20 @@ class Shape:
     high: Vector
     cell: float
     regions: Mapping[str, Region] = field(default_factory=dict)
+    wall: float | None = None
+    literature: Literature | None = None
+    probe: Probe | None = None
+    press: Vector | None = None
 
     @property
     def size(self) -> float:
         """Diagonal of the box [m]."""
         return float(np.linalg.norm(np.subtract(self.high, self.low)))
+
+
+def at_depth(shape: Shape, depth: float) -> Shape:
+    """The body inside f = -depth [m]: the lumen of a hollow organ when depth is its wall."""
+    return replace(shape, level=lambda points: shape.level(points) + depth)
 
 
 def gradient(level: Level, points: np.ndarray, step: float) -> np.ndarray:

@@ -1,6 +1,6 @@
 """The mesh of an organ, and the few numbers that everybody asks of it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -10,13 +10,17 @@ import numpy as np
 class OrganMesh:
     """A closed surface and, when filled, the tetrahedra of which it is the boundary, node by node.
 
+    A hollow organ has two surfaces, the outer one and the lumen's; both bound its tissue.
+
     name: what it is
-    points: rest positions [m], shape (n, 3); the `surface_count` nodes of the surface come first
-    triangles: surface, shape (t, 3), seen anticlockwise from outside
+    points: rest positions [m], shape (n, 3); the `surface_count` nodes of the boundary come first
+    triangles: the whole boundary, shape (t, 3), seen anticlockwise from outside the tissue (a lumen's from the lumen)
     tetrahedra: shape (k, 4), positive volumes; empty when not filled
-    surface_count: number of surface nodes
-    patches: name -> indices of the surface nodes inside that attachment region
+    surface_count: number of boundary nodes
+    patches: name -> indices of the outer surface's nodes inside that attachment region
     recipe: how to make it again, JSON-able
+    outer_count: number of nodes of the outer surface, which come first of all (0 means all of `surface_count`); in a
+        layered wall node i + outer_count of the lumen faces node i
     """
 
     name: str
@@ -26,19 +30,67 @@ class OrganMesh:
     surface_count: int
     patches: dict[str, np.ndarray] = field(default_factory=dict)
     recipe: dict[str, Any] = field(default_factory=dict)
+    outer_count: int = 0
+
+    def __post_init__(self) -> None:
+        """A solid organ: all of its boundary is outer surface."""
+        object.__setattr__(self, "outer_count", self.outer_count or self.surface_count)
+
+    @property
+    def surfaces(self) -> dict[str, np.ndarray]:
+        """Name -> indices into `triangles`: "outer" and, when hollow, "lumen"."""
+        outer = (self.triangles < self.outer_count).all(axis=1)
+        parts = {"outer": np.flatnonzero(outer)}
+        return parts | {"lumen": np.flatnonzero(~outer)} if self.hollow else parts
+
+    @property
+    def hollow(self) -> bool:
+        """Whether there is a lumen."""
+        return self.outer_count < self.surface_count
+
+    @property
+    def outer_triangles(self) -> np.ndarray:
+        """Triangles of the outer surface, shape (t, 3), outward."""
+        return self.triangles[self.surfaces["outer"]]
+
+    @property
+    def lumen_triangles(self) -> np.ndarray:
+        """Triangles around the lumen, shape (t, 3), turned so that they enclose it with positive volume."""
+        return self.triangles[self.surfaces["lumen"]][:, ::-1] if self.hollow else np.empty((0, 3), np.int64)
 
     @property
     def volume(self) -> float:
-        """Enclosed volume [m^3] of the polyhedron."""
+        """Volume [m^3] of the tissue, bounded by all of `triangles`."""
         return signed_volume(self.points, self.triangles)
 
     @property
+    def outer_volume(self) -> float:
+        """Volume [m^3] inside the outer surface: tissue and lumen."""
+        return signed_volume(self.points, self.outer_triangles)
+
+    @property
+    def lumen_volume(self) -> float:
+        """Volume [m^3] of the lumen; 0 for a solid organ."""
+        return signed_volume(self.points, self.lumen_triangles) if self.hollow else 0.0
+
+    def outer(self) -> "OrganMesh":
+        """The outer surface alone, unfilled, with its patches."""
+        return replace(
+            self,
+            points=self.points[: self.outer_count],
+            triangles=self.outer_triangles,
+            tetrahedra=np.empty((0, 4), np.int64),
+            surface_count=self.outer_count,
+            recipe=self.recipe | {"fill": False},
+        )
+
+    @property
     def area(self) -> float:
-        """Area of the surface [m^2]."""
+        """Area of the whole boundary [m^2]."""
         return float(triangle_areas(self.points, self.triangles).sum())
 
     def patch_triangles(self, name: str) -> np.ndarray:
-        """Surface triangles, shape (s, 3), with all three nodes in patch `name`."""
+        """Boundary triangles, shape (s, 3), with all three nodes in patch `name`."""
         inside = np.zeros(len(self.points), bool)
         inside[self.patches[name]] = True
         return self.triangles[inside[self.triangles].all(axis=1)]

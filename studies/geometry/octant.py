@@ -32,4 +32,5 @@ def build_octant(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[
     inverted = tetrahedron_volumes(points, tetrahedra) < 0
     tetrahedra[inverted] = tetrahedra[inverted][:, [0, 2, 1, 3]]
     points, triangles, tetrahedra, count = surface_first(radius * points, tetrahedra)
-    return {"points": points, "triangles": triangles, "tetrahedra": tetrahedra, "surface_count": np.array(count)}
+    cells = {"triangles": triangles, "tetrahedra": tetrahedra}
+    return {"points": points, **cells, "surface_count": np.array(count), "outer_count": np.array(count)}

@@ -6,6 +6,8 @@ from studies.geometry.mesh import tetrahedron_volumes, triangle_areas
 
 MIN_DIHEDRAL, MIN_RATIO = 8.0, 0.1
 """Below 8 degrees or a radius ratio of 0.1 an element stiffens the body and forces a small time step."""
+MIN_WALL_RATIO = 0.05
+"""The same for a thin wall, whose elements are flat by nature."""
 
 
 def triangle_radius_ratio(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -6,10 +6,15 @@ from studies.errors import StudyError
 from studies.geometry.levelset import Shape
 
 
-def ball_shape(radius: float = 0.05) -> Shape:
-    """Ball of the given radius [m] around the origin; raises StudyError unless 0 < radius < inf."""
+def ball_shape(radius: float = 0.05, wall: float | None = None) -> Shape:
+    """Ball of the given radius [m] around the origin, hollow with a wall [m].
+
+    Raises StudyError unless 0 < radius < inf and 0 < wall < radius.
+    """
     if not 0 < radius < np.inf:
         raise StudyError(f"a ball of radius {radius} m cannot be meshed; give a radius above 0")
+    if wall is not None and not 0 < wall < radius:
+        raise StudyError(f"a wall of {wall} m does not fit into a ball of radius {radius} m; choose one under that")
     reach = 1.2 * radius
     return Shape(
         name="ball",
@@ -17,6 +22,7 @@ def ball_shape(radius: float = 0.05) -> Shape:
         low=(-reach, -reach, -reach),
         high=(reach, reach, reach),
         cell=radius / 8.0,
+        wall=wall,
     )
 
 

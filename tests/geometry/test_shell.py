@@ -1,0 +1,134 @@
+"""Hollow organs: the wall between two matched surfaces, and what a mesh says of its two surfaces."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from studies.errors import StudyError
+from studies.geometry import HalfSpace, ball, check_surface, check_tetrahedra, fill, organ
+from studies.geometry.mesh import boundary_triangles, signed_volume, tetrahedron_volumes
+from studies.geometry.organs import SHAPES
+from studies.geometry.quality import MIN_WALL_RATIO, tetrahedron_radius_ratio
+from studies.geometry.shell import fill_wall, split_prisms, suggested_layers
+
+RADIUS, WALL = 0.05, 0.01
+CAP = {"top": HalfSpace((0.0, 0.0, 0.035), (0.0, 0.0, -1.0))}
+
+
+def hollow_ball(nodes=300, layers=None, regions=None, **more):
+    return organ("ball", nodes, regions, parameters={"radius": RADIUS, "wall": WALL} | more, layers=layers)
+
+
+@pytest.fixture(scope="module")
+def shells(mesh_cache):
+    """Hollow balls by number of layers."""
+    return {layers: hollow_ball(layers=layers, regions=CAP) for layers in (1, 2, 3)}
+
+
+def rows(cells):
+    return {tuple(sorted(row)) for row in cells.tolist()}
+
+
+@pytest.mark.parametrize("layers", [1, 2, 3])
+def test_wall_is_closed_oriented_and_conforming(shells, layers):
+    mesh = shells[layers]
+    check_tetrahedra(mesh.points, mesh.tetrahedra)
+    assert rows(boundary_triangles(mesh.tetrahedra)) == rows(mesh.triangles)
+    # Not only the same nodes but the same turn: outward of the tissue, so into the lumen.
+    turned = {tuple(np.roll(row, -row.argmin())) for row in boundary_triangles(mesh.tetrahedra)}
+    assert turned == {tuple(np.roll(row, -row.argmin())) for row in mesh.triangles}
+    assert len(mesh.points) == 300 * (layers + 1) and len(mesh.tetrahedra) == 3 * layers * 596
+    assert tetrahedron_radius_ratio(mesh.points, mesh.tetrahedra).min() >= MIN_WALL_RATIO == 0.05
+    total = tetrahedron_volumes(mesh.points, mesh.tetrahedra).sum()
+    assert total == pytest.approx(mesh.volume, rel=1e-12)  # two sums of some thousand rounded terms
+
+
+def test_the_two_surfaces_are_tagged_and_close_by_themselves(shells):
+    mesh = shells[2]
+    assert mesh.hollow and mesh.surface_count == 600 and mesh.outer_count == 300
+    assert set(mesh.surfaces) == {"outer", "lumen"}
+    assert np.sort(np.concatenate(list(mesh.surfaces.values()))).tolist() == list(range(len(mesh.triangles)))
+    check_surface(mesh.points[:300], mesh.outer_triangles)  # outward: positive volume
+    check_surface(mesh.points[300:600], mesh.lumen_triangles - 300)
+    for triangles in (mesh.outer_triangles, mesh.lumen_triangles):
+        assert len(triangles) == 2 * 300 - 4  # Euler: genus 0
+    assert mesh.outer_volume - mesh.lumen_volume == pytest.approx(mesh.volume, rel=1e-12)
+    solid = ball(300, RADIUS)
+    assert not solid.hollow and set(solid.surfaces) == {"outer"} and solid.lumen_volume == 0
+    assert solid.outer_volume == solid.volume and (solid.outer_triangles == solid.triangles).all()
+
+
+def test_lumen_nodes_face_the_outer_ones_at_the_depth_of_the_wall(shells):
+    for layers, mesh in shells.items():
+        outer, lumen = mesh.points[:300], mesh.points[300:600]
+        # On a ball the facing point is along the radius: the closed form is the outer node, shrunk.
+        assert np.abs(lumen - outer * (1 - WALL / RADIUS)).max() < 1e-12
+        for k in range(1, layers):
+            ring = mesh.points[300 * (k + 1) : 300 * (k + 2)]
+            assert np.abs(ring - outer * (1 - k / layers * WALL / RADIUS)).max() < 1e-12
+
+
+def test_attachments_are_on_the_outer_surface_only(shells):
+    mesh = shells[1]
+    assert len(mesh.patches["top"]) > 5 and mesh.patches["top"].max() < mesh.outer_count
+    assert (mesh.points[mesh.patches["top"], 2] >= 0.035 - 1e-9).all()
+    # The lumen reaches as high, z = 0.04, yet is not attached.
+    assert mesh.points[300:600, 2].max() > 0.037
+
+
+def test_the_outer_surface_alone(shells):
+    alone = shells[2].outer()
+    assert not alone.hollow and not len(alone.tetrahedra) and len(alone.points) == 300
+    check_surface(alone.points, alone.triangles)
+    made = organ("ball", 300, CAP, fill=False, parameters={"radius": RADIUS, "wall": WALL})
+    assert (made.points == alone.points).all() and (made.triangles == alone.triangles).all()
+    assert (made.patches["top"] == alone.patches["top"]).all()
+    assert alone.recipe == made.recipe | {"layers": 2}
+    assert fill(made).volume == pytest.approx(alone.volume, rel=1e-12)  # filled as a solid
+
+
+def test_layers_follow_the_edges_unless_asked_for(shells):
+    mesh = shells[1]
+    surface = mesh.points[:300], mesh.outer_triangles
+    # An edge of 300 equilateral triangles on this ball: sqrt(8 pi / (sqrt 3 N)) R = 11 mm.
+    assert [suggested_layers(*surface, wall) for wall in (0.001, 0.011, 0.022, 0.033)] == [1, 1, 2, 3]
+    assert len(hollow_ball(regions={}).tetrahedra) == 3 * 596
+
+
+def test_prisms_are_cut_the_same_way_from_both_sides():
+    # Two prisms over two triangles that share an edge, the columns numbered against the order of the triangles.
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    points = np.concatenate([square, square - [0, 0, 1]])
+    for triangles in ([[0, 1, 2], [0, 2, 3]], [[2, 0, 1], [3, 0, 2]], [[1, 2, 0], [2, 3, 0]]):
+        cells = split_prisms(np.array(triangles), np.array([0, 4]))
+        volumes = tetrahedron_volumes(points, cells)
+        assert volumes == pytest.approx(np.full(6, 1 / 6))
+        assert len(boundary_triangles(cells)) == 12  # a cube cut into triangles: nothing left open inside
+        assert signed_volume(points, boundary_triangles(cells)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: hollow_ball(wall=0.06), "a wall of 0.06 m does not fit into a ball of radius 0.05 m"),
+        (lambda: hollow_ball(wall=0.0), "a wall of 0.0 m does not fit"),
+        (lambda: hollow_ball(layers=0), "ball: 0 layers asked for its wall; choose 1 to 12"),
+        (lambda: organ("ball", 300, layers=2), "ball: 2 layers asked for, but it is solid"),
+        (lambda: hollow_ball(wall=0.0499), r"its wall of 49\.9 mm folds or flattens an element"),
+        (lambda: hollow_ball(wal=0.01), "unknown parameter of the ball 'wal'; did you mean 'wall'"),
+        (lambda: organ("bal", 300), "unknown organ 'bal'; did you mean 'ball'"),
+    ],
+)
+def test_bad_walls_get_a_sentence(call, sentence):
+    with pytest.raises(StudyError, match=sentence):
+        call()
+
+
+def test_a_wall_without_a_lumen_gets_a_sentence():
+    surface = ball(150, RADIUS, fill=False)
+    solid = SHAPES["ball"](RADIUS)
+    with pytest.raises(StudyError, match="a wall of 60 mm does not fit into it"):
+        fill_wall(replace(solid, wall=0.06), surface.points, surface.triangles, 1)
+    with pytest.raises(StudyError, match="ball is solid"):
+        fill_wall(solid, surface.points, surface.triangles, 1)
