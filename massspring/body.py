@@ -177,17 +177,18 @@ def tetrahedral_body(
     return Body(points, mass, springs, triangles, tetrahedra, law)
 
 
-def surface_body(points: np.ndarray, triangles: np.ndarray, material: Material) -> Body:
+def surface_body(points: np.ndarray, triangles: np.ndarray, material: Material, axis: str = "straight") -> Body:
     """The paper's body (JHC05, section 3): structural, bending and inner springs, virtual nodes on the dominant axis.
 
-    `points` (n, 3) [m] are the surface nodes, `triangles` (f, 3) outward. The virtual nodes follow the surface nodes;
-    consecutive ones are joined by axial springs, without which the axis could come apart. Raises MassSpringError.
+    `points` (n, 3) [m] are the surface nodes, `triangles` (f, 3) outward; `axis` one of `AXES`. The virtual nodes
+    follow the surface nodes; consecutive ones are joined by axial springs, without which the axis could come apart.
+    Raises MassSpringError.
     """
     triangles = np.ascontiguousarray(triangles, dtype=np.uint32)
     points = np.ascontiguousarray(points, dtype=np.float64)
     _check_surface(points, triangles)
     structural = unique_edges(triangles, EDGES_OF_TRIANGLE)
-    virtual = virtual_nodes(points, spacing=float(lengths(points, structural).mean()))
+    virtual = virtual_nodes(points, triangles, float(lengths(points, structural).mean()), axis)
     nearest = closest_virtual_node(points, virtual)
     used, nearest = np.unique(nearest, return_inverse=True)
     rest = np.vstack([points, virtual[used]])

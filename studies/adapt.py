@@ -51,7 +51,7 @@ def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh) -> Body:
         raise StudyError(f"the stiffness factor is {recipe.stiffness}; it must be positive")
     material = Material(scene.tissue.shear_modulus, scene.tissue.density)
     if recipe.kind == "surface":
-        body = surface_body(mesh.points[: mesh.surface_count], mesh.triangles, material)
+        body = surface_body(mesh.points[: mesh.surface_count], mesh.triangles, material, recipe.axis)
     else:
         body = tetrahedral_body(mesh.points, mesh.triangles, mesh.tetrahedra, material, recipe.law)
     return body if recipe.stiffness == 1.0 else body.stiffened(recipe.stiffness)

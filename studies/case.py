@@ -29,6 +29,8 @@ class BodyRecipe:
     """Stiffness law of a tetrahedral body."""
     stiffness: float = 1.0
     """Factor on every spring; 1 matches the tissue's shear modulus."""
+    axis: Literal["straight", "centre_line"] = "straight"
+    """Of a surface body: "centre_line" follows a bent organ."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,8 @@ class Case:
         parts = [self.scene.name, self.body.kind, str(self.body.nodes), self.method.name, step]
         if self.body.kind == "tetrahedral" and self.body.law != "van_gelder":
             parts.append(self.body.law)
+        if self.body.axis != "straight":
+            parts.append(self.body.axis)
         if self.body.stiffness != 1.0:
             parts.append(f"k{self.body.stiffness:g}")
         return "-".join(parts)
