@@ -1,5 +1,8 @@
 """Smooth building blocks for level functions: any unit of length, as long as it is one."""
 
+from collections.abc import Sequence
+from math import comb
+
 import numpy as np
 
 
@@ -29,3 +32,92 @@ def groove(x: np.ndarray, start: tuple[float, ...], end: tuple[float, ...], widt
     # The clip makes only a second derivative jump, far weaker than the grooves themselves.
     nearest = a + np.clip(t, 0.0, 1.0)[:, None] * along
     return depth * np.exp(-np.sum((x - nearest) ** 2, axis=1) / width**2)
+
+
+Sphere = tuple[float, float, float, float]
+"""Centre and radius."""
+STARTS, STEPS, BATCH = 17, 40, 4096
+"""Values of s tried before Newton's method; its most steps (4 to 6 are usual, halving alone needs 30); points at a
+time, few enough to stay in the cache."""
+FLAT = 1e-9
+"""Step of s at which the search ends: f is flat there, so its error is the square of this."""
+
+
+def canal(x: np.ndarray, spheres: Sequence[Sphere]) -> np.ndarray:
+    """Signed distance, shape (n,), to the canal surface: min over s of |x - c(s)| - r(s), the envelope of spheres.
+
+    (c, r)(s), 0 <= s <= 1, is the Bezier curve of the control `spheres`, so no sampling is part of the surface.
+    |grad| = 1 wherever the nearest s is unique: f = -w is a wall of even thickness. An end is round and infinitely
+    smooth when the last control sphere lies well inside the one before it (`closed` adds such spheres).
+    Monge, Application de l'analyse a la geometrie, 1807.
+    """
+    rows = _powers(np.asarray(spheres, float))
+    first = _derivative(rows)
+    second = _derivative(first)
+    table = np.hstack([rows, first, second])
+    return np.concatenate([np.empty(0), *(_nearest(part, table) for part in _parts(np.asarray(x, float)))])
+
+
+def _parts(x: np.ndarray) -> list[np.ndarray]:
+    return [x[k : k + BATCH] for k in range(0, len(x), BATCH)]
+
+
+def _nearest(x: np.ndarray, table: np.ndarray) -> np.ndarray:
+    """min over s of |x - c(s)| - r(s), shape (n,): the best of STARTS values, then a bracketed Newton's method."""
+    starts = np.linspace(0.0, 1.0, STARTS)
+    at = _monomials(starts, len(table)) @ table[:, :4]
+    square = (x**2).sum(axis=1)[:, None] - 2.0 * x @ at[:, :3].T + (at[:, :3] ** 2).sum(axis=1)
+    s = starts[(np.sqrt(np.maximum(square, 0.0)) - at[:, 3]).argmin(axis=1)]
+    low, high = np.maximum(s - starts[1], 0.0), np.minimum(s + starts[1], 1.0)
+    for _ in range(STEPS):
+        at = _monomials(s, len(table)) @ table
+        d, rate, bend = x - at[:, :3], at[:, 4:7], at[:, 8:11]
+        length = np.maximum(np.sqrt(np.einsum("ij,ij->i", d, d)), 1e-12)
+        along = np.einsum("ij,ij->i", d, rate) / length
+        slope = -along - at[:, 7]
+        curved = (np.einsum("ij,ij->i", rate, rate) - np.einsum("ij,ij->i", d, bend) - along**2) / length - at[:, 11]
+        low, high = np.where(slope < 0, s, low), np.where(slope > 0, s, high)
+        step = s - slope / np.where(curved > 0, curved, 1.0)
+        # Halving where there is no valley to follow, or where Newton's step leaves the interval with the minimum.
+        new = np.where((step >= low) & (step <= high) & (curved > 0), step, 0.5 * (low + high))
+        moved, s = np.abs(new - s).max(), new
+        if moved < FLAT:
+            break
+    at = _monomials(s, len(table)) @ table[:, :4]
+    return np.linalg.norm(x - at[:, :3], axis=1) - at[:, 3]
+
+
+def closed(spheres: Sequence[Sphere]) -> list[Sphere]:
+    """The control spheres with one more at each end, inside the last: the canal surface closes smoothly there."""
+    rows = np.asarray(spheres, float)
+
+    def cap(last: np.ndarray, before: np.ndarray) -> Sphere:
+        along = (last - before)[:3] / np.linalg.norm((last - before)[:3])
+        x, y, z = last[:3] + 0.3 * last[3] * along
+        return float(x), float(y), float(z), float(0.6 * last[3])
+
+    return [cap(rows[0], rows[1]), *spheres, cap(rows[-1], rows[-2])]
+
+
+def _powers(control: np.ndarray) -> np.ndarray:
+    """Coefficients of s^0, s^1, ... of the Bezier curve of control points (k, 4)."""
+    degree = len(control) - 1
+    rows = []
+    for j in range(degree + 1):
+        terms = [(-1.0) ** (i + j) * comb(j, i) * control[i] for i in range(j + 1)]
+        rows.append(comb(degree, j) * np.sum(terms, axis=0))
+    return np.array(rows)
+
+
+def _derivative(coefficients: np.ndarray) -> np.ndarray:
+    """Coefficients of the derivative, with a row of zeros so that the shape stays."""
+    factors = np.arange(1, len(coefficients))[:, None]
+    return np.vstack([factors * coefficients[1:], np.zeros(coefficients.shape[1])])
+
+
+def _monomials(s: np.ndarray, count: int) -> np.ndarray:
+    """1, s, s^2, ..., shape (n, count)."""
+    powers = np.ones((len(s), count))
+    for k in range(1, count):
+        np.multiply(powers[:, k - 1], s, out=powers[:, k])
+    return powers

@@ -4,6 +4,17 @@ from collections.abc import Callable
 
 from studies.geometry.levelset import Shape
 from studies.geometry.organs.ball import ball_shape
+from studies.geometry.organs.bladder import bladder_shape
+from studies.geometry.organs.kidney import kidney_shape
 from studies.geometry.organs.liver import liver_shape
+from studies.geometry.organs.spleen import spleen_shape
+from studies.geometry.organs.stomach import stomach_shape
 
-SHAPES: dict[str, Callable[..., Shape]] = {"ball": ball_shape, "liver": liver_shape}
+SHAPES: dict[str, Callable[..., Shape]] = {
+    "ball": ball_shape,
+    "liver": liver_shape,
+    "stomach": stomach_shape,
+    "kidney": kidney_shape,
+    "spleen": spleen_shape,
+    "bladder": bladder_shape,
+}

@@ -4,10 +4,12 @@ Axes: x to the patient's left, y to the back, z to the head; the origin lies in 
 after the usual sonographic sizes (width 20-23 cm, right lobe 14-16 cm high and 10-13 cm deep, about 1,500 mL).
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from studies.geometry.blends import ellipsoid, groove, smooth_max, smooth_min
-from studies.geometry.levelset import Shape, normals, project
+from studies.geometry.levelset import Literature, Probe, Shape, normals, project
 from studies.geometry.regions import EllipsoidRegion, Vector
 
 MM = 1e-3
@@ -33,14 +35,20 @@ def liver_level(points: np.ndarray) -> np.ndarray:
     return (body + falciform + notch + gallbladder + cava) * MM
 
 
+def _plain_liver() -> Shape:
+    return Shape("liver", liver_level, (-0.13, -0.08, -0.1), (0.14, 0.09, 0.1), cell=0.005, regions=LIVER_REGIONS)
+
+
 def liver_shape() -> Shape:
     """The liver of an adult."""
-    return Shape("liver", liver_level, (-0.13, -0.08, -0.1), (0.14, 0.09, 0.1), cell=0.005, regions=LIVER_REGIONS)
+    literature = Literature(1500.0, "Henderson et al., Radiology 141 (1981) 525: 1,493 mL by CT")
+    probe = Probe(LIVER_PROBE_POINT, LIVER_PROBE_NORMAL)
+    return replace(_plain_liver(), literature=literature, probe=probe, press=LIVER_PRESS_DIRECTION)
 
 
 def project_liver(points: np.ndarray) -> np.ndarray:
     """Points, shape (n, 3) [m], brought onto the liver's true surface along the gradient of its level."""
-    return project(liver_shape(), points)
+    return project(_plain_liver(), points)
 
 
 def _vector(row: np.ndarray) -> Vector:
@@ -49,7 +57,7 @@ def _vector(row: np.ndarray) -> Vector:
 
 LIVER_PROBE_POINT: Vector = _vector(project_liver(np.array([[-45.0, -57.0, -33.0]]) * MM)[0])
 """Point of the surface, low on the front of the right lobe, where an instrument palpates [m]; smooth 3 cm around."""
-LIVER_PROBE_NORMAL: Vector = _vector(normals(liver_shape(), np.array([LIVER_PROBE_POINT]))[0])
+LIVER_PROBE_NORMAL: Vector = _vector(normals(_plain_liver(), np.array([LIVER_PROBE_POINT]))[0])
 """Outward normal there; a probe moves against it."""
 LIVER_PRESS_DIRECTION: Vector = (0.0, 0.9, 0.19**0.5)
 """Unit vector, to the back and up: a plane with this normal, moving along it from the front, meets the smooth front of

@@ -1,0 +1,39 @@
+"""Spleen: a curved wedge under the left ribs, hollowed by stomach and kidney. Axes: x outwards to the ribs, y back
+along the tenth rib, z to the superior border."""
+
+import numpy as np
+
+from studies.geometry.blends import ellipsoid, groove, smooth_max, smooth_min
+from studies.geometry.levelset import Literature, Shape
+from studies.geometry.organs.millimetres import MARGIN, MM, check_lengths, metres, si, touch
+from studies.geometry.regions import EllipsoidRegion
+
+VOLUME = Literature(200.0, "Prassopoulos et al., Eur. Radiol. 7 (1997) 246: 215 mL by CT")
+
+
+def spleen_shape(length: float = 124.0, width: float = 80.0, thickness: float = 49.0, notch: float = 8.0) -> Shape:
+    """An adult's spleen [mm]: 12 cm long, 7 wide, 4 thick; notch: depth of those in its superior border.
+
+    Raises StudyError for a length that is none.
+    """
+    check_lengths("spleen", length=length, width=width, thickness=thickness, notch=notch)
+    u, v, t = 0.5 * length, 0.5 * width, thickness
+
+    def level(x: np.ndarray) -> np.ndarray:
+        outer = ellipsoid(x, (-0.4 * t, 0, 0), (0.9 * t, u, v))
+        stomach = ellipsoid(x, (-1.25 * t, -0.5 * u, 0.35 * v), (t, 1.2 * u, 1.2 * v))
+        kidney = ellipsoid(x, (-1.25 * t, 0.5 * u, -0.75 * v), (0.9 * t, u, v))
+        body = smooth_max(outer, -smooth_min(stomach, kidney, 8), 10)
+        # The superior border is notched towards its front end: what is left of the lobes of the embryo.
+        for y in (-0.55, -0.15):
+            body = body + groove(x, (0.3 * t, y * u, 1.1 * v), (-t, y * u, 0.75 * v), 7, notch)
+        return body
+
+    low = metres(-1.2 * t - MARGIN, -u - MARGIN, -v - MARGIN)
+    high = metres(0.6 * t + MARGIN, u + MARGIN, v + MARGIN)
+    regions = {"hilum": EllipsoidRegion(metres(-0.35 * t, 0, -0.15 * v), metres(0.5 * t, 0.42 * u, 0.3 * v))}
+    probe = touch(level, (4 * t, 0, 0), (-1, 0, 0))
+    return Shape("spleen", si(level), low, high, 4 * MM, regions, None, VOLUME, probe, (-1.0, 0.0, 0.0))
+
+
+SPLEEN_REGIONS = spleen_shape().regions
