@@ -29,6 +29,7 @@ from reference_fem.errors import ReferenceProblem, SlowSolverWarning  # noqa: E4
 from reference_fem.evaluate import Evaluator  # noqa: E402
 from reference_fem.material import NeoHookean  # noqa: E402
 from reference_fem.mesh import curve  # noqa: E402
+from reference_fem.modes import Modes, natural_frequencies  # noqa: E402
 from reference_fem.problem import Held, Problem  # noqa: E402
 from reference_fem.system import NewtonSettings  # noqa: E402
 
@@ -38,6 +39,7 @@ __all__ = [
     "Equilibrium",
     "Evaluator",
     "Held",
+    "Modes",
     "NeoHookean",
     "NewtonSettings",
     "Problem",
@@ -48,6 +50,7 @@ __all__ = [
     "curve",
     "equilibrium_path",
     "facet_nodes",
+    "natural_frequencies",
     "nodes",
     "surface_triangles",
 ]

@@ -40,6 +40,12 @@ def check_loads(problem):
             )
 
 
+def check_inertia(problem):
+    """Refuse a body without mass where motion is asked for."""
+    if problem.density == 0.0:
+        raise ReferenceProblem("the density is 0 kg/m³: a body that moves needs its mass, give the density")
+
+
 def rigid_motions(x):
     """Six rigid velocities of nodes x (n, 3) about their centre, scaled to unit size: (n, 3, 6)."""
     arm = x - x.mean(axis=0)
@@ -55,10 +61,19 @@ def null_space(matrix):
     return vt[rank:].T
 
 
+def rigid_freedoms(x, held_dofs):
+    """Rigid motions that the held unknowns leave free, in the columns of rigid_motions, (6, 0 to 6)."""
+    return null_space(held_rigid_motions(x, held_dofs))
+
+
+def held_rigid_motions(x, held_dofs):
+    """What the held unknowns see of the six rigid motions, padded with zeros to six rows at least."""
+    return np.vstack((rigid_motions(x).reshape(-1, 6)[held_dofs], np.zeros((6, 6))))
+
+
 def check_held(x, held_dofs):
     """Refuse a body that can still move rigidly, naming the motion. x: (N2, 3); held_dofs: unknown numbers."""
-    seen = rigid_motions(x).reshape(-1, 6)[held_dofs]
-    seen = np.vstack((seen, np.zeros((6, 6))))
+    seen = held_rigid_motions(x, held_dofs)
     slides = null_space(seen[:, :3])
     names = [f"slide along {direction(v)}" for v in slides.T]
     fixed = np.vstack((seen, np.hstack((slides.T, np.zeros((slides.shape[1], 3)))) * 10.0))

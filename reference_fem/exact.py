@@ -1,6 +1,8 @@
 """Closed forms and converged tables that the solver is held against (docs/theory.md, oracles). SI units throughout."""
 
 import numpy as np
+from scipy.optimize import root_scalar
+from scipy.special import spherical_jn
 
 BALL_BETWEEN_PLANES = {
     0.05: (0.06463, 1.00446),
@@ -64,3 +66,35 @@ def hertz_plane_force(mu, radius, share):
     """Small-approach force [N] of an incompressible ball between two planes, share = approach / 2R: 4/3 E* R² d^1.5,
     E* = 4 mu."""
     return 16.0 / 3.0 * mu * radius**2 * share**1.5
+
+
+def ball_torsional(n=2):
+    """Lowest omega R / sqrt(mu/rho) of a free ball that twists about its centre, any Poisson ratio:
+    (n - 1) j_n(y) = y j_{n+1}(y) (Lamb 1882, vibrations of the first class)."""
+    return first_root(lambda y: (n - 1) * spherical_jn(n, y) - y * spherical_jn(n + 1, y))
+
+
+def ball_spheroidal(poisson, n=2):
+    """Lowest omega R / sqrt(mu/rho) of a free ball that changes its shape, n >= 2; poisson = 0.5 is incompressible.
+
+    Traction-free surface of shear (y) and compression (x) waves (Lamb 1882, vibrations of the second class).
+    """
+    slowness = np.sqrt((1.0 - 2.0 * poisson) / (2.0 * (1.0 - poisson)))
+
+    def traction(y):
+        x = slowness * y
+        # j_{n+1}(x) x / j_n(x), which vanishes where nothing can be compressed
+        ratio = x * spherical_jn(n + 1, x) / spherical_jn(n, x) if x > 0.0 else 0.0
+        shear, next_shear = spherical_jn(n, y), y * spherical_jn(n + 1, y)
+        normal = (n * n - n - 0.5 * y * y + 2.0 * ratio) * ((n * n - 1 - 0.5 * y * y) * shear + next_shear)
+        return normal - n * (n + 1) * ((n - 1) * shear - next_shear) * (n - 1 - ratio)
+
+    return first_root(traction)
+
+
+def first_root(function, low=0.5, high=10.0):
+    """Least root in low..high; the frequencies of a ball are more than the 0.05 of this scan apart."""
+    grid = np.arange(low, high, 0.05)
+    signs = np.sign([function(y) for y in grid])
+    k = int(np.flatnonzero(signs[1:] != signs[:-1])[0])
+    return float(root_scalar(function, bracket=(grid[k], grid[k + 1])).root)

@@ -88,7 +88,7 @@ class System:
         mask = np.zeros(self.total, dtype=bool)
         for held in self.held:
             mask[held.dofs] = True
-        checks.check_held(self.nodes, np.flatnonzero(mask))
+        self.check_freedom(np.flatnonzero(mask))
         self.pattern = build_pattern(self.elements.dofs, mask)
         self.positions = self.pattern.positions(self.elements.dofs)
         self.surface = self.build_surface()
@@ -97,6 +97,10 @@ class System:
         start = contact.place(self.rows, problem.obstacles, settings.start)
         checks.check_start(self.surface, start, checks.boundary_size(mesh))
         self.solver = SymmetricSolver(settings.solver)
+
+    def check_freedom(self, held_dofs):
+        """At rest nothing else balances a load than the holders: every rigid motion must be held."""
+        checks.check_held(self.nodes, held_dofs)
 
     def build_surface(self):
         facets = build_facets(self.problem.mesh, self.problem.contact_order)

@@ -61,6 +61,18 @@ def ball_octant(n, grade=0.5, radial=0.3):
     return round_off(points, elements, (1.0,))
 
 
+def whole_ball(n):
+    """The unit ball, 8 n³ curved elements: eight octants, joined where they meet."""
+    octant = ball_octant(n, grade=1.0, radial=0.0)
+    signs = list(itertools.product((1.0, -1.0), repeat=3))
+    corners = octant.doflocs[:, : octant.nvertices].T
+    points = np.concatenate([corners * sign for sign in signs])
+    elements = np.concatenate([octant.t.T + k * len(corners) for k in range(8)])
+    # 1e-9 of the radius joins what mirroring parted by round-off; adding zero turns -0.0 into 0.0
+    _, first, merged = np.unique(points.round(9) + 0.0, axis=0, return_index=True, return_inverse=True)
+    return round_off(points[first], merged[elements], (1.0,))
+
+
 def shell_octant(inner, n, layers):
     """inner <= r <= 1, x, y, z >= 0: n² columns of prisms, each cut in three by ascending vertex number."""
     index = {pair: k for k, pair in enumerate((i, j) for i in range(n + 1) for j in range(n + 1 - i))}

@@ -1,0 +1,65 @@
+"""The consistent mass of the displacement, for frequencies and motion (docs/theory.md, reference)."""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from skfem import ElementTetP2
+from skfem.quadrature import get_quadrature
+from skfem.refdom import RefTet
+
+from reference_fem.checks import check_inertia
+from reference_fem.elements import basis_table
+from reference_fem.system import System
+
+
+class Mass(NamedTuple):
+    """The same mass twice: for forces, and where the tangent wants it."""
+
+    matrix: sp.csr_matrix
+    """One component, between the P2 nodes, (N2, N2) [kg]."""
+    values: np.ndarray
+    """All components in the slots of the tangent's pattern, (pattern.size,) [kg]."""
+
+    def times(self, field):
+        """Mass times a nodal field (N2, 3)."""
+        return self.matrix @ field
+
+
+def element_masses(elements, density, order):
+    """rho integral N_a N_b of every element, (ne, 10, 10) [kg]: quartic, exact on straight elements at order 4."""
+    values, _ = basis_table(ElementTetP2(), get_quadrature(RefTet, order)[0])
+    return density * np.einsum("eq,qa,qb->eab", elements.weights, values, values)
+
+
+class MovingSystem(System):
+    """A System with inertia: the body may be free to move as a whole. Raises ReferenceProblem for one without mass."""
+
+    def __init__(self, problem, settings):
+        super().__init__(problem, settings)
+        self.mass = build_mass(self)
+
+    def check_freedom(self, held_dofs):
+        check_inertia(self.problem)
+
+
+def build_mass(system: System) -> Mass:
+    """Consistent mass of a system, by the quadrature of its elements."""
+    problem, elements = system.problem, system.elements
+    local = element_masses(elements, problem.density, problem.order)
+    count = len(system.nodes)
+    table = elements.dofs[:, :10].astype(np.int64) // 3
+    rows, cols = np.repeat(table, 10, axis=1).ravel(), np.tile(table, (1, 10)).ravel()
+    matrix = sp.csr_matrix((local.ravel(), (rows, cols)), shape=(count, count))
+    return Mass(matrix, packed(local, system.positions, system.pattern.size, elements.dofs.shape[1]))
+
+
+def packed(local, positions, size, width):
+    """Element masses (ne, 10, 10), once for each component, added into the slots of packed upper triangles."""
+    values = np.zeros(size)
+    a, b = np.triu_indices(10)
+    for component in range(3):
+        row, col = 10 * component + a, 10 * component + b
+        slots = positions[:, row * width - row * (row - 1) // 2 + col - row]
+        values += np.bincount(slots.ravel(), local[:, a, b].ravel(), minlength=size)
+    return values
