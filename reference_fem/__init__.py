@@ -22,6 +22,7 @@ _folder_before = config.CACHE_DIR  # pyright: ignore[reportAttributeAccessIssue]
 if "NUMBA_CACHE_DIR" not in os.environ:
     config.CACHE_DIR = str(cache_folder())  # pyright: ignore[reportAttributeAccessIssue]
 
+from reference_fem.cavity import Cavity  # noqa: E402
 from reference_fem.contact import RigidPlane, RigidSphere  # noqa: E402
 from reference_fem.elements import facet_nodes, nodes, surface_triangles  # noqa: E402
 from reference_fem.equilibrium import Equilibrium, equilibrium_path  # noqa: E402
@@ -36,6 +37,7 @@ from reference_fem.system import NewtonSettings  # noqa: E402
 config.CACHE_DIR = _folder_before  # pyright: ignore[reportAttributeAccessIssue]
 
 __all__ = [
+    "Cavity",
     "Equilibrium",
     "Evaluator",
     "Held",

@@ -10,7 +10,7 @@ from reference_fem.checks import check_times
 from reference_fem.errors import ReferenceProblem
 from reference_fem.newton import StepFailed, solve_step
 from reference_fem.problem import Problem
-from reference_fem.system import Loads, NewtonSettings, State, System
+from reference_fem.system import NewtonSettings, State, System
 
 EASY = 8
 """Newton iterations below which the next sub-step may be twice as long."""
@@ -44,6 +44,10 @@ class Equilibrium:
     substeps: int
     energy: float
     """Strain energy [J]."""
+    cavity_pressure: np.ndarray
+    """Gauge pressure in each lumen, positive when it pushes the wall out, (nc,) [Pa]."""
+    cavity_volume: np.ndarray
+    """Volume of each lumen, (nc,) [m³]."""
 
     @property
     def min_J(self):
@@ -62,8 +66,9 @@ def equilibrium_path(
 ) -> list[Equilibrium]:
     """Equilibria at the given times [s], reached from rest at settings.start; on_step sees each as it is found.
 
-    Gravity is switched on first, at the start. Raises ReferenceProblem for a problem that cannot be set up, and when
-    a sub-step below settings.smallest_step still fails: then its `converged` holds what was reached.
+    Gravity and cavities that start filled are switched on first, at the start. Raises ReferenceProblem for a problem
+    that cannot be set up, and when a sub-step below settings.smallest_step still fails: then its `converged` holds
+    what was reached.
     """
     settings = settings or NewtonSettings()
     times = check_times(times, settings.start)
@@ -72,7 +77,7 @@ def equilibrium_path(
     try:
         state = system.rest()
         pending = (0, 0)
-        if np.any(system.weight):
+        if system.starts_loaded():
             state, *pending = advance(system, state, settings.start, 1.0, path)
         for t in times:
             state, iterations, substeps = advance(system, state, t, 1.0, path)
@@ -107,7 +112,7 @@ def advance(system: System, state: State, t, load, path):
 
 def stuck(state: State, t, failure, path):
     """The exception for a path that cannot go on."""
-    gravity = f" under {100 * state.load:.3g} % of gravity" if state.load < 1.0 else ""
+    gravity = f" under {100 * state.load:.3g} % of what acts at the start" if state.load < 1.0 else ""
     return ReferenceProblem(
         f"no equilibrium found between t = {state.t:g} s{gravity} (the last that converged) and t = {t:g} s: "
         f"{failure}; refine the mesh where it folds, or ask for less",
@@ -118,15 +123,14 @@ def stuck(state: State, t, failure, path):
 def describe(system: System, state: State, iterations, substeps) -> Equilibrium:
     """Everything worth knowing about a converged state."""
     n, elements = system.displacement_count, system.elements
-    loads = Loads(state.load, system.obstacles_at(state.t), state.multiplier, state.stiffness)
-    found = system.evaluate(state.x, loads, tangent=False)
+    found = system.evaluate(state.x, system.loads_of(state), tangent=False)
     J = np.linalg.det(assembly.deformation(state.x, elements)[0])
     reaction = np.zeros(n)
     reaction[system.pattern.held] = found.residual[system.pattern.held]
     return Equilibrium(
         t=float(state.t),
         u=state.x[:n].reshape(-1, 3).copy(),
-        p=state.x[n:].copy(),
+        p=state.x[n : system.field_count].copy(),
         obstacle_force=found.touch.force,
         held_force=held_forces(system, reaction),
         reaction=reaction.reshape(-1, 3),
@@ -138,6 +142,8 @@ def describe(system: System, state: State, iterations, substeps) -> Equilibrium:
         newton_iterations=iterations,
         substeps=substeps,
         energy=assembly.energy(state.x, elements, system.problem.material),
+        cavity_pressure=state.x[system.field_count :].copy(),
+        cavity_volume=found.volumes,
     )
 
 

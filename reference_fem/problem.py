@@ -8,6 +8,7 @@ from skfem import MeshTet
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
 
+from reference_fem.cavity import Cavity
 from reference_fem.contact import RigidPlane, RigidSphere, finite_vector
 from reference_fem.elements import ElementTetP2, basis_table, element_nodes, facet_nodes, nodes
 from reference_fem.errors import ReferenceProblem
@@ -34,6 +35,7 @@ class Problem:
     """A quasi-static problem in SI units; the body is stress-free on its mesh.
 
     mesh: MeshTet (straight) or MeshTet2 (curved, see curve). gravity [m/s²], density [kg/m³].
+    cavities: lumens that keep a volume or a pressure; a lumen not named is open.
     order: degree integrated exactly; 5 is the lowest with positive weights at or above what p J needs (4).
     """
 
@@ -45,6 +47,7 @@ class Problem:
     density: float = 0.0
     order: int = 5
     contact_order: int = 4
+    cavities: Sequence[Cavity] = ()
 
 
 @dataclass(frozen=True, eq=False)

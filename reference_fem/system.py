@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from skfem import ElementTriP2
 
-from reference_fem import assembly, checks, contact
-from reference_fem.elements import build_elements, build_facets, nodes
+from reference_fem import assembly, cavity, checks, contact
+from reference_fem.elements import build_elements, build_facets, facet_nodes, nodes
 from reference_fem.errors import ReferenceProblem
 from reference_fem.linear import SymmetricSolver
 from reference_fem.pattern import build_pattern
@@ -34,7 +35,11 @@ class NewtonSettings:
 
 @dataclass
 class State:
-    """Unknowns and multipliers at time t under a share `load` of gravity; `iterations` spent to come here."""
+    """Unknowns x and contact multipliers at time t; `iterations` spent to come here.
+
+    x: u at the P2 nodes [m], interleaved, p at the vertices [Pa], pressures of the cavities [Pa]. load: share of
+    gravity and of the cavities' start values that acts, 1 once they are switched on.
+    """
 
     t: float
     load: float
@@ -47,12 +52,14 @@ class State:
 class Loads(NamedTuple):
     """What acts during one evaluation: share of gravity, obstacles (no, 8), multipliers, penalty factor.
 
-    shift (no, 3) [m]: a further move of the obstacles to be linearised, None = none.
+    filling (nc,): wanted volumes [m³] of the cavities, or pressures [Pa] where those are prescribed. shift (no, 3) [m]:
+    a further move of the obstacles to be linearised, None = none.
     """
 
     gravity: float
     rows: np.ndarray
     multiplier: np.ndarray
+    filling: np.ndarray = np.zeros(0)
     stiffness: float = 1.0
     shift: np.ndarray | None = None
 
@@ -62,10 +69,15 @@ class Evaluation:
     """Residual (full), tangent values, least J, contact state, and the two relative errors that Newton drives down."""
 
     residual: np.ndarray
+    """One entry for each unknown; those of the cavities are volume misfits [m³], or pressure misfits [Pa]."""
     values: np.ndarray
     smallest_J: float
     touch: contact.Touch
     errors: np.ndarray
+    volumes: np.ndarray
+    """Of the cavities, (nc,) [m³]."""
+    gradients: np.ndarray
+    """dV/dx of the cavities, (nc, field_count) [m²]."""
 
     @property
     def usable(self):
@@ -81,17 +93,19 @@ class System:
         checks.check_loads(problem)
         self.nodes = nodes(mesh)
         self.displacement_count = 3 * len(self.nodes)
-        self.total = self.displacement_count + mesh.nvertices
+        self.field_count = self.displacement_count + mesh.nvertices
+        self.total = self.field_count + len(problem.cavities)
         self.elements = build_elements(mesh, problem.order)
         self.volume = float(self.elements.weights.sum())
         self.held = find_held(problem)
-        mask = np.zeros(self.total, dtype=bool)
+        mask = np.zeros(self.field_count, dtype=bool)
         for held in self.held:
             mask[held.dofs] = True
         self.check_freedom(np.flatnonzero(mask))
         self.pattern = build_pattern(self.elements.dofs, mask)
         self.positions = self.pattern.positions(self.elements.dofs)
         self.surface = self.build_surface()
+        self.lumens = cavity.find_lumens(problem, self.pattern, ElementTriP2(), facet_nodes(mesh), self.held)
         self.rows = np.array([obstacle.row() for obstacle in problem.obstacles]).reshape(-1, 8)
         self.weight = self.gravity_force()
         start = contact.place(self.rows, problem.obstacles, settings.start)
@@ -111,7 +125,7 @@ class System:
         return contact.Surface(dofs.astype(np.uint32), positions, rest, facets.values, facets.weights, penalty)
 
     def gravity_force(self):
-        force = np.zeros(self.total)
+        force = np.zeros(self.field_count)
         pull = self.problem.density * np.asarray(self.problem.gravity, dtype=float)
         volumes = nodal_volumes(self.problem.mesh, self.elements.weights, self.problem.order)
         force[: self.displacement_count] = np.outer(volumes, pull).ravel()
@@ -124,9 +138,23 @@ class System:
     def obstacles_at(self, t):
         return contact.place(self.rows, self.problem.obstacles, t)
 
+    def filling_at(self, t, load):
+        """What the cavities are wanted to hold at time t, see Loads."""
+        return np.array([lumen.target(t, load) for lumen in self.lumens])
+
+    def starts_loaded(self):
+        """Whether something is to be switched on at the start, before time runs: gravity, or a cavity's content."""
+        start = self.settings.start
+        return bool(np.any(self.weight) or np.any(self.filling_at(start, 1.0) != self.filling_at(start, 0.0)))
+
+    def loads_of(self, state: State) -> Loads:
+        """What acts in a converged state."""
+        rows, filling = self.obstacles_at(state.t), self.filling_at(state.t, state.load)
+        return Loads(state.load, rows, state.multiplier, filling, state.stiffness)
+
     def held_at(self, t):
         """Prescribed values of the held unknowns at time t; refuses regions that contradict each other."""
-        wanted = np.full(self.total, np.nan)
+        wanted = np.full(self.field_count, np.nan)
         for k, held in enumerate(self.held):
             value, there = held.displacement(t), wanted[held.dofs]
             clash = np.abs(value - there) > 1e-9 * (np.abs(value) + np.abs(there))
@@ -140,33 +168,63 @@ class System:
 
     def evaluate(self, x, loads: Loads, tangent=True) -> Evaluation:
         """Residual and, if wanted, tangent at x under the loads."""
-        residual = -loads.gravity * self.weight
+        residual = np.zeros(self.total)
+        residual[: self.field_count] = -loads.gravity * self.weight
         values = np.zeros(self.pattern.size if tangent else 1)
         shift = np.zeros((len(loads.rows), 3)) if loads.shift is None else loads.shift
         penalty = loads.stiffness * self.surface.penalty
         touch = contact.touch(loads.rows, shift, loads.multiplier, penalty)
         parameters = self.problem.material.parameters
         J = assembly.add_elements(x, self.elements, parameters, self.positions, values, residual, tangent)
-        if J > 0.0 and len(loads.rows):
-            contact.add_contact(x, self.surface, touch, values, residual, tangent)
-        return Evaluation(residual, values, J, touch, self.relative_errors(residual, touch, loads.gravity))
+        volumes, gradients = np.zeros(len(self.lumens)), np.zeros((len(self.lumens), self.field_count))
+        if J > 0.0:
+            if len(loads.rows):
+                contact.add_contact(x, self.surface, touch, values, residual, tangent)
+            for k, (lumen, wanted) in enumerate(zip(self.lumens, loads.filling, strict=True)):
+                pressure = x[self.field_count + k]
+                volumes[k] = lumen.add(x, pressure, gradients[k], values, tangent)
+                residual[: self.field_count] -= pressure * gradients[k]
+                residual[self.field_count + k] = (pressure if lumen.by_pressure else volumes[k]) - wanted
+        errors = self.relative_errors(x, residual, touch, loads.gravity, gradients)
+        return Evaluation(residual, values, J, touch, errors, volumes, gradients)
 
-    def relative_errors(self, residual, touch, load):
-        """(unbalanced force over the forces at work, volume misfit over V0)."""
-        n = self.displacement_count
-        free = np.zeros(self.total)
+    def relative_errors(self, x, residual, touch, load, gradients):
+        """(unbalanced force over the forces at work, misfit of tissue volume or filling over the whole)."""
+        n, m, mu = self.displacement_count, self.field_count, self.problem.material.mu
+        free = np.zeros(m)
         free[self.pattern.free] = residual[self.pattern.free]
-        floor = 1e-9 * self.problem.material.mu * self.volume ** (2.0 / 3.0)
         held = residual[self.pattern.held]
-        sizes = (np.linalg.norm(held), np.abs(touch.force).sum(), load * np.linalg.norm(self.weight), floor)
-        return np.array([np.linalg.norm(free[:n]) / max(sizes), np.abs(free[n:]).sum() / self.volume])
+        inside = np.linalg.norm(x[m:] @ gradients)
+        floor = 1e-9 * mu * self.volume ** (2.0 / 3.0)
+        sizes = (np.linalg.norm(held), np.abs(touch.force).sum(), load * np.linalg.norm(self.weight), inside, floor)
+        misfits = [np.abs(free[n:]).sum() / self.volume]
+        for lumen, misfit in zip(self.lumens, residual[m:], strict=True):
+            misfits.append(abs(misfit) / (mu if lumen.by_pressure else lumen.volume0))
+        return np.array([np.linalg.norm(free[:n]) / max(sizes), max(misfits)])
 
     def step(self, found: Evaluation, x, target):
         """Newton direction at x that also takes the held unknowns to their target."""
-        direction = np.zeros(self.total)
-        lift = target - x[self.pattern.held]
-        load = -found.residual[self.pattern.free] - self.pattern.lifting(found.values) @ lift
+        direction, free, held = np.zeros(self.total), self.pattern.free, self.pattern.held
+        lift = target - x[held]
         self.solver.factor(self.pattern.upper(found.values))
-        direction[self.pattern.free] = self.solver.solve(load)
-        direction[self.pattern.held] = lift
+        direction[free] = self.solver.solve(-found.residual[free] - self.pattern.lifting(found.values) @ lift)
+        direction[held] = lift
+        if self.lumens:
+            self.border(found, direction)
         return direction
+
+    def border(self, found: Evaluation, direction):
+        """Adds the change of the cavity pressures, and what it does to the fields, to a direction at fixed pressures.
+
+        With K b = dV/dx, the field direction is d + b dp, and dV/dx·(d + b dp) = -misfit gives dp: one more solve for
+        each cavity, no dense row in the pattern (docs/theory.md, eq. 42).
+        """
+        free, m = self.pattern.free, self.field_count
+        columns = np.array([self.solver.solve(gradient[free]) for gradient in found.gradients])
+        matrix = found.gradients[:, free] @ columns.T
+        right = -found.residual[m:] - found.gradients @ direction[:m]
+        for k, lumen in enumerate(self.lumens):
+            if lumen.by_pressure:
+                matrix[k], right[k] = np.eye(len(self.lumens))[k], -found.residual[m + k]
+        direction[m:] = np.linalg.solve(matrix, right)
+        direction[free] += direction[m:] @ columns
