@@ -6,14 +6,18 @@ The mesh: grid convergence index of Roache (J. Fluids Eng. 116, 1994) as Celik e
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import root_scalar
 
 from reference_fem.errors import ReferenceProblem
 
-SAFETY = 1.25
-"""Factor on the extrapolated error of three meshes (Roache: 1.25 with three meshes, 3 with two)."""
+SAFETY, TWO_MESHES = 1.25, 3.0
+"""Factors on the extrapolated error, of three meshes and of two, whose order is a guess (Roache)."""
+SCATTER = 2.0
+"""Factor on the spread of values that go to and fro: the range of three is on average 1.7 of their standard deviation,
+and the finest may be two of these off."""
 SLOWEST, FASTEST = 1.0, 3.0
 """Range of orders that are believed: where a held patch ends the stress is singular, which leaves order 1 in the force
 (energy) however small the elements; 3 is the order of the displacement of quadratic elements."""
@@ -30,7 +34,7 @@ class MeshError:
     shift: float
     """Extrapolated minus finest value, for fields the size of it; 0 where nothing can be extrapolated."""
     order: float
-    """Observed, within SLOWEST to FASTEST; NaN where the values do not approach one another the same way."""
+    """Observed, within SLOWEST to FASTEST; NaN where the values go to and fro: the spread then counts."""
 
     @property
     def monotone(self) -> bool:
@@ -65,33 +69,38 @@ def mesh_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray | N
     """Error of the finest value of a family of three, sizes and values fine to coarse.
 
     sizes: h1 < h2 < h3 [m]. values: numbers, or arrays (n,) or (n, c) at the same n points; their size is the root of
-    the weighted sum of squares, weights (n,), default 1. The grid convergence index SAFETY |f2 − f1|/(r^p − 1) where
-    the two changes are alike; else the spread, the largest difference of any two.
+    the weighted sum of squares, weights (n,), default 1. The shift of a number has its sign, that of a field is a size.
     Raises ReferenceProblem for sizes that are not three different ones, and values that are not finite.
     """
     fine, middle, coarse = (np.atleast_1d(np.asarray(value, dtype=float)) for value in values)
     if not all(np.isfinite(value).all() for value in (fine, middle, coarse)):
         raise ReferenceProblem("the values of a family of meshes are not finite: one of its solutions broke off")
-    near, far = middle - fine, coarse - middle
-    fine_change, coarse_change = _norm(near, weights), _norm(far, weights)
-    alike = _dot(near, far, weights) > ALIKE * fine_change * coarse_change
-    error = changes_error(sizes, coarse_change, fine_change, alike)
-    if error.monotone:
-        sign = -np.sign(near[0]) if near.size == 1 else 1.0
-        return MeshError(error.uncertainty, float(sign * error.shift), error.order)
-    return MeshError(max(fine_change, coarse_change, _norm(coarse - fine, weights)), 0.0, error.order)
+    near, far, ends = middle - fine, coarse - middle, coarse - fine
+    error = changes_error(sizes, [_norm(change, weights) for change in (near, far, ends)], alike(near, far, weights))
+    sign = -float(np.sign(near[0])) if near.size == 1 else 1.0
+    return MeshError(error.uncertainty, sign * error.shift, error.order)
 
 
-def changes_error(sizes: Sequence[float], coarse_change: float, fine_change: float, alike: bool) -> MeshError:
-    """The same from the sizes |f3 − f2| and |f2 − f1| of the changes alone; `alike` says whether they go the same way.
+def alike(near: np.ndarray, far: np.ndarray, weights: np.ndarray | None = None) -> bool:
+    """Whether two changes (n,) or (n, c) go the same way, so that they may be the tails of one error."""
+    return _dot(near, far, weights) >= ALIKE * _norm(near, weights) * _norm(far, weights)
 
-    The shift is its size, its sign unknown. A quantity without a sign, as a distance of surfaces, has no more to say.
+
+def changes_error(sizes: Sequence[float], changes: Sequence[float], same_way: bool) -> MeshError:
+    """Error of the finest value from the sizes of the changes |f2 − f1|, |f3 − f2|, |f3 − f1| alone.
+
+    Changes that go the same way: the grid convergence index SAFETY |f2 − f1|/(r^p − 1). Otherwise SCATTER times the
+    spread, the largest of the three. Two sizes and one change: order SLOWEST, safety TWO_MESHES. The shift has no sign.
+    Raises ReferenceProblem for sizes that do not grow.
     """
+    if len(sizes) == 2:
+        shift = changes[0] / (_ratios(sizes)[0] ** SLOWEST - 1)
+        return MeshError(TWO_MESHES * shift, shift, SLOWEST)
     r, _ = _ratios(sizes)
-    if not alike:
-        return MeshError(max(coarse_change, fine_change), 0.0, float("nan"))
-    order = observed_order(sizes, coarse_change, fine_change)
-    shift = fine_change / (r**order - 1)
+    if not same_way:
+        return MeshError(SCATTER * max(changes), 0.0, float("nan"))
+    order = observed_order(sizes, changes[1], changes[0])
+    shift = changes[0] / (r**order - 1)
     return MeshError(SAFETY * shift, shift, order)
 
 
@@ -111,13 +120,13 @@ def combined(shares: Mapping[str, float]) -> float:
     return float(np.sqrt(sum(share**2 for share in shares.values())))
 
 
-def _ratios(sizes: Sequence[float]) -> tuple[float, float]:
-    if len(sizes) != 3 or not 0 < sizes[0] < sizes[1] < sizes[2]:
+def _ratios(sizes: Sequence[float]) -> tuple[float, ...]:
+    if len(sizes) not in (2, 3) or not (sizes[0] > 0 and all(a < b for a, b in pairwise(sizes))):
         raise ReferenceProblem(
-            f"an error bar needs three meshes of different size, fine to coarse; these have element sizes "
+            "an error bar needs two or three meshes of different size, fine to coarse; these have element sizes "
             f"{', '.join(f'{size:.3g}' for size in sizes)} m"
         )
-    return sizes[1] / sizes[0], sizes[2] / sizes[1]
+    return tuple(b / a for a, b in pairwise(sizes))
 
 
 def _dot(a: np.ndarray, b: np.ndarray, weights: np.ndarray | None) -> float:

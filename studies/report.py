@@ -18,7 +18,7 @@ from studies.machine import write_machine
 from studies.metrics import Run
 from studies.paths import study_folder
 from studies.plots.organs import draw_organs
-from studies.reference import reference_path
+from studies.reference_solve import pieces
 from studies.run import case_path
 from studies.scenes import SCENES
 from studies.sweep import load_runs
@@ -102,8 +102,7 @@ def inputs_of(root: Path, study: Study) -> str:
     files = [case_path(root, study.name, case) for case in study.cases]
     files += [timing_file(root, study.name, case) for case in study.cases if case.timed]
     for scene in study.scenes:
-        levels = scene.reference.levels[-2:] if scene.reference is not None else ()
-        files += [reference_path(root, scene, level) for level in levels]
+        files += [piece.path(root) for piece in pieces(scene)]
     for file in files:
         state = file.stat() if file.exists() else None
         digest.update(f"{file.name} {state and (state.st_mtime_ns, state.st_size)}\n".encode())

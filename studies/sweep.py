@@ -15,9 +15,9 @@ from studies.case import Case
 from studies.catalog import Study
 from studies.errors import StudyError
 from studies.metrics import Run
-from studies.reference import Reference, load_reference, reference_is_current, reference_path, solve_reference
+from studies.reference import Reference, load_reference
+from studies.reference_solve import Piece, pieces, solve
 from studies.run import case_is_current, case_path, run_case
-from studies.scenes import Scene
 from studies.store import Record, Status, peek, read_record
 from studies.timed import read_timing, time_cases, timing_is_current
 
@@ -39,62 +39,50 @@ class Progress(Protocol):
 
 @dataclass(frozen=True)
 class Task:
-    """One piece of work that can run in any process: a reference on one mesh, or a case."""
+    """One piece of work that can run in any process: a piece of a reference, or a case."""
 
     root: Path
     study: str
-    case: Case | None = None
-    scene: Scene | None = None
-    level: float = 0.0
+    work: Case | Piece
 
     @property
     def weight(self) -> float:
         """Longest first keeps both cores busy to the end: references by mesh, then cases by size over step."""
-        if self.case is None:
-            return 1e9 + (self.level if self.level > 1 else 1e3 / self.level)
-        return self.case.body.nodes / self.case.dt_fraction
+        if isinstance(self.work, Piece):
+            return 1e9 + self.work.weight
+        return self.work.body.nodes / self.work.dt_fraction
 
     @property
     def label(self) -> str:
         """For progress and messages."""
-        return (
-            self.case.name
-            if self.case is not None
-            else f"reference {self.scene.name if self.scene else ''} {self.level:g}"
-        )
+        return f"reference {self.work.name}" if isinstance(self.work, Piece) else self.work.name
 
     def is_current(self) -> bool:
         """Whether it need not run."""
-        if self.case is not None:
-            return case_is_current(self.root, self.study, self.case)
-        assert self.scene is not None
-        return reference_is_current(self.root, self.scene, self.level)
+        if isinstance(self.work, Piece):
+            return self.work.is_current(self.root)
+        return case_is_current(self.root, self.study, self.work)
 
     def path(self) -> Path:
         """Where its record lies."""
-        if self.case is not None:
-            return case_path(self.root, self.study, self.case)
-        assert self.scene is not None
-        return reference_path(self.root, self.scene, self.level)
+        return (
+            self.work.path(self.root) if isinstance(self.work, Piece) else case_path(self.root, self.study, self.work)
+        )
 
     def perform(self) -> Path:
         """Does it."""
-        if self.case is not None:
-            return run_case(self.root, self.study, self.case)
-        assert self.scene is not None
-        return solve_reference(self.root, self.scene, self.level)
+        if isinstance(self.work, Piece):
+            return solve(self.root, self.work)
+        return run_case(self.root, self.study, self.work)
 
 
 def tasks_of(root: Path, studies: Iterable[Study]) -> list[Task]:
     """Everything the studies need, each piece once, longest first."""
     tasks: dict[Path, Task] = {}
     for study in studies:
-        for scene in study.scenes:
-            for level in scene.reference.levels[-2:] if scene.reference is not None else ():
-                task = Task(root, study.name, scene=scene, level=level)
-                tasks[task.path()] = task
-        for case in study.cases:
-            task = Task(root, study.name, case=case)
+        found = [piece for scene in study.scenes for piece in pieces(scene)]
+        for work in (*found, *study.cases):
+            task = Task(root, study.name, work)
             tasks[task.path()] = task
     return sorted(tasks.values(), key=lambda task: -task.weight)
 

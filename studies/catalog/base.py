@@ -45,7 +45,7 @@ class Study:
 def smoke_case(case: Case) -> Case:
     """A case small enough for a smoke run."""
     plan = case.scene.reference
-    coarse = replace(plan, levels=plan.levels[:2]) if plan is not None else None
+    coarse = replace(plan, levels=plan.levels[:2], variants=()) if plan is not None else None
     return case.replaced(
         scene=replace(case.scene, reference=coarse),
         body=replace(case.body, nodes=min(case.body.nodes, SMOKE_NODES)),

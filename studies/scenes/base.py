@@ -69,7 +69,9 @@ class ReferencePlan:
     mesh: str
     """"solid": the scene's organ with so many surface nodes; "octant": an eighth of a ball (three symmetry planes)."""
     levels: tuple[float, ...]
-    """Surface nodes ("solid"), or element size over radius away from the contact ("octant")."""
+    """Surface nodes ("solid"), or element size over radius away from the contact ("octant"); three are the rule."""
+    variants: tuple[str, ...] = ("steps", "contact", "kappa")
+    """Settings that are made better on the coarsest mesh, for their share of the error bar."""
 
     def __post_init__(self) -> None:
         if self.mesh not in ("solid", "octant") or len(self.levels) < 2:

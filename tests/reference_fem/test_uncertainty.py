@@ -7,7 +7,9 @@ from reference_fem import ReferenceProblem
 from reference_fem.uncertainty import (
     FASTEST,
     SAFETY,
+    SCATTER,
     SLOWEST,
+    TWO_MESHES,
     changes_error,
     combined,
     mesh_error,
@@ -54,19 +56,27 @@ def test_values_that_go_to_and_fro_have_the_spread():
     error = mesh_error(SIZES, [3.0, 3.4, 2.9])
     assert not error.monotone
     assert error.shift == 0.0
-    assert error.uncertainty == pytest.approx(0.5, rel=1e-12)
-    assert mesh_error(SIZES, [3.0, 2.9, 3.4]).uncertainty == pytest.approx(0.5, rel=1e-12)
+    assert error.uncertainty == pytest.approx(SCATTER * 0.5, rel=1e-12)
+    assert mesh_error(SIZES, [3.0, 2.9, 3.4]).uncertainty == pytest.approx(SCATTER * 0.5, rel=1e-12)
     # Two changes of a field at right angles are no approach either; the ends are then farthest apart.
     turned = mesh_error(SIZES, [np.array([0.0, 0.0]), np.array([3.0, 0.0]), np.array([3.0, 4.0])])
     assert not turned.monotone
-    assert turned.uncertainty == pytest.approx(5.0, rel=1e-12)
+    assert turned.uncertainty == pytest.approx(SCATTER * 5.0, rel=1e-12)
 
 
 def test_sizes_of_changes_are_enough():
     values = law(2.0)
-    changes = values[2] - values[1], values[1] - values[0]
-    assert changes_error(SIZES, *changes, alike=True).uncertainty == mesh_error(SIZES, values).uncertainty
-    assert changes_error(SIZES, 0.2, 0.3, alike=False).uncertainty == 0.3
+    changes = values[1] - values[0], values[2] - values[1], values[2] - values[0]
+    assert changes_error(SIZES, changes, same_way=True).uncertainty == mesh_error(SIZES, values).uncertainty
+    assert changes_error(SIZES, (0.2, 0.3, 0.4), same_way=False).uncertainty == SCATTER * 0.4
+
+
+def test_two_meshes_have_the_largest_bar():
+    """Three times what order one leaves, more than three meshes of any order say."""
+    values = law(1.0)
+    two = changes_error(SIZES[:2], [values[1] - values[0]], same_way=True)
+    assert two.uncertainty == pytest.approx(TWO_MESHES * 0.3, rel=1e-12)
+    assert two.uncertainty > mesh_error(SIZES, values).uncertainty
 
 
 def test_no_change_is_no_error():
@@ -75,9 +85,9 @@ def test_no_change_is_no_error():
     assert observed_order(SIZES, 0.0, 0.1) == SLOWEST
 
 
-@pytest.mark.parametrize("sizes", [(1.0, 1.0, 2.0), (2.0, 1.5, 1.0), (1.0, 2.0), (0.0, 1.0, 2.0)])
+@pytest.mark.parametrize("sizes", [(1.0, 1.0, 2.0), (2.0, 1.5, 1.0), (1.0,), (0.0, 1.0, 2.0)])
 def test_sizes_that_are_no_family_are_refused(sizes):
-    with pytest.raises(ReferenceProblem, match="three meshes of different size"):
+    with pytest.raises(ReferenceProblem, match="meshes of different size"):
         mesh_error(sizes, [1.0, 2.0, 3.0])
 
 

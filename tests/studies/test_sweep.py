@@ -91,7 +91,7 @@ def test_a_damaged_file_is_stale_and_runs_again(results):
     assert len(remarks) == 1
     assert "damaged" in remarks[0] or "cut off" in remarks[0]
     assert module.warnings_of(results, study) == []
-    assert not failed(Task(results, "tiny", case=diverging_case()))
+    assert not failed(Task(results, "tiny", diverging_case()))
     assert run_studies(results, [study], 1, Silent()) == 1
     assert load_runs(results, study)[1] == []
 
@@ -120,9 +120,9 @@ def test_references_are_shared_and_come_first(tmp_path):
     scene = replace(BALL_SQUEEZE, reference=ReferencePlan("octant", (0.9, 0.5, 0.4)))
     one, two = (tiny_study(name=name, cases=(tiny_case(scene=scene),)) for name in ("one", "two"))
     tasks = tasks_of(tmp_path, [one, two])
-    assert [task.label for task in tasks[:2]] == ["reference ball_squeeze 0.4", "reference ball_squeeze 0.5"]
-    assert len(tasks) == 4
-    assert len({task.path() for task in tasks}) == 4
+    assert [task.label for task in tasks[:2]] == ["reference ball_squeeze-0.4", "reference ball_squeeze-0.5"]
+    assert len(tasks) == 6 + 2  # three meshes and three variants, shared; a case of each study
+    assert len({task.path() for task in tasks}) == 8
 
 
 def test_results_that_cannot_be_written_are_told_before_anything_runs(tmp_path, monkeypatch):
@@ -149,7 +149,7 @@ def test_a_process_that_dies_is_one_sentence(tmp_path):
 def test_the_number_of_threads_is_given_back(monkeypatch, tmp_path):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
-    perform([Task(tmp_path, "tiny", case=tiny_case(body=replace(tiny_case().body, stiffness=-1.0)))], 1, Silent())
+    perform([Task(tmp_path, "tiny", tiny_case(body=replace(tiny_case().body, stiffness=-1.0)))], 1, Silent())
     assert os.environ["OMP_NUM_THREADS"] == "7"
     assert "MKL_NUM_THREADS" not in os.environ
 

@@ -1,0 +1,45 @@
+"""What of an equilibrium path is stored."""
+
+import numpy as np
+
+from reference_fem import Equilibrium, Problem, nodes
+from studies.adapt_reference import whole_forces
+from studies.scenes.base import Scene
+from studies.store import Field
+
+
+def fields_of(scene: Scene, problem: Problem, found: list[Equilibrium]) -> dict[str, Field]:
+    """The equilibria at the checkpoints, one row each; NaN where the path did not get there."""
+    count = len(scene.checkpoints)
+    x, tetrahedra = nodes(problem.mesh), problem.mesh.t.T.astype(np.int64)
+
+    def series(values: list, unit: str, description: str) -> Field:
+        shape = np.shape(values[0]) if values else ()
+        padded = np.full((count, *shape), np.nan)
+        if values:
+            padded[: len(values)] = values
+        return Field(padded, unit, description)
+
+    contact = [whole_forces(scene, e.obstacle_force[None])[0] for e in found]
+    return {
+        "t": Field(np.array(scene.checkpoints), "s", "scene time of each equilibrium"),
+        "contact_force": series(contact, "N", "force of each obstacle on the body"),
+        "held_force": series([e.held_force for e in found], "N", "force of each held region on the body"),
+        "volume": series([e.volume / e.volume0 for e in found], "1", "volume over rest volume"),
+        "pressure": series(
+            [mean_pressure(tetrahedra, e) for e in found], "Pa", "volume mean of the pressure, compression positive"
+        ),
+        "min_j": series([e.min_J for e in found], "1", "smallest J at a quadrature point"),
+        "max_j": series([e.max_J for e in found], "1", "largest J at a quadrature point"),
+        "penetration": series([e.penetration for e in found], "m", "deepest penetration of an obstacle"),
+        "newton": series([float(e.newton_iterations) for e in found], "1", "Newton iterations"),
+        "displacement": series([e.u for e in found], "m", "displacement of the second-order nodes"),
+        "nodes": Field(x, "m", "rest positions of the second-order nodes"),
+        "tetrahedra": Field(tetrahedra, "1", "vertices of each tetrahedron"),
+    }
+
+
+def mean_pressure(tetrahedra: np.ndarray, equilibrium: Equilibrium) -> float:
+    """Volume mean of −p [Pa]: p of the solver is positive in tension, the multiplier of the springs in compression."""
+    volume = equilibrium.weights.sum(axis=1)
+    return -float(volume @ equilibrium.p[tetrahedra].mean(axis=1) / volume.sum())

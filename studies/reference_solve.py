@@ -1,0 +1,171 @@
+"""One solution of a scene's reference: what it depends on, where it lies, how it is solved and stored."""
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from reference_fem import Equilibrium, NewtonSettings, Problem, ReferenceProblem, equilibrium_path, nodes
+from studies.adapt_reference import reference_problem
+from studies.case import scene_to_json
+from studies.fingerprint import source_fingerprint
+from studies.paths import record_path
+from studies.records import new_record
+from studies.reference_fields import fields_of
+from studies.scenes.base import Scene
+from studies.store import Status, is_current, write_record
+
+STUDY = "reference"
+PENALTY_FACTOR, KAPPA_FACTOR, STEP_FACTOR = 3.0, 10.0, 2.0
+"""How much better a setting is made: stiffer contact with as much less penetration, bulk modulus, load steps."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A mesh of the scene's family, or that mesh with one setting made better."""
+
+    scene: Scene
+    level: float
+    variant: str = ""
+    """"" or a name of VARIANTS."""
+
+    @property
+    def name(self) -> str:
+        """For people and file names."""
+        return f"{self.scene.name}-{self.level:g}" + (f"-{self.variant}" if self.variant else "")
+
+    @property
+    def key(self) -> str:
+        """What the solution depends on, besides the code: not the frames, the damping or the other meshes."""
+        scene, plan = self.scene, self.scene.reference
+        assert plan is not None  # a piece belongs to a plan
+        plain = Scene(
+            name=scene.name,
+            title="",
+            organ=scene.organ,
+            tissue=scene.tissue,
+            duration=0.0,
+            frames=0,
+            checkpoints=scene.checkpoints,
+            probed=scene.probed,
+            reference=replace(plan, levels=(self.level, self.level), variants=()),
+            obstacles=scene.obstacles,
+            held=scene.held,
+            gravity=scene.gravity,
+        )
+        data = {"scene": json.loads(scene_to_json(plain)), "level": self.level, "variant": self.variant}
+        return json.dumps(data, sort_keys=True, ensure_ascii=False)
+
+    def path(self, root: Path) -> Path:
+        """Where it lies."""
+        return record_path(root, STUDY, self.name, self.key)
+
+    def is_current(self, root: Path) -> bool:
+        """Whether it is there, from this code."""
+        return is_current(self.path(root), self.key, reference_fingerprint())
+
+    @property
+    def weight(self) -> float:
+        """What it costs, roughly: unknowns."""
+        return self.level if self.level > 1 else self.level**-3
+
+
+def pieces(scene: Scene) -> list[Piece]:
+    """All that the reference of a scene is made of: every mesh, and each setting made better on the coarsest."""
+    if scene.reference is None:
+        return []
+    family = [Piece(scene, level) for level in scene.reference.levels]
+    return [*family, *(replace(family[0], variant=name) for name in variants(scene))]
+
+
+def variants(scene: Scene) -> list[str]:
+    """The settings that matter in a scene: nothing touches, nothing sinks in."""
+    assert scene.reference is not None
+    return [name for name in scene.reference.variants if name != "contact" or scene.obstacles]
+
+
+def reference_fingerprint() -> str:
+    """Hash of all code that a reference depends on."""
+    return source_fingerprint(
+        "reference_fem",
+        "studies.geometry",
+        "studies.adapt",
+        "studies.adapt_reference",
+        "studies.reference_fields",
+        "studies.reference_solve",
+    )
+
+
+Set = tuple[Problem, tuple[float, ...], NewtonSettings]
+
+
+def finer_steps(problem: Problem, times: tuple[float, ...], settings: NewtonSettings) -> Set:
+    """Load steps half as long."""
+    starts = (settings.start, *times[:-1])
+    halves = [(start + end) / STEP_FACTOR for start, end in zip(starts, times, strict=True)]
+    return problem, tuple(sorted({*times, *halves})), settings
+
+
+def stiffer_contact(problem: Problem, times: tuple[float, ...], settings: NewtonSettings) -> Set:
+    """Penalty three times as stiff, a third of the penetration allowed."""
+    stiffer = replace(
+        settings,
+        penalty=PENALTY_FACTOR * settings.penalty,
+        penetration_tol=settings.penetration_tol / PENALTY_FACTOR,
+    )
+    return problem, times, stiffer
+
+
+def less_compressible(problem: Problem, times: tuple[float, ...], settings: NewtonSettings) -> Set:
+    """Bulk modulus ten times as large."""
+    material = replace(problem.material, kappa=KAPPA_FACTOR * problem.material.kappa)
+    return replace(problem, material=material), times, settings
+
+
+VARIANTS: dict[str, tuple[Callable[[Problem, tuple[float, ...], NewtonSettings], Set], float]] = {
+    "steps": (finer_steps, STEP_FACTOR),
+    "contact": (stiffer_contact, PENALTY_FACTOR),
+    "kappa": (less_compressible, KAPPA_FACTOR),
+}
+"""Each with the factor by which it makes a setting better."""
+
+
+def solve(root: Path, piece: Piece) -> Path:
+    """Solves the scene's load path and stores it; a path that breaks off is stored up to there."""
+    checkpoints = piece.scene.checkpoints
+    work: Set = (reference_problem(piece.scene, piece.level), checkpoints, NewtonSettings())
+    if piece.variant:
+        work = VARIANTS[piece.variant][0](*work)
+    problem, times, settings = work
+    started = time.monotonic()
+    status, message = Status.OK, ""
+    try:
+        path = equilibrium_path(problem, times, settings)
+    except ReferenceProblem as error:
+        path = error.converged
+        status, message = Status.NOT_CONVERGED, str(error)
+    found = [e for e in path if e.t in checkpoints]
+    record = new_record(
+        kind="reference",
+        key=piece.key,
+        name=piece.name,
+        status=status,
+        message=message,
+        fingerprint=reference_fingerprint(),
+        attributes=_attributes(piece, problem, found, time.monotonic() - started),
+        fields=fields_of(piece.scene, problem, found),
+    )
+    write_record(piece.path(root), record)
+    return piece.path(root)
+
+
+def _attributes(piece: Piece, problem: Problem, found: list[Equilibrium], seconds: float) -> dict:
+    return {
+        "scene": piece.scene.name,
+        "level": float(piece.level),
+        "variant": piece.variant,
+        "unknowns": 3 * len(nodes(problem.mesh)) + problem.mesh.nvertices,
+        "steps_done": len(found),
+        "seconds": seconds,
+    }
