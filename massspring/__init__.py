@@ -8,6 +8,7 @@ from massspring.methods import METHODS, Free, ImplicitVolume, Method, State
 from massspring.obstacles import Attachment, Obstacle, Path, Plane, Sphere
 from massspring.simulation import Setup, simulate
 from massspring.stability import StepLimit, step_limit
+from massspring.volumes import Ramp, Volumes
 
 __all__ = [
     "METHODS",
@@ -23,10 +24,12 @@ __all__ = [
     "Obstacle",
     "Path",
     "Plane",
+    "Ramp",
     "Setup",
     "Sphere",
     "State",
     "StepLimit",
+    "Volumes",
     "make_clock",
     "simulate",
     "step_limit",

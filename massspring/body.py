@@ -1,6 +1,7 @@
-"""A body: particles, springs and the closed surface whose volume can be kept."""
+"""A body: particles, springs, its closed surface and the volumes that can be kept."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -19,12 +20,16 @@ from massspring.springs import (
     unique_edges,
     van_gelder_weights,
 )
+from massspring.surface import check_finite, check_surface
+from massspring.volumes import Volumes
 
 AXIS_MASS_SHARE = 0.25
 """A pyramid over the axis has a quarter of its mass at the apex (linear shape functions)."""
 SURFACE_WEIGHTS = {SpringKind.STRUCTURAL: 1.0, SpringKind.BENDING: 0.5, SpringKind.INNER: 0.5, SpringKind.AXIAL: 1.0}
 """Relative stiffness of the kinds; their sum is scaled to the shear modulus. The paper names no values."""
 STIFFNESS_LAWS = ("van_gelder", "uniform")
+SAME_VOLUME = 1e-9
+"""Relative: both are sums of the same determinants, up to round-off of some million additions."""
 NO_TETRAHEDRA = np.empty((0, 4), dtype=np.uint32)
 
 
@@ -54,16 +59,18 @@ class Body:
     """[kg], (n,)."""
     springs: Springs
     triangles: np.ndarray
-    """Closed surface, outward, (f, 3) uint32."""
+    """Closed surface, outward, (f, 3) uint32; of several sheets for a hollow body (inner sheets face the lumen)."""
     tetrahedra: np.ndarray = field(default_factory=lambda: NO_TETRAHEDRA)
     """(k, 4) uint32, positive; empty for a surface body."""
     law: str = "given"
     """Stiffness law, recorded with every result: it alone moves a force by 12–16 %."""
+    volumes: Volumes | None = None
+    """What methods keep; None: the whole."""
 
     def __post_init__(self) -> None:
-        _check_finite("rest positions", self.rest)
-        _check_finite("masses", self.mass)
-        _check_surface(self.rest, self.triangles)
+        check_finite("rest positions", self.rest)
+        check_finite("masses", self.mass)
+        check_surface(self.rest, self.triangles)
         if len(self.mass) != len(self.rest):
             raise MassSpringError(f"{len(self.mass)} masses for {len(self.rest)} nodes; give one mass per node")
         if not (self.mass > 0).all():
@@ -76,6 +83,23 @@ class Body:
                 f"tetrahedron {worst} has volume {self.tetrahedron_volumes[worst]:.3g} m³; "
                 "swap two of its nodes or remove it"
             )
+        self._check_volumes()
+
+    def _check_volumes(self) -> None:
+        filled = float(self.tetrahedron_volumes.sum())
+        if len(self.tetrahedra) and abs(filled - self.volume) > SAME_VOLUME * filled:
+            raise MassSpringError(
+                f"the surface encloses {self.volume:.6g} m³ but the tetrahedra fill {filled:.6g} m³; "
+                "give all sheets of their boundary, each turned outward of the tissue"
+            )
+        if int(self.kept.triangles.max()) >= len(self.rest):
+            raise MassSpringError(
+                f"a kept volume names a node beyond the {len(self.rest)} there are; build it on this body"
+            )
+        if not (self.rest_volumes > 0).all():
+            worst = int(np.argmin(self.rest_volumes))
+            name, volume = self.kept.names[worst], self.rest_volumes[worst]
+            raise MassSpringError(f"volume '{name}' is {volume:.3g} m³ at rest; turn its triangles round")
 
     def _check_springs(self) -> None:
         springs = self.springs
@@ -83,7 +107,7 @@ class Body:
             raise MassSpringError(
                 f"a spring ends at node {int(springs.ends.max())}, but there are {len(self.rest)} nodes"
             )
-        _check_finite("spring stiffnesses", springs.stiffness)
+        check_finite("spring stiffnesses", springs.stiffness)
         if not (springs.rest_length > 0).all():
             worst = int(np.argmin(springs.rest_length))
             raise MassSpringError(
@@ -106,6 +130,16 @@ class Body:
         return float(enclosed_volume(self.rest, self.triangles))
 
     @property
+    def kept(self) -> Volumes:
+        """The volumes that methods keep: `volumes`, or the whole."""
+        return Volumes.whole(self) if self.volumes is None else self.volumes
+
+    @cached_property
+    def rest_volumes(self) -> np.ndarray:
+        """V0_r [m³] of the kept volumes, (m,)."""
+        return self.kept.measure(self.rest)
+
+    @property
     def tetrahedron_volumes(self) -> np.ndarray:
         """Rest volumes [m³], (k,)."""
         volumes = np.empty(len(self.tetrahedra))
@@ -117,37 +151,13 @@ class Body:
         """Diagonal of the bounding box at rest [m]."""
         return float(np.linalg.norm(np.ptp(self.rest, axis=0)))
 
+    def keeping(self, volumes: Volumes) -> "Body":
+        """The same body with other volumes to keep. Raises MassSpringError for one that is not positive at rest."""
+        return replace(self, volumes=volumes)
+
     def stiffened(self, factor: float) -> "Body":
         """The same body with every spring `factor` times as stiff."""
         return replace(self, springs=replace(self.springs, stiffness=self.springs.stiffness * factor))
-
-
-def _check_finite(what: str, values: np.ndarray) -> None:
-    if not np.isfinite(values).all():
-        raise MassSpringError(
-            f"{what} hold {int((~np.isfinite(values)).sum())} values that are not finite; repair the input"
-        )
-
-
-def _check_surface(points: np.ndarray, triangles: np.ndarray) -> None:
-    """Closed and consistently oriented: every directed edge once, its reverse once; outward: positive volume."""
-    if len(triangles) < 4:
-        raise MassSpringError(f"the surface has {len(triangles)} triangles; a closed one has at least 4")
-    if int(triangles.max()) >= len(points):
-        raise MassSpringError(f"a triangle names node {int(triangles.max())}, but there are {len(points)} nodes")
-    edges = triangles[:, EDGES_OF_TRIANGLE].reshape(-1, 2).astype(np.int64)
-    forward = edges[:, 0] * len(points) + edges[:, 1]
-    backward = edges[:, 1] * len(points) + edges[:, 0]
-    if len(np.unique(forward)) != len(forward):
-        raise MassSpringError(
-            "an edge is walked twice in the same sense; the surface is not manifold, or not consistently oriented"
-        )
-    lonely = np.setdiff1d(forward, backward)
-    if len(lonely):
-        raise MassSpringError(f"the surface is open at {len(lonely)} edges; close it, its volume is not defined")
-    volume = enclosed_volume(points, triangles)
-    if not volume > 0:
-        raise MassSpringError(f"the surface encloses {volume:.3g} m³; it is flat or inside-out, flip its triangles")
 
 
 def tetrahedral_body(
@@ -186,7 +196,7 @@ def surface_body(points: np.ndarray, triangles: np.ndarray, material: Material, 
     """
     triangles = np.ascontiguousarray(triangles, dtype=np.uint32)
     points = np.ascontiguousarray(points, dtype=np.float64)
-    _check_surface(points, triangles)
+    check_surface(points, triangles)
     structural = unique_edges(triangles, EDGES_OF_TRIANGLE)
     virtual = virtual_nodes(points, triangles, float(lengths(points, structural).mean()), axis)
     nearest = closest_virtual_node(points, virtual)

@@ -8,7 +8,6 @@ from massspring.body import Body
 from massspring.clock import Clock
 from massspring.kernels.deformation import smallest_ratio, tetrahedron_volumes_into
 from massspring.kernels.springs import spring_energy
-from massspring.kernels.volume import enclosed_volume
 from massspring.methods.base import State
 
 
@@ -19,9 +18,11 @@ class History:
     t: np.ndarray
     """End of each frame [s], (F,)."""
     volume: np.ndarray
-    """[m³], (F, 1)."""
+    """Of each kept volume [m³], (F, m)."""
+    volume_target: np.ndarray
+    """What each kept volume should be at the end of each frame [m³], (F, m)."""
     pressure: np.ndarray
-    """lam of the last step of the frame [Pa], (F, 1)."""
+    """lam of the last step of the frame [Pa], (F, m)."""
     kinetic: np.ndarray
     """[J], (F,)."""
     elastic: np.ndarray
@@ -47,7 +48,11 @@ class History:
     message: str
     """Why it stopped; empty when it did not."""
     skipped_steps: int
-    """Steps without a volume gradient to push on."""
+    """Steps in which a volume had no gradient to push on."""
+    capped_steps: int
+    """Steps that made up for a part only of a wrong volume."""
+    iterations: np.ndarray
+    """For the multipliers of each frame: their sum over its steps, and the most in one step, (F, 2) int64."""
 
 
 class Recorder:
@@ -58,9 +63,14 @@ class Recorder:
         self.body = body
         self.clock = clock
         self.rest_volumes = body.tetrahedron_volumes
-        self.volumes = np.empty_like(self.rest_volumes)
+        self.cell_volumes = np.empty_like(self.rest_volumes)
         self.t = clock.frame * np.arange(1, frames + 1)
-        self.scalars = {name: np.full(frames, np.nan) for name in ("volume", "pressure", "kinetic", "elastic", "min_j")}
+        self.scalars = {name: np.full(frames, np.nan) for name in ("kinetic", "elastic", "min_j")}
+        self.volumes = body.kept
+        self.volume, self.pressure, self.volume_target = (
+            np.full((frames, self.volumes.count), np.nan) for _ in range(3)
+        )
+        self.iterations = np.zeros((frames, 2), dtype=np.int64)
         self.contact_force = np.full((frames, obstacles, 3), np.nan)
         self.held_force = np.full((frames, attachments, 3), np.nan)
         self.frame_ns = np.zeros(frames, dtype=np.int64)
@@ -68,21 +78,24 @@ class Recorder:
         self.kept: dict[int, np.ndarray] = {}
         self.final = body.rest
         self.skipped = 0
+        self.capped = 0
 
     def record(self, frame: int, state: State, elapsed_ns: int) -> None:
         """Reads the state after frame number `frame` (0, 1, …)."""
         net, x, v = state.network, state.x, state.v
-        self.scalars["volume"][frame] = enclosed_volume(x, net.triangles)
-        self.scalars["pressure"][frame] = state.lam
+        self.volume[frame] = self.volumes.measure(x)
+        self.pressure[frame] = state.lam
         self.scalars["kinetic"][frame] = 0.5 * float(net.mass @ np.einsum("ij,ij->i", v, v))
         self.scalars["elastic"][frame] = spring_energy(x, net.ends, net.rest_length, net.stiffness)
         if len(self.rest_volumes):
-            tetrahedron_volumes_into(x, self.body.tetrahedra, self.volumes)
-            self.scalars["min_j"][frame] = smallest_ratio(self.volumes, self.rest_volumes)
+            tetrahedron_volumes_into(x, self.body.tetrahedra, self.cell_volumes)
+            self.scalars["min_j"][frame] = smallest_ratio(self.cell_volumes, self.rest_volumes)
         self.contact_force[frame] = state.tally.contact_impulse / self.clock.frame
         self.held_force[frame] = state.tally.held_impulse / self.clock.frame
         self.frame_ns[frame] = elapsed_ns
         self.skipped += int(state.tally.skipped[0])
+        self.capped += int(state.tally.capped[0])
+        self.iterations[frame] = state.tally.iterations
         self.final = x
         if frame + 1 in self.keep:
             self.kept[frame + 1] = x
@@ -100,8 +113,9 @@ class Recorder:
         shape = (len(frames), self.body.node_count, 3)
         return History(
             t=self.t,
-            volume=self.scalars["volume"][:, None],
-            pressure=self.scalars["pressure"][:, None],
+            volume=self.volume,
+            volume_target=self.volume_target,
+            pressure=self.pressure,
             kinetic=self.scalars["kinetic"],
             elastic=self.scalars["elastic"],
             contact_force=self.contact_force,
@@ -115,4 +129,6 @@ class Recorder:
             good_frames=good_frames,
             message=message,
             skipped_steps=self.skipped,
+            capped_steps=self.capped,
+            iterations=self.iterations,
         )

@@ -1,8 +1,8 @@
 """Frame by frame: moves the obstacles, advances the method, records. The only Python in the loop is once per frame."""
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from time import perf_counter_ns
 
 import numpy as np
@@ -14,6 +14,7 @@ from massspring.history import History, Recorder
 from massspring.kernels.layout import Drive
 from massspring.methods.base import Method, State, start
 from massspring.obstacles import Attachment, Obstacle, Plane
+from massspring.volumes import Ramp
 
 ESCAPED = 20.0
 """A node this many body sizes from rest, beyond any obstacle's push, has left: the run has diverged."""
@@ -34,6 +35,8 @@ class Setup:
     """Mass-proportional damping [1/s]."""
     velocity: np.ndarray | None = None
     """Initial velocities [m/s], (n, 3); None: at rest."""
+    targets: Mapping[str, Ramp] = field(default_factory=dict)
+    """Name of a kept volume -> its target over time as a factor of its rest volume; unnamed ones stay at 1."""
 
     def __post_init__(self) -> None:
         for number, obstacle in enumerate(self.obstacles):
@@ -41,6 +44,14 @@ class Setup:
             if depth > 1e-6 * self.body.size:
                 raise MassSpringError(
                     f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
+                )
+        for name, ramp in self.targets.items():
+            if name not in self.body.kept.names:
+                known = ", ".join(self.body.kept.names[:6])
+                raise MassSpringError(f"target '{name}' names no kept volume; the body keeps {known}")
+            if min(ramp.values) <= 0:
+                raise MassSpringError(
+                    f"target '{name}' falls to {min(ramp.values):g} of its rest volume; keep it positive"
                 )
         if not (np.isfinite(self.damping) and self.damping >= 0):
             raise MassSpringError(f"damping is {self.damping} 1/s; it must be zero or positive")
@@ -66,7 +77,13 @@ class Setup:
             radius=np.array([0.0 if isinstance(o, Plane) else o.radius for o in self.obstacles]),
             position=_tracks([np.asarray(_anchor(o)) + o.path(t) for o in self.obstacles], len(t)),
             held_displacement=_tracks([a.path(t) for a in self.attachments], len(t)),
+            volume_target=self.volume_targets(t),
         )
+
+    def volume_targets(self, t: np.ndarray) -> np.ndarray:
+        """What each kept volume should be at times `t` (q,) [s], (q, m) [m³]."""
+        factors = [self.targets[name](t) if name in self.targets else np.ones(len(t)) for name in self.body.kept.names]
+        return np.column_stack(factors) * self.body.rest_volumes
 
 
 def _anchor(obstacle: Obstacle) -> tuple[float, float, float]:
@@ -85,7 +102,7 @@ def _tracks(tracks: list[np.ndarray], steps: int) -> np.ndarray:
 def trouble(state: State, body: Body) -> str | None:
     """Why the run cannot go on, or None: values that are not finite, or nodes that have left."""
     far = float(np.abs(state.x - body.rest).max())
-    if np.isfinite(far) and np.isfinite(state.lam) and far < ESCAPED * body.size:
+    if np.isfinite(far) and np.isfinite(state.lam).all() and far < ESCAPED * body.size:
         return None
     return "positions are no longer finite" if not np.isfinite(far) else f"a node has moved {far:.3g} m from rest"
 
@@ -102,6 +119,7 @@ def simulate(
     A run longer than `time_limit` [s] of wall time ends early. Frame times are those of `advance` alone.
     """
     recorder = Recorder(setup.body, setup.clock, len(setup.obstacles), len(setup.attachments), frozenset(snapshots))
+    recorder.volume_target[:] = setup.volume_targets(recorder.t)
     state = setup.start()
     advance = setup.method.advance
     begun = perf_counter_ns()

@@ -99,7 +99,7 @@ def volume_lines() -> list[Line]:
 
 def _worst(case: Case) -> float:
     record = measure(case)
-    return float(np.max(np.abs(record.fields["volume"].values / record.attributes["rest_volume"] - 1)))
+    return float(np.max(np.abs(record.fields["volume"].values / record.fields["volume_target"].values - 1)))
 
 
 def reference_lines() -> list[Line]:

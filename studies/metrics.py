@@ -47,8 +47,9 @@ class Run:
 
     @cached_property
     def volume_ratio(self) -> np.ndarray:
-        """V/V0 of every frame [1], (F,)."""
-        return self.field("volume")[:, 0] / self.record.attributes["rest_volume"]
+        """V/V0 of every frame [1], of the kept volume that is farthest off in it, (F,)."""
+        ratio = self.field("volume") / self.field("volume_target")
+        return ratio[np.arange(len(ratio)), np.argmax(np.abs(ratio - 1), axis=1)]
 
     @cached_property
     def displacement_error(self) -> tuple[np.ndarray, np.ndarray]:

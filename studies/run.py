@@ -75,7 +75,7 @@ def judge(case: Case, prepared: Prepared, history: History) -> tuple[Status, str
     smallest = float(history.min_j[-1])
     if smallest <= 0:
         return Status.INVERTED, f"a tetrahedron ends inside out (smallest volume ratio {smallest:.3g})"
-    drift = float(np.max(np.abs(history.volume[:, 0] / prepared.setup.body.volume - 1)))
+    drift = float(np.max(np.abs(history.volume / history.volume_target - 1)))
     if case.method.volume_tol is not None and drift > DRIFT:
         return (
             Status.DRIFTED,
@@ -120,6 +120,7 @@ def _fields(prepared: Prepared, history: History) -> dict[str, Field]:
     return {
         "t": Field(history.t, "s", "end of each frame"),
         "volume": Field(history.volume, "m^3", "enclosed volume, one column per kept volume"),
+        "volume_target": Field(history.volume_target, "m^3", "what each kept volume should be"),
         "pressure": Field(history.pressure, "Pa", "multiplier of each kept volume in the last step of the frame"),
         "kinetic": Field(history.kinetic, "J", "kinetic energy"),
         "elastic": Field(history.elastic, "J", "energy of the springs"),

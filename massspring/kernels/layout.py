@@ -15,7 +15,7 @@ class Network(NamedTuple):
     stiffness: np.ndarray
     """[N/m], (s,)."""
     triangles: np.ndarray
-    """Closed surface, outward, (f, 3) uint32."""
+    """Closed surface of the one volume that is kept, outward, (f, 3) uint32; of the whole where there are several."""
     mass: np.ndarray
     """[kg], (n,)."""
     inverse_mass: np.ndarray
@@ -28,6 +28,53 @@ class Network(NamedTuple):
     """Attachment each held node belongs to, (h,) uint32."""
     held_rest: np.ndarray
     """Rest positions of the held nodes [m], (h, 3)."""
+    longest_correction: float
+    """How far a step may move a node to make up for a wrong volume [m]; what is left is made up later."""
+
+
+class VolumeRows(NamedTuple):
+    """m volumes over f oriented triangles: J = dV/dx as sparse rows with e entries, its transpose, and scratch."""
+
+    triangles: np.ndarray
+    """(f, 3) uint32."""
+    term_start: np.ndarray
+    """First term of each triangle, (f + 1,) uint32; a term is a volume that the triangle bounds."""
+    term_share: np.ndarray
+    """s_rf [1], (t,)."""
+    term_entry: np.ndarray
+    """Entries of J that the term adds to, one per corner, (t, 3) uint32."""
+    row_start: np.ndarray
+    """First entry of each volume, (m + 1,) uint32."""
+    column: np.ndarray
+    """Node of each entry, (e,) uint32."""
+    node_start: np.ndarray
+    """Where the entries of each node begin in the next two, (n + 1,) uint32."""
+    node_entry: np.ndarray
+    """Entries node by node, volumes ascending, (e,) uint32."""
+    node_row: np.ndarray
+    """Their volumes, (e,) uint32."""
+    value: np.ndarray
+    """J_rj [m²], (e, 3)."""
+    volume: np.ndarray
+    """V_r [m³], (m,)."""
+    lam: np.ndarray
+    """Multipliers, on the way in those of the last step [Pa], (m,)."""
+    right: np.ndarray
+    """Right-hand side of the multipliers [m³/s²], (m,)."""
+    diagonal: np.ndarray
+    """S_rr [m⁴/kg], (m,)."""
+    matrix: np.ndarray
+    """S [m⁴/kg], (m, m); (0, 0) where it is solved iteratively."""
+    residual: np.ndarray
+    """(m,)."""
+    search: np.ndarray
+    """(m,)."""
+    image: np.ndarray
+    """(m,)."""
+    allowed: np.ndarray
+    """Residual at which the iteration ends, (m,)."""
+    node_vector: np.ndarray
+    """(n, 3)."""
 
 
 class Motion(NamedTuple):
@@ -72,6 +119,16 @@ class Drive(NamedTuple):
     """Plane points and sphere centres at the end of each step [m], (q, o, 3)."""
     held_displacement: np.ndarray
     """Of the attachments at the end of each step [m], (q, g, 3)."""
+    volume_target: np.ndarray
+    """What each kept volume should be at the end of each step [m³], (q, m)."""
+
+
+class Accuracy(NamedTuple):
+    """When an iteration for the multipliers ends."""
+
+    tolerance: float
+    """Volume error left by the linear solve, over the volume [1]."""
+    most_iterations: int
 
 
 class Tally(NamedTuple):
@@ -82,4 +139,8 @@ class Tally(NamedTuple):
     held_impulse: np.ndarray
     """Impulse of each attachment on the body [N s], (g, 3)."""
     skipped: np.ndarray
-    """Steps whose volume gradient vanished, so that no pressure could act, (1,) int64."""
+    """Steps in which a wrong volume had no gradient to push on, so that no pressure could act, (1,) int64."""
+    capped: np.ndarray
+    """Steps that made up for a part only of a wrong volume, (1,) int64."""
+    iterations: np.ndarray
+    """Iterations for the multipliers: their sum, and the most in one step, (2,) int64; 0 where they are direct."""

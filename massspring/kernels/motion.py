@@ -1,5 +1,7 @@
 """Time stepping: symplectic Euler, prescribed nodes, and the multiplier of one volume."""
 
+import math
+
 from massspring.kernels.compiled import compiled
 
 
@@ -50,6 +52,32 @@ def volume_multiplier(motion, inverse_mass, volume_error, dt):
     if not mobility > 0.0:
         return 0.0, mobility
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
+
+
+@compiled
+def steepest(gradient, inverse_mass):
+    """max_i w_i |G_i| [m²/kg]: how far the node that moves most goes per unit of pressure and dt²."""
+    largest = 0.0
+    for i in range(inverse_mass.shape[0]):
+        square = gradient[i, 0] ** 2 + gradient[i, 1] ** 2 + gradient[i, 2] ** 2
+        largest = max(largest, inverse_mass[i] * math.sqrt(square))
+    return largest
+
+
+@compiled
+def surely_short(volume_error, mobility, lightest, longest):
+    """Whether no node moves farther than `longest` [m] to make up for a wrong volume: |e| √(max w / G·W̃·G) ≤ longest.
+
+    max_i w_i |G_i| ≤ √(max w · G·W̃·G) without contact; the true reach is looked for only when this bound fails.
+    """
+    return volume_error * volume_error * lightest <= longest * longest * mobility
+
+
+@compiled
+def capped_error(volume_error, mobility, steepest, longest):
+    """V0 − V, at most `longest` · G·W̃·G / max w|G| [m³]: then no node moves farther than `longest` [m] (eq. 35)."""
+    most = longest * mobility / steepest if steepest > 0.0 else 0.0
+    return min(max(volume_error, -most), most)
 
 
 @compiled

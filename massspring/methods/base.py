@@ -7,8 +7,13 @@ import numpy as np
 
 from massspring.body import Body
 from massspring.errors import MassSpringError
-from massspring.kernels.layout import Drive, Motion, Network, Tally
+from massspring.kernels.layout import Drive, Motion, Network, Tally, VolumeRows
+from massspring.methods.rows import volume_rows
 from massspring.obstacles import Attachment
+from massspring.volumes import Volumes
+
+LONGEST_CORRECTION = 0.3
+"""How far a step moves a node to make up for a wrong volume, in mean spring lengths: too little to turn a triangle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,10 +22,10 @@ class State:
 
     network: Network
     motion: Motion
-    rest_volume: float
-    """V0 [m³]."""
-    lam: float = 0.0
-    """Interior gauge pressure of the last step [Pa]; 0 for methods that keep no volume."""
+    lam: np.ndarray
+    """Interior gauge pressure of each kept volume in the last step [Pa], (m,); 0 for methods that keep none."""
+    rows: VolumeRows | None = None
+    """None where one closed surface is kept: a division needs no rows."""
     tally: Tally = field(default_factory=lambda: new_tally(0, 0))
     """What the last frame measured of itself."""
 
@@ -37,7 +42,9 @@ class State:
 
 def new_tally(obstacles: int, attachments: int) -> Tally:
     """A tally at zero."""
-    return Tally(np.zeros((obstacles, 3)), np.zeros((attachments, 3)), np.zeros(1, dtype=np.int64))
+    return Tally(
+        np.zeros((obstacles, 3)), np.zeros((attachments, 3)), *(np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
+    )
 
 
 class Method(Protocol):
@@ -57,7 +64,10 @@ class Method(Protocol):
 
 def start(body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
     """The body at rest, or with velocities `v` (n, 3) [m/s]. Raises MassSpringError for bad attachments."""
-    network = _network(body, attachments)
+    kept = body.kept
+    alone = kept.count == 1 and bool((np.abs(kept.share.data) == 1.0).all())
+    surface = turned(kept) if alone else body.triangles
+    network = _network(body, attachments, surface)
     n = body.node_count
     velocity = np.zeros((n, 3)) if v is None else np.array(v, dtype=np.float64)
     if velocity.shape != (n, 3):
@@ -73,10 +83,17 @@ def start(body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | 
         approach=np.zeros(n),
         clearance=np.zeros(n),
     )
-    return State(network, motion, body.volume)
+    return State(network, motion, np.zeros(kept.count), None if alone else volume_rows(kept, n))
 
 
-def _network(body: Body, attachments: tuple[Attachment, ...]) -> Network:
+def turned(volumes: Volumes) -> np.ndarray:
+    """The triangles of one volume, all in the sense that encloses it, (f, 3) uint32."""
+    share = volumes.share.tocoo()
+    triangles = volumes.triangles[share.col]
+    return np.ascontiguousarray(np.where(share.data[:, None] > 0, triangles, triangles[:, ::-1]))
+
+
+def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarray) -> Network:
     nodes = [np.asarray(a.nodes, dtype=np.int64) for a in attachments]
     for number, held in enumerate(nodes):
         if not len(held):
@@ -92,13 +109,16 @@ def _network(body: Body, attachments: tuple[Attachment, ...]) -> Network:
         ends=body.springs.ends,
         rest_length=body.springs.rest_length,
         stiffness=body.springs.stiffness,
-        triangles=body.triangles,
+        triangles=surface,
         mass=body.mass,
         inverse_mass=inverse_mass,
         surface_nodes=body.surface_nodes,
         held_nodes=held_nodes.astype(np.uint32),
         held_group=np.repeat(np.arange(len(nodes)), [len(h) for h in nodes]).astype(np.uint32),
         held_rest=body.rest[held_nodes],
+        longest_correction=LONGEST_CORRECTION * float(body.springs.rest_length.mean())
+        if body.springs.count
+        else np.inf,
     )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from massspring import Body, Material, surface_body, tetrahedral_body
+from massspring import Body, Material, Volumes, surface_body, tetrahedral_body
 
 SOFT = Material(shear_modulus=1800.0, density=1060.0)
 CUBE_TETRAHEDRA = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
@@ -24,9 +24,29 @@ def block(cells: tuple[int, int, int], edge: float = 0.02, distortion: float = 0
     tetrahedra = np.stack(corners, axis=1)[:, CUBE_TETRAHEDRA].reshape(-1, 4)
     random = np.random.default_rng(7)
     points = edge * (grid + distortion * random.uniform(-1, 1, grid.shape))
+    return points, boundary(tetrahedra), tetrahedra
+
+
+def boundary(tetrahedra: np.ndarray) -> np.ndarray:
+    """Outward faces of single cells, (f, 3)."""
     faces = tetrahedra[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    return points, faces[first[count == 1]], tetrahedra
+    return faces[first[count == 1]]
+
+
+def hollow_block(cells: int = 4, edge: float = 0.02) -> tuple[np.ndarray, ...]:
+    """A block whose inner cells are missing: points, all boundary triangles, tetrahedra, triangles round the lumen."""
+    points, _, tetrahedra = block((cells, cells, cells), edge)
+    cell = np.arange(cells**3)
+    inside = np.all([(c > 0) & (c < cells - 1) for c in np.unravel_index(cell, (cells,) * 3)], axis=0)
+    outside = ~np.repeat(inside, len(CUBE_TETRAHEDRA))
+    used, renumbered = np.unique(tetrahedra[outside], return_inverse=True)
+    tetrahedra = renumbered.reshape(-1, 4)
+    triangles = boundary(tetrahedra)
+    centre = points[used].mean(axis=0)
+    reach = np.abs(points[used] - centre).max(axis=1)
+    lumen = triangles[(reach[triangles] < (cells / 2 - 0.5) * edge).all(axis=1)]
+    return points[used], triangles, tetrahedra, lumen[:, ::-1].copy()
 
 
 def icosphere(levels: int, radius: float = 0.05) -> tuple[np.ndarray, np.ndarray]:
@@ -64,6 +84,24 @@ def block_body() -> Body:
 def ball_body() -> Body:
     """Surface body of 162 nodes and its virtual nodes."""
     return surface_body(*icosphere(2), SOFT)
+
+
+@pytest.fixture(scope="session")
+def hollow_body() -> Body:
+    """A wall of one cell around a lumen of 2 × 2 × 2 cells, both kept."""
+    points, triangles, tetrahedra, lumen = hollow_block()
+    body = tetrahedral_body(points, triangles, tetrahedra, SOFT)
+    return body.keeping(Volumes.closed_surfaces(body, {"wall": triangles, "lumen": lumen}))
+
+
+@pytest.fixture(params=["block", "ball", "hollow", "regions", "nodal"])
+def kept_body(request: pytest.FixtureRequest) -> Body:
+    """Every kind of volumes: the whole of either kind of body, wall and lumen, regions, one per node."""
+    kind = request.param
+    if kind in ("regions", "nodal"):
+        block_body = request.getfixturevalue("block_body")
+        return block_body.keeping(Volumes.nodal(block_body) if kind == "nodal" else Volumes.regions(block_body, 7))
+    return request.getfixturevalue(f"{kind}_body")
 
 
 @pytest.fixture(params=["block", "ball"])

@@ -128,10 +128,10 @@ def test_looking_only_at_near_nodes_changes_no_bit(ball_body):
         for factor in (-3.0, 0.5, 1.0, 5.0):
             near, far = (_copied(state.motion) for _ in range(2))
             for motion in (near, far):
-                find_contacts(net, motion, drive, 0, state.lam)
-            lam = factor * state.lam
+                find_contacts(net, motion, drive, 0, state.lam[0])
+            lam = factor * state.lam[0]
             mobility = float((net.inverse_mass[:, None] * near.gradient**2).sum())
-            reach = pressure_reach(lam - state.lam, mobility, lightest, dt)
+            reach = pressure_reach(lam - state.lam[0], mobility, lightest, dt)
             changed = revise_contacts(net, near, drive, 0, lam, reach)
             assert changed == revise_contacts(net, far, drive, 0, lam, np.inf)
             for name in ("touched", "normal", "approach"):

@@ -60,6 +60,7 @@ def fields(scene, kind, error, volume_end, good):
     values = {
         "t": t,
         "volume": volume[:, None],
+        "volume_target": np.full((FRAMES, 1), VOLUME),
         "contact_force": felt["obstacle"],
         "held_force": felt["held"],
         "snapshots": np.stack([final] * len(scene.checkpoints)) if good == FRAMES else np.zeros((0, 7, 3)),

@@ -50,6 +50,7 @@ def run(final=None, volume=(1.0, 1.0, 1.0, 1.0), force=(0.5, 1.0, 1.5, 2.0), **c
     values = {
         "t": T,
         "volume": EDGE**3 * np.array(volume)[:, None],
+        "volume_target": np.full((len(volume), 1), EDGE**3),
         "pressure": np.full((4, 1), 5.0),
         "contact_force": np.zeros((4, 0, 3)),
         "held_force": held,

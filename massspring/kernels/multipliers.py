@@ -1,0 +1,116 @@
+"""The multipliers of m volumes: S lam = rhs with S = J W̃ Jᵀ, dense for few, iterative for many (eq. 33, 34)."""
+
+import math
+
+from massspring.kernels.compiled import compiled
+from massspring.kernels.rows import NEGLIGIBLE, mobilise, rows_times_into, transposed_rows_times_into
+
+
+@compiled
+def dense_into(rows, motion, inverse_mass, matrix):
+    """S_rs = Σ_j J_rj · W̃_j J_sj [m⁴/kg], its lower triangle, (m, m) (eq. 33)."""
+    matrix[:] = 0.0
+    for j in range(inverse_mass.shape[0]):
+        w = inverse_mass[j]
+        if w == 0.0:
+            continue
+        n0, n1, n2 = 0.0, 0.0, 0.0
+        if motion.touched[j] > 0:
+            n0, n1, n2 = motion.normal[j, 0], motion.normal[j, 1], motion.normal[j, 2]
+        for k in range(rows.node_start[j], rows.node_start[j + 1]):
+            e, r = rows.node_entry[k], rows.node_row[k]
+            g0, g1, g2 = rows.value[e, 0], rows.value[e, 1], rows.value[e, 2]
+            along = g0 * n0 + g1 * n1 + g2 * n2
+            g0, g1, g2 = w * (g0 - along * n0), w * (g1 - along * n1), w * (g2 - along * n2)
+            # The volumes around a node come in ascending order.
+            for q in range(rows.node_start[j], k + 1):
+                e = rows.node_entry[q]
+                matrix[r, rows.node_row[q]] += g0 * rows.value[e, 0] + g1 * rows.value[e, 1] + g2 * rows.value[e, 2]
+
+
+@compiled
+def solve_dense(matrix, right, lam):
+    """S lam = rhs by Cholesky, L over S in place (eq. 33).
+
+    A volume that is held by its nodes, or depends on those before it, has a pivot of round-off: lam_r = 0.
+    """
+    m = right.shape[0]
+    for k in range(m):
+        diagonal = matrix[k, k]
+        pivot = diagonal
+        for q in range(k):
+            pivot -= matrix[k, q] * matrix[k, q]
+        if pivot > NEGLIGIBLE * diagonal:
+            root = math.sqrt(pivot)
+            matrix[k, k] = root
+            for i in range(k + 1, m):
+                total = matrix[i, k]
+                for q in range(k):
+                    total -= matrix[i, q] * matrix[k, q]
+                matrix[i, k] = total / root
+        else:
+            matrix[k, k] = 0.0
+            for i in range(k + 1, m):
+                matrix[i, k] = 0.0
+    for k in range(m):
+        total = right[k]
+        for q in range(k):
+            total -= matrix[k, q] * lam[q]
+        lam[k] = total / matrix[k, k] if matrix[k, k] > 0.0 else 0.0
+    for k in range(m - 1, -1, -1):
+        total = lam[k]
+        for i in range(k + 1, m):
+            total -= matrix[i, k] * lam[i]
+        lam[k] = total / matrix[k, k] if matrix[k, k] > 0.0 else 0.0
+
+
+@compiled
+def apply_schur(rows, motion, inverse_mass, p, product):
+    """S p = J (W̃ (Jᵀ p)), (m,) (eq. 33)."""
+    transposed_rows_times_into(rows, p, rows.node_vector)
+    mobilise(motion, inverse_mass, rows.node_vector)
+    rows_times_into(rows, rows.node_vector, product)
+
+
+@compiled
+def solve_iteratively(rows, motion, inverse_mass, lam, allowed, most):
+    """S lam = rhs by conjugate gradients with the diagonal as preconditioner, from the lam given (eq. 34).
+
+    Ends when |rhs − S lam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number.
+    A volume without a diagonal has nothing to push on: lam_r = 0.
+    """
+    m = lam.shape[0]
+    residual, search, image = rows.residual, rows.search, rows.image
+    for r in range(m):
+        if not rows.diagonal[r] > 0.0:
+            lam[r] = 0.0
+    apply_schur(rows, motion, inverse_mass, lam, image)
+    rho = 0.0
+    for r in range(m):
+        residual[r] = rows.right[r] - image[r] if rows.diagonal[r] > 0.0 else 0.0
+        search[r] = residual[r] / rows.diagonal[r] if rows.diagonal[r] > 0.0 else 0.0
+        rho += residual[r] * search[r]
+    for iteration in range(most):
+        worst = 0.0
+        for r in range(m):
+            worst = max(worst, abs(residual[r]) - allowed[r])
+        if worst <= 0.0 or not rho > 0.0:
+            return iteration
+        apply_schur(rows, motion, inverse_mass, search, image)
+        curvature = 0.0
+        for r in range(m):
+            curvature += search[r] * image[r]
+        if not curvature > 0.0:
+            return iteration
+        alpha = rho / curvature
+        before = rho
+        rho = 0.0
+        for r in range(m):
+            lam[r] += alpha * search[r]
+            if rows.diagonal[r] > 0.0:
+                residual[r] -= alpha * image[r]
+                rho += residual[r] * residual[r] / rows.diagonal[r]
+        for r in range(m):
+            if rows.diagonal[r] > 0.0:
+                search[r] = residual[r] / rows.diagonal[r] + rho / before * search[r]
+    return most

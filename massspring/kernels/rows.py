@@ -1,0 +1,123 @@
+"""Several volumes at once: the sparse rows J_r = dV_r/dx and what multiplies them (docs/theory.md, section 8)."""
+
+import math
+
+from massspring.kernels.compiled import compiled
+
+NEGLIGIBLE = 1e-12
+"""A diagonal or pivot this much smaller than what it was summed from is round-off."""
+
+
+@compiled
+def rows_into(x, rows):
+    """J_rj = Σ_f∋j s_rf (1/6) (x_b − x_a) × (x_c − x_a) [m²], the non-zero entries (e, 3) (eq. 32).
+
+    One area vector a triangle serves its three nodes in every volume it bounds. Σ_j J_rj = 0.
+    """
+    rows.value[:] = 0.0
+    for f in range(rows.triangles.shape[0]):
+        a, b, c = rows.triangles[f, 0], rows.triangles[f, 1], rows.triangles[f, 2]
+        a0, a1, a2 = x[a, 0], x[a, 1], x[a, 2]
+        b0, b1, b2 = x[b, 0] - a0, x[b, 1] - a1, x[b, 2] - a2
+        c0, c1, c2 = x[c, 0] - a0, x[c, 1] - a1, x[c, 2] - a2
+        n0, n1, n2 = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
+        for t in range(rows.term_start[f], rows.term_start[f + 1]):
+            share = rows.term_share[t] / 6.0
+            s0, s1, s2 = share * n0, share * n1, share * n2
+            for corner in range(3):
+                e = rows.term_entry[t, corner]
+                rows.value[e, 0] += s0
+                rows.value[e, 1] += s1
+                rows.value[e, 2] += s2
+
+
+@compiled
+def volumes_of_rows_into(x, rows, volume):
+    """V_r = (1/3) Σ_j (x_j − x_o) · J_rj [m³], (m,) (eq. 32); o is a node of the volume, so that no digits are lost."""
+    for r in range(volume.shape[0]):
+        o = rows.column[rows.row_start[r]]
+        o0, o1, o2 = x[o, 0], x[o, 1], x[o, 2]
+        three = 0.0
+        for e in range(rows.row_start[r], rows.row_start[r + 1]):
+            j = rows.column[e]
+            three += (x[j, 0] - o0) * rows.value[e, 0]
+            three += (x[j, 1] - o1) * rows.value[e, 1]
+            three += (x[j, 2] - o2) * rows.value[e, 2]
+        volume[r] = three / 3.0
+
+
+@compiled
+def rows_times_into(rows, u, product):
+    """(J u)_r = Σ_j J_rj · u_j, (m,)."""
+    for r in range(product.shape[0]):
+        total = 0.0
+        for e in range(rows.row_start[r], rows.row_start[r + 1]):
+            j = rows.column[e]
+            total += rows.value[e, 0] * u[j, 0] + rows.value[e, 1] * u[j, 1] + rows.value[e, 2] * u[j, 2]
+        product[r] = total
+
+
+@compiled
+def transposed_rows_times_into(rows, p, out):
+    """(Jᵀ p)_j = Σ_r J_rj p_r, (n, 3): with pressures p [Pa] the force of all volumes on each node [N]."""
+    for j in range(out.shape[0]):
+        o0, o1, o2 = 0.0, 0.0, 0.0
+        for k in range(rows.node_start[j], rows.node_start[j + 1]):
+            e = rows.node_entry[k]
+            pressure = p[rows.node_row[k]]
+            o0 += pressure * rows.value[e, 0]
+            o1 += pressure * rows.value[e, 1]
+            o2 += pressure * rows.value[e, 2]
+        out[j, 0], out[j, 1], out[j, 2] = o0, o1, o2
+
+
+@compiled
+def allowed_velocity_into(motion, u):
+    """ṽ: v* of a free node, v* + n (a − n·v*) of a touched one [m/s], (n, 3) (eq. 9)."""
+    for i in range(u.shape[0]):
+        u0, u1, u2 = motion.v_star[i, 0], motion.v_star[i, 1], motion.v_star[i, 2]
+        if motion.touched[i] > 0:
+            n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+            kick = motion.approach[i] - (u0 * n0 + u1 * n1 + u2 * n2)
+            u0, u1, u2 = u0 + kick * n0, u1 + kick * n1, u2 + kick * n2
+        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+
+
+@compiled
+def mobilise(motion, inverse_mass, u):
+    """u := W̃ u in place, (n, 3): no motion of a held node, none of a touched one along its normal (eq. 9)."""
+    for i in range(u.shape[0]):
+        w = inverse_mass[i]
+        u0, u1, u2 = w * u[i, 0], w * u[i, 1], w * u[i, 2]
+        if motion.touched[i] > 0:
+            n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+            along = u0 * n0 + u1 * n1 + u2 * n2
+            u0, u1, u2 = u0 - along * n0, u1 - along * n1, u2 - along * n2
+        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+
+
+@compiled
+def diagonal_into(rows, motion, inverse_mass, diagonal):
+    """S_rr = Σ_j J_rj · W̃_j J_rj [m⁴/kg], (m,); 0 where contact and held nodes leave nothing but round-off."""
+    for r in range(diagonal.shape[0]):
+        total, free = 0.0, 0.0
+        for e in range(rows.row_start[r], rows.row_start[r + 1]):
+            j = rows.column[e]
+            g0, g1, g2 = rows.value[e, 0], rows.value[e, 1], rows.value[e, 2]
+            square = g0 * g0 + g1 * g1 + g2 * g2
+            free += square * inverse_mass[j]
+            if motion.touched[j] > 0:
+                along = g0 * motion.normal[j, 0] + g1 * motion.normal[j, 1] + g2 * motion.normal[j, 2]
+                square -= along * along
+            total += inverse_mass[j] * square
+        diagonal[r] = total if total > NEGLIGIBLE * free else 0.0
+
+
+@compiled
+def steepest_of_row(rows, inverse_mass, r):
+    """max_j w_j |J_rj| [m²/kg]: how far the node that moves most goes per unit of pressure and dt²."""
+    steepest = 0.0
+    for e in range(rows.row_start[r], rows.row_start[r + 1]):
+        g0, g1, g2 = rows.value[e, 0], rows.value[e, 1], rows.value[e, 2]
+        steepest = max(steepest, inverse_mass[rows.column[e]] * math.sqrt(g0 * g0 + g1 * g1 + g2 * g2))
+    return steepest
