@@ -85,13 +85,13 @@ def test_probe_is_on_the_surface_and_looks_out(name):
 
 @pytest.mark.parametrize(
     ("name", "patch", "area"),
-    # [cm^2]. Bare area: a tenth of a liver's face under the diaphragm; hila 3 x 5 cm; tubes 25-30 mm wide, closed.
+    # [cm^2]. Bare area: a tenth of a liver's face under the diaphragm; hila 3 x 5 cm; round ends of tubes 22 to 35 mm wide: half spheres have 8 to 19.
     [
         ("liver", "bare_area", (30, 50)),
         ("kidney", "hilum", (10, 22)),
         ("spleen", "hilum", (5, 15)),
-        ("stomach", "cardia", (5, 14)),
-        ("stomach", "pylorus", (5, 14)),
+        ("stomach", "cardia", (10, 20)),
+        ("stomach", "pylorus", (10, 20)),
         ("bladder", "neck", (6, 16)),
     ],
 )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from studies.geometry.blends import canal, closed, ellipsoid, smooth_max, smooth_min
+from studies.geometry.blends import canal, closed, ellipsoid, local_min, smooth_max
 from studies.geometry.levelset import Literature, Shape
 from studies.geometry.organs.millimetres import MARGIN, MM, check_lengths, check_wall, metres, si, touch
 from studies.geometry.regions import BallRegion
@@ -13,7 +13,7 @@ CAPACITY = Literature(
 
 
 def bladder_shape(
-    width: float = 102.0, depth: float = 94.0, height: float = 92.0, neck: float = 13.0, wall: float = 4.0
+    width: float = 106.0, depth: float = 97.0, height: float = 95.0, neck: float = 13.0, wall: float = 4.0
 ) -> Shape:
     """A well filled adult bladder [mm].
 
@@ -27,9 +27,9 @@ def bladder_shape(
 
     def level(x: np.ndarray) -> np.ndarray:
         apex = ellipsoid(x, (0, -0.5 * b, 0.3 * c), (0.5 * a, 0.75 * b, 0.5 * c))
-        egg = smooth_min(ellipsoid(x, (0, 4, 0), (a, b, c)), apex, 14)
+        egg = local_min(ellipsoid(x, (0, 4, 0), (a, b, c)), apex, 18)
         flat = smooth_max(egg, ellipsoid(x, (0, 0, -2.1 * c), (3 * c, 3 * c, 3 * c)), 12)
-        return smooth_min(flat, canal(x, funnel), 12)
+        return local_min(flat, canal(x, funnel), 16)
 
     low = metres(-a - MARGIN, -1.4 * b - MARGIN, -1.5 * c - neck - MARGIN)
     high = metres(a + MARGIN, 1.2 * b + MARGIN, c + MARGIN)

@@ -12,21 +12,21 @@ VOLUME = Literature(
 )
 
 
-def kidney_shape(length: float = 110.0, width: float = 58.0, thickness: float = 46.0, sinus: float = 20.0) -> Shape:
+def kidney_shape(length: float = 110.0, width: float = 60.0, thickness: float = 47.0, sinus: float = 20.0) -> Shape:
     """An adult's kidney [mm], 11 cm long, 5-6 wide, 4-5 thick (Emamian et al., Am. J. Roentgenol. 160 (1993) 83).
 
     sinus: depth of the hollow behind the lips of the hilum. Raises StudyError for a length that is none.
     """
     check_lengths("kidney", length=length, width=width, thickness=thickness, sinus=sinus)
     w, half = 0.5 * width, 0.5 * length
-    upper, lower = (-0.24 * w, 0, half - 0.78 * w, w), (-0.24 * w, 0, 0.78 * w - half, w)
-    bean = closed([upper, (0.22 * w, 0, 0.3 * half, w), (0.22 * w, 0, -0.3 * half, w), lower])
-    hilum, slit = (-0.86 * w, -0.1 * w, 0), (sinus, 0.16 * thickness, 0.17 * length)
+    upper, lower = (-0.16 * w, 0, half - 0.84 * w, w), (-0.16 * w, 0, 0.84 * w - half, w)
+    bean = closed([upper, (0.16 * w, 0, 0.3 * half, w), (0.16 * w, 0, -0.3 * half, w), lower])
+    hilum, slit = (-0.88 * w, -0.06 * w, 0), (sinus, 0.18 * thickness, 0.18 * length)
 
     def level(x: np.ndarray) -> np.ndarray:
         # Flattened from front to back, and hollowed where vessels and ureter come in, between two lips.
         outer = canal(x * (1.0, width / thickness, 1.0), bean)
-        return smooth_max(outer, -ellipsoid(x, hilum, slit), 6)
+        return smooth_max(outer, -ellipsoid(x, hilum, slit), 11)
 
     high = metres(1.3 * w + MARGIN, 0.55 * thickness + MARGIN, half + MARGIN)
     regions = {"hilum": EllipsoidRegion(metres(*hilum), metres(w, 0.32 * thickness, 0.24 * length))}
