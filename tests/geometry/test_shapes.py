@@ -85,7 +85,8 @@ def test_probe_is_on_the_surface_and_looks_out(name):
 
 @pytest.mark.parametrize(
     ("name", "patch", "area"),
-    # [cm^2]. Bare area: a tenth of a liver's face under the diaphragm; hila 3 x 5 cm; round ends of tubes 22 to 35 mm wide: half spheres have 8 to 19.
+    # [cm^2]. Bare area: a tenth of a liver's face under the diaphragm; hila 3 x 5 cm; the round ends of tubes 22 to
+    # 35 mm wide: half spheres have 8 to 19.
     [
         ("liver", "bare_area", (30, 50)),
         ("kidney", "hilum", (10, 22)),

@@ -11,29 +11,28 @@ CAPACITY = Literature(1000.0, "Ferrua and Singh, J. Food Sci. 75 (2010) R151: ab
 
 
 def stomach_shape(
-    height: float = 215.0, fundus: float = 48.0, body: float = 45.0, antrum: float = 26.0, wall: float = 4.5
+    height: float = 203.0,
+    width: float = 166.0,
+    fundus: float = 48.0,
+    body: float = 45.0,
+    antrum: float = 26.0,
+    wall: float = 4.5,
 ) -> Shape:
     """A distended adult stomach: fundus above the cardia, body, incisura, antrum rising to the pylorus [mm].
 
-    height: from the fundus to the lowest point of the greater curvature; fundus, body, antrum: outer radii. A wall of
-    4-5 mm (Rapaccini et al., J. Ultrasound Med. 7 (1988)), a tube 35 mm wide at both ends (cardia and pylorus).
+    height, width: of the whole, as seen from the front; fundus, body, antrum: outer radii. The wall is 4-5 mm thick
+    (Rapaccini et al., J. Ultrasound Med. 7 (1988) 383); the ends at cardia and pylorus are tubes 35 mm wide.
     Raises StudyError for a length that is none and a wall that fills the pylorus.
     """
-    check_lengths("stomach", height=height, fundus=fundus, body=body, antrum=antrum, wall=wall)
+    check_lengths("stomach", height=height, width=width, fundus=fundus, body=body, antrum=antrum, wall=wall)
     check_wall("stomach", wall, 0.68 * antrum)
-    h, f, b, a = height, fundus, body, antrum
-    sac = closed(
-        [(32, 18, 0.25 * h, 1.05 * f), (44, 8, 0.1 * h, b), (40, -6, -0.16 * h, b), (14, -12, -0.3 * h, 0.82 * b)]
-    )
-    exit_ = closed(
-        [
-            (30, -10, -0.28 * h, 1.05 * a),
-            (-6, -14, -0.37 * h, 1.4 * a),
-            (-48, -8, -0.32 * h, 1.15 * a),
-            (-70, 10, -0.15 * h, 0.68 * a),
-        ]
-    )
-    gullet = closed([(10, 18, 0.13 * h, 0.68 * a), (-10, 18, 0.16 * h, 0.68 * a), (-30, 16, 0.26 * h, 0.68 * a)])
+    h, w, f, b, a = height, width, fundus, body, antrum
+    upper = [(0.19 * w, 0.4 * b, 0.265 * h, 1.05 * f), (0.26 * w, 0.18 * b, 0.105 * h, b)]
+    lower = [(0.24 * w, -0.13 * b, -0.17 * h, b), (0.085 * w, -0.27 * b, -0.32 * h, 0.82 * b)]
+    sinus = [(0.18 * w, -0.22 * b, -0.295 * h, 1.05 * a), (-0.035 * w, -0.3 * b, -0.39 * h, 1.4 * a)]
+    outlet = [(-0.29 * w, -0.18 * b, -0.34 * h, 1.15 * a), (-0.42 * w, 0.22 * b, -0.16 * h, 0.68 * a)]
+    cardia = [(0.06 * w, 0.4 * b, 0.14 * h), (-0.06 * w, 0.4 * b, 0.17 * h), (-0.18 * w, 0.36 * b, 0.275 * h)]
+    sac, exit_, gullet = closed([*upper, *lower]), closed([*sinus, *outlet]), closed([(*c, 0.68 * a) for c in cardia])
 
     def level(x: np.ndarray) -> np.ndarray:
         # Where body and antrum meet on the lesser curvature, the blend leaves the incisura.
@@ -44,7 +43,7 @@ def stomach_shape(
         "cardia": BallRegion(metres(*gullet[-1][:3]), 0.68 * a * MM),
         "pylorus": BallRegion(metres(*exit_[-1][:3]), 0.68 * a * MM),
     }
-    probe = touch(level, (42, -200, 0), (0, 1, 0))
+    probe = touch(level, (0.25 * w, -5 * b, 0), (0, 1, 0))
     return Shape("stomach", si(level), low, high, 5 * MM, regions, wall * MM, CAPACITY, probe, (0.0, 1.0, 0.0))
 
 
