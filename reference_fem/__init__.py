@@ -24,11 +24,13 @@ if "NUMBA_CACHE_DIR" not in os.environ:
 
 from reference_fem.cavity import Cavity  # noqa: E402
 from reference_fem.contact import RigidPlane, RigidSphere  # noqa: E402
+from reference_fem.element_table import ELEMENTS, Element  # noqa: E402
 from reference_fem.elements import facet_nodes, nodes, surface_triangles  # noqa: E402
 from reference_fem.equilibrium import Equilibrium, equilibrium_path  # noqa: E402
 from reference_fem.errors import ReferenceProblem, SlowSolverWarning  # noqa: E402
 from reference_fem.evaluate import Evaluator  # noqa: E402
-from reference_fem.material import NeoHookean  # noqa: E402
+from reference_fem.loads import BodyForce, Traction  # noqa: E402
+from reference_fem.material import Material, MooneyRivlin, NeoHookean  # noqa: E402
 from reference_fem.mesh import curve  # noqa: E402
 from reference_fem.modes import Modes, natural_frequencies  # noqa: E402
 from reference_fem.problem import Held, Problem  # noqa: E402
@@ -37,11 +39,16 @@ from reference_fem.system import NewtonSettings  # noqa: E402
 config.CACHE_DIR = _folder_before  # pyright: ignore[reportAttributeAccessIssue]
 
 __all__ = [
+    "ELEMENTS",
+    "BodyForce",
     "Cavity",
+    "Element",
     "Equilibrium",
     "Evaluator",
     "Held",
+    "Material",
     "Modes",
+    "MooneyRivlin",
     "NeoHookean",
     "NewtonSettings",
     "Problem",
@@ -49,6 +56,7 @@ __all__ = [
     "RigidPlane",
     "RigidSphere",
     "SlowSolverWarning",
+    "Traction",
     "curve",
     "equilibrium_path",
     "facet_nodes",

@@ -34,10 +34,9 @@ def check_loads(problem):
     if gravity.any() and problem.density == 0.0:
         raise ReferenceProblem("gravity acts but the density is 0 kg/m³: give the density, or no gravity")
     for name in ("order", "contact_order"):
-        if getattr(problem, name) < 4:
-            raise ReferenceProblem(
-                f"the quadrature {name} is {getattr(problem, name)}: 4 is the least that integrates p J exactly"
-            )
+        given = getattr(problem, name)
+        if given is not None and given < 4:
+            raise ReferenceProblem(f"the quadrature {name} is {given}: 4 is the least that integrates p J exactly")
 
 
 def check_inertia(problem):
@@ -94,7 +93,8 @@ def direction(v):
 
 def check_start(surface, rows, size):
     """Refuse an obstacle that starts deeper than START_DEPTH of the body's size in the undeformed body."""
-    y = np.einsum("qa,fia->fqi", surface.values, surface.rest[surface.dofs].reshape(-1, 3, 6)).reshape(-1, 3)
+    y = np.einsum("qa,fia->fqi", surface.values, surface.rest[surface.dofs].reshape(len(surface.dofs), 3, -1))
+    y = y.reshape(-1, 3)
     for k, row in enumerate(rows):
         depth = -min(gap_into(row, point, np.empty(3))[0] for point in y)
         if depth > START_DEPTH * size:

@@ -64,9 +64,9 @@ class Surface(NamedTuple):
     """What the contact kernel reads of the boundary: nf facets, nq points each."""
 
     dofs: np.ndarray
-    """Unknowns of the six nodes, u_x first, then u_y, u_z, (nf, 18) uint32."""
+    """Unknowns of the six nodes (three, for linear elements), u_x first, then u_y, u_z, (nf, 18) uint32."""
     positions: np.ndarray
-    """Slots of the packed 18 x 18 upper triangle, (nf, 171) uint32."""
+    """Slots of the packed upper triangle of 18 x 18, (nf, 171) uint32."""
     rest: np.ndarray
     """Rest coordinates, interleaved like the unknowns, (3 N2,) [m]."""
     values: np.ndarray
@@ -132,7 +132,8 @@ def add_contact(x, surface, touch, values, residual, tangent):
     dofs, positions, rest, shapes, weights, _ = surface
     rows, shift, multiplier, penalty, pressure, force = touch
     y, n, k = np.empty(3), np.empty(3), np.empty((3, 3))
-    K = np.empty((18, 18))
+    count = shapes.shape[1]
+    K = np.empty((3 * count, 3 * count))
     force[:] = 0.0
     for o in range(rows.shape[0]):
         for f in range(dofs.shape[0]):
@@ -140,8 +141,8 @@ def add_contact(x, surface, touch, values, residual, tangent):
             for q in range(weights.shape[1]):
                 for i in range(3):
                     y[i] = 0.0
-                    for a in range(6):
-                        dof = dofs[f, 6 * i + a]
+                    for a in range(count):
+                        dof = dofs[f, count * i + a]
                         y[i] += shapes[q, a] * (rest[dof] + x[dof])
                 g, curvature = gap_into(rows[o], y, n)
                 t = max(0.0, multiplier[o, f, q] - penalty[f] * g)
@@ -161,8 +162,8 @@ def add_contact(x, surface, touch, values, residual, tangent):
                     force[o, i] += push
                     for j in range(3):
                         push += k[i, j] * shift[o, j]
-                    for a in range(6):
-                        residual[dofs[f, 6 * i + a]] -= push * shapes[q, a]
+                    for a in range(count):
+                        residual[dofs[f, count * i + a]] -= push * shapes[q, a]
                 if tangent:
                     add_point_stiffness(shapes[q], k, K)
             if tangent and touched:
@@ -172,11 +173,12 @@ def add_contact(x, surface, touch, values, residual, tangent):
 @njit(cache=True)
 def add_point_stiffness(N, k, K):
     """K[ia, jb] += k_ij N_a N_b."""
+    count = len(N)
     for i in range(3):
-        for a in range(6):
+        for a in range(count):
             for j in range(3):
-                for b in range(6):
-                    K[6 * i + a, 6 * j + b] += k[i, j] * N[a] * N[b]
+                for b in range(count):
+                    K[count * i + a, count * j + b] += k[i, j] * N[a] * N[b]
 
 
 @njit(cache=True)
@@ -191,7 +193,7 @@ def scatter(K, positions, values):
 
 def potential(x, surface: Surface, touch: Touch):
     """sum w (t² - m²) / (2 eps) [J] in plain NumPy, apart from the kernel, to check it."""
-    moved = (surface.rest + x[: len(surface.rest)])[surface.dofs].reshape(-1, 3, 6)
+    moved = (surface.rest + x[: len(surface.rest)])[surface.dofs].reshape(len(surface.dofs), 3, -1)
     y = np.einsum("qa,fia->fqi", surface.values, moved)
     total, eps = 0.0, touch.penalty[:, None]
     for row, m in zip(touch.rows, touch.multiplier, strict=True):

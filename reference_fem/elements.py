@@ -1,16 +1,17 @@
-"""Taylor-Hood P2/P1 on tetrahedra: reference tables and the geometry of one mesh, from scikit-fem.
+"""Elements on one mesh: their unknowns, reference tables and geometry, from scikit-fem.
 
-A local vector has 34 entries: u_x at the ten nodes, then u_y, u_z, then p at the four vertices.
+Whatever the element, the mesh gives ten nodes to a tetrahedron and results are reported at them (`nodes`).
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from skfem import ElementTetP1, ElementTetP2, ElementTriP2, MeshTet
+from skfem import ElementTetMini, ElementTetP2, ElementTriP2, MeshTet
 from skfem.assembly import Dofs
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet, RefTri
 
+from reference_fem.element_table import ELEMENTS, Element
 from reference_fem.errors import ReferenceProblem
 
 FACET_EDGES = ((0, 1), (1, 2), (0, 2))
@@ -18,25 +19,30 @@ FACET_EDGES = ((0, 1), (1, 2), (0, 2))
 
 
 class Elements(NamedTuple):
-    """Everything the element kernel reads, for `ne` elements and `nq` quadrature points each."""
+    """Everything the element kernel reads, for `ne` elements and `nq` quadrature points each.
+
+    A local vector has u_x at the `nu` functions, then u_y, u_z, then p at the `np` functions.
+    """
 
     dofs: np.ndarray
-    """Global unknown of each local one, (ne, 34) uint32."""
+    """Global unknown of each local one, (ne, 3 nu + np) uint32; (ne, 3 nu) when the pressure is eliminated."""
     gradients: np.ndarray
-    """Rest gradients of the ten displacement functions, (ne, nq, 3, 10) [1/m]."""
+    """Rest gradients of the displacement functions, (ne, nq, 3, nu) [1/m]."""
     pressures: np.ndarray
-    """Values of the four pressure functions, (nq, 4)."""
+    """Values of the pressure functions, (nq, np)."""
     weights: np.ndarray
     """Rest volume of each quadrature point, (ne, nq) [m³]."""
+    functions: tuple
+    """nu zeros: a tuple's length is known to the compiler, an array's is not."""
 
 
 class Facets(NamedTuple):
-    """Boundary facets as six-node triangles, turned outward, for `nf` facets and `nq` points each."""
+    """Boundary facets, turned outward, for `nf` facets and `nq` points each."""
 
     nodes: np.ndarray
-    """Three vertices, then the mid-side nodes of FACET_EDGES, (nf, 6)."""
+    """Three vertices, then the mid-side nodes of FACET_EDGES, (nf, 6); without those for linear facets, (nf, 3)."""
     values: np.ndarray
-    """Values of the six functions, (nq, 6)."""
+    """Values of the six (or three) functions, (nq, 6)."""
     weights: np.ndarray
     """Rest area of each quadrature point, (nf, nq) [m²]."""
 
@@ -63,22 +69,62 @@ def nodes(mesh: MeshTet) -> np.ndarray:
     return np.ascontiguousarray(np.hstack((mesh.p, middles)).T)
 
 
-def build_elements(mesh: MeshTet, order: int) -> Elements:
+def displacement_table(mesh: MeshTet, element: Element) -> np.ndarray:
+    """Numbers of each element's displacement functions, (ne, nu): vertices first, then mid-side nodes or bubbles."""
+    return np.asarray(Dofs(mesh, element.displacement).element_dofs).T
+
+
+def displacement_points(mesh: MeshTet, element: Element) -> np.ndarray:
+    """Rest positions that belong to the displacement functions, (n, 3) [m]: nodes, or the centre for a bubble."""
+    if isinstance(element.displacement, ElementTetP2):
+        return nodes(mesh)
+    points = nodes(mesh)[: mesh.nvertices]
+    if isinstance(element.displacement, ElementTetMini):
+        points = np.vstack((points, points[mesh.t[:4]].mean(axis=0)))
+    return points
+
+
+def at_nodes(mesh: MeshTet, element: Element, values) -> np.ndarray:
+    """A displacement field (n, 3) at the P2 nodes, (N2, 3); mid-side nodes of a linear field lie between two vertices,
+    and a bubble is zero there."""
+    if isinstance(element.displacement, ElementTetP2):
+        return values
+    corners = values[: mesh.nvertices]
+    return np.vstack((corners, corners[mesh.edges].mean(axis=0)))
+
+
+def forces_at_nodes(mesh: MeshTet, element: Element, forces):
+    """Forces on the displacement functions (n, 3) as forces on the P2 nodes, (N2, 3) [N]; bubbles carry none."""
+    if isinstance(element.displacement, ElementTetP2):
+        return forces
+    return np.vstack((forces[: mesh.nvertices], np.zeros((len(nodes(mesh)) - mesh.nvertices, 3))))
+
+
+def build_elements(mesh: MeshTet, order: int, element: Element = ELEMENTS["P2/P1"]) -> Elements:
     """Tables of every element; raises ReferenceProblem for folded or flat elements.
 
-    order: degree that the quadrature integrates exactly; u enters J as a cubic and p J as a quartic.
+    order: degree that the quadrature integrates exactly; P2 displacements enter J as a cubic and p J as a quartic.
     """
     points, w = get_quadrature(RefTet, order)
-    _, local = basis_table(ElementTetP2(), points)
-    pressures, _ = basis_table(ElementTetP1(), points)
-    table, x = element_nodes(mesh), nodes(mesh)
-    jacobian = np.einsum("eni,qJn->eqiJ", x[table], local)
+    _, shape = basis_table(ElementTetP2(), points)
+    _, local = basis_table(element.displacement, points)
+    x = nodes(mesh)
+    jacobian = np.einsum("eni,qJn->eqiJ", x[element_nodes(mesh)], shape)
     det = np.linalg.det(jacobian)
     check_shapes(det)
     gradients = np.einsum("eqJi,qJn->eqin", np.linalg.inv(jacobian), local)
-    count = len(x)
-    dofs = np.hstack([3 * table + c for c in range(3)] + [3 * count + table[:, :4]])
-    return Elements(dofs.astype(np.uint32), np.ascontiguousarray(gradients), pressures, np.abs(det) * w)
+    table = displacement_table(mesh, element)
+    dofs, pressures = [3 * table + c for c in range(3)], np.ones((len(w), 1))
+    if element.pressure is not None:
+        dofs.append(3 * (table.max() + 1) + mesh.t[:4].T)
+        pressures, _ = basis_table(element.pressure, points)
+    return Elements(
+        dofs=np.hstack(dofs).astype(np.uint32),
+        gradients=np.ascontiguousarray(gradients),
+        pressures=pressures,
+        weights=np.abs(det) * w,
+        functions=(0,) * table.shape[1],
+    )
 
 
 def check_shapes(det):
@@ -136,16 +182,17 @@ def edge_index(mesh, pairs):
     return order[np.searchsorted(keys, wanted, sorter=order)]
 
 
-def build_facets(mesh: MeshTet, order: int) -> Facets:
+def build_facets(mesh: MeshTet, order: int, element: Element = ELEMENTS["P2/P1"]) -> Facets:
     """Quadrature on the boundary. Raises ReferenceProblem when the order has a rule with negative weights."""
     points, w = get_quadrature(RefTri, order)
     if w.min() <= 0.0:
         raise ReferenceProblem(f"the contact order {order} has a rule with negative weights: use 4, 5, 6 or 8")
-    values, local = basis_table(ElementTriP2(), points)
+    _, local = basis_table(ElementTriP2(), points)
     table = facet_nodes(mesh)
     tangents = np.einsum("fni,qJn->fqJi", nodes(mesh)[table], local)
     area = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2)
-    return Facets(table, values, area * w)
+    values, _ = basis_table(element.facet, points)
+    return Facets(table[:, : values.shape[1]], values, area * w)
 
 
 def surface_triangles(mesh: MeshTet) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 
 from reference_fem import assembly, contact
 from reference_fem.checks import check_times
+from reference_fem.elements import at_nodes, forces_at_nodes
 from reference_fem.errors import ReferenceProblem
 from reference_fem.newton import StepFailed, solve_step
 from reference_fem.problem import Problem
@@ -66,7 +67,7 @@ def equilibrium_path(
 ) -> list[Equilibrium]:
     """Equilibria at the given times [s], reached from rest at settings.start; on_step sees each as it is found.
 
-    Gravity and cavities that start filled are switched on first, at the start. Raises ReferenceProblem for a problem
+    Dead loads and cavities that start filled are switched on first, at the start. Raises ReferenceProblem for a problem
     that cannot be set up, and when a sub-step below settings.smallest_step still fails: then its `converged` holds
     what was reached.
     """
@@ -124,16 +125,17 @@ def describe(system: System, state: State, iterations, substeps) -> Equilibrium:
     """Everything worth knowing about a converged state."""
     n, elements = system.displacement_count, system.elements
     found = system.evaluate(state.x, system.loads_of(state), tangent=False)
-    J = np.linalg.det(assembly.deformation(state.x, elements)[0])
+    mesh, material = system.problem.mesh, system.problem.material
+    J = np.linalg.det(assembly.deformation(state.x, elements, material.kappa)[0])
     reaction = np.zeros(n)
     reaction[system.pattern.held] = found.residual[system.pattern.held]
     return Equilibrium(
         t=float(state.t),
-        u=state.x[:n].reshape(-1, 3).copy(),
-        p=state.x[n : system.field_count].copy(),
+        u=at_nodes(mesh, system.element, state.x[:n].reshape(-1, 3).copy()),
+        p=assembly.vertex_pressure(state.x[: system.field_count], elements, mesh, material.kappa),
         obstacle_force=found.touch.force,
         held_force=held_forces(system, reaction),
-        reaction=reaction.reshape(-1, 3),
+        reaction=forces_at_nodes(mesh, system.element, reaction.reshape(-1, 3)),
         volume=float(np.sum(elements.weights * J)),
         volume0=system.volume,
         J=J,
@@ -141,7 +143,7 @@ def describe(system: System, state: State, iterations, substeps) -> Equilibrium:
         penetration=contact.penetration(found.touch),
         newton_iterations=iterations,
         substeps=substeps,
-        energy=assembly.energy(state.x, elements, system.problem.material),
+        energy=assembly.energy(state.x, elements, material),
         cavity_pressure=state.x[system.field_count :].copy(),
         cavity_volume=found.volumes,
     )

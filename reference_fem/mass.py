@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from skfem import ElementTetP2
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
 
@@ -17,7 +16,7 @@ class Mass(NamedTuple):
     """The same mass twice: for forces, and where the tangent wants it."""
 
     matrix: sp.csr_matrix
-    """One component, between the P2 nodes, (N2, N2) [kg]."""
+    """One component, between the displacement functions (the P2 nodes), (N2, N2) [kg]."""
     values: np.ndarray
     """All components in the slots of the tangent's pattern, (pattern.size,) [kg]."""
 
@@ -26,9 +25,9 @@ class Mass(NamedTuple):
         return self.matrix @ field
 
 
-def element_masses(elements, density, order):
-    """rho integral N_a N_b of every element, (ne, 10, 10) [kg]: quartic, exact on straight elements at order 4."""
-    values, _ = basis_table(ElementTetP2(), get_quadrature(RefTet, order)[0])
+def element_masses(element, elements, density, order):
+    """rho integral N_a N_b of every element, (ne, nu, nu) [kg]; for P2 exact at order 4 on straight elements."""
+    values, _ = basis_table(element.displacement, get_quadrature(RefTet, order)[0])
     return density * np.einsum("eq,qa,qb->eab", elements.weights, values, values)
 
 
@@ -46,20 +45,20 @@ class MovingSystem(System):
 def build_mass(system: System) -> Mass:
     """Consistent mass of a system, by the quadrature of its elements."""
     problem, elements = system.problem, system.elements
-    local = element_masses(elements, problem.density, problem.order)
-    count = len(system.nodes)
-    table = elements.dofs[:, :10].astype(np.int64) // 3
-    rows, cols = np.repeat(table, 10, axis=1).ravel(), np.tile(table, (1, 10)).ravel()
+    local = element_masses(system.element, elements, problem.density, problem.degree)
+    count, width = len(system.nodes), len(elements.functions)
+    table = elements.dofs[:, :width].astype(np.int64) // 3
+    rows, cols = np.repeat(table, width, axis=1).ravel(), np.tile(table, (1, width)).ravel()
     matrix = sp.csr_matrix((local.ravel(), (rows, cols)), shape=(count, count))
     return Mass(matrix, packed(local, system.positions, system.pattern.size, elements.dofs.shape[1]))
 
 
 def packed(local, positions, size, width):
-    """Element masses (ne, 10, 10), once for each component, added into the slots of packed upper triangles."""
-    values = np.zeros(size)
-    a, b = np.triu_indices(10)
+    """Element masses (ne, nu, nu), once for each component, added into the slots of packed upper triangles."""
+    values, count = np.zeros(size), local.shape[1]
+    a, b = np.triu_indices(count)
     for component in range(3):
-        row, col = 10 * component + a, 10 * component + b
+        row, col = count * component + a, count * component + b
         slots = positions[:, row * width - row * (row - 1) // 2 + col - row]
         values += np.bincount(slots.ravel(), local[:, a, b].ravel(), minlength=size)
     return values

@@ -1,4 +1,8 @@
-"""Nearly incompressible materials with the pressure as an unknown (docs/theory.md, reference)."""
+"""Nearly incompressible materials with the pressure as an unknown (docs/theory.md, reference).
+
+Every material is W = iso(F) + p (J - 1) - p²/(2 kappa): p is positive in tension, the Cauchy stress is its deviator
+plus p, and the pressure is zero at rest. The compiled law has two terms; a neo-Hookean solid has only the first.
+"""
 
 from dataclasses import dataclass
 
@@ -8,11 +12,54 @@ from numba import njit
 from reference_fem.errors import ReferenceProblem
 
 
-@dataclass(frozen=True)
-class NeoHookean:
-    """W = mu/2 (J^-2/3 tr FᵀF - 3) + p (J - 1) - p²/(2 kappa); the pressure is zero at rest.
+def check_modulus(name, value):
+    """Refuse a modulus that is not a positive finite number."""
+    if not (np.isfinite(value) and value > 0.0):
+        raise ReferenceProblem(
+            f"the material's {name} is {value} Pa: it must be positive and finite "
+            f"(a nearly incompressible tissue has kappa of about 1000 mu)"
+        )
 
-    p is positive in tension: the Cauchy stress is its deviator plus p. mu, kappa in Pa.
+
+class TwoTermLaw:
+    """What every material here shares: all that follows from its `parameters`."""
+
+    mu: float
+    """Shear modulus at rest [Pa]."""
+    kappa: float
+    """Bulk modulus [Pa]."""
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """What the compiled law reads: (2 c1, 2 c2, kappa) [Pa]."""
+        raise NotImplementedError
+
+    def energy_density(self, F, p):
+        """W [J/m³] for F (..., 3, 3) and p (...) [Pa]; written apart from the kernel, to check it."""
+        m1, m2, kappa = self.parameters
+        J, C = np.linalg.det(F), np.swapaxes(F, -1, -2) @ F
+        I1 = np.trace(C, axis1=-2, axis2=-1)
+        I2 = 0.5 * (I1**2 - np.sum(C * C, axis=(-2, -1)))
+        isochoric = m1 * (I1 * J ** (-2.0 / 3.0) - 3.0) + m2 * (I2 * J ** (-4.0 / 3.0) - 3.0)
+        return 0.5 * isochoric + p * (J - 1.0) - 0.5 * p**2 / kappa
+
+    def stress(self, F, p):
+        """First Piola-Kirchhoff stress P (..., 3, 3) [Pa], P Fᵀ = dev(m1 b + m2 (I1 b - b²)) + J p.
+
+        m1, m2 = 2 c1 J^-2/3, 2 c2 J^-4/3, b = F Fᵀ; written apart from the kernel, to check it.
+        """
+        J = np.linalg.det(F)[..., None, None]
+        b, one = F @ np.swapaxes(F, -1, -2), np.eye(3)
+        I1 = np.trace(b, axis1=-2, axis2=-1)[..., None, None]
+        shear = self.parameters[0] * J ** (-2.0 / 3.0) * b + self.parameters[1] * J ** (-4.0 / 3.0) * (I1 * b - b @ b)
+        deviator = shear - np.trace(shear, axis1=-2, axis2=-1)[..., None, None] / 3.0 * one
+        return (deviator + J * np.asarray(p)[..., None, None] * one) @ np.swapaxes(np.linalg.inv(F), -1, -2)
+
+
+@dataclass(frozen=True)
+class NeoHookean(TwoTermLaw):
+    """W = mu/2 (J^-2/3 I1 - 3) + p (J - 1) - p²/(2 kappa); mu, kappa in Pa.
+
     Raises ReferenceProblem when mu or kappa is not a positive finite number.
     """
 
@@ -20,23 +67,48 @@ class NeoHookean:
     kappa: float
 
     def __post_init__(self):
-        for name, value in (("mu", self.mu), ("kappa", self.kappa)):
-            if not (np.isfinite(value) and value > 0.0):
-                raise ReferenceProblem(
-                    f"the material's {name} is {value} Pa: it must be positive and finite "
-                    f"(a nearly incompressible tissue has kappa of about 1000 mu)"
-                )
+        check_modulus("mu", self.mu)
+        check_modulus("kappa", self.kappa)
 
     @property
     def parameters(self):
-        """What the compiled element kernel needs: (mu, kappa) [Pa]."""
-        return np.array([self.mu, self.kappa])
+        """(mu, 0, kappa) [Pa]."""
+        return np.array([self.mu, 0.0, self.kappa])
 
-    def energy_density(self, F, p):
-        """W [J/m³] for F (..., 3, 3) and p (...) [Pa]; written apart from the kernel, to check it."""
-        J = np.linalg.det(F)
-        isochoric = np.sum(F * F, axis=(-2, -1)) * J ** (-2.0 / 3.0) - 3.0
-        return 0.5 * self.mu * isochoric + p * (J - 1.0) - 0.5 * p**2 / self.kappa
+
+@dataclass(frozen=True)
+class MooneyRivlin(TwoTermLaw):
+    """W = c1 (J^-2/3 I1 - 3) + c2 (J^-4/3 I2 - 3) + p (J - 1) - p²/(2 kappa), shear modulus 2 (c1 + c2); all in Pa.
+
+    Two-term law of Mooney (1940) and Rivlin (1948), its invariants made isochoric. Raises ReferenceProblem when kappa
+    or the shear modulus is not positive and finite, or c1 or c2 is negative (then the energy is not polyconvex).
+    """
+
+    c1: float
+    c2: float
+    kappa: float
+
+    def __post_init__(self):
+        for name, value in (("c1", self.c1), ("c2", self.c2)):
+            if not value >= 0.0:
+                raise ReferenceProblem(
+                    f"the material's {name} is {value} Pa: it must not be negative, or large strains have no solution"
+                )
+        check_modulus("mu = 2 (c1 + c2)", self.mu)
+        check_modulus("kappa", self.kappa)
+
+    @property
+    def mu(self):
+        """Shear modulus at rest [Pa]."""
+        return 2.0 * (self.c1 + self.c2)
+
+    @property
+    def parameters(self):
+        """(2 c1, 2 c2, kappa) [Pa]."""
+        return np.array([2.0 * self.c1, 2.0 * self.c2, self.kappa])
+
+
+Material = NeoHookean | MooneyRivlin
 
 
 @njit(cache=True)
@@ -51,10 +123,10 @@ def cofactor_into(F, cof):
 
 
 @njit(cache=True)
-def neo_hookean_into(F, p, parameters, H, P, A):
+def response_into(F, p, parameters, H, P, A, scratch):
     """P = dW/dF (3, 3) [Pa], A = dP/dF (9, 9) [Pa], H = F^-T; returns J, and J <= 0 leaves the rest unset.
 
-    With m = mu J^-2/3: P = m (F - I1/3 H) + p J H and, row iJ, column kL,
+    With m = 2 c1 J^-2/3: P = m (F - I1/3 H) + p J H and, row iJ, column kL,
     A = m (1 - 2/3 (F⊗H + H⊗F)) + (2/9 m I1 + p J) H⊗H + (m I1/3 - p J) H_iL H_kJ.
     """
     J = cofactor_into(F, H)
@@ -79,4 +151,37 @@ def neo_hookean_into(F, p, parameters, H, P, A):
                         - mixed * (F[i, r] * H[k, s] + H[i, r] * F[k, s])
                     )
             A[3 * i + r, 3 * i + r] += m
+    if parameters[1] != 0.0:
+        add_second_invariant(F, H, I1, parameters[1] * J ** (-4.0 / 3.0), P, A, scratch)
     return J
+
+
+@njit(cache=True)
+def add_second_invariant(F, H, I1, m, P, A, scratch):
+    """P += m (D - 2/3 I2 H), A += its derivative, m = 2 c2 J^-4/3; I2 = (I1² - |C|²)/2, D = I1 F - F C.
+
+    A: m (dD - 4/3 (D⊗H + H⊗D) + 2/3 I2 (4/3 H⊗H + H_iL H_kJ)), and with b = F Fᵀ
+    dD = 2 F⊗F - F_iL F_kJ + (I1 δ_ik - b_ik) δ_JL - δ_ik C_LJ.
+    """
+    C, b, D = scratch[0], scratch[1], scratch[2]
+    I2 = 0.5 * I1 * I1
+    for i in range(3):
+        for r in range(3):
+            C[i, r] = F[0, i] * F[0, r] + F[1, i] * F[1, r] + F[2, i] * F[2, r]
+            b[i, r] = F[i, 0] * F[r, 0] + F[i, 1] * F[r, 1] + F[i, 2] * F[r, 2]
+            I2 -= 0.5 * C[i, r] * C[i, r]
+    for i in range(3):
+        for r in range(3):
+            D[i, r] = I1 * F[i, r] - (F[i, 0] * C[0, r] + F[i, 1] * C[1, r] + F[i, 2] * C[2, r])
+            P[i, r] += m * (D[i, r] - 2.0 / 3.0 * I2 * H[i, r])
+    for i in range(3):
+        for r in range(3):
+            for k in range(3):
+                for s in range(3):
+                    slope = 2.0 * F[i, r] * F[k, s] - F[i, s] * F[k, r]
+                    slope -= 4.0 / 3.0 * (D[i, r] * H[k, s] + H[i, r] * D[k, s])
+                    slope += 2.0 / 3.0 * I2 * (4.0 / 3.0 * H[i, r] * H[k, s] + H[i, s] * H[k, r])
+                    A[3 * i + r, 3 * k + s] += m * slope
+                A[3 * i + r, 3 * k + r] -= m * b[i, k]
+                A[3 * i + r, 3 * i + k] -= m * C[r, k]
+            A[3 * i + r, 3 * i + r] += m * I1

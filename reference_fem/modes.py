@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from reference_fem.checks import rigid_freedoms
+from reference_fem.elements import at_nodes
 from reference_fem.errors import ReferenceProblem
 from reference_fem.mass import MovingSystem
 from reference_fem.problem import Problem
@@ -56,7 +57,8 @@ def natural_frequencies(problem: Problem, count: int, solver="auto") -> Modes:
     shapes = np.zeros((rigid + count, n))
     shapes[:, free] = vectors.T
     # round-off leaves a rigid motion's omega² at either side of zero
-    return Modes(np.sqrt(np.maximum(values, 0.0)), shapes.reshape(rigid + count, -1, 3), rigid)
+    fields = [at_nodes(problem.mesh, system.element, shape.reshape(-1, 3)) for shape in shapes]
+    return Modes(np.sqrt(np.maximum(values, 0.0)), np.array(fields), rigid)
 
 
 def lowest(system: MovingSystem, free, count):

@@ -28,19 +28,19 @@ def solve_step(system: System, state: State, t, load) -> State:
     """
     rows, target, old = system.obstacles_at(t), system.held_at(t), system.obstacles_at(state.t)
     filling = system.filling_at(t, load)
-    x, multiplier, stiffness = state.x, state.multiplier, 1.0
-    found = system.evaluate(x, Loads(load, old, multiplier, filling, shift=rows[:, 1:4] - old[:, 1:4]))
+    x, multiplier, stiffness, force = state.x, state.multiplier, 1.0, system.force_at(t, load)
+    found = system.evaluate(x, Loads(force, old, multiplier, filling, shift=rows[:, 1:4] - old[:, 1:4]))
     before = None
     for iteration in range(1, system.settings.max_iterations + 1):
         direction = system.step(found, x, target)
-        x, found = search(system, x, direction, Loads(load, rows, multiplier, filling, stiffness), before)
+        x, found = search(system, x, direction, Loads(force, rows, multiplier, filling, stiffness), before)
         arrived = np.array_equal(x[system.pattern.held], target)
         sunk = too_deep(system, x, found)
         if arrived and settled(found, system.settings, LOOSE if sunk else 1.0):
             if not sunk:
                 return State(t, load, x, multiplier, iteration, stiffness)
             multiplier, stiffness = found.touch.pressure, PENALTY_GROWTH * stiffness
-            found = system.evaluate(x, Loads(load, rows, multiplier, filling, stiffness))
+            found = system.evaluate(x, Loads(force, rows, multiplier, filling, stiffness))
         before = found
     raise StepFailed(
         f"{system.settings.max_iterations} Newton iterations left a relative force error of {found.errors[0]:.1e}"

@@ -5,21 +5,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from skfem import MeshTet
-from skfem.quadrature import get_quadrature
-from skfem.refdom import RefTet
 
 from reference_fem.cavity import Cavity
 from reference_fem.contact import RigidPlane, RigidSphere, finite_vector
-from reference_fem.elements import ElementTetP2, basis_table, element_nodes, facet_nodes, nodes
+from reference_fem.element_table import find_element
+from reference_fem.elements import build_facets, displacement_points
 from reference_fem.errors import ReferenceProblem
-from reference_fem.material import NeoHookean
+from reference_fem.loads import BodyForce, Traction
+from reference_fem.material import Material
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
     """Displacement components prescribed at boundary nodes.
 
-    where: (3, N) rest positions -> bool (N,), asked at the P2 nodes of the boundary.
+    where: (3, N) rest positions -> bool (N,), asked at the nodes of the boundary.
     motion: t [s] -> (3,) displacement [m], None = stays. shape: (3, N) rest positions -> (3, N) factors that the
     displacement is multiplied with, component by component, None = 1 (for radial or affine motions).
     """
@@ -35,19 +35,27 @@ class Problem:
     """A quasi-static problem in SI units; the body is stress-free on its mesh.
 
     mesh: MeshTet (straight) or MeshTet2 (curved, see curve). gravity [m/s²], density [kg/m³].
-    cavities: lumens that keep a volume or a pressure; a lumen not named is open.
-    order: degree integrated exactly; 5 is the lowest with positive weights at or above what p J needs (4).
+    cavities: lumens that keep a volume or a pressure; a lumen not named is open. element: a name in ELEMENTS.
+    order: degree integrated exactly, None = the element's own (for P2/P1 that is 5, the lowest with positive weights at
+    or above what p J needs, 4). loads: dead forces, switched on with gravity at the start, then as their time says.
     """
 
     mesh: MeshTet
-    material: NeoHookean
+    material: Material
     held: Sequence[Held]
     obstacles: Sequence[RigidPlane | RigidSphere] = ()
     gravity: Sequence[float] = (0.0, 0.0, 0.0)
     density: float = 0.0
-    order: int = 5
+    order: int | None = None
     contact_order: int = 4
     cavities: Sequence[Cavity] = ()
+    element: str = "P2/P1"
+    loads: Sequence[Traction | BodyForce] = ()
+
+    @property
+    def degree(self) -> int:
+        """The quadrature order in use."""
+        return find_element(self.element).order if self.order is None else self.order
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +80,9 @@ class HeldNodes:
 
 def find_held(problem: Problem) -> list[HeldNodes]:
     """Held regions as unknowns; raises ReferenceProblem when a region finds no node or names a wrong component."""
-    x = nodes(problem.mesh)
-    boundary = np.unique(facet_nodes(problem.mesh))
+    element = find_element(problem.element)
+    x = displacement_points(problem.mesh, element)
+    boundary = np.unique(build_facets(problem.mesh, problem.contact_order, element).nodes)
     found = []
     for k, held in enumerate(problem.held):
         components = tuple(held.components)
@@ -90,9 +99,3 @@ def find_held(problem: Problem) -> list[HeldNodes]:
         dofs = np.stack([3 * chosen + c for c in components])
         found.append(HeldNodes(chosen, dofs, components, factors[list(components)], held.motion))
     return found
-
-
-def nodal_volumes(mesh, weights, order):
-    """Rest volume that belongs to each P2 node, the integral of its function, (N2,) [m³] (negative at vertices)."""
-    values, _ = basis_table(ElementTetP2(), get_quadrature(RefTet, order)[0])
-    return np.bincount(element_nodes(mesh).ravel(), (weights @ values).ravel(), minlength=len(nodes(mesh)))

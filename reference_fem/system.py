@@ -4,14 +4,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from skfem import ElementTriP2
 
 from reference_fem import assembly, cavity, checks, contact
-from reference_fem.elements import build_elements, build_facets, facet_nodes, nodes
+from reference_fem.element_table import find_element
+from reference_fem.elements import build_elements, build_facets, displacement_points
 from reference_fem.errors import ReferenceProblem
 from reference_fem.linear import SymmetricSolver
+from reference_fem.loads import BodyForce, find_points, nodal_force
 from reference_fem.pattern import build_pattern
-from reference_fem.problem import Problem, find_held, nodal_volumes
+from reference_fem.problem import Problem, find_held
 
 
 @dataclass(frozen=True)
@@ -37,8 +38,9 @@ class NewtonSettings:
 class State:
     """Unknowns x and contact multipliers at time t; `iterations` spent to come here.
 
-    x: u at the P2 nodes [m], interleaved, p at the vertices [Pa], pressures of the cavities [Pa]. load: share of
-    gravity and of the cavities' start values that acts, 1 once they are switched on.
+    x: u at the displacement functions (P2: the nodes) [m], interleaved, p at the vertices [Pa] unless the element
+    eliminates it, pressures of the cavities [Pa]. load: share of
+    the dead forces and of the cavities' start values that acts, 1 once they are switched on.
     """
 
     t: float
@@ -50,13 +52,14 @@ class State:
 
 
 class Loads(NamedTuple):
-    """What acts during one evaluation: share of gravity, obstacles (no, 8), multipliers, penalty factor.
+    """What acts during one evaluation: dead forces (field_count,) [N], or 0, obstacles (no, 8), multipliers, penalty
+    factor.
 
     filling (nc,): wanted volumes [m³] of the cavities, or pressures [Pa] where those are prescribed. shift (no, 3) [m]:
     a further move of the obstacles to be linearised, None = none.
     """
 
-    gravity: float
+    force: np.ndarray | float
     rows: np.ndarray
     multiplier: np.ndarray
     filling: np.ndarray = np.zeros(0)
@@ -91,11 +94,12 @@ class System:
         mesh, self.problem, self.settings = problem.mesh, problem, settings
         checks.check_mesh(mesh)
         checks.check_loads(problem)
-        self.nodes = nodes(mesh)
+        self.element = find_element(problem.element)
+        self.nodes = displacement_points(mesh, self.element)
         self.displacement_count = 3 * len(self.nodes)
-        self.field_count = self.displacement_count + mesh.nvertices
+        self.field_count = self.displacement_count + (mesh.nvertices if self.element.pressure else 0)
         self.total = self.field_count + len(problem.cavities)
-        self.elements = build_elements(mesh, problem.order)
+        self.elements = build_elements(mesh, problem.degree, self.element)
         self.volume = float(self.elements.weights.sum())
         self.held = find_held(problem)
         mask = np.zeros(self.field_count, dtype=bool)
@@ -104,10 +108,11 @@ class System:
         self.check_freedom(np.flatnonzero(mask))
         self.pattern = build_pattern(self.elements.dofs, mask)
         self.positions = self.pattern.positions(self.elements.dofs)
-        self.surface = self.build_surface()
-        self.lumens = cavity.find_lumens(problem, self.pattern, ElementTriP2(), facet_nodes(mesh), self.held)
+        facets = build_facets(mesh, problem.contact_order, self.element)
+        self.surface = self.build_surface(facets)
+        self.lumens = cavity.find_lumens(problem, self.pattern, self.element.facet, facets.nodes, self.held)
         self.rows = np.array([obstacle.row() for obstacle in problem.obstacles]).reshape(-1, 8)
-        self.weight = self.gravity_force()
+        self.loaded = self.find_loads()
         start = contact.place(self.rows, problem.obstacles, settings.start)
         checks.check_start(self.surface, start, checks.boundary_size(mesh))
         self.solver = SymmetricSolver(settings.solver)
@@ -116,19 +121,25 @@ class System:
         """At rest nothing else balances a load than the holders: every rigid motion must be held."""
         checks.check_held(self.nodes, held_dofs)
 
-    def build_surface(self):
-        facets = build_facets(self.problem.mesh, self.problem.contact_order)
+    def build_surface(self, facets):
         dofs = np.hstack([3 * facets.nodes + c for c in range(3)])
         penalty = self.settings.penalty * self.problem.material.mu / np.sqrt(facets.weights.sum(axis=1))
         positions = self.pattern.positions(dofs)
         rest = self.nodes.ravel()
         return contact.Surface(dofs.astype(np.uint32), positions, rest, facets.values, facets.weights, penalty)
 
-    def gravity_force(self):
+    def find_loads(self):
+        """The dead loads at their quadrature points, weight among them."""
+        loads, pull = list(self.problem.loads), self.problem.density * np.asarray(self.problem.gravity, dtype=float)
+        if pull.any():
+            loads.append(BodyForce(lambda t, x: np.repeat(pull[:, None], x.shape[1], axis=1)))
+        return [find_points(load, self.problem.mesh, self.element, self.problem.degree) for load in loads]
+
+    def force_at(self, t, share=1.0):
+        """Share of all dead forces at time t, (field_count,) [N]."""
         force = np.zeros(self.field_count)
-        pull = self.problem.density * np.asarray(self.problem.gravity, dtype=float)
-        volumes = nodal_volumes(self.problem.mesh, self.elements.weights, self.problem.order)
-        force[: self.displacement_count] = np.outer(volumes, pull).ravel()
+        for points in self.loaded:
+            force[: self.displacement_count] += share * nodal_force(points, t)
         return force
 
     def rest(self) -> State:
@@ -143,14 +154,14 @@ class System:
         return np.array([lumen.target(t, load) for lumen in self.lumens])
 
     def starts_loaded(self):
-        """Whether something is to be switched on at the start, before time runs: gravity, or a cavity's content."""
+        """Whether something is to be switched on at the start, before time runs: a force, or a cavity's content."""
         start = self.settings.start
-        return bool(np.any(self.weight) or np.any(self.filling_at(start, 1.0) != self.filling_at(start, 0.0)))
+        return bool(np.any(self.force_at(start)) or np.any(self.filling_at(start, 1.0) != self.filling_at(start, 0.0)))
 
     def loads_of(self, state: State) -> Loads:
         """What acts in a converged state."""
         rows, filling = self.obstacles_at(state.t), self.filling_at(state.t, state.load)
-        return Loads(state.load, rows, state.multiplier, filling, state.stiffness)
+        return Loads(self.force_at(state.t, state.load), rows, state.multiplier, filling, state.stiffness)
 
     def held_at(self, t):
         """Prescribed values of the held unknowns at time t; refuses regions that contradict each other."""
@@ -169,7 +180,7 @@ class System:
     def evaluate(self, x, loads: Loads, tangent=True) -> Evaluation:
         """Residual and, if wanted, tangent at x under the loads."""
         residual = np.zeros(self.total)
-        residual[: self.field_count] = -loads.gravity * self.weight
+        residual[: self.field_count] -= loads.force
         values = np.zeros(self.pattern.size if tangent else 1)
         shift = np.zeros((len(loads.rows), 3)) if loads.shift is None else loads.shift
         penalty = loads.stiffness * self.surface.penalty
@@ -185,10 +196,10 @@ class System:
                 volumes[k] = lumen.add(x, pressure, gradients[k], values, tangent)
                 residual[: self.field_count] -= pressure * gradients[k]
                 residual[self.field_count + k] = (pressure if lumen.by_pressure else volumes[k]) - wanted
-        errors = self.relative_errors(x, residual, touch, loads.gravity, gradients)
+        errors = self.relative_errors(x, residual, touch, loads.force, gradients)
         return Evaluation(residual, values, J, touch, errors, volumes, gradients)
 
-    def relative_errors(self, x, residual, touch, load, gradients):
+    def relative_errors(self, x, residual, touch, force, gradients):
         """(unbalanced force over the forces at work, misfit of tissue volume or filling over the whole)."""
         n, m, mu = self.displacement_count, self.field_count, self.problem.material.mu
         free = np.zeros(m)
@@ -196,7 +207,7 @@ class System:
         held = residual[self.pattern.held]
         inside = np.linalg.norm(x[m:] @ gradients)
         floor = 1e-9 * mu * self.volume ** (2.0 / 3.0)
-        sizes = (np.linalg.norm(held), np.abs(touch.force).sum(), load * np.linalg.norm(self.weight), inside, floor)
+        sizes = (np.linalg.norm(held), np.abs(touch.force).sum(), np.linalg.norm(force), inside, floor)
         misfits = [np.abs(free[n:]).sum() / self.volume]
         for lumen, misfit in zip(self.lumens, residual[m:], strict=True):
             misfits.append(abs(misfit) / (mu if lumen.by_pressure else lumen.volume0))

@@ -7,7 +7,6 @@ from skfem import ElementTetP2
 from reference_fem import Evaluator, ReferenceProblem, nodes, surface_triangles
 from reference_fem.elements import basis_table, build_elements, build_facets, element_nodes, facet_nodes
 from reference_fem.pattern import build_pattern
-from reference_fem.problem import nodal_volumes
 from tests.reference_fem.bodies import ball_octant, block, shell_octant
 
 
@@ -41,12 +40,6 @@ def test_mid_side_nodes_of_facets_are_in_the_middle():
     x, table = nodes(mesh), facet_nodes(mesh)
     for k, (i, j) in enumerate(((0, 1), (1, 2), (0, 2))):
         np.testing.assert_allclose(x[table[:, 3 + k]], 0.5 * (x[table[:, i]] + x[table[:, j]]), atol=1e-15)
-
-
-def test_nodal_volumes_sum_to_the_body():
-    mesh = ball_octant(3)
-    weights = build_elements(mesh, 5).weights
-    assert nodal_volumes(mesh, weights, 5).sum() == pytest.approx(weights.sum(), rel=1e-13)
 
 
 def test_pattern_adds_up_to_the_dense_matrix():

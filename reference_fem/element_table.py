@@ -1,0 +1,49 @@
+"""The elements to choose from, each with what it promises."""
+
+from dataclasses import dataclass
+
+import skfem
+from skfem import ElementTetMini, ElementTetP1, ElementTetP2, ElementTriP1, ElementTriP2
+
+from reference_fem.errors import ReferenceProblem
+
+
+@dataclass(frozen=True)
+class Element:
+    """One way to interpolate displacement and pressure on a tetrahedron."""
+
+    name: str
+    displacement: skfem.Element
+    pressure: skfem.Element | None
+    """Continuous pressure, an unknown at the vertices; None: constant in each element, and eliminated there."""
+    order: int
+    """Lowest quadrature order with positive weights that keeps the rates."""
+    rates: tuple[float, float]
+    """Orders of the L2 errors of displacement and pressure in the mesh size, measured on a manufactured solution."""
+    locks: bool
+    """Whether it turns far too stiff as kappa/mu grows."""
+    source: str
+
+    @property
+    def facet(self) -> skfem.Element:
+        """Its displacement on a boundary triangle."""
+        return ElementTriP2() if isinstance(self.displacement, ElementTetP2) else ElementTriP1()
+
+
+ELEMENTS = {
+    entry.name: entry
+    for entry in (
+        Element("P2/P1", ElementTetP2(), ElementTetP1(), 5, (3.0, 2.0), False, "Taylor and Hood 1973; the default"),
+        Element("MINI", ElementTetMini(), ElementTetP1(), 6, (2.0, 1.5), False, "Arnold, Brezzi and Fortin 1984"),
+        Element("P2/P0", ElementTetP2(), None, 5, (2.0, 1.0), False, "mean dilatation, Nagtegaal, Parks and Rice 1974"),
+        Element("P1", ElementTetP1(), None, 5, (2.0, 1.0), True, "displacement alone: the control that must lock"),
+    )
+}
+"""The elements that a problem can name."""
+
+
+def find_element(name: str) -> Element:
+    """The entry called `name`; raises ReferenceProblem with the choices."""
+    if name not in ELEMENTS:
+        raise ReferenceProblem(f"there is no element {name!r}: choose one of {', '.join(ELEMENTS)}")
+    return ELEMENTS[name]
