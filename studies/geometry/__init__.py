@@ -3,7 +3,10 @@
 from studies.geometry.api import attach, ball, ball_octant, fill, liver, organ
 from studies.geometry.checks import check_surface, check_tetrahedra
 from studies.geometry.mesh import OrganMesh
+from studies.geometry.organs import SHAPES
 from studies.geometry.organs.ball import project_ball
+from studies.geometry.organs.bladder import BLADDER_REGIONS
+from studies.geometry.organs.kidney import KIDNEY_REGIONS
 from studies.geometry.organs.liver import (
     LIVER_PRESS_DIRECTION,
     LIVER_PROBE_NORMAL,
@@ -11,14 +14,22 @@ from studies.geometry.organs.liver import (
     LIVER_REGIONS,
     project_liver,
 )
+from studies.geometry.organs.spleen import SPLEEN_REGIONS
+from studies.geometry.organs.stomach import STOMACH_REGIONS
+from studies.geometry.organs.variation import vary
 from studies.geometry.reading import read_mesh
 from studies.geometry.regions import BallRegion, EllipsoidRegion, HalfSpace, Region
 
 __all__ = [
+    "BLADDER_REGIONS",
+    "KIDNEY_REGIONS",
     "LIVER_PRESS_DIRECTION",
     "LIVER_PROBE_NORMAL",
     "LIVER_PROBE_POINT",
     "LIVER_REGIONS",
+    "SHAPES",
+    "SPLEEN_REGIONS",
+    "STOMACH_REGIONS",
     "BallRegion",
     "EllipsoidRegion",
     "HalfSpace",
@@ -35,4 +46,5 @@ __all__ = [
     "project_ball",
     "project_liver",
     "read_mesh",
+    "vary",
 ]

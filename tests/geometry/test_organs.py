@@ -18,7 +18,7 @@ from studies.geometry import (
     project_liver,
 )
 from studies.geometry.mesh import boundary_triangles, tetrahedron_volumes, triangle_normals, unique_edges
-from studies.geometry.organs.liver import BARE_AREA, liver_level, liver_shape
+from studies.geometry.organs.liver import LIVER
 from studies.geometry.quality import MIN_DIHEDRAL, MIN_RATIO, dihedral_angles, tetrahedron_radius_ratio
 
 RADIUS = 0.05
@@ -59,7 +59,7 @@ def test_elements_are_good(bodies, organ, nodes):
 @organ_and_count
 def test_surface_nodes_lie_on_the_true_surface(bodies, organ, nodes):
     surface = bodies[organ][nodes].points[:nodes]
-    level = np.linalg.norm(surface, axis=1) - RADIUS if organ == "ball" else liver_level(surface)
+    level = np.linalg.norm(surface, axis=1) - RADIUS if organ == "ball" else LIVER.level(surface)
     # The projection stops at 1e-13 of the box, 0.4 m across the liver's.
     assert np.abs(level).max() < 1e-13
 
@@ -87,7 +87,7 @@ def test_liver_is_a_wedge_thick_on_the_right_and_hollow_below(livers):
     assert 0.7 < right < 0.9
 
     def inside(x, y, z):
-        return liver_level(np.array([[x, y, z]]) * 1e-3)[0] < 0
+        return LIVER.level(np.array([[x, y, z]]) * 1e-3)[0] < 0
 
     # Between the front margin and the back of the visceral face there is air: the face is hollow.
     assert inside(-45, -38, -57) and inside(-45, 60, 4) and not inside(-45, 11, -26.5)
@@ -106,13 +106,13 @@ def test_liver_notch_and_falciform_groove_are_there():
     lowest = []
     for x in (-0.01, 0.017, 0.044):
         columns = [np.column_stack([np.full_like(z, x), np.full_like(z, y), z]) for y in np.linspace(-0.07, -0.03, 21)]
-        lowest.append(min((z[liver_level(c) < 0].min() for c in columns if (liver_level(c) < 0).any()), default=np.inf))
+        lowest.append(min((z[LIVER.level(c) < 0].min() for c in columns if (LIVER.level(c) < 0).any()), default=np.inf))
     assert lowest[1] > 0.5 * (lowest[0] + lowest[2]) + 2e-3
 
 
 def test_probe_point_and_press_direction_meet_the_smooth_front(livers):
     point, normal = np.array(LIVER_PROBE_POINT), np.array(LIVER_PROBE_NORMAL)
-    assert abs(liver_level(point[None])[0]) < 1e-13
+    assert abs(LIVER.level(point[None])[0]) < 1e-13
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-12) and normal[1] < -0.8
     assert np.linalg.norm(LIVER_PRESS_DIRECTION) == pytest.approx(1.0, abs=1e-12)
     mesh = livers[1100]
@@ -131,7 +131,7 @@ def test_probe_point_and_press_direction_meet_the_smooth_front(livers):
 def test_projections_keep_what_is_on_the_surface_and_move_the_rest_there(balls, livers):
     for mesh, project, level in (
         (balls[300], project_ball, lambda x: np.linalg.norm(x, axis=1) - RADIUS),
-        (livers[300], project_liver, liver_level),
+        (livers[300], project_liver, LIVER.level),
     ):
         surface = mesh.points[: mesh.surface_count]
         assert np.abs(project(surface) - surface).max() < 1e-13  # how exactly the nodes are on it
@@ -182,7 +182,3 @@ def test_octant_is_an_eighth_of_a_ball_graded_to_its_pole(sizes):
 def test_bad_wishes_get_a_sentence(call, sentence):
     with pytest.raises(StudyError, match=sentence):
         call()
-
-
-def test_default_regions_are_those_of_the_shape():
-    assert liver_shape().regions["bare_area"] is BARE_AREA

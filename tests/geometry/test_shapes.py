@@ -1,5 +1,7 @@
 """The organs as functions of position: sizes from the literature, even walls, boxes, attachments, bad wishes."""
 
+import inspect
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +13,7 @@ from studies.geometry.blends import canal, closed
 from studies.geometry.levelset import at_depth, gradient, normals
 from studies.geometry.mesh import signed_volume, triangle_areas
 from studies.geometry.organs import SHAPES
+from studies.geometry.organs.variation import vary
 from studies.geometry.surface import first_surface
 
 ORGANS = ("liver", "stomach", "kidney", "spleen", "bladder")
@@ -38,22 +41,69 @@ def test_volume_is_that_of_the_literature(fine, name):
 
 @pytest.mark.parametrize("name", ORGANS)
 def test_outside_and_lumen_are_one_piece_without_holes_or_handles(name):
-    shape = SHAPES[name]()
-    for level in (shape.level, *([lumen_of(shape).level] if shape.wall else [])):
-        check_ball_topology(shape, level)
+    check_topology(SHAPES[name](), cell=4 * MM)
 
 
-def check_ball_topology(shape, level, cell=4 * MM):
-    """One piece, one outside, Euler characteristic of a ball, on a grid; nothing near the walls of the box."""
+def check_topology(shape, cell):
+    """On a grid, organ and lumen: one piece, one outside, the Euler number of a ball; room in the box."""
     axes = [np.arange(a, b, cell) for a, b in zip(shape.low, shape.high, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    inside = (level(grid.reshape(-1, 3)) < 0).reshape(grid.shape[:3])
-    assert label(inside, connectivity=1, return_num=True)[1] == 1
-    assert label(~inside, connectivity=1, return_num=True)[1] == 1
-    assert euler_number(inside, connectivity=1) == 1
-    rim = np.ones_like(inside)
+    level = shape.level(grid.reshape(-1, 3)).reshape(grid.shape[:3])
+    for depth in (0.0, *([shape.wall] if shape.wall else [])):
+        inside = level < -depth
+        assert label(inside, connectivity=1, return_num=True)[1] == 1
+        assert label(~inside, connectivity=1, return_num=True)[1] == 1
+        assert euler_number(inside, connectivity=1) == 1
+    rim = np.ones(level.shape, bool)
     rim[2:-2, 2:-2, 2:-2] = False
-    assert not (inside & rim).any()  # two cells to spare, as Shape promises
+    assert not ((level < 0) & rim).any()  # two cells to spare, as Shape promises
+    return level
+
+
+def check_variant(name, seed, spread=0.2):
+    """A random organ is closed, of genus 0 inside and out, in its box, with a wall that fits and attachments."""
+    shape = SHAPES[name](**vary(name, seed, spread))
+    level = check_topology(shape, cell=5 * MM)
+    assert shape.probe is not None and abs(shape.level(np.array([shape.probe.point]))[0]) < 1e-12
+    if shape.wall:
+        # The wall is nowhere thicker than the organ, whose thickest part is at the lowest level.
+        assert shape.wall < 0.25 * -level.min()
+    return shape
+
+
+@pytest.mark.parametrize("name", ORGANS)
+def test_random_organs_are_organs(name):
+    for seed in range(4):
+        check_variant(name, seed)
+    check_variant(name, 4, spread=0.3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ORGANS)
+def test_forty_random_organs_are_organs(name):
+    for seed in range(40):
+        check_variant(name, seed)
+
+
+@pytest.mark.parametrize("name", ORGANS)
+def test_random_parameters_are_plausible_and_repeatable(name):
+    assert vary(name, 3) == vary(name, 3) == json.loads(json.dumps(vary(name, 3)))
+    assert vary(name, 3) != vary(name, 4) and vary(name, 3, 0.0) == default_parameters(name)
+    default = default_parameters(name)
+    ratio = np.array([[vary(name, seed)[key] / default[key] for key in default] for seed in range(200)])
+    assert ratio.min() > 0.8 and ratio.max() < 1.2
+    assert ratio.min(axis=0).max() < 0.9 and ratio.max(axis=0).min() > 1.1
+    # Shares 0.7 and 0.3 of two equal spreads: the correlation of two lengths is 0.49 / (0.49 + 0.09) = 0.84.
+    free = [k for k, key in enumerate(default) if key != "wall"]
+    together = np.corrcoef(ratio.T)
+    assert np.abs(together[np.ix_(free, free)] - np.eye(len(free)) * 0.155 - 0.845).max() < 0.1  # 200 draws: +- 0.03
+    if "wall" in default:
+        wall = list(default).index("wall")
+        assert np.abs(np.delete(together[wall], wall)).max() < 0.25
+
+
+def default_parameters(name):
+    return {key: p.default for key, p in inspect.signature(SHAPES[name]).parameters.items()}
 
 
 @pytest.mark.parametrize("name", HOLLOW)
@@ -145,6 +195,10 @@ def test_canal_is_the_smallest_distance_to_its_spheres():
         (lambda: SHAPES["spleen"](notch=float("nan")), "spleen: notch = nan mm is no length"),
         (lambda: SHAPES["stomach"](wall=40.0), "stomach: a wall of 40 mm leaves no lumen"),
         (lambda: SHAPES["bladder"](wall=12.0), "bladder: a wall of 12 mm leaves no lumen"),
+        (lambda: SHAPES["liver"](depth=float("inf")), "liver: depth = inf mm is no length"),
+        (lambda: vary("kidny", 0), "unknown organ 'kidny'; did you mean 'kidney'"),
+        (lambda: vary("kidney", -1), "the seed -1 is no whole number"),
+        (lambda: vary("kidney", 0, 0.5), "a spread of 0.5 is outside 0 to 0.3"),
     ],
 )
 def test_impossible_organs_get_a_sentence(call, sentence):

@@ -1,7 +1,6 @@
 """Liver: a wedge under the diaphragm, thick on the right, tapering to the left, hollowed from below.
 
-Axes: x to the patient's left, y to the back, z to the head; the origin lies in the right lobe. Lengths in millimetres
-after the usual sonographic sizes (width 20-23 cm, right lobe 14-16 cm high and 10-13 cm deep, about 1,500 mL).
+Axes: x to the patient's left, y to the back, z to the head; the origin lies in the right lobe.
 """
 
 from dataclasses import replace
@@ -9,56 +8,59 @@ from dataclasses import replace
 import numpy as np
 
 from studies.geometry.blends import ellipsoid, groove, smooth_max, smooth_min
-from studies.geometry.levelset import Literature, Probe, Shape, normals, project
+from studies.geometry.levelset import Literature, Shape, project
+from studies.geometry.organs.millimetres import MM, check_lengths, metres, probe_near, si
 from studies.geometry.regions import EllipsoidRegion, Vector
 
-MM = 1e-3
-BARE_AREA = EllipsoidRegion(center=(-0.035, 0.053, 0.043), semi_axes=(0.045, 0.040, 0.026))
-"""Where the liver grows to the diaphragm, behind and above the right lobe: about 41 cm² of its surface."""
-LIVER_REGIONS: dict[str, EllipsoidRegion] = {"bare_area": BARE_AREA}
+VOLUME = Literature(1500.0, "Henderson et al., Radiology 141 (1981) 525: 1,493 mL by CT")
+PRESS: Vector = (0.0, 0.9, 0.19**0.5)
+"""To the back and up: a plane with this normal, moving along it from the front, meets the smooth front of the right
+lobe first, away from the thin margin, and presses the liver against its bare area."""
 
 
-def liver_level(points: np.ndarray) -> np.ndarray:
-    """Level [m], shape (n,), of points [m], shape (n, 3): the space under the diaphragm less what presses up."""
-    x = points / MM
-    right = ellipsoid(x, (-38, 4, -7), (73, 64, 84))
-    left = ellipsoid(x, (38, -17, 28), (80, 43, 32))
-    dome = smooth_min(right, left, 24)
-    # Kidney, colon and duodenum below the right lobe and the stomach below the left press their hollows.
-    bowel = ellipsoid(x, (53, 84, -151), (175, 175, 175))
-    stomach = ellipsoid(x, (97, 17, -70), (92, 92, 92))
-    body = smooth_max(dome, -smooth_min(bowel, stomach, 20), 9)
-    falciform = groove(x, (17, -55, 63), (17, -63, -17), 9, 5)
-    notch = groove(x, (17, -75, -42), (17, -18, -14), 12, 30)
-    gallbladder = groove(x, (-22, -70, -70), (-6, 0, -18), 13, 9)
-    cava = groove(x, (2, 62, 70), (2, 62, -20), 14, 9)
-    return (body + falciform + notch + gallbladder + cava) * MM
+def liver_shape(
+    width: float = 231.0,
+    depth: float = 131.0,
+    height: float = 152.0,
+    left_lobe: float = 64.0,
+    notch: float = 30.0,
+    margin: float = 9.0,
+) -> Shape:
+    """An adult's liver [mm]: 20-23 cm wide, the right lobe 14-16 cm high and 10-13 deep (usual sonographic sizes).
+
+    left_lobe: its height; notch: depth of that of the round ligament; margin: width over which the inferior margin is
+    rounded off, the sharpest that meshes of 550 nodes carry. Raises StudyError for a length that is none.
+    """
+    check_lengths("liver", width=width, depth=depth, height=height, left_lobe=left_lobe, notch=notch, margin=margin)
+    scale = np.array([width / 231.0, depth / 131.0, height / 152.0])
+
+    def level(points: np.ndarray) -> np.ndarray:
+        x = points / scale
+        left = ellipsoid(x, (38, -17, 28), (80, 43, 0.5 * left_lobe))
+        dome = smooth_min(ellipsoid(x, (-38, 4, -7), (73, 64, 84)), left, 24)
+        # Kidney, colon and duodenum below the right lobe and the stomach below the left press their hollows.
+        stomach = ellipsoid(x, (97, 17, -70), (92, 92, 92))
+        body = smooth_max(dome, -smooth_min(ellipsoid(x, (53, 84, -151), (175, 175, 175)), stomach, 20), margin)
+        falciform = groove(x, (17, -55, 63), (17, -63, -17), 9, 5)
+        ligament = groove(x, (17, -75, -42), (17, -18, -14), 12, notch)
+        gallbladder = groove(x, (-22, -70, -70), (-6, 0, -18), 13, 9)
+        cava = groove(x, (2, 62, 70), (2, 62, -20), 14, 9)
+        return (body + falciform + ligament + gallbladder + cava) * scale.min()
+
+    low, high = metres(*(-130, -80, -100) * scale), metres(*(140, 90, 100) * scale)
+    bare_area = EllipsoidRegion(metres(*(-35, 53, 43) * scale), metres(*(45, 40, 26) * scale))
+    shape = Shape("liver", si(level), low, high, 5 * MM, {"bare_area": bare_area}, None, VOLUME, None, PRESS)
+    # Low on the front of the right lobe, smooth 3 cm around.
+    return replace(shape, probe=probe_near(shape, metres(*(-45, -57, -33) * scale)))
 
 
-def _plain_liver() -> Shape:
-    return Shape("liver", liver_level, (-0.13, -0.08, -0.1), (0.14, 0.09, 0.1), cell=0.005, regions=LIVER_REGIONS)
-
-
-def liver_shape() -> Shape:
-    """The liver of an adult."""
-    literature = Literature(1500.0, "Henderson et al., Radiology 141 (1981) 525: 1,493 mL by CT")
-    probe = Probe(LIVER_PROBE_POINT, LIVER_PROBE_NORMAL)
-    return replace(_plain_liver(), literature=literature, probe=probe, press=LIVER_PRESS_DIRECTION)
+LIVER = liver_shape()
+LIVER_REGIONS = LIVER.regions
+LIVER_PRESS_DIRECTION = PRESS
+assert LIVER.probe is not None  # liver_shape gives it one
+LIVER_PROBE_POINT, LIVER_PROBE_NORMAL = LIVER.probe.point, LIVER.probe.normal
 
 
 def project_liver(points: np.ndarray) -> np.ndarray:
-    """Points, shape (n, 3) [m], brought onto the liver's true surface along the gradient of its level."""
-    return project(_plain_liver(), points)
-
-
-def _vector(row: np.ndarray) -> Vector:
-    return float(row[0]), float(row[1]), float(row[2])
-
-
-LIVER_PROBE_POINT: Vector = _vector(project_liver(np.array([[-45.0, -57.0, -33.0]]) * MM)[0])
-"""Point of the surface, low on the front of the right lobe, where an instrument palpates [m]; smooth 3 cm around."""
-LIVER_PROBE_NORMAL: Vector = _vector(normals(_plain_liver(), np.array([LIVER_PROBE_POINT]))[0])
-"""Outward normal there; a probe moves against it."""
-LIVER_PRESS_DIRECTION: Vector = (0.0, 0.9, 0.19**0.5)
-"""Unit vector, to the back and up: a plane with this normal, moving along it from the front, meets the smooth front of
-the right lobe first, away from the thin margin, and presses the liver against its bare area."""
+    """Points, shape (n, 3) [m], brought onto the true surface of the default liver along the gradient of its level."""
+    return project(LIVER, points)

@@ -6,7 +6,7 @@ import numpy as np
 
 from studies.errors import StudyError
 from studies.geometry.blends import Sphere
-from studies.geometry.levelset import Level, Probe, gradient
+from studies.geometry.levelset import Level, Probe, Shape, gradient, normals, project
 from studies.geometry.regions import Vector
 
 MM = 1e-3
@@ -39,7 +39,8 @@ def si(level: Level) -> Level:
 
 def metres(x: float, y: float, z: float) -> Vector:
     """Three lengths [mm] in metres."""
-    return x * MM, y * MM, z * MM
+    # Division rounds 43 mm to the same number as 0.043 m; multiplication by 0.001 does not.
+    return float(x) / 1e3, float(y) / 1e3, float(z) / 1e3
 
 
 def box_of(*tubes: list[Sphere]) -> tuple[Vector, Vector]:
@@ -73,6 +74,16 @@ def touch(level: Callable[[np.ndarray], np.ndarray], start: Vector, direction: V
     point = np.asarray(start, float) + high * along
     normal = gradient(level, point[None], 1e-4)[0]
     return Probe(metres(*point), unit(*normal))
+
+
+def probe_near(shape: Shape, seed: Vector) -> Probe:
+    """The probe at the surface point to which `seed` [m] is brought along the gradient.
+
+    Raises StudyError when it lies too far off.
+    """
+    point = project(shape, np.array([seed]))
+    normal = normals(shape, point)[0]
+    return Probe((float(point[0, 0]), float(point[0, 1]), float(point[0, 2])), unit(*normal))
 
 
 def unit(x: float, y: float, z: float) -> Vector:

@@ -1,0 +1,39 @@
+"""Random but plausible organs, for studies of a population."""
+
+import inspect
+import zlib
+
+import numpy as np
+
+from studies.errors import StudyError
+from studies.geometry.organs import SHAPES
+from studies.suggest import choose
+
+COMMON = 0.7
+"""Share of the spread that all lengths of one organ have in common: a long kidney is a wide one."""
+WIDEST = 0.3
+"""Largest spread: beyond it parts of an organ no longer fit to each other."""
+
+
+def vary(name: str, seed: int, spread: float = 0.2) -> dict[str, float]:
+    """Parameters for `SHAPES[name]`, each within a factor 1 - spread to 1 + spread of its default; JSON-able.
+
+    All lengths share one random size and have a smaller part of their own; the wall varies by itself, because filling
+    thins it. The same seed gives the same organ. Raises StudyError for an unknown organ, a seed that is no whole number
+    from 0 on, or a spread outside 0 to WIDEST.
+    """
+    shape = choose(name, SHAPES, "organ")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise StudyError(f"{name}: the seed {seed!r} is no whole number from 0 on; give one such as 1")
+    if not 0 <= spread <= WIDEST:
+        raise StudyError(f"{name}: a spread of {spread} is outside 0 to {WIDEST}; 0.2 means 20 % up or down")
+    rng = np.random.default_rng([int(seed), zlib.crc32(name.encode())])
+    size = rng.uniform(-1.0, 1.0)
+    values = {}
+    for parameter in inspect.signature(shape).parameters.values():
+        if parameter.default is None:  # a ball is solid
+            continue
+        own = rng.uniform(-1.0, 1.0)
+        share = own if parameter.name == "wall" else COMMON * size + (1.0 - COMMON) * own
+        values[parameter.name] = float(parameter.default * (1.0 + spread * share))
+    return values
