@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from studies.errors import StudyError
-from studies.geometry.regions import Region, Vector
+from studies.geometry.regions import KnownRegion, Vector
 
 Level = Callable[[np.ndarray], np.ndarray]
 
@@ -45,7 +45,7 @@ class Shape:
     low: Vector
     high: Vector
     cell: float
-    regions: Mapping[str, Region] = field(default_factory=dict)
+    regions: Mapping[str, KnownRegion] = field(default_factory=dict)
     wall: float | None = None
     literature: Literature | None = None
     probe: Probe | None = None

@@ -71,6 +71,9 @@ class EllipsoidRegion:
         return (np.linalg.norm(scaled, axis=1) - 1.0) * axes.min()
 
 
+KnownRegion = HalfSpace | BallRegion | EllipsoidRegion
+"""Those that can be stored as JSON."""
+
 KINDS: dict[str, type] = {cls.__name__: cls for cls in (HalfSpace, BallRegion, EllipsoidRegion)}
 
 
