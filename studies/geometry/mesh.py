@@ -108,6 +108,22 @@ def triangle_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.cross(b - a, c - a)
 
 
+def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals, shape (n, 3), of the nodes: of their triangles, weighted by the angle there.
+
+    G. Thuermer, C. Wuethrich: Computing vertex normals from polygonal facets, J. Graphics Tools 3(1), 1998.
+    """
+    normals = triangle_normals(points, triangles)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    total = np.zeros_like(points)
+    for corner in range(3):
+        here, after, before = (points[triangles[:, (corner + k) % 3]] for k in range(3))
+        one, other = after - here, before - here
+        cosine = np.einsum("ij,ij->i", one, other) / (np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1))
+        np.add.at(total, triangles[:, corner], np.arccos(np.clip(cosine, -1.0, 1.0))[:, None] * normals)
+    return total / np.linalg.norm(total, axis=1)[:, None]
+
+
 def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Areas [m^2], shape (t,)."""
     return np.linalg.norm(triangle_normals(points, triangles), axis=1) / 2.0

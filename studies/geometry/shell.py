@@ -10,12 +10,15 @@ from itertools import pairwise
 import numpy as np
 
 from studies.errors import StudyError
-from studies.geometry.levelset import Shape, at_depth, normals, project
-from studies.geometry.mesh import unique_edges
+from studies.geometry.levelset import Shape, at_depth, project
+from studies.geometry.mend import mend_nodes
+from studies.geometry.mesh import unique_edges, vertex_normals
 from studies.geometry.quality import MIN_WALL_RATIO, tetrahedron_radius_ratio
 
-LONGEST_STEP = 0.25
-"""Of the mean edge: how far the surface moves inwards at a time, so that a fold is seen while it is small."""
+LONGEST_STEP = 0.5
+"""Of the mean edge: how far the surface moves inwards at a time, before its normals are taken again."""
+GOOD_WALL_RATIO = 0.2
+"""Elements under this radius ratio get their inner nodes moved."""
 MOST_LAYERS = 12
 
 
@@ -49,7 +52,7 @@ def fill_wall(
     # Ring k has its nodes at first[k]; the lumen's come second, right behind the surface's.
     first = np.array([0, *range(2 * count, (layers + 1) * count, count), count])
     tetrahedra = split_prisms(triangles, first)
-    everything = np.concatenate([rings[0], rings[-1], *rings[1:-1]])
+    everything = mend_wall(shape, np.concatenate([rings[0], rings[-1], *rings[1:-1]]), tetrahedra, layers)
     worst = float(tetrahedron_radius_ratio(everything, tetrahedra).min())
     if worst < MIN_WALL_RATIO:
         raise StudyError(
@@ -59,10 +62,23 @@ def fill_wall(
     return everything, np.concatenate([triangles, triangles[:, ::-1] + count]), tetrahedra
 
 
+def mend_wall(shape: Shape, points: np.ndarray, tetrahedra: np.ndarray, layers: int) -> np.ndarray:
+    """The points with nodes of poor elements moved along their level sets; those of the outer surface stay."""
+    count = len(points) // (layers + 1)
+    wall = float(shape.wall or 0.0)
+    depths = wall * np.repeat([0.0, 1.0, *np.arange(1, layers) / layers], count)
+
+    def bring(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:
+        return project(at_depth(shape, depths[nodes[0]]), places)
+
+    return mend_nodes(points, tetrahedra, np.arange(len(points)) >= count, bring, GOOD_WALL_RATIO)
+
+
 def offset_rings(shape: Shape, points: np.ndarray, triangles: np.ndarray, layers: int) -> list[np.ndarray]:
     """Nodes of the layers from the outer surface (first) to the lumen f = -wall (last), each (n, 3) [m].
 
-    Short steps along the normals of f, each brought onto its level exactly.
+    Short steps along the normals of the triangulation, not of f: in a crease they fan out less. Each step ends on its
+    level exactly.
     """
     wall = float(shape.wall or 0.0)
     steps = max(1, int(np.ceil(wall / layers / (LONGEST_STEP * mean_edge(points, triangles)))))
@@ -72,7 +88,8 @@ def offset_rings(shape: Shape, points: np.ndarray, triangles: np.ndarray, layers
             x = rings[-1]
             for step in range(1, steps + 1):
                 depth = wall * (layer + step / steps) / layers
-                x = project(at_depth(shape, depth), x - normals(shape, x) * (wall / layers / steps))
+                inward = -vertex_normals(x, triangles) * (wall / layers / steps)
+                x = project(at_depth(shape, depth), x + inward)
             rings.append(x)
     except StudyError as error:
         raise StudyError(

@@ -7,10 +7,11 @@ import pytest
 
 from studies.errors import StudyError
 from studies.geometry import HalfSpace, ball, check_surface, check_tetrahedra, fill, organ
+from studies.geometry.levelset import at_depth, project
 from studies.geometry.mesh import boundary_triangles, signed_volume, tetrahedron_volumes
 from studies.geometry.organs import SHAPES
 from studies.geometry.quality import MIN_WALL_RATIO, tetrahedron_radius_ratio
-from studies.geometry.shell import fill_wall, split_prisms, suggested_layers
+from studies.geometry.shell import fill_wall, mend_wall, split_prisms, suggested_layers
 
 RADIUS, WALL = 0.05, 0.01
 CAP = {"top": HalfSpace((0.0, 0.0, 0.035), (0.0, 0.0, -1.0))}
@@ -61,12 +62,15 @@ def test_the_two_surfaces_are_tagged_and_close_by_themselves(shells):
 
 def test_lumen_nodes_face_the_outer_ones_at_the_depth_of_the_wall(shells):
     for layers, mesh in shells.items():
-        outer, lumen = mesh.points[:300], mesh.points[300:600]
-        # On a ball the facing point is along the radius: the closed form is the outer node, shrunk.
-        assert np.abs(lumen - outer * (1 - WALL / RADIUS)).max() < 1e-12
-        for k in range(1, layers):
-            ring = mesh.points[300 * (k + 1) : 300 * (k + 2)]
-            assert np.abs(ring - outer * (1 - k / layers * WALL / RADIUS)).max() < 1e-12
+        outer = mesh.points[:300]
+        rings = {layers: mesh.points[300:600]}
+        rings |= {k: mesh.points[300 * (k + 1) : 300 * (k + 2)] for k in range(1, layers)}
+        for k, ring in rings.items():
+            depth = k / layers * WALL
+            assert np.abs(np.linalg.norm(ring, axis=1) - (RADIUS - depth)).max() < 1e-13
+            # On a ball the facing point is on the radius; the normals of a mesh with 11 mm edges miss it a little.
+            aside = np.linalg.norm(ring - outer * (1 - depth / RADIUS), axis=1)
+            assert aside.max() < 0.15 * depth and np.median(aside) < 0.05 * depth
 
 
 def test_attachments_are_on_the_outer_surface_only(shells):
@@ -106,6 +110,22 @@ def test_prisms_are_cut_the_same_way_from_both_sides():
         assert volumes == pytest.approx(np.full(6, 1 / 6))
         assert len(boundary_triangles(cells)) == 12  # a cube cut into triangles: nothing left open inside
         assert signed_volume(points, boundary_triangles(cells)) == pytest.approx(1.0)
+
+
+def test_a_spoiled_node_is_mended_on_its_level_and_the_others_stay(shells):
+    mesh = shells[2]
+    node = 450
+    spoiled = mesh.points.copy()
+    neighbours = np.unique(mesh.lumen_triangles[(mesh.lumen_triangles == node).any(axis=1)])
+    spoiled[node] += 0.95 * (mesh.points[neighbours[neighbours != node][0]] - mesh.points[node])
+    shape = SHAPES["ball"](RADIUS, WALL)
+    spoiled[node] = project(at_depth(shape, WALL), spoiled[[node]])[0]
+    assert tetrahedron_radius_ratio(spoiled, mesh.tetrahedra).min() < 0.1
+    mended = mend_wall(shape, spoiled, mesh.tetrahedra, 2)
+    assert tetrahedron_radius_ratio(mended, mesh.tetrahedra).min() >= 0.2
+    assert np.linalg.norm(mended[node]) == pytest.approx(RADIUS - WALL, rel=1e-12)
+    moved = np.flatnonzero((mended != spoiled).any(axis=1))
+    assert node in moved and len(moved) < 10 and moved.min() >= 300
 
 
 @pytest.mark.parametrize(
