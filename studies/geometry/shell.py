@@ -69,7 +69,7 @@ def mend_wall(shape: Shape, points: np.ndarray, tetrahedra: np.ndarray, layers: 
     depths = wall * np.repeat([0.0, 1.0, *np.arange(1, layers) / layers], count)
 
     def bring(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:
-        return project(at_depth(shape, depths[nodes[0]]), places)
+        return project(at_depth(shape, float(depths[nodes[0]])), places)
 
     return mend_nodes(points, tetrahedra, np.arange(len(points)) >= count, bring, GOOD_WALL_RATIO)
 
