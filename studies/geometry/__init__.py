@@ -1,7 +1,8 @@
 """Meshes of organs: gmsh and meshio live here only. Lengths in metres, surface nodes numbered first."""
 
-from studies.geometry.api import attach, ball, ball_octant, fill, liver, organ
+from studies.geometry.api import attach, ball, ball_octant, curved, fill, liver, organ, organ_family
 from studies.geometry.checks import check_surface, check_tetrahedra
+from studies.geometry.curved import CurvedMesh
 from studies.geometry.mesh import OrganMesh
 from studies.geometry.organs import SHAPES
 from studies.geometry.organs.ball import project_ball
@@ -31,6 +32,7 @@ __all__ = [
     "SPLEEN_REGIONS",
     "STOMACH_REGIONS",
     "BallRegion",
+    "CurvedMesh",
     "EllipsoidRegion",
     "HalfSpace",
     "OrganMesh",
@@ -40,9 +42,11 @@ __all__ = [
     "ball_octant",
     "check_surface",
     "check_tetrahedra",
+    "curved",
     "fill",
     "liver",
     "organ",
+    "organ_family",
     "project_ball",
     "project_liver",
     "read_mesh",

@@ -1,15 +1,17 @@
 """The meshes of the project by name: what scenes ask for."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from studies.errors import StudyError
 from studies.geometry.checks import check_one_part, check_surface
-from studies.geometry.jobs import TIME_LIMIT, mesh_from, patches_of
+from studies.geometry.curved import CurvedMesh, make_curved
+from studies.geometry.jobs import TIME_LIMIT, cached, mesh_from, patches_of
 from studies.geometry.mesh import OrganMesh
 from studies.geometry.quality import MIN_DIHEDRAL, dihedral_angles
 from studies.geometry.regions import Region, region_to_dict
@@ -48,6 +50,40 @@ def organ(
             raise StudyError(f"{name}: {layers} layers asked for, but it is solid; only a hollow organ has layers")
         recipe["layers"] = int(layers)
     return mesh_from(recipe)
+
+
+def organ_family(
+    name: str,
+    sizes: Sequence[int],
+    regions: Mapping[str, Region] | None = None,
+    fill: bool = True,
+    parameters: Mapping[str, Any] | None = None,
+    layers: int | None = None,
+) -> list[OrganMesh]:
+    """Meshes of the same shape, attached at the same places, with `sizes` nodes on the outer surface, coarsest first.
+
+    Raises StudyError for one that cannot be made, and for sizes that do not grow.
+    """
+    if any(b <= a for a, b in pairwise(sizes)):
+        raise StudyError(f"{name}: a family of meshes needs growing node counts, not {list(sizes)}")
+    return [organ(name, nodes, regions, fill, parameters, layers) for nodes in sizes]
+
+
+def curved(mesh: OrganMesh) -> CurvedMesh:
+    """The filled organ with second-order elements that follow its true shape, its lumen's too; cached.
+
+    The vertices are those of `mesh`, and no element is folded anywhere. Raises StudyError for a mesh that is not
+    filled, whose true shape is not known, or that is too coarse to be curved.
+    """
+    arrays = {"points": mesh.points, "tetrahedra": mesh.tetrahedra}
+    recipe = {"kind": "curved", "name": f"{mesh.name}-curved", "source": mesh.recipe}
+
+    def make() -> dict[str, np.ndarray]:
+        made = make_curved(mesh)
+        return {"points": made.points, "cells": made.cells}
+
+    stored = cached(recipe, arrays, ("points", "cells"), make)
+    return CurvedMesh(stored["points"], stored["cells"], len(mesh.points))
 
 
 def ball(

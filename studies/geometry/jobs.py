@@ -8,6 +8,7 @@ import sys
 import tempfile
 import warnings
 import zipfile
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
@@ -36,13 +37,23 @@ def mesh_from(
 
     limit: seconds the worker may take. Raises StudyError when the mesh cannot be made.
     """
-    arrays = arrays or {}
+    given = arrays or {}
+    return to_mesh(recipe, cached(recipe, given, PARTS, lambda: run_worker(recipe, given, limit)))
+
+
+def cached(
+    recipe: dict[str, Any],
+    arrays: dict[str, np.ndarray],
+    parts: tuple[str, ...],
+    make: Callable[[], dict[str, np.ndarray]],
+) -> dict[str, np.ndarray]:
+    """The arrays called `parts` for a recipe: from the cache, or made and stored there."""
     path = cache_folder() / f"{recipe['name']}-{recipe_hash(recipe, arrays)}.npz"
-    result = read_cached(path)
+    result = read_cached(path, parts)
     if result is None:
-        result = run_worker(recipe, arrays, limit)
+        result = make()
         write_cached(path, result)
-    return to_mesh(recipe, result)
+    return result
 
 
 def to_mesh(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> OrganMesh:
@@ -90,17 +101,17 @@ def code_hash() -> str:
     digest = hashlib.sha256()
     for path in sorted(HERE.rglob("*.py")):
         digest.update(path.relative_to(HERE).as_posix().encode() + path.read_bytes())
-    digest.update(" ".join(version(name) for name in ("gmsh", "scikit-image", "numpy")).encode())
+    digest.update(" ".join(version(name) for name in ("gmsh", "scikit-image", "numpy", "scipy")).encode())
     return digest.hexdigest()
 
 
-def read_cached(path: Path) -> dict[str, np.ndarray] | None:
+def read_cached(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | None:
     """The stored arrays, or None when there are none or the file is damaged (said in a warning)."""
     if not path.exists():
         return None
     try:
         with np.load(path, allow_pickle=False) as data:
-            return {key: data[key] for key in PARTS}
+            return {key: data[key] for key in parts}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         warnings.warn(f"the cached mesh {path} is damaged ({error}); it is made again", stacklevel=3)
         return None
