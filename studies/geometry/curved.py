@@ -15,6 +15,8 @@ from studies.geometry.shapes import make_shape
 GOOD = 0.1
 """Elements whose Jacobian may fall below this fraction of the straight one get their inner mid-side nodes moved."""
 ROUNDS = 20
+MOST_BAD = 0.05
+"""Share of such elements beyond which single nodes cannot mend the mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +141,8 @@ def unfold(points: np.ndarray, cells: np.ndarray, movable: np.ndarray) -> np.nda
     for _ in range(ROUNDS):
         jacobian = smallest_jacobian(points, cells)
         bad = np.flatnonzero(jacobian < GOOD)
+        if len(bad) > MOST_BAD * len(cells) + 1:
+            break
         nodes = np.unique(cells[bad, 4:])
         gained = [move_middle(points, cells, int(node), trials) for node in nodes[movable[nodes]]]
         if not any(gained):

@@ -26,8 +26,8 @@ def jacobian_coefficients(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Bernstein coefficients [m^3], shape (k, 20), of det dx/dxi of quadratic tetrahedra (k, 10) in VTK's order.
 
     The determinant is a cubic polynomial and lies between its smallest and largest coefficient, so an element with
-    positive coefficients is folded nowhere. A straight element has 20 times 6 V (A. Johnen, J.-F. Remacle, C. Geuzaine: Geometrical validity of curvilinear finite elements, J. Comput. Phys. 233,
-    2013).
+    positive coefficients is folded nowhere. A straight element has 20 times 6 V. Johnen, Remacle, Geuzaine: Geometrical
+    validity of curvilinear finite elements, J. Comput. Phys. 233 (2013).
     """
     x = points[cells]
     control = x.copy()
