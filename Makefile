@@ -5,7 +5,7 @@ PYTEST := $(BIN)/python -m pytest -q -n 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study smoke test check lint figures bench clean distclean setup-run setup-test setup-dev FORCE
+.PHONY: help study verify smoke test check lint figures bench clean distclean setup-run setup-test setup-dev FORCE
 
 help: ## this list
 	@echo "make TARGET"
@@ -19,6 +19,9 @@ study: setup-run ## run every study, then the charts and tables (the main job; m
 study-%: setup-run ## run one study and draw it: make study-volume_loss
 	$(BIN)/organbench run $*
 	$(BIN)/organbench plot $*
+
+verify: setup-run ## the reference against closed forms, published numbers and other codes (minutes)
+	$(BIN)/organbench verify
 
 smoke: setup-run ## every study with its smallest settings: does it all hang together?
 	$(BIN)/organbench run --smoke $(STUDIES)

@@ -22,34 +22,29 @@ def uniaxial_force(mu, area, stretch):
     return mu * area * (stretch - stretch**-2)
 
 
-def uniaxial_lateral_stretch(mu, kappa, stretch):
-    """Lateral stretch b of the nearly incompressible block: root of W's lateral stress, by Newton from s^-1/2.
+def principal_stress(material, stretches, axis):
+    """Nominal stress [Pa] along `axis` of a body stretched by three principal stretches, p = kappa (J - 1).
 
-    With p = kappa (J - 1) and J = s b²: mu J^-2/3 (b - I1 / (3 b)) + kappa (J - 1) J / b = 0.
+    P_i = m1 J^-2/3 (s_i - I1 / 3 s_i) + m2 J^-4/3 (s_i (I1 - s_i²) - 2 I2 / 3 s_i) + kappa (J - 1) J / s_i.
     """
-    b = stretch**-0.5
-    for _ in range(50):
-        move = lateral_stress(mu, kappa, stretch, b) * 2e-6 * b
-        slope = lateral_stress(mu, kappa, stretch, b * (1 + 1e-6)) - lateral_stress(mu, kappa, stretch, b * (1 - 1e-6))
-        b -= move / slope
-        if abs(move / slope) < 1e-15 * b:
-            break
-    return b
+    m1, m2, kappa = material.parameters
+    squares, s, J = np.square(stretches), stretches[axis], np.prod(stretches)
+    I1, I2 = squares.sum(), 0.5 * (squares.sum() ** 2 - np.square(squares).sum())
+    first = m1 * J ** (-2.0 / 3.0) * (s - I1 / (3.0 * s))
+    second = m2 * J ** (-4.0 / 3.0) * (s * (I1 - s**2) - 2.0 * I2 / (3.0 * s))
+    return first + second + kappa * (J - 1.0) * J / s
 
 
-def lateral_stress(mu, kappa, stretch, b):
-    """Nominal lateral stress [Pa] of a block stretched by `stretch` and b, b."""
-    J = stretch * b**2
-    I1 = stretch**2 + 2.0 * b**2
-    return mu * J ** (-2.0 / 3.0) * (b - I1 / (3.0 * b)) + kappa * (J - 1.0) * J / b
+def uniaxial_lateral_stretch(material, stretch):
+    """Lateral stretch of the nearly incompressible block with free sides: root of the lateral stress near s^-1/2."""
+    near, tight = (0.7 * stretch**-0.5, 1.3 * stretch**-0.5), {"xtol": 1e-15, "rtol": 1e-15}
+    return root_scalar(lambda b: float(principal_stress(material, (b, b, stretch), 0)), bracket=near, **tight).root
 
 
-def uniaxial_stress(mu, kappa, stretch):
+def uniaxial_stress(material, stretch):
     """Nominal axial stress [Pa] of the nearly incompressible block with free sides."""
-    b = uniaxial_lateral_stretch(mu, kappa, stretch)
-    J = stretch * b**2
-    I1 = stretch**2 + 2.0 * b**2
-    return mu * J ** (-2.0 / 3.0) * (stretch - I1 / (3.0 * stretch)) + kappa * (J - 1.0) * J / stretch
+    b = uniaxial_lateral_stretch(material, stretch)
+    return principal_stress(material, (b, b, stretch), 2)
 
 
 def thick_sphere_pressure(mu, inner, outer, inner_stretch):

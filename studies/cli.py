@@ -15,6 +15,7 @@ from reference_fem import ReferenceProblem
 from studies import report as reports
 from studies.case import BodyRecipe, Case
 from studies.catalog import STUDIES, Study
+from studies.commands.verify import verify
 from studies.describe import describe
 from studies.errors import StudyError
 from studies.find import find_study
@@ -195,6 +196,9 @@ def replay(path: Path) -> None:
     if stored.machine != new.machine:
         console.print("it was stored on another machine")
     raise typer.Exit(1)
+
+
+app.command()(verify)
 
 
 @app.command("safe-dt")

@@ -1,0 +1,83 @@
+"""What an oracle says: numbers held against the truth, and errors over mesh size."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from reference_fem.element_table import find_element
+from reference_fem.elements import displacement_points
+from reference_fem.problem import Problem
+
+
+@dataclass(frozen=True)
+class Check:
+    """One number held against the truth."""
+
+    quantity: str
+    unit: str
+    expected: float
+    got: float
+    tolerance: float
+    """Largest deviation allowed: relative to the expected value, or in `unit` when `absolute`."""
+    mesh: str
+    unknowns: int
+    absolute: bool = False
+    control: bool = False
+    """A method known to be wrong: it must deviate by more than the tolerance."""
+
+    @property
+    def deviation(self) -> float:
+        """Distance from the expected value, relative to it unless `absolute`."""
+        gap = abs(self.got - self.expected)
+        return gap if self.absolute else gap / abs(self.expected)
+
+    @property
+    def met(self) -> bool:
+        """Whether the number is where it must be; a NaN never is."""
+        return self.deviation > self.tolerance if self.control else self.deviation <= self.tolerance
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Error of one quantity over mesh size."""
+
+    panel: str
+    """What is measured: curves of one panel share axes."""
+    label: str
+    sizes: tuple[float, ...]
+    """Element size over the size of the body, from coarse to fine."""
+    errors: tuple[float, ...]
+    """Relative errors."""
+
+    @property
+    def order(self) -> float:
+        """Slope between the two finest meshes."""
+        (h1, h0), (e1, e0) = self.sizes[-2:], self.errors[-2:]
+        return float(np.log(e1 / e0) / np.log(h1 / h0))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one oracle found."""
+
+    checks: tuple[Check, ...]
+    curves: tuple[Curve, ...] = ()
+
+
+@dataclass(frozen=True)
+class Oracle:
+    """A problem whose answer is known from elsewhere."""
+
+    name: str
+    title: str
+    source: str
+    measure: Callable[[], Outcome]
+    fast: bool = True
+    """Whether it belongs to the half that every change must pass."""
+
+
+def unknowns(problem: Problem) -> int:
+    """Unknowns of a problem, held ones among them."""
+    element, mesh = find_element(problem.element), problem.mesh
+    return 3 * len(displacement_points(mesh, element)) + (mesh.nvertices if element.pressure else 0)

@@ -1,0 +1,45 @@
+"""A body whose whole boundary moves affinely is affine inside, at constant pressure, on any mesh."""
+
+import numpy as np
+
+from reference_fem.element_table import ELEMENTS
+from reference_fem.elements import nodes
+from reference_fem.equilibrium import equilibrium_path
+from reference_fem.material import MooneyRivlin
+from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
+from reference_fem.oracles.bodies import block
+from reference_fem.oracles.uniaxial import TIGHT
+from reference_fem.problem import Held, Problem
+
+STRAIN = 5e-4
+"""Volume change, so that the pressure is not zero."""
+RATIOS = (10.0, 1e3, 1e5)
+
+
+def affine():
+    """A shear and stretch with det F = 1 + STRAIN, (3, 3)."""
+    F = np.array([[1.1, 0.2, 0.0], [0.0, 0.95, 0.1], [0.05, 0.0, 0.98]])
+    return F * ((1.0 + STRAIN) / np.linalg.det(F)) ** (1.0 / 3.0)
+
+
+def measure() -> Outcome:
+    """Largest error of displacement and pressure, for every element and from kappa/mu = 10 to 1e5."""
+    mesh, checks = block(skew=0.1), []
+    x, F = nodes(mesh), affine()
+    for name in ELEMENTS:
+        for ratio in RATIOS:
+            material = MooneyRivlin(0.3, 0.2, ratio)
+            shape = lambda x: (F - np.eye(3)) @ x  # noqa: E731
+            held = [Held(lambda x: np.ones(x.shape[1], bool), (0, 1, 2), lambda t: (t, t, t), shape)]
+            problem = Problem(mesh, material, held, element=name)
+            state = equilibrium_path(problem, [1.0], TIGHT)[0]
+            misfit = float(np.abs(state.u - x @ (F - np.eye(3)).T).max())
+            size, at = unknowns(problem), f"{name}, kappa/mu {ratio:g}"
+            about = f"block, {mesh.nelements} {name}"
+            checks.append(Check(f"worst u error, {at}", "m", 0.0, misfit, 1e-8, about, size, absolute=True))
+            worst = state.p[np.argmax(np.abs(state.p - ratio * STRAIN))]
+            checks.append(Check(f"worst pressure, {at}", "mu", ratio * STRAIN, float(worst), 1e-8, about, size))
+    return Outcome(tuple(checks))
+
+
+ORACLE = Oracle("patch", "Patch test: affine boundary, constant pressure", "closed form", measure)

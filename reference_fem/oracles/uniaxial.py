@@ -1,0 +1,41 @@
+"""A block pulled and squeezed along one axis, its sides free: the state is homogeneous, so any mesh is exact."""
+
+from reference_fem import exact
+from reference_fem.equilibrium import equilibrium_path
+from reference_fem.material import MooneyRivlin, NeoHookean
+from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
+from reference_fem.oracles.bodies import block, symmetry
+from reference_fem.problem import Held, Problem
+from reference_fem.system import NewtonSettings
+
+STRETCHES = (0.7, 0.8, 0.9, 1.5)
+LAWS = {"neo-Hookean": NeoHookean(1.0, 1000.0), "Mooney-Rivlin": MooneyRivlin(0.3, 0.2, 1000.0)}
+TIGHT = NewtonSettings(force_tol=1e-11, volume_tol=1e-12)
+"""Newton converges quadratically: one more iteration, and round-off alone is left."""
+
+
+def pull(material, stretch, mesh, element="P2/P1"):
+    """(problem, equilibrium) of the block at one stretch; the pulled end is the last held region."""
+    end = Held(lambda x: x[2] > 1 - 1e-9, (2,), lambda t: (0.0, 0.0, (stretch - 1.0) * t))
+    problem = Problem(mesh, material, [*symmetry(), end], element=element)
+    return problem, equilibrium_path(problem, [0.5, 1.0], TIGHT)[-1]
+
+
+def measure() -> Outcome:
+    """Force and volume at four stretches."""
+    mesh, checks = block(skew=0.1), []
+    for law, material in LAWS.items():
+        for stretch in STRETCHES:
+            problem, state = pull(material, stretch, mesh)
+            at = f"{law}, stretch {stretch:g}"
+            side = exact.uniaxial_lateral_stretch(material, stretch)
+            for what, unit, expected, got in (
+                ("force", "mu m²", exact.uniaxial_stress(material, stretch), state.held_force[3, 2]),
+                ("V/V0", "1", stretch * side**2, state.volume),
+            ):
+                mesh_name = f"block, {mesh.nelements} P2/P1"
+                checks.append(Check(f"{what}, {at}", unit, expected, float(got), 1e-8, mesh_name, unknowns(problem)))
+    return Outcome(tuple(checks))
+
+
+ORACLE = Oracle("uniaxial", "Block with free sides, pulled and squeezed", "closed form at kappa = 1000 mu", measure)

@@ -1,0 +1,44 @@
+"""The fast half of the oracle pack, and the pack's own contract. The slow half runs in `organbench verify`."""
+
+import numpy as np
+import pytest
+
+from reference_fem.oracles import ORACLES, Check, Curve
+
+FAST = [oracle for oracle in ORACLES if oracle.fast]
+
+
+@pytest.mark.parametrize("oracle", FAST, ids=[oracle.name for oracle in FAST])
+def test_every_number_is_where_it_must_be(oracle):
+    found = oracle.measure()
+    assert found.checks
+    off = [f"{c.quantity}: {c.got:.8g}, expected {c.expected:.8g}" for c in found.checks if not c.met]
+    assert not off, "; ".join(off)
+
+
+def test_oracles_have_names_of_their_own_and_a_source():
+    names = [oracle.name for oracle in ORACLES]
+    assert len(set(names)) == len(names)
+    assert all(oracle.source and oracle.title for oracle in ORACLES)
+
+
+@pytest.mark.parametrize("got, met", [(1.009, True), (0.991, True), (1.011, False), (np.nan, False)])
+def test_a_check_judges_by_the_relative_deviation(got, met):
+    assert Check("force", "N", 1.0, got, 0.01, "mesh", 3).met is met
+    assert Check("force", "N", -100.0, -100.0 * got, 0.01, "mesh", 3).met is met
+
+
+@pytest.mark.parametrize("got, met", [(3.1, True), (2.8, False), (np.nan, False)])
+def test_a_check_in_units_of_its_quantity(got, met):
+    assert Check("order", "1", 3.0, got, 0.15, "mesh", 3, absolute=True).met is met
+
+
+@pytest.mark.parametrize("got, met", [(0.4, True), (0.9, False), (np.nan, False)])
+def test_a_control_must_miss(got, met):
+    assert Check("displacement", "m", 1.0, got, 0.5, "mesh", 3, control=True).met is met
+
+
+def test_the_order_of_a_curve_is_its_slope_at_the_fine_end():
+    sizes = (0.4, 0.2, 0.1)
+    errors = (1.0, 2.0 * 0.2**3, 2.0 * 0.1**3)
+    assert Curve("u", "P2/P1", sizes, errors).order == pytest.approx(3.0, abs=1e-12)
