@@ -93,6 +93,7 @@ def reference_fingerprint() -> str:
         "studies.adapt",
         "studies.adapt_reference",
         "studies.reference_fields",
+        "studies.reference_mesh",
         "studies.reference_solve",
     )
 

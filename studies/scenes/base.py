@@ -72,6 +72,10 @@ class ReferencePlan:
     """Surface nodes ("solid"), or element size over radius away from the contact ("octant"); three are the rule."""
     variants: tuple[str, ...] = ("steps", "contact", "kappa")
     """Settings that are made better on the coarsest mesh, for their share of the error bar."""
+    at_outlines: int = 0
+    """Times the elements at the outlines of held regions are halved; three halve their size."""
+    at_contact: int = 0
+    """Times the elements at the surface that an obstacle will reach are halved."""
 
     def __post_init__(self) -> None:
         if self.mesh not in ("solid", "octant") or len(self.levels) < 2:

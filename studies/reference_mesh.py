@@ -1,0 +1,153 @@
+"""The mesh of a reference: the mesher's, finer where it counts, its sides curved onto the true surface and outlines."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from skfem import MeshTet, MeshTet2
+
+from massspring import Obstacle, Plane
+from reference_fem import Evaluator, curve, facet_nodes, nodes
+from studies.adapt import mesh_for, patch_nodes
+from studies.distance import distance_to_surface
+from studies.geometry import OrganMesh, ball_octant
+from studies.geometry.levelset import Shape, project
+from studies.geometry.mesh import boundary_triangles
+from studies.geometry.organs import SHAPES
+from studies.scenes.base import Held, Organ, Scene
+from studies.suggest import choose
+
+POLE_REFINEMENT = 0.35
+"""Element size at the contact of an octant, over that elsewhere: at 10 % the contact is a third of the ball's."""
+SAME_POINT = 1e-9
+"""Two points closer than this fraction of the body are one: far above rounding, far below an edge."""
+
+
+def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarray]]:
+    """The second-order mesh on one level of the scene's plan, and the nodes of each of its held regions.
+
+    A region is held at the nodes of its facets: a mid-side node outside them, across a dent, stays free.
+    Raises StudyError for a mesh that cannot be made.
+    """
+    plan = scene.reference
+    assert plan is not None  # nobody asks for the mesh of a scene without one
+    if scene.symmetric:
+        return _curved_octant(scene, _straight(_octant(scene, level))), []
+    organ_mesh = mesh_for(scene, int(level))
+    patches = [patch_nodes(organ_mesh, held.name, held.region) for held in scene.held]
+    body = coarse = coarse_body(_straight(organ_mesh), patches)
+    for _ in range(plan.at_outlines):
+        body = body.bisected(body.at_outlines())
+    for _ in range(plan.at_contact):
+        body = body.bisected(body.inside(scene.obstacles, scene.checkpoints[-1]))
+    shape = true_shape(scene.organ)
+    mesh = MeshTet2.from_mesh(body.mesh)
+    if shape is not None:
+        mesh = _on_true_shape(_moved(body, coarse, shape, scene.held), body, shape, scene.held)
+    return mesh, [np.unique(facets) for facets in body.facets(mesh)]
+
+
+def _octant(scene: Scene, level: float) -> OrganMesh:
+    radius = float(scene.organ.parameters["radius"])
+    return ball_octant(radius, level * radius, POLE_REFINEMENT * level * radius)
+
+
+def _straight(organ_mesh: OrganMesh) -> MeshTet:
+    return MeshTet(np.ascontiguousarray(organ_mesh.points.T), np.ascontiguousarray(organ_mesh.tetrahedra.T))
+
+
+def _curved_octant(scene: Scene, straight: MeshTet) -> MeshTet2:
+    radius = float(scene.organ.parameters["radius"])
+    shape = true_shape(scene.organ)
+    assert shape is not None  # a ball
+    return curve(straight, onto(shape), lambda x: np.linalg.norm(x, axis=0) > radius * (1 - 1e-6))
+
+
+def _moved(body: "Body", coarse: "Body", shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:
+    """The finer mesh moved as the sides of the coarse one are to lie on the true shape.
+
+    Inside an element that move is smooth and turns nothing over, so its parts stay upright however small they are;
+    moving each new vertex onto the surface by itself folds small elements beside large ones.
+    """
+    plain = MeshTet2.from_mesh(coarse.mesh)
+    move = nodes(_on_true_shape(plain, coarse, shape, helds)) - nodes(plain)
+    finer = MeshTet2.from_mesh(body.mesh)
+    x = nodes(finer)
+    return replace(finer, doflocs=np.ascontiguousarray((x + Evaluator(plain).displacement(move, x)).T))
+
+
+def _on_true_shape(mesh: MeshTet2, body: "Body", shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:
+    """The mesh with the nodes of its boundary on the true surface, those of outlines on the true outlines.
+
+    A polygon instead would hold the body h²/8r too little or too much, of first order in the force.
+    """
+    points = nodes(mesh).copy()
+    outer = np.unique(facet_nodes(mesh))
+    points[outer] = project(shape, points[outer])
+    for held, facets in zip(helds, body.facets(mesh), strict=True):
+        rim = np.unique(rim_sides(facets))
+        points[rim] = project(shape, points[rim], (held.region.level,))
+    return replace(mesh, doflocs=np.ascontiguousarray(points.T))
+
+
+def true_shape(organ: Organ) -> Shape | None:
+    """The organ as a level function; None where only a mesh is known."""
+    return None if organ.shape == "file" else choose(organ.shape, SHAPES, "organ")(**organ.parameters)
+
+
+def onto(shape: Shape) -> Callable[[np.ndarray], np.ndarray]:
+    """Projection of points (3, N) [m] onto the true surface."""
+    return lambda x: project(shape, np.ascontiguousarray(x.T)).T
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A mesh with straight sides, and where on its surface it is held."""
+
+    mesh: MeshTet
+    corners: np.ndarray
+    """Vertices before any refinement [m], (n, 3)."""
+    patches: list[np.ndarray]
+    """Of each held region its triangles of `corners`, (f, 3): a finer mesh has parts of them."""
+
+    def facets(self, mesh: MeshTet2) -> list[np.ndarray]:
+        """Of each patch the six nodes of its facets (f, 6) in the second-order mesh with the same vertices."""
+        table, reach = facet_nodes(mesh), SAME_POINT * float(np.ptp(self.corners))
+        middles = self.mesh.p.T[table[:, :3]].mean(axis=1)
+        return [table[distance_to_surface(middles, self.corners, patch) < reach] for patch in self.patches]
+
+    def at_outlines(self) -> np.ndarray:
+        """Elements with a vertex on an outline: there the stress is singular."""
+        rims = [rim_sides(facets)[:, :2].ravel() for facets in self.facets(MeshTet2.from_mesh(self.mesh))]
+        return np.flatnonzero(np.isin(self.mesh.t, np.concatenate([*rims, []])).any(axis=0))
+
+    def inside(self, obstacles: tuple[Obstacle, ...], t: float) -> np.ndarray:
+        """Boundary elements with a vertex that at rest is where an obstacle will be at time t [s]."""
+        outer = np.unique(boundary_triangles(self.mesh.t.T))
+        x = self.mesh.p[:, outer].T
+        deep = np.zeros(len(x), dtype=bool)
+        for obstacle in obstacles:
+            moved = x - np.asarray(obstacle.path(t))
+            if isinstance(obstacle, Plane):
+                deep |= (moved - obstacle.point) @ obstacle.unit_normal < 0
+            else:
+                deep |= np.linalg.norm(moved - obstacle.centre, axis=1) < obstacle.radius
+        return np.flatnonzero(np.isin(self.mesh.t, outer[deep]).any(axis=0))
+
+    def bisected(self, elements: np.ndarray) -> "Body":
+        """Each of the elements halved at its longest edge, and of their neighbours as many as that takes."""
+        finer = self.mesh.refined(elements)
+        return replace(self, mesh=MeshTet(np.ascontiguousarray(finer.p), np.ascontiguousarray(finer.t)))
+
+
+def coarse_body(mesh: MeshTet, patches: list[np.ndarray]) -> Body:
+    """A body that is held at the boundary facets whose vertices are all in one of the patches."""
+    outer = boundary_triangles(mesh.t.T)
+    return Body(mesh, mesh.p.T.copy(), [outer[np.isin(outer, patch).all(axis=1)] for patch in patches])
+
+
+def rim_sides(facets: np.ndarray) -> np.ndarray:
+    """The outline of a patch of six-node facets (f, 6): sides of one facet only, as end, end, middle, (s, 3)."""
+    sides = facets[:, [[0, 1, 3], [1, 2, 4], [0, 2, 5]]].reshape(-1, 3)
+    _, first, count = np.unique(sides[:, 2], return_index=True, return_counts=True)
+    return sides[first[count == 1]]
