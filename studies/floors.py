@@ -4,15 +4,14 @@ Differences of solutions are taken at the vertices of the coarsest mesh, weighte
 that a mesh refined somewhere does not count more there.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_fem.uncertainty import alike, cell_size, changes_error, combined, setting_error
+from reference_fem.uncertainty import MeshError, cell_size, combined, field_error, mesh_error, setting_error
 from studies.distance import hausdorff
 from studies.errors import StudyError
 from studies.geometry.mesh import boundary_triangles, tetrahedron_volumes, triangle_areas
@@ -139,25 +138,23 @@ def pressure(a: View, b: View) -> float:
     return float(abs(a.series("pressure")[-1] / b.series("pressure")[-1] - 1))
 
 
-def _inside(view: View) -> np.ndarray:
-    return view.u * np.sqrt(view.places.volumes)[:, None]
-
-
-def _outside(view: View) -> np.ndarray:
-    return view.u * np.sqrt(view.places.areas)[:, None]
-
-
-QUANTITIES: dict[str, tuple[Measure, Callable[[View], np.ndarray]]] = {
+NUMBERS: dict[str, tuple[Measure, Callable[[View], np.ndarray]]] = {
     "force": (force, lambda view: view.force),
     "force_end": (force_end, lambda view: view.force[-1:]),
-    "surface": (surface, _outside),
-    "surface_mean": (surface_mean, _outside),
-    "interior": (interior, _inside),
-    "silhouette": (silhouette, _outside),
     "volume": (volume, lambda view: view.series("volume")),
     "pressure": (pressure, lambda view: view.series("pressure")[-1:]),
 }
-"""By the name that metrics use: how a change is measured, and the vector whose changes tell whether they are alike."""
+"""Numbers and series of them: how a change is measured, and the values."""
+FIELDS: dict[str, tuple[Measure, Callable[[Places], np.ndarray]]] = {
+    "surface": (surface, lambda places: places.areas),
+    "interior": (interior, lambda places: places.volumes),
+}
+"""The displacement, with the weights of its points."""
+ABOUT_SURFACE: dict[str, Measure] = {"surface_mean": surface_mean, "silhouette": silhouette}
+"""What is read off the displaced surface: it has the bar of its change from one mesh to the next, times how many times
+the change of the surface its own bar is."""
+QUANTITIES: dict[str, Measure] = {name: m for name, (m, _) in (NUMBERS | FIELDS).items()} | ABOUT_SURFACE
+"""By the name that metrics use."""
 
 
 def uncertainties(
@@ -172,25 +169,25 @@ def uncertainties(
     places = Places(coarser[-1])
     views = [View(solution, places) for solution in (finest, *coarser)]
     better = {str(s.record.attributes["variant"]): View(s, places) for s in variants}
-    return {name: _uncertainty(name, views, better) for name in QUANTITIES}
-
-
-def _uncertainty(name: str, views: Sequence[View], better: Mapping[str, View]) -> Uncertainty:
-    measure, vector = QUANTITIES[name]
     family = views[:FAMILY]
+    found = {}
+    for name, measure in QUANTITIES.items():
+        mesh = _of_mesh(name, family)
+        shares = {key: setting_error(measure(views[-1], view), VARIANTS[key][1]) for key, view in better.items()}
+        found[name] = Uncertainty({"mesh": mesh.uncertainty, **shares}, mesh.order, mesh.shift)
+    return found
+
+
+def _of_mesh(name: str, family: Sequence[View]) -> MeshError:
+    """What the meshes leave, relative to the size of the quantity."""
     sizes = [view.cell_size for view in family]
-    changes = [measure(b, a) for a, b in pairwise(family)]
-    vectors = [vector(view) for view in family]
-    same_way = True
-    if len(family) == FAMILY:
-        changes.append(measure(family[2], family[0]))
-        same_way = alike(vectors[1] - vectors[0], vectors[2] - vectors[1])
-    mesh = changes_error(sizes, changes, same_way)
-    shares = {key: setting_error(measure(views[-1], view), VARIANTS[key][1]) for key, view in better.items()}
-    return Uncertainty({"mesh": mesh.uncertainty, **shares}, mesh.order, _sign(vectors) * mesh.shift)
-
-
-def _sign(vectors: Sequence[np.ndarray]) -> float:
-    """Which way a number goes on from the finest mesh, as a change of its size; a field has no sign."""
-    fine, middle = vectors[:2]
-    return float(np.sign((fine - middle) * fine)[0]) if fine.size == 1 else 1.0
+    if name in NUMBERS:
+        values = [NUMBERS[name][1](view) for view in family]
+        size = 1.0 if name == "volume" else float(np.linalg.norm(values[0]))
+        error, sign = mesh_error(sizes, values), float(np.sign(values[0][0]))
+        return MeshError(error.uncertainty / size, sign * error.shift / size, error.order)
+    weights = FIELDS[name if name in FIELDS else "surface"][1](family[0].places)
+    field = field_error(sizes, [view.u for view in family], weights)
+    change = np.sqrt(weights @ ((family[1].u - family[0].u) ** 2).sum(axis=1))
+    scale = QUANTITIES[name](family[1], family[0]) / change if change else 0.0
+    return MeshError(scale * field.uncertainty, scale * field.shift, field.order)

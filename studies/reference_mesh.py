@@ -1,5 +1,6 @@
 """The mesh of a reference: the mesher's, finer where it counts, its sides curved onto the true surface and outlines."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -41,9 +42,7 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
     for _ in range(plan.at_contact):
         body = body.bisected(body.inside(scene.obstacles, scene.checkpoints[-1]))
     shape = true_shape(scene.organ)
-    mesh = MeshTet2.from_mesh(body.mesh)
-    if shape is not None:
-        mesh = _on_true_shape(_moved(body, coarse, shape, scene.held), body, shape, scene.held)
+    mesh = MeshTet2.from_mesh(body.mesh) if shape is None else _curved(body, coarse, shape, scene.held)
     return mesh, [np.unique(facets) for facets in body.facets(mesh)]
 
 
@@ -63,17 +62,19 @@ def _curved_octant(scene: Scene, straight: MeshTet) -> MeshTet2:
     return curve(straight, onto(shape), lambda x: np.linalg.norm(x, axis=0) > radius * (1 - 1e-6))
 
 
-def _moved(body: "Body", coarse: "Body", shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:
-    """The finer mesh moved as the sides of the coarse one are to lie on the true shape.
+def _curved(body: "Body", coarse: "Body", shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:
+    """The finer mesh with sides as curved as those of the coarse one that lie on the true shape.
 
-    Inside an element that move is smooth and turns nothing over, so its parts stay upright however small they are;
+    The quadratic map of a coarse element takes its parts with it exactly, so they stay upright however small they are;
     moving each new vertex onto the surface by itself folds small elements beside large ones.
     """
     plain = MeshTet2.from_mesh(coarse.mesh)
-    move = nodes(_on_true_shape(plain, coarse, shape, helds)) - nodes(plain)
+    curved = _on_true_shape(plain, coarse, shape, helds)
+    if body is coarse:
+        return curved
     finer = MeshTet2.from_mesh(body.mesh)
-    x = nodes(finer)
-    return replace(finer, doflocs=np.ascontiguousarray((x + Evaluator(plain).displacement(move, x)).T))
+    move = Evaluator(plain).displacement(nodes(curved) - nodes(plain), nodes(finer))
+    return replace(finer, doflocs=np.ascontiguousarray((nodes(finer) + move).T))
 
 
 def _on_true_shape(mesh: MeshTet2, body: "Body", shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:
@@ -136,7 +137,13 @@ class Body:
 
     def bisected(self, elements: np.ndarray) -> "Body":
         """Each of the elements halved at its longest edge, and of their neighbours as many as that takes."""
-        finer = self.mesh.refined(elements)
+        talk = logging.getLogger("skfem.mesh.mesh")
+        before = talk.level
+        talk.setLevel(logging.ERROR)  # it tells that its own slices are copied
+        try:
+            finer = self.mesh.refined(elements)
+        finally:
+            talk.setLevel(before)
         return replace(self, mesh=MeshTet(np.ascontiguousarray(finer.p), np.ascontiguousarray(finer.t)))
 
 

@@ -27,5 +27,5 @@ LIVER_PRESS = Scene(
     held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),
     probed=Probed("obstacle", 0, LIVER_PRESS_DIRECTION),
     damping=8.0,
-    reference=ReferencePlan("solid", (300, 450, 650)),
+    reference=ReferencePlan("solid", (200, 360, 650)),
 )

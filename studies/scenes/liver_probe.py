@@ -29,5 +29,5 @@ LIVER_PROBE = Scene(
     held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),
     probed=Probed("obstacle", 0, INWARD),
     damping=8.0,
-    reference=ReferencePlan("solid", (300, 450, 650)),
+    reference=ReferencePlan("solid", (200, 360, 650), at_contact=3),
 )

@@ -10,8 +10,8 @@ from reference_fem.uncertainty import (
     SCATTER,
     SLOWEST,
     TWO_MESHES,
-    changes_error,
     combined,
+    field_error,
     mesh_error,
     observed_order,
     setting_error,
@@ -43,13 +43,38 @@ def test_orders_that_are_not_plausible_are_not_believed(order, believed):
     assert error.uncertainty == pytest.approx(SAFETY * gap / (1.3**believed - 1), rel=1e-12)
 
 
-def test_a_field_has_the_order_of_its_size():
+SLOPES, WEIGHTS = np.array([[0.3, -0.1], [0.2, 0.5], [0.0, 0.1]]), np.array([1.0, 4.0, 0.5])
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 2.5])
+def test_a_field_has_the_order_of_its_size(order):
     """Each point has a slope of its own; the points' weights decide what its size is."""
-    slopes, weights = np.array([[0.3, -0.1], [0.2, 0.5], [0.0, 0.1]]), np.array([1.0, 4.0, 0.5])
-    fields = [2.0 + slopes * h**2 for h in SIZES]
-    error = mesh_error(SIZES, fields, weights)
-    assert error.order == pytest.approx(2.0, rel=1e-9)
-    assert error.shift == pytest.approx(np.sqrt(weights @ (slopes**2).sum(axis=1)), rel=1e-9)
+    error = field_error(SIZES, [2.0 + SLOPES * h**order for h in SIZES], WEIGHTS)
+    left = np.sqrt(WEIGHTS @ (SLOPES**2).sum(axis=1))
+    assert error.order == pytest.approx(order, abs=0.01)
+    assert error.shift == pytest.approx(left, rel=0.01)
+    assert error.uncertainty == pytest.approx(SAFETY * left, rel=0.01)
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 2.5])
+@pytest.mark.parametrize("own", [0.5, 1.0, 3.0])
+def test_errors_that_each_mesh_has_for_itself_are_told_apart(order, own):
+    """Independent fields on top of a common one, `own` times as large: extrapolation sees the common one alone."""
+    noise = np.random.default_rng(5)
+    common = noise.normal(size=(3000, 3))
+    fields = [1.0 + h**order * (common + own * noise.normal(size=(3000, 3))) for h in SIZES]
+    error = field_error(SIZES, fields, np.full(3000, 1 / 9000))
+    # 9,000 independent numbers tell the order to a few hundredths and sizes to a few per cent.
+    assert error.order == pytest.approx(order, abs=0.15)
+    assert error.uncertainty == pytest.approx(SAFETY * np.sqrt(1 + own**2), rel=0.1)
+    assert error.shift == pytest.approx(1.0, rel=0.25)
+
+
+def test_fields_that_come_no_closer_have_the_spread():
+    fields = [np.zeros((3, 1)), np.full((3, 1), 0.4), np.full((3, 1), 0.1)]
+    error = field_error(SIZES, fields, np.full(3, 1 / 3))
+    assert error.uncertainty == pytest.approx(SCATTER * 0.4, rel=1e-12)
+    assert not error.monotone
 
 
 def test_values_that_go_to_and_fro_have_the_spread():
@@ -58,29 +83,25 @@ def test_values_that_go_to_and_fro_have_the_spread():
     assert error.shift == 0.0
     assert error.uncertainty == pytest.approx(SCATTER * 0.5, rel=1e-12)
     assert mesh_error(SIZES, [3.0, 2.9, 3.4]).uncertainty == pytest.approx(SCATTER * 0.5, rel=1e-12)
-    # Two changes of a field at right angles are no approach either; the ends are then farthest apart.
+    # Two changes of a series at right angles are no approach either; its ends are then farthest apart.
     turned = mesh_error(SIZES, [np.array([0.0, 0.0]), np.array([3.0, 0.0]), np.array([3.0, 4.0])])
     assert not turned.monotone
     assert turned.uncertainty == pytest.approx(SCATTER * 5.0, rel=1e-12)
 
 
-def test_sizes_of_changes_are_enough():
-    values = law(2.0)
-    changes = values[1] - values[0], values[2] - values[1], values[2] - values[0]
-    assert changes_error(SIZES, changes, same_way=True).uncertainty == mesh_error(SIZES, values).uncertainty
-    assert changes_error(SIZES, (0.2, 0.3, 0.4), same_way=False).uncertainty == SCATTER * 0.4
-
-
 def test_two_meshes_have_the_largest_bar():
     """Three times what order one leaves, more than three meshes of any order say."""
     values = law(1.0)
-    two = changes_error(SIZES[:2], [values[1] - values[0]], same_way=True)
+    two = mesh_error(SIZES[:2], values[:2])
     assert two.uncertainty == pytest.approx(TWO_MESHES * 0.3, rel=1e-12)
     assert two.uncertainty > mesh_error(SIZES, values).uncertainty
+    field = field_error(SIZES[:2], [np.array([[v]]) for v in values[:2]], np.ones(1))
+    assert field.uncertainty == pytest.approx(two.uncertainty, rel=1e-12)
 
 
 def test_no_change_is_no_error():
     assert mesh_error(SIZES, [2.0, 2.0, 2.0]).uncertainty == 0.0
+    assert field_error(SIZES, [np.ones((2, 1))] * 3, np.ones(2)).uncertainty == 0.0
     assert observed_order(SIZES, 0.1, 0.0) == FASTEST
     assert observed_order(SIZES, 0.0, 0.1) == SLOWEST
 
