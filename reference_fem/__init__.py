@@ -24,6 +24,7 @@ if "NUMBA_CACHE_DIR" not in os.environ:
 
 from reference_fem.cavity import Cavity  # noqa: E402
 from reference_fem.contact import RigidPlane, RigidSphere  # noqa: E402
+from reference_fem.dynamics import DynamicsSettings, Moment, motion_path  # noqa: E402
 from reference_fem.element_table import ELEMENTS, Element  # noqa: E402
 from reference_fem.elements import facet_nodes, nodes, surface_triangles  # noqa: E402
 from reference_fem.equilibrium import Equilibrium, equilibrium_path  # noqa: E402
@@ -42,12 +43,14 @@ __all__ = [
     "ELEMENTS",
     "BodyForce",
     "Cavity",
+    "DynamicsSettings",
     "Element",
     "Equilibrium",
     "Evaluator",
     "Held",
     "Material",
     "Modes",
+    "Moment",
     "MooneyRivlin",
     "NeoHookean",
     "NewtonSettings",
@@ -60,6 +63,7 @@ __all__ = [
     "curve",
     "equilibrium_path",
     "facet_nodes",
+    "motion_path",
     "natural_frequencies",
     "nodes",
     "surface_triangles",

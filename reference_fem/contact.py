@@ -207,3 +207,12 @@ def penetration(touch: Touch):
     """Deepest point inside an obstacle [m], from t = m - eps g where t > 0."""
     depth = (touch.pressure - touch.multiplier) / touch.penalty[:, None]
     return float(np.max(depth, initial=0.0, where=touch.pressure > 0.0))
+
+
+def misplacement(touch: Touch):
+    """Farthest from the surface of its obstacle, on either side, that a point feels a contact pressure [m].
+
+    Too deep, or on its way out and still pushed by a multiplier from before.
+    """
+    off = np.abs(touch.pressure - touch.multiplier) / touch.penalty[:, None]
+    return float(np.max(off, initial=0.0, where=touch.pressure > 0.0))

@@ -7,7 +7,6 @@ import scipy.sparse as sp
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
 
-from reference_fem.checks import check_inertia
 from reference_fem.elements import basis_table
 from reference_fem.system import System
 
@@ -29,17 +28,6 @@ def element_masses(element, elements, density, order):
     """rho integral N_a N_b of every element, (ne, nu, nu) [kg]; for P2 exact at order 4 on straight elements."""
     values, _ = basis_table(element.displacement, get_quadrature(RefTet, order)[0])
     return density * np.einsum("eq,qa,qb->eab", elements.weights, values, values)
-
-
-class MovingSystem(System):
-    """A System with inertia: the body may be free to move as a whole. Raises ReferenceProblem for one without mass."""
-
-    def __init__(self, problem, settings):
-        super().__init__(problem, settings)
-        self.mass = build_mass(self)
-
-    def check_freedom(self, held_dofs):
-        check_inertia(self.problem)
 
 
 def build_mass(system: System) -> Mass:

@@ -1,6 +1,6 @@
 """Natural frequencies and modes of a body about its rest shape."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -9,7 +9,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from reference_fem.checks import rigid_freedoms
 from reference_fem.elements import at_nodes
 from reference_fem.errors import ReferenceProblem
-from reference_fem.mass import MovingSystem
+from reference_fem.inertia import MovingSystem
 from reference_fem.problem import Problem
 from reference_fem.system import Loads, NewtonSettings
 
@@ -41,10 +41,10 @@ def natural_frequencies(problem: Problem, count: int, solver="auto") -> Modes:
 
     K z = omega² diag(M, 0) z with the tangent K of P2/P1 at rest and the consistent mass M; the pressure has no
     inertia. Shift-invert Lanczos (Lehoucq, Sorensen, Yang, ARPACK Users' Guide, 1998) on the displacement alone: the
-    pressure is eliminated by every solve. Prescribed displacements are held at zero; obstacles and gravity play no
-    part. Raises ReferenceProblem for a body without mass and for a count that the mesh cannot give.
+    pressure is eliminated by every solve. Prescribed displacements are held at zero; obstacles and loads play no part,
+    and a lumen is empty. Raises ReferenceProblem for a body without mass and for a count that the mesh cannot give.
     """
-    system = MovingSystem(problem, NewtonSettings(solver=solver))
+    system = MovingSystem(replace(problem, obstacles=(), cavities=()), NewtonSettings(solver=solver))
     pattern, n = system.pattern, system.displacement_count
     free = pattern.free[pattern.free < n]
     rigid = rigid_freedoms(system.nodes, pattern.held).shape[1]
@@ -65,7 +65,7 @@ def lowest(system: MovingSystem, free, count):
     """The count smallest omega² (ascending) and their modes (len(free), count) on the free displacements."""
     problem, mass = system.problem, system.mass
     rest = system.rest()
-    tangent = system.evaluate(rest.x, Loads(0.0, system.rows[:0], rest.multiplier[:0])).values
+    tangent = system.evaluate(rest.x, Loads(0.0, system.rows, rest.multiplier)).values
     # below zero, so that a free body can be factorised; about the softest elastic omega² of a compact body
     shift = -problem.material.mu / (problem.density * system.volume ** (2.0 / 3.0))
     system.solver.factor(system.pattern.upper(tangent - shift * mass.values))

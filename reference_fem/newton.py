@@ -24,7 +24,8 @@ def solve_step(system: System, state: State, t, load) -> State:
     """The equilibrium at time t from the one in `state`; raises StepFailed.
 
     The first direction is taken at the old obstacles with their move linearised (the predictor). Multipliers are
-    updated, and the penalty raised, only while some point is deeper than allowed; the next step starts low again.
+    updated, and the penalty raised, only while some point is deeper than allowed, or is pushed from as far outside;
+    the next step starts low again.
     """
     rows, target, old = system.obstacles_at(t), system.held_at(t), system.obstacles_at(state.t)
     filling = system.filling_at(t, load)
@@ -35,9 +36,9 @@ def solve_step(system: System, state: State, t, load) -> State:
         direction = system.step(found, x, target)
         x, found = search(system, x, direction, Loads(force, rows, multiplier, filling, stiffness), before)
         arrived = np.array_equal(x[system.pattern.held], target)
-        sunk = too_deep(system, x, found)
-        if arrived and settled(found, system.settings, LOOSE if sunk else 1.0):
-            if not sunk:
+        off = misplaced(system, x, found)
+        if arrived and settled(found, system.settings, LOOSE if off else 1.0):
+            if not off:
                 return State(t, load, x, multiplier, iteration, stiffness)
             multiplier, stiffness = found.touch.pressure, PENALTY_GROWTH * stiffness
             found = system.evaluate(x, Loads(force, rows, multiplier, filling, stiffness))
@@ -52,10 +53,10 @@ def settled(found, settings, slack):
     return found.errors[0] <= slack * settings.force_tol and found.errors[1] <= slack * settings.volume_tol
 
 
-def too_deep(system, x, found):
-    """Whether contact penetrates more than its share of the largest displacement."""
+def misplaced(system, x, found):
+    """Whether contact acts farther from an obstacle's surface than its share of the largest displacement."""
     allowed = system.settings.penetration_tol * np.abs(x[: system.displacement_count]).max()
-    return contact.penetration(found.touch) > allowed
+    return contact.misplacement(found.touch) > allowed
 
 
 def search(system, x, direction, loads, before):
