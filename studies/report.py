@@ -9,18 +9,18 @@ from typing import Any
 
 import pandas as pd
 
-from studies.adapt import mesh_for
 from studies.atomic import write_whole
 from studies.catalog import Study
 from studies.errors import StudyError
 from studies.fingerprint import source_fingerprint
+from studies.geometry import SHAPES, organ
 from studies.machine import write_machine
 from studies.metrics import Run
 from studies.paths import study_folder
+from studies.plots.organ_springs import draw_organ_springs
 from studies.plots.organs import draw_organs
 from studies.reference_solve import pieces
 from studies.run import case_path
-from studies.scenes import SCENES
 from studies.sweep import load_runs
 from studies.table import study_table
 from studies.timed import timing_file
@@ -29,6 +29,8 @@ BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 """Between these lines of README.md stands the summary; `organbench report --readme` writes it."""
 
 FIGURE_NODES = 550
+PAPER_NODES = {"liver": 544, "stomach": 550}
+"""Surface nodes of the organs in Figure 1 of Jung, Hong and Choi (2005)."""
 HEADLINE = "volume_loss"
 """The study that the summary is read off."""
 
@@ -110,12 +112,12 @@ def inputs_of(root: Path, study: Study) -> str:
 
 
 def draw_figures(root: Path) -> list[Path]:
-    """The organs of the scenes with their attachments, each once; the path of the picture."""
-    meshes = {scene.organ.shape: mesh_for(scene, FIGURE_NODES) for scene in SCENES}  # later scenes have attachments
-    path = root / "figures" / "organs.png"
-    make_folder(path.parent)
-    draw_organs(meshes, path)
-    return [path]
+    """The gallery of all organs, and the springs of the paper's liver and stomach; the paths of the pictures."""
+    gallery, springs = root / "figures" / "organs.png", root / "figures" / "organ_springs.png"
+    make_folder(gallery.parent)
+    draw_organs({name: organ(name, FIGURE_NODES) for name in SHAPES}, gallery)
+    draw_organ_springs({name: organ(name, nodes, fill=False) for name, nodes in PAPER_NODES.items()}, springs)
+    return [gallery, springs]
 
 
 def summary_of(runs_of: dict[str, list[Run]]) -> str:

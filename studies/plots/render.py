@@ -14,6 +14,8 @@ DARKEST, RANGE, WRAP = 0.50, 0.58, 1.5
 GLOSS, SHARPNESS = 0.22, 24
 EDGE = 0.86
 """Brightness of the mesh lines over that of their triangle."""
+HAIR = 0.3
+"""Width of a line that closes the seam between smooth faces [pt]."""
 
 
 @dataclass(frozen=True)
@@ -54,23 +56,38 @@ def shade(normals: np.ndarray, colours: np.ndarray) -> np.ndarray:
     return np.clip(colours * brightness[:, None] + gloss[:, None], 0.0, 1.0)
 
 
+def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals of the triangles (t, 3), each the mean of those of its nodes."""
+    rows = vertex_normals(points, triangles)[triangles].mean(axis=1)
+    return rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+
+
 def draw_surface(
     axes: Axes, points: np.ndarray, triangles: np.ndarray, colours: np.ndarray, camera: Camera, edges: float = 0.4
 ) -> None:
     """Draws a closed surface: points (n, 3), outward triangles (t, 3), colours (t, 3), line width of the mesh [pt].
 
-    Triangles that look away are left out, the others are drawn far ones first.
+    Without lines (edges = 0) it looks smooth.
     """
-    seen = camera.see(points)
-    corners = seen[triangles]
-    a, b, c = corners[..., :2].transpose(1, 0, 2)
-    facing = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] > 0
-    normals = camera.see(vertex_normals(points, triangles))[triangles].mean(axis=1)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    order = np.argsort(corners[:, :, 2].mean(axis=1), kind="stable")
+    draw_faces(axes, points[triangles], smooth_normals(points, triangles), colours, camera, edges)
+
+
+def draw_faces(
+    axes: Axes, corners: np.ndarray, normals: np.ndarray, colours: np.ndarray, camera: Camera, edges: float = 0.4
+) -> None:
+    """Draws faces with corners (t, k, 3), unit normals (t, 3) for the light, colours (t, 3), lines of `edges` [pt].
+
+    Those that look away, whose corners run clockwise, are left out; the others are drawn far ones first.
+    """
+    seen = camera.see(corners)
+    x, y = (seen[:, :, :2] - seen[:, :1, :2]).transpose(2, 0, 1)
+    facing = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) > 0
+    order = np.argsort(seen[:, :, 2].mean(axis=1), kind="stable")
     order = order[facing[order]]
-    lit = shade(normals[order], colours[order])
-    polygons = PolyCollection(corners[order][:, :, :2], facecolors=lit, edgecolors=EDGE * lit, linewidths=edges)  # pyright: ignore[reportArgumentType]
+    lit = shade(camera.see(normals[order]), colours[order])
+    # A face without a line of its own colour leaves a hair of what is behind it along its rim.
+    line, width = (EDGE * lit, edges) if edges else (lit, HAIR)
+    polygons = PolyCollection(seen[order][:, :, :2], facecolors=lit, edgecolors=line, linewidths=width)  # pyright: ignore[reportArgumentType]
     polygons.set_joinstyle("round")
     axes.add_collection(polygons, autolim=False)
 

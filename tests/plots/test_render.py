@@ -7,18 +7,16 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Patch
 
 from massspring import METHODS
-from studies.geometry import OrganMesh
-from studies.plots import organs, volume_history
+from studies.plots import volume_history
 from studies.plots.page import finish, page, spread_out
 from studies.plots.render import LIGHT, Camera, draw_surface, shade, uniform, vertex_normals
 from studies.plots.style import method_colour, save, styled
-from tests.plots.made_up import CELLS, POINTS, RADIUS, TRIANGLES, run
+from tests.plots.made_up import POINTS, RADIUS, TRIANGLES, run
 
 FRONT = Camera(azimuth=-90.0, elevation=0.0)
 
@@ -108,41 +106,3 @@ def test_the_users_own_settings_change_nothing(tmp_path):
 def test_saved_size_is_inches_times_dpi(tmp_path):
     save(Figure(figsize=(2, 1)), tmp_path / "a.png", dpi=100)
     assert imread(BytesIO((tmp_path / "a.png").read_bytes())).shape[:2] == (100, 200)
-
-
-def octahedron(**changes):
-    """An organ of six surface nodes whose upper four are held."""
-    values = {
-        "name": "octahedron",
-        "points": POINTS,
-        "triangles": TRIANGLES,
-        "tetrahedra": CELLS,
-        "surface_count": 6,
-        "patches": {"top_cap": np.array([0, 2, 4])},
-    }
-    return OrganMesh(**(values | changes))
-
-
-def test_organs_show_their_patch_in_its_colour_from_the_side_it_is_on():
-    figure = organs.figure({"ball": octahedron()})
-    colour = np.array(to_rgb(organs.PATCH_COLOURS[0]))
-    painted = []
-    for axes in figure.axes:
-        faces = np.asarray(axes.collections[0].get_facecolor())[:, :3]
-        tissue = np.array(to_rgb(organs.TISSUE))
-        painted.append(sum(np.argmax(face) == np.argmax(colour) != np.argmax(tissue) for face in faces))
-    assert sorted(painted) == [0, 1]  # one triangle, seen from one of two sides
-    assert figure.legends[0].get_texts()[0].get_text() == "held: top cap"
-
-
-@pytest.mark.parametrize("meshes", [{}, {"a": octahedron(tetrahedra=np.zeros((0, 4), int), patches={})}])
-def test_organs_without_filling_or_patches_or_organs(meshes, tmp_path):
-    organs.draw_organs(meshes, tmp_path / "a.png")
-    assert (tmp_path / "a.png").stat().st_size > 2000
-
-
-def test_organs_say_volume_and_size():
-    said = "\n".join(text.get_text() for axes in organs.figure({"ball": octahedron()}).axes for text in axes.texts)
-    assert "167 mL" in said  # 4/3 r³
-    assert "6 surface nodes, 8 triangles, 8 tetrahedra" in said
-    assert "20 mm" in said

@@ -11,7 +11,7 @@ from studies.geometry.regions import EllipsoidRegion
 VOLUME = Literature(200.0, "Prassopoulos et al., Eur. Radiol. 7 (1997) 246: 215 mL by CT")
 
 
-def spleen_shape(length: float = 128.0, width: float = 84.0, thickness: float = 52.0, notch: float = 8.0) -> Shape:
+def spleen_shape(length: float = 126.0, width: float = 82.0, thickness: float = 50.0, notch: float = 10.0) -> Shape:
     """An adult's spleen [mm]: 12 cm long, 7 wide, 4 thick; notch: depth of those in its superior border.
 
     Raises StudyError for a length that is none.
@@ -23,10 +23,10 @@ def spleen_shape(length: float = 128.0, width: float = 84.0, thickness: float = 
         outer = ellipsoid(x, (-0.4 * t, 0, 0), (0.9 * t, u, v))
         stomach = ellipsoid(x, (-1.25 * t, -0.5 * u, 0.35 * v), (t, 1.2 * u, 1.2 * v))
         kidney = ellipsoid(x, (-1.25 * t, 0.5 * u, -0.75 * v), (0.9 * t, u, v))
-        body = smooth_max(outer, -smooth_min(stomach, kidney, 8), 14)
+        body = smooth_max(outer, -smooth_min(stomach, kidney, 8), 10)
         # The superior border is notched towards its front end: what is left of the lobes of the embryo.
         for y in (-0.55, -0.15):
-            body = body + groove(x, (0.3 * t, y * u, 1.1 * v), (-t, y * u, 0.75 * v), 7, notch)
+            body = body + groove(x, (0.3 * t, y * u, 1.1 * v), (-t, y * u, 0.75 * v), 6, notch)
         return body
 
     low = metres(-1.2 * t - MARGIN, -u - MARGIN, -v - MARGIN)
