@@ -20,6 +20,7 @@ from studies.geometry.organs.stomach import STOMACH_REGIONS
 from studies.geometry.organs.variation import vary
 from studies.geometry.reading import read_mesh
 from studies.geometry.regions import BallRegion, EllipsoidRegion, HalfSpace, Region
+from studies.geometry.scan import scan
 
 __all__ = [
     "BLADDER_REGIONS",
@@ -50,5 +51,6 @@ __all__ = [
     "project_ball",
     "project_liver",
     "read_mesh",
+    "scan",
     "vary",
 ]

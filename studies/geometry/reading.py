@@ -15,8 +15,8 @@ from scipy.spatial import KDTree
 from studies.errors import StudyError
 from studies.geometry.checks import check_finite, check_surface, check_tetrahedra
 from studies.geometry.mesh import OrganMesh, signed_volume, surface_first, tetrahedron_volumes
+from studies.geometry.units import UNITS, check_unit
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 LARGEST, SMALLEST = 5.0, 1e-3
 """Longest side [m] of a bounding box beyond which the unit is probably wrong: no organ is that large or small."""
 WELD = 1e-7
@@ -32,8 +32,8 @@ def read_mesh(path: str | Path, unit: str | None = None, flip: bool = False) -> 
     is not what was said. Raises StudyError for a file that cannot be read or whose mesh is not usable.
     """
     path = Path(path)
-    if unit is not None and unit not in UNITS:
-        raise StudyError(f"unit {unit!r} is not known; use one of {', '.join(UNITS)}")
+    if unit is not None:
+        check_unit(unit)
     raw = parse(path)
     name = path.name
     points = np.asarray(raw.points, float) * UNITS[unit or "m"]

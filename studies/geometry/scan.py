@@ -1,0 +1,90 @@
+"""Real organs: from a surface in a file to a mesh of a wanted number of nodes."""
+
+import hashlib
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from studies.errors import StudyError
+from studies.geometry.api import fill as fill_mesh
+from studies.geometry.checks import check_finite, check_one_part, check_surface, check_volume
+from studies.geometry.jobs import mesh_from
+from studies.geometry.mesh import OrganMesh, boundary_triangles
+from studies.geometry.reading import cells_of, parse, weld
+from studies.geometry.repair import Mended, border, mend
+from studies.geometry.units import UNITS, settled_unit
+
+
+def scan(
+    path: str | Path,
+    nodes: int | None = None,
+    *,
+    unit: str | None = None,
+    smooth: float = 0.0,
+    holes: bool = False,
+    fill: bool = True,
+) -> OrganMesh:
+    """A body from the surface in a file: welded, its largest part kept, oriented, and remeshed to `nodes` nodes.
+
+    nodes: None keeps the file's own triangles. unit: of the file, "m", "cm" or "mm"; None where only metres make an
+    organ of it. smooth: see scan_shape [m]; needs `nodes`. holes: close borders first. fill: with tetrahedra. Warns of
+    every change to the surface. Raises StudyError for what cannot be read, mended or meshed.
+    """
+    path = Path(path)
+    points, triangles = raw_surface(path)
+    unit = settled_unit(path.name, float(np.ptp(points, axis=0).max()), unit)
+    points = points * UNITS[unit]
+    mended = mend(*weld(points, triangles), path.name, holes)
+    for sentence in mended.said:
+        warnings.warn(f"{path.name}: {sentence}", stacklevel=2)
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    recipe: dict[str, Any] = {
+        "kind": "file",
+        "name": path.stem,
+        "file": path.name,
+        "sha256": digest,
+        "unit": unit,
+        "holes": bool(holes),
+    }
+    if nodes is None:
+        return as_it_is(mended, recipe, smooth, fill)
+    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
+        raise StudyError(f"{path.name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
+    check_watertight(mended, path.name)
+    recipe |= {"kind": "scan", "nodes": int(nodes), "smooth": float(smooth), "fill": bool(fill), "regions": {}}
+    return mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles})
+
+
+def raw_surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) in the file's unit and triangles (t, 3): of the surface, or the boundary of the tetrahedra.
+
+    Raises StudyError for a file without them or with coordinates that are not finite.
+    """
+    raw = parse(path)
+    points = np.asarray(raw.points, float)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise StudyError(f"{path.name}: points have shape {points.shape}; a body needs three coordinates per point")
+    check_finite(points, path.name)
+    tetrahedra, triangles = cells_of(raw, path.name)
+    return points, boundary_triangles(tetrahedra) if len(tetrahedra) else triangles
+
+
+def as_it_is(mended: Mended, recipe: dict[str, Any], smooth: float, fill: bool) -> OrganMesh:
+    """The mended surface with the file's own triangles, filled when asked."""
+    if smooth:
+        raise StudyError(f"{recipe['file']}: smoothing makes a new surface; say how many nodes it shall have (--nodes)")
+    check_surface(mended.points, mended.triangles, recipe["file"])
+    check_one_part(mended.triangles, recipe["file"])
+    none = np.empty((0, 4), np.int64)
+    surface = OrganMesh(recipe["name"], mended.points, mended.triangles, none, len(mended.points), {}, recipe)
+    return fill_mesh(surface) if fill else surface
+
+
+def check_watertight(mended: Mended, name: str) -> None:
+    """Raise StudyError unless the surface has an inside: no border, and a volume."""
+    left = len(border(mended.triangles))
+    if left:
+        raise StudyError(f"{name}: the surface is open at {left} edges; close the holes (--close-holes)")
+    check_volume(mended.points, mended.triangles, name)

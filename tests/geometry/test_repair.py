@@ -1,0 +1,79 @@
+"""Mending: every change is made, counted and said."""
+
+import numpy as np
+import pytest
+
+from studies.errors import StudyError
+from studies.geometry import check_surface
+from studies.geometry.mesh import signed_volume
+from studies.geometry.repair import border, mend, oriented, part_of, without_holes
+from tests.geometry.boxes import box, split, together
+
+
+def test_a_sound_surface_is_left_alone():
+    points, faces = split(*box())
+    mended = mend(points, faces, "box")
+    assert (mended.points == points).all() and (mended.triangles == faces).all() and mended.said == ()
+
+
+def test_neighbours_are_made_to_agree_and_to_look_outward():
+    points, faces = split(*box(), times=2)
+    mixed = faces.copy()
+    turn = np.random.default_rng(0).random(len(faces)) < 0.3
+    mixed[turn] = mixed[turn, ::-1]
+    mended = mend(points, mixed, "box")
+    assert signed_volume(mended.points, mended.triangles) == pytest.approx(1.0, rel=1e-12)
+    check_surface(mended.points, mended.triangles)
+    assert mended.said == (f"{turn.sum()} triangles are turned to agree with their neighbours",)
+    mended = mend(points, faces[:, ::-1], "box")
+    assert signed_volume(mended.points, mended.triangles) == pytest.approx(1.0, rel=1e-12)
+    assert mended.said == ("the surface was inside out and is turned round",)
+
+
+def test_moebius_bands_are_refused():
+    turns = np.linspace(0, 2 * np.pi, 21)[:-1]
+    across = np.stack([np.cos(turns / 2) * np.cos(turns), np.cos(turns / 2) * np.sin(turns), np.sin(turns / 2)], axis=1)
+    middle = np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
+    points = np.vstack([middle - 0.3 * across, middle + 0.3 * across])
+    first = np.arange(20)
+    following = (first + 1) % 20
+    # Once round, the two rims change places.
+    far = np.where(first == 19, following, following + 20)
+    near = np.where(first == 19, following + 20, following)
+    faces = np.vstack([np.column_stack([first, near, far]), np.column_stack([first, far, first + 20])])
+    with pytest.raises(StudyError, match="only one side"):
+        mend(points, faces, "band")
+    assert oriented(box()[1], "box")[1] == 0
+
+
+def test_only_the_largest_part_stays():
+    speck, lumen = box((3, 3, 3), (3.1, 3.1, 3.1)), box((0.2, 0.2, 0.2), (0.6, 0.6, 0.6))
+    points, faces = together(speck, box(), (lumen[0], lumen[1][:, ::-1]))
+    assert len(np.unique(part_of(faces))) == 3
+    mended = mend(points, faces, "box")
+    assert len(mended.points) == 8 and signed_volume(mended.points, mended.triangles) == pytest.approx(1.0)
+    share = 100 * (6 * 0.01 + 6 * 0.16) / (6 + 6 * 0.01 + 6 * 0.16)
+    assert mended.said == (f"2 of 3 separate parts are left out ({share:.2g} % of the area)",)
+
+
+def test_doubled_and_collapsed_triangles_go():
+    points, faces = box()
+    odd = np.vstack([faces, faces[3:5], faces[7:8, [0, 2, 1]], [[1, 1, 2]]])
+    mended = mend(points, odd, "box")
+    assert (mended.triangles == faces).all()
+    assert mended.said == ("4 triangles that were doubled or had no three corners are left out",)
+    with pytest.raises(StudyError, match="no usable triangle"):
+        mend(points, np.array([[0, 0, 1]]), "box")
+
+
+def test_holes_are_closed_on_request():
+    points, faces = split(*box(), times=2)
+    at_corner, at_side = (faces == 0).any(axis=1), (faces == 7).any(axis=1)
+    torn = faces[~at_corner & ~at_side]
+    assert len(border(mend(points, torn, "box").triangles)) > 0
+    mended = mend(points, torn, "box", holes=True)
+    assert mended.said == ("2 holes are closed by flat fans",)
+    check_surface(mended.points, mended.triangles)
+    # Two corners are cut off: less than a cube of the edge of the missing triangles each.
+    assert 1.0 - 2 * 0.25**3 < signed_volume(mended.points, mended.triangles) < 1.0
+    assert without_holes(points, faces)[2] == 0
