@@ -1,5 +1,6 @@
 """Making a mesh from its recipe, inside the worker process. The same recipe gives the same mesh bit for bit."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,11 +8,13 @@ import numpy as np
 from studies.geometry.checks import check_surface
 from studies.geometry.count import Surface, surface_with
 from studies.geometry.fill import fill_surface
+from studies.geometry.fit import evenly_spread, followed
 from studies.geometry.gmsh_session import Remesher, fresh_model
 from studies.geometry.levelset import Shape
 from studies.geometry.mesh import triangle_areas
 from studies.geometry.octant import build_octant
 from studies.geometry.regions import region_from_dict
+from studies.geometry.scan_shape import scan_shape, scan_surface
 from studies.geometry.shapes import make_shape
 from studies.geometry.shell import fill_wall
 from studies.geometry.snap import relax, snap_region
@@ -25,7 +28,8 @@ def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
     Raises StudyError when the recipe cannot be made.
     """
-    return {"organ": build_organ, "fill": build_fill, "ball_octant": build_octant}[recipe["kind"]](recipe, arrays)
+    makers = {"organ": build_organ, "scan": build_scan, "fill": build_fill, "ball_octant": build_octant}
+    return makers[recipe["kind"]](recipe, arrays)
 
 
 def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
@@ -33,20 +37,38 @@ def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     return mesh_shape(make_shape(recipe["organ"], recipe["parameters"]), recipe)
 
 
+def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
+    """The shape that a given surface pictures, with `nodes` nodes, some of them where even ones would cut corners."""
+    nodes = recipe["nodes"]
+    shape = scan_shape(arrays["points"], arrays["triangles"], nodes, recipe["smooth"], recipe["name"])
+    start = scan_surface(shape)
+    points, triangles = even_surface(shape, start, evenly_spread(nodes))
+    points, triangles = followed(shape, points, triangles, start[0], nodes)
+    return finish(replace(shape, wall=recipe.get("wall")), points, triangles, recipe)
+
+
 def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:
     """Any shape by the `nodes`, `regions`, `fill` and `layers` of a recipe; hollow when the shape has a wall."""
-    start_points, start_triangles = first_surface(shape)
-    area = float(triangle_areas(start_points, start_triangles).sum())
-    with fresh_model():
-        remesher = Remesher(start_points, start_triangles)
-        points, triangles = surface_with(recipe["nodes"], area, remesher.mesh, shape)
+    points, triangles = even_surface(shape, first_surface(shape), recipe["nodes"])
     points, triangles = snap_all(shape, points, triangles, recipe["regions"])
+    return finish(shape, points, triangles, recipe)
+
+
+def even_surface(shape: Shape, start: Surface, nodes: int) -> Surface:
+    """A surface of `nodes` nodes with edges of one length, from a fine first triangulation."""
+    area = float(triangle_areas(*start).sum())
+    with fresh_model():
+        return surface_with(nodes, area, Remesher(*start).mesh, shape)
+
+
+def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict[str, Any]) -> Arrays:
+    """A surface on f = 0, filled as its recipe says; elements of a scan are as good as its folds allow."""
     check_surface(points, triangles, shape.name)
     if not recipe["fill"]:
         return arrays_of(points, triangles, np.empty((0, 4), np.int64), len(points), len(points))
     if shape.wall is not None:
         return arrays_of(*fill_wall(shape, points, triangles, recipe.get("layers")), 2 * len(points), len(points))
-    all_points, tetrahedra = fill_surface(points, triangles)
+    all_points, tetrahedra = fill_surface(points, triangles, strict=recipe["kind"] != "scan")
     return arrays_of(all_points, triangles, tetrahedra, len(points), len(points))
 
 

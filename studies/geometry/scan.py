@@ -24,13 +24,16 @@ def scan(
     unit: str | None = None,
     smooth: float = 0.0,
     holes: bool = False,
+    wall: float | None = None,
+    layers: int | None = None,
     fill: bool = True,
 ) -> OrganMesh:
     """A body from the surface in a file: welded, its largest part kept, oriented, and remeshed to `nodes` nodes.
 
     nodes: None keeps the file's own triangles. unit: of the file, "m", "cm" or "mm"; None where only metres make an
-    organ of it. smooth: see scan_shape [m]; needs `nodes`. holes: close borders first. fill: with tetrahedra. Warns of
-    every change to the surface. Raises StudyError for what cannot be read, mended or meshed.
+    organ of it. smooth: see scan_shape [m]; needs `nodes`. holes: close borders first. wall: thickness [m] of the wall
+    of a hollow organ, in `layers` of elements; needs `nodes`. fill: with tetrahedra. Warns of every change to the
+    surface. Raises StudyError for what cannot be read, mended or meshed.
     """
     path = Path(path)
     points, triangles = raw_surface(path)
@@ -49,12 +52,27 @@ def scan(
         "holes": bool(holes),
     }
     if nodes is None:
-        return as_it_is(mended, recipe, smooth, fill)
+        if smooth or wall is not None:
+            raise StudyError(
+                f"{path.name}: smoothing and a wall need a new surface; say how many nodes it shall have (--nodes)"
+            )
+        return as_it_is(mended, recipe, fill)
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{path.name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
     check_watertight(mended, path.name)
+    check_lengths(path.name, smooth, wall)
+    if wall is not None:
+        recipe |= {"wall": float(wall)} | ({} if layers is None else {"layers": int(layers)})
     recipe |= {"kind": "scan", "nodes": int(nodes), "smooth": float(smooth), "fill": bool(fill), "regions": {}}
     return mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles})
+
+
+def check_lengths(name: str, smooth: float, wall: float | None) -> None:
+    """Raise StudyError unless the lengths [m] are such."""
+    if not 0 <= smooth < np.inf:
+        raise StudyError(f"{name}: smoothing over {1e3 * smooth:g} mm asked for; give 0 or a few millimetres")
+    if wall is not None and not 0 < wall < np.inf:
+        raise StudyError(f"{name}: a wall of {1e3 * wall:g} mm asked for; give a thickness above 0")
 
 
 def raw_surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -71,10 +89,8 @@ def raw_surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return points, boundary_triangles(tetrahedra) if len(tetrahedra) else triangles
 
 
-def as_it_is(mended: Mended, recipe: dict[str, Any], smooth: float, fill: bool) -> OrganMesh:
+def as_it_is(mended: Mended, recipe: dict[str, Any], fill: bool) -> OrganMesh:
     """The mended surface with the file's own triangles, filled when asked."""
-    if smooth:
-        raise StudyError(f"{recipe['file']}: smoothing makes a new surface; say how many nodes it shall have (--nodes)")
     check_surface(mended.points, mended.triangles, recipe["file"])
     check_one_part(mended.triangles, recipe["file"])
     none = np.empty((0, 4), np.int64)

@@ -44,10 +44,10 @@ def test_deep_folds_are_closed_and_wide_ones_are_not():
     volume, cleft = signed_volume(points, faces), 10 * 35 * 50 * MM**3
     assert volume == pytest.approx((50**3 - 10 * 35 * 50) * MM**3, rel=1e-12)
     inside = np.array([[25.0, 25, 35]]) * MM
-    assert scan_shape(points, faces, 550).level(inside) > 4 * MM
-    assert scan_shape(points, faces, 550, smooth=7 * MM).level(inside) < -4 * MM
-    assert scan_shape(points, faces, 550, smooth=3 * MM).level(inside) > 3 * MM
-    closed = smoothed(points, faces, 1.5 * MM, 7 * MM, "u")
+    assert scan_shape(points, faces, 150).level(inside) > 4 * MM
+    assert scan_shape(points, faces, 150, smooth=7 * MM).level(inside) < -4 * MM
+    assert scan_shape(points, faces, 150, smooth=3 * MM).level(inside) > 3 * MM
+    closed = smoothed(points, faces, 2.5 * MM, 7 * MM, "u")
     assert signed_volume(*closed) == pytest.approx(volume + cleft, rel=0.02)
 
 
