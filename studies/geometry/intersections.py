@@ -53,9 +53,10 @@ def fold_cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     length = np.maximum(dot(along, along), 1e-300)[:, None]
     u, v = a[:, 2] - a[:, 0], b[:, 2] - a[:, 0]
     u, v = u - dot(u, along)[:, None] / length * along, v - dot(v, along)[:, None] / length * along
-    folded = dot(u, v) > 0
-    folded[folded] = orientation(*(a[folded, k] for k in range(3)), b[folded, 2]) == 0
-    return folded
+    folded = np.flatnonzero(dot(u, v) > 0)
+    crosses = np.zeros(len(a), bool)
+    crosses[folded] = orientation(a[folded, 0], a[folded, 1], a[folded, 2], b[folded, 2]) == 0
+    return crosses
 
 
 def fan_cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -63,10 +64,11 @@ def fan_cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     u, v = unit(a[:, 1:] - a[:, :1]), unit(b[:, 1:] - b[:, :1])
     between = (u.sum(axis=1) - v.sum(axis=1))[:, None, :]
     # A plane through the common corner with one triangle on either side.
-    maybe = ~((dot(u, between) > CLEAR).all(axis=1) & (dot(v, between) < -CLEAR).all(axis=1))
-    a, b = a[maybe], b[maybe]
-    maybe[maybe] = segment_meets(a[:, 1], a[:, 2], b) | segment_meets(b[:, 1], b[:, 2], a)
-    return maybe
+    least, most = dot(u, between).min(axis=1), dot(v, between).max(axis=1)
+    maybe = np.flatnonzero((least <= CLEAR) | (most >= -CLEAR))
+    crosses, a, b = np.zeros(len(a), bool), a[maybe], b[maybe]
+    crosses[maybe] = segment_meets(a[:, 1], a[:, 2], b) | segment_meets(b[:, 1], b[:, 2], a)
+    return crosses
 
 
 def apart_cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -118,7 +120,8 @@ def segment_meets_flat(p: np.ndarray, q: np.ndarray, triangle: np.ndarray) -> np
 def boxes_meet(p: np.ndarray, q: np.ndarray, s: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Whether the boxes of segments p, q and s, t (n, 2) touch: what decides for segments on one line."""
     low, high = np.minimum(p, q), np.maximum(p, q)
-    return ((low <= np.maximum(s, t)) & (np.minimum(s, t) <= high)).all(axis=1)
+    touch = (low <= np.maximum(s, t)) & (np.minimum(s, t) <= high)
+    return touch[:, 0] & touch[:, 1]
 
 
 def dot(u: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from skimage.measure import marching_cubes
 
 from studies.errors import StudyError
@@ -73,7 +73,8 @@ def smoothed(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: flo
     def excess(shift: float) -> float:
         return DistanceGrid(closed.low, cell, values - shift).volume - closed.volume
 
-    return iso_surface(blurred, float(brentq(excess, -smooth, smooth, xtol=1e-6 * cell)), name)
+    shift = root_scalar(excess, bracket=(-smooth, smooth), xtol=1e-6 * cell).root
+    return iso_surface(blurred, shift, name)
 
 
 def iso_surface(grid: DistanceGrid, value: float, name: str) -> Surface:
