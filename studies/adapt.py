@@ -8,6 +8,7 @@ from massspring import (
     Attachment,
     Body,
     Material,
+    Ramp,
     Setup,
     StepLimit,
     make_clock,
@@ -15,12 +16,15 @@ from massspring import (
     surface_body,
     tetrahedral_body,
 )
+from massspring.volumes import Volumes
 from studies.case import BodyRecipe, Case
 from studies.errors import StudyError
 from studies.geometry import OrganMesh, fill, organ, read_mesh
 from studies.geometry.organs import SHAPES
 from studies.scenes.base import Scene
 from studies.suggest import choose
+
+LUMEN, WHOLE = "lumen", "whole"
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +55,41 @@ def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh) -> Body:
         raise StudyError(f"the stiffness factor is {recipe.stiffness}; it must be positive")
     material = Material(scene.tissue.shear_modulus, scene.tissue.density)
     if recipe.kind == "surface":
-        body = surface_body(mesh.points[: mesh.surface_count], mesh.triangles, material, recipe.axis)
+        outside = mesh.outer() if mesh.hollow else mesh
+        body = surface_body(outside.points[: outside.outer_count], outside.triangles, material, recipe.axis)
     else:
         body = tetrahedral_body(mesh.points, mesh.triangles, mesh.tetrahedra, material, recipe.law)
-    return body if recipe.stiffness == 1.0 else body.stiffened(recipe.stiffness)
+    if recipe.stiffness != 1.0:
+        body = body.stiffened(recipe.stiffness)
+    volumes = volumes_for(scene, recipe, mesh, body)
+    return body if volumes is None else body.keeping(volumes)
+
+
+def volumes_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, body: Body) -> Volumes | None:
+    """The volumes a recipe asks for; None for the tissue as a whole. Raises MassSpringError for what a body has not."""
+    surfaces = {}
+    if recipe.kind == "tetrahedral" and mesh.hollow and scene.filled:
+        if recipe.volumes == "whole":
+            return Volumes.closed_surfaces(body, {WHOLE: mesh.outer_triangles})
+        if recipe.volumes == "scene":
+            return Volumes.closed_surfaces(body, {"wall": mesh.triangles, LUMEN: mesh.lumen_triangles})
+        surfaces = {LUMEN: mesh.lumen_triangles}
+    if recipe.volumes in ("scene", "whole"):
+        return None
+    tissue = Volumes.nodal(body) if recipe.volumes == "nodal" else Volumes.regions(body, recipe.regions)
+    return tissue.joined(Volumes.closed_surfaces(body, surfaces)) if surfaces else tissue
+
+
+def targets_for(scene: Scene, mesh: OrganMesh, body: Body) -> dict[str, Ramp]:
+    """How the kept volumes change when the lumen is filled."""
+    if scene.lumen is None or set(scene.lumen.filling.values) == {1.0}:
+        return {}
+    filling = scene.lumen.filling
+    if LUMEN in body.kept.names:
+        return {LUMEN: filling}
+    # One volume for wall and content grows by what the content grows.
+    share = mesh.lumen_volume / (mesh.lumen_volume + mesh.volume)
+    return {body.kept.names[0]: Ramp(filling.times, tuple(1.0 + share * (f - 1.0) for f in filling.values))}
 
 
 def attachments_for(scene: Scene, mesh: OrganMesh) -> tuple[Attachment, ...]:
@@ -75,12 +110,16 @@ def prepare(case: Case) -> Prepared:
     reason = scene.skip(case.method)
     if reason is not None:
         raise StudyError(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
-    mesh = mesh_for(scene, case.body.nodes, filled=case.body.kind == "tetrahedral")
+    # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.
+    mesh = mesh_for(scene, case.body.nodes, filled=case.body.kind == "tetrahedral" or scene.lumen is not None)
     body = body_for(scene, case.body, mesh)
+    targets = targets_for(scene, mesh, body)
+    if case.body.kind == "surface" and mesh.hollow:
+        mesh = mesh.outer()
     attachments = attachments_for(scene, mesh)
     held = np.concatenate([a.nodes for a in attachments]) if attachments else None
     limit = step_limit(body, scene.damping, held)
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
     clock = make_clock(scene.duration, case.frames or scene.frames, dt, limit)
-    setup = Setup(body, case.method, clock, scene.obstacles, attachments, scene.gravity, scene.damping)
+    setup = Setup(body, case.method, clock, scene.obstacles, attachments, scene.gravity, scene.damping, targets=targets)
     return Prepared(mesh, setup, limit)

@@ -29,6 +29,11 @@ class BodyRecipe:
     """Stiffness law of a tetrahedral body."""
     stiffness: float = 1.0
     """Factor on every spring; 1 matches the tissue's shear modulus."""
+    volumes: Literal["scene", "whole", "regions", "nodal"] = "scene"
+    """Which volumes are kept. "scene": those that physics keeps apart, the wall and a closed lumen of a hollow organ;
+    "whole": one, enclosed by the outer surface, as in the paper; "regions": `regions` parts; "nodal": one per node."""
+    regions: int = 32
+    """How many, where volumes is "regions"."""
     axis: Literal["straight", "centre_line"] = "straight"
     """Of a surface body: "centre_line" follows a bent organ."""
 
@@ -67,6 +72,8 @@ class Case:
         parts = [self.scene.name, self.body.kind, str(self.body.nodes), self.method.name, step]
         if self.body.kind == "tetrahedral" and self.body.law != "van_gelder":
             parts.append(self.body.law)
+        if self.body.volumes != "scene":
+            parts.append(f"{self.body.regions}regions" if self.body.volumes == "regions" else self.body.volumes)
         if self.body.axis != "straight":
             parts.append(self.body.axis)
         if self.body.stiffness != 1.0:

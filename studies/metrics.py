@@ -16,7 +16,7 @@ from studies.timing import FrameTiming
 PERCENT = 100.0
 ALWAYS = ("volume",)
 """Quantities with a truth of their own: a volume is compared with the body's own rest volume."""
-GAUGE_FREE = ("pressure",)
+GAUGE_FREE = ("pressure", "lumen")
 """Quantities that every scene with a reference allows: a rigid turn does not change them."""
 COMPARABLE = (Status.OK, Status.INVERTED, Status.DRIFTED)
 """A run that ended early has no last checkpoint."""
@@ -50,6 +50,20 @@ class Run:
         """V/V0 of every frame [1], of the kept volume that is farthest off in it, (F,)."""
         ratio = self.field("volume") / self.field("volume_target")
         return ratio[np.arange(len(ratio)), np.argmax(np.abs(ratio - 1), axis=1)]
+
+    @cached_property
+    def lumen(self) -> int | None:
+        """Column of the lumen among the kept volumes; None where it is none of them."""
+        column = int(self.record.attributes.get("lumen_column", -1))
+        return column if column >= 0 else None
+
+    @cached_property
+    def tissue_pressure(self) -> np.ndarray:
+        """Mean multiplier of the tissue's volumes [Pa], weighted by their size, (F,)."""
+        size, lam = self.field("volume_target"), self.field("pressure")
+        if self.lumen is not None:
+            size, lam = np.delete(size, self.lumen, axis=1), np.delete(lam, self.lumen, axis=1)
+        return (size * lam).sum(axis=1) / size.sum(axis=1)
 
     @cached_property
     def displacement_error(self) -> tuple[np.ndarray, np.ndarray]:
@@ -109,6 +123,8 @@ class Metric:
         if self.quantity is None or self.quantity in ALWAYS:
             return True
         word = self.quantity.split("_")[0]
+        if word == "lumen" and not run.case.scene.filled:
+            return False
         return run.reference is not None and (word in GAUGE_FREE or word in run.case.scene.quantities)
 
 
@@ -188,8 +204,17 @@ def inverted_share(run: Run) -> float:
 def pressure_error(run: Run) -> float:
     """100 (lam/p_ref − 1) at the last checkpoint [%]; NaN for a method without a pressure."""
     assert run.reference is not None
-    lam = float(run.field("pressure")[run.checkpoint_frames[-1], 0])
+    lam = float(run.tissue_pressure[run.checkpoint_frames[-1]])
     return PERCENT * (lam / float(run.reference.field("pressure")[-1]) - 1) if lam else float("nan")
+
+
+def lumen_pressure_error(run: Run) -> float:
+    """100 (lam/p_ref − 1) of the lumen at the last checkpoint [%]; NaN where the lumen is no volume of its own."""
+    assert run.reference is not None
+    if run.lumen is None:
+        return float("nan")
+    lam = float(run.field("pressure")[run.checkpoint_frames[-1], run.lumen])
+    return PERCENT * (lam / float(run.reference.field("lumen_pressure")[-1]) - 1) if lam else float("nan")
 
 
 def _timing(run: Run, quantile: float) -> float:
@@ -226,6 +251,7 @@ METRICS: tuple[Metric, ...] = (
     Metric("mean_error", "%", "lower", mean_error, "surface_mean"),
     Metric("silhouette_error", "%", "lower", silhouette_error, "silhouette"),
     Metric("pressure_error", "%", "-", pressure_error, "pressure"),
+    Metric("lumen_pressure_error", "%", "-", lumen_pressure_error, "lumen"),
     Metric("min_j", "1", "higher", min_j),
     Metric("inverted_share", "%", "lower", inverted_share),
     Metric("step_time", "µs", "lower", step_time),

@@ -29,6 +29,9 @@ def fields_of(scene: Scene, problem: Problem, found: list[Equilibrium]) -> dict[
         "pressure": series(
             [mean_pressure(tetrahedra, e) for e in found], "Pa", "volume mean of the pressure, compression positive"
         ),
+        "lumen_pressure": series(
+            [float(e.cavity_pressure.sum()) if scene.filled else np.nan for e in found], "Pa", "pressure of the lumen"
+        ),
         "min_j": series([e.min_J for e in found], "1", "smallest J at a quadrature point"),
         "max_j": series([e.max_J for e in found], "1", "largest J at a quadrature point"),
         "penetration": series([e.penetration for e in found], "m", "deepest penetration of an obstacle"),

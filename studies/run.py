@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from massspring import History, MassSpringError, simulate
-from studies.adapt import Prepared, prepare
+from studies.adapt import LUMEN, Prepared, prepare
 from studies.case import Case, case_from_json
 from studies.errors import StudyError
 from studies.fingerprint import source_fingerprint
@@ -112,6 +112,8 @@ def _attributes(prepared: Prepared, history: History) -> dict[str, float | int |
         "triangles": len(setup.body.triangles),
         "law": setup.body.law,
         "skipped_steps": history.skipped_steps,
+        "volumes": setup.body.kept.count,
+        "lumen_column": setup.body.kept.names.index(LUMEN) if LUMEN in setup.body.kept.names else -1,
     }
 
 

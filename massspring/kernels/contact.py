@@ -6,11 +6,30 @@ from massspring.kernels.compiled import compiled
 
 
 @compiled
+def sphere_contact(s0, s1, s2, r0, r1, r2, radius):
+    """(gap, normal, height) of a node at s now and at r after the predicted step, seen from the centre [m] (eq. 12).
+
+    n = s/|s|; the node ends the step at n·r⁺ = height = √(R² − |r − n (n·r)|²), on the sphere, moved along n alone.
+    A node that slides farther than R within a step has no such point: it ends on the tangent plane at r/|r|.
+    """
+    distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+    if not distance > 0.0:
+        return math.inf, 0.0, 0.0, 0.0, 0.0
+    now = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
+    along = (r0 * s0 + r1 * s1 + r2 * s2) / now if now > 0.0 else 0.0
+    below = radius * radius - (distance * distance - along * along)
+    if along > 0.0 and below > 0.0:
+        return distance - radius, s0 / now, s1 / now, s2 / now, math.sqrt(below)
+    return distance - radius, r0 / distance, r1 / distance, r2 / distance, radius
+
+
+@compiled
 def touch(motion, drive, step, node, u0, u1, u2):
     """Puts the node on the obstacle it would enter deepest when moving with u [m/s]; the smallest gap [m] (eq. 12).
 
-    Plane: gap = n·(x + dt u − p). Sphere: gap = |x + dt u − c| − R, n towards the node.
-    `approach` a = n·(target − x)/dt ends the step exactly on the tangent plane, so never inside.
+    Plane: gap = n·(x + dt u − p). Sphere: gap = |x + dt u − c| − R.
+    `approach` a = n·(target − x)/dt ends the step on the obstacle. A sphere pushes along n = (x − c)/|x − c| of the
+    position now, not of the prediction: that would do work on a node that slides, and pump its oscillations up.
     """
     nearest = math.inf
     dt = drive.dt
@@ -21,19 +40,16 @@ def touch(motion, drive, step, node, u0, u1, u2):
         if drive.is_plane[o]:
             n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
             gap = n0 * r0 + n1 * r1 + n2 * r2
+            height = 0.0
         else:
-            distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
-            gap = distance - drive.radius[o]
-            if not distance > 0.0:
-                continue
-            n0, n1, n2 = r0 / distance, r1 / distance, r2 / distance
+            gap, n0, n1, n2, height = sphere_contact(x0 - p0, x1 - p1, x2 - p2, r0, r1, r2, drive.radius[o])
         if gap < nearest:
             nearest = gap
             if gap < 0.0:
                 motion.touched[node] = o + 1
                 motion.normal[node, 0], motion.normal[node, 1], motion.normal[node, 2] = n0, n1, n2
                 along = n0 * (p0 - x0) + n1 * (p1 - x1) + n2 * (p2 - x2)
-                motion.approach[node] = (along + drive.radius[o]) / dt
+                motion.approach[node] = (along + height) / dt
     return nearest
 
 

@@ -2,10 +2,25 @@
 
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.base import Held, Organ, Probed, ReferencePlan, Scene, Tissue
+from studies.scenes.base import Held, Lumen, Organ, Probed, ReferencePlan, Scene, Tissue
+from studies.scenes.bladder_fill import BLADDER_FILL
+from studies.scenes.kidney_probe import KIDNEY_PROBE
 from studies.scenes.liver_press import LIVER_PRESS
 from studies.scenes.liver_probe import LIVER_PROBE
+from studies.scenes.spleen_sag import SPLEEN_SAG
+from studies.scenes.stomach_press import STOMACH_PRESS
+from studies.scenes.stomach_probe import STOMACH_PROBE
 
-SCENES: tuple[Scene, ...] = (BALL_SQUEEZE, BALL_CLAMPED, LIVER_PRESS, LIVER_PROBE)
+SCENES: tuple[Scene, ...] = (
+    BALL_SQUEEZE,
+    BALL_CLAMPED,
+    LIVER_PRESS,
+    LIVER_PROBE,
+    KIDNEY_PROBE,
+    SPLEEN_SAG,
+    STOMACH_PRESS,
+    STOMACH_PROBE,
+    BLADDER_FILL,
+)
 
-__all__ = ["SCENES", "Held", "Organ", "Probed", "ReferencePlan", "Scene", "Tissue"]
+__all__ = ["SCENES", "Held", "Lumen", "Organ", "Probed", "ReferencePlan", "Scene", "Tissue"]

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from massspring import Method, Obstacle, Path
+from massspring import Method, Obstacle, Path, Ramp
 from studies.errors import StudyError
 from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace
+from studies.geometry.levelset import Probe, Shape
 
 Region = HalfSpace | BallRegion | EllipsoidRegion
 Vector = tuple[float, float, float]
@@ -45,6 +46,22 @@ class Held:
     name: str
     region: Region
     path: Path = field(default_factory=Path)
+
+
+@dataclass(frozen=True)
+class Lumen:
+    """What fills a hollow organ."""
+
+    content: str = "closed"
+    """"closed": an incompressible content, its volume prescribed; "open": drained, without pressure."""
+    filling: Ramp = field(default_factory=Ramp)
+    """Volume of a closed lumen over time, as a factor of its volume at rest."""
+
+    def __post_init__(self) -> None:
+        if self.content not in ("closed", "open"):
+            raise StudyError(f"a lumen's content is 'closed' or 'open', not '{self.content}'")
+        if self.content == "open" and set(self.filling.values) != {1.0}:
+            raise StudyError("an open lumen cannot be filled; close it, or leave its filling out")
 
 
 @dataclass(frozen=True)
@@ -101,6 +118,8 @@ class Scene:
     reference: ReferencePlan | None
     obstacles: tuple[Obstacle, ...] = ()
     held: tuple[Held, ...] = ()
+    lumen: Lumen | None = None
+    """Of a hollow organ; None for a solid one."""
     gravity: Vector = (0.0, 0.0, 0.0)
     """[m/s²]."""
     damping: float = 0.0
@@ -120,6 +139,11 @@ class Scene:
         return {held.name: held.region for held in self.held}
 
     @property
+    def filled(self) -> bool:
+        """Whether a lumen's content pushes back."""
+        return self.lumen is not None and self.lumen.content == "closed"
+
+    @property
     def symmetric(self) -> bool:
         """Whether the reference is an octant, mirrored at the three coordinate planes."""
         return self.reference is not None and self.reference.mesh == "octant"
@@ -130,6 +154,12 @@ class Scene:
         return force[..., self.probed.number, :] @ np.asarray(self.probed.direction)
 
 
+KIDNEY = Tissue(4900.0, 1050.0, "kidney, MR elastography at 45 Hz: 4.9 ± 0.5 kPa; density about 1,050 kg/m³")
+SPLEEN = Tissue(
+    3600.0, 1060.0, "spleen, MR elastography at 60 Hz: 3.6 ± 0.3 kPa (Talwalkar et al. 2009); density as liver"
+)
+STOMACH = Tissue(640.0, 1058.0, "stomach wall, MR elastography: 0.64 kPa; wall tests at large stretch are far stiffer")
+BLADDER = Tissue(10_000.0, 1040.0, "bladder wall, assumed: published moduli span a decade; the pressure scales with mu")
 LIVER = Tissue(1800.0, 1060.0, "liver, MR elastography: 1.8 ± 0.4 kPa; density 1,060 kg/m³")
 
 
@@ -137,6 +167,13 @@ def press_times(start: float, end: float, steps: int, rest: float) -> tuple[floa
     """`steps` evenly spaced times up to the end of a press [s], the last moved to `rest`, when all is still."""
     times = np.linspace(start, end, steps + 1)[1:]
     return (*times[:-1].tolist(), rest)
+
+
+def probe_of(shape: Shape) -> Probe:
+    """Where the shape is palpated. Raises StudyError for a shape that does not say."""
+    if shape.probe is None:
+        raise StudyError(f"the shape '{shape.name}' names no probe point; give it one, or choose another organ")
+    return shape.probe
 
 
 def scaled(direction: Vector, length: float) -> Vector:

@@ -1,0 +1,30 @@
+"""A filled stomach between the back wall and a plane that presses from the front: wall and content are two volumes."""
+
+from massspring import Path, Plane
+from studies.geometry.organs.stomach import STOMACH_REGIONS
+from studies.scenes.base import STOMACH, Held, Lumen, Organ, Probed, ReferencePlan, Scene, press_times
+
+FRONT, BACK = -0.0495, 0.0630  # m: the stomach reaches from 0.0490 before the origin to 0.0625 behind it
+DEPTH = 0.020  # m, a sixth of the stomach's depth
+PRESS_END = 6.0  # s: slow enough that damping drags with less than 3 % of the force
+DURATION = 8.0  # s
+INWARD = (0.0, 1.0, 0.0)
+
+STOMACH_PRESS = Scene(
+    name="stomach_press",
+    title="Filled stomach held at cardia and pylorus, pressed 20 mm against the back wall by a frictionless plane",
+    organ=Organ("stomach"),
+    tissue=STOMACH,
+    duration=DURATION,
+    frames=240,
+    checkpoints=press_times(0.0, PRESS_END, 5, DURATION),
+    obstacles=(
+        Plane((0.0, FRONT, 0.0), INWARD, Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), (0.0, DEPTH, 0.0)))),
+        Plane((0.0, BACK, 0.0), (0.0, -1.0, 0.0)),
+    ),
+    held=tuple(Held(name, STOMACH_REGIONS[name]) for name in ("cardia", "pylorus")),
+    lumen=Lumen(),
+    probed=Probed("obstacle", 0, INWARD),
+    damping=8.0,
+    reference=ReferencePlan("solid", (400, 550, 800)),
+)
