@@ -5,8 +5,9 @@ from scipy.spatial import KDTree
 from skfem import MeshTet2
 
 from massspring import Obstacle, Plane
+from reference_fem import Cavity, NeoHookean, Problem, RigidPlane, RigidSphere, nodes
 from reference_fem import Held as HeldPatch
-from reference_fem import NeoHookean, Problem, RigidPlane, RigidSphere, nodes
+from studies.errors import StudyError
 from studies.reference_mesh import reference_mesh
 from studies.scenes.base import Scene
 
@@ -20,7 +21,7 @@ def reference_problem(scene: Scene, level: float) -> Problem:
     Raises StudyError for a mesh that cannot be made, ReferenceProblem for one that cannot be used.
     """
     tissue = scene.tissue
-    mesh, patches = reference_mesh(scene, level)
+    mesh, patches, lumen = reference_mesh(scene, level)
     return Problem(
         mesh=mesh,
         material=NeoHookean(tissue.shear_modulus, tissue.shear_modulus * tissue.bulk_over_shear),
@@ -28,7 +29,17 @@ def reference_problem(scene: Scene, level: float) -> Problem:
         obstacles=tuple(_rigid(o) for o in kept_obstacles(scene)),
         gravity=scene.gravity,
         density=tissue.density,
+        cavities=(_cavity(scene, lumen),) if scene.filled else (),
     )
+
+
+def _cavity(scene: Scene, middles: np.ndarray) -> Cavity:
+    """The lumen, walled by the facets with these middles (f, 3) [m]; its volume follows the scene."""
+    if not len(middles):
+        raise StudyError(f"scene '{scene.name}' fills a lumen, but its {scene.organ.shape} has none; leave it out")
+    assert scene.lumen is not None  # it is filled
+    tree, reach = KDTree(middles), SAME_POINT * float(np.ptp(middles))
+    return Cavity(where=lambda x: tree.query(x.T)[0] < reach, volume=scene.lumen.filling)
 
 
 def anchor(obstacle: Obstacle) -> np.ndarray:

@@ -138,11 +138,17 @@ def pressure(a: View, b: View) -> float:
     return float(abs(a.series("pressure")[-1] / b.series("pressure")[-1] - 1))
 
 
+def lumen(a: View, b: View) -> float:
+    """|p_a/p_b − 1| of the lumen at the last checkpoint."""
+    return float(abs(a.series("lumen_pressure")[-1] / b.series("lumen_pressure")[-1] - 1))
+
+
 NUMBERS: dict[str, tuple[Measure, Callable[[View], np.ndarray]]] = {
     "force": (force, lambda view: view.force),
     "force_end": (force_end, lambda view: view.force[-1:]),
     "volume": (volume, lambda view: view.series("volume")),
     "pressure": (pressure, lambda view: view.series("pressure")[-1:]),
+    "lumen": (lumen, lambda view: view.series("lumen_pressure")[-1:]),
 }
 """Numbers and series of them: how a change is measured, and the values."""
 FIELDS: dict[str, tuple[Measure, Callable[[Places], np.ndarray]]] = {
@@ -172,6 +178,8 @@ def uncertainties(
     family = views[:FAMILY]
     found = {}
     for name, measure in QUANTITIES.items():
+        if name == "lumen" and not finest.scene.filled:
+            continue
         mesh = _of_mesh(name, family)
         shares = {key: setting_error(measure(views[-1], view), VARIANTS[key][1]) for key, view in better.items()}
         found[name] = Uncertainty({"mesh": mesh.uncertainty, **shares}, mesh.order, mesh.shift)

@@ -9,9 +9,11 @@ from skfem import MeshTet, MeshTet2
 
 from massspring import Obstacle, Plane
 from reference_fem import Evaluator, curve, facet_nodes, nodes
+from reference_fem.elements import edge_index
 from studies.adapt import mesh_for, patch_nodes
 from studies.distance import distance_to_surface
-from studies.geometry import OrganMesh, ball_octant
+from studies.geometry import OrganMesh, ball_octant, curved
+from studies.geometry.jacobian import PAIRS
 from studies.geometry.levelset import Shape, project
 from studies.geometry.mesh import boundary_triangles
 from studies.geometry.organs import SHAPES
@@ -24,8 +26,9 @@ SAME_POINT = 1e-9
 """Two points closer than this fraction of the body are one: far above rounding, far below an edge."""
 
 
-def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarray]]:
-    """The second-order mesh on one level of the scene's plan, and the nodes of each of its held regions.
+def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarray], np.ndarray]:
+    """The second-order mesh on one level of the scene's plan, the nodes of each of its held regions, and the middles of
+    the corners of the lumen's facets [m], (f, 3).
 
     A region is held at the nodes of its facets: a mid-side node outside them, across a dent, stays free.
     Raises StudyError for a mesh that cannot be made.
@@ -33,17 +36,21 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
     plan = scene.reference
     assert plan is not None  # nobody asks for the mesh of a scene without one
     if scene.symmetric:
-        return _curved_octant(scene, _straight(_octant(scene, level))), []
+        return _curved_octant(scene, _straight(_octant(scene, level))), [], np.empty((0, 3))
     organ_mesh = mesh_for(scene, int(level))
     patches = [patch_nodes(organ_mesh, held.name, held.region) for held in scene.held]
-    body = coarse = coarse_body(_straight(organ_mesh), patches)
+    lumen = np.arange(organ_mesh.outer_count, organ_mesh.surface_count)
+    body = coarse = coarse_body(_straight(organ_mesh), [*patches, lumen])
     for _ in range(plan.at_outlines):
         body = body.bisected(body.at_outlines())
     for _ in range(plan.at_contact):
         body = body.bisected(body.inside(scene.obstacles, scene.checkpoints[-1]))
     shape = true_shape(scene.organ)
-    mesh = MeshTet2.from_mesh(body.mesh) if shape is None else _curved(body, coarse, shape, scene.held)
-    return mesh, [np.unique(facets) for facets in body.facets(mesh)]
+    mesh = MeshTet2.from_mesh(body.mesh)
+    if shape is not None:
+        mesh = _curved(body, coarse, _on_true_shape(organ_mesh, coarse, shape, scene.held))
+    *held, wall = body.facets(mesh)
+    return mesh, [np.unique(facets) for facets in held], nodes(mesh)[wall[:, :3]].mean(axis=1)
 
 
 def _octant(scene: Scene, level: float) -> OrganMesh:
@@ -62,30 +69,30 @@ def _curved_octant(scene: Scene, straight: MeshTet) -> MeshTet2:
     return curve(straight, onto(shape), lambda x: np.linalg.norm(x, axis=0) > radius * (1 - 1e-6))
 
 
-def _curved(body: "Body", coarse: "Body", shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:
+def _curved(body: "Body", coarse: "Body", curved_coarse: MeshTet2) -> MeshTet2:
     """The finer mesh with sides as curved as those of the coarse one that lie on the true shape.
 
     The quadratic map of a coarse element takes its parts with it exactly, so they stay upright however small they are;
     moving each new vertex onto the surface by itself folds small elements beside large ones.
     """
-    plain = MeshTet2.from_mesh(coarse.mesh)
-    curved = _on_true_shape(plain, coarse, shape, helds)
     if body is coarse:
-        return curved
-    finer = MeshTet2.from_mesh(body.mesh)
-    move = Evaluator(plain).displacement(nodes(curved) - nodes(plain), nodes(finer))
+        return curved_coarse
+    plain, finer = MeshTet2.from_mesh(coarse.mesh), MeshTet2.from_mesh(body.mesh)
+    move = Evaluator(plain).displacement(nodes(curved_coarse) - nodes(plain), nodes(finer))
     return replace(finer, doflocs=np.ascontiguousarray((nodes(finer) + move).T))
 
 
-def _on_true_shape(mesh: MeshTet2, body: "Body", shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:
-    """The mesh with the nodes of its boundary on the true surface, those of outlines on the true outlines.
+def _on_true_shape(organ_mesh: OrganMesh, body: "Body", shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:
+    """The mesh with the nodes of its boundary on the true surfaces, those of outlines on the true outlines.
 
     A polygon instead would hold the body h²/8r too little or too much, of first order in the force.
     """
+    mesh, smooth = MeshTet2.from_mesh(body.mesh), curved(organ_mesh)
     points = nodes(mesh).copy()
-    outer = np.unique(facet_nodes(mesh))
-    points[outer] = project(shape, points[outer])
-    for held, facets in zip(helds, body.facets(mesh), strict=True):
+    points[mesh.nvertices + edge_index(mesh, smooth.cells[:, np.array(PAIRS)].reshape(-1, 2))] = smooth.points[
+        smooth.cells[:, 4:].ravel()
+    ]
+    for held, facets in zip(helds, body.facets(mesh)[: len(helds)], strict=True):
         rim = np.unique(rim_sides(facets))
         points[rim] = project(shape, points[rim], (held.region.level,))
     return replace(mesh, doflocs=np.ascontiguousarray(points.T))
@@ -109,13 +116,16 @@ class Body:
     corners: np.ndarray
     """Vertices before any refinement [m], (n, 3)."""
     patches: list[np.ndarray]
-    """Of each held region its triangles of `corners`, (f, 3): a finer mesh has parts of them."""
+    """Of each held region and last of the lumen: its triangles of `corners`, (f, 3). A finer mesh has parts of them."""
 
     def facets(self, mesh: MeshTet2) -> list[np.ndarray]:
         """Of each patch the six nodes of its facets (f, 6) in the second-order mesh with the same vertices."""
         table, reach = facet_nodes(mesh), SAME_POINT * float(np.ptp(self.corners))
         middles = self.mesh.p.T[table[:, :3]].mean(axis=1)
-        return [table[distance_to_surface(middles, self.corners, patch) < reach] for patch in self.patches]
+        return [
+            table[distance_to_surface(middles, self.corners, patch) < reach] if len(patch) else table[:0]
+            for patch in self.patches
+        ]
 
     def at_outlines(self) -> np.ndarray:
         """Elements with a vertex on an outline: there the stress is singular."""

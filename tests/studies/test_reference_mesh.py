@@ -36,7 +36,7 @@ def areas(mesh, chosen):
 @pytest.mark.parametrize("times", [0, 3])
 def test_caps_are_round(mesh_cache, times):
     """A cap |z| > 0.8 R is a disc of radius 0.6 R seen along z; a polygon of a dozen sides would be 4 % smaller."""
-    mesh, patches = reference_mesh(planned(BALL_CLAMPED, at_outlines=times), LEVEL)
+    mesh, patches, _ = reference_mesh(planned(BALL_CLAMPED, at_outlines=times), LEVEL)
     for patch in patches:
         x = nodes(mesh)[patch]
         # New nodes lie on the quadratic sides of a dozen elements around: a thousandth of the radius off the sphere.
@@ -47,7 +47,7 @@ def test_caps_are_round(mesh_cache, times):
 
 
 def test_outline_is_closed_and_on_the_edge_of_the_region(mesh_cache):
-    mesh, patches = reference_mesh(BALL_CLAMPED, LEVEL)
+    mesh, patches, _ = reference_mesh(BALL_CLAMPED, LEVEL)
     table = facet_nodes(mesh)
     sides = rim_sides(table[np.isin(table[:, :3], patches[0]).all(axis=1)])
     _, count = np.unique(sides[:, :2], return_counts=True)
