@@ -4,7 +4,8 @@ from massspring import Path, Plane
 from studies.geometry import LIVER_PRESS_DIRECTION, LIVER_REGIONS
 from studies.scenes.base import LIVER, Held, Organ, Probed, ReferencePlan, Scene, press_times, scaled
 
-FRONT = -0.0690  # m: the liver begins at -0.0686 along the press direction
+FRONT = -0.0686  # m: where the liver begins along the press direction
+GAP = 0.0014  # m between plane and liver at the start: curved facets of a coarse mesh bulge that far
 DEPTH = 0.020  # m, a sixth of the liver's depth
 PRESS_END = 6.0  # s: slow enough that damping drags with less than 3 % of the force
 DURATION = 8.0  # s
@@ -19,9 +20,9 @@ LIVER_PRESS = Scene(
     checkpoints=press_times(0.0, PRESS_END, 5, DURATION),
     obstacles=(
         Plane(
-            scaled(LIVER_PRESS_DIRECTION, FRONT),
+            scaled(LIVER_PRESS_DIRECTION, FRONT - GAP),
             LIVER_PRESS_DIRECTION,
-            Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(LIVER_PRESS_DIRECTION, DEPTH))),
+            Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(LIVER_PRESS_DIRECTION, DEPTH + GAP))),
         ),
     ),
     held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),

@@ -4,7 +4,8 @@ from massspring import Path, Plane
 from studies.geometry.organs.stomach import STOMACH_REGIONS
 from studies.scenes.base import STOMACH, Held, Lumen, Organ, Probed, ReferencePlan, Scene, press_times
 
-FRONT, BACK = -0.0495, 0.0630  # m: the stomach reaches from 0.0490 before the origin to 0.0625 behind it
+FRONT, BACK = -0.0487, 0.0630  # m: the stomach reaches from FRONT to 0.0621, and a coarse curved mesh a little farther
+GAP = 0.0008  # m between plane and stomach at the start
 DEPTH = 0.020  # m, a sixth of the stomach's depth
 PRESS_END = 6.0  # s: slow enough that damping drags with less than 3 % of the force
 DURATION = 8.0  # s
@@ -19,7 +20,7 @@ STOMACH_PRESS = Scene(
     frames=240,
     checkpoints=press_times(0.0, PRESS_END, 5, DURATION),
     obstacles=(
-        Plane((0.0, FRONT, 0.0), INWARD, Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), (0.0, DEPTH, 0.0)))),
+        Plane((0.0, FRONT - GAP, 0.0), INWARD, Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), (0.0, DEPTH + GAP, 0.0)))),
         Plane((0.0, BACK, 0.0), (0.0, -1.0, 0.0)),
     ),
     held=tuple(Held(name, STOMACH_REGIONS[name]) for name in ("cardia", "pylorus")),
