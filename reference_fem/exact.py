@@ -47,6 +47,22 @@ def uniaxial_stress(material, stretch):
     return principal_stress(material, (b, b, stretch), 2)
 
 
+THICK_CYLINDER = {0.49: 5.0399e-3, 0.499: 5.0602e-3, 0.4999: 5.0623e-3}
+"""Poisson's ratio -> displacement [m] of the inner radius of MacNeal and Harder's thick cylinder in plane strain: radii
+3 and 9 m, E = 1000 Pa, inner pressure 1 Pa (Finite Elements in Analysis and Design 1, 1985)."""
+
+COOK = {"corner u_x": -5.821, "corner u_y": 6.923, "mid-edge u_y": 6.951}
+"""Displacements [mm] of Cook's membrane, finite strain, incompressible neo-Hookean in plane strain, mu = 80.1938 MPa,
+100 N of shear on each mm of thickness: upper right corner, and middle of the loaded edge."""
+
+
+def thick_cylinder_displacement(ratio, inner=3.0, outer=9.0, young=1000.0):
+    """Displacement [m] of the inner radius under unit pressure in plane strain (Lamé):
+    (1 + nu) a ((1 - 2 nu) a² + b²) / (E (b² - a²))."""
+    squares = (1.0 - 2.0 * ratio) * inner**2 + outer**2
+    return (1.0 + ratio) * inner * squares / (young * (outer**2 - inner**2))
+
+
 def thick_sphere_pressure(mu, inner, outer, inner_stretch):
     """Pressure [Pa] inside an incompressible thick sphere of rest radii inner, outer [m], inner radius stretched."""
     outer_stretch = np.cbrt(1.0 + (inner / outer) ** 3 * (inner_stretch**3 - 1.0))

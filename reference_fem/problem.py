@@ -8,7 +8,7 @@ from skfem import MeshTet
 
 from reference_fem.cavity import Cavity
 from reference_fem.contact import RigidPlane, RigidSphere, finite_vector
-from reference_fem.element_table import find_element
+from reference_fem.element_table import DEFAULT, find_element
 from reference_fem.elements import build_facets, displacement_points
 from reference_fem.errors import ReferenceProblem
 from reference_fem.loads import BodyForce, Traction
@@ -49,7 +49,7 @@ class Problem:
     order: int | None = None
     contact_order: int = 4
     cavities: Sequence[Cavity] = ()
-    element: str = "P2/P1"
+    element: str = DEFAULT
     loads: Sequence[Traction | BodyForce] = ()
 
     @property

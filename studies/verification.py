@@ -65,8 +65,8 @@ def check_table(verdicts: Sequence[Verdict]) -> pd.DataFrame:
 
 
 def tolerance(check: Check) -> str:
-    """What the deviation must be, in words: "<= 0.005", "<= 0.15 abs", "> 0.5" for a control that must miss."""
-    sign = ">" if check.control else "<="
+    """What the deviation must be: "<= 0.005", "<= 0.15 abs" in the quantity's unit, "> 0.5" for what must miss."""
+    sign = ">" if check.kind == "misses" else "<="
     return f"{sign} {check.tolerance:g}{' abs' if check.absolute else ''}"
 
 
@@ -99,7 +99,7 @@ def closeness(check: Check) -> float:
     used = check.deviation / check.tolerance
     if not math.isfinite(used):
         return math.inf
-    return 1.0 / max(used, 1e-300) if check.control else used
+    return 1.0 / max(used, 1e-300) if check.kind == "misses" else used
 
 
 def curves_of(verdicts: Sequence[Verdict]) -> list[Curve]:

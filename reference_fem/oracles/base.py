@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -23,19 +24,21 @@ class Check:
     mesh: str
     unknowns: int
     absolute: bool = False
-    control: bool = False
-    """A method known to be wrong: it must deviate by more than the tolerance."""
+    kind: Literal["within", "at least", "misses"] = "within"
+    """at least: only a smaller value deviates. misses: a control, known to be wrong: it must deviate by more."""
 
     @property
     def deviation(self) -> float:
         """Distance from the expected value, relative to it unless `absolute`."""
         gap = abs(self.got - self.expected)
+        if self.kind == "at least" and self.got > self.expected:
+            gap = 0.0
         return gap if self.absolute else gap / abs(self.expected)
 
     @property
     def met(self) -> bool:
         """Whether the number is where it must be; a NaN never is."""
-        return self.deviation > self.tolerance if self.control else self.deviation <= self.tolerance
+        return self.deviation > self.tolerance if self.kind == "misses" else self.deviation <= self.tolerance
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,12 @@
 """Meshes of the oracles: a block, an eighth of a ball, an eighth of a thick shell (side or radius 1 m)."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
-from skfem import MeshTet
+from skfem import MeshTet, MeshTet2
 
+from reference_fem.elements import nodes
 from reference_fem.mesh import curve
 from reference_fem.problem import Held
 
@@ -103,3 +105,19 @@ def round_off(points, elements, radii):
 
 def on_radius(radius):
     return lambda x: np.abs(np.linalg.norm(x, axis=0) - radius) < 1e-9
+
+
+def mapped(cells, place):
+    """A second-order mesh of the unit cube, cells along each edge, its nodes moved by place: (3, N) -> (3, N) [m]."""
+    mesh = MeshTet.init_tensor(*[np.linspace(0.0, 1.0, n + 1) for n in cells])
+    return replace(MeshTet2.from_mesh(mesh), doflocs=place(nodes(mesh).T))
+
+
+def straight(mesh):
+    """The same mesh without mid-side nodes of its own."""
+    return MeshTet(np.ascontiguousarray(mesh.doflocs[:, : mesh.nvertices]), mesh.t)
+
+
+def between(bottom, top):
+    """A slab one element thick in plane strain: z is held on both faces [m]."""
+    return Held(lambda x: (x[2] < bottom + 1e-9) | (x[2] > top - 1e-9), (2,))

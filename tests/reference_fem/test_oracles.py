@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from reference_fem.oracles import ORACLES, Check, Curve
+from reference_fem import exact
+from reference_fem.oracles import ORACLES, Check, Curve, manufactured
 
 FAST = [oracle for oracle in ORACLES if oracle.fast]
 
@@ -33,12 +34,33 @@ def test_a_check_in_units_of_its_quantity(got, met):
     assert Check("order", "1", 3.0, got, 0.15, "mesh", 3, absolute=True).met is met
 
 
+@pytest.mark.parametrize("got, met", [(1.9, True), (2.6, True), (1.8, False), (np.nan, False)])
+def test_a_check_from_below(got, met):
+    assert Check("order", "1", 2.0, got, 0.15, "mesh", 3, absolute=True, kind="at least").met is met
+
+
 @pytest.mark.parametrize("got, met", [(0.4, True), (0.9, False), (np.nan, False)])
 def test_a_control_must_miss(got, met):
-    assert Check("displacement", "m", 1.0, got, 0.5, "mesh", 3, control=True).met is met
+    assert Check("displacement", "m", 1.0, got, 0.5, "mesh", 3, kind="misses").met is met
 
 
 def test_the_order_of_a_curve_is_its_slope_at_the_fine_end():
     sizes = (0.4, 0.2, 0.1)
     errors = (1.0, 2.0 * 0.2**3, 2.0 * 0.1**3)
     assert Curve("u", "P2/P1", sizes, errors).order == pytest.approx(3.0, abs=1e-12)
+
+
+def test_the_closed_forms_have_the_published_values():
+    """Five digits are published."""
+    for ratio, displacement in exact.THICK_CYLINDER.items():
+        assert exact.thick_cylinder_displacement(ratio) == pytest.approx(displacement, rel=1e-5)
+
+
+def test_the_made_up_motion_is_differentiated_right():
+    """F against central differences of the positions, J against 1 + q / kappa."""
+    X, kappa = np.random.default_rng(0).uniform(0.0, 1.0, (3, 20)), 7.0
+    _, F, q = manufactured.motion(X, kappa)
+    for axis, e in enumerate(1e-5 * np.eye(3)[:, :, None]):
+        slope = (manufactured.motion(X + e, kappa)[0] - manufactured.motion(X - e, kappa)[0]) / 2e-5
+        np.testing.assert_allclose(F[:, :, axis], slope.T, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.det(F), 1.0 + q / kappa, rtol=1e-13)

@@ -47,8 +47,8 @@ def test_a_number_that_is_off_fails_the_command(run, tmp_path, got):
 
 
 def test_a_control_that_agrees_fails_the_command(run):
-    assert run([oracle("control", 2.0, control=True)]).exit_code == 1
-    assert run([oracle("control", 3.0, control=True)]).exit_code == 0
+    assert run([oracle("control", 2.0, kind="misses")]).exit_code == 1
+    assert run([oracle("control", 3.0, kind="misses")]).exit_code == 0
 
 
 def test_the_fast_half_leaves_the_whole_alone(run, tmp_path):
