@@ -35,8 +35,8 @@ ELEMENTS = {
     for entry in (
         Element("P2/P1", ElementTetP2(), ElementTetP1(), 5, (3.0, 2.0), False, "Taylor and Hood 1973; the default"),
         Element("MINI", ElementTetMini(), ElementTetP1(), 6, (2.0, 1.5), False, "Arnold, Brezzi and Fortin 1984"),
-        # condensed: 5 % fewer unknowns than P2/P1, but on the same mesh of the manufactured solution (15,000 unknowns) its
-        # error of u is 40 times larger; and without functions on the faces its pressure loses order as kappa/mu grows
+        # condensed: 5 % fewer unknowns than P2/P1, but on the same mesh of the manufactured solution (15,000 unknowns)
+        # its error of u is 40 times larger, and without functions on the faces its pressure loses order at large kappa
         Element("P2/P0", ElementTetP2(), None, 5, (1.7, 0.8), False, "mean dilatation, Nagtegaal, Parks and Rice 1974"),
         Element("P1", ElementTetP1(), None, 5, (2.0, 1.0), True, "displacement alone: the control that must lock"),
     )

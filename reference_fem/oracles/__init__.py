@@ -1,10 +1,10 @@
 """Problems whose answers are known from elsewhere: closed forms, published numbers, other codes (docs/theory.md)."""
 
-from reference_fem.oracles import cook, cylinder, manufactured, patch, thick_sphere, uniaxial
+from reference_fem.oracles import ball, cook, cylinder, manufactured, patch, ringing, thick_sphere, uniaxial
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome
 
 ORACLES: tuple[Oracle, ...] = tuple(
-    module.ORACLE for module in (uniaxial, patch, thick_sphere, cylinder, cook, manufactured)
+    module.ORACLE for module in (uniaxial, patch, thick_sphere, cylinder, cook, ringing, manufactured, ball)
 )
 
 __all__ = ["ORACLES", "Check", "Curve", "Oracle", "Outcome"]

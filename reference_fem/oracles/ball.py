@@ -1,0 +1,65 @@
+"""A ball squeezed between two frictionless planes, by an eighth of it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from reference_fem import exact
+from reference_fem.contact import RigidPlane
+from reference_fem.elements import nodes
+from reference_fem.equilibrium import Equilibrium, equilibrium_path
+from reference_fem.material import NeoHookean
+from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
+from reference_fem.oracles.bodies import ball_octant, symmetry
+from reference_fem.problem import Problem
+
+KAPPA = 5000.0
+"""Over mu."""
+JUDGED = (0.10, 0.15, 0.20, 0.25, 0.30, 0.35)
+"""Approaches of the planes over the diameter; the path starts at half the first."""
+FAMILY = (5, 7, 10)
+"""Elements to a quarter circle."""
+GRADE = 0.5
+"""Element size at the pole over that at the equator."""
+
+
+def squeeze(mesh, shares: Sequence[float]) -> tuple[Problem, list[Equilibrium]]:
+    """(problem, equilibria) of an octant of unit radius and modulus, at approaches over the diameter."""
+    plane = RigidPlane((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), lambda t: (0.0, 0.0, -t))
+    problem = Problem(mesh, NeoHookean(1.0, KAPPA), symmetry(), [plane])
+    return problem, equilibrium_path(problem, shares)
+
+
+def whole_force(state: Equilibrium) -> float:
+    """Force of one plane on the whole ball [mu R²]: four octants lean on it."""
+    return -4.0 * float(state.obstacle_force[0, 2])
+
+
+def measure() -> Outcome:
+    """Force, equator and volume on the finest mesh; the force's error at 0.30 over mesh size."""
+    checks, errors = [], []
+    for cells in FAMILY:
+        mesh = ball_octant(cells, GRADE)
+        problem, path = squeeze(mesh, (0.05, *JUDGED))
+        by_share = {state.t: state for state in path}
+        errors.append(abs(whole_force(by_share[0.30]) / exact.BALL_BETWEEN_PLANES[0.30][0] - 1.0))
+    x, about = nodes(mesh), (f"octant, {mesh.nelements} elements", unknowns(problem))
+    for share in JUDGED:
+        state, (force, equator) = by_share[share], exact.BALL_BETWEEN_PLANES[share]
+        radius = float((x + state.u)[np.argmax(x[:, 0]), 0])
+        checks.append(Check(f"force, d {share:.2f}", "mu R²", force, whole_force(state), 5e-3, *about))
+        checks.append(Check(f"equator, d {share:.2f}", "R", equator, radius, 5e-4, *about))
+    ratio = path[-1].volume / path[-1].volume0
+    checks.append(Check(f"V/V0, d {JUDGED[-1]:.2f}", "1", 1.0, float(ratio), 1e-4, *about))
+    sizes = tuple(1.0 / cells for cells in FAMILY)
+    curve = Curve("oracles: error of the main quantity", "squeezed ball, force", sizes, tuple(errors))
+    return Outcome(tuple(checks), (curve,))
+
+
+ORACLE = Oracle(
+    "ball_between_planes",
+    "Ball between frictionless planes",
+    "axisymmetric P2/P1 solution, two meshes within 1e-4",
+    measure,
+    fast=False,
+)
