@@ -23,7 +23,8 @@ from massspring import (
 )
 from massspring import Path as Motion
 from reference_fem import bench as reference_bench
-from reference_fem import equilibrium_path
+from reference_fem import crosscheck, equilibrium_path
+from reference_fem.crosscheck.bench import iteration_ratio
 from reference_fem.exact import BALL_BETWEEN_PLANES
 from studies.adapt_reference import reference_problem, whole_forces
 from studies.case import BodyRecipe, Case
@@ -134,9 +135,25 @@ def speed_lines() -> list[Line]:
     ]
 
 
+def second_code_lines() -> list[Line]:
+    """A Newton iteration of the reference over one of NGSolve's own Newton, same problem, mesh and core."""
+    if not crosscheck.available():
+        return []
+    with pinned(threads=1):
+        cost = iteration_ratio()
+    note = f"{cost['unknowns']} unknowns; NGSolve with {cost['inverse']}: {cost['ngsolve_s']:.3g} s"
+    return [Line("Newton iteration over NGSolve's", cost["ratio"], "1", 1.5, note=note)]
+
+
 def main() -> None:
     """Measures everything; the table says for each number whether it is met."""
-    stages: tuple[Callable[[], list[Line]], ...] = (step_lines, volume_lines, reference_lines, speed_lines)
+    stages: tuple[Callable[[], list[Line]], ...] = (
+        step_lines,
+        volume_lines,
+        reference_lines,
+        speed_lines,
+        second_code_lines,
+    )
     lines = [line for stage in stages for line in stage()]
     table = pd.DataFrame(
         {

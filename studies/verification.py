@@ -8,10 +8,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from reference_fem.oracles import ORACLES, Check, Curve, Oracle, Outcome
+from reference_fem import oracles
+from reference_fem.oracles import Check, Curve, Oracle, Outcome
 from studies.atomic import write_whole
+from studies.second_opinion import second_opinions
 
 FOLDER = "verify"
+ORACLES: tuple[Oracle, ...] = (*oracles.ORACLES, *second_opinions())
+"""The pack, with the second opinion where the code for it is installed."""
 
 
 @dataclass(frozen=True)

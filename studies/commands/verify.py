@@ -7,6 +7,7 @@ import pandas as pd
 import typer
 from rich.console import Console
 
+from reference_fem import crosscheck
 from studies.verification import FOLDER, Verdict, run_pack, tolerance, write_verdicts
 
 console = Console(soft_wrap=True)
@@ -25,6 +26,8 @@ def verify(
     root = results / FAST if fast else results
     for path in write_verdicts(root / FOLDER, verdicts):
         console.print(str(path), markup=False, highlight=False)
+    if not crosscheck.available():
+        console.print("no second opinion: NGSolve is not installed (pip install organbench[crosscheck])", markup=False)
     count = sum(len(verdict.outcome.checks) for verdict in verdicts)
     failed = [f"{v.oracle.name}: {check.quantity}" for v in verdicts for check in v.failed]
     console.print(f"{count - len(failed)} of {count} numbers are where they must be", highlight=False)

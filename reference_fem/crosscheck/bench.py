@@ -1,0 +1,65 @@
+"""Time of a Newton iteration here and in NGSolve, on the same problem and mesh; the caller pins the core and prints."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from reference_fem.crosscheck.cases import clamped_ball
+from reference_fem.crosscheck.ngsolve_code import Model
+from reference_fem.oracles.base import unknowns
+from reference_fem.problem import Problem
+from reference_fem.system import NewtonSettings, System
+
+INVERSES = ("sparsecholesky", "umfpack")
+"""NGSolve's own direct solvers; with MKL's, where it has that, it took no less time."""
+
+FIRST = 0.02
+"""Time of the state that both iterate at: deformed a little, as within a loading path."""
+
+
+def iteration_ratio(n=7, repeats=3) -> dict:
+    """Seconds of an iteration (tangent, residual, factors, solution), ours over the faster of NGSolve's.
+
+    By turns, least of the repeats after one that warms up. Keys: unknowns, own_s, ngsolve_s, ratio, inverse.
+    Raises ReferenceProblem where the extra is missing.
+    """
+    problem = clamped_ball(n)
+    actions = {"own": own_iteration(problem)} | {name: ngsolve_iteration(problem, name) for name in INVERSES}
+    best = dict.fromkeys(actions, np.inf)
+    for _ in range(repeats):
+        for name, action in actions.items():
+            best[name] = min(best[name], action())
+    inverse = min(INVERSES, key=lambda name: best[name])
+    ratio = best["own"] / best[inverse]
+    names = ("unknowns", "own_s", "ngsolve_s", "ratio", "inverse")
+    return dict(zip(names, (int(unknowns(problem)), best["own"], best[inverse], ratio, inverse), strict=True))
+
+
+def own_iteration(problem: Problem) -> Callable[[], float]:
+    """An action that takes one iteration here and returns its seconds; it has been called once to warm up."""
+    system = System(problem, NewtonSettings())
+    state, target = system.rest(), system.held_at(FIRST)
+    loads = system.loads_of(state)
+    x = system.step(system.evaluate(state.x, loads), state.x, target)
+
+    def action():
+        start = time.perf_counter()
+        system.step(system.evaluate(x, loads), x, target)
+        return time.perf_counter() - start
+
+    action()
+    return action
+
+
+def ngsolve_iteration(problem: Problem, inverse) -> Callable[[], float]:
+    """The same in NGSolve's own Newton: two of its iterations, halved."""
+    model = Model(problem)
+    model.advance(FIRST, inverse)
+
+    def action():
+        start = time.perf_counter()
+        model.iterate(inverse, 0.0, 2)
+        return 0.5 * (time.perf_counter() - start)
+
+    return action

@@ -1,0 +1,60 @@
+"""Three problems that both codes solve on the same mesh with the same quadrature points."""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial import KDTree
+from skfem import MeshTet
+
+from reference_fem.elements import facet_nodes, nodes
+from reference_fem.errors import ReferenceProblem
+from reference_fem.material import NeoHookean
+from reference_fem.oracles.bodies import shell_octant, symmetry, whole_ball
+from reference_fem.problem import Held, Problem
+
+STEPS = (0.25, 0.5, 0.75, 1.0)
+"""Times of the loading path; all motions end at 1."""
+
+
+def straight(mesh) -> MeshTet:
+    """The vertices of a curved mesh, joined by straight edges: NGSolve's curves are not ours."""
+    return MeshTet(np.ascontiguousarray(mesh.doflocs[:, : mesh.nvertices]), mesh.t)
+
+
+def facets_where(mesh: MeshTet, inside: Callable) -> Callable:
+    """What Held.where asks, for the boundary facets all of whose vertices are `inside`: (3, n) points -> bool (n,)."""
+    table, x = facet_nodes(mesh), nodes(mesh)
+    whole = np.asarray(inside(x.T), dtype=bool)[table[:, :3]].all(axis=1)
+    if not whole.any():
+        raise ReferenceProblem("a patch contains no whole boundary facet: choose a larger one, or a finer mesh")
+    tree = KDTree(x[np.unique(table[whole])])
+    # far above round-off, far below an edge
+    return lambda points: tree.query(points.T)[0] < 1e-9 * float(np.ptp(x))
+
+
+def clamped_ball(n=4) -> Problem:
+    """A ball between clamped caps (those beyond 0.8 of the radius), one pushed in by 0.3 of the radius and aside."""
+    mesh = straight(whole_ball(n))
+    top, bottom = (facets_where(mesh, lambda x, sign=sign: sign * x[2] > 0.8) for sign in (1.0, -1.0))
+    push = Held(top, motion=lambda t: (0.1 * t, 0.0, -0.3 * t))
+    return Problem(mesh, NeoHookean(1.0, 500.0), [push, Held(bottom)])
+
+
+def thick_sphere(n=6, layers=4) -> Problem:
+    """An eighth of a shell, 0.5 to 1 of the radius, whose inner surface is blown up by 0.3 of its radius."""
+    mesh = straight(shell_octant(0.5, n, layers))
+    wall = facets_where(mesh, lambda x: np.abs(np.linalg.norm(x, axis=0) - 0.5) < 1e-9)
+    blow = Held(wall, motion=lambda t: (0.15 * t,) * 3, shape=lambda x: x / np.linalg.norm(x, axis=0))
+    return Problem(mesh, NeoHookean(1.0, 5000.0), [blow, *symmetry()])
+
+
+def pulled_organ(mesh: MeshTet, attached, grip, move) -> Problem:
+    """An organ of mu = 1.8 kPa, attached at some vertices and gripped at others (numbers); move: (3,) [m]."""
+    if len(np.intersect1d(attached, grip)):
+        raise ReferenceProblem("the attached and the gripped patch share vertices: take patches that lie apart")
+
+    def patch(numbers):
+        return facets_where(mesh, lambda x: np.isin(np.arange(x.shape[1]), numbers))
+
+    pull = Held(patch(grip), motion=lambda t: tuple(t * np.asarray(move, dtype=float)))
+    return Problem(mesh, NeoHookean(1800.0, 1800.0 * 5000.0), [pull, Held(patch(attached))])
