@@ -1,6 +1,5 @@
 """Step by step through time: steps that fail are halved and grow again; an account of the energy is kept."""
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,8 +22,6 @@ class Powers(NamedTuple):
     """Their positions, (no, 3) [m]."""
     push: np.ndarray
     """Their forces on the body, (no, 3) [N]."""
-    contact: np.ndarray
-    """Contact pressures, (no, nf, nq) [Pa]."""
     reaction: np.ndarray
     """Forces of the holders, one for each held unknown [N]."""
     pressures: np.ndarray
@@ -49,10 +46,8 @@ class Account:
         dissipation = 2.0 * system.damping * kinetic(system, motion)
         rows = loads.rows[:, 1:4]
         reaction, pressures = found.residual[system.pattern.held], state.x[system.field_count :]
-        touch = found.touch
-        return Powers(
-            np.asarray(loads.force), rows, touch.force, touch.pressure, reaction, pressures, found.volumes, dissipation
-        )
+        push = found.touch.force
+        return Powers(np.asarray(loads.force), rows, push, reaction, pressures, found.volumes, dissipation)
 
     def book(self, old: Motion, new: Motion):
         """The step from old to new."""
@@ -120,8 +115,7 @@ class March:
         system, old = self.system, self.motion
         dt = t - old.state.t
         system.clock = TimeStep(old, dt, self.scheme, system.pattern.held, *held_motion(system, t, dt))
-        # the pressures found are the best multipliers, and points that have left are to start without
-        state = solve_step(system, replace(old.state, multiplier=self.account.now.contact), t, 1.0)
+        state = solve_step(system, old.state, t, 1.0)
         self.motion = Motion(state, *system.clock.at(state.x[: system.displacement_count]))
         system.clock = Instant(self.motion)
         self.account.book(old, self.motion)

@@ -5,7 +5,7 @@ import numpy as np
 from reference_fem import contact
 from reference_fem.system import Loads, State, System
 
-PENALTY_GROWTH = 3.0
+PENALTY_GROWTH = 2.0
 """Factor on the contact penalty at each multiplier update inside a step: plain updates gain little where a facet is
 partly in contact, for its points then ask for more than six nodes can give."""
 
@@ -23,29 +23,49 @@ class StepFailed(Exception):
 def solve_step(system: System, state: State, t, load) -> State:
     """The equilibrium at time t from the one in `state`; raises StepFailed.
 
-    The first direction is taken at the old obstacles with their move linearised (the predictor). Multipliers are
-    updated, and the penalty raised, only while some point is deeper than allowed, or is pushed from as far outside;
-    the next step starts low again.
+    Multipliers are updated, and the penalty raised, only while some point is deeper than allowed, or is pushed from as
+    far outside; the next step starts low again.
     """
-    rows, target, old = system.obstacles_at(t), system.held_at(t), system.obstacles_at(state.t)
-    filling = system.filling_at(t, load)
-    x, multiplier, stiffness, force = state.x, state.multiplier, 1.0, system.force_at(t, load)
-    found = system.evaluate(x, Loads(force, old, multiplier, filling, shift=rows[:, 1:4] - old[:, 1:4]))
+    target, stiffness = system.held_at(t), 1.0
+    loads = Loads(system.force_at(t, load), system.obstacles_at(t), state.pressure, system.filling_at(t, load))
+    x, found = first_guess(system, state, t, loads)
     before = None
     for iteration in range(1, system.settings.max_iterations + 1):
         direction = system.step(found, x, target)
-        x, found = search(system, x, direction, Loads(force, rows, multiplier, filling, stiffness), before)
+        x, found = search(system, x, direction, loads, before)
         arrived = np.array_equal(x[system.pattern.held], target)
         off = misplaced(system, x, found)
         if arrived and settled(found, system.settings, LOOSE if off else 1.0):
             if not off:
-                return State(t, load, x, multiplier, iteration, stiffness)
-            multiplier, stiffness = found.touch.pressure, PENALTY_GROWTH * stiffness
-            found = system.evaluate(x, Loads(force, rows, multiplier, filling, stiffness))
+                rate = rate_of(state, t, x)
+                return State(t, load, x, loads.multiplier, found.touch.pressure, iteration, stiffness, rate)
+            stiffness *= PENALTY_GROWTH
+            loads = loads._replace(multiplier=found.touch.pressure, stiffness=stiffness)
+            found = system.evaluate(x, loads)
         before = found
     raise StepFailed(
         f"{system.settings.max_iterations} Newton iterations left a relative force error of {found.errors[0]:.1e}"
     )
+
+
+def first_guess(system, state, t, loads: Loads):
+    """Where Newton starts, and the evaluation its first direction is taken from.
+
+    On the straight line through the last two states: the points that come into contact are then known beforehand.
+    Where there is no such line, or it folds an element: at the old state, with the move of the obstacles linearised.
+    """
+    if state.rate is not None and t > state.t:
+        x = state.x + (t - state.t) * state.rate
+        found = system.evaluate(x, loads)
+        if found.usable:
+            return x, found
+    old = system.obstacles_at(state.t)
+    return state.x, system.evaluate(state.x, loads._replace(rows=old, shift=loads.rows[:, 1:4] - old[:, 1:4]))
+
+
+def rate_of(state, t, x):
+    """Mean dx/dt since the last state [1/s]; None while time stands still."""
+    return (x - state.x) / (t - state.t) if t > state.t else None
 
 
 def settled(found, settings, slack):

@@ -30,7 +30,7 @@ def released(system: MovingSystem, state: State, v, dt) -> Motion:
     v = v.copy()
     v[held], held_a = held_motion(system, state.t, dt)
     x = np.concatenate((state.x[:n], np.zeros(system.total - n)))
-    loads = system.loads_of(State(state.t, 1.0, x, state.multiplier))
+    loads = system.loads_of(State(state.t, 1.0, x, state.multiplier, state.pressure))
     for k, lumen in enumerate(system.lumens):
         if lumen.by_pressure:
             x[system.field_count + k] = loads.filling[k]
@@ -44,7 +44,7 @@ def released(system: MovingSystem, state: State, v, dt) -> Motion:
     put_mass(system, found.values, dt)
     solution = system.step(found, x, x[held] + held_a)
     x[n:] += solution[n:]
-    return Motion(State(state.t, 1.0, x, state.multiplier), v, solution[:n], solution[:n].copy())
+    return Motion(State(state.t, 1.0, x, state.multiplier, state.pressure), v, solution[:n], solution[:n].copy())
 
 
 def put_mass(system, values, dt):

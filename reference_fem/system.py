@@ -23,9 +23,9 @@ class NewtonSettings:
     volume_tol: float = 1e-8
     penetration_tol: float = 1e-3
     """Deepest contact penetration over the largest displacement; more than that and the multiplier is updated."""
-    penalty: float = 30.0
-    """Contact penalty times facet size over mu. Soft, and left to the multiplier: on a deep spherical probe 30 to 300
-    take about as many iterations and agree to 6e-4 in the force, but 300 needs sub-steps and 1000 can fail."""
+    penalty: float = 60.0
+    """Contact penalty times facet size over mu. Soft, and left to the multiplier: 30 to 100 take about as many
+    iterations and agree to 6e-4 in the force, but on a deep spherical probe 300 needs sub-steps and 1000 can fail."""
     max_iterations: int = 25
     smallest_step: float = 1.0 / 1024.0
     """Smallest sub-step, as a fraction of the interval between two wanted times."""
@@ -39,16 +39,20 @@ class State:
     """Unknowns x and contact multipliers at time t; `iterations` spent to come here.
 
     x: u at the displacement functions (P2: the nodes) [m], interleaved, p at the vertices [Pa] unless the element
-    eliminates it, pressures of the cavities [Pa]. load: share of
-    the dead forces and of the cavities' start values that acts, 1 once they are switched on.
+    eliminates it, pressures of the cavities [Pa]. load: share of the dead forces and of the cavities' start values that
+    acts, 1 once they are switched on. rate: mean dx/dt since the state before, where the next step looks first.
     """
 
     t: float
     load: float
     x: np.ndarray
     multiplier: np.ndarray
+    """With which the contact pressures follow from x, (no, nf, nq) [Pa]."""
+    pressure: np.ndarray
+    """The contact pressures: the multipliers the next step starts from, so that points that left start without."""
     iterations: int = 0
     stiffness: float = 1.0
+    rate: np.ndarray | None = None
 
 
 class Loads(NamedTuple):
@@ -144,7 +148,7 @@ class System:
 
     def rest(self) -> State:
         shape = (len(self.rows), *self.surface.weights.shape)
-        return State(self.settings.start, 0.0, np.zeros(self.total), np.zeros(shape))
+        return State(self.settings.start, 0.0, np.zeros(self.total), np.zeros(shape), np.zeros(shape))
 
     def obstacles_at(self, t):
         return contact.place(self.rows, self.problem.obstacles, t)
