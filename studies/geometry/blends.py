@@ -46,8 +46,8 @@ Sphere = tuple[float, float, float, float]
 STARTS, STEPS, BATCH = 17, 40, 4096
 """Values of s tried before Newton's method; its most steps (4 to 6 are usual, halving alone needs 30); points at a
 time, few enough to stay in the cache."""
-FLAT = 1e-9
-"""Step of s at which the search ends: f is flat there, so its error is the square of this."""
+FLAT = 1e-6
+"""Step of s at which the search ends: f is flat there, so its error is the square of this, 1e-12 of its length."""
 
 
 def canal(x: np.ndarray, spheres: Sequence[Sphere]) -> np.ndarray:

@@ -13,7 +13,7 @@ from studies.geometry.organs.millimetres import MM, check_lengths, metres, probe
 from studies.geometry.regions import EllipsoidRegion, Vector
 
 VOLUME = Literature(1500.0, "Henderson et al., Radiology 141 (1981) 525: 1,493 mL by CT")
-PRESS: Vector = (0.0, 0.9, 0.19**0.5)
+LIVER_PRESS_DIRECTION: Vector = (0.0, 0.9, 0.19**0.5)
 """To the back and up: a plane with this normal, moving along it from the front, meets the smooth front of the right
 lobe first, away from the thin margin, and presses the liver against its bare area."""
 
@@ -49,14 +49,15 @@ def liver_shape(
 
     low, high = metres(*(-130, -80, -100) * scale), metres(*(140, 90, 100) * scale)
     bare_area = EllipsoidRegion(metres(*(-35, 53, 43) * scale), metres(*(45, 40, 26) * scale))
-    shape = Shape("liver", si(level), low, high, 5 * MM, {"bare_area": bare_area}, None, VOLUME, None, PRESS)
+    shape = Shape(
+        "liver", si(level), low, high, 5 * MM, {"bare_area": bare_area}, None, VOLUME, None, LIVER_PRESS_DIRECTION
+    )
     # Low on the front of the right lobe, smooth 3 cm around.
     return replace(shape, probe=probe_near(shape, metres(*(-45, -57, -33) * scale)))
 
 
 LIVER = liver_shape()
 LIVER_REGIONS = LIVER.regions
-LIVER_PRESS_DIRECTION = PRESS
 assert LIVER.probe is not None  # liver_shape gives it one
 LIVER_PROBE_POINT, LIVER_PROBE_NORMAL = LIVER.probe.point, LIVER.probe.normal
 
