@@ -48,8 +48,7 @@ def liver_shape(
         return (body + falciform + ligament + gallbladder + cava) * scale.min()
 
     low, high = metres(*(-130, -80, -100) * scale), metres(*(140, 90, 100) * scale)
-    bare_area = EllipsoidRegion(metres(*(-35, 53, 43) * scale), metres(*(45, 40, 26) * scale))
-    regions = {"bare_area": bare_area}
+    regions = {"bare_area": EllipsoidRegion(metres(*(-35, 53, 43) * scale), metres(*(45, 40, 26) * scale))}
     shape = Shape("liver", si(level), low, high, 5 * MM, regions, None, VOLUME, None, LIVER_PRESS_DIRECTION)
     # Low on the front of the right lobe, smooth 3 cm around.
     return replace(shape, probe=probe_near(shape, metres(*(-45, -57, -33) * scale)))
