@@ -21,7 +21,8 @@ class DynamicsSettings:
     """How time advances; the start of time and the effort of a step are Newton's settings.
 
     dt: largest step [s], None = the intervals between the wanted times. damping: c [1/s] of the force -c M v, as the
-    mass-spring body has it. rho_inf: what is left in a step of an oscillation that the step cannot resolve, 0 to 1.
+    mass-spring body has it. rho_inf: what a step leaves of an oscillation that it cannot resolve, 0 to 1; take 0.5 for
+    an impact, where 0.9 lets the few nodes in contact chatter.
     Raises ReferenceProblem for values out of range.
     """
 

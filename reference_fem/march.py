@@ -1,4 +1,7 @@
-"""Step by step through time: steps that fail are halved and grow again; an account of the energy is kept."""
+"""Step by step through time: steps that fail are halved and grow again; the energy is accounted for.
+
+docs/theory.md, eq. 55.
+"""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Natural frequencies and modes of a body about its rest shape."""
+"""Natural frequencies and modes of a body about its rest shape (docs/theory.md, eq. 51)."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""The start of a motion: the accelerations that go with a displacement and a velocity."""
+"""The start of a motion: the accelerations that go with a displacement and a velocity (docs/theory.md, eq. 54)."""
 
 import numpy as np
 
