@@ -37,6 +37,17 @@ class BodyRecipe:
     axis: Literal["straight", "centre_line"] = "straight"
     """Of a surface body: "centre_line" follows a bent organ."""
 
+    @property
+    def series(self) -> str:
+        """What sets it apart in charts and tables: its kind, and the volumes it keeps where that was chosen."""
+        chosen = {
+            "scene": "",
+            "whole": ", one volume",
+            "regions": f", {self.regions} volumes",
+            "nodal": ", nodal volumes",
+        }
+        return self.kind + chosen[self.volumes]
+
 
 @dataclass(frozen=True)
 class Case:

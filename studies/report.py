@@ -63,9 +63,15 @@ def write_table(path: Path, table: pd.DataFrame) -> Path:
 
 
 def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
-    """Charts and tables of all studies, the summary and machine.json; paths, and what is missing in sentences."""
+    """Charts and tables of all studies, the summary and machine.json; paths, and what is missing in sentences.
+
+    A study of which nothing is stored keeps the charts that are there.
+    """
     written, remarks = [], []
     for study in studies:
+        if not any(case_path(root, study.name, case).exists() for case in study.cases):
+            remarks.append(f"{study.name}: not run here; `organbench run {study.name}` runs it")
+            continue
         paths, missing = refresh(root, study)
         written += paths
         remarks += [f"{study.name}: {sentence}" for sentence in missing]

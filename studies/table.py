@@ -25,7 +25,7 @@ def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
     case, attributes = run.case, run.record.attributes
     row: dict[str, object] = {
         "scene": case.scene.name,
-        "body": case.body.kind,
+        "body": case.body.series,
         "nodes": case.body.nodes,
         "stiffness": case.body.stiffness,
         "method": case.method.name,

@@ -8,7 +8,8 @@ from studies.case import Case
 from studies.metrics import Run
 from studies.scenes import Scene
 
-SMOKE_NODES = 150
+SMOKE_NODES, SMOKE_NODES_HOLLOW = 150, 400
+"""A wall folds on a coarser surface."""
 SMOKE_FRAMES = 20
 
 
@@ -48,6 +49,6 @@ def smoke_case(case: Case) -> Case:
     coarse = replace(plan, levels=plan.levels[:2], variants=()) if plan is not None else None
     return case.replaced(
         scene=replace(case.scene, reference=coarse),
-        body=replace(case.body, nodes=min(case.body.nodes, SMOKE_NODES)),
+        body=replace(case.body, nodes=min(case.body.nodes, SMOKE_NODES_HOLLOW if case.scene.lumen else SMOKE_NODES)),
         frames=min(case.frames or case.scene.frames, SMOKE_FRAMES),
     )

@@ -4,8 +4,7 @@ from massspring import Free, ImplicitVolume
 from studies.case import BodyRecipe, Case
 from studies.catalog.base import Chart, Study
 from studies.plots import accuracy, force_path, squeeze, volume_history
-from studies.scenes import SCENES
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE
 
 TETRAHEDRAL, SURFACE = BodyRecipe("tetrahedral"), BodyRecipe("surface")
 FINE_STEP = 0.05
@@ -17,7 +16,7 @@ VOLUME_LOSS = Study(
     cases=(
         *(
             Case(scene, body, method)
-            for scene in SCENES
+            for scene in (BALL_SQUEEZE, BALL_CLAMPED, LIVER_PRESS, LIVER_PROBE)
             for body in (TETRAHEDRAL, SURFACE)
             for method in (Free(), ImplicitVolume())
         ),

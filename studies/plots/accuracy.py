@@ -66,7 +66,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 def _draw_scene(axes: Axes, group: Sequence[Run], metrics: Sequence[Metric]) -> list[float]:
     """The values drawn, errors and floors."""
-    series = grouped(group, lambda run: (run.case.body.kind, run.case.method.name))
+    series = grouped(group, lambda run: (run.case.body.series, run.case.method.name))
     offsets = np.linspace(-REACH, REACH, len(series) + 2)[1:-1]
     drawn: list[float] = []
     for place, metric in enumerate(metrics):
@@ -94,7 +94,7 @@ def _draw_point(axes: Axes, x: float, error: float, floor: float, run: Run) -> f
     height = max(error, floor)
     colour = method_colour(run.case.method.name)
     face = colour if floor <= SHARE * error else "white"
-    marker = BODY_MARKERS[run.case.body.kind] if error > floor else "_"
+    marker = BODY_MARKERS[run.case.body.series] if error > floor else "_"
     axes.plot(x, height, marker=marker, color=colour, markerfacecolor=face, markersize=7.5, markeredgewidth=1.6)
     return height
 

@@ -38,9 +38,9 @@ LABEL_GAP = 0.085
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
     """One panel per scene, the error at the last checkpoint at the end of each line."""
-    shown = [run for run in runs if has_frames(run)]
+    shown = [run for run in runs if has_frames(run) and "force" in run.case.scene.quantities]
     if not shown:
-        return blank(TITLE, "no run has recorded a frame yet")
+        return blank(TITLE, "no run of a scene that asks for a force has recorded a frame yet")
     scenes = by_scene(shown)
     columns = min(2, len(scenes))
     sheet = page(5.2 * columns, 3.0 * -(-len(scenes) // columns) + 0.4)
@@ -61,7 +61,7 @@ def _draw_scene(axes: Axes, group: Sequence[Run]) -> None:
         run = same[0]  # another time step lies on the same line; the table shows by how much it does not
         good = slice(0, good_frames(run))
         colour = method_colour(run.case.method.name)
-        axes.plot(run.field("t")[good], run.force[good], color=colour, linestyle=BODY_LINES[run.case.body.kind])
+        axes.plot(run.field("t")[good], run.force[good], color=colour, linestyle=BODY_LINES[run.case.body.series])
         ends.append((float(run.force[good][-1]), _error(run), colour))
     top = ROOM * _largest(group)
     motion = _motion(group[0].case.scene)

@@ -139,7 +139,7 @@ def good_frames(run: Run) -> int:
 
 def body_method_handles(runs: Sequence[Run], markers: bool = False) -> list[Artist]:
     """Legend entries for every method and body that occurs, and for both together: colour is method, line is body."""
-    series = dict.fromkeys((run.case.body.kind, run.case.method.name) for run in runs)
+    series = dict.fromkeys((run.case.body.series, run.case.method.name) for run in runs)
     return [series_handle(kind, method, markers) for kind, method in series]
 
 

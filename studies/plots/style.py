@@ -30,8 +30,19 @@ GREY, LIGHT, PALE = "#5A5A5A", "#B5B5B5", "#E4E4E4"
 
 METHOD_COLOURS = {"free": VERMILLION, "implicit_volume": BLUE}
 OTHER_METHODS = (GREEN, PURPLE, ORANGE, SKY)
-BODY_LINES = {"tetrahedral": "-", "surface": (0, (4, 1.6))}
-BODY_MARKERS = {"tetrahedral": "o", "surface": "s"}
+BODY_LINES = {
+    "tetrahedral": "-",
+    "surface": (0, (4, 1.6)),
+    "tetrahedral, one volume": (0, (1, 1.2)),
+    "tetrahedral, nodal volumes": (0, (6, 1.5, 1, 1.5)),
+}
+BODY_MARKERS = {
+    "tetrahedral": "o",
+    "surface": "s",
+    "tetrahedral, one volume": "D",
+    "tetrahedral, nodal volumes": "^",
+}
+"""Of the bodies that charts tell apart, by BodyRecipe.series."""
 STATUS_LOOKS: dict[Status, tuple[str, str]] = {
     Status.OK: (GREEN, "o"),
     Status.INVERTED: (PURPLE, "v"),

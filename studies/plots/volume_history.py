@@ -65,7 +65,7 @@ def _draw_run(upper: Axes, lower: Axes, run: Run, finer: bool) -> None:
     """The first run of a series in full; the same with another step as a thin line where it can be told apart."""
     good = slice(0, good_frames(run))
     change = PERCENT * (run.volume_ratio[good] - 1)
-    look = {"color": method_colour(run.case.method.name), "linestyle": BODY_LINES[run.case.body.kind]}
+    look = {"color": method_colour(run.case.method.name), "linestyle": BODY_LINES[run.case.body.series]}
     if not finer:
         upper.plot(run.field("t")[good], change, **look)
     # Zero has no logarithm; an exact volume lies on the bottom of the axis.

@@ -23,4 +23,22 @@ SCENES: tuple[Scene, ...] = (
     BLADDER_FILL,
 )
 
-__all__ = ["SCENES", "Held", "Lumen", "Organ", "Probed", "ReferencePlan", "Scene", "Tissue"]
+__all__ = [
+    "BALL_CLAMPED",
+    "BALL_SQUEEZE",
+    "BLADDER_FILL",
+    "KIDNEY_PROBE",
+    "LIVER_PRESS",
+    "LIVER_PROBE",
+    "SCENES",
+    "SPLEEN_SAG",
+    "STOMACH_PRESS",
+    "STOMACH_PROBE",
+    "Held",
+    "Lumen",
+    "Organ",
+    "Probed",
+    "ReferencePlan",
+    "Scene",
+    "Tissue",
+]

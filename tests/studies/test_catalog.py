@@ -4,7 +4,7 @@ import pytest
 
 from studies.adapt import prepare
 from studies.catalog import STUDIES
-from studies.catalog.base import SMOKE_FRAMES, SMOKE_NODES
+from studies.catalog.base import SMOKE_FRAMES, SMOKE_NODES, SMOKE_NODES_HOLLOW
 from studies.paths import readable
 from studies.table import metric
 from tests.studies.tiny import tiny_case, tiny_study
@@ -59,7 +59,7 @@ def test_smoke_is_small_and_still_the_same_question(study):
     assert {case.scene.name for case in smoke.cases} == {case.scene.name for case in study.cases}
     assert {case.timed for case in smoke.cases} == {case.timed for case in study.cases}
     for case in smoke.cases:
-        assert case.body.nodes <= SMOKE_NODES
+        assert case.body.nodes <= (SMOKE_NODES_HOLLOW if case.scene.lumen else SMOKE_NODES)
         assert case.frames <= SMOKE_FRAMES
         assert len(case.scene.reference.levels) == 2
     assert smoke.smoke() == smoke

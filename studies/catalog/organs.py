@@ -1,0 +1,43 @@
+"""Does what holds for ball and liver hold for kidney, spleen, stomach and bladder, solid and hollow?"""
+
+from massspring import Free, ImplicitVolume
+from studies.case import BodyRecipe, Case
+from studies.catalog.base import Chart, Study
+from studies.plots import accuracy, force_path, volume_history
+from studies.scenes import BLADDER_FILL, KIDNEY_PROBE, SPLEEN_SAG, STOMACH_PRESS, STOMACH_PROBE, Scene
+
+SOLID, HOLLOW = (KIDNEY_PROBE, SPLEEN_SAG), (STOMACH_PRESS, STOMACH_PROBE, BLADDER_FILL)
+METHODS = (Free(), ImplicitVolume())
+
+
+def _cases(scene: Scene, *bodies: BodyRecipe) -> tuple[Case, ...]:
+    return tuple(Case(scene, body, m) for body in bodies for m in METHODS if scene.skip(m) is None)
+
+
+ORGANS = Study(
+    name="organs",
+    question=__doc__ or "",
+    cases=(
+        *(case for scene in SOLID for case in _cases(scene, BodyRecipe(), BodyRecipe("surface"))),
+        # The paper's body of a bent organ has a bent axis; of a hollow one it keeps wall and content as one volume.
+        *(case for scene in HOLLOW for case in _cases(scene, BodyRecipe(), BodyRecipe("surface", axis="centre_line"))),
+        *(Case(scene, BodyRecipe(volumes="whole"), ImplicitVolume()) for scene in HOLLOW),
+    ),
+    charts=(
+        Chart("volume.png", volume_history.draw),
+        Chart("force.png", force_path.draw),
+        Chart("accuracy.png", accuracy.draw),
+    ),
+    columns=(
+        "volume_worst",
+        "force_error",
+        "force_end",
+        "surface_error",
+        "interior_error",
+        "mean_error",
+        "silhouette_error",
+        "pressure_error",
+        "lumen_pressure_error",
+        "min_j",
+    ),
+)
