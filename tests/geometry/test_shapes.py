@@ -11,7 +11,6 @@ import pytest
 from skimage.measure import euler_number, label
 
 from studies.errors import StudyError
-from studies.geometry.blends import canal, closed
 from studies.geometry.levelset import at_depth, gradient, normals
 from studies.geometry.mesh import signed_volume, triangle_areas
 from studies.geometry.organs import SHAPES
@@ -160,34 +159,6 @@ def test_what_is_symmetric_is_symmetric(name, axis):
     x = np.random.default_rng(1).uniform(shape.low, shape.high, (500, 3))
     mirrored = x * np.where(np.arange(3) == axis, -1.0, 1.0)
     assert shape.level(x) == pytest.approx(shape.level(mirrored), abs=1e-14)
-
-
-def test_canal_of_two_spheres_is_the_round_cone():
-    x = np.random.default_rng(2).uniform(-3, 5, (400, 3))
-    # Closed form: the nearest point of the axis lies where distance and radius balance (Quilez, "Round cone").
-    a, b, ra, rb = np.zeros(3), np.array([0.0, 0.0, 2.0]), 1.0, 0.5
-    p = np.column_stack([np.linalg.norm(x[:, :2], axis=1), x[:, 2]])
-    sine = (ra - rb) / 2.0
-    cosine = np.sqrt(1 - sine**2)
-    k = p @ (-sine, cosine)
-    exact = p @ (cosine, sine) - ra
-    exact = np.where(k > 2.0 * cosine, np.linalg.norm(x - b, axis=1) - rb, exact)
-    exact = np.where(k < 0, np.linalg.norm(x - a, axis=1) - ra, exact)
-    assert canal(x, [(*a, ra), (*b, rb)]) == pytest.approx(exact, abs=1e-12)
-
-
-def test_canal_is_the_smallest_distance_to_its_spheres():
-    spheres = closed([(0, 0, 0, 1.0), (3, 1, 0, 1.5), (4, -1, 2, 1.0), (6, 2, 1, 0.7)])
-    x = np.random.default_rng(3).uniform(-3, 8, (120, 3))
-    s = np.linspace(0, 1, 20001)
-    at = np.array(spheres, float)[None]
-    for _ in range(len(spheres) - 1):  # de Casteljau
-        at = (1 - s)[:, None, None] * at[:, :-1] + s[:, None, None] * at[:, 1:]
-    at = at[:, 0]
-    brute = (np.linalg.norm(x[:, None] - at[:, :3], axis=2) - at[:, 3]).min(axis=1)
-    found = canal(x, spheres)
-    # Sampling misses the minimum by curvature * spacing^2 / 8, some 1e-7 here, and never lies below it.
-    assert (found <= brute + 1e-12).all() and (brute - found).max() < 1e-6
 
 
 @pytest.mark.parametrize("name", SHAPES)
