@@ -1,5 +1,6 @@
 """One number for the state of the code: a stored result is current only while it stays the same."""
 
+import ast
 import hashlib
 from functools import cache
 from importlib.util import find_spec
@@ -9,22 +10,48 @@ from studies.errors import StudyError
 
 
 @cache
-def source_fingerprint(*sources: str | Path) -> str:
+def source_fingerprint(*sources: str | Path, without: tuple[str, ...] = ()) -> str:
     """SHA-256 (hex) over the Python sources of packages or modules (by dotted name), folders and files (by Path).
 
-    It depends on what the files say and on their names inside their package, not on where the checkout lies, its
-    dates or its line endings. Read once per process: a running process computes with the code it has loaded.
-    Raises StudyError for a source that does not exist.
+    It depends on what the code does and on file names inside their package: not on comments, docstrings, layout or
+    line endings, nor on where the checkout lies. `without`: files of packages ("name.py") that do not count.
+    Read once per process: a running process computes with the code it has loaded.
+    Raises StudyError for a source that does not exist, or is no Python.
     """
     digest = hashlib.sha256()
     for source in sources:
         root = source if isinstance(source, Path) else _location(source)
         for file in _python_files(root):
-            content = file.read_bytes().replace(b"\r\n", b"\n")
+            if root.is_dir() and file.relative_to(root).as_posix() in without:
+                continue
+            content = _meaning(file)
             label = f"{root.name}/{file.relative_to(root).as_posix()}" if root.is_dir() else file.name
             digest.update(f"{label}\0{len(content)}\0".encode())
             digest.update(content)
     return digest.hexdigest()
+
+
+@cache
+def _meaning(file: Path) -> bytes:
+    """The syntax tree of a file without the strings that stand by themselves."""
+    try:
+        tree = ast.parse(file.read_bytes())
+    except SyntaxError as error:
+        raise StudyError(f"{file} is no Python ({error.msg}, line {error.lineno}): mend it") from error
+    for node in ast.walk(tree):
+        for name in ("body", "orelse", "finalbody"):
+            block = getattr(node, name, None)
+            if isinstance(block, list):
+                setattr(node, name, [statement for statement in block if not _is_remark(statement)])
+    return ast.dump(tree).encode()
+
+
+def _is_remark(statement: ast.stmt) -> bool:
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )
 
 
 def _location(name: str) -> Path:
