@@ -24,6 +24,7 @@ from studies.links import link_study
 from studies.metrics import METRICS
 from studies.paths import study_folder
 from studies.progress import TerminalProgress
+from studies.reference_report import reference_listing
 from studies.run import replay as replay_run
 from studies.safe_dt import safe_step
 from studies.scenes import SCENES
@@ -119,7 +120,7 @@ def _draw(root: Path, study: Study) -> list[Path]:
 
 @app.command()
 def status(study: Annotated[str, typer.Argument()] = "", results: Results = Path("results")) -> None:
-    """How many cases are ok, failed, stale or missing, and why."""
+    """How many cases are ok, failed, stale or missing, and why; and how the references stand, mesh by mesh."""
     chosen = [find_study(study)] if study else list(STUDIES)
     for entry in chosen:
         found = standings(results, entry)
@@ -131,6 +132,10 @@ def status(study: Annotated[str, typer.Argument()] = "", results: Results = Path
             for standing in found:
                 if standing.status != "ok":
                     console.print(f"  {standing.status:13} {standing.task.label}: {standing.message}", markup=False)
+    listing = reference_listing(results, {scene.name: scene for entry in chosen for scene in entry.scenes}.values())
+    if len(listing):
+        console.print("references:", highlight=False)
+        console.print(listing.to_string(index=False, na_rep=""), markup=False, highlight=False)
 
 
 @app.command()

@@ -14,7 +14,7 @@ def source_fingerprint(*sources: str | Path, without: tuple[str, ...] = ()) -> s
     """SHA-256 (hex) over the Python sources of packages or modules (by dotted name), folders and files (by Path).
 
     It depends on what the code does and on file names inside their package: not on comments, docstrings, layout or
-    line endings, nor on where the checkout lies. `without`: files of packages ("name.py") that do not count.
+    line endings, nor on where the checkout lies. `without`: beginnings of paths inside packages ("name.py", "folder/") that do not count.
     Read once per process: a running process computes with the code it has loaded.
     Raises StudyError for a source that does not exist, or is no Python.
     """
@@ -22,7 +22,7 @@ def source_fingerprint(*sources: str | Path, without: tuple[str, ...] = ()) -> s
     for source in sources:
         root = source if isinstance(source, Path) else _location(source)
         for file in _python_files(root):
-            if root.is_dir() and file.relative_to(root).as_posix() in without:
+            if root.is_dir() and file.relative_to(root).as_posix().startswith(without):
                 continue
             content = _meaning(file)
             label = f"{root.name}/{file.relative_to(root).as_posix()}" if root.is_dir() else file.name

@@ -18,6 +18,8 @@ ALWAYS = ("volume",)
 """Quantities with a truth of their own: a volume is compared with the body's own rest volume."""
 GAUGE_FREE = ("pressure", "lumen")
 """Quantities that every scene with a reference allows: a rigid turn does not change them."""
+DOUBT = 0.1
+"""An error with more than this share of uncertainty in it is doubtful (docs/theory.md, the reference)."""
 COMPARABLE = (Status.OK, Status.INVERTED, Status.DRIFTED)
 """A run that ended early has no last checkpoint."""
 
@@ -117,6 +119,11 @@ class Metric:
         if self.quantity is None or run.reference is None or not self._allowed(run):
             return float("nan")
         return PERCENT * run.reference.floor[self.quantity]
+
+    def doubtful(self, run: Run) -> bool:
+        """Whether the reference is not ten times better than what it judges here."""
+        floor = self.floor(run)
+        return floor == floor and self.quantity not in ALWAYS and floor > DOUBT * abs(self(run))
 
     def _allowed(self, run: Run) -> bool:
         """Whether there is something to compare with, and the scene says that it may be."""

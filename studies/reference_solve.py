@@ -14,7 +14,7 @@ from studies.paths import record_path
 from studies.records import new_record
 from studies.reference_fields import fields_of
 from studies.scenes.base import Scene
-from studies.store import Status, is_current, write_record
+from studies.store import Status, is_current, peek, why_stale, write_record
 
 STUDY = "reference"
 PENALTY_FACTOR, KAPPA_FACTOR, STEP_FACTOR = 3.0, 10.0, 2.0
@@ -65,6 +65,13 @@ class Piece:
         """Whether it is there, from this code."""
         return is_current(self.path(root), self.key, reference_fingerprint())
 
+    def state(self, root: Path) -> str:
+        """ "missing", "unreadable", "stale", or the status it ended with."""
+        why = why_stale(self.path(root), self.key, reference_fingerprint())
+        if why is None:
+            return str(peek(self.path(root)).status)
+        return why if why == "missing" else "unreadable" if why.startswith("unreadable") else "stale"
+
     @property
     def weight(self) -> float:
         """What it costs, roughly: unknowns."""
@@ -85,6 +92,10 @@ def variants(scene: Scene) -> list[str]:
     return [name for name in scene.reference.variants if name != "contact" or scene.obstacles]
 
 
+JUDGES = ("bench.py", "crosscheck", "dynamics", "exact.py", "modes.py", "motion", "oracles/", "uncertainty.py")
+"""Beginnings of the solver's files that no equilibrium is computed with: they judge it, or move bodies in time."""
+
+
 def reference_fingerprint() -> str:
     """Hash of all code that a reference depends on."""
     return source_fingerprint(
@@ -95,6 +106,7 @@ def reference_fingerprint() -> str:
         "studies.reference_fields",
         "studies.reference_mesh",
         "studies.reference_solve",
+        without=JUDGES,
     )
 
 

@@ -1,6 +1,5 @@
 """What people look at: charts, tables as CSV, the summary of results that README shows."""
 
-import hashlib
 import json
 import math
 from collections.abc import Hashable, Mapping, Sequence
@@ -12,17 +11,17 @@ import pandas as pd
 from studies.atomic import write_whole
 from studies.catalog import Study
 from studies.errors import StudyError
-from studies.fingerprint import source_fingerprint
 from studies.geometry import SHAPES, organ
 from studies.machine import write_machine
 from studies.metrics import Run
 from studies.paths import study_folder
 from studies.plots.organ_springs import draw_organ_springs
 from studies.plots.organs import draw_organs
+from studies.reference_report import refresh_uncertainty, state_of
 from studies.reference_solve import pieces
 from studies.run import case_path
 from studies.sweep import load_runs
-from studies.table import study_table
+from studies.table import DOUBTFUL, study_table, write_table
 from studies.timed import timing_file
 
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
@@ -56,12 +55,6 @@ def make_folder(folder: Path) -> None:
         ) from error
 
 
-def write_table(path: Path, table: pd.DataFrame) -> Path:
-    """A table as CSV with six significant digits; whole or not at all."""
-    write_whole(path, table.to_csv(index=False, float_format="%.6g").encode())
-    return path
-
-
 def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
     """Charts and tables of all studies, the summary and machine.json; paths, and what is missing in sentences.
 
@@ -75,6 +68,7 @@ def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]
         paths, missing = refresh(root, study)
         written += paths
         remarks += [f"{study.name}: {sentence}" for sentence in missing]
+    written += refresh_uncertainty(root, [scene for study in studies for scene in study.scenes])
     write_machine(root / "machine.json")
     return written, remarks
 
@@ -106,15 +100,9 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
 
 def inputs_of(root: Path, study: Study) -> str:
     """Hash of all that charts and tables are made from: result files with their sizes and times, and the code."""
-    digest = hashlib.sha256(source_fingerprint("studies", "massspring", "reference_fem").encode())
     files = [case_path(root, study.name, case) for case in study.cases]
     files += [timing_file(root, study.name, case) for case in study.cases if case.timed]
-    for scene in study.scenes:
-        files += [piece.path(root) for piece in pieces(scene)]
-    for file in files:
-        state = file.stat() if file.exists() else None
-        digest.update(f"{file.name} {state and (state.st_mtime_ns, state.st_size)}\n".encode())
-    return digest.hexdigest()
+    return state_of([*files, *(piece.path(root) for scene in study.scenes for piece in pieces(scene))])
 
 
 def draw_figures(root: Path) -> list[Path]:
@@ -139,9 +127,12 @@ def summary_of(runs_of: dict[str, list[Run]]) -> str:
     for row in rows.to_dict("records"):
         cells = [_cell(row, name) for name in SUMMARY_COLUMNS]
         lines.append(f"| {row['scene']} | {row['body']} | {row['method']} | " + " | ".join(cells) + " |")
+    if any(DOUBT_MARK in line for line in lines):
+        lines += ["", f"{DOUBT_MARK} the reference is not ten times better than this error"]
     return "\n".join(lines)
 
 
+DOUBT_MARK = "†"
 SUMMARY_METRICS = ("volume_worst", "force_end", "interior_error", "mean_error", "silhouette_error", "min_j")
 SUMMARY_COLUMNS = (
     "volume_worst [%]",
@@ -175,7 +166,8 @@ def _cell(row: Mapping[Hashable, Any], column: str) -> str:
     if not floor > 0:
         return f"{value:{sign}.3g}"
     digits = max(0, -math.floor(math.log10(floor)))  # as many as the uncertainty has
-    return f"{value:{sign}.{digits}f} ± {floor:.{digits}f}".replace("-", "−")
+    mark = f" {DOUBT_MARK}" if column.split(" [")[0] in str(row.get(DOUBTFUL, "")).split() else ""
+    return f"{value:{sign}.{digits}f} ± {floor:.{digits}f}{mark}".replace("-", "−")
 
 
 def write_readme(readme: Path, summary: str) -> None:

@@ -1,11 +1,16 @@
 """One row per case: what it was, how it ended, and the study's metrics beside the floor of their reference."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import pandas as pd
 
+from studies.atomic import write_whole
 from studies.metrics import METRICS, Metric, Run
 from studies.suggest import choose
+
+DOUBTFUL = "doubtful"
+"""Column with the metrics of which the reference knows the truth less than ten times better than the model."""
 
 
 def metric(name: str) -> Metric:
@@ -36,4 +41,11 @@ def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
     for entry in metrics:
         row[f"{entry.name} [{entry.unit}]"] = entry(run)
         row[f"{entry.name} floor [{entry.unit}]"] = entry.floor(run)
+    row[DOUBTFUL] = " ".join(entry.name for entry in metrics if entry.doubtful(run))
     return row
+
+
+def write_table(path: Path, table: pd.DataFrame) -> Path:
+    """A table as CSV with six significant digits; whole or not at all."""
+    write_whole(path, table.to_csv(index=False, float_format="%.6g").encode())
+    return path

@@ -8,12 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.metrics import METRICS, Metric, Run
+from studies.metrics import DOUBT, METRICS, Metric, Run
 from studies.plots.page import (
     band_handle,
     blank,
     body_method_handles,
     by_scene,
+    doubt_mark,
+    doubts,
     finish,
     grouped,
     has_frames,
@@ -31,8 +33,6 @@ QUANTITIES = {
     "interior_error": "interior",
     "silhouette_error": "silhouette",
 }
-SHARE = 0.1
-"""A floor above this share of the error makes the error doubtful (docs/theory.md, Judging)."""
 ROOM = 1.7
 """Top of the axis over the largest value: so much that its marker is whole."""
 REACH = 0.38
@@ -55,13 +55,13 @@ def figure(runs: Sequence[Run]) -> Figure:
         spare.set_axis_off()
     values = [0.1, 100.0]
     for panel, (name, group) in zip(axes.flat, scenes.items(), strict=False):
-        panel.set_title(heading(name))
+        panel.set_title(heading(name) + doubt_mark(group, metrics))
         values += _draw_scene(panel, group, metrics)
     for panel in axes[:, 0]:
         log_axis(panel.yaxis)
         panel.set_ylim(min(values) / ROOM, ROOM * max(values))
         panel.set_ylabel("relative error [%]")
-    return finish(sheet, TITLE, _handles(shown), [*_notes(), *remarks(runs)], columns=3)
+    return finish(sheet, TITLE, _handles(shown), [*_notes(), *doubts(shown, metrics), *remarks(runs)], columns=3)
 
 
 def _draw_scene(axes: Axes, group: Sequence[Run], metrics: Sequence[Metric]) -> list[float]:
@@ -93,7 +93,7 @@ def _draw_point(axes: Axes, x: float, error: float, floor: float, run: Run) -> f
     """A filled marker where the floor is small beside the error, else a hollow one; never below the floor."""
     height = max(error, floor)
     colour = method_colour(run.case.method.name)
-    face = colour if floor <= SHARE * error else "white"
+    face = colour if floor <= DOUBT * error else "white"
     marker = BODY_MARKERS[run.case.body.series] if error > floor else "_"
     axes.plot(x, height, marker=marker, color=colour, markerfacecolor=face, markersize=7.5, markeredgewidth=1.6)
     return height

@@ -9,12 +9,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from massspring import Path as Motion
-from studies.metrics import COMPARABLE, Run, force_end
+from studies.metrics import COMPARABLE, METRICS, Run, force_end
 from studies.plots.page import (
     band_handle,
     blank,
     body_method_handles,
     by_scene,
+    doubt_mark,
+    doubts,
     finish,
     good_frames,
     grouped,
@@ -29,6 +31,8 @@ from studies.plots.style import BLACK, BODY_LINES, GREY, SMALL, heading, method_
 from studies.scenes import Scene
 
 TITLE = "Force of the press against the reference"
+FORCES = [metric for metric in METRICS if metric.name == "force_end"]
+"""What is written at the ends of the lines."""
 ROOM = 1.06
 """Top of the axis over the largest force."""
 LABEL_GAP = 0.085
@@ -52,7 +56,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     reference = reference_handle(linestyle="-", linewidth=1)
     handles = [*body_method_handles(shown), reference, band_handle("± its uncertainty")]
     notes = ["At the end of each line: its error there, after all has come to rest. Dotted: the press stops."]
-    return finish(sheet, TITLE, handles, [*notes, *remarks(runs)], columns=3)
+    return finish(sheet, TITLE, handles, [*notes, *doubts(shown, FORCES), *remarks(runs)], columns=3)
 
 
 def _draw_scene(axes: Axes, group: Sequence[Run]) -> None:
@@ -71,7 +75,8 @@ def _draw_scene(axes: Axes, group: Sequence[Run]) -> None:
     axes.set(xlim=(0, 1.015 * group[0].case.scene.duration), ylim=(0, top), xlabel="time [s]", ylabel="force [N]")
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     deep = 1e3 * float(np.linalg.norm(motion.displacements[-1]))
-    axes.set_title(f"{heading(group[0].case.scene.name)}, {deep:.3g} mm in {motion.times[-1]:g} s")
+    mark = doubt_mark(group, FORCES)
+    axes.set_title(f"{heading(group[0].case.scene.name)}{mark}, {deep:.3g} mm in {motion.times[-1]:g} s")
 
 
 def _motion(scene: Scene) -> Motion:

@@ -11,13 +11,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
-from studies.metrics import Run
+from studies.metrics import Metric, Run
 from studies.plots.style import (
     BLACK,
     BODY_LINES,
     BODY_MARKERS,
     GREY,
     SMALL,
+    heading,
     method_colour,
     readable,
     remark,
@@ -33,6 +34,7 @@ NARROWEST = 8.0
 HANDLE = 0.62
 """Width of a legend entry besides its words [inch]."""
 MOST_NOTES = 6
+DOUBT_MARK = "†"
 SHORT = 200.0
 """A logarithmic axis from one end to the other of which values grow less than this has numbers between the decades."""
 
@@ -125,6 +127,29 @@ def remarks(runs: Sequence[Run]) -> list[str]:
     bare = [name for name, group in by_scene(runs).items() if all(run.reference is None for run in group)]
     missing = [f"No reference for {', '.join(map(readable, bare))}: no error can be given there."] if bare else []
     return [*missing, *ended]
+
+
+def doubts(runs: Sequence[Run], metrics: Sequence[Metric]) -> list[str]:
+    """A note for each scene whose reference is not ten times better than every error it judges, and in what."""
+    notes = []
+    for name, group in by_scene(runs).items():
+        weak = [metric for metric in metrics if any(metric.doubtful(run) for run in group)]
+        if weak:
+            worst = max(_share(metric, run) for metric in weak for run in group if metric.doubtful(run))
+            what = ", ".join(readable(metric.name) for metric in weak)
+            percent = f"up to {100 * worst:.0f} % of" if worst < 1 else "as large as"
+            notes.append(f"{DOUBT_MARK} {heading(name)}: the reference's uncertainty is {percent} some {what} drawn.")
+    return notes
+
+
+def _share(metric: Metric, run: Run) -> float:
+    error = abs(metric(run))
+    return metric.floor(run) / error if error else np.inf
+
+
+def doubt_mark(group: Sequence[Run], metrics: Sequence[Metric]) -> str:
+    """Behind the name of a scene that `doubts` has a note on."""
+    return f" {DOUBT_MARK}" if any(metric.doubtful(run) for metric in metrics for run in group) else ""
 
 
 def has_frames(run: Run) -> bool:

@@ -9,7 +9,19 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.metrics import COMPARABLE, METRICS, Metric, Run, real_time
-from studies.plots.page import band_handle, blank, by_scene, finish, grouped, log_axis, page, panels, remarks
+from studies.plots.page import (
+    band_handle,
+    blank,
+    by_scene,
+    doubt_mark,
+    doubts,
+    finish,
+    grouped,
+    log_axis,
+    page,
+    panels,
+    remarks,
+)
 from studies.plots.style import BLACK, GREY, SMALL, heading, method_colour, readable, remark, save, styled
 from studies.store import Status
 
@@ -32,7 +44,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     steps = sorted({_step(run) for run in timed}, reverse=True)
     values = [1.0, 100.0]
     for column, (name, group) in zip(axes.T, scenes.items(), strict=True):
-        column[0].set_title(heading(name))
+        column[0].set_title(heading(name) + doubt_mark(group, metrics))
         column[-1].set_xlabel("computing time per simulated second [ms/s]")
         for panel, metric in zip(column, metrics, strict=True):
             values += _draw_panel(panel, group, metric, steps)
@@ -41,7 +53,9 @@ def figure(runs: Sequence[Run]) -> Figure:
         log_axis(panel.yaxis)
         panel.set_ylabel(ROWS[metric.name])
     axes[0, 0].set_ylim(0.7 * min(values), 1.2 * max(values))
-    return finish(sheet, TITLE, _handles(timed, steps), [_meaning(), *remarks(runs)], columns=3)
+    return finish(
+        sheet, TITLE, _handles(timed, steps), [_meaning(), *doubts(timed, metrics), *remarks(runs)], columns=3
+    )
 
 
 def cost(run: Run) -> float:

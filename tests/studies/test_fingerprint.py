@@ -59,8 +59,9 @@ def test_files_left_out_do_not_count(tmp_path):
     one, two, three = (package(tmp_path / name, f"x = {name}\n") for name in ("1", "2", "3"))
     for folder, text in ((one, "y = 1\n"), (two, "y = 1\n"), (three, "y = 2\n")):
         (folder / "b.py").write_text(text)
-    left = [source_fingerprint(folder, without=("sub/a.py",)) for folder in (one, two, three)]
-    assert left[0] == left[1] != left[2]
+    for without in ("sub/a.py", "sub/"):
+        left = [source_fingerprint(folder, without=(without,)) for folder in (one, two, three)]
+        assert left[0] == left[1] != left[2]
 
 
 def test_a_file_that_is_no_python_is_refused(tmp_path):

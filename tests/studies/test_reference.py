@@ -4,6 +4,7 @@ import shutil
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from reference_fem import ReferenceProblem
@@ -14,6 +15,7 @@ from studies.errors import StudyError
 from studies.floors import QUANTITIES
 from studies.geometry.mesh import signed_volume
 from studies.reference import load_reference
+from studies.reference_report import reference_listing, refresh_uncertainty
 from studies.reference_solve import Piece, pieces, solve
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_clamped import BALL_CLAMPED
@@ -177,6 +179,43 @@ def test_settings_are_varied_only_where_they_matter():
     untouched = replace(SCENE, obstacles=(), probed=BALL_CLAMPED.probed)
     assert [piece.variant for piece in pieces(untouched)] == ["", "", "", "steps", "kappa"]
     assert pieces(replace(SCENE, reference=None)) == []
+
+
+def test_listing_says_how_every_piece_stands(solved, tmp_path, monkeypatch):
+    root = shutil.copytree(solved, tmp_path / "results")
+    Piece(SCENE, LEVELS[1]).path(root).unlink()
+    damaged = Piece(SCENE, LEVELS[0], "kappa").path(root)
+    damaged.write_bytes(damaged.read_bytes()[:500])
+    whole, spoilt = reference_listing(solved, [SCENE]), reference_listing(root, [SCENE])
+    assert whole["state"].tolist() == ["ok"] * 6
+    assert whole["steps"].tolist() == ["2/2"] * 6
+    assert (whole["seconds"] > 0).all()
+    assert whole["unknowns"][:3].is_monotonic_increasing
+    assert spoilt["state"].tolist() == ["ok", "missing", "ok", "ok", "ok", "unreadable"]
+    bars = whole["force uncertainty [%]"]
+    assert bars[2] > 0
+    assert bars.drop(2).isna().all()
+    assert spoilt["force uncertainty [%]"].isna().all()
+    monkeypatch.setattr(module, "reference_fingerprint", lambda: "other")
+    assert reference_listing(solved, [SCENE])["state"].tolist() == ["stale"] * 6
+
+
+def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, tmp_path, found):
+    root = shutil.copytree(solved, tmp_path / "results")
+    table, chart = refresh_uncertainty(root, [SCENE, SCENE, replace(SCENE, name="bare", reference=None)])
+    rows = pd.read_csv(table)
+    assert rows["quantity"].tolist() == list(QUANTITIES)
+    shares = rows[["mesh [%]", "steps [%]", "contact [%]", "kappa [%]"]].to_numpy()
+    np.testing.assert_allclose(np.linalg.norm(shares, axis=1), rows["uncertainty [%]"], rtol=1e-5)
+    assert rows["uncertainty [%]"][0] == pytest.approx(100 * found.floor["force"], rel=1e-5)
+    assert chart.read_bytes()[:4] == b"\x89PNG"
+    chart.write_bytes(b"old")
+    refresh_uncertainty(root, [SCENE])
+    assert chart.read_bytes() == b"old"
+    solve(root, Piece(SCENE, LEVELS[0]))
+    refresh_uncertainty(root, [SCENE])
+    assert chart.read_bytes()[:4] == b"\x89PNG"
+    assert refresh_uncertainty(tmp_path / "empty", [SCENE]) == []
 
 
 def broken(problem, times, settings, **_):

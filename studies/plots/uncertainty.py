@@ -1,0 +1,100 @@
+"""How far each quantity of each reference may be from the truth, and what that comes from."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from studies.floors import Uncertainty
+from studies.plots.page import blank, finish, log_axis, page, panels
+from studies.plots.style import (
+    BLUE,
+    GREEN,
+    LIGHT,
+    ORANGE,
+    SMALL,
+    VERMILLION,
+    heading,
+    readable,
+    save,
+    styled,
+)
+
+TITLE = "What the references leave open"
+LOOKS = {"mesh": (BLUE, "o"), "contact": (VERMILLION, "s"), "kappa": (GREEN, "^"), "steps": (ORANGE, "D")}
+"""Colour and marker of each share."""
+WORDS = {
+    "mesh": "mesh (three of them)",
+    "contact": "contact (penalty × 3)",
+    "kappa": "bulk modulus (× 10)",
+    "steps": "load steps (halved)",
+}
+LOWEST = 1e-4
+"""Where a smaller share is drawn [%]: nobody asks whether it is a millionth or less."""
+PERCENT = 100.0
+
+
+@styled
+def figure(known: Mapping[str, Mapping[str, Uncertainty]]) -> Figure:
+    """One panel per scene, a row per quantity: its shares, and a bar up to their sum."""
+    if not known:
+        return blank(TITLE, "no reference has been solved on its family of meshes yet")
+    columns = min(2, len(known))
+    rows = -(-len(known) // columns)
+    sheet = page(5.2 * columns, 2.9 * rows + 0.3)
+    axes = panels(sheet, rows, columns, sharex=True, sharey=True)
+    for spare in axes.flat[len(known) :]:
+        spare.set_axis_off()
+    for panel, (scene, quantities) in zip(axes.flat, known.items(), strict=False):
+        panel.set_title(heading(scene))
+        _draw(panel, quantities)
+    top = max(PERCENT * u.total for quantities in known.values() for u in quantities.values())
+    log_axis(axes[0, 0].xaxis)
+    axes[0, 0].set_xlim(0.5 * LOWEST, 3 * max(top, LOWEST))
+    axes[0, 0].invert_yaxis()
+    for panel in axes[-1]:
+        panel.set_xlabel("relative uncertainty [%]")
+    return finish(sheet, TITLE, _handles(), _notes(known), columns=3)
+
+
+def _draw(axes: Axes, quantities: Mapping[str, Uncertainty]) -> None:
+    for row, uncertainty in enumerate(quantities.values()):
+        total = PERCENT * uncertainty.total
+        axes.plot([0.5 * LOWEST, max(total, LOWEST)], [row, row], color=LIGHT, linewidth=9, solid_capstyle="butt")
+        for name, share in uncertainty.shares.items():
+            colour, marker = LOOKS[name]
+            face = colour if name != "mesh" or uncertainty.order == uncertainty.order else "white"
+            at = max(PERCENT * share, LOWEST)
+            axes.plot(at, row, marker=marker, color=colour, markerfacecolor=face, markersize=7, markeredgewidth=1.5)
+        place = {"xytext": (7, 0), "textcoords": "offset points", "va": "center", "size": SMALL}
+        axes.annotate(f"{total:.2g}", (max(total, LOWEST), row), **place)
+    axes.set_yticks(range(len(quantities)), [readable(name) for name in quantities])
+    axes.tick_params(axis="y", length=0)
+    axes.grid(visible=False, axis="y")
+
+
+def _handles() -> list:
+    shares = [
+        Line2D([], [], color=colour, marker=marker, linestyle="", markersize=7, label=WORDS[name])
+        for name, (colour, marker) in LOOKS.items()
+    ]
+    hollow = {"marker": "o", "color": BLUE, "markerfacecolor": "white", "linestyle": "", "markersize": 7}
+    bar = Line2D([], [], color=LIGHT, linewidth=9, label="all together, number in %")
+    return [*shares, Line2D([], [], label="mesh, not monotone: spread", **hollow), bar]
+
+
+def _notes(known: Mapping[str, Mapping[str, Uncertainty]]) -> list[str]:
+    orders = [u.order for quantities in known.values() for u in quantities.values() if u.order == u.order]
+    seen = f" Observed orders {np.min(orders):.2g} to {np.max(orders):.2g}." if orders else ""
+    return [
+        "Bar: root of the sum of the squares of the shares; it is the floor in the other charts. Settings are changed "
+        f"on the coarsest mesh. Shares below {LOWEST:g} % are drawn there.{seen}"
+    ]
+
+
+def draw(known: Mapping[str, Mapping[str, Uncertainty]], path: Path) -> None:
+    """Writes the chart as PNG."""
+    save(figure(known), path)
