@@ -14,7 +14,8 @@ def source_fingerprint(*sources: str | Path, without: tuple[str, ...] = ()) -> s
     """SHA-256 (hex) over the Python sources of packages or modules (by dotted name), folders and files (by Path).
 
     It depends on what the code does and on file names inside their package: not on comments, docstrings, layout or
-    line endings, nor on where the checkout lies. `without`: beginnings of paths inside packages ("name.py", "folder/") that do not count.
+    line endings, nor on where the checkout lies. `without`: beginnings of paths inside packages ("name.py", "folder/")
+    that do not count.
     Read once per process: a running process computes with the code it has loaded.
     Raises StudyError for a source that does not exist, or is no Python.
     """

@@ -6,8 +6,6 @@ from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from studies.atomic import write_whole
 from studies.catalog import Study
 from studies.errors import StudyError

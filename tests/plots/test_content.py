@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from massspring import Free
-from studies.plots import accuracy, force_path, volume_history
+from studies.floors import Uncertainty
+from studies.plots import accuracy, force_path, uncertainty, volume_history
 from studies.plots import work_precision as work
-from studies.plots.style import BLACK, BLUE, VERMILLION
+from studies.plots.page import DOUBT_MARK
+from studies.plots.style import BLACK, BLUE, ORANGE, VERMILLION
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store import Status
@@ -116,3 +118,41 @@ def test_work_precision_marks_a_run_that_ended_with_a_fault():
     figure = work.figure([run(BALL_CLAMPED, frame_ms=1.0, status=Status.INVERTED)])
     assert points(figure.axes[0], BLUE)[0][2]
     assert "ended inverted" in words(figure.legends[0])
+
+
+@pytest.mark.parametrize("chart", [accuracy, force_path, work])
+def test_a_reference_that_is_not_ten_times_better_is_marked(chart):
+    """Floors are 1 to 2 %: ten times better than errors of 300 %, not than those of 5 % (0.4 % of the silhouette)."""
+
+    def said(error):
+        return words(chart.figure([run(BALL_CLAMPED, error=error, frame_ms=0.5)]))
+
+    assert DOUBT_MARK not in said(3.0)
+    assert f"Ball clamped {DOUBT_MARK}" in said(0.05)
+    note = said(0.05).split(f"{DOUBT_MARK} Ball clamped: the reference's uncertainty is ")[1]
+    assert note.startswith(("up to", "as large as"))
+    assert "force" in note
+
+
+def known(order=2.0, mesh=0.01):
+    return Uncertainty({"mesh": mesh, "steps": 0.0, "contact": 0.002, "kappa": 1e-3}, order, 0.005)
+
+
+def test_shares_of_an_error_bar_are_drawn_where_they_are():
+    figure = uncertainty.figure({"ball_squeeze": {"force": known(), "interior": known(float("nan"), 0.03)}})
+    (panel,) = figure.axes
+    assert [(x, y) for x, y, _ in points(panel, VERMILLION)] == [(pytest.approx(0.2), 0), (pytest.approx(0.2), 1)]
+    mesh = points(panel, BLUE)
+    assert [x for x, _, _ in mesh] == pytest.approx([1.0, 3.0])
+    assert [hollow for _, _, hollow in mesh] == [False, True]  # the second is a spread
+    assert [x for x, _, _ in points(panel, ORANGE)] == [uncertainty.LOWEST] * 2
+    assert f"{100 * known().total:.2g}" in words(figure)
+    assert [label.get_text() for label in panel.get_yticklabels()] == ["force", "interior"]
+    assert panel.get_ylim()[0] > panel.get_ylim()[1]
+
+
+def test_error_bars_without_references_say_so(tmp_path):
+    assert "no reference" in words(uncertainty.figure({}))
+    uncertainty.draw({"ball_squeeze": {"force": known()}}, tmp_path / "a.png")
+    uncertainty.draw({"ball_squeeze": {"force": known()}}, tmp_path / "b.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()

@@ -14,6 +14,7 @@ from studies.catalog import STUDIES
 from studies.geometry.organs import SHAPES
 from studies.metrics import METRICS
 from studies.paths import index_path
+from studies.reference_solve import pieces
 from studies.run import case_path
 from studies.scenes import SCENES
 from studies.store import Field, read_record, write_record
@@ -81,8 +82,13 @@ def test_status_counts_and_says_why(organbench, tiny_file, results):
 def test_status_of_everything(organbench, tmp_path):
     code, out, _ = organbench("status", "--results", tmp_path)
     assert code == 0
-    assert [line.split(":")[0] for line in out.splitlines()] == [study.name for study in STUDIES]
-    assert all("missing" in line for line in out.splitlines())
+    counts, references = out.split("references:\n")
+    assert [line.split(":")[0] for line in counts.splitlines()] == [study.name for study in STUDIES]
+    head, *rows = references.splitlines()
+    assert head.split()[:3] == ["scene", "level", "variant"]
+    assert len(rows) == len({p.name for study in STUDIES for scene in study.scenes for p in pieces(scene)})
+    assert all(row.endswith("missing") for row in rows)
+    assert all("missing" in line for line in counts.splitlines())
 
 
 def test_show_tells_units_status_and_numbers(organbench, results):

@@ -14,7 +14,7 @@ from studies.scenes import SCENES
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store import Field, Status
-from studies.table import metric, study_table
+from studies.table import DOUBTFUL, metric, study_table
 from studies.timing import FrameTiming
 from tests.studies.tiny import cube
 
@@ -235,6 +235,21 @@ def test_floor_stands_beside_the_number_in_the_table():
     assert table["dt [ms]"].tolist() == [50.0, 50.0]
     assert table["dt/dt_c"].tolist() == [0.5, 0.5]
     assert "min_j floor [1]" not in table
+
+
+def test_doubtful_is_what_the_reference_knows_less_than_ten_times_better():
+    """The floor of the force error is 1 %, of the last force 2 %: 10 and 20 % are just good enough."""
+    force = metric("force_error")
+    assert force.floor(run()) == pytest.approx(1.0, rel=1e-12)
+    assert not force.doubtful(run(force=(9.0, 1.11, 9.0, 2.22)))
+    assert force.doubtful(run(force=(9.0, 0.91, 9.0, 1.82)))
+    assert metric("force_end").doubtful(run(force=(9.0, 9.0, 9.0, 1.62)))
+    assert not metric("force_end").doubtful(run(force=(9.0, 9.0, 9.0, 1.58)))
+    # A volume has a truth of its own, and without a reference there is nothing to doubt.
+    assert not metric("volume_worst").doubtful(run())
+    assert not force.doubtful(run(reference=None))
+    table = study_table([run(force=(9.0, 0.91, 9.0, 1.82)), run(reference=None)], ["force_error", "min_j"])
+    assert table[DOUBTFUL].tolist() == ["force_error", ""]
 
 
 def test_a_floor_stands_behind_its_metric_whichever_run_has_it():

@@ -5,14 +5,16 @@ import math
 import os
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from studies.catalog import Chart
 from studies.errors import StudyError
 from studies.machine import machine_id
-from studies.report import BEGIN, END, draw_charts, refresh, report, summary_of, write_readme, write_table
+from studies.report import BEGIN, DOUBT_MARK, END, draw_charts, refresh, report, summary_of, write_readme, write_table
 from studies.run import case_path
 from studies.store import Status
 from studies.sweep import load_runs
@@ -71,6 +73,16 @@ def test_summary_shows_numbers_or_a_dash(finished_sweep):
     assert float(kept[3]) < float(free[3])
     assert kept[4] == "–"  # no reference, no force error
     assert lost[3:] == ["–"] * 6
+
+
+def test_summary_marks_what_the_reference_does_not_know_well_enough(finished_sweep, monkeypatch):
+    runs, _ = load_runs(finished_sweep, tiny_study())
+    assert DOUBT_MARK not in summary_of({"volume_loss": runs})
+    floor = dict.fromkeys(("force_end", "silhouette", "force", "volume", "surface_mean"), 0.02)
+    truth = SimpleNamespace(floor=floor, force=np.array([1.0]), displacement=lambda x: 0 * x)
+    text = summary_of({"volume_loss": [replace(runs[0], reference=truth)]})
+    assert f"± 2 {DOUBT_MARK} |" in text.replace("2.0", "2")
+    assert text.endswith("the reference is not ten times better than this error")
 
 
 def test_fine_steps_are_no_headline(finished_sweep):
