@@ -23,7 +23,7 @@ POINTS, TRIANGLES, CELLS = cube(2, EDGE)
 T = np.array([1.0, 2.0, 3.0, 4.0])
 SCENE = replace(BALL_CLAMPED, checkpoints=(2.0, 4.0), duration=4.0)
 SHIFT = np.array([0.03, 0.0, 0.0])
-FLOORS = ("force", "force_end", "surface", "interior", "silhouette", "volume", "pressure")
+FLOORS = ("force", "force_end", "surface", "interior", "silhouette", "volume", "pressure", "lumen")
 
 
 def bend(x):
@@ -37,7 +37,7 @@ def reference(motion=bend, force=(1.0, 2.0), pressure=(10.0, 20.0)):
         displacement=motion,
         force=np.array(force),
         surface=lambda: (POINTS + motion(POINTS), TRIANGLES),
-        field=lambda name: {"pressure": np.array(pressure)}[name],
+        field=lambda name: {"pressure": np.array(pressure), "lumen_pressure": np.array(pressure)}[name],
         floor={name: 0.01 * (k + 1) for k, name in enumerate(FLOORS)},
     )
 
@@ -68,7 +68,8 @@ def run(final=None, volume=(1.0, 1.0, 1.0, 1.0), force=(0.5, 1.0, 1.5, 2.0), **c
         status=changes.pop("status", Status.OK),
         message="",
         fingerprint="",
-        attributes={"rest_volume": EDGE**3, "steps": 20, "frame": 1.0, "dt": 0.05, "dt_limit": 0.1},
+        attributes={"rest_volume": EDGE**3, "steps": 20, "frame": 1.0, "dt": 0.05, "dt_limit": 0.1}
+        | changes.pop("attributes", {}),
         fields={name: Field(np.asarray(v), "1", "made up") for name, v in values.items()},
     )
     case = Case(changes.pop("scene", SCENE), BodyRecipe())
@@ -105,8 +106,9 @@ def test_every_metric_is_a_number_somewhere():
     """A metric that no scene allows would be an empty column for ever."""
     timing = FrameTiming(np.full((2, 4), 1e6))
     for entry in METRICS:
+        kept = {"attributes": {"lumen_column": 0}} if entry.quantity == "lumen" else {}
         values = [
-            entry(run(scene=replace(scene, checkpoints=(2.0, 4.0), probed=SCENE.probed), timing=timing))
+            entry(run(scene=replace(scene, checkpoints=(2.0, 4.0), probed=SCENE.probed), timing=timing, **kept))
             for scene in SCENES
         ]
         assert np.isfinite(values).any(), entry.name
