@@ -15,6 +15,7 @@ from reference_fem import ReferenceProblem
 from studies import report as reports
 from studies.case import BodyRecipe, Case
 from studies.catalog import STUDIES, Study
+from studies.commands.mesh import check, mesh
 from studies.commands.verify import verify
 from studies.describe import describe
 from studies.errors import StudyError
@@ -204,6 +205,8 @@ def replay(path: Path) -> None:
 
 
 app.command()(verify)
+app.command()(mesh)
+app.command()(check)
 
 
 @app.command("safe-dt")

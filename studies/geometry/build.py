@@ -1,6 +1,5 @@
 """Making a mesh from its recipe, inside the worker process. The same recipe gives the same mesh bit for bit."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,13 +7,11 @@ import numpy as np
 from studies.geometry.checks import check_surface
 from studies.geometry.count import Surface, surface_with
 from studies.geometry.fill import fill_surface
-from studies.geometry.fit import evenly_spread, followed
 from studies.geometry.gmsh_session import Remesher, fresh_model
 from studies.geometry.levelset import Shape
 from studies.geometry.mesh import triangle_areas
 from studies.geometry.octant import build_octant
 from studies.geometry.regions import region_from_dict
-from studies.geometry.scan_shape import scan_shape, scan_surface
 from studies.geometry.shapes import make_shape
 from studies.geometry.shell import fill_wall
 from studies.geometry.snap import relax, snap_region
@@ -28,23 +25,17 @@ def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
     Raises StudyError when the recipe cannot be made.
     """
-    makers = {"organ": build_organ, "scan": build_scan, "fill": build_fill, "ball_octant": build_octant}
-    return makers[recipe["kind"]](recipe, arrays)
+    if recipe["kind"] == "scan":
+        # Its compiled distances take half a second to import, which other meshes need not wait for.
+        from studies.geometry.scan_build import build_scan
+
+        return build_scan(recipe, arrays)
+    return {"organ": build_organ, "fill": build_fill, "ball_octant": build_octant}[recipe["kind"]](recipe, arrays)
 
 
 def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     """An organ of SHAPES with `nodes` surface nodes, its outlines of regions snapped, filled when asked."""
     return mesh_shape(make_shape(recipe["organ"], recipe["parameters"]), recipe)
-
-
-def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """The shape that a given surface pictures, with `nodes` nodes, some of them where even ones would cut corners."""
-    nodes = recipe["nodes"]
-    shape = scan_shape(arrays["points"], arrays["triangles"], nodes, recipe["smooth"], recipe["name"])
-    start = scan_surface(shape)
-    points, triangles = even_surface(shape, start, evenly_spread(nodes))
-    points, triangles = followed(shape, points, triangles, start[0], nodes)
-    return finish(replace(shape, wall=recipe.get("wall")), points, triangles, recipe)
 
 
 def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:

@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import io
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -14,11 +15,14 @@ from scipy.spatial import KDTree
 
 from studies.errors import StudyError
 from studies.geometry.checks import check_finite, check_surface, check_tetrahedra
+from studies.geometry.estimate import check_whole
 from studies.geometry.mesh import OrganMesh, signed_volume, surface_first, tetrahedron_volumes
 from studies.geometry.units import UNITS, check_unit
 
 LARGEST, SMALLEST = 5.0, 1e-3
 """Longest side [m] of a bounding box beyond which the unit is probably wrong: no organ is that large or small."""
+PATCH = "patch_"
+"""Point data with this prefix are attachments."""
 WELD = 1e-7
 """Points nearer than this fraction of the diagonal are one point: single precision, in which STL is written."""
 
@@ -46,18 +50,33 @@ def read_mesh(path: str | Path, unit: str | None = None, flip: bool = False) -> 
     points, cells = weld(points, tetrahedra if len(tetrahedra) else triangles)
     warn_about_unit(points, name)
     if len(tetrahedra):
-        return tetrahedral(points, cells, flip, recipe)
+        return with_patches(tetrahedral(points, cells, flip, recipe), raw)
     triangles = cells
     if flip and signed_volume(points, triangles) < 0:
         triangles = triangles[:, ::-1].copy()
     check_surface(points, triangles, name)
-    return OrganMesh(path.stem, points, triangles, np.empty((0, 4), np.int64), len(points), {}, recipe)
+    none = np.empty((0, 4), np.int64)
+    return with_patches(OrganMesh(path.stem, points, triangles, none, len(points), {}, recipe), raw)
+
+
+def with_patches(mesh: OrganMesh, raw: meshio.Mesh) -> OrganMesh:
+    """The mesh with the attachments that the file keeps as point data `patch_NAME`, above 0 at their nodes."""
+    _, number = KDTree(np.asarray(raw.points, float) * UNITS[mesh.recipe["unit"]]).query(
+        mesh.points[: mesh.outer_count]
+    )
+    patches = {
+        key.removeprefix(PATCH): np.flatnonzero(np.asarray(values).ravel()[number] > 0)
+        for key, values in raw.point_data.items()
+        if key.startswith(PATCH)
+    }
+    return replace(mesh, patches=patches) if patches else mesh
 
 
 def parse(path: Path) -> meshio.Mesh:
     """What meshio makes of the file; raises StudyError when it makes nothing of it."""
     if not path.is_file():
         raise StudyError(f"there is no mesh file {path}; check the name")
+    check_whole(path)
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():

@@ -89,6 +89,11 @@ def raw_surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return points, boundary_triangles(tetrahedra) if len(tetrahedra) else triangles
 
 
+def longest_side(path: Path) -> float:
+    """Longest side of the bounding box of a surface in a file, in the file's unit."""
+    return float(np.ptp(raw_surface(path)[0], axis=0).max())
+
+
 def as_it_is(mended: Mended, recipe: dict[str, Any], fill: bool) -> OrganMesh:
     """The mended surface with the file's own triangles, filled when asked."""
     check_surface(mended.points, mended.triangles, recipe["file"])

@@ -39,8 +39,8 @@ def scan_shape(points: np.ndarray, triangles: np.ndarray, nodes: int, smooth: fl
                 f"{name}: smoothing over {1e3 * smooth:.3g} mm would leave nothing of a body of "
                 f"{1e3 * diagonal:.3g} mm; use a few millimetres"
             )
-        cell = min(cell, max(smooth / 2.0, FINEST * diagonal))
-        points, triangles = smoothed(points, triangles, cell, smooth, name)
+        fine = min(cell, max(smooth / 2.0, FINEST * diagonal))
+        points, triangles = smoothed(points, triangles, fine, smooth, name)
     grid = distance_grid(points, triangles, cell, ROOM * cell)
     low, high = tuple(map(float, grid.low)), tuple(map(float, grid.high))
     return Shape(name, grid.level(), low, high, cell=cell)  # pyright: ignore[reportArgumentType]

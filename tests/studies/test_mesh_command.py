@@ -1,0 +1,176 @@
+"""`organbench mesh` and `organbench check`: files in, files out, one sentence where it cannot be."""
+
+import json
+import os
+
+import meshio
+import numpy as np
+import pytest
+
+from studies.commands import mesh as commands
+from studies.geometry import read_mesh
+from studies.geometry.mesh import signed_volume
+from tests.geometry.boxes import box, split, together
+from tests.geometry.real import real_surface
+
+EGG = split(*box((-1, -1, -1), (1, 1, 1)), times=2)
+POINTS = EGG[0] / np.linalg.norm(EGG[0], axis=1, keepdims=True) * (30, 25, 20)
+FACES = EGG[1]
+
+
+@pytest.fixture
+def egg(tmp_path):
+    """A sound surface in millimetres."""
+    return stored(tmp_path / "egg.ply", POINTS, FACES)
+
+
+def stored(path, points, faces):
+    meshio.write_points_cells(path, points, [("triangle", np.asarray(faces, np.int32))])
+    return path
+
+
+def test_an_organ_is_meshed_and_found_clean(organbench, tmp_path):
+    target = tmp_path / "kidney.vtu"
+    code, out, err = organbench("mesh", "kidney", "--nodes", 200, "--seed", 3, "-o", target)
+    assert (code, err) == (0, "")
+    assert out.startswith("kidney: 200 outer nodes, 396 outer triangles, ")
+    assert out.strip().endswith(f"written to {target} in metres")
+    made = read_mesh(target)
+    assert made.surface_count == 200 and "hilum" in made.patches
+    code, out, _ = organbench("check", target)
+    assert code == 0 and "nothing is wrong with it" in out
+    other = tmp_path / "other.stl"
+    assert organbench("mesh", "kidney", "--nodes", 200, "--seed", 4, "-o", other)[0] == 0
+    assert read_mesh(other).volume != pytest.approx(made.volume, rel=0.01) and not len(read_mesh(other).tetrahedra)
+
+
+def test_a_file_is_mended_remeshed_and_filled(organbench, tmp_path):
+    speck = box((60, 60, 60), (62, 62, 62))
+    path = stored(tmp_path / "scan.stl", *together((POINTS, FACES[:, ::-1]), speck))
+    target = tmp_path / "scan.vtu"
+    code, out, err = organbench("mesh", "--from", path, "--unit", "mm", "--nodes", 150, "-o", target)
+    assert code == 0 and "150 outer nodes" in out
+    assert "scan.stl: 1 of 2 separate parts are left out" in err and "inside out and is turned round" in err
+    made = read_mesh(target)
+    assert made.volume == pytest.approx(1e-9 * signed_volume(POINTS, FACES), rel=0.05)
+    assert organbench("check", target)[0] == 0
+
+
+def test_a_scan_can_be_hollow_and_in_millimetres(organbench, egg, tmp_path):
+    target = tmp_path / "hollow.vtu"
+    words = ("mesh", "--from", egg, "--unit", "mm", "--nodes", 200, "--wall", 4, "--write-unit", "mm", "-o", target)
+    code, out, _ = organbench(*words)
+    assert code == 0 and "lumen" in out and out.strip().endswith("in millimetres")
+    assert np.ptp(read_mesh(target, unit="mm").points[:, 0]) == pytest.approx(0.06, rel=0.03)
+
+
+def test_curved_elements_on_request(organbench, tmp_path):
+    target = tmp_path / "ball.vtu"
+    assert organbench("mesh", "ball", "--nodes", 150, "--order", 2, "-o", target)[0] == 0
+    assert "tetra10" in meshio.read(target).cells_dict
+
+
+def test_findings_and_their_exit_code(organbench, tmp_path):
+    path = stored(tmp_path / "open.ply", 1e-3 * POINTS, FACES[3:])
+    code, out, err = organbench("check", path)
+    assert (code, err) == (1, "")
+    assert "so it has no inside and no volume" in out
+    assert "-> organbench mesh --from FILE --close-holes" in out
+    code, out, _ = organbench("check", path, "--json")
+    found = json.loads(out)
+    assert code == 1 and not found["clean"] and found["findings"][0]["code"] == "open"
+    assert found["measures"]["open_edges"] == found["findings"][0]["count"] > 0
+    closed = tmp_path / "closed.ply"
+    assert organbench("mesh", "--from", path, "--close-holes", "-o", closed)[0] == 0
+    assert organbench("check", closed)[0] == 0
+
+
+def refusals(folder):
+    """Words and what is told."""
+    egg = stored(folder / "egg.ply", POINTS, FACES)
+    nan = POINTS.copy()
+    nan[2] = np.nan
+    bad = stored(folder / "nan.ply", nan, FACES)
+    torn = stored(folder / "torn.ply", POINTS, FACES[3:])
+    single = stored(folder / "single.ply", POINTS, FACES[:1])
+    text = folder / "notes.stl"
+    text.write_text("no mesh at all\n" * 20)
+    cut = folder / "cut.stl"
+    meshio.write_points_cells(cut, POINTS, [("triangle", FACES)], file_format="stl", binary=True)
+    cut.write_bytes(cut.read_bytes()[:5000])
+    huge = folder / "huge.stl"
+    with open(huge, "wb") as file:
+        file.write(bytes(80) + np.uint32(10_000_000).tobytes())
+        file.truncate(84 + 500_000_000)
+    out = ("-o", folder / "out.vtu")
+    scan = ("mesh", "--from", egg, "--unit", "mm")
+    return {
+        "nothing to mesh": (("mesh", *out), "say what to mesh"),
+        "both": (("mesh", "ball", "--from", egg, *out), "say what to mesh"),
+        "unknown organ": (("mesh", "livr", *out), "did you mean 'liver'"),
+        "unit": (("mesh", "--from", egg, *out), "does not say its unit; its longest side is 60"),
+        "odd unit": (("mesh", "--from", egg, "--unit", "in", *out), "unit 'in' is not known"),
+        "itself": ((*scan, "-o", egg), "egg.ply is the file that is read"),
+        "suffix": ((*scan, "-o", folder / "out.xyz"), "choose one of these suffixes"),
+        "filled stl": ((*scan, "--fill", "-o", folder / "out.stl"), "holds triangles only"),
+        "curved stl": ((*scan, "--order", 2, "-o", folder / "out.stl"), "curved elements (--order 2) fill a body"),
+        "curved scan": ((*scan, "--nodes", 150, "--order", 2, *out), "true shape"),
+        "seed": ((*scan, "--seed", 1, *out), "--seed varies synthetic organs"),
+        "options": (("mesh", "ball", "--smooth", 2, "--close-holes", *out), "--smooth and --close-holes are for files"),
+        "solid": (("mesh", "liver", "--wall", 3, *out), "the liver is solid; --wall is for ball"),
+        "thick wall": ((*scan, "--nodes", 150, "--wall", 30, *out), "does not fit into it"),
+        "wall of a file": ((*scan, "--wall", 3, *out), "say how many nodes"),
+        "few nodes": ((*scan, "--nodes", 10, *out), "10 surface nodes asked for"),
+        "few nodes of an organ": (("mesh", "liver", "--nodes", 20, *out), "20 surface nodes asked for"),
+        "nan": (("mesh", "--from", bad, "--unit", "mm", *out), "1 points are not finite"),
+        "open": (("mesh", "--from", torn, "--unit", "mm", "--nodes", 150, *out), "close the holes (--close-holes)"),
+        "open kept": (("mesh", "--from", torn, "--unit", "mm", *out), "the surface is open"),
+        "one triangle": (("mesh", "--from", single, "--unit", "mm", *out), "the surface is open"),
+        "text": (("mesh", "--from", text, "--unit", "mm", *out), "notes.stl"),
+        "text checked": (("check", text), "notes.stl"),
+        "cut": (("mesh", "--from", cut, "--unit", "mm", *out), "cut.stl is cut short"),
+        "cut checked": (("check", cut), "cut.stl is cut short"),
+        "missing": (("check", folder / "none.ply"), "there is no mesh file"),
+        "huge": (("mesh", "--from", huge, "--unit", "mm", *out), "about 10,000,000 triangles (500 MB)"),
+        "huge checked": (("check", huge), "say --yes to go on"),
+        "folder": (("mesh", "ball", "--nodes", 150, "-o", folder / "egg.ply" / "out.vtu"), "was not written"),
+    }
+
+
+def test_bad_input_is_one_sentence_and_nothing_is_written(refused, tmp_path):
+    cases = refusals(tmp_path)
+    before = sorted(os.listdir(tmp_path))
+    for case, (words, told) in cases.items():
+        assert told in refused(*words), case
+        assert sorted(os.listdir(tmp_path)) == before, case
+
+
+def test_a_person_is_asked_for_the_unit_and_before_large_files(organbench, egg, tmp_path, monkeypatch):
+    asked = []
+
+    def prompt(question, default):
+        asked.append((question, default))
+        return "mm"
+
+    monkeypatch.setattr(commands.sys.stdin, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr(commands.typer, "prompt", prompt)
+    target = tmp_path / "out.ply"
+    assert organbench("mesh", "--from", egg, "-o", target)[0] == 0
+    ((question, default),) = asked
+    assert "longest side is 60, the size of an organ in centimetres or millimetres" in question and default == "mm"
+    assert np.ptp(read_mesh(target).points[:, 0]) == pytest.approx(0.06, rel=1e-6)
+    monkeypatch.setattr(commands, "size_warning", lambda path: "it is large")
+    monkeypatch.setattr(commands.typer, "confirm", lambda question: question != "it is large. Go on?")
+    code, out, err = organbench("check", egg, "--unit", "mm")
+    assert (code, out) == (2, "") and err.startswith("organbench: it is large; say --yes")
+    code, _, err = organbench("check", egg, "--unit", "mm", "--yes")
+    assert code == 0 and "warning: it is large" in err
+
+
+@pytest.mark.slow
+def test_real_organs_by_the_command(organbench, tmp_path):
+    path = real_surface("spleen_hra_550")
+    target = tmp_path / "spleen.vtu"
+    code, _, err = organbench("mesh", "--from", path, "--unit", "mm", "--nodes", 300, "--smooth", 2, "-o", target)
+    assert (code, err) == (0, "")
+    assert read_mesh(target).volume == pytest.approx(189e-6, rel=0.05)
