@@ -58,7 +58,8 @@ def write_mesh(mesh: OrganMesh, path: Path, unit: str = "m", curved: CurvedMesh 
         parts = written.cell_data.pop("part")
         written.cell_data = {"gmsh:physical": parts, "gmsh:geometrical": parts}
         # meshio does not read whole numbers back from a text MSH.
-        written.point_data = {name: np.asarray(values, float) for name, values in written.point_data.items()}
+        patches: dict[str, Any] = {name: np.asarray(values, float) for name, values in written.point_data.items()}
+        written.point_data = patches
     write_whole(path, content(written, path.suffix.lower()))
 
 
