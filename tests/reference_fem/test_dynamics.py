@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from reference_fem import (
     DynamicsSettings,
@@ -14,7 +15,7 @@ from reference_fem import (
     natural_frequencies,
     nodes,
 )
-from reference_fem.inertia import MovingSystem, scheme
+from reference_fem.inertia import Motion, MovingSystem, TimeStep, scheme
 from tests.reference_fem.bodies import ball_octant, block, symmetry, whole_ball
 
 MU, RHO = 1800.0, 1060.0
@@ -111,6 +112,33 @@ def test_the_parameters_are_those_of_chung_and_hulbert():
     """rho_inf = 1: alpha_m = alpha_f = 1/2, beta = 1/4, gamma = 1/2; rho_inf = 0: -1, 0, 1, 3/2."""
     np.testing.assert_allclose(scheme(1.0), (0.5, 0.5, 0.25, 0.5))
     np.testing.assert_allclose(scheme(0.0), (-1.0, 0.0, 1.0, 1.5))
+
+
+def test_the_tangent_is_the_slope_of_the_residual_with_inertia():
+    """Central differences along one direction of the free unknowns; held ones bring no inertia of their own."""
+    mesh = block((1, 1, 1))
+    system = MovingSystem(
+        Problem(mesh, NeoHookean(MU, 10.0 * MU), [Held(lambda x: x[2] < 1e-9)], density=RHO), NewtonSettings(), 40.0
+    )
+    random, free = np.random.default_rng(1), system.pattern.free
+    v, a, memory = random.standard_normal((3, system.displacement_count))
+    held = system.pattern.held
+    old = Motion(system.rest(), v, a, memory)
+    system.clock = TimeStep(old, 0.01, scheme(0.8), held, 0.0 * held, 0.0 * held)
+    x, step = 1e-3 * random.standard_normal((2, system.total))
+    x[held] = 0.0
+    loads = system.loads_of(old.state)
+    values = system.evaluate(x, loads).values
+    for unknowns in (free, held):
+        d = np.zeros(system.total)
+        d[unknowns] = step[unknowns]
+        ends = [system.evaluate(x + 1e-3 * sign * d, loads, tangent=False).residual[free] for sign in (1.0, -1.0)]
+        slope = (ends[0] - ends[1]) / 2e-3
+        upper = system.pattern.upper(values)
+        tangent = upper + upper.T - sp.diags(upper.diagonal())
+        product = tangent @ d[free] + system.pattern.lifting(values) @ d[held]
+        # the third derivative over a step of 1e-6 m
+        np.testing.assert_allclose(product, slope, atol=1e-6 * np.abs(slope).max())
 
 
 @pytest.mark.parametrize("element", ["P2/P1", "P2/P0"])
