@@ -18,7 +18,7 @@ from studies.geometry.surface import first_surface
 from studies.plots.cut import cut_face, cut_surface
 from studies.plots.page import blank, finish, page, panels
 from studies.plots.render import Camera, draw_faces, draw_surface, frame, scale_bar, smooth_normals, uniform
-from studies.plots.style import BLUE, GREEN, NORMAL, ORANGE, PURPLE, SKY, SMALL, heading, readable, save, styled
+from studies.plots.style import BLUE, GREEN, NORMAL, ORANGE, PURPLE, SKY, heading, readable, save, styled
 
 TITLE = "Organs"
 FRONT = Camera(azimuth=-72.0, elevation=14.0)
@@ -112,7 +112,7 @@ def window(axes: Axes, points: np.ndarray, camera: Camera) -> None:
     margin = 0.05 * (high - low).max()
     frame(axes, low - (margin, 3.2 * margin), high + margin)
     length = max((bar for bar in ROUND if bar <= 0.3 * (high - low).max()), default=ROUND[0])
-    scale_bar(axes, low[0], low[1] - margin, length, f"{1e3 * length:g} mm", size=SMALL)
+    scale_bar(axes, low[0], low[1] - margin, length, f"{1e3 * length:g} mm", size=NORMAL)
 
 
 def _describe(axes: Axes, mesh: OrganMesh, shape: Shape) -> None:
@@ -124,7 +124,7 @@ def _describe(axes: Axes, mesh: OrganMesh, shape: Shape) -> None:
     words += [f"{mesh.outer_count:,} nodes, {len(mesh.outer_triangles):,} triangles"]
     words += [f"{len(mesh.tetrahedra):,} tetrahedra"]
     place = {"transform": axes.transAxes, "ha": "center", "va": "top"}
-    axes.text(0.5, -0.02, "\n".join(words), size=SMALL, linespacing=1.35, **place)
+    axes.text(0.5, -0.02, "\n".join(words), size=NORMAL, linespacing=1.35, **place)
 
 
 def draw_organs(meshes: Mapping[str, OrganMesh], path: Path) -> None:

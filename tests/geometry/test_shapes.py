@@ -17,8 +17,8 @@ from studies.geometry.organs import SHAPES
 from studies.geometry.organs.variation import vary
 from studies.geometry.surface import first_surface
 
-ORGANS = ("liver", "stomach", "kidney", "spleen", "bladder")
-HOLLOW = ("stomach", "bladder")
+ORGANS = tuple(name for name, make in SHAPES.items() if make().literature is not None)
+HOLLOW = tuple(name for name in ORGANS if SHAPES[name]().wall is not None)
 MM = 1e-3
 
 
