@@ -6,11 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from reference_fem import oracles
-from reference_fem.oracles import Check, Curve, Oracle, Outcome
+from reference_fem.oracles import Check, Curve, Oracle, Outcome, kappa
 from studies.atomic import write_whole
+from studies.plots import verify as convergence
 from studies.second_opinion import second_opinions
 
 FOLDER = "verify"
@@ -112,8 +114,19 @@ def curves_of(verdicts: Sequence[Verdict]) -> list[Curve]:
 
 
 def write_verdicts(folder: Path, verdicts: Sequence[Verdict]) -> list[Path]:
-    """Writes verify.csv and verify.md; their paths. Raises StudyError when they cannot be written."""
-    table, words = folder / "verify.csv", folder / "verify.md"
+    """Writes verify.csv, verify.md and convergence.png; their paths. Raises StudyError when one cannot be written."""
+    table, words, chart = (folder / name for name in ("verify.csv", "verify.md", "convergence.png"))
     write_whole(table, check_table(verdicts).to_csv(index=False, float_format="%.9g").encode())
     write_whole(words, summary(verdicts).encode())
-    return [table, words]
+    convergence.draw(curves_of(verdicts), chart)
+    return [table, words, chart]
+
+
+def write_kappa(folder: Path) -> list[Path]:
+    """Solves and writes what kappa/mu does to a result: kappa.csv and kappa.png; their paths."""
+    rows, ratios = kappa.dependence(), np.array(kappa.RATIOS)
+    table, chart = folder / "kappa.csv", folder / "kappa.png"
+    frame = pd.DataFrame({"kappa/mu": ratios, **rows})
+    write_whole(table, frame.to_csv(index=False, float_format="%.9g").encode())
+    convergence.draw_kappa(ratios, rows, chart)
+    return [table, chart]

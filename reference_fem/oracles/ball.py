@@ -19,14 +19,14 @@ JUDGED = (0.10, 0.15, 0.20, 0.25, 0.30, 0.35)
 """Approaches of the planes over the diameter; the path starts at half the first."""
 FAMILY = (5, 7, 10)
 """Elements to a quarter circle."""
-GRADE = 0.5
-"""Element size at the pole over that at the equator."""
+GRADE, RADIAL = 0.35, 0.5
+"""Finer at the pole and towards the surface: see ball_octant."""
 
 
-def squeeze(mesh, shares: Sequence[float]) -> tuple[Problem, list[Equilibrium]]:
+def squeeze(mesh, shares: Sequence[float], kappa=KAPPA) -> tuple[Problem, list[Equilibrium]]:
     """(problem, equilibria) of an octant of unit radius and modulus, at approaches over the diameter."""
     plane = RigidPlane((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), lambda t: (0.0, 0.0, -t))
-    problem = Problem(mesh, NeoHookean(1.0, KAPPA), symmetry(), [plane])
+    problem = Problem(mesh, NeoHookean(1.0, kappa), symmetry(), [plane])
     return problem, equilibrium_path(problem, shares)
 
 
@@ -39,7 +39,7 @@ def measure() -> Outcome:
     """Force, equator and volume on the finest mesh; the force's error at 0.30 over mesh size."""
     checks, errors = [], []
     for cells in FAMILY:
-        mesh = ball_octant(cells, GRADE)
+        mesh = ball_octant(cells, GRADE, RADIAL)
         problem, path = squeeze(mesh, (0.05, *JUDGED))
         by_share = {state.t: state for state in path}
         errors.append(abs(whole_force(by_share[0.30]) / exact.BALL_BETWEEN_PLANES[0.30][0] - 1.0))

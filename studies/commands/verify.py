@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 
 from reference_fem import crosscheck
-from studies.verification import FOLDER, Verdict, run_pack, tolerance, write_verdicts
+from studies.verification import FOLDER, Verdict, run_pack, tolerance, write_kappa, write_verdicts
 
 console = Console(soft_wrap=True)
 FAST = "smoke"
@@ -24,7 +24,10 @@ def verify(
     """Holds the reference against closed forms, published numbers and other codes (exit code 1: a number is off)."""
     verdicts = run_pack(fast, show)
     root = results / FAST if fast else results
-    for path in write_verdicts(root / FOLDER, verdicts):
+    written = write_verdicts(root / FOLDER, verdicts)
+    if not fast:
+        written += write_kappa(root / FOLDER)
+    for path in written:
         console.print(str(path), markup=False, highlight=False)
     if not crosscheck.available():
         console.print("no second opinion: NGSolve is not installed (pip install organbench[crosscheck])", markup=False)

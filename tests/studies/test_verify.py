@@ -2,11 +2,12 @@
 
 import math
 
+import numpy as np
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from reference_fem.oracles import Check, Curve, Oracle, Outcome
+from reference_fem.oracles import Check, Curve, Oracle, Outcome, kappa
 from studies import cli, verification
 
 
@@ -20,6 +21,7 @@ def oracle(name, got, fast=True, **options):
 def run(monkeypatch, tmp_path):
     def invoke(pack, *words):
         monkeypatch.setattr(verification, "ORACLES", tuple(pack))
+        monkeypatch.setattr(verification.kappa, "dependence", lambda: {"force": 1.0 + 1.0 / np.array(kappa.RATIOS)})
         return CliRunner().invoke(cli.app, ["verify", "--results", str(tmp_path), *words])
 
     return invoke
@@ -36,6 +38,8 @@ def test_numbers_that_agree_are_printed_and_kept(run, tmp_path):
     words = (tmp_path / "verify" / "verify.md").read_text()
     assert "Title of second" in words
     assert "402 unknowns" in words
+    assert (tmp_path / "verify" / "convergence.png").stat().st_size > 10_000
+    assert list(pd.read_csv(tmp_path / "verify" / "kappa.csv")["kappa/mu"]) == list(kappa.RATIOS)
 
 
 @pytest.mark.parametrize("got", [2.1, math.nan])
