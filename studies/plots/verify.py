@@ -69,9 +69,9 @@ def kappa_figure(ratios: np.ndarray, rows: dict[str, np.ndarray]) -> Figure:
     handles = []
     for k, (name, values) in enumerate(rows.items()):
         change = np.abs(values[:-1] / values[-1] - 1.0)
-        look = {"color": COLOURS[k % len(COLOURS)], "marker": MARKERS[k % len(MARKERS)]}
-        axes.plot(ratios[:-1], change, markersize=6, **look)
-        handles.append(Line2D([], [], label=name, **look))
+        colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
+        axes.plot(ratios[:-1], change, color=colour, marker=marker, markersize=6)
+        handles.append(Line2D([], [], color=colour, marker=marker, label=name))
     low, high = ratios[0], ratios[-2]
     first = max(abs(values[0] / values[-1] - 1.0) for values in rows.values())
     axes.plot([low, high], [first, first * low / high], color=GREY, linestyle=":", linewidth=1.4)
