@@ -23,7 +23,6 @@ if "NUMBA_CACHE_DIR" not in os.environ:
     config.CACHE_DIR = str(cache_folder())  # pyright: ignore[reportAttributeAccessIssue]
 
 from reference_fem.cavity import Cavity  # noqa: E402
-from reference_fem.contact import RigidPlane, RigidSphere  # noqa: E402
 from reference_fem.dynamics import DynamicsSettings, Moment, motion_path  # noqa: E402
 from reference_fem.element_table import ELEMENTS, Element  # noqa: E402
 from reference_fem.elements import facet_nodes, nodes, surface_triangles  # noqa: E402
@@ -34,8 +33,9 @@ from reference_fem.loads import BodyForce, Traction  # noqa: E402
 from reference_fem.material import Material, MooneyRivlin, NeoHookean  # noqa: E402
 from reference_fem.mesh import curve  # noqa: E402
 from reference_fem.modes import Modes, natural_frequencies  # noqa: E402
+from reference_fem.obstacles import RigidCapsule, RigidPlane, RigidSphere  # noqa: E402
 from reference_fem.problem import Held, Problem  # noqa: E402
-from reference_fem.system import NewtonSettings  # noqa: E402
+from reference_fem.state import NewtonSettings  # noqa: E402
 
 config.CACHE_DIR = _folder_before  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -56,6 +56,7 @@ __all__ = [
     "NewtonSettings",
     "Problem",
     "ReferenceProblem",
+    "RigidCapsule",
     "RigidPlane",
     "RigidSphere",
     "SlowSolverWarning",

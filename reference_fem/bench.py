@@ -5,11 +5,12 @@ import time
 import numpy as np
 from skfem import MeshTet
 
-from reference_fem.contact import RigidPlane
 from reference_fem.equilibrium import equilibrium_path
 from reference_fem.material import NeoHookean
+from reference_fem.obstacles import RigidPlane
 from reference_fem.problem import Held, Problem
-from reference_fem.system import Loads, NewtonSettings, System
+from reference_fem.state import Loads, NewtonSettings
+from reference_fem.system import System
 
 
 def slab(cells, obstacles=()):

@@ -15,9 +15,9 @@ from numba import njit
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
-from reference_fem.contact import scatter
 from reference_fem.elements import basis_table, facet_nodes, nodes
 from reference_fem.errors import ReferenceProblem
+from reference_fem.surface import scatter
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from reference_fem.contact import gap_into
 from reference_fem.elements import check_neighbours, facet_nodes, nodes
 from reference_fem.errors import ReferenceProblem
+from reference_fem.obstacles import gaps
+from reference_fem.surface import point_positions
 
 START_DEPTH = 1e-3
 """Depth at the start that is taken as touching, over the size of the body: the sag of a coarse facet."""
@@ -93,10 +94,9 @@ def direction(v):
 
 def check_start(surface, rows, size):
     """Refuse an obstacle that starts deeper than START_DEPTH of the body's size in the undeformed body."""
-    y = np.einsum("qa,fia->fqi", surface.values, surface.rest[surface.dofs].reshape(len(surface.dofs), 3, -1))
-    y = y.reshape(-1, 3)
+    y = point_positions(np.zeros(len(surface.rest)), surface)
     for k, row in enumerate(rows):
-        depth = -min(gap_into(row, point, np.empty(3))[0] for point in y)
+        depth = -float(gaps(row, y).min())
         if depth > START_DEPTH * size:
             raise ReferenceProblem(
                 f"obstacle {k} starts {depth:.3g} m inside the body (limit {START_DEPTH * size:.3g} m): "

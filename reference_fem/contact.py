@@ -1,80 +1,40 @@
-"""Frictionless contact with rigid planes and spheres at the quadrature points of the boundary.
+"""Contact with rigid obstacles at the quadrature points of the boundary, frictionless or without slip.
 
 Augmented Lagrangian (Alart & Curnier 1991; Wriggers, Computational Contact Mechanics, 2006, ch. 6): the nominal
 pressure is t = max(0, m - eps g), m the multiplier [Pa], g the gap [m], eps the penalty [Pa/m], and the potential
 sum w (t² - m²) / (2 eps). Never at the vertices of a six-node facet: an even pressure loads them with zero.
 
+No slip: a point that touched at the end of a load step is stuck from then on to the place of the obstacle it touched,
+by the traction T = m_T - eps s, s its slip across the obstacle's normal there; it is let go when its pressure ends.
+The place is known to the length of a load step: shorter steps for a contact that spreads over what it grips.
+
 Order 4 has as many points to a facet as nodes. More points ask for more than the nodes can give where a facet is
-partly in contact: active points flicker and Newton needs longer (order 8: half as many iterations again). Three
-averages to a facet need fewer, but let points sink ten times deeper than the thousandth that is allowed.
+partly in contact: active points flicker and Newton needs longer (order 8: half as many iterations again). Three points
+need fewer (6 -> 4.5 on a squeezed ball; mid-sides alone 3), but between them the body sinks three to thirty times
+deeper than the thousandth that is allowed.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from reference_fem.errors import ReferenceProblem
-
-PLANE, SPHERE = 0, 1
-
-
-def finite_vector(value, name):
-    vector = np.asarray(value, dtype=float)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ReferenceProblem(f"{name} is {value!r}: three finite numbers are needed")
-    return vector
+from reference_fem.obstacles import gap_into, gaps
+from reference_fem.surface import Surface, add_point_stiffness, point_positions, scatter
 
 
-@dataclass(frozen=True)
-class RigidPlane:
-    """The body stays in normal·(x - point - motion(t)) >= 0. motion: t [s] -> displacement (3,) [m], None = rests."""
+class Grip(NamedTuple):
+    """What no-slip obstacles hold; arrays of length 0 where all are frictionless."""
 
-    point: tuple
-    normal: tuple
-    motion: Callable | None = None
-
-    def row(self):
-        """(kind, point, unit normal, radius) for the kernel."""
-        normal = finite_vector(self.normal, "a plane's normal")
-        size = np.linalg.norm(normal)
-        if size == 0.0:
-            raise ReferenceProblem("a plane's normal is (0, 0, 0): give a direction that points to the body's side")
-        return np.array([PLANE, *finite_vector(self.point, "a plane's point"), *normal / size, 0.0])
+    stuck: np.ndarray
+    """Points that are held, (no, nf, nq) bool."""
+    anchor: np.ndarray
+    """Where, from the obstacle's reference point, (no, nf, nq, 3) [m]."""
+    traction: np.ndarray
+    """Multiplier m_T, (no, nf, nq, 3) [Pa]."""
 
 
-@dataclass(frozen=True)
-class RigidSphere:
-    """The body stays outside |x - center - motion(t)| >= radius [m]. motion: t [s] -> (3,) [m], None = rests."""
-
-    center: tuple
-    radius: float
-    motion: Callable | None = None
-
-    def row(self):
-        """(kind, centre, unused, radius) for the kernel."""
-        if not (np.isfinite(self.radius) and self.radius > 0.0):
-            raise ReferenceProblem(f"a sphere's radius is {self.radius} m: it must be positive and finite")
-        return np.array([SPHERE, *finite_vector(self.center, "a sphere's center"), 0.0, 0.0, 0.0, self.radius])
-
-
-class Surface(NamedTuple):
-    """What the contact kernel reads of the boundary: nf facets, nq points each."""
-
-    dofs: np.ndarray
-    """Unknowns of the six nodes (three, for linear elements), u_x first, then u_y, u_z, (nf, 18) uint32."""
-    positions: np.ndarray
-    """Slots of the packed upper triangle of 18 x 18, (nf, 171) uint32."""
-    rest: np.ndarray
-    """Rest coordinates, interleaved like the unknowns, (3 N2,) [m]."""
-    values: np.ndarray
-    """Six functions at the points, (nq, 6)."""
-    weights: np.ndarray
-    """Rest areas, (nf, nq) [m²]."""
-    penalty: np.ndarray
-    """Basic eps of each facet, (nf,) [Pa/m]."""
+NO_GRIP = Grip(np.zeros((0, 0, 0), dtype=bool), np.zeros((0, 0, 0, 3)), np.zeros((0, 0, 0, 3)))
 
 
 class Touch(NamedTuple):
@@ -88,82 +48,60 @@ class Touch(NamedTuple):
     """m at every point, (no, nf, nq) [Pa]."""
     penalty: np.ndarray
     """eps of each facet, (nf,) [Pa/m]."""
+    grip: Grip
     pressure: np.ndarray
     """t at every point, overwritten, (no, nf, nq) [Pa]."""
+    traction: np.ndarray
+    """T at every point, overwritten, shaped like the grip's [Pa]."""
     force: np.ndarray
     """Resultant on the body, overwritten, (no, 3) [N]."""
 
 
-def touch(rows, shift, multiplier, penalty) -> Touch:
+def touch(rows, shift, multiplier, penalty, grip=NO_GRIP) -> Touch:
     """A Touch with room for its results."""
-    return Touch(rows, shift, multiplier, penalty, np.zeros_like(multiplier), np.zeros((len(rows), 3)))
-
-
-def place(rows, obstacles, t):
-    """Rows of the obstacles moved to time t; raises ReferenceProblem when a motion is not finite."""
-    moved = rows.copy()
-    for k, obstacle in enumerate(obstacles):
-        if obstacle.motion is not None:
-            moved[k, 1:4] += finite_vector(obstacle.motion(t), f"the motion of obstacle {k} at t = {t:g} s")
-    return moved
-
-
-@njit(cache=True)
-def gap_into(row, y, n):
-    """Gap g [m] between point y and an obstacle, unit normal n towards the body, curvature of g [1/m]."""
-    g = 0.0
-    if row[0] == PLANE:
-        for i in range(3):
-            n[i] = row[4 + i]
-            g += n[i] * (y[i] - row[1 + i])
-        return g, 0.0
-    for i in range(3):
-        n[i] = y[i] - row[1 + i]
-        g += n[i] * n[i]
-    r = np.sqrt(g)
-    for i in range(3):
-        n[i] /= r
-    return r - row[7], 1.0 / r
+    zeros = np.zeros_like(multiplier), np.zeros_like(grip.traction), np.zeros((len(rows), 3))
+    return Touch(rows, shift, multiplier, penalty, grip, *zeros)
 
 
 @njit(cache=True)
 def add_contact(x, surface, touch, values, residual, tangent):
-    """residual -= w t n N and, if tangent, values += w (eps n⊗n - t curvature (1 - n⊗n)) N N; fills touch."""
+    """residual -= w (t n + T) N and, if tangent, values += w d²(potential) N N; fills touch (eq. 19, 43).
+
+    Normal part: eps n⊗n - t curvature (1 - n⊗n - a⊗a); part of a stuck point: eps (1 - n0⊗n0), n0 at its anchor.
+    """
     dofs, positions, rest, shapes, weights, _ = surface
-    rows, shift, multiplier, penalty, pressure, force = touch
-    y, n, k = np.empty(3), np.empty(3), np.empty((3, 3))
     count = shapes.shape[1]
-    K = np.empty((3 * count, 3 * count))
-    force[:] = 0.0
-    for o in range(rows.shape[0]):
+    nodes, y = np.empty((count, 3)), np.empty(3)
+    k, push, K = np.empty((3, 3)), np.empty(3), np.empty((3 * count, 3 * count))
+    touch.force[:] = 0.0
+    for o in range(touch.rows.shape[0]):
         for f in range(dofs.shape[0]):
+            for i in range(3):
+                for a in range(count):
+                    dof = dofs[f, count * i + a]
+                    nodes[a, i] = rest[dof] + x[dof]
+            if out_of_reach(touch.rows[o], nodes, touch.multiplier[o, f]):
+                continue
             touched = False
             for q in range(weights.shape[1]):
                 for i in range(3):
                     y[i] = 0.0
                     for a in range(count):
-                        dof = dofs[f, count * i + a]
-                        y[i] += shapes[q, a] * (rest[dof] + x[dof])
-                g, curvature = gap_into(rows[o], y, n)
-                t = max(0.0, multiplier[o, f, q] - penalty[f] * g)
-                pressure[o, f, q] = t
-                if t == 0.0:
+                        y[i] += shapes[q, a] * nodes[a, i]
+                if not press_point(touch, o, f, q, y, push, k):
                     continue
                 if tangent and not touched:
                     K[:] = 0.0
                 touched = True
                 w = weights[f, q]
                 for i in range(3):
+                    touch.force[o, i] += w * push[i]
+                    moved = push[i]
                     for j in range(3):
-                        k[i, j] = w * (penalty[f] + t * curvature) * n[i] * n[j]
-                    k[i, i] -= w * t * curvature
-                for i in range(3):
-                    push = w * t * n[i]
-                    force[o, i] += push
-                    for j in range(3):
-                        push += k[i, j] * shift[o, j]
+                        moved += k[i, j] * touch.shift[o, j]
+                        k[i, j] *= w
                     for a in range(count):
-                        residual[dofs[f, count * i + a]] -= push * shapes[q, a]
+                        residual[dofs[f, count * i + a]] -= w * moved * shapes[q, a]
                 if tangent:
                     add_point_stiffness(shapes[q], k, K)
             if tangent and touched:
@@ -171,35 +109,96 @@ def add_contact(x, surface, touch, values, residual, tangent):
 
 
 @njit(cache=True)
-def add_point_stiffness(N, k, K):
-    """K[ia, jb] += k_ij N_a N_b."""
-    count = len(N)
-    for i in range(3):
-        for a in range(count):
-            for j in range(3):
-                for b in range(count):
-                    K[count * i + a, count * j + b] += k[i, j] * N[a] * N[b]
+def out_of_reach(row, nodes, multiplier):
+    """Whether no point of a facet can feel an obstacle: no multiplier, and farther than the facet extends.
+
+    The functions of a six-node triangle sum to 5/3 at most in absolute value, so its points stay within twice the
+    distance of the nodes from their centre.
+    """
+    for q in range(len(multiplier)):
+        if multiplier[q] > 0.0:
+            return False
+    centre, n, along, reach = np.zeros(3), np.empty(3), np.empty(3), 0.0
+    for a in range(len(nodes)):
+        for i in range(3):
+            centre[i] += nodes[a, i] / len(nodes)
+    for a in range(len(nodes)):
+        d = 0.0
+        for i in range(3):
+            d += (nodes[a, i] - centre[i]) ** 2
+        reach = max(reach, d)
+    return gap_into(row, centre, n, along)[0] > 2.0 * np.sqrt(reach)
 
 
 @njit(cache=True)
-def scatter(K, positions, values):
-    """values[positions] += packed upper triangle of K."""
-    slot = 0
-    for a in range(K.shape[0]):
-        for b in range(a, K.shape[0]):
-            values[positions[slot]] += K[a, b]
-            slot += 1
+def press_point(touch, o, f, q, y, push, k):
+    """push = t n + T (3,) and k = -d push/dy (3, 3) at the point y; False when it does not touch."""
+    row, eps = touch.rows[o], touch.penalty[f]
+    n, along = np.empty(3), np.empty(3)
+    g, curvature = gap_into(row, y, n, along)
+    t = max(0.0, touch.multiplier[o, f, q] - eps * g)
+    touch.pressure[o, f, q] = t
+    if t == 0.0:
+        return False
+    for i in range(3):
+        push[i] = t * n[i]
+        for j in range(3):
+            k[i, j] = (eps + t * curvature) * n[i] * n[j] + t * curvature * along[i] * along[j]
+        k[i, i] -= t * curvature
+    grip = touch.grip
+    if o < grip.stuck.shape[0] and grip.stuck[o, f, q]:
+        z, sunk = np.empty(3), 0.0
+        for i in range(3):
+            z[i] = row[1 + i] + grip.anchor[o, f, q, i]
+        gap_into(row, z, n, along)
+        for i in range(3):
+            sunk += n[i] * (y[i] - z[i])
+        for i in range(3):
+            T = grip.traction[o, f, q, i] - eps * (y[i] - z[i] - sunk * n[i])
+            touch.traction[o, f, q, i] = T
+            push[i] += T
+            for j in range(3):
+                k[i, j] -= eps * n[i] * n[j]
+            k[i, i] += eps
+    return True
+
+
+def first_grip(rows, sticks, surface: Surface, x, near) -> Grip:
+    """The grip at the start: of sticking obstacles, the points not farther than `near` [m]."""
+    if not sticks.any():
+        return NO_GRIP
+    shape = (len(rows), *surface.weights.shape)
+    y = point_positions(x, surface)
+    stuck = np.array([stick & (gaps(row, y) <= near) for row, stick in zip(rows, sticks, strict=True)])
+    return Grip(stuck, y - rows[:, None, None, 1:4], np.zeros((*shape, 3)))
+
+
+def renewed_grip(found: Touch, sticks, surface: Surface, x) -> Grip:
+    """The grip after a load step: what is pressed stays stuck where it was, or sticks where it is now."""
+    old = found.grip
+    if not sticks.any():
+        return old
+    stuck = sticks[:, None, None] & (found.pressure > 0.0)
+    here = point_positions(x, surface) - found.rows[:, None, None, 1:4]
+    kept = (stuck & old.stuck)[..., None]
+    return Grip(stuck, np.where(kept, old.anchor, here), np.where(kept, found.traction, 0.0))
 
 
 def potential(x, surface: Surface, touch: Touch):
-    """sum w (t² - m²) / (2 eps) [J] in plain NumPy, apart from the kernel, to check it."""
-    moved = (surface.rest + x[: len(surface.rest)])[surface.dofs].reshape(len(surface.dofs), 3, -1)
-    y = np.einsum("qa,fia->fqi", surface.values, moved)
-    total, eps = 0.0, touch.penalty[:, None]
-    for row, m in zip(touch.rows, touch.multiplier, strict=True):
-        g = (y - row[1:4]) @ row[4:7] if row[0] == PLANE else np.linalg.norm(y - row[1:4], axis=2) - row[7]
-        t = np.maximum(0.0, m - eps * g)
+    """sum w (t² - m² + T² - m_T²) / (2 eps) [J] in plain NumPy, apart from the kernel, to check it."""
+    y, total, eps = point_positions(x, surface), 0.0, touch.penalty[:, None]
+    for o, (row, m) in enumerate(zip(touch.rows, touch.multiplier, strict=True)):
+        t = np.maximum(0.0, m - eps * gaps(row, y))
         total += np.sum(surface.weights * (t**2 - m**2) / (2.0 * eps))
+        if o < len(touch.grip.stuck):
+            anchor, hold = touch.grip.anchor[o], touch.grip.traction[o]
+            slip = y - row[1:4] - anchor
+            ahead = np.stack([gaps(row, row[1:4] + anchor + 1e-6 * e) for e in np.eye(3)], axis=-1)
+            behind = np.stack([gaps(row, row[1:4] + anchor - 1e-6 * e) for e in np.eye(3)], axis=-1)
+            n = (ahead - behind) / 2e-6
+            slip = slip - np.sum(slip * n, axis=-1, keepdims=True) * n
+            share = np.sum((hold - eps[..., None] * slip) ** 2 - hold**2, axis=-1) / (2.0 * eps)
+            total += np.sum(surface.weights * share, where=touch.grip.stuck[o] & (t > 0.0))
     return float(total)
 
 
@@ -207,6 +206,14 @@ def penetration(touch: Touch):
     """Deepest point inside an obstacle [m], from t = m - eps g where t > 0."""
     depth = (touch.pressure - touch.multiplier) / touch.penalty[:, None]
     return float(np.max(depth, initial=0.0, where=touch.pressure > 0.0))
+
+
+def slippage(touch: Touch):
+    """Farthest that a stuck point has slipped [m], from T = m_T - eps s where it is pressed."""
+    if not touch.grip.stuck.size:
+        return 0.0
+    slip = np.linalg.norm(touch.traction - touch.grip.traction, axis=-1) / touch.penalty[:, None]
+    return float(np.max(slip, initial=0.0, where=touch.grip.stuck & (touch.pressure > 0.0)))
 
 
 def misplacement(touch: Touch):

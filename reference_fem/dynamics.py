@@ -13,7 +13,7 @@ from reference_fem.errors import ReferenceProblem
 from reference_fem.inertia import MovingSystem, scheme
 from reference_fem.march import March, kinetic
 from reference_fem.problem import Problem
-from reference_fem.system import NewtonSettings
+from reference_fem.state import NewtonSettings
 
 
 @dataclass(frozen=True)

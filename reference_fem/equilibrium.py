@@ -11,7 +11,8 @@ from reference_fem.elements import at_nodes, forces_at_nodes
 from reference_fem.errors import ReferenceProblem
 from reference_fem.newton import StepFailed, solve_step
 from reference_fem.problem import Problem
-from reference_fem.system import NewtonSettings, State, System
+from reference_fem.state import NewtonSettings, State
+from reference_fem.system import System
 
 EASY = 8
 """Newton iterations below which the next sub-step may be twice as long."""
@@ -40,6 +41,8 @@ class Equilibrium:
     """Rest volume of the quadrature points, (ne, nq) [m³]."""
     penetration: float
     """Deepest quadrature point inside an obstacle [m]."""
+    slippage: float
+    """Farthest that a point stuck to a no-slip obstacle has slipped [m]."""
     newton_iterations: int
     """Linear solves since the previous wanted time, failed sub-steps not counted."""
     substeps: int
@@ -142,6 +145,7 @@ def describe(system: System, state: State, iterations, substeps) -> Equilibrium:
         J=J,
         weights=elements.weights,
         penetration=contact.penetration(found.touch),
+        slippage=contact.slippage(found.touch),
         newton_iterations=iterations,
         substeps=substeps,
         energy=assembly.energy(state.x, elements, material),

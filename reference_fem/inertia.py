@@ -14,7 +14,8 @@ import numpy as np
 
 from reference_fem.checks import check_inertia
 from reference_fem.mass import build_mass
-from reference_fem.system import Evaluation, Loads, State, System
+from reference_fem.state import Loads, State
+from reference_fem.system import Evaluation, System
 
 
 class Scheme(NamedTuple):

@@ -13,7 +13,7 @@ from reference_fem.errors import ReferenceProblem
 from reference_fem.inertia import Instant, Motion, MovingSystem, Scheme, TimeStep
 from reference_fem.newton import StepFailed, solve_step
 from reference_fem.release import held_motion, released
-from reference_fem.system import State
+from reference_fem.state import State
 
 
 class Powers(NamedTuple):

@@ -11,7 +11,7 @@ from reference_fem.elements import at_nodes
 from reference_fem.errors import ReferenceProblem
 from reference_fem.inertia import MovingSystem
 from reference_fem.problem import Problem
-from reference_fem.system import Loads, NewtonSettings
+from reference_fem.state import Loads, NewtonSettings
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,12 @@
 """Newton's method on one load step."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from reference_fem import contact
-from reference_fem.system import Loads, State, System
+from reference_fem.state import Loads, State
+from reference_fem.system import System
 
 PENALTY_GROWTH = 2.0
 """Factor on the contact penalty at each multiplier update inside a step: plain updates gain little where a facet is
@@ -27,7 +30,8 @@ def solve_step(system: System, state: State, t, load) -> State:
     far outside; the next step starts low again.
     """
     target, stiffness = system.held_at(t), 1.0
-    loads = Loads(system.force_at(t, load), system.obstacles_at(t), state.pressure, system.filling_at(t, load))
+    force, filling = system.force_at(t, load), system.filling_at(t, load)
+    loads = Loads(force, system.obstacles_at(t), state.pressure, filling, grip=state.hold)
     x, found = first_guess(system, state, t, loads)
     before = None
     for iteration in range(1, system.settings.max_iterations + 1):
@@ -37,10 +41,12 @@ def solve_step(system: System, state: State, t, load) -> State:
         off = misplaced(system, x, found)
         if arrived and settled(found, system.settings, LOOSE if off else 1.0):
             if not off:
-                rate = rate_of(state, t, x)
-                return State(t, load, x, loads.multiplier, found.touch.pressure, iteration, stiffness, rate)
+                rate, hold = rate_of(state, t, x), contact.renewed_grip(found.touch, system.sticks, system.surface, x)
+                settled_in = State(t, load, x, loads.multiplier, found.touch.pressure, iteration)
+                return replace(settled_in, stiffness=stiffness, rate=rate, grip=loads.grip, hold=hold)
             stiffness *= PENALTY_GROWTH
-            loads = loads._replace(multiplier=found.touch.pressure, stiffness=stiffness)
+            grip = loads.grip._replace(traction=found.touch.traction)
+            loads = loads._replace(multiplier=found.touch.pressure, stiffness=stiffness, grip=grip)
             found = system.evaluate(x, loads)
         before = found
     raise StepFailed(
@@ -74,9 +80,10 @@ def settled(found, settings, slack):
 
 
 def misplaced(system, x, found):
-    """Whether contact acts farther from an obstacle's surface than its share of the largest displacement."""
+    """Whether contact acts farther from an obstacle's surface, or from where it stuck, than its share of the largest
+    displacement."""
     allowed = system.settings.penetration_tol * np.abs(x[: system.displacement_count]).max()
-    return contact.misplacement(found.touch) > allowed
+    return max(contact.misplacement(found.touch), contact.slippage(found.touch)) > allowed
 
 
 def search(system, x, direction, loads, before):

@@ -7,12 +7,12 @@ import numpy as np
 from skfem import MeshTet
 
 from reference_fem.cavity import Cavity
-from reference_fem.contact import RigidPlane, RigidSphere, finite_vector
 from reference_fem.element_table import DEFAULT, find_element
 from reference_fem.elements import build_facets, displacement_points
 from reference_fem.errors import ReferenceProblem
 from reference_fem.loads import BodyForce, Traction
 from reference_fem.material import Material
+from reference_fem.obstacles import Obstacle, finite_vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Problem:
     mesh: MeshTet
     material: Material
     held: Sequence[Held]
-    obstacles: Sequence[RigidPlane | RigidSphere] = ()
+    obstacles: Sequence[Obstacle] = ()
     gravity: Sequence[float] = (0.0, 0.0, 0.0)
     density: float = 0.0
     order: int | None = None

@@ -1,9 +1,11 @@
 """The start of a motion: the accelerations that go with a displacement and a velocity (docs/theory.md, eq. 54)."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from reference_fem.inertia import Motion, MovingSystem
-from reference_fem.system import State
+from reference_fem.state import State
 
 
 def held_motion(system: MovingSystem, t, dt):
@@ -30,7 +32,7 @@ def released(system: MovingSystem, state: State, v, dt) -> Motion:
     v = v.copy()
     v[held], held_a = held_motion(system, state.t, dt)
     x = np.concatenate((state.x[:n], np.zeros(system.total - n)))
-    loads = system.loads_of(State(state.t, 1.0, x, state.multiplier, state.pressure))
+    loads = system.loads_of(replace(state, load=1.0, x=x, rate=None))
     for k, lumen in enumerate(system.lumens):
         if lumen.by_pressure:
             x[system.field_count + k] = loads.filling[k]
@@ -44,7 +46,12 @@ def released(system: MovingSystem, state: State, v, dt) -> Motion:
     put_mass(system, found.values, dt)
     solution = system.step(found, x, x[held] + held_a)
     x[n:] += solution[n:]
-    return Motion(State(state.t, 1.0, x, state.multiplier, state.pressure), v, solution[:n], solution[:n].copy())
+    return Motion(
+        replace(state, load=1.0, x=x, rate=None),
+        v,
+        solution[:n],
+        solution[:n].copy(),
+    )
 
 
 def put_mass(system, values, dt):

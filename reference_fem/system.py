@@ -1,11 +1,10 @@
 """The discrete system of one problem: residual, tangent and Newton's direction under given loads."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from reference_fem import assembly, cavity, checks, contact
+from reference_fem import assembly, cavity, checks, contact, obstacles
 from reference_fem.element_table import find_element
 from reference_fem.elements import build_elements, build_facets, displacement_points
 from reference_fem.errors import ReferenceProblem
@@ -13,62 +12,11 @@ from reference_fem.linear import SymmetricSolver
 from reference_fem.loads import BodyForce, find_points, nodal_force
 from reference_fem.pattern import build_pattern
 from reference_fem.problem import Problem, find_held
+from reference_fem.state import Loads, NewtonSettings, State
+from reference_fem.surface import Surface
 
-
-@dataclass(frozen=True)
-class NewtonSettings:
-    """How hard to try. Tolerances are relative: force to the largest of reactions, contact and weight; volume to V0."""
-
-    force_tol: float = 1e-6
-    volume_tol: float = 1e-8
-    penetration_tol: float = 1e-3
-    """Deepest contact penetration over the largest displacement; more than that and the multiplier is updated."""
-    penalty: float = 60.0
-    """Contact penalty times facet size over mu. Soft, and left to the multiplier: 30 to 100 take about as many
-    iterations and agree to 6e-4 in the force, but on a deep spherical probe 300 needs sub-steps and 1000 can fail."""
-    max_iterations: int = 25
-    smallest_step: float = 1.0 / 1024.0
-    """Smallest sub-step, as a fraction of the interval between two wanted times."""
-    start: float = 0.0
-    """Time [s] of the undeformed state."""
-    solver: str = "auto"
-
-
-@dataclass
-class State:
-    """Unknowns x and contact multipliers at time t; `iterations` spent to come here.
-
-    x: u at the displacement functions (P2: the nodes) [m], interleaved, p at the vertices [Pa] unless the element
-    eliminates it, pressures of the cavities [Pa]. load: share of the dead forces and of the cavities' start values that
-    acts, 1 once they are switched on. rate: mean dx/dt since the state before, where the next step looks first.
-    """
-
-    t: float
-    load: float
-    x: np.ndarray
-    multiplier: np.ndarray
-    """With which the contact pressures follow from x, (no, nf, nq) [Pa]."""
-    pressure: np.ndarray
-    """The contact pressures: the multipliers the next step starts from, so that points that left start without."""
-    iterations: int = 0
-    stiffness: float = 1.0
-    rate: np.ndarray | None = None
-
-
-class Loads(NamedTuple):
-    """What acts during one evaluation: dead forces (field_count,) [N], or 0, obstacles (no, 8), multipliers, penalty
-    factor.
-
-    filling (nc,): wanted volumes [m³] of the cavities, or pressures [Pa] where those are prescribed. shift (no, 3) [m]:
-    a further move of the obstacles to be linearised, None = none.
-    """
-
-    force: np.ndarray | float
-    rows: np.ndarray
-    multiplier: np.ndarray
-    filling: np.ndarray = np.zeros(0)
-    stiffness: float = 1.0
-    shift: np.ndarray | None = None
+TOUCHING = 1e-6
+"""Gap over the size of the body below which a point sticks to a no-slip obstacle from the start: round-off, no more."""
 
 
 @dataclass
@@ -116,8 +64,9 @@ class System:
         self.surface = self.build_surface(facets)
         self.lumens = cavity.find_lumens(problem, self.pattern, self.element.facet, facets.nodes, self.held)
         self.rows = np.array([obstacle.row() for obstacle in problem.obstacles]).reshape(-1, 8)
+        self.sticks = obstacles.sticky(problem.obstacles)
         self.loaded = self.find_loads()
-        start = contact.place(self.rows, problem.obstacles, settings.start)
+        start = self.obstacles_at(settings.start)
         checks.check_start(self.surface, start, checks.boundary_size(mesh))
         self.solver = SymmetricSolver(settings.solver)
 
@@ -130,7 +79,7 @@ class System:
         penalty = self.settings.penalty * self.problem.material.mu / np.sqrt(facets.weights.sum(axis=1))
         positions = self.pattern.positions(dofs)
         rest = self.nodes.ravel()
-        return contact.Surface(dofs.astype(np.uint32), positions, rest, facets.values, facets.weights, penalty)
+        return Surface(dofs.astype(np.uint32), positions, rest, facets.values, facets.weights, penalty)
 
     def find_loads(self):
         """The dead loads at their quadrature points, weight among them."""
@@ -148,10 +97,12 @@ class System:
 
     def rest(self) -> State:
         shape = (len(self.rows), *self.surface.weights.shape)
-        return State(self.settings.start, 0.0, np.zeros(self.total), np.zeros(shape), np.zeros(shape))
+        x, start = np.zeros(self.total), self.settings.start
+        grip = contact.first_grip(self.obstacles_at(start), self.sticks, self.surface, x, TOUCHING * np.ptp(self.nodes))
+        return State(start, 0.0, x, np.zeros(shape), np.zeros(shape), grip=grip, hold=grip)
 
     def obstacles_at(self, t):
-        return contact.place(self.rows, self.problem.obstacles, t)
+        return obstacles.place(self.rows, self.problem.obstacles, t)
 
     def filling_at(self, t, load):
         """What the cavities are wanted to hold at time t, see Loads."""
@@ -165,7 +116,8 @@ class System:
     def loads_of(self, state: State) -> Loads:
         """What acts in a converged state."""
         rows, filling = self.obstacles_at(state.t), self.filling_at(state.t, state.load)
-        return Loads(self.force_at(state.t, state.load), rows, state.multiplier, filling, state.stiffness)
+        force = self.force_at(state.t, state.load)
+        return Loads(force, rows, state.multiplier, filling, state.stiffness, grip=state.grip)
 
     def held_at(self, t):
         """Prescribed values of the held unknowns at time t; refuses regions that contradict each other."""
@@ -188,7 +140,7 @@ class System:
         values = np.zeros(self.pattern.size if tangent else 1)
         shift = np.zeros((len(loads.rows), 3)) if loads.shift is None else loads.shift
         penalty = loads.stiffness * self.surface.penalty
-        touch = contact.touch(loads.rows, shift, loads.multiplier, penalty)
+        touch = contact.touch(loads.rows, shift, loads.multiplier, penalty, loads.grip)
         parameters = self.problem.material.parameters
         J = assembly.add_elements(x, self.elements, parameters, self.positions, values, residual, tangent)
         volumes, gradients = np.zeros(len(self.lumens)), np.zeros((len(self.lumens), self.field_count))

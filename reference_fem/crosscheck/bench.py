@@ -9,7 +9,8 @@ from reference_fem.crosscheck.cases import clamped_ball
 from reference_fem.crosscheck.ngsolve_code import Model
 from reference_fem.oracles.base import unknowns
 from reference_fem.problem import Problem
-from reference_fem.system import NewtonSettings, System
+from reference_fem.state import NewtonSettings
+from reference_fem.system import System
 
 INVERSES = ("sparsecholesky", "umfpack")
 """NGSolve's own direct solvers; with MKL's, where it has that, it took no less time."""

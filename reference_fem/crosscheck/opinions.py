@@ -10,7 +10,7 @@ from reference_fem.crosscheck.ngsolve_code import solve
 from reference_fem.equilibrium import equilibrium_path
 from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
 from reference_fem.problem import Problem
-from reference_fem.system import NewtonSettings
+from reference_fem.state import NewtonSettings
 
 CLOSE = NewtonSettings(force_tol=1e-10, volume_tol=1e-12)
 """So that what differs is the codes, not where their iterations stop."""

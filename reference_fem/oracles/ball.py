@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from reference_fem import exact
-from reference_fem.contact import RigidPlane
 from reference_fem.elements import nodes
 from reference_fem.equilibrium import Equilibrium, equilibrium_path
 from reference_fem.material import NeoHookean
+from reference_fem.obstacles import RigidPlane
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import ball_octant, symmetry
 from reference_fem.problem import Problem

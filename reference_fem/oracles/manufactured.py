@@ -20,7 +20,8 @@ from reference_fem.newton import solve_step
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import block
 from reference_fem.problem import Held, Problem
-from reference_fem.system import NewtonSettings, System
+from reference_fem.state import NewtonSettings
+from reference_fem.system import System
 
 SHEARS, PRESSURE = (0.15, 0.10, 0.12), 2.0
 """a, b, c [m] and the largest pressure over the shear modulus."""

@@ -9,7 +9,7 @@ from reference_fem.material import NeoHookean
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import shell_octant, symmetry
 from reference_fem.problem import Problem
-from reference_fem.system import NewtonSettings
+from reference_fem.state import NewtonSettings
 
 STRETCHES = (1.1, 1.25, 1.5)
 MESHES = {0.5: ((4, 3), (6, 4), (8, 5)), 0.8: ((8, 3),)}

@@ -16,7 +16,8 @@ from reference_fem import (
     contact,
     curve,
 )
-from reference_fem.system import Loads, System
+from reference_fem.state import Loads
+from reference_fem.system import System
 from tests.reference_fem.bodies import block
 
 STEP = 1e-6

@@ -1,0 +1,69 @@
+"""What a load step starts from, what acts during it, and how hard to try."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from reference_fem.contact import NO_GRIP, Grip
+
+
+@dataclass(frozen=True)
+class NewtonSettings:
+    """How hard to try. Tolerances are relative: force to the largest of reactions, contact and weight; volume to V0."""
+
+    force_tol: float = 1e-6
+    volume_tol: float = 1e-8
+    penetration_tol: float = 1e-3
+    """Deepest contact penetration over the largest displacement; more than that and the multiplier is updated."""
+    penalty: float = 60.0
+    """Contact penalty times facet size over mu. Soft, and left to the multiplier: 30 to 100 take about as many
+    iterations and agree to 6e-4 in the force, but on a deep spherical probe 300 needs sub-steps and 1000 can fail."""
+    max_iterations: int = 25
+    smallest_step: float = 1.0 / 1024.0
+    """Smallest sub-step, as a fraction of the interval between two wanted times."""
+    start: float = 0.0
+    """Time [s] of the undeformed state."""
+    solver: str = "auto"
+
+
+@dataclass
+class State:
+    """Unknowns x and contact multipliers at time t; `iterations` spent to come here.
+
+    x: u at the displacement functions (P2: the nodes) [m], interleaved, p at the vertices [Pa] unless the element
+    eliminates it, pressures of the cavities [Pa]. load: share of the dead forces and of the cavities' start values that
+    acts, 1 once they are switched on. rate: mean dx/dt since the state before, where the next step looks first.
+    """
+
+    t: float
+    load: float
+    x: np.ndarray
+    multiplier: np.ndarray
+    """With which the contact pressures follow from x, (no, nf, nq) [Pa]."""
+    pressure: np.ndarray
+    """The contact pressures: the multipliers the next step starts from, so that points that left start without."""
+    iterations: int = 0
+    stiffness: float = 1.0
+    rate: np.ndarray | None = None
+    grip: Grip = NO_GRIP
+    """With which the tractions of stuck points follow from x."""
+    hold: Grip = NO_GRIP
+    """The grip that the next step starts from."""
+
+
+class Loads(NamedTuple):
+    """What acts during one evaluation: dead forces (field_count,) [N], or 0, obstacles (no, 8), multipliers, penalty
+    factor.
+
+    filling (nc,): wanted volumes [m³] of the cavities, or pressures [Pa] where those are prescribed. shift (no, 3) [m]:
+    a further move of the obstacles to be linearised, None = none.
+    """
+
+    force: np.ndarray | float
+    rows: np.ndarray
+    multiplier: np.ndarray
+    filling: np.ndarray = np.zeros(0)
+    stiffness: float = 1.0
+    shift: np.ndarray | None = None
+    grip: Grip = NO_GRIP

@@ -1,0 +1,50 @@
+"""The boundary as the kernels read it, and how small matrices of its facets go into the tangent."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+
+class Surface(NamedTuple):
+    """What the contact kernel reads of the boundary: nf facets, nq points each."""
+
+    dofs: np.ndarray
+    """Unknowns of the six nodes (three, for linear elements), u_x first, then u_y, u_z, (nf, 18) uint32."""
+    positions: np.ndarray
+    """Slots of the packed upper triangle of 18 x 18, (nf, 171) uint32."""
+    rest: np.ndarray
+    """Rest coordinates, interleaved like the unknowns, (3 N2,) [m]."""
+    values: np.ndarray
+    """Six functions at the points, (nq, 6)."""
+    weights: np.ndarray
+    """Rest areas, (nf, nq) [m²]."""
+    penalty: np.ndarray
+    """Basic eps of each facet, (nf,) [Pa/m]."""
+
+
+def point_positions(x, surface: Surface):
+    """Where the contact points are, (nf, nq, 3) [m]."""
+    moved = (surface.rest + x[: len(surface.rest)])[surface.dofs].reshape(len(surface.dofs), 3, -1)
+    return np.einsum("qa,fia->fqi", surface.values, moved)
+
+
+@njit(cache=True)
+def add_point_stiffness(N, k, K):
+    """K[ia, jb] += k_ij N_a N_b."""
+    count = len(N)
+    for i in range(3):
+        for a in range(count):
+            for j in range(3):
+                for b in range(count):
+                    K[count * i + a, count * j + b] += k[i, j] * N[a] * N[b]
+
+
+@njit(cache=True)
+def scatter(K, positions, values):
+    """values[positions] += packed upper triangle of K."""
+    slot = 0
+    for a in range(K.shape[0]):
+        for b in range(a, K.shape[0]):
+            values[positions[slot]] += K[a, b]
+            slot += 1
