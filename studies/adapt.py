@@ -19,12 +19,15 @@ from massspring import (
 from massspring.volumes import Volumes
 from studies.case import BodyRecipe, Case
 from studies.errors import StudyError
-from studies.geometry import OrganMesh, fill, organ, read_mesh
+from studies.geometry import OrganMesh, fill, organ, read_mesh, scan
 from studies.geometry.organs import SHAPES
 from studies.scenes.base import Scene
 from studies.suggest import choose
 
 LUMEN, WHOLE = "lumen", "whole"
+
+FILE_PARAMETERS = ("path", "unit", "remesh", "smooth", "wall")
+"""Of the organ "file"."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +40,10 @@ class Prepared:
 
 
 def mesh_for(scene: Scene, nodes: int, filled: bool = True) -> OrganMesh:
-    """The scene's organ with `nodes` surface nodes; a mesh file comes as it is. Raises StudyError."""
+    """The scene's organ with `nodes` surface nodes. Raises StudyError.
+
+    A mesh file comes as it is, unless its parameters ask for a new surface: "remesh": true, or "smooth" or "wall" [m].
+    """
     if choose(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
         return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters)
     parameters = scene.organ.parameters
@@ -45,6 +51,11 @@ def mesh_for(scene: Scene, nodes: int, filled: bool = True) -> OrganMesh:
         raise StudyError(
             f"scene '{scene.name}': an organ from a file needs a path and a unit, it has {dict(parameters)}"
         )
+    for key in parameters:
+        choose(key, FILE_PARAMETERS, "parameter of an organ from a file")
+    asked = {key: parameters[key] for key in ("smooth", "wall") if key in parameters}
+    if asked or parameters.get("remesh"):
+        return scan(parameters["path"], nodes, unit=parameters["unit"], fill=filled, **asked)
     mesh = read_mesh(parameters["path"], unit=parameters["unit"])
     return fill(mesh) if filled and not len(mesh.tetrahedra) else mesh
 

@@ -36,7 +36,8 @@ class Organ:
     shape: str
     """A name of `studies.geometry`, or "file"."""
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    """Of the shape; for "file": {"path": …, "unit": "m" or "mm"}."""
+    """Of the shape; for "file": {"path": …, "unit": "m" or "mm"}, and "remesh": true, "smooth" or "wall" [m] for a new
+    surface with the nodes that are asked for."""
 
 
 @dataclass(frozen=True)

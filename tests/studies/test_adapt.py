@@ -12,6 +12,7 @@ from studies.errors import StudyError
 from studies.geometry import HalfSpace
 from studies.scenes import Held
 from studies.scenes.ball_clamped import BALL_CLAMPED
+from tests.geometry.boxes import box, split
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
 
 CLAMPED = replace(BALL_CLAMPED, reference=None)
@@ -70,6 +71,22 @@ def test_a_mesh_from_a_file_is_attached_where_the_region_is(tmp_path):
     found = patch_nodes(mesh, "top", top)
     assert len(found) == 9
     assert (mesh.points[found, 2] == 0.05).all()
+
+
+def test_a_file_may_ask_for_a_new_surface(tmp_path):
+    points, faces = split(*box((-1, -1, -1), (1, 1, 1)), times=3)
+    points *= 0.03 / np.linalg.norm(points, axis=1, keepdims=True)
+    scene = file_scene(write_obj(tmp_path / "ball.obj", points, faces))
+    asked = dict(scene.organ.parameters)
+
+    def meshed(**more):
+        return mesh_for(replace(scene, organ=replace(scene.organ, parameters=asked | more)), 150)
+
+    assert meshed().surface_count == len(points)
+    assert meshed(remesh=True).surface_count == 150
+    assert meshed(wall=0.005).hollow
+    with pytest.raises(StudyError, match="unknown parameter of an organ from a file 'wal'; did you mean 'wall'"):
+        meshed(wal=0.005)
 
 
 def test_dt_auto_is_the_fraction_of_the_limit_of_the_held_body():
