@@ -26,7 +26,7 @@ from reference_fem.cavity import Cavity  # noqa: E402
 from reference_fem.dynamics import DynamicsSettings, Moment, motion_path  # noqa: E402
 from reference_fem.element_table import ELEMENTS, Element  # noqa: E402
 from reference_fem.elements import facet_nodes, nodes, surface_triangles  # noqa: E402
-from reference_fem.equilibrium import Equilibrium, equilibrium_path  # noqa: E402
+from reference_fem.equilibrium import Checkpoint, Equilibrium, equilibrium_path  # noqa: E402
 from reference_fem.errors import ReferenceProblem, SlowSolverWarning  # noqa: E402
 from reference_fem.evaluate import Evaluator  # noqa: E402
 from reference_fem.loads import BodyForce, Traction  # noqa: E402
@@ -43,6 +43,7 @@ __all__ = [
     "ELEMENTS",
     "BodyForce",
     "Cavity",
+    "Checkpoint",
     "DynamicsSettings",
     "Element",
     "Equilibrium",

@@ -62,14 +62,26 @@ class Equilibrium:
         return float(self.J.max())
 
 
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """A path half-way: what was found at its first times, and all that the next load step starts from."""
+
+    path: list[Equilibrium]
+    state: State
+
+
 def equilibrium_path(
     problem: Problem,
     times,
     settings: NewtonSettings | None = None,
     on_step: Callable[[Equilibrium], None] | None = None,
+    on_checkpoint: Callable[[Checkpoint], None] | None = None,
+    resume: Checkpoint | None = None,
 ) -> list[Equilibrium]:
     """Equilibria at the given times [s], reached from rest at settings.start; on_step sees each as it is found.
 
+    on_checkpoint gets what `resume` needs to go on from there with the same problem, times and settings: the answers
+    are then those of the uninterrupted path.
     Dead loads and cavities that start filled are switched on first, at the start. Raises ReferenceProblem for a problem
     that cannot be set up, and when a sub-step below settings.smallest_step still fails: then its `converged` holds
     what was reached.
@@ -77,18 +89,20 @@ def equilibrium_path(
     settings = settings or NewtonSettings()
     times = check_times(times, settings.start)
     system = System(problem, settings)
-    path: list[Equilibrium] = []
+    path: list[Equilibrium] = [] if resume is None else list(resume.path)
     try:
-        state = system.rest()
+        state = system.rest() if resume is None else resume.state
         pending = (0, 0)
-        if system.starts_loaded():
+        if resume is None and system.starts_loaded():
             state, *pending = advance(system, state, settings.start, 1.0, path)
-        for t in times:
+        for t in times[len(path) :]:
             state, iterations, substeps = advance(system, state, t, 1.0, path)
             path.append(describe(system, state, iterations + pending[0], substeps + pending[1]))
             pending = (0, 0)
             if on_step is not None:
                 on_step(path[-1])
+            if on_checkpoint is not None:
+                on_checkpoint(Checkpoint(list(path), state))
     finally:
         system.solver.release()
     return path

@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from studies.atomic import write_whole
+from studies.checkpoints import kept
 from studies.errors import StudyError
 from studies.fingerprint import source_fingerprint
 from studies.paths import study_folder
@@ -66,7 +67,10 @@ def reference_listing(root: Path, scenes: Iterable[Scene]) -> pd.DataFrame:
         plan = scene.reference
         for piece in pieces(scene):
             path, state = piece.path(root), piece.state(root)
-            known = peek(path).attributes if state not in ("missing", "unreadable") else {}
+            known = peek(path).attributes if state not in ("missing", "half-way", "unreadable") else {}
+            if state == "half-way":
+                begun = kept(path, piece.stamp)
+                known = {"steps_done": len([e for e in begun.path if e.t in scene.checkpoints]) if begun else 0}
             finest = plan is not None and not piece.variant and piece.level == plan.levels[-1]
             floor = references[scene.name].floor["force"] if finest and scene.name in references else float("nan")
             rows.append(

@@ -9,6 +9,7 @@ from pathlib import Path
 from reference_fem import Equilibrium, NewtonSettings, Problem, ReferenceProblem, equilibrium_path, nodes
 from studies.adapt_reference import reference_problem
 from studies.case import scene_to_json
+from studies.checkpoints import drop, keep, kept
 from studies.fingerprint import source_fingerprint
 from studies.paths import record_path
 from studies.records import new_record
@@ -65,8 +66,15 @@ class Piece:
         """Whether it is there, from this code."""
         return is_current(self.path(root), self.key, reference_fingerprint())
 
+    @property
+    def stamp(self) -> str:
+        """Problem and code in one text."""
+        return f"{reference_fingerprint()} {self.key}"
+
     def state(self, root: Path) -> str:
-        """ "missing", "unreadable", "stale", or the status it ended with."""
+        """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""
+        if kept(self.path(root), self.stamp) is not None:
+            return "half-way"
         why = why_stale(self.path(root), self.key, reference_fingerprint())
         if why is None:
             return str(peek(self.path(root)).status)
@@ -151,10 +159,14 @@ def solve(root: Path, piece: Piece) -> Path:
     if piece.variant:
         work = VARIANTS[piece.variant][0](*work)
     problem, times, settings = work
+    record_file, stamp = piece.path(root), piece.stamp
+    before = kept(record_file, stamp)
     started = time.monotonic()
     status, message = Status.OK, ""
     try:
-        path = equilibrium_path(problem, times, settings)
+        path = equilibrium_path(
+            problem, times, settings, on_checkpoint=lambda c: keep(record_file, stamp, c), resume=before
+        )
     except ReferenceProblem as error:
         path = error.converged
         status, message = Status.NOT_CONVERGED, str(error)
@@ -169,8 +181,9 @@ def solve(root: Path, piece: Piece) -> Path:
         attributes=_attributes(piece, problem, found, time.monotonic() - started),
         fields=fields_of(piece.scene, problem, found),
     )
-    write_record(piece.path(root), record)
-    return piece.path(root)
+    write_record(record_file, record)
+    drop(record_file)
+    return record_file
 
 
 def _attributes(piece: Piece, problem: Problem, found: list[Equilibrium], seconds: float) -> dict:

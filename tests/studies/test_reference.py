@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from reference_fem import ReferenceProblem
+from reference_fem import Checkpoint, ReferenceProblem
+from studies import checkpoints
 from studies import reference_solve as module
 from studies.adapt_reference import whole_forces
 from studies.distance import hausdorff
@@ -218,6 +219,58 @@ def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, 
     assert refresh_uncertainty(tmp_path / "empty", [SCENE]) == []
 
 
+class Killed(BaseException):
+    """What a process that dies leaves behind: nothing is caught, nothing tidied."""
+
+
+def test_a_crash_half_way_costs_no_finished_step(solved, tmp_path, monkeypatch):
+    """The second load step dies; the next run starts at the first one's end and finds the same."""
+    piece, true_path, starts = Piece(SCENE, LEVELS[0]), module.equilibrium_path, []
+
+    def dies(problem, times, settings, on_checkpoint, resume):
+        def then_die(checkpoint):
+            on_checkpoint(checkpoint)
+            raise Killed
+
+        return true_path(problem, times, settings, on_checkpoint=then_die, resume=resume)
+
+    def watched(problem, times, settings, on_checkpoint, resume):
+        starts.append(len(resume.path) if resume else 0)
+        return true_path(problem, times, settings, on_checkpoint=on_checkpoint, resume=resume)
+
+    monkeypatch.setattr(module, "equilibrium_path", dies)
+    with pytest.raises(Killed):
+        solve(tmp_path, piece)
+    listing = reference_listing(tmp_path, [SCENE])
+    assert listing["state"].tolist() == ["half-way", *["missing"] * 5]
+    assert listing["steps"][0] == "1/2"
+    monkeypatch.setattr(module, "equilibrium_path", watched)
+    again, whole = read_record(solve(tmp_path, piece)), read_record(piece.path(solved))
+    assert starts == [1]
+    assert again.status == Status.OK
+    for name in ("displacement", "contact_force", "pressure"):
+        known = whole.fields[name].values
+        # The factorisation may order its sums by the first matrix it sees: rounding, not Newton's tolerance of 1e-6.
+        np.testing.assert_allclose(again.fields[name].values, known, rtol=0, atol=1e-9 * np.abs(known).max())
+    assert reference_listing(tmp_path, [SCENE])["state"][0] == "ok"
+    assert not list(tmp_path.rglob("*.steps"))
+
+
+def test_steps_of_other_code_are_not_gone_on_from(tmp_path, monkeypatch):
+    piece, asked = Piece(SCENE, LEVELS[0]), []
+    checkpoints.keep(piece.path(tmp_path), "other code", Checkpoint([], None))
+
+    def watched(problem, times, settings, on_checkpoint, resume):
+        asked.append(resume)
+        raise ReferenceProblem("enough")
+
+    monkeypatch.setattr(module, "equilibrium_path", watched)
+    solve(tmp_path, piece)
+    checkpoints.steps_path(piece.path(tmp_path)).write_bytes(b"cut off")
+    solve(tmp_path, piece)
+    assert asked == [None, None]
+
+
 def broken(problem, times, settings, **_):
     raise ReferenceProblem("no equilibrium found between t = 1 s and t = 4 s: the mesh folds; refine it", converged=[])
 
@@ -226,8 +279,8 @@ def test_a_path_that_breaks_off_is_stored_and_not_believed(solved, tmp_path, mon
     root = shutil.copytree(solved, tmp_path / "results")
     true_path = module.equilibrium_path
 
-    def half(problem, times, *settings):
-        raise ReferenceProblem("the mesh folds; refine it", converged=true_path(problem, times[:1], *settings))
+    def half(problem, times, settings, **_):
+        raise ReferenceProblem("the mesh folds; refine it", converged=true_path(problem, times[:1], settings))
 
     monkeypatch.setattr(module, "equilibrium_path", half)
     record = read_record(solve(root, Piece(SCENE, LEVELS[1])))
