@@ -17,7 +17,7 @@ def bladder_shape(
 ) -> Shape:
     """A well filled adult bladder [mm].
 
-    neck: its outer radius. The wall is 3 mm thick full, 5 mm empty (Manieri et al., J. Urol. 159 (1998) 761).
+    neck: its outer radius. The wall has up to 3 mm full, 5 mm empty (Jequier, Am. J. Roentgenol. 149 (1987) 563).
     Raises StudyError for a length that is none and a wall that fills the neck.
     """
     check_lengths("bladder", width=width, depth=depth, height=height, neck=neck, wall=wall)

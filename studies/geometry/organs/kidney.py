@@ -8,12 +8,12 @@ from studies.geometry.organs.millimetres import MARGIN, MM, check_lengths, metre
 from studies.geometry.regions import EllipsoidRegion
 
 VOLUME = Literature(
-    150.0, "Cheong et al., Clin. J. Am. Soc. Nephrol. 2 (2007) 38: 134 mL in women, 169 mL in men, by MRI"
+    150.0, "137 ± 30 mL by ultrasound (Lee, J. Korean Soc. Med. Ultrasound 15 (1996) 63), 150 g in textbooks"
 )
 
 
 def kidney_shape(length: float = 110.0, width: float = 60.0, thickness: float = 47.0, sinus: float = 20.0) -> Shape:
-    """An adult's kidney [mm], 11 cm long, 5-6 wide, 4-5 thick (Emamian et al., Am. J. Roentgenol. 160 (1993) 83).
+    """An adult's kidney [mm]: 10.6 ± 0.6 cm long (Lee 1996, as for the volume), 6 wide, 4-5 thick.
 
     sinus: depth of the hollow behind the lips of the hilum. Raises StudyError for a length that is none.
     """

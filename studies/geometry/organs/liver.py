@@ -12,7 +12,7 @@ from studies.geometry.levelset import Literature, Shape, project
 from studies.geometry.organs.millimetres import MM, check_lengths, metres, probe_near, si
 from studies.geometry.regions import EllipsoidRegion, Vector
 
-VOLUME = Literature(1500.0, "Henderson et al., Radiology 141 (1981) 525: 1,493 mL by CT")
+VOLUME = Literature(1500.0, "Henderson et al., Radiology 141 (1981) 525: 1,493 ± 230 mL by CT")
 LIVER_PRESS_DIRECTION: Vector = (0.0, 0.9, 0.19**0.5)
 """To the back and up: a plane with this normal, moving along it from the front, meets the smooth front of the right
 lobe first, away from the thin margin, and presses the liver against its bare area."""

@@ -8,13 +8,13 @@ from studies.geometry.levelset import Literature, Shape
 from studies.geometry.organs.millimetres import MARGIN, MM, check_lengths, metres, si, touch
 from studies.geometry.regions import EllipsoidRegion
 
-VOLUME = Literature(200.0, "Prassopoulos et al., Eur. Radiol. 7 (1997) 246: 215 mL by CT")
+VOLUME = Literature(200.0, "Prassopoulos et al., Eur. Radiol. 7 (1997) 246: 215 mL, 107 to 315, by CT")
 
 
 def spleen_shape(length: float = 126.0, width: float = 82.0, thickness: float = 50.0, notch: float = 10.0) -> Shape:
-    """An adult's spleen [mm]: 12 cm long, 7 wide, 4 thick; notch: depth of those in its superior border.
+    """An adult's spleen [mm]: 10-12 cm long, 7-9 wide, 4.6 thick (Caglar et al., Folia Morphol. 73, 2014).
 
-    Raises StudyError for a length that is none.
+    notch: depth of those in its superior border. Raises StudyError for a length that is none.
     """
     check_lengths("spleen", length=length, width=width, thickness=thickness, notch=notch)
     u, v, t = 0.5 * length, 0.5 * width, thickness

@@ -20,8 +20,8 @@ def stomach_shape(
 ) -> Shape:
     """A distended adult stomach: fundus above the cardia, body, incisura, antrum rising to the pylorus [mm].
 
-    height, width: of the whole, as seen from the front; fundus, body, antrum: outer radii. The wall is 4-5 mm thick
-    (Rapaccini et al., J. Ultrasound Med. 7 (1988) 383); the ends at cardia and pylorus are tubes 35 mm wide.
+    height, width: of the whole, as seen from the front; fundus, body, antrum: outer radii. The wall has 4.9 ± 1.6 mm
+    (Suk et al., J. Clin. Ultrasound 36 (2008) 462); the ends at cardia and pylorus are tubes 35 mm wide.
     Raises StudyError for a length that is none and a wall that fills the pylorus.
     """
     check_lengths("stomach", height=height, width=width, fundus=fundus, body=body, antrum=antrum, wall=wall)
