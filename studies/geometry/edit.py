@@ -13,42 +13,43 @@ def with_node_count(points: np.ndarray, triangles: np.ndarray, nodes: int) -> tu
 
     Edits keep to themselves: the neighbourhood of one is not edited again. Returns as near as that permits.
     """
-    touched = np.zeros(len(points), bool)
-    while len(points) != nodes:
-        edge = pick_edge(points, triangles, touched, split=len(points) < nodes)
-        if edge is None:
-            break
-        near = np.unique(triangles[np.isin(triangles, edge).any(axis=1)])
-        touched[near] = True
-        if len(points) < nodes:
-            points, triangles = split_edge(points, triangles, edge)
-            touched = np.append(touched, True)
+    split = len(points) < nodes
+    edges = pick_edges(points, triangles, abs(len(points) - nodes), split)
+    for k in range(len(edges)):
+        if split:
+            points, triangles = split_edge(points, triangles, edges[k])
         else:
-            points, triangles = collapse_edge(points, triangles, edge)
-            touched = np.delete(touched, edge[1])
+            points, triangles = collapse_edge(points, triangles, edges[k])
+            # The node that vanished leaves no gap in the numbering.
+            edges = edges - (edges > edges[k, 1])
     return points, triangles
 
 
-def pick_edge(points: np.ndarray, triangles: np.ndarray, touched: np.ndarray, split: bool) -> np.ndarray | None:
-    """The longest edge to split or the shortest to collapse that leaves 4 to 7 edges at every node around."""
+def pick_edges(points: np.ndarray, triangles: np.ndarray, wanted: int, split: bool) -> np.ndarray:
+    """Up to `wanted` edges, shape (e, 2), the longest to split or the shortest to collapse, far from each other, that
+    leave 4 to 7 edges at every node around."""
     edges = unique_edges(triangles)
     valence = np.bincount(edges.ravel(), minlength=len(points))
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    around = np.argsort(triangles.ravel(), kind="stable") // 3
+    start = np.concatenate([[0], np.cumsum(np.bincount(triangles.ravel(), minlength=len(points)))])
+    touched = np.zeros(len(points), bool)
+    picked = []
     for edge in edges[np.argsort(-length if split else length, kind="stable")]:
-        if touched[edge].any():
+        if len(picked) == wanted:
+            break
+        one, other = (np.unique(triangles[around[start[node] : start[node + 1]]]) for node in edge)
+        near = np.union1d(one, other)
+        if touched[near].any():
             continue
-        fans = triangles[np.isin(triangles, edge).sum(axis=1) == 2]
-        opposite = np.setdiff1d(fans, edge)
-        if split:
-            if (valence[opposite] <= 6).all():
-                return edge
-            continue
-        one, other = (np.unique(triangles[(triangles == node).any(axis=1)]) for node in edge)
-        # A collapse keeps the surface a manifold only where the ends share exactly the two opposite nodes.
         shared = np.intersect1d(one, other)
-        if len(shared) == 4 and valence[edge].sum() - 4 <= 7 and (valence[opposite] >= 5).all():
-            return edge
-    return None
+        opposite = shared[(shared != edge[0]) & (shared != edge[1])]
+        # A collapse keeps the surface a manifold only where the ends share exactly the two opposite nodes.
+        collapsible = len(shared) == 4 and valence[edge].sum() - 4 <= 7 and (valence[opposite] >= 5).all()
+        if (valence[opposite] <= 6).all() if split else collapsible:
+            picked.append(edge)
+            touched[near] = True
+    return np.array(picked, dtype=np.int64).reshape(-1, 2)
 
 
 def split_edge(points: np.ndarray, triangles: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

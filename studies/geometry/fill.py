@@ -7,6 +7,11 @@ from studies.geometry.gmsh_session import fill_once
 from studies.geometry.quality import MIN_DIHEDRAL, MIN_RATIO, dihedral_angles, tetrahedron_radius_ratio
 
 DELAUNAY, FRONTAL, HXT = 1, 4, 10
+MANY = 3000
+"""Surface nodes beyond which the fill is graded: elements grow inwards, or most would lie where nothing happens."""
+FEW_ATTEMPTS = ((DELAUNAY, True, False), (FRONTAL, True, False), (HXT, False, False))
+MANY_ATTEMPTS = ((HXT, False, True), (DELAUNAY, False, True), (HXT, False, False))
+"""Algorithm, Netgen's optimiser, graded. Netgen doubles the worst angle but takes seconds where elements are many."""
 
 
 def fill_surface(points: np.ndarray, triangles: np.ndarray, strict: bool = True) -> tuple[np.ndarray, np.ndarray]:
@@ -15,22 +20,19 @@ def fill_surface(points: np.ndarray, triangles: np.ndarray, strict: bool = True)
     Several algorithms are tried in a fixed order until the worst element is good enough. Raises StudyError when all
     fail, or, when strict, the best is still worse than MIN_DIHEDRAL or MIN_RATIO.
     """
-    # Netgen's optimiser doubles the worst angle but takes seconds where there are many elements.
-    attempts = (
-        [(DELAUNAY, True), (FRONTAL, True), (HXT, False)] if len(points) <= 3000 else [(HXT, False), (DELAUNAY, False)]
-    )
+    attempts, enough = (FEW_ATTEMPTS, 1.5) if len(points) <= MANY else (MANY_ATTEMPTS, 1.25)
     best: tuple[float, np.ndarray, np.ndarray] | None = None
     failures: list[str] = []
-    for algorithm, netgen in attempts:
+    for algorithm, netgen, graded in attempts:
         try:
-            all_points, tetrahedra = fill_once(points, triangles, seed=1, algorithm=algorithm, netgen=netgen)
+            all_points, tetrahedra = fill_once(points, triangles, algorithm, netgen, graded)
         except StudyError as error:
             failures.append(str(error))
             continue
         score = fill_score(all_points, tetrahedra)
         if best is None or score > best[0]:
             best = (score, all_points, tetrahedra)
-        if score >= 1.5:
+        if score >= enough:
             break
     if best is None:
         raise StudyError(f"the surface of {len(points)} nodes could not be filled with tetrahedra: {failures[-1]}")

@@ -7,7 +7,7 @@ import gmsh
 import numpy as np
 
 from studies.errors import StudyError
-from studies.geometry.mesh import boundary_triangles, tetrahedron_volumes
+from studies.geometry.mesh import boundary_triangles, row_keys, tetrahedron_volumes
 
 TRIANGLE, TETRAHEDRON = 2, 4
 
@@ -83,17 +83,19 @@ class Remesher:
 
 
 def fill_once(
-    points: np.ndarray, triangles: np.ndarray, seed: int, algorithm: int, netgen: bool
+    points: np.ndarray, triangles: np.ndarray, algorithm: int, netgen: bool, graded: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tetrahedra inside a closed surface: all points, the surface's first and unchanged, and tetrahedra (k, 4).
 
-    Raises StudyError when gmsh fails or does not keep the surface node by node.
+    graded: elements grow from the surface inwards instead of staying as small as the facets. Raises StudyError when gmsh fails or does not keep the surface node by node.
     """
-    with fresh_model(seed, Mesh_Algorithm3D=algorithm, Mesh_Optimize=1, Mesh_OptimizeNetgen=float(netgen)):
+    with fresh_model(Mesh_Algorithm3D=algorithm, Mesh_Optimize=1, Mesh_OptimizeNetgen=float(netgen)):
         surface = add_surface(points, triangles)
         loop = gmsh.model.geo.addSurfaceLoop([surface])
         gmsh.model.geo.addVolume([loop])
         gmsh.model.geo.synchronize()
+        if graded:
+            grow_inwards(surface, points)
         gmsh.model.mesh.generate(3)
         tags, all_points, tetrahedra = read_elements(TETRAHEDRON)
     count = len(points)
@@ -106,9 +108,20 @@ def fill_once(
     return all_points, tetrahedra
 
 
+def grow_inwards(surface: int, points: np.ndarray) -> None:
+    """Let the size of elements grow from that of the facets to an eighth of the body's least extent in its middle."""
+    extent = float(np.ptp(points, axis=0).min())
+    field = gmsh.model.mesh.field.add("Extend")
+    gmsh.model.mesh.field.setNumbers(field, "SurfacesList", [surface])
+    gmsh.model.mesh.field.setNumber(field, "DistMax", extent / 2.0)
+    gmsh.model.mesh.field.setNumber(field, "SizeMax", extent / 8.0)
+    gmsh.model.mesh.field.setAsBackgroundMesh(field)
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+
+
 def same_triangles(one: np.ndarray, other: np.ndarray) -> bool:
     """Whether two sets of triangles use the same nodes, whatever the order."""
-    if len(one) != len(other):
+    if len(one) != len(other) or one.max() != other.max():
         return False
-    rows = [np.unique(np.sort(triangles, axis=1), axis=0) for triangles in (one, other)]
-    return rows[0].shape == rows[1].shape and bool((rows[0] == rows[1]).all())
+    rows = [np.sort(row_keys(np.sort(triangles, axis=1))) for triangles in (one, other)]
+    return bool((rows[0] == rows[1]).all())

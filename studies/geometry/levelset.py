@@ -76,28 +76,54 @@ def normals(shape: Shape, points: np.ndarray) -> np.ndarray:
     return rows / np.linalg.norm(rows, axis=1, keepdims=True)
 
 
-def project(shape: Shape, points: np.ndarray, constraints: tuple[Level, ...] = ()) -> np.ndarray:
+STALE = 0.05
+"""A step that leaves more than this share of the residual takes new gradients before the next one."""
+STEPS = 60
+
+
+def project(
+    shape: Shape, points: np.ndarray, constraints: tuple[Level, ...] = (), within: float | None = None
+) -> np.ndarray:
     """Move points (n, 3) [m] onto f = 0, and onto g = 0 for every further constraint g.
 
-    Newton's method with the smallest correction, d = -A^T (A A^T)^-1 r with the gradients as rows of A. Raises
-    StudyError where it does not converge, which happens only far from the surface or where the constraints do not meet.
+    Newton's method with the smallest correction, d = -A^T (A A^T)^-1 r with the gradients as rows of A, which are kept
+    while they serve (chord method). within: residual [m] at which a point stays; rounding when None. Raises StudyError
+    where it does not converge, which happens only far from the surface or where the constraints do not meet.
     """
     x = np.array(points, float)
     levels = (shape.level, *constraints)
-    # The step of the difference only changes the rate of convergence; the residual decides where the points end.
-    step, tolerance = 1e-6 * shape.size, 1e-13 * shape.size
-    for _ in range(60):
-        residual = np.stack([level(x) for level in levels], axis=1)
-        moving = np.abs(residual).max(axis=1, initial=0.0) > tolerance
-        if not moving.any():
+    tolerance = 1e-13 * shape.size if within is None else within
+    residual = np.stack([level(x) for level in levels], axis=1)
+    rows = np.zeros((len(x), len(levels), 3))
+    stale = np.ones(len(x), bool)
+    moving = np.flatnonzero(np.abs(residual).max(axis=1, initial=0.0) > tolerance)
+    for _ in range(STEPS):
+        if not len(moving):
             return x
-        rows = np.stack([gradient(level, x[moving], step) for level in levels], axis=1)
-        gram = rows @ rows.transpose(0, 2, 1) + 1e-12 * np.eye(len(levels))
-        d = -(rows.transpose(0, 2, 1) @ np.linalg.solve(gram, residual[moving][:, :, None]))[:, :, 0]
+        new = moving[stale[moving]]
+        if len(new):
+            rows[new] = forward_gradients(levels, x[new], residual[new], 1e-6 * shape.size)
+        a, r = rows[moving], residual[moving]
+        gram = a @ a.transpose(0, 2, 1) + 1e-12 * np.eye(len(levels))
+        d = -(a.transpose(0, 2, 1) @ np.linalg.solve(gram, r[:, :, None]))[:, :, 0]
         # A step longer than a cell leaves the neighbourhood in which the gradient means anything.
         d *= np.minimum(1.0, shape.cell / np.maximum(np.linalg.norm(d, axis=1), 1e-300))[:, None]
         x[moving] += d
-    worst = np.abs(np.stack([level(x) for level in levels])).max()
+        residual[moving] = np.stack([level(x[moving]) for level in levels], axis=1)
+        left = np.abs(residual[moving]).max(axis=1)
+        stale[moving] = left > STALE * np.abs(r).max(axis=1)
+        moving = moving[left > tolerance]
+    worst = np.abs(residual).max()
     raise StudyError(
         f"{shape.name}: points could not be brought onto the surface (still {worst:.2g} m away); start nearer to it"
     )
+
+
+def forward_gradients(levels: tuple[Level, ...], x: np.ndarray, values: np.ndarray, step: float) -> np.ndarray:
+    """Gradients, shape (n, l, 3), of l levels at x (n, 3) [m] where they have `values` (n, l), by forward differences.
+
+    Good enough for Newton's method, whose residual and not its gradient decides where the points end.
+    """
+    shifted = (x[None, :, :] + step * np.eye(3)[:, None, :]).reshape(-1, 3)
+    ahead = np.stack([level(shifted).reshape(3, len(x)) for level in levels], axis=2)
+    return (ahead - values[None]).transpose(1, 2, 0) / step

@@ -37,8 +37,8 @@ def sweep(shape: Shape, points: np.ndarray, triangles: np.ndarray) -> np.ndarray
     """Even out: SWEEPS times 0.7 of the way to the mean of the neighbours and one step back onto f = 0."""
     edges = unique_edges(triangles)
     for _ in range(SWEEPS):
-        points = project(shape, points + 0.7 * (neighbour_mean(points, edges) - points))
-    return points
+        points = project(shape, points + 0.7 * (neighbour_mean(points, edges) - points), within=0.01 * shape.cell)
+    return project(shape, points)
 
 
 def neighbour_mean(points: np.ndarray, edges: np.ndarray) -> np.ndarray:

@@ -182,3 +182,17 @@ def test_octant_is_an_eighth_of_a_ball_graded_to_its_pole(sizes):
 def test_bad_wishes_get_a_sentence(call, sentence):
     with pytest.raises(StudyError, match=sentence):
         call()
+
+
+@pytest.mark.slow
+def test_a_fine_surface_is_filled_with_elements_that_grow_inwards():
+    mesh = ball(4000, RADIUS)
+    assert mesh.surface_count == 4000
+    check_tetrahedra(mesh.points, mesh.tetrahedra)
+    assert rows(boundary_triangles(mesh.tetrahedra)) == rows(mesh.triangles)
+    assert dihedral_angles(mesh.points, mesh.tetrahedra).min() >= MIN_DIHEDRAL
+    assert tetrahedron_radius_ratio(mesh.points, mesh.tetrahedra).min() >= MIN_RATIO
+    size = np.cbrt(tetrahedron_volumes(mesh.points, mesh.tetrahedra))
+    depth = RADIUS - np.linalg.norm(mesh.points[mesh.tetrahedra].mean(axis=1), axis=1)
+    # Edges of 2.4 mm at the surface and of an eighth of the diameter, 12 mm, in the middle.
+    assert np.median(size[depth > 0.5 * RADIUS]) > 2.5 * np.median(size[depth < 0.05 * RADIUS])
