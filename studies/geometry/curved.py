@@ -10,6 +10,7 @@ from studies.errors import StudyError
 from studies.geometry.jacobian import PAIRS, curved_volume, smallest_jacobian
 from studies.geometry.levelset import Shape, at_depth, project
 from studies.geometry.mesh import OrganMesh, tetrahedron_volumes, unique_edges
+from studies.geometry.regions import Region, region_from_dict
 from studies.geometry.shapes import make_shape
 
 GOOD = 0.1
@@ -62,9 +63,19 @@ def true_surfaces(mesh: OrganMesh) -> list[tuple[np.ndarray, Shape]]:
     raise StudyError(f"{mesh.name}: its true shape is not known, so it cannot be curved; mesh it from an organ")
 
 
+def true_outlines(mesh: OrganMesh) -> list[tuple[np.ndarray, Region]]:
+    """Of each attachment the edges (e, 2) of its outline, and the region on whose level = 0 they lie."""
+    outlines = []
+    for name, data in mesh.recipe.get("regions", {}).items():
+        half = mesh.patch_triangles(name)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+        edges, count = np.unique(np.sort(half, axis=1), axis=0, return_counts=True)
+        outlines.append((edges[count == 1], region_from_dict(data)))
+    return outlines
+
+
 def make_curved(mesh: OrganMesh) -> CurvedMesh:
-    """The second-order mesh of a filled organ: mid-side nodes of the boundary on the true surface, the inner ones
-    moved along. Raises StudyError for a mesh without tetrahedra or true shape, or too coarse to be curved unfolded."""
+    """The second-order mesh of a filled organ: mid-side nodes of the boundary on the true surface, those of outlines of
+    attachments on the true outlines, the inner ones moved along. Raises StudyError for a mesh without tetrahedra or true shape, or too coarse to be curved unfolded."""
     if not len(mesh.tetrahedra):
         raise StudyError(f"{mesh.name}: only a filled mesh can be curved; ask for fill=True")
     count = len(mesh.points)
@@ -78,6 +89,10 @@ def make_curved(mesh: OrganMesh) -> CurvedMesh:
         here = np.searchsorted(key, unique_edges(triangles) @ [count, 1])
         straight = mesh.points[edges[here]].mean(axis=1)
         moved[here] = project(shape, straight) - straight
+    for rim, region in true_outlines(mesh):
+        here = np.searchsorted(key, rim @ [count, 1])
+        straight = mesh.points[rim].mean(axis=1)
+        moved[here] = project(true_surfaces(mesh)[0][1], straight, (region.level,)) - straight
     fixed = np.isin(key, unique_edges(mesh.triangles) @ [count, 1])
     moved = spread(mesh, middle, moved, fixed)
     points = np.concatenate([mesh.points, mesh.points[edges].mean(axis=1) + moved])

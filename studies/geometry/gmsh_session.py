@@ -87,7 +87,8 @@ def fill_once(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tetrahedra inside a closed surface: all points, the surface's first and unchanged, and tetrahedra (k, 4).
 
-    graded: elements grow from the surface inwards instead of staying as small as the facets. Raises StudyError when gmsh fails or does not keep the surface node by node.
+    graded: elements grow from the surface inwards instead of staying as small as the facets.
+    Raises StudyError when gmsh fails or does not keep the surface node by node.
     """
     with fresh_model(Mesh_Algorithm3D=algorithm, Mesh_Optimize=1, Mesh_OptimizeNetgen=float(netgen)):
         surface = add_surface(points, triangles)

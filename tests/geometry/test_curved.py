@@ -8,8 +8,8 @@ import skfem
 from skfem.models.poisson import laplace
 
 from studies.errors import StudyError
-from studies.geometry import api, ball, ball_octant, curved, organ, organ_family
-from studies.geometry.curved import GOOD, make_curved, middle_stiffness, unfold
+from studies.geometry import HalfSpace, api, ball, ball_octant, curved, organ, organ_family
+from studies.geometry.curved import GOOD, make_curved, middle_stiffness, true_outlines, unfold
 from studies.geometry.family import true_volume
 from studies.geometry.jacobian import PAIRS, curved_volume, jacobian_coefficients, smallest_jacobian
 from studies.geometry.levelset import Shape, at_depth
@@ -74,6 +74,20 @@ def test_nodes_are_on_the_true_surfaces_and_nothing_folds(families, name):
             nodes = [middle[edge] for edge in map(tuple, unique_edges(triangles).tolist())]
             # The projection stops at 1e-13 of the box.
             assert np.abs(at_depth(shape, depth).level(made.points[nodes])).max() < 1e-12
+
+
+def test_outlines_of_attachments_are_curves():
+    """The rim of a cap of a ball is a circle: its mid-side nodes are on it, not on the chords."""
+    cap = 0.035
+    mesh = ball(300, RADIUS, {"top": HalfSpace((0.0, 0.0, cap), (0.0, 0.0, -1.0))})
+    made = curved(mesh)
+    rim = true_outlines(mesh)[0][0]
+    assert len(rim) > 10
+    ends = np.sort(made.cells[:, np.array(PAIRS)].reshape(-1, 2), axis=1).tolist()
+    middle = dict(zip(map(tuple, ends), made.cells[:, 4:].ravel().tolist(), strict=True))
+    points = made.points[[middle[edge] for edge in map(tuple, rim.tolist())]]
+    assert np.abs(points[:, 2] - cap).max() < 1e-13
+    assert np.abs(np.hypot(points[:, 0], points[:, 1]) - np.sqrt(RADIUS**2 - cap**2)).max() < 1e-13
 
 
 def test_a_wall_folds_unless_its_inner_nodes_follow(families):
