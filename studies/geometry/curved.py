@@ -74,8 +74,10 @@ def true_outlines(mesh: OrganMesh) -> list[tuple[np.ndarray, Region]]:
 
 
 def make_curved(mesh: OrganMesh) -> CurvedMesh:
-    """The second-order mesh of a filled organ: mid-side nodes of the boundary on the true surface, those of outlines of
-    attachments on the true outlines, the inner ones moved along. Raises StudyError for a mesh without tetrahedra or true shape, or too coarse to be curved unfolded."""
+    """The second-order mesh of a filled organ, its boundary on the true surfaces and outlines, the rest moved along.
+
+    Raises StudyError for a mesh without tetrahedra or true shape, or too coarse to be curved unfolded.
+    """
     if not len(mesh.tetrahedra):
         raise StudyError(f"{mesh.name}: only a filled mesh can be curved; ask for fill=True")
     count = len(mesh.points)
