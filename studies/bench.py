@@ -29,6 +29,7 @@ from reference_fem.exact import BALL_BETWEEN_PLANES
 from studies.adapt_reference import reference_problem, whole_forces
 from studies.case import BodyRecipe, Case
 from studies.geometry import ball
+from studies.geometry import bench as geometry_bench
 from studies.report import write_table
 from studies.run import measure
 from studies.scenes.ball_squeeze import BALL_SQUEEZE, PRESS_END, RADIUS
@@ -145,6 +146,11 @@ def second_code_lines() -> list[Line]:
     return [Line("Newton iteration over NGSolve's", cost["ratio"], "1", 1.5, note=note)]
 
 
+def geometry_lines() -> list[Line]:
+    """Meshes of random organs, of a fine liver and of families."""
+    return [Line(*promise) for promise in geometry_bench.promises()]
+
+
 def main() -> None:
     """Measures everything; the table says for each number whether it is met."""
     stages: tuple[Callable[[], list[Line]], ...] = (
@@ -153,6 +159,7 @@ def main() -> None:
         reference_lines,
         speed_lines,
         second_code_lines,
+        geometry_lines,
     )
     lines = [line for stage in stages for line in stage()]
     table = pd.DataFrame(

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from studies.errors import StudyError
 from studies.geometry.checks import check_surface
 from studies.geometry.count import Surface, surface_with
 from studies.geometry.fill import fill_surface
@@ -11,7 +12,7 @@ from studies.geometry.gmsh_session import Remesher, fresh_model
 from studies.geometry.levelset import Shape
 from studies.geometry.mesh import triangle_areas
 from studies.geometry.octant import build_octant
-from studies.geometry.regions import region_from_dict
+from studies.geometry.regions import ON_CURVE, Region, region_from_dict
 from studies.geometry.shapes import make_shape
 from studies.geometry.shell import fill_wall
 from studies.geometry.snap import relax, snap_region
@@ -40,8 +41,8 @@ def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
 def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:
     """Any shape by the `nodes`, `regions`, `fill` and `layers` of a recipe; hollow when the shape has a wall."""
-    points, triangles = even_surface(shape, first_surface(shape), recipe["nodes"])
-    points, triangles = snap_all(shape, points, triangles, recipe["regions"])
+    regions = [region_from_dict(data) for data in recipe["regions"].values()]
+    points, triangles = mesh_surface(shape, recipe["nodes"], regions)
     return finish(shape, points, triangles, recipe)
 
 
@@ -63,12 +64,46 @@ def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict
     return arrays_of(all_points, triangles, tetrahedra, len(points), len(points))
 
 
-def snap_all(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: dict[str, dict[str, Any]]) -> Surface:
+def mesh_surface(shape: Shape, nodes: int, regions: list[Region]) -> Surface:
+    """An even surface with `nodes` nodes and every region's outline on its edges.
+
+    Where edges are too long for a region, the surface is meshed again with edges half as long in the regions.
+    """
+    start_points, start_triangles = first_surface(shape)
+    area = float(triangle_areas(start_points, start_triangles).sum())
+    for region in regions:
+        region.level(start_points[:1])  # a region that is none is refused here, not inside the mesher
+    with fresh_model():
+        remesher = Remesher(start_points, start_triangles)
+        surface = snap_if_it_fits(shape, *surface_with(nodes, area, remesher.mesh, shape), regions)
+        if surface is None:
+            remesher.finer_in(regions)
+            surface = snap_all(shape, *surface_with(nodes, area, remesher.mesh, shape), regions)
+    return surface
+
+
+def snap_if_it_fits(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region]) -> Surface | None:
+    """The surface with its outlines, or None when its edges are too long for one of the regions."""
+    try:
+        surface = snap_all(shape, points, triangles, regions)
+    except StudyError:
+        # Not lost: the finer surface that follows either fits or says the same.
+        return None
+    return surface if all(is_met(region, *surface) for region in regions) else None
+
+
+def is_met(region: Region, points: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether some triangle lies inside the region, outline included."""
+    inside = region.level(points) <= ON_CURVE * np.linalg.norm(np.ptp(points, axis=0))
+    return bool(inside[triangles].all(axis=1).any())
+
+
+def snap_all(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region]) -> Surface:
     """Even out the surface, then give every region its outline; earlier outlines stay where they are."""
     fixed = np.zeros(len(points), bool)
     points = relax(shape, points, triangles, None, fixed, fixed)
-    for data in regions.values():
-        points, triangles, on_curve = snap_region(shape, points, triangles, region_from_dict(data), fixed)
+    for region in regions:
+        points, triangles, on_curve = snap_region(shape, points, triangles, region, fixed)
         fixed |= on_curve
     return points, triangles
 

@@ -7,7 +7,8 @@ import gmsh
 import numpy as np
 
 from studies.errors import StudyError
-from studies.geometry.mesh import boundary_triangles, row_keys, tetrahedron_volumes
+from studies.geometry.mesh import boundary_triangles, same_triangles, tetrahedron_volumes
+from studies.geometry.regions import Region
 
 TRIANGLE, TETRAHEDRON = 2, 4
 
@@ -68,11 +69,18 @@ class Remesher:
         gmsh.model.mesh.createGeometry()
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
         self.center = points.mean(axis=0)
+        self.regions: list[Region] = []
+
+    def finer_in(self, regions: list[Region]) -> None:
+        """From now on edges in the regions are half as long as elsewhere."""
+        self.regions = regions
 
     def mesh(self, size: float) -> tuple[np.ndarray, np.ndarray]:
         """Points (n, 3) [m] near the surface and outward triangles (t, 3) with edges of length `size` [m]."""
-        gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", 0.5 * size if self.regions else size)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        if self.regions:
+            gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, lc: self.size_at(size, np.array([[x, y, z]])))
         gmsh.model.mesh.clear()
         gmsh.model.mesh.generate(2)
         _, points, triangles = read_elements(TRIANGLE)
@@ -80,6 +88,11 @@ class Remesher:
         if np.einsum("ij,ij->", a, np.cross(b, c)) < 0:
             triangles = triangles[:, ::-1].copy()
         return points, triangles
+
+    def size_at(self, size: float, point: np.ndarray) -> float:
+        """Length of edges [m] at a point (1, 3): half of `size` in the regions, all of it twice that length away."""
+        outside = min(float(region.level(point)[0]) for region in self.regions)
+        return size * (0.5 + 0.25 * min(max(outside / size, 0.0), 2.0))
 
 
 def fill_once(
@@ -118,11 +131,3 @@ def grow_inwards(surface: int, points: np.ndarray) -> None:
     gmsh.model.mesh.field.setNumber(field, "SizeMax", extent / 8.0)
     gmsh.model.mesh.field.setAsBackgroundMesh(field)
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
-
-
-def same_triangles(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether two sets of triangles use the same nodes, whatever the order."""
-    if len(one) != len(other) or one.max() != other.max():
-        return False
-    rows = [np.sort(row_keys(np.sort(triangles, axis=1))) for triangles in (one, other)]
-    return bool((rows[0] == rows[1]).all())

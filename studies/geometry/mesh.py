@@ -152,6 +152,14 @@ def row_keys(rows: np.ndarray) -> np.ndarray:
     return key
 
 
+def same_triangles(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two sets of triangles use the same nodes, whatever the order."""
+    if len(one) != len(other) or one.max() != other.max():
+        return False
+    rows = [np.sort(row_keys(np.sort(triangles, axis=1))) for triangles in (one, other)]
+    return bool((rows[0] == rows[1]).all())
+
+
 def tetrahedron_volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
     """Signed volumes [m^3], shape (k,)."""
     a, b, c, d = points[tetrahedra].transpose(1, 0, 2)

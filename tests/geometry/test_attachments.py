@@ -115,3 +115,14 @@ def test_regions_survive_json(region):
     again = region_from_dict(region_to_dict(region))
     x = np.random.default_rng(0).normal(size=(20, 3))
     assert type(again) is type(region) and (again.level(x) == region.level(x)).all()
+
+
+def test_a_region_smaller_than_the_edges_gets_a_finer_surface():
+    """A disc 16 mm wide on a ball of 150 nodes, whose edges are 16 mm: the surface is meshed finer there."""
+    small = {"spot": BallRegion((0.0, 0.03, 0.04), 0.008)}
+    mesh = ball(150, RADIUS, small)
+    assert mesh.surface_count == 150
+    check_surface(mesh.points[:150], mesh.triangles)
+    assert len(mesh.patch_triangles("spot")) >= 3
+    # The cap a sphere of radius r cuts from one of radius R around a point of it has the area pi r^2; facets lose some.
+    assert 0.6 < patch_area(mesh, "spot") / (np.pi * 0.008**2) < 1.0

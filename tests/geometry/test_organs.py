@@ -17,9 +17,11 @@ from studies.geometry import (
     project_ball,
     project_liver,
 )
+from studies.geometry.levelset import normals
 from studies.geometry.mesh import boundary_triangles, tetrahedron_volumes, triangle_normals, unique_edges
 from studies.geometry.organs.liver import LIVER
 from studies.geometry.quality import MIN_DIHEDRAL, MIN_RATIO, dihedral_angles, tetrahedron_radius_ratio
+from studies.geometry.surface import first_surface
 
 RADIUS = 0.05
 COUNTS = (150, 300, 550, 1100)
@@ -115,14 +117,13 @@ def test_probe_point_and_press_direction_meet_the_smooth_front(livers):
     assert abs(LIVER.level(point[None])[0]) < 1e-13
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-12) and normal[1] < -0.8
     assert np.linalg.norm(LIVER_PRESS_DIRECTION) == pytest.approx(1.0, abs=1e-12)
+    # On the true surface: where a coarse mesh is met first depends on where its nodes happen to be.
+    points, _ = first_surface(LIVER)
+    first = points[np.argmin(points @ LIVER_PRESS_DIRECTION)]
+    near = points[np.linalg.norm(points - first, axis=1) < 0.012]
+    # Met head on, and smooth over the 2.4 cm that touch first; on the thin margin it would be -0.55 to -0.02.
+    assert len(near) > 20 and (normals(LIVER, near) @ LIVER_PRESS_DIRECTION).max() < -0.8
     mesh = livers[1100]
-    first = mesh.points[np.argmin(mesh.points @ LIVER_PRESS_DIRECTION)]
-    near = np.linalg.norm(mesh.points[: mesh.surface_count] - first, axis=1) < 0.018
-    faces = mesh.triangles[near[mesh.triangles].all(axis=1)]
-    normals = triangle_normals(mesh.points, faces)
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    # Measured -0.95 here; where a plane meets the thin margin first (directions further up), -0.55 to -0.02.
-    assert len(faces) > 10 and (normals @ LIVER_PRESS_DIRECTION).max() < -0.8
     # The bare area looks the way the plane pushes: pressed against, not torn off.
     patch = triangle_normals(mesh.points, mesh.patch_triangles("bare_area")).sum(axis=0)
     assert patch @ LIVER_PRESS_DIRECTION > 0.9 * np.linalg.norm(patch)
