@@ -21,7 +21,7 @@ from studies.errors import StudyError
 from studies.geometry.mesh import OrganMesh
 from studies.geometry.regions import ON_CURVE, region_from_dict
 
-TIME_LIMIT = 120.0
+TIME_LIMIT = 300.0
 """Seconds after which a meshing job is given up: 20 times what the largest one takes; gmsh hangs without a word."""
 
 PARTS = ("points", "triangles", "tetrahedra", "surface_count", "outer_count")
