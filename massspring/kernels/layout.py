@@ -37,12 +37,14 @@ class VolumeRows(NamedTuple):
 
     triangles: np.ndarray
     """(f, 3) uint32."""
+    normal: np.ndarray
+    """Of the triangles, twice their area long [m²], (f, 3)."""
     term_start: np.ndarray
-    """First term of each triangle, (f + 1,) uint32; a term is a volume that the triangle bounds."""
+    """First term of each entry of J, (e + 1,) uint32; a term is a triangle at its node that bounds its volume."""
+    term_triangle: np.ndarray
+    """(t,) uint32."""
     term_share: np.ndarray
-    """s_rf [1], (t,)."""
-    term_entry: np.ndarray
-    """Entries of J that the term adds to, one per corner, (t, 3) uint32."""
+    """s_rf / 6 [1], (t,)."""
     row_start: np.ndarray
     """First entry of each volume, (m + 1,) uint32."""
     column: np.ndarray
@@ -60,13 +62,11 @@ class VolumeRows(NamedTuple):
     lam: np.ndarray
     """Multipliers, on the way in those of the last step [Pa], (m,)."""
     right: np.ndarray
-    """Right-hand side of the multipliers [m³/s²], (m,)."""
+    """What the multipliers of the moment leave of the right-hand side [m³/s²], (m,)."""
     diagonal: np.ndarray
     """S_rr [m⁴/kg], (m,)."""
     matrix: np.ndarray
     """S [m⁴/kg], (m, m); (0, 0) where it is solved iteratively."""
-    residual: np.ndarray
-    """(m,)."""
     search: np.ndarray
     """(m,)."""
     image: np.ndarray

@@ -29,10 +29,10 @@ def dense_into(rows, motion, inverse_mass, matrix):
 
 
 @compiled
-def solve_dense(matrix, right, lam):
-    """S lam = rhs by Cholesky, L over S in place (eq. 33).
+def solve_dense(matrix, right, change):
+    """S Δlam = rhs by Cholesky, L over S in place (eq. 33).
 
-    A volume that is held by its nodes, or depends on those before it, has a pivot of round-off: lam_r = 0.
+    A volume that is held by its nodes, or depends on those before it, has a pivot of round-off: Δlam_r = 0.
     """
     m = right.shape[0]
     for k in range(m):
@@ -55,13 +55,13 @@ def solve_dense(matrix, right, lam):
     for k in range(m):
         total = right[k]
         for q in range(k):
-            total -= matrix[k, q] * lam[q]
-        lam[k] = total / matrix[k, k] if matrix[k, k] > 0.0 else 0.0
+            total -= matrix[k, q] * change[q]
+        change[k] = total / matrix[k, k] if matrix[k, k] > 0.0 else 0.0
     for k in range(m - 1, -1, -1):
-        total = lam[k]
+        total = change[k]
         for i in range(k + 1, m):
-            total -= matrix[i, k] * lam[i]
-        lam[k] = total / matrix[k, k] if matrix[k, k] > 0.0 else 0.0
+            total -= matrix[i, k] * change[i]
+        change[k] = total / matrix[k, k] if matrix[k, k] > 0.0 else 0.0
 
 
 @compiled
@@ -74,43 +74,43 @@ def apply_schur(rows, motion, inverse_mass, p, product):
 
 @compiled
 def solve_iteratively(rows, motion, inverse_mass, lam, allowed, most):
-    """S lam = rhs by conjugate gradients with the diagonal as preconditioner, from the lam given (eq. 34).
+    """lam += S⁻¹ rhs by conjugate gradients with the diagonal as preconditioner (eq. 34).
 
-    Ends when |rhs − S lam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number.
-    A volume without a diagonal has nothing to push on: lam_r = 0.
+    Ends when |rhs − S Δlam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number. A volume
+    without a diagonal has nothing to push on and is left out.
     """
     m = lam.shape[0]
-    residual, search, image = rows.residual, rows.search, rows.image
+    residual, search, image = rows.right, rows.search, rows.image
+    rho = 0.0
+    worst = 0.0
     for r in range(m):
         if not rows.diagonal[r] > 0.0:
-            lam[r] = 0.0
-    apply_schur(rows, motion, inverse_mass, lam, image)
-    rho = 0.0
-    for r in range(m):
-        residual[r] = rows.right[r] - image[r] if rows.diagonal[r] > 0.0 else 0.0
-        search[r] = residual[r] / rows.diagonal[r] if rows.diagonal[r] > 0.0 else 0.0
-        rho += residual[r] * search[r]
-    for iteration in range(most):
-        worst = 0.0
+            residual[r] = 0.0
+        search[r] = 0.0
+        worst = max(worst, abs(residual[r]) - allowed[r])
+    iteration = 0
+    while worst > 0.0 and iteration < most:
+        before = rho
+        rho = 0.0
         for r in range(m):
-            worst = max(worst, abs(residual[r]) - allowed[r])
-        if worst <= 0.0 or not rho > 0.0:
-            return iteration
+            if rows.diagonal[r] > 0.0:
+                rho += residual[r] * residual[r] / rows.diagonal[r]
+        keep = rho / before if iteration > 0 else 0.0
+        for r in range(m):
+            if rows.diagonal[r] > 0.0:
+                search[r] = residual[r] / rows.diagonal[r] + keep * search[r]
         apply_schur(rows, motion, inverse_mass, search, image)
         curvature = 0.0
         for r in range(m):
             curvature += search[r] * image[r]
         if not curvature > 0.0:
-            return iteration
+            break
         alpha = rho / curvature
-        before = rho
-        rho = 0.0
+        worst = 0.0
         for r in range(m):
             lam[r] += alpha * search[r]
             if rows.diagonal[r] > 0.0:
                 residual[r] -= alpha * image[r]
-                rho += residual[r] * residual[r] / rows.diagonal[r]
-        for r in range(m):
-            if rows.diagonal[r] > 0.0:
-                search[r] = residual[r] / rows.diagonal[r] + rho / before * search[r]
-    return most
+            worst = max(worst, abs(residual[r]) - allowed[r])
+        iteration += 1
+    return iteration

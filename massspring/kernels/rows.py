@@ -14,21 +14,21 @@ def rows_into(x, rows):
 
     One area vector a triangle serves its three nodes in every volume it bounds. Σ_j J_rj = 0.
     """
-    rows.value[:] = 0.0
+    normal = rows.normal
     for f in range(rows.triangles.shape[0]):
         a, b, c = rows.triangles[f, 0], rows.triangles[f, 1], rows.triangles[f, 2]
         a0, a1, a2 = x[a, 0], x[a, 1], x[a, 2]
         b0, b1, b2 = x[b, 0] - a0, x[b, 1] - a1, x[b, 2] - a2
         c0, c1, c2 = x[c, 0] - a0, x[c, 1] - a1, x[c, 2] - a2
-        n0, n1, n2 = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
-        for t in range(rows.term_start[f], rows.term_start[f + 1]):
-            share = rows.term_share[t] / 6.0
-            s0, s1, s2 = share * n0, share * n1, share * n2
-            for corner in range(3):
-                e = rows.term_entry[t, corner]
-                rows.value[e, 0] += s0
-                rows.value[e, 1] += s1
-                rows.value[e, 2] += s2
+        normal[f, 0], normal[f, 1], normal[f, 2] = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
+    for e in range(rows.value.shape[0]):
+        g0, g1, g2 = 0.0, 0.0, 0.0
+        for t in range(rows.term_start[e], rows.term_start[e + 1]):
+            f, share = rows.term_triangle[t], rows.term_share[t]
+            g0 += share * normal[f, 0]
+            g1 += share * normal[f, 1]
+            g2 += share * normal[f, 2]
+        rows.value[e, 0], rows.value[e, 1], rows.value[e, 2] = g0, g1, g2
 
 
 @compiled
@@ -72,10 +72,13 @@ def transposed_rows_times_into(rows, p, out):
 
 
 @compiled
-def allowed_velocity_into(motion, u):
-    """ṽ: v* of a free node, v* + n (a − n·v*) of a touched one [m/s], (n, 3) (eq. 9)."""
+def pushed_velocity_into(motion, inverse_mass, dt, u):
+    """u = ṽ + dt W̃ F [m/s], (n, 3), with F = Jᵀ lam in `motion.gradient` [N] (eq. 9, 10)."""
     for i in range(u.shape[0]):
-        u0, u1, u2 = motion.v_star[i, 0], motion.v_star[i, 1], motion.v_star[i, 2]
+        push = dt * inverse_mass[i]
+        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
+        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
+        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
         if motion.touched[i] > 0:
             n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
             kick = motion.approach[i] - (u0 * n0 + u1 * n1 + u2 * n2)

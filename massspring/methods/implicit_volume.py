@@ -32,8 +32,8 @@ from massspring.kernels.motion import (
 )
 from massspring.kernels.multipliers import dense_into, solve_dense, solve_iteratively
 from massspring.kernels.rows import (
-    allowed_velocity_into,
     diagonal_into,
+    pushed_velocity_into,
     rows_into,
     rows_times_into,
     steepest_of_row,
@@ -88,11 +88,11 @@ def implicit_volume_frame(network, motion, drive, tally, lam):
 
 @compiled
 def set_right_side(network, rows, motion, target, dt, tolerance):
-    """rhs_r = (V0_r − V_r)/dt² − (J ṽ)_r/dt [m³/s²] with capped errors (eq. 33, 35).
+    """rhs_r = (V0_r − V_r)/dt² − (J u)_r/dt [m³/s²] with capped errors (eq. 33, 35), u = ṽ + dt W̃ Jᵀ lam.
 
     Returns whether a volume was capped, and whether a wrong one had nothing to push on.
     """
-    allowed_velocity_into(motion, rows.node_vector)
+    pushed_velocity_into(motion, network.inverse_mass, dt, rows.node_vector)
     rows_times_into(rows, rows.node_vector, rows.right)
     diagonal_into(rows, motion, network.inverse_mass, rows.diagonal)
     lightest = network.inverse_mass.max()
@@ -113,14 +113,17 @@ def set_right_side(network, rows, motion, target, dt, tolerance):
 
 @compiled
 def solve_multipliers(network, rows, motion, tally, accuracy):
-    """S lam = rhs for the contacts of the moment (eq. 33, 34); then F = Jᵀ lam [N] stands in the place of lam G."""
+    """lam += S⁻¹ rhs for the contacts of the moment (eq. 33, 34); then F = Jᵀ lam [N] in the place of lam G."""
     if rows.matrix.shape[0] > 0:
         dense_into(rows, motion, network.inverse_mass, rows.matrix)
-        solve_dense(rows.matrix, rows.right, rows.lam)
+        solve_dense(rows.matrix, rows.right, rows.search)
+        rows.lam[:] += rows.search
     else:
         count = solve_iteratively(rows, motion, network.inverse_mass, rows.lam, rows.allowed, accuracy.most_iterations)
         tally.iterations[0] += count
         tally.iterations[1] = max(tally.iterations[1], count)
+        if count == 0:
+            return
     transposed_rows_times_into(rows, rows.lam, motion.gradient)
 
 
@@ -142,9 +145,9 @@ def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy):
         )
         rows_into(motion.x, rows)
         volumes_of_rows_into(motion.x, rows, rows.volume)
+        transposed_rows_times_into(rows, rows.lam, motion.gradient)
         passes = 1
         if drive.radius.shape[0] > 0:
-            transposed_rows_times_into(rows, rows.lam, motion.gradient)
             find_contacts(network, motion, drive, step, 1.0)
             passes = CONTACT_PASSES
         for sweep in range(passes):

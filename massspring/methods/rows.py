@@ -18,13 +18,16 @@ def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
     key = terms.indices.astype(np.int64)[:, None] * nodes + corners
     entries, place = np.unique(key, return_inverse=True)
     row, column = entries // nodes, entries % nodes
+    place = place.reshape(-1)
+    by_entry = np.argsort(place, kind="stable")
     by_node = np.lexsort((row, column))
     dense = m if m <= DENSE_UP_TO else 0
     return VolumeRows(
         triangles=volumes.triangles,
-        term_start=terms.indptr.astype(np.uint32),
-        term_share=terms.data.astype(np.float64),
-        term_entry=np.ascontiguousarray(place.reshape(-1, 3), dtype=np.uint32),
+        normal=np.zeros((len(volumes.triangles), 3)),
+        term_start=_starts(place, len(entries)),
+        term_triangle=np.repeat(triangle, 3)[by_entry].astype(np.uint32),
+        term_share=np.repeat(terms.data, 3)[by_entry] / 6.0,
         row_start=_starts(row, m),
         column=column.astype(np.uint32),
         node_start=_starts(column, nodes),
@@ -33,10 +36,7 @@ def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
         value=np.zeros((len(entries), 3)),
         matrix=np.zeros((dense, dense)),
         node_vector=np.zeros((nodes, 3)),
-        **{
-            name: np.zeros(m)
-            for name in ("volume", "lam", "right", "diagonal", "residual", "search", "image", "allowed")
-        },
+        **{name: np.zeros(m) for name in ("volume", "lam", "right", "diagonal", "search", "image", "allowed")},
     )
 
 
