@@ -5,7 +5,7 @@ from massspring.clock import Clock, make_clock
 from massspring.errors import MassSpringError
 from massspring.history import History
 from massspring.methods import METHODS, Free, ImplicitVolume, Method, State
-from massspring.obstacles import Attachment, Obstacle, Path, Plane, Sphere
+from massspring.obstacles import Attachment, Capsule, Obstacle, Path, Plane, Sphere
 from massspring.simulation import Setup, simulate
 from massspring.stability import StepLimit, step_limit
 from massspring.volumes import Ramp, Volumes
@@ -14,6 +14,7 @@ __all__ = [
     "METHODS",
     "Attachment",
     "Body",
+    "Capsule",
     "Clock",
     "Free",
     "History",

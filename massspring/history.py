@@ -9,6 +9,7 @@ from massspring.clock import Clock
 from massspring.kernels.deformation import smallest_ratio, tetrahedron_volumes_into
 from massspring.kernels.springs import spring_energy
 from massspring.methods.base import State
+from massspring.obstacles import Obstacle
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,8 @@ class History:
     """[J], (F,)."""
     contact_force: np.ndarray
     """Mean force of each obstacle on the body during the frame [N], (F, o, 3)."""
+    penetration: np.ndarray
+    """How deep the deepest surface node lies in each obstacle at the end of the frame [m], (F, o)."""
     held_force: np.ndarray
     """Mean force of each attachment on the body during the frame [N], (F, g, 3)."""
     min_j: np.ndarray
@@ -58,7 +61,9 @@ class History:
 class Recorder:
     """Fills the arrays of a History; a minimum J is only looked for where there are tetrahedra."""
 
-    def __init__(self, body: Body, clock: Clock, obstacles: int, attachments: int, keep: frozenset[int]) -> None:
+    def __init__(
+        self, body: Body, clock: Clock, obstacles: tuple[Obstacle, ...], attachments: int, keep: frozenset[int]
+    ) -> None:
         frames = clock.frames
         self.body = body
         self.clock = clock
@@ -71,7 +76,10 @@ class Recorder:
             np.full((frames, self.volumes.count), np.nan) for _ in range(3)
         )
         self.iterations = np.zeros((frames, 2), dtype=np.int64)
-        self.contact_force = np.full((frames, obstacles, 3), np.nan)
+        self.obstacles = obstacles
+        self.surface_nodes = body.surface_nodes
+        self.contact_force = np.full((frames, len(obstacles), 3), np.nan)
+        self.penetration = np.full((frames, len(obstacles)), np.nan)
         self.held_force = np.full((frames, attachments, 3), np.nan)
         self.frame_ns = np.zeros(frames, dtype=np.int64)
         self.keep = keep
@@ -91,6 +99,8 @@ class Recorder:
             tetrahedron_volumes_into(x, self.body.tetrahedra, self.cell_volumes)
             self.scalars["min_j"][frame] = smallest_ratio(self.cell_volumes, self.rest_volumes)
         self.contact_force[frame] = state.tally.contact_impulse / self.clock.frame
+        for o, obstacle in enumerate(self.obstacles):
+            self.penetration[frame, o] = max(0.0, -obstacle.gap(x[self.surface_nodes], float(self.t[frame])).min())
         self.held_force[frame] = state.tally.held_impulse / self.clock.frame
         self.frame_ns[frame] = elapsed_ns
         self.skipped += int(state.tally.skipped[0])
@@ -119,6 +129,7 @@ class Recorder:
             kinetic=self.scalars["kinetic"],
             elastic=self.scalars["elastic"],
             contact_force=self.contact_force,
+            penetration=self.penetration,
             held_force=self.held_force,
             min_j=self.scalars["min_j"],
             snapshot_frames=np.array(frames, dtype=np.int64),

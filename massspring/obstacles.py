@@ -1,6 +1,7 @@
-"""Rigid, frictionless obstacles and attachments that move along prescribed paths."""
+"""Rigid obstacles and attachments that move along prescribed paths."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -42,6 +43,15 @@ def _unit(name: str, vector: tuple[float, float, float]) -> np.ndarray:
     return np.asarray(vector) / length
 
 
+Friction = float | Literal["no_slip"]
+"""Coulomb's coefficient [1]; 0: frictionless; "no_slip": what touches moves with the obstacle."""
+
+
+def _check_friction(friction: Friction) -> None:
+    if friction != "no_slip" and not (isinstance(friction, int | float) and np.isfinite(friction) and friction >= 0):
+        raise MassSpringError(f"the friction is {friction!r}; give a coefficient from 0 on, or 'no_slip'")
+
+
 @dataclass(frozen=True)
 class Plane:
     """The body stays where n·(x − point) ≥ 0."""
@@ -51,11 +61,18 @@ class Plane:
     normal: tuple[float, float, float]
     """Towards the body; any length."""
     path: Path = STILL
+    friction: Friction = 0.0
 
     def __post_init__(self) -> None:
         _unit("plane normal", self.normal)
+        _check_friction(self.friction)
         if not np.isfinite(self.point).all():
             raise MassSpringError(f"the plane goes through {self.point}; give finite metres")
+
+    @property
+    def anchor(self) -> np.ndarray:
+        """What the path moves [m], (3,)."""
+        return np.asarray(self.point, dtype=np.float64)
 
     @property
     def unit_normal(self) -> np.ndarray:
@@ -64,7 +81,7 @@ class Plane:
 
     def gap(self, points: np.ndarray, t: float) -> np.ndarray:
         """Signed distance [m] of `points` (n, 3) at time `t`, negative inside the obstacle, (n,)."""
-        return (points - (np.asarray(self.point) + self.path(t))) @ self.unit_normal
+        return (points - (self.anchor + self.path(t))) @ self.unit_normal
 
 
 @dataclass(frozen=True)
@@ -76,19 +93,65 @@ class Sphere:
     radius: float
     """[m]."""
     path: Path = STILL
+    friction: Friction = 0.0
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.radius) and self.radius > 0):
             raise MassSpringError(f"the sphere has radius {self.radius} m; it must be positive")
         if not np.isfinite(self.centre).all():
             raise MassSpringError(f"the sphere lies at {self.centre}; give finite metres")
+        _check_friction(self.friction)
+
+    @property
+    def anchor(self) -> np.ndarray:
+        """What the path moves [m], (3,)."""
+        return np.asarray(self.centre, dtype=np.float64)
 
     def gap(self, points: np.ndarray, t: float) -> np.ndarray:
         """Signed distance [m] of `points` (n, 3) at time `t`, negative inside the obstacle, (n,)."""
-        return np.linalg.norm(points - (np.asarray(self.centre) + self.path(t)), axis=1) - self.radius
+        return np.linalg.norm(points - (self.anchor + self.path(t)), axis=1) - self.radius
 
 
-Obstacle = Plane | Sphere
+@dataclass(frozen=True)
+class Capsule:
+    """A rod with round ends; the body stays outside."""
+
+    start: tuple[float, float, float]
+    """One end of the axis [m], at path displacement 0."""
+    end: tuple[float, float, float]
+    """The other [m]."""
+    radius: float
+    """[m]."""
+    path: Path = STILL
+    friction: Friction = 0.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.radius) and self.radius > 0):
+            raise MassSpringError(f"the capsule has radius {self.radius} m; it must be positive")
+        if not (np.isfinite(self.start).all() and np.isfinite(self.end).all()):
+            raise MassSpringError(f"the capsule reaches from {self.start} to {self.end}; give finite metres")
+        if tuple(self.start) == tuple(self.end):
+            raise MassSpringError(f"the capsule starts and ends at {self.start}; give it a length, or use a sphere")
+        _check_friction(self.friction)
+
+    @property
+    def anchor(self) -> np.ndarray:
+        """What the path moves [m], (3,)."""
+        return np.asarray(self.start, dtype=np.float64)
+
+    @property
+    def span(self) -> np.ndarray:
+        """From start to end [m], (3,)."""
+        return np.asarray(self.end, dtype=np.float64) - self.anchor
+
+    def gap(self, points: np.ndarray, t: float) -> np.ndarray:
+        """Signed distance [m] of `points` (n, 3) at time `t`, negative inside the obstacle, (n,)."""
+        from_start = points - (self.anchor + self.path(t))
+        share = np.clip(from_start @ self.span / (self.span @ self.span), 0.0, 1.0)
+        return np.linalg.norm(from_start - share[:, None] * self.span, axis=1) - self.radius
+
+
+Obstacle = Plane | Sphere | Capsule
 
 
 @dataclass(frozen=True, eq=False)

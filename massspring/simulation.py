@@ -13,7 +13,8 @@ from massspring.errors import MassSpringError
 from massspring.history import History, Recorder
 from massspring.kernels.layout import Drive
 from massspring.methods.base import Method, State, start
-from massspring.obstacles import Attachment, Obstacle, Plane
+from massspring.obstacles import Attachment, Capsule, Obstacle, Plane
+from massspring.surface import winding_number
 from massspring.volumes import Ramp
 
 ESCAPED = 20.0
@@ -40,7 +41,7 @@ class Setup:
 
     def __post_init__(self) -> None:
         for number, obstacle in enumerate(self.obstacles):
-            depth = -float(obstacle.gap(self.body.rest[self.body.surface_nodes], 0.0).min())
+            depth = starting_depth(obstacle, self.body)
             if depth > 1e-6 * self.body.size:
                 raise MassSpringError(
                     f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
@@ -67,15 +68,20 @@ class Setup:
 
     def drive(self, frame: int) -> Drive:
         """The outside world during frame number `frame` (0, 1, …): positions at the end of each of its steps."""
-        t = frame * self.clock.frame + self.clock.dt * np.arange(1, self.clock.steps + 1)
+        dt = self.clock.dt
+        t = frame * self.clock.frame + dt * np.arange(1, self.clock.steps + 1)
         return Drive(
-            dt=self.clock.dt,
+            dt=dt,
             damping=float(self.damping),
             gravity=np.asarray(self.gravity, dtype=np.float64),
             is_plane=np.array([isinstance(o, Plane) for o in self.obstacles], dtype=np.bool_),
             plane_normal=_rows([o.unit_normal if isinstance(o, Plane) else np.zeros(3) for o in self.obstacles]),
             radius=np.array([0.0 if isinstance(o, Plane) else o.radius for o in self.obstacles]),
-            position=_tracks([np.asarray(_anchor(o)) + o.path(t) for o in self.obstacles], len(t)),
+            span=_rows([o.span if isinstance(o, Capsule) else np.zeros(3) for o in self.obstacles]),
+            friction=np.array([np.inf if o.friction == "no_slip" else float(o.friction) for o in self.obstacles]),
+            rough=any(o.friction != 0 for o in self.obstacles),
+            position=_tracks([o.anchor + o.path(t) for o in self.obstacles], len(t)),
+            velocity=_tracks([(o.path(t) - o.path(t - dt)) / dt for o in self.obstacles], len(t)),
             held_displacement=_tracks([a.path(t) for a in self.attachments], len(t)),
             volume_target=self.volume_targets(t),
         )
@@ -86,8 +92,16 @@ class Setup:
         return np.column_stack(factors) * self.body.rest_volumes
 
 
-def _anchor(obstacle: Obstacle) -> tuple[float, float, float]:
-    return obstacle.point if isinstance(obstacle, Plane) else obstacle.centre
+def starting_depth(obstacle: Obstacle, body: Body) -> float:
+    """How deep the body reaches into an obstacle at the start [m]; an obstacle between all nodes counts too."""
+    depth = -float(obstacle.gap(body.rest[body.surface_nodes], 0.0).min())
+    if isinstance(obstacle, Plane):
+        return depth
+    ends = [obstacle.anchor + obstacle.path(0.0)]
+    if isinstance(obstacle, Capsule):
+        ends.append(ends[0] + obstacle.span)
+    inside = any(abs(winding_number(end, body.rest, body.triangles)) > 0.5 for end in ends)
+    return max(depth, obstacle.radius) if inside else depth
 
 
 def _rows(vectors: list[np.ndarray]) -> np.ndarray:
@@ -118,7 +132,7 @@ def simulate(
     `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is told after each.
     A run longer than `time_limit` [s] of wall time ends early. Frame times are those of `advance` alone.
     """
-    recorder = Recorder(setup.body, setup.clock, len(setup.obstacles), len(setup.attachments), frozenset(snapshots))
+    recorder = Recorder(setup.body, setup.clock, setup.obstacles, len(setup.attachments), frozenset(snapshots))
     recorder.volume_target[:] = setup.volume_targets(recorder.t)
     state = setup.start()
     advance = setup.method.advance

@@ -92,10 +92,18 @@ class Motion(NamedTuple):
     """G = dV/dx [m²], (n, 3)."""
     touched: np.ndarray
     """0 for a free node, else 1 + the obstacle it lies on, (n,) uint32."""
+    second: np.ndarray
+    """1 + the other obstacle of a node in a wedge, (n,) uint32."""
+    locked: np.ndarray
+    """Directions that obstacles take from a node: 0, 1 (slides on one), 2 (in a wedge) or 3 (sticks), (n,) uint8."""
     normal: np.ndarray
     """Unit normal of the touched obstacle, towards the body, (n, 3)."""
-    approach: np.ndarray
-    """Normal velocity that ends the step on the obstacle [m/s], (n,)."""
+    second_normal: np.ndarray
+    """Of the second obstacle, (n, 3)."""
+    direction: np.ndarray
+    """The normal of a node that slides, the edge of one in a wedge, (n, 3)."""
+    goal: np.ndarray
+    """Velocity that ends the step on the obstacles, in the directions taken, less what friction takes [m/s], (n, 3)."""
     clearance: np.ndarray
     """Distance to the nearest obstacle at the end of the predicted step [m], (n,)."""
 
@@ -110,13 +118,21 @@ class Drive(NamedTuple):
     gravity: np.ndarray
     """[m/s²], (3,)."""
     is_plane: np.ndarray
-    """(o,) bool; what is no plane is a sphere."""
+    """(o,) bool; what is no plane is a capsule, a sphere where it has no length."""
     plane_normal: np.ndarray
     """Unit normals, towards the body, (o, 3)."""
     radius: np.ndarray
-    """Of the spheres [m], (o,)."""
+    """Of spheres and capsules [m], (o,)."""
+    span: np.ndarray
+    """From the start of a capsule's axis to its end [m], (o, 3)."""
+    friction: np.ndarray
+    """Coulomb's coefficient [1], (o,); inf where nothing slips."""
+    rough: bool
+    """Whether any obstacle has friction."""
     position: np.ndarray
-    """Plane points and sphere centres at the end of each step [m], (q, o, 3)."""
+    """Plane points, sphere centres and starts of capsules at the end of each step [m], (q, o, 3)."""
+    velocity: np.ndarray
+    """Of the obstacles, mean over each step [m/s], (q, o, 3)."""
     held_displacement: np.ndarray
     """Of the attachments at the end of each step [m], (q, g, 3)."""
     volume_target: np.ndarray

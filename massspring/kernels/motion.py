@@ -3,6 +3,7 @@
 import math
 
 from massspring.kernels.compiled import compiled
+from massspring.kernels.contact import allowed_part, shares
 
 
 @compiled
@@ -40,14 +41,18 @@ def volume_multiplier(motion, inverse_mass, volume_error, dt):
     mobility = 0.0
     for i in range(inverse_mass.shape[0]):
         g0, g1, g2 = motion.gradient[i, 0], motion.gradient[i, 1], motion.gradient[i, 2]
-        flow += g0 * motion.v_star[i, 0] + g1 * motion.v_star[i, 1] + g2 * motion.v_star[i, 2]
+        v0, v1, v2 = motion.v_star[i, 0], motion.v_star[i, 1], motion.v_star[i, 2]
+        flow += g0 * v0 + g1 * v1 + g2 * v2
         square = g0 * g0 + g1 * g1 + g2 * g2
-        if motion.touched[i] > 0:
-            n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-            along = g0 * n0 + g1 * n1 + g2 * n2
-            v_along = motion.v_star[i, 0] * n0 + motion.v_star[i, 1] * n1 + motion.v_star[i, 2] * n2
-            flow += along * (motion.approach[i] - v_along)
-            square -= along * along
+        if motion.locked[i] > 0:
+            locked = motion.locked[i]
+            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+            p0, p1, p2 = allowed_part(locked, d0, d1, d2, g0, g1, g2)
+            square = g0 * p0 + g1 * p1 + g2 * p2
+            p0, p1, p2 = allowed_part(locked, d0, d1, d2, v0, v1, v2)
+            flow += g0 * (p0 + motion.goal[i, 0] - v0)
+            flow += g1 * (p1 + motion.goal[i, 1] - v1)
+            flow += g2 * (p2 + motion.goal[i, 2] - v2)
         mobility += inverse_mass[i] * square
     if not mobility > 0.0:
         return 0.0, mobility
@@ -81,26 +86,42 @@ def capped_error(volume_error, mobility, steepest, longest):
 
 
 @compiled
+def book(contact_impulse, o, other, k0, k1, k2):
+    """Moves an impulse [N s] from the account of one obstacle to another's: a wedge pushes with both."""
+    contact_impulse[o, 0] -= k0
+    contact_impulse[o, 1] -= k1
+    contact_impulse[o, 2] -= k2
+    contact_impulse[other, 0] += k0
+    contact_impulse[other, 1] += k1
+    contact_impulse[other, 2] += k2
+
+
+@compiled
 def advance(motion, mass, inverse_mass, lam, dt, contact_impulse):
     """v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺ (eq. 10).
 
-    Adds the impulse of each obstacle, n (m (a − n·v*) − dt lam n·G) [N s].
+    Adds the impulse of each obstacle, m (v⁺ − u) with u what the node would do without it [N s].
     """
     for i in range(mass.shape[0]):
         push = dt * lam * inverse_mass[i]
         u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
         u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
         u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
-        if motion.touched[i] > 0:
-            o = motion.touched[i] - 1
-            n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-            kick = motion.approach[i] - (u0 * n0 + u1 * n1 + u2 * n2)
-            u0 += kick * n0
-            u1 += kick * n1
-            u2 += kick * n2
-            contact_impulse[o, 0] += mass[i] * kick * n0
-            contact_impulse[o, 1] += mass[i] * kick * n1
-            contact_impulse[o, 2] += mass[i] * kick * n2
+        if motion.locked[i] > 0:
+            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+            k0, k1, k2 = -u0, -u1, -u2
+            u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
+            u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
+            o, m = motion.touched[i] - 1, mass[i]
+            k0, k1, k2 = m * (k0 + u0), m * (k1 + u1), m * (k2 + u2)
+            contact_impulse[o, 0] += k0
+            contact_impulse[o, 1] += k1
+            contact_impulse[o, 2] += k2
+            if motion.locked[i] == 2:
+                m0, m1, m2 = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
+                n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+                _, beta = shares(k0, k1, k2, n0, n1, n2, m0, m1, m2)
+                book(contact_impulse, o, motion.second[i] - 1, beta * m0, beta * m1, beta * m2)
         motion.v[i, 0], motion.v[i, 1], motion.v[i, 2] = u0, u1, u2
         motion.x[i, 0] += dt * u0
         motion.x[i, 1] += dt * u1

@@ -3,6 +3,7 @@
 import math
 
 from massspring.kernels.compiled import compiled
+from massspring.kernels.contact import allowed_part
 from massspring.kernels.rows import NEGLIGIBLE, mobilise, rows_times_into, transposed_rows_times_into
 
 
@@ -14,14 +15,13 @@ def dense_into(rows, motion, inverse_mass, matrix):
         w = inverse_mass[j]
         if w == 0.0:
             continue
-        n0, n1, n2 = 0.0, 0.0, 0.0
-        if motion.touched[j] > 0:
-            n0, n1, n2 = motion.normal[j, 0], motion.normal[j, 1], motion.normal[j, 2]
         for k in range(rows.node_start[j], rows.node_start[j + 1]):
             e, r = rows.node_entry[k], rows.node_row[k]
             g0, g1, g2 = rows.value[e, 0], rows.value[e, 1], rows.value[e, 2]
-            along = g0 * n0 + g1 * n1 + g2 * n2
-            g0, g1, g2 = w * (g0 - along * n0), w * (g1 - along * n1), w * (g2 - along * n2)
+            if motion.locked[j] > 0:
+                d0, d1, d2 = motion.direction[j, 0], motion.direction[j, 1], motion.direction[j, 2]
+                g0, g1, g2 = allowed_part(motion.locked[j], d0, d1, d2, g0, g1, g2)
+            g0, g1, g2 = w * g0, w * g1, w * g2
             # The volumes around a node come in ascending order.
             for q in range(rows.node_start[j], k + 1):
                 e = rows.node_entry[q]

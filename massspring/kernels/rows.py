@@ -3,6 +3,7 @@
 import math
 
 from massspring.kernels.compiled import compiled
+from massspring.kernels.contact import allowed_part
 
 NEGLIGIBLE = 1e-12
 """A diagonal or pivot this much smaller than what it was summed from is round-off."""
@@ -79,23 +80,22 @@ def pushed_velocity_into(motion, inverse_mass, dt, u):
         u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
         u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
         u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
-        if motion.touched[i] > 0:
-            n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-            kick = motion.approach[i] - (u0 * n0 + u1 * n1 + u2 * n2)
-            u0, u1, u2 = u0 + kick * n0, u1 + kick * n1, u2 + kick * n2
+        if motion.locked[i] > 0:
+            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+            u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
+            u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
         u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
 
 
 @compiled
 def mobilise(motion, inverse_mass, u):
-    """u := W̃ u in place, (n, 3): no motion of a held node, none of a touched one along its normal (eq. 9)."""
+    """u := W̃ u in place, (n, 3): no motion of a held node, none into an obstacle (eq. 9)."""
     for i in range(u.shape[0]):
         w = inverse_mass[i]
         u0, u1, u2 = w * u[i, 0], w * u[i, 1], w * u[i, 2]
-        if motion.touched[i] > 0:
-            n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-            along = u0 * n0 + u1 * n1 + u2 * n2
-            u0, u1, u2 = u0 - along * n0, u1 - along * n1, u2 - along * n2
+        if motion.locked[i] > 0:
+            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+            u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
         u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
 
 
@@ -109,9 +109,10 @@ def diagonal_into(rows, motion, inverse_mass, diagonal):
             g0, g1, g2 = rows.value[e, 0], rows.value[e, 1], rows.value[e, 2]
             square = g0 * g0 + g1 * g1 + g2 * g2
             free += square * inverse_mass[j]
-            if motion.touched[j] > 0:
-                along = g0 * motion.normal[j, 0] + g1 * motion.normal[j, 1] + g2 * motion.normal[j, 2]
-                square -= along * along
+            if motion.locked[j] > 0:
+                d0, d1, d2 = motion.direction[j, 0], motion.direction[j, 1], motion.direction[j, 2]
+                p0, p1, p2 = allowed_part(motion.locked[j], d0, d1, d2, g0, g1, g2)
+                square = g0 * p0 + g1 * p1 + g2 * p2
             total += inverse_mass[j] * square
         diagonal[r] = total if total > NEGLIGIBLE * free else 0.0
 

@@ -79,8 +79,9 @@ def start(body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | 
         force=np.zeros((n, 3)),
         gradient=np.zeros((n, 3)),
         touched=np.zeros(n, dtype=np.uint32),
-        normal=np.zeros((n, 3)),
-        approach=np.zeros(n),
+        second=np.zeros(n, dtype=np.uint32),
+        locked=np.zeros(n, dtype=np.uint8),
+        **{name: np.zeros((n, 3)) for name in ("normal", "second_normal", "direction", "goal")},
         clearance=np.zeros(n),
     )
     return State(network, motion, np.zeros(kept.count), None if alone else volume_rows(kept, n))

@@ -5,6 +5,7 @@ import pytest
 
 from massspring import (
     Attachment,
+    Capsule,
     Clock,
     Free,
     ImplicitVolume,
@@ -116,6 +117,120 @@ def test_held_nodes_follow_their_path_exactly(ball_body):
         assert np.allclose(x[nodes] - ball_body.rest[nodes], path(frame * clock.frame), atol=1e-12)
 
 
+def test_the_distance_to_a_capsule_is_that_to_the_nearest_of_many_spheres():
+    """Outside truth: 2,001 spheres along the axis; the nearest is off by half a spacing's square over twice the gap."""
+    capsule = Capsule((0.0, 0.01, 0.0), (0.05, -0.02, 0.03), 0.004, Path((0.0, 1.0), ((0, 0, 0), (0.01, 0, 0))))
+    points = np.random.default_rng(0).uniform(-0.1, 0.1, (50, 3))
+    axis = capsule.anchor + np.linspace(0, 1, 2001)[:, None] * capsule.span + [0.005, 0, 0]
+    nearest = np.linalg.norm(points[:, None] - axis[None], axis=2).min(axis=1) - 0.004
+    assert np.allclose(capsule.gap(points, 0.5), nearest, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", [Free(), ImplicitVolume()], ids=["free", "implicit_volume"])
+@pytest.mark.parametrize("direction", [(0.0, 1.0, 0.0), (0.3, 0.2, 1.0)], ids=["lying", "tip first"])
+def test_no_node_is_left_inside_a_capsule(ball_body, method, direction):
+    clock = clock_for(ball_body, 30, 10)
+    axis = 0.06 * np.array(direction) / np.linalg.norm(direction)
+    start = np.array([0.001, 0.0, 0.0612]) - (0.5 * axis if direction[2] == 0 else 0)
+    capsule = Capsule(tuple(start), tuple(start + axis), 0.01, Path((0.0, clock.duration), ((0, 0, 0), (0, 0, -0.02))))
+    held = Attachment(np.flatnonzero(ball_body.rest[:, 2] < -0.04))
+    history = simulate(Setup(ball_body, method, clock, (capsule,), (held,), damping=30.0), snapshots=range(1, 31))
+    for frame, x in zip(history.snapshot_frames, history.snapshots, strict=True):
+        assert capsule.gap(x[ball_body.surface_nodes], frame * clock.frame).min() > -INSIDE
+    assert history.contact_force[-1, 0, 2] < 0
+    assert history.penetration.max() < INSIDE
+
+
+def wedge_of(depth: float, duration: float, angle: float) -> tuple[Plane, Plane]:
+    """Two planes that close on a ball of radius 0.05 m from below, their normals `angle` [rad] off the vertical."""
+    planes = []
+    for side in (-1, 1):
+        normal = np.array([side * np.sin(angle), 0.0, np.cos(angle)])
+        path = Path((0.0, duration), ((0, 0, 0), tuple(depth * normal)))
+        planes.append(Plane(tuple(-0.05 * normal), tuple(normal), path))
+    return planes[0], planes[1]
+
+
+def test_a_body_in_a_wedge_enters_neither_side_and_keeps_its_volume(ball_body):
+    """Nodes at the bottom lie on both planes; each plane only pushes, along its own normal."""
+    clock = clock_for(ball_body, 60, 20)
+    planes = wedge_of(0.03, 0.5 * clock.duration, 0.4)
+    held = Attachment(np.flatnonzero(ball_body.rest[:, 2] > 0.04))
+    setup = Setup(ball_body, ImplicitVolume(), clock, planes, (held,), damping=40.0)
+    state, wedged = setup.start(), 0
+    for frame in range(clock.frames):
+        state = setup.method.advance(state, setup.drive(frame))
+        wedged = max(wedged, int((state.motion.locked == 2).sum()))
+    assert wedged > 0, "no node came between the planes"
+    history = simulate(setup)
+    assert history.penetration.max() < INSIDE
+    assert np.abs(history.volume / ball_body.volume - 1).max() < 1e-4
+    for o, plane in enumerate(planes):
+        force = history.contact_force[-1, o]
+        assert force @ plane.unit_normal == pytest.approx(np.linalg.norm(force), rel=1e-9) and force[2] > 0
+    x, z = history.contact_force[-1].sum(axis=0)[[0, 2]]
+    assert np.allclose([x, z], -history.held_force[-1, 0][[0, 2]], atol=0.01 * z)
+
+
+def test_planes_that_meet_inside_the_body_leave_their_penetration_in_the_record(ball_body):
+    """Facing obstacles without room between them: what cannot be met is recorded, and nothing blows up."""
+    clock = clock_for(ball_body, 40, 20)
+    planes = squeeze(ball_body, 0.5 * float(np.ptp(ball_body.rest[:, 2])) + 0.002, clock.duration)
+    history = simulate(Setup(ball_body, Free(), clock, planes, damping=60.0))  # no volume can be kept in no room
+    assert history.outcome == "finished"
+    assert history.penetration[-1].max() == pytest.approx(0.004, abs=1e-6)  # all of their overlap
+
+
+def sledge(friction, slope: float, frames: int, damping: float = 0.0):
+    """A flat block lying on a plane in gravity that leans by `slope`; how it ends, and the clock."""
+    body = tetrahedral_body(*block((3, 3, 1), distortion=0.0), SOFT)
+    clock = clock_for(body, frames, 20)
+    plane = Plane((0, 0, float(body.rest[:, 2].min())), (0, 0, 1), friction=friction)
+    gravity = (slope * 9.81, 0.0, -9.81)
+    return body, clock, simulate(Setup(body, ImplicitVolume(), clock, (plane,), (), gravity, damping=damping))
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_block_slides_down_a_slope_by_coulombs_law(friction):
+    """Closed form: it gains (slope − mu) g t. The block quivers under its weight: 3 % of that."""
+    body, clock, history = sledge(friction, 0.6, 8)
+    t = clock.duration
+    moved = float((body.mass @ (history.final - body.rest))[0] / body.mass.sum())
+    assert moved == pytest.approx(0.5 * (0.6 - friction) * 9.81 * t * t, rel=0.03)
+    force = history.contact_force.sum(axis=(0, 1))
+    assert -force[0] == pytest.approx(friction * force[2], rel=0.02, abs=1e-12)
+
+
+@pytest.mark.parametrize("friction", [0.9, "no_slip"])
+def test_a_block_rests_on_a_rough_slope(friction):
+    """mu > slope: the nodes that carry it stay where they are, and the plane takes the whole weight."""
+    body, clock, history = sledge(friction, 0.3, 60, damping=20.0)
+    sole = body.rest[:, 2] < body.rest[:, 2].min() + 1e-9
+    assert np.abs(history.final - body.rest)[sole].max() < 1e-3  # a twentieth of an edge: it quivers
+    assert 0.5 * 0.3 * 9.81 * clock.duration**2 > 0.05  # without friction it would be far away
+    assert history.contact_force[-1, 0, 0] == pytest.approx(-0.3 * 9.81 * body.mass.sum(), rel=0.01)
+    assert history.contact_force[-1, 0, 2] == pytest.approx(9.81 * body.mass.sum(), rel=0.01)
+
+
+def test_a_rough_plane_takes_along_what_it_touches(ball_body):
+    clock = clock_for(ball_body, 100, 20)
+    low, high = ball_body.rest[:, 2].min(), ball_body.rest[:, 2].max()
+    keys = (0.0, 0.2 * clock.duration, 0.4 * clock.duration)
+    down = Path(keys, ((0, 0, 0), (0, 0, -0.01), (0.004, 0, -0.01)))
+    planes = (Plane((0, 0, high), (0, 0, -1), down, "no_slip"), Plane((0, 0, low), (0, 0, 1), friction="no_slip"))
+    setup = Setup(ball_body, ImplicitVolume(), clock, planes, damping=40.0)
+    history = simulate(setup, snapshots=(30, 100))
+    before, after = history.snapshots
+    upper = np.flatnonzero(planes[0].gap(before, 30 * clock.frame) < INSIDE)
+    lower = np.flatnonzero(planes[1].gap(before, 30 * clock.frame) < INSIDE)
+    step = down(100 * clock.frame) - down(30 * clock.frame)
+    stuck = [u for u in upper if planes[0].gap(after[u][None], 100 * clock.frame)[0] < INSIDE]
+    assert len(stuck) > 3 and np.allclose(after[stuck] - before[stuck], step, atol=1e-9)
+    assert len(lower) > 3 and np.abs(after[lower] - before[lower])[:, :2].max() < 1e-9
+    assert history.contact_force[30:40, 0, 0].min() > 0  # while the plane moves, it pulls sideways
+    assert np.abs(history.volume / ball_body.volume - 1).max() < 1e-4
+
+
 def test_a_plane_that_only_touches_changes_nothing(ball_body):
     clock = clock_for(ball_body, 5, 10)
     resting = Plane((0, 0, ball_body.rest[:, 2].max()), (0, 0, -1))
@@ -128,6 +243,13 @@ BAD = {
     "inside": (lambda: (Sphere((0, 0, 0.05), 0.01),), "starts 0.01 m inside"),
     "no direction": (lambda: (Plane((0, 0, 0), (0, 0, 0)),), "needs a direction"),
     "no radius": (lambda: (Sphere((0, 0, 1), 0.0),), "must be positive"),
+    "between nodes": (lambda: (Sphere((0.001, 0.002, 0.001), 1e-4),), "starts 0.0001 m inside"),
+    "capsule reaches in": (lambda: (Capsule((0, 0, 0.2), (0.001, 0, 0.002), 1e-4),), "starts .* inside the body"),
+    "capsule without length": (lambda: (Capsule((0, 0, 1), (0, 0, 1), 0.1),), "give it a length, or use a sphere"),
+    "capsule without radius": (lambda: (Capsule((0, 0, 1), (0, 0, 2), 0.0),), "must be positive"),
+    "nan capsule": (lambda: (Capsule((0, 0, 1), (0, 0, np.nan), 0.1),), "give finite metres"),
+    "negative friction": (lambda: (Plane((0, 0, -1), (0, 0, 1), friction=-0.1),), "friction is -0.1"),
+    "unknown friction": (lambda: (Sphere((0, 0, 1), 0.1, friction="sticky"),), "friction is 'sticky'"),  # pyright: ignore
     "nan path": (lambda: (Plane((0, 0, 1), (0, 0, -1), Path((0.0, 1.0), ((0, 0, 0), (0, 0, np.nan)))),), "not finite"),
     "path back in time": (lambda: (Plane((0, 0, 1), (0, 0, -1), Path((1.0, 0.0), ((0, 0, 0), (0, 0, 0)))),), "ascend"),
     "ragged path": (lambda: (Plane((0, 0, 1), (0, 0, -1), Path((0.0, 1.0), ((0, 0, 0),))),), "one each"),
@@ -171,7 +293,7 @@ def test_looking_only_at_near_nodes_changes_no_bit(ball_body):
             reach = pressure_reach(lam - state.lam[0], mobility, lightest, dt)
             changed = revise_contacts(net, near, drive, 0, lam, reach)
             assert changed == revise_contacts(net, far, drive, 0, lam, np.inf)
-            for name in ("touched", "normal", "approach"):
+            for name in ("touched", "locked", "normal", "goal"):
                 assert np.array_equal(getattr(near, name), getattr(far, name))
             changes += changed
             skipped += int((near.clearance[ball_body.surface_nodes] > reach).sum())

@@ -229,8 +229,10 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     touched = np.array([40, 41, 90])
     normals = rng.normal(size=(3, 3))
     mo.normal[touched] = normals / np.linalg.norm(normals, axis=1)[:, None]
-    mo.touched[touched] = 1
-    mo.approach[touched] = 0.05 * rng.normal(size=3)
+    approach = 0.05 * rng.normal(size=3)
+    mo.touched[touched], mo.locked[touched] = 1, 1
+    mo.direction[touched] = mo.normal[touched]
+    mo.goal[touched] = approach[:, None] * mo.normal[touched]
     wanted = 1.02 * body.volume
     error = wanted - volume_gradient_into(mo.x, net.triangles, mo.gradient)
     lam, _ = motion_kernels.volume_multiplier(mo, net.inverse_mass, error, dt)
@@ -238,11 +240,11 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     n = 3 * body.node_count
     rows = [dt * mo.gradient.ravel()]
     right = [error]
-    for i in touched:
+    for i, a in zip(touched, approach, strict=True):
         row = np.zeros((body.node_count, 3))
         row[i] = mo.normal[i]
         rows.append(row.ravel())
-        right.append(mo.approach[i])
+        right.append(a)
     for i in net.held_nodes:
         for axis in range(3):
             row = np.zeros((body.node_count, 3))

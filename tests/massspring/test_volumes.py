@@ -93,7 +93,10 @@ def test_rows_are_the_derivative_of_the_volumes(several):
 
 
 def touched_and_held(body: Body, dt: float):
-    """A state in motion with two held nodes and three on obstacles of random normals, its rows filled."""
+    """A state in motion, its rows filled: two nodes held, three sliding, one in a wedge, one sticking.
+
+    And what that fixes: (node, direction, velocity along it [m/s]).
+    """
     random = np.random.default_rng(0)
     held, touched = np.array([5, 17]), np.array([20, 21, 30])
     state = start(body, (Attachment(held),), v=0.1 * random.normal(size=body.rest.shape))
@@ -102,11 +105,23 @@ def touched_and_held(body: Body, dt: float):
     mo.v_star[held] = [0.02, 0.0, -0.01]
     normals = random.normal(size=(3, 3))
     mo.normal[touched] = normals / np.linalg.norm(normals, axis=1)[:, None]
-    mo.touched[touched] = 1
-    mo.approach[touched] = 0.05 * random.normal(size=3)
+    approach = 0.05 * random.normal(size=3)
+    mo.touched[touched], mo.locked[touched] = 1, 1
+    mo.direction[touched] = mo.normal[touched]
+    mo.goal[touched] = approach[:, None] * mo.normal[touched]
+    edge, wedged, stuck = np.linalg.qr(random.normal(size=(3, 3)))[0], 31, 40
+    mo.touched[[wedged, stuck]] = 1
+    mo.locked[[wedged, stuck]] = 2, 3
+    mo.direction[wedged] = edge[0]
+    mo.goal[wedged] = 0.03 * edge[1] - 0.02 * edge[2]
+    mo.goal[stuck] = [0.01, -0.02, 0.03]
+    fixed = [(wedged, edge[1], 0.03), (wedged, edge[2], -0.02)]
+    fixed += [(stuck, axis, float(axis @ mo.goal[stuck])) for axis in np.eye(3)]
+    fixed += [(i, mo.normal[i], a) for i, a in zip(touched, approach, strict=True)]
+    fixed += [(i, axis, float(axis @ mo.v_star[i])) for i in held for axis in np.eye(3)]
     rows_into(mo.x, rows)
     volumes_of_rows_into(mo.x, rows, rows.volume)
-    return state, held, touched
+    return state, fixed
 
 
 @pytest.mark.parametrize("dense", [True, False], ids=["dense", "iterative"])
@@ -115,7 +130,7 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
     if not dense:
         monkeypatch.setattr(rows_module, "DENSE_UP_TO", 0)
     dt = 1e-3
-    state, held, touched = touched_and_held(several, dt)
+    state, fixed = touched_and_held(several, dt)
     mo, rows, n = state.motion, state.rows, several.node_count
     target = 1.001 * several.rest_volumes
     network = state.network._replace(longest_correction=np.inf)
@@ -126,8 +141,10 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
     for r in range(several.kept.count):
         entries = slice(rows.row_start[r], rows.row_start[r + 1])
         jacobian[r, rows.column[entries]] = rows.value[entries]
-    rectangle = np.vstack([dt * jacobian.reshape(len(jacobian), -1), *_single_rows(mo.normal, touched, held)])
-    right = np.concatenate([target - rows.volume, mo.approach[touched], mo.v_star[held].ravel()])
+    rectangle = np.vstack(
+        [dt * jacobian.reshape(len(jacobian), -1), *[_single_row(n, i, axis) for i, axis, _ in fixed]]
+    )
+    right = np.concatenate([target - rows.volume, [velocity for _, _, velocity in fixed]])
     mass, empty = np.repeat(several.mass, 3), np.zeros((len(rectangle), len(rectangle)))
     system = np.block([[np.diag(mass), -rectangle.T], [rectangle, empty]])
     solution = np.linalg.lstsq(system, np.concatenate([mass * mo.v_star.ravel(), right]), rcond=1e-14)[0]
@@ -136,19 +153,16 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
     assert np.abs(mo.gradient - force).max() < 1e-6 * np.abs(force).max()
     if several.kept.count < n:  # pressures of nodes may hold a part that moves nothing
         assert np.abs(rows.lam - lam).max() < 1e-6 * np.abs(lam).max()
-    motion_kernels.advance(mo, several.mass, network.inverse_mass, 1.0, dt, np.zeros((1, 3)))
+    motion_kernels.advance(mo, several.mass, network.inverse_mass, 1.0, dt, np.zeros((2, 3)))
     assert np.allclose(mo.v.ravel(), solution[: 3 * n], atol=1e-7)  # a millionth of the velocities of 0.1 m/s
     assert (tally.iterations[1] > 0) != dense
 
 
-def _single_rows(normal: np.ndarray, touched: np.ndarray, held: np.ndarray) -> list[np.ndarray]:
-    """n·v of the touched nodes, then the three components of the held ones, each as rows (·, 3 n)."""
-    along = np.zeros((len(touched), *normal.shape))
-    along[np.arange(len(touched)), touched] = normal[touched]
-    fixed = np.zeros((len(held), 3, *normal.shape))
-    for number, node in enumerate(held):
-        fixed[number, :, node] = np.eye(3)
-    return [along.reshape(len(touched), -1), fixed.reshape(3 * len(held), -1)]
+def _single_row(nodes: int, node: int, direction: np.ndarray) -> np.ndarray:
+    """direction · v of one node as a row (3 n,)."""
+    row = np.zeros((nodes, 3))
+    row[node] = direction
+    return row.ravel()
 
 
 def test_the_whole_by_rows_is_the_whole_by_a_division(block_body):
