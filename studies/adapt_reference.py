@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from skfem import MeshTet2
 
-from massspring import Obstacle, Plane
+from massspring import Capsule, Obstacle, Plane
 from reference_fem import Cavity, NeoHookean, Problem, RigidPlane, RigidSphere, nodes
 from reference_fem import Held as HeldPatch
 from studies.errors import StudyError
@@ -43,8 +43,8 @@ def _cavity(scene: Scene, middles: np.ndarray) -> Cavity:
 
 
 def anchor(obstacle: Obstacle) -> np.ndarray:
-    """Point of a plane or centre of a sphere [m], (3,)."""
-    return np.asarray(obstacle.point if isinstance(obstacle, Plane) else obstacle.centre, dtype=float)
+    """Point of a plane, centre of a sphere or start of a capsule [m], (3,)."""
+    return obstacle.anchor
 
 
 def kept_obstacles(scene: Scene) -> tuple[Obstacle, ...]:
@@ -85,6 +85,8 @@ def _held(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray]) -> tuple[Held
 
 
 def _rigid(obstacle: Obstacle) -> RigidPlane | RigidSphere:
+    if isinstance(obstacle, Capsule) or obstacle.friction != 0:
+        raise StudyError(f"the reference knows frictionless planes and spheres, not {obstacle}; judge without it")
     if isinstance(obstacle, Plane):
         return RigidPlane(obstacle.point, tuple(obstacle.unit_normal), obstacle.path)
     return RigidSphere(obstacle.centre, obstacle.radius, obstacle.path)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from skfem import MeshTet, MeshTet2
 
-from massspring import Obstacle, Plane
+from massspring import Obstacle
 from reference_fem import Evaluator, curve, facet_nodes, nodes
 from reference_fem.elements import edge_index
 from studies.adapt import mesh_for, patch_nodes
@@ -138,11 +138,7 @@ class Body:
         x = self.mesh.p[:, outer].T
         deep = np.zeros(len(x), dtype=bool)
         for obstacle in obstacles:
-            moved = x - np.asarray(obstacle.path(t))
-            if isinstance(obstacle, Plane):
-                deep |= (moved - obstacle.point) @ obstacle.unit_normal < 0
-            else:
-                deep |= np.linalg.norm(moved - obstacle.centre, axis=1) < obstacle.radius
+            deep |= obstacle.gap(x, t) < 0
         return np.flatnonzero(np.isin(self.mesh.t, outer[deep]).any(axis=0))
 
     def bisected(self, elements: np.ndarray) -> "Body":

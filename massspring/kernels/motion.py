@@ -3,7 +3,8 @@
 import math
 
 from massspring.kernels.compiled import compiled
-from massspring.kernels.contact import allowed_part, shares
+from massspring.kernels.distances import allowed_part
+from massspring.kernels.rubbing import shares
 
 
 @compiled

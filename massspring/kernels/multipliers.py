@@ -3,7 +3,7 @@
 import math
 
 from massspring.kernels.compiled import compiled
-from massspring.kernels.contact import allowed_part
+from massspring.kernels.distances import allowed_part
 from massspring.kernels.rows import NEGLIGIBLE, mobilise, rows_times_into, transposed_rows_times_into
 
 

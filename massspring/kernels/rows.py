@@ -3,7 +3,7 @@
 import math
 
 from massspring.kernels.compiled import compiled
-from massspring.kernels.contact import allowed_part
+from massspring.kernels.distances import allowed_part
 
 NEGLIGIBLE = 1e-12
 """A diagonal or pivot this much smaller than what it was summed from is round-off."""

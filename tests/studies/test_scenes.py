@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import METHODS, Path, Plane, Ramp, simulate
+from massspring import METHODS, Capsule, Path, Plane, Ramp, simulate
 from reference_fem import NewtonSettings
 from reference_fem.problem import find_held
 from reference_fem.system import System
@@ -190,3 +190,12 @@ def test_both_solvers_hold_the_same_region(scene):
         assert set(corners) <= set(patch)
         assert len(corners) >= 0.95 * len(patch)
         assert (held.region.level(mesh.points[patch]) <= 1e-3 * np.ptp(mesh.points)).all()
+
+
+@pytest.mark.parametrize(
+    "obstacle", [Plane((0, 0, 1), (0, 0, -1), friction="no_slip"), Capsule((0, 0, 1), (0, 0, 2), 0.1)]
+)
+def test_an_obstacle_that_the_reference_does_not_know_is_refused(obstacle):
+    liver = next(s for s in SCENES if s.name == "liver_press")
+    with pytest.raises(StudyError, match="the reference knows frictionless planes and spheres"):
+        reference_problem(replace(liver, obstacles=(obstacle,)), 150)

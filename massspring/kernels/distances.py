@@ -1,0 +1,58 @@
+"""Where a node is beside an obstacle, and what motion an obstacle leaves it.
+
+These functions take numbers, not tuples of arrays: a call that is not inlined counts the references of every array it
+is given, which costs 200 ns.
+"""
+
+import math
+
+from massspring.kernels.compiled import compiled
+
+
+@compiled
+def allowed_part(locked, d0, d1, d2, g0, g1, g2):
+    """P g, what obstacles leave of a vector: P = I − n nᵀ on one, e eᵀ on two, 0 where a node sticks (eq. 9)."""
+    along = g0 * d0 + g1 * d1 + g2 * d2
+    if locked == 1:
+        return g0 - along * d0, g1 - along * d1, g2 - along * d2
+    if locked == 2:
+        return along * d0, along * d1, along * d2
+    return 0.0, 0.0, 0.0
+
+
+@compiled
+def axis_share(r0, r1, r2, s0, s1, s2):
+    """Where on a segment 0 … s the point nearest to r lies, 0 … 1; 0 where s has no length."""
+    square = s0 * s0 + s1 * s1 + s2 * s2
+    return min(max((r0 * s0 + r1 * s1 + r2 * s2) / square, 0.0), 1.0) if square > 0.0 else 0.0
+
+
+@compiled
+def sphere_contact(s0, s1, s2, r0, r1, r2, radius):
+    """(gap, normal, lift) of a node at s now and at r after the predicted step, seen from the centre [m] (eq. 12).
+
+    n = s/|s|; the node ends the step at n·r⁺ = n·r + lift = √(R² − |r − n (n·r)|²), on the sphere, moved along n alone.
+    A node that slides farther than R within a step has no such point: it ends on the tangent plane at r/|r|.
+    """
+    distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+    if not distance > 0.0:
+        return math.inf, 0.0, 0.0, 0.0, 0.0
+    now = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
+    along = (r0 * s0 + r1 * s1 + r2 * s2) / now if now > 0.0 else 0.0
+    below = radius * radius - (distance * distance - along * along)
+    if along > 0.0 and below > 0.0:
+        return distance - radius, s0 / now, s1 / now, s2 / now, math.sqrt(below) - along
+    return distance - radius, r0 / distance, r1 / distance, r2 / distance, radius - distance
+
+
+@compiled
+def round_contact(s0, s1, s2, r0, r1, r2, a0, a1, a2, radius):
+    """`sphere_contact` with the sphere around the nearest point of an axis 0 … a, a capsule's; a = 0: a sphere's.
+
+    Along the side both points are seen from the axis. A node that passes from side to end ends on the tangent plane.
+    """
+    now, then = axis_share(s0, s1, s2, a0, a1, a2), axis_share(r0, r1, r2, a0, a1, a2)
+    r0, r1, r2 = r0 - then * a0, r1 - then * a1, r2 - then * a2
+    if now == then or (0.0 < now < 1.0 and 0.0 < then < 1.0):
+        return sphere_contact(s0 - now * a0, s1 - now * a1, s2 - now * a2, r0, r1, r2, radius)
+    return sphere_contact(r0, r1, r2, r0, r1, r2, radius)

@@ -1,0 +1,160 @@
+"""Contact with friction, and of a node with two obstacles at once (docs/theory.md, section 9)."""
+
+import math
+
+from massspring.kernels.compiled import compiled
+from massspring.kernels.distances import allowed_part, axis_share
+
+SLIPS = 1.0 + 1e-9
+"""Round-off must not turn a node that just sticks into one that slips."""
+PARALLEL = 1e-4
+"""Squared sine between two normals (0.6°) below which they count as one: there is no edge to slide along."""
+
+
+@compiled
+def rub(network, motion, drive, step, lam):
+    """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 36)."""
+    for c in range(network.surface_nodes.shape[0]):
+        i = network.surface_nodes[c]
+        if motion.locked[i] != 1 or not drive.friction[motion.touched[i] - 1] > 0.0:
+            continue
+        o = motion.touched[i] - 1
+        push = drive.dt * lam * network.inverse_mass[i]
+        n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
+        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
+        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+        g0, g1, g2 = motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2]
+        pressed = drive.friction[o] * ((g0 - u0) * n0 + (g1 - u1) * n1 + (g2 - u2) * n2)
+        w0, w1, w2 = drive.velocity[step, o, 0], drive.velocity[step, o, 1], drive.velocity[step, o, 2]
+        s0, s1, s2 = allowed_part(1, n0, n1, n2, u0 - w0, u1 - w1, u2 - w2)
+        slip = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
+        if slip <= pressed:
+            w0, w1, w2 = allowed_part(1, n0, n1, n2, w0, w1, w2)
+            motion.locked[i] = 3
+            motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = g0 + w0, g1 + w1, g2 + w2
+        else:
+            lost = pressed / slip
+            motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = g0 - lost * s0, g1 - lost * s1, g2 - lost * s2
+
+
+@compiled
+def release_slipping(network, motion, drive, lam):
+    """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 36)."""
+    changes = 0
+    for c in range(network.surface_nodes.shape[0]):
+        i = network.surface_nodes[c]
+        if motion.locked[i] != 3:
+            continue
+        push = drive.dt * lam * network.inverse_mass[i]
+        n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+        k0 = motion.goal[i, 0] - motion.v_star[i, 0] - push * motion.gradient[i, 0]
+        k1 = motion.goal[i, 1] - motion.v_star[i, 1] - push * motion.gradient[i, 1]
+        k2 = motion.goal[i, 2] - motion.v_star[i, 2] - push * motion.gradient[i, 2]
+        along = k0 * n0 + k1 * n1 + k2 * n2
+        s0, s1, s2 = allowed_part(1, n0, n1, n2, k0, k1, k2)
+        needed, most = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2), drive.friction[motion.touched[i] - 1] * along
+        if along > 0.0 and needed > SLIPS * most:
+            a = motion.goal[i, 0] * n0 + motion.goal[i, 1] * n1 + motion.goal[i, 2] * n2
+            g0, g1, g2 = a * n0 + most / needed * s0, a * n1 + most / needed * s1, a * n2 + most / needed * s2
+            motion.locked[i] = 1
+            motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = g0, g1, g2
+            changes += 1
+    return changes
+
+
+@compiled
+def wedge(network, motion, drive, step, lam):
+    """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 37); how many.
+
+    Obstacles that face each other have no edge: the deeper one wins, and the other's penetration is recorded.
+    """
+    changes = 0
+    dt = drive.dt
+    for c in range(network.surface_nodes.shape[0]):
+        i = network.surface_nodes[c]
+        if motion.locked[i] != 1:
+            continue
+        push = dt * lam * network.inverse_mass[i]
+        n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
+        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
+        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+        u0, u1, u2 = allowed_part(1, n0, n1, n2, u0, u1, u2)
+        u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
+        y0, y1, y2 = motion.x[i, 0] + dt * u0, motion.x[i, 1] + dt * u1, motion.x[i, 2] + dt * u2
+        deepest = 0.0
+        for o in range(drive.radius.shape[0]):
+            if o + 1 == motion.touched[i]:
+                continue
+            p0, p1, p2 = drive.position[step, o, 0], drive.position[step, o, 1], drive.position[step, o, 2]
+            if drive.is_plane[o]:
+                m0, m1, m2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
+                gap = m0 * (y0 - p0) + m1 * (y1 - p1) + m2 * (y2 - p2)
+            else:
+                a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
+                m0, m1, m2 = y0 - p0, y1 - p1, y2 - p2
+                share = axis_share(m0, m1, m2, a0, a1, a2)
+                m0, m1, m2 = m0 - share * a0, m1 - share * a1, m2 - share * a2
+                distance = math.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
+                if not distance > 0.0:
+                    continue
+                gap = distance - drive.radius[o]
+                m0, m1, m2 = m0 / distance, m1 / distance, m2 / distance
+            e0, e1, e2 = n1 * m2 - n2 * m1, n2 * m0 - n0 * m2, n0 * m1 - n1 * m0
+            square = e0 * e0 + e1 * e1 + e2 * e2
+            if gap < deepest and square > PARALLEL:
+                deepest = gap
+                # goal = α n + β m with n·goal = a and m·goal = b.
+                a, b = n0 * u0 + n1 * u1 + n2 * u2, m0 * u0 + m1 * u1 + m2 * u2 - gap / dt
+                cosine, root = n0 * m0 + n1 * m1 + n2 * m2, math.sqrt(square)
+                alpha, beta = (a - cosine * b) / square, (b - cosine * a) / square
+                motion.second[i] = o + 1
+                motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2] = m0, m1, m2
+                motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2] = e0 / root, e1 / root, e2 / root
+                motion.goal[i, 0] = alpha * n0 + beta * m0
+                motion.goal[i, 1] = alpha * n1 + beta * m1
+                motion.goal[i, 2] = alpha * n2 + beta * m2
+        if deepest < 0.0:
+            motion.locked[i] = 2
+            changes += 1
+    return changes
+
+
+@compiled
+def shares(k0, k1, k2, n0, n1, n2, m0, m1, m2):
+    """The parts of k = α n + β n' + rest along two normals that are not parallel: (α, β)."""
+    along, other = k0 * n0 + k1 * n1 + k2 * n2, k0 * m0 + k1 * m1 + k2 * m2
+    cosine = n0 * m0 + n1 * m1 + n2 * m2
+    square = 1.0 - cosine * cosine
+    return (along - cosine * other) / square, (other - cosine * along) / square
+
+
+@compiled
+def release_wedged(network, motion, drive, lam):
+    """Frees nodes in a wedge that one of their obstacles would pull; the next search finds the other (eq. 37)."""
+    changes = 0
+    for c in range(network.surface_nodes.shape[0]):
+        i = network.surface_nodes[c]
+        if motion.locked[i] != 2:
+            continue
+        push = drive.dt * lam * network.inverse_mass[i]
+        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
+        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
+        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+        # What the edge leaves free is at right angles to both normals and takes no share.
+        alpha, beta = shares(
+            motion.goal[i, 0] - u0,
+            motion.goal[i, 1] - u1,
+            motion.goal[i, 2] - u2,
+            motion.normal[i, 0],
+            motion.normal[i, 1],
+            motion.normal[i, 2],
+            motion.second_normal[i, 0],
+            motion.second_normal[i, 1],
+            motion.second_normal[i, 2],
+        )
+        if alpha < 0.0 or beta < 0.0:
+            motion.touched[i], motion.locked[i], motion.clearance[i] = 0, 0, 0.0
+            changes += 1
+    return changes
