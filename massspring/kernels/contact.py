@@ -6,59 +6,74 @@ What is rare (friction, two obstacles at once) has loops of its own in `kernels.
 import math
 
 from massspring.kernels.compiled import compiled
-from massspring.kernels.distances import round_contact
+from massspring.kernels.distances import gap, round_contact
 from massspring.kernels.rubbing import release_slipping, release_wedged, rub, wedge
 
 
 @compiled
-def touch(motion, drive, step, node, u0, u1, u2):
-    """Puts the node on the obstacle it would enter deepest when moving with u [m/s]; the smallest gap [m] (eq. 12).
+def seat(network, motion, drive, step, lam, count):
+    """Puts the first `count` nodes of `motion.entering` on the obstacle each would enter deepest (eq. 12).
 
-    Plane: gap = n·(x + dt u − p). Sphere, capsule: gap = distance of x + dt u to centre or axis − R.
     `goal` n a, a = n·(target − x)/dt, ends the step on the obstacle. A round one pushes along n = (x − c)/|x − c| of
     the position now, not of the prediction: that would do work on a node that slides, and pump its oscillations up.
     """
-    nearest = math.inf
     dt = drive.dt
-    x0, x1, x2 = motion.x[node, 0], motion.x[node, 1], motion.x[node, 2]
-    for o in range(drive.radius.shape[0]):
-        p0, p1, p2 = drive.position[step, o, 0], drive.position[step, o, 1], drive.position[step, o, 2]
-        r0, r1, r2 = x0 + dt * u0 - p0, x1 + dt * u1 - p1, x2 + dt * u2 - p2
-        if drive.is_plane[o]:
+    for k in range(count):
+        i = motion.entering[k]
+        push = dt * lam * network.inverse_mass[i]
+        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
+        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
+        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+        deepest = 0.0
+        for o in range(drive.radius.shape[0]):
+            s0 = motion.x[i, 0] - drive.position[step, o, 0]
+            s1 = motion.x[i, 1] - drive.position[step, o, 1]
+            s2 = motion.x[i, 2] - drive.position[step, o, 2]
+            r0, r1, r2 = s0 + dt * u0, s1 + dt * u1, s2 + dt * u2
             n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
-            gap = n0 * r0 + n1 * r1 + n2 * r2
-            lift = -gap
-        else:
             a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-            gap, n0, n1, n2, lift = round_contact(x0 - p0, x1 - p1, x2 - p2, r0, r1, r2, a0, a1, a2, drive.radius[o])
-        if gap < nearest:
-            nearest = gap
-            if gap < 0.0:
+            depth = gap(drive.is_plane[o], r0, r1, r2, n0, n1, n2, a0, a1, a2, drive.radius[o])
+            if depth < deepest:
+                deepest = depth
+                lift = -depth
+                if not drive.is_plane[o]:
+                    n0, n1, n2, lift = round_contact(s0, s1, s2, r0, r1, r2, a0, a1, a2, drive.radius[o])
                 a = n0 * u0 + n1 * u1 + n2 * u2 + lift / dt
-                motion.touched[node], motion.locked[node] = o + 1, 1
-                motion.normal[node, 0], motion.normal[node, 1], motion.normal[node, 2] = n0, n1, n2
-                motion.direction[node, 0], motion.direction[node, 1], motion.direction[node, 2] = n0, n1, n2
-                motion.goal[node, 0], motion.goal[node, 1], motion.goal[node, 2] = a * n0, a * n1, a * n2
-    return nearest
+                motion.touched[i], motion.locked[i] = o + 1, 1
+                motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2] = n0, n1, n2
+                motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2] = n0, n1, n2
+                motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = a * n0, a * n1, a * n2
 
 
 @compiled
 def find_contacts(network, motion, drive, step, lam):
     """Touched nodes of the step when the last pressure acts as a force: u = v* + dt lam W G (eq. 12)."""
+    dt = drive.dt
+    count = 0
     for c in range(network.surface_nodes.shape[0]):
         i = network.surface_nodes[c]
         motion.touched[i], motion.locked[i] = 0, 0
-        if network.inverse_mass[i] > 0.0:
-            push = drive.dt * lam * network.inverse_mass[i]
-            motion.clearance[i] = touch(
-                motion,
-                drive,
-                step,
-                i,
-                motion.v_star[i, 0] + push * motion.gradient[i, 0],
-                motion.v_star[i, 1] + push * motion.gradient[i, 1],
-                motion.v_star[i, 2] + push * motion.gradient[i, 2],
+        if network.inverse_mass[i] == 0.0:
+            continue
+        push = dt * lam * network.inverse_mass[i]
+        y0 = motion.x[i, 0] + dt * (motion.v_star[i, 0] + push * motion.gradient[i, 0])
+        y1 = motion.x[i, 1] + dt * (motion.v_star[i, 1] + push * motion.gradient[i, 1])
+        y2 = motion.x[i, 2] + dt * (motion.v_star[i, 2] + push * motion.gradient[i, 2])
+        nearest = math.inf
+        for o in range(drive.radius.shape[0]):
+            r0, r1, r2 = (
+                y0 - drive.position[step, o, 0],
+                y1 - drive.position[step, o, 1],
+                y2 - drive.position[step, o, 2],
             )
+            n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
+            a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
+            nearest = min(nearest, gap(drive.is_plane[o], r0, r1, r2, n0, n1, n2, a0, a1, a2, drive.radius[o]))
+        motion.clearance[i] = nearest
+        if nearest < 0.0:
+            motion.entering[count] = i
+            count += 1
+    seat(network, motion, drive, step, lam, count)
     if drive.rough:
         rub(network, motion, drive, step, lam)
     if drive.radius.shape[0] > 1:
@@ -72,7 +87,8 @@ def revise_contacts(network, motion, drive, step, lam, reach):
     `reach` [m] is how far the new pressure can have moved a node from where `clearance` was measured: distances to
     obstacles change by no more, so a free node farther away need not be looked at.
     """
-    changes = 0
+    dt = drive.dt
+    count, changes = 0, 0
     if drive.rough:
         changes += release_slipping(network, motion, drive, lam)
     if drive.radius.shape[0] > 1:
@@ -82,7 +98,7 @@ def revise_contacts(network, motion, drive, step, lam, reach):
         locked = motion.locked[i]
         if network.inverse_mass[i] == 0.0 or locked == 2 or (locked == 0 and motion.clearance[i] > reach):
             continue
-        push = drive.dt * lam * network.inverse_mass[i]
+        push = dt * lam * network.inverse_mass[i]
         u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
         u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
         u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
@@ -94,9 +110,22 @@ def revise_contacts(network, motion, drive, step, lam, reach):
                 # A released node is looked at again, whatever the pressure becomes.
                 motion.clearance[i] = 0.0
                 changes += 1
-        elif touch(motion, drive, step, i, u0, u1, u2) < 0.0:
-            changes += 1
-    return changes
+            continue
+        y0, y1, y2 = motion.x[i, 0] + dt * u0, motion.x[i, 1] + dt * u1, motion.x[i, 2] + dt * u2
+        for o in range(drive.radius.shape[0]):
+            r0, r1, r2 = (
+                y0 - drive.position[step, o, 0],
+                y1 - drive.position[step, o, 1],
+                y2 - drive.position[step, o, 2],
+            )
+            n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
+            a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
+            if gap(drive.is_plane[o], r0, r1, r2, n0, n1, n2, a0, a1, a2, drive.radius[o]) < 0.0:
+                motion.entering[count] = i
+                count += 1
+                break
+    seat(network, motion, drive, step, lam, count)
+    return changes + count
 
 
 @compiled

@@ -28,21 +28,30 @@ def axis_share(r0, r1, r2, s0, s1, s2):
 
 
 @compiled
+def gap(is_plane, r0, r1, r2, n0, n1, n2, a0, a1, a2, radius):
+    """Distance [m], negative inside: of r to the plane n·r = 0, or to the axis 0 … a less a radius (eq. 12)."""
+    if is_plane:
+        return n0 * r0 + n1 * r1 + n2 * r2
+    share = axis_share(r0, r1, r2, a0, a1, a2)
+    r0, r1, r2 = r0 - share * a0, r1 - share * a1, r2 - share * a2
+    return math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius
+
+
+@compiled
 def sphere_contact(s0, s1, s2, r0, r1, r2, radius):
-    """(gap, normal, lift) of a node at s now and at r after the predicted step, seen from the centre [m] (eq. 12).
+    """(normal, lift) of a node at s now and at r after the predicted step, seen from the centre [m] (eq. 12).
 
     n = s/|s|; the node ends the step at n·r⁺ = n·r + lift = √(R² − |r − n (n·r)|²), on the sphere, moved along n alone.
-    A node that slides farther than R within a step has no such point: it ends on the tangent plane at r/|r|.
+    A node that slides farther than R within a step has no such point: it ends on the tangent plane at r/|r|. Inverse
+    lengths are infinite at the very centre, and the run has diverged.
     """
     distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
-    if not distance > 0.0:
-        return math.inf, 0.0, 0.0, 0.0, 0.0
     now = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
     along = (r0 * s0 + r1 * s1 + r2 * s2) / now if now > 0.0 else 0.0
     below = radius * radius - (distance * distance - along * along)
     if along > 0.0 and below > 0.0:
-        return distance - radius, s0 / now, s1 / now, s2 / now, math.sqrt(below) - along
-    return distance - radius, r0 / distance, r1 / distance, r2 / distance, radius - distance
+        return s0 / now, s1 / now, s2 / now, math.sqrt(below) - along
+    return r0 / distance, r1 / distance, r2 / distance, radius - distance
 
 
 @compiled

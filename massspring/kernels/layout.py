@@ -104,6 +104,8 @@ class Motion(NamedTuple):
     """The normal of a node that slides, the edge of one in a wedge, (n, 3)."""
     goal: np.ndarray
     """Velocity that ends the step on the obstacles, in the directions taken, less what friction takes [m/s], (n, 3)."""
+    entering: np.ndarray
+    """Scratch: nodes that would enter an obstacle, (n,) uint32."""
     clearance: np.ndarray
     """Distance to the nearest obstacle at the end of the predicted step [m], (n,)."""
 

@@ -80,6 +80,7 @@ def start(body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | 
         gradient=np.zeros((n, 3)),
         touched=np.zeros(n, dtype=np.uint32),
         second=np.zeros(n, dtype=np.uint32),
+        entering=np.zeros(n, dtype=np.uint32),
         locked=np.zeros(n, dtype=np.uint8),
         **{name: np.zeros((n, 3)) for name in ("normal", "second_normal", "direction", "goal")},
         clearance=np.zeros(n),
