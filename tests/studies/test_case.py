@@ -80,7 +80,7 @@ UNREADABLE = {
     "kind": (lambda d: d["body"].update(kind="jelly"), "kind"),
     "scene": (lambda d: d["scene"].update(dampping=3.0), "dampping"),
     "tissue": (lambda d: d["scene"]["tissue"].update(viscosity=3.0), "scene.tissue.viscosity"),
-    "obstacle": (lambda d: d["scene"]["obstacles"][1].update(friction=0.3), "friction"),
+    "obstacle": (lambda d: d["scene"]["obstacles"][1].update(bounce=0.3), "bounce"),
     "organ missing": (lambda d: d["scene"].pop("organ"), "organ"),
     "normal": (lambda d: d["scene"]["obstacles"][0].update(normal=[0, 0, 0]), "direction"),
     "dt missing": (lambda d: d.pop("dt"), "dt"),
