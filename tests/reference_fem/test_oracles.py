@@ -6,10 +6,15 @@ import pytest
 from reference_fem import exact
 from reference_fem.oracles import ORACLES, Check, Curve, manufactured
 
-FAST = [oracle for oracle in ORACLES if oracle.fast]
+LONG = ("thick_sphere", "cylinder", "manufactured")
+FAST = [
+    pytest.param(oracle, id=oracle.name, marks=[pytest.mark.slow] if oracle.name in LONG else [])
+    for oracle in ORACLES
+    if oracle.fast
+]
 
 
-@pytest.mark.parametrize("oracle", FAST, ids=[oracle.name for oracle in FAST])
+@pytest.mark.parametrize("oracle", FAST)
 def test_every_number_is_where_it_must_be(oracle):
     found = oracle.measure()
     assert found.checks
