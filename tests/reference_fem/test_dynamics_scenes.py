@@ -198,6 +198,17 @@ def test_a_hollow_body_in_motion_keeps_its_content():
     assert max(abs(m.cavity_pressure[0]) for m in path) > 0.01
 
 
+def test_filling_a_hollow_body_does_work():
+    """The lumen is filled by a tenth: its pressure's work becomes strain and motion, to 1 % at 20 steps."""
+    lumen = Cavity(
+        lambda x: np.linalg.norm(x, axis=0) < 0.75, volume=lambda t: 1.0 + 0.1 * np.sin(0.5 * np.pi * t) ** 2
+    )
+    problem = Problem(shell_octant(0.5, 3, 2), MATERIAL, symmetry(), cavities=[lumen], density=0.1)
+    last = motion_path(problem, (1.0,), DynamicsSettings(dt=0.05))[-1]
+    assert last.work > 1e-4
+    assert abs(last.balance) < 0.01 * last.work
+
+
 def pulled(settings):
     """A cube drawn out by a half of its height, in a time in which shear waves cross it four times."""
     grip = Held(lambda x: x[2] > 1 - 1e-9, motion=lambda t: (0.0, 0.0, 0.5 * np.sin(0.5 * np.pi * t) ** 2))
