@@ -7,15 +7,18 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import cg
 
 from studies.errors import StudyError
-from studies.geometry.jacobian import PAIRS, curved_volume, smallest_jacobian
+from studies.geometry.jacobian import PAIRS, curved_volume, scaled_coefficients, smallest_jacobian
 from studies.geometry.levelset import Shape, at_depth, project
+from studies.geometry.mend import trial_moves
 from studies.geometry.mesh import OrganMesh, tetrahedron_volumes, unique_edges
 from studies.geometry.regions import Region, region_from_dict
 from studies.geometry.shapes import make_shape
 
 GOOD = 0.1
 """Elements whose Jacobian may fall below this fraction of the straight one get their inner mid-side nodes moved."""
-ROUNDS = 20
+ROUNDS = 30
+REACH = (0.2, 0.1, 0.04, 0.01, 0.003)
+"""Trial moves in lengths of the edge."""
 MOST_BAD = 0.05
 """Share of such elements beyond which single nodes cannot mend the mesh."""
 
@@ -152,9 +155,9 @@ def middle_stiffness(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
 
 
 def unfold(points: np.ndarray, cells: np.ndarray, movable: np.ndarray) -> np.ndarray:
-    """Points with the movable mid-side nodes of nearly folded elements moved to where the worst element is better."""
+    """Points with the movable mid-side nodes of nearly folded elements moved to where the elements around fold less."""
     points = points.copy()
-    trials = np.concatenate([reach * np.concatenate([np.eye(3), -np.eye(3)]) for reach in (0.2, 0.1, 0.04, 0.01)])
+    trials = trial_moves(REACH)
     for _ in range(ROUNDS):
         jacobian = smallest_jacobian(points, cells)
         bad = np.flatnonzero(jacobian < GOOD)
@@ -175,9 +178,17 @@ def move_middle(points: np.ndarray, cells: np.ndarray, node: int, trials: np.nda
     places = points[node] + trials * np.linalg.norm(points[around[0, i]] - points[around[0, j]])
     corners = np.where((around == node)[None, :, :, None], places[:, None, None, :], points[around][None])
     stars = np.arange(10 * len(trials) * len(around)).reshape(-1, 10)
-    worst = smallest_jacobian(corners.reshape(-1, 3), stars).reshape(len(trials), -1).min(axis=1)
-    best = int(worst.argmax())
-    if worst[best] <= smallest_jacobian(points, around).min() + 1e-3:
+    costs = fold_cost(corners.reshape(-1, 3), stars).reshape(len(trials), -1).sum(axis=1)
+    best = int(costs.argmin())
+    if costs[best] >= 0.999 * fold_cost(points, around).sum():
         return False
     points[node] = places[best]
     return True
+
+
+def fold_cost(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Sum of exp(-c / GOOD) over the scaled coefficients c of the Jacobian, shape (k,).
+
+    Smooth, unlike the smallest coefficient, at which moves of single nodes get stuck where several are equal.
+    """
+    return np.exp(-scaled_coefficients(points, cells) / GOOD).sum(axis=1)

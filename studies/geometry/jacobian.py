@@ -44,12 +44,17 @@ def jacobian_coefficients(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return (coefficients / _TIMES[:, None]).T
 
 
+def scaled_coefficients(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Bernstein coefficients, shape (k, 20), over 6 V of the straight element: 1 where straight."""
+    a, b, c, d = points[cells[:, :4]].transpose(1, 0, 2)
+    straight = np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a))
+    return jacobian_coefficients(points, cells) / straight[:, None]
+
+
 def smallest_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Lower bound, shape (k,), of det dx/dxi over 6 V of the straight element with the same vertices: 1 where straight,
     at most 0 where the element may be folded."""
-    a, b, c, d = points[cells[:, :4]].transpose(1, 0, 2)
-    straight = np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a))
-    return jacobian_coefficients(points, cells).min(axis=1) / straight
+    return scaled_coefficients(points, cells).min(axis=1)
 
 
 def curved_volume(points: np.ndarray, cells: np.ndarray) -> float:

@@ -24,10 +24,7 @@ def mend_nodes(
     than that worst one.
     """
     points = points.copy()
-    directions = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
-    directions = directions[np.abs(directions).sum(axis=1) > 0]
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    trials = np.concatenate([reach * directions for reach in REACH])
+    trials = trial_moves(REACH)
     for _ in range(ROUNDS):
         ratio = tetrahedron_radius_ratio(points, tetrahedra)
         bad = np.flatnonzero(ratio < wanted)
@@ -38,6 +35,14 @@ def mend_nodes(
         if not any(moves):
             return points
     return points
+
+
+def trial_moves(reaches: tuple[float, ...]) -> np.ndarray:
+    """Moves, shape (26 r, 3), of each of the given lengths towards the faces, edges and corners of a cube."""
+    directions = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
+    directions = directions[np.abs(directions).sum(axis=1) > 0]
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    return np.concatenate([reach * directions for reach in reaches])
 
 
 def move_node(points: np.ndarray, tetrahedra: np.ndarray, node: int, trials: np.ndarray, bring: Bring) -> bool:
