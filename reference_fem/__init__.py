@@ -35,7 +35,7 @@ from reference_fem.mesh import curve  # noqa: E402
 from reference_fem.modes import Modes, natural_frequencies  # noqa: E402
 from reference_fem.obstacles import RigidCapsule, RigidPlane, RigidSphere  # noqa: E402
 from reference_fem.problem import Held, Problem  # noqa: E402
-from reference_fem.state import NewtonSettings  # noqa: E402
+from reference_fem.state import NewtonSettings, State  # noqa: E402
 
 config.CACHE_DIR = _folder_before  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -61,6 +61,7 @@ __all__ = [
     "RigidPlane",
     "RigidSphere",
     "SlowSolverWarning",
+    "State",
     "Traction",
     "curve",
     "equilibrium_path",

@@ -1,5 +1,6 @@
 """How fast the reference is on this machine; functions return numbers, the caller pins the core and prints."""
 
+import resource
 import time
 
 import numpy as np
@@ -54,7 +55,8 @@ def iteration_costs(cells=7, repeats=7, solver="auto"):
 
 
 def contact_path(cells=9, steps=10, solver="auto"):
-    """A tilted plane pressed into the cube in equal steps: unknowns, wall_s, iterations (list, one per step)."""
+    """A tilted plane pressed into the cube in equal steps: unknowns, wall_s, peak_bytes of the process so far,
+    iterations (list, one per step)."""
     plane = RigidPlane((1.0, 0.5, 1.0), (-0.2, 0.0, -1.0), lambda t: (0.0, 0.0, -0.2 * t))
     problem = slab(cells, [plane])
     start = time.perf_counter()
@@ -62,5 +64,6 @@ def contact_path(cells=9, steps=10, solver="auto"):
     return {
         "unknowns": path[0].u.size + path[0].p.size,
         "wall_s": time.perf_counter() - start,
+        "peak_bytes": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
         "iterations": [state.newton_iterations for state in path],
     }

@@ -81,7 +81,7 @@ def check_held(x, held_dofs):
     if names:
         raise ReferenceProblem(
             f"the body is free to {' and '.join(names)}: hold a patch of it or use symmetry planes "
-            f"(frictionless contact holds nothing)"
+            f"(contact holds nothing before it is made, and a lumen never does)"
         )
 
 
@@ -112,6 +112,17 @@ def check_times(times, start):
     if np.any(np.diff(times) <= 0.0) or times[0] < start:
         raise ReferenceProblem(f"the times {times} s must increase and not lie before the start, {start:g} s")
     return times
+
+
+def check_resumed(rest, state):
+    """Refuse a stored state that does not fit the problem, whose state at rest is `rest`."""
+    for name in ("x", "multiplier", "pressure"):
+        wanted, given = getattr(rest, name).shape, getattr(state, name).shape
+        if wanted != given:
+            raise ReferenceProblem(
+                f"the load step to go on from has {name} of shape {given}, this problem {wanted}: it is of another "
+                f"mesh, element or set of obstacles, solve the path from its start"
+            )
 
 
 def boundary_size(mesh):

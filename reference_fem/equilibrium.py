@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reference_fem import assembly, contact
-from reference_fem.checks import check_times
+from reference_fem.checks import check_resumed, check_times
 from reference_fem.elements import at_nodes, forces_at_nodes
 from reference_fem.errors import ReferenceProblem
 from reference_fem.newton import StepFailed, solve_step
@@ -64,7 +64,10 @@ class Equilibrium:
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """A path half-way: what was found at its first times, and all that the next load step starts from."""
+    """A path half-way: what was found at its first times, and all that the next load step starts from.
+
+    state.to_arrays() and State.from_arrays store it without this package's classes.
+    """
 
     path: list[Equilibrium]
     state: State
@@ -91,9 +94,11 @@ def equilibrium_path(
     system = System(problem, settings)
     path: list[Equilibrium] = [] if resume is None else list(resume.path)
     try:
-        state = system.rest() if resume is None else resume.state
-        pending = (0, 0)
-        if resume is None and system.starts_loaded():
+        state, pending = system.rest(), (0, 0)
+        if resume is not None:
+            check_resumed(state, resume.state)
+            state = resume.state
+        elif system.starts_loaded():
             state, *pending = advance(system, state, settings.start, 1.0, path)
         for t in times[len(path) :]:
             state, iterations, substeps = advance(system, state, t, 1.0, path)

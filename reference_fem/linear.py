@@ -1,9 +1,11 @@
 """Symmetric indefinite sparse systems: MKL Pardiso when it is there, SciPy's SuperLU otherwise."""
 
+import os
 import sys
 import warnings
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,6 +21,24 @@ good factors leave 1e-10."""
 # after perturbed pivots; pivots perturbed below 1e-8; scaling and weighted matching, both advised for saddle points;
 # 2x2 pivots.
 PARDISO_CONTROL = {0: 1, 1: 2, 7: 0, 9: 8, 10: 1, 12: 1, 20: 1}
+
+
+def free_bytes():
+    """Memory that can be had without swapping; all there is where the system does not tell."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
+
+
+def check_memory(needed, free, unknowns):
+    """Refuse factors that do not fit, before the machine swaps; both in bytes."""
+    if needed > free:
+        raise ReferenceProblem(
+            f"factorising {unknowns} unknowns needs {needed / 1e9:.2g} GB of memory and {free / 1e9:.2g} GB are free: "
+            f"use a coarser mesh (half as many unknowns need about 0.4 of it) or a larger machine"
+        )
 
 
 @cache
@@ -54,6 +74,11 @@ class PardisoFactors:
         self.solver.set_phase(phase)
         return self.solver._call_pardiso(self.upper, b)
 
+    def needed_bytes(self):
+        """What the factors will take, known once the pattern is analysed: Pardiso's iparm(15), (16) and (17) [kB]."""
+        while_analysing, kept, factors = (int(self.solver.iparm[index]) for index in (14, 15, 16))
+        return 1024 * max(while_analysing, kept + factors)
+
     def factor(self, upper, afresh=False):
         """Factorise; the matching and ordering of the first matrix serve its successors unless afresh."""
         self.upper = upper
@@ -63,6 +88,7 @@ class PardisoFactors:
             self.upper = upper
             self.call(11, nothing)
             self.analysed = True
+            check_memory(self.needed_bytes(), free_bytes(), len(nothing))
         self.call(22, nothing)
 
     def solve(self, b):

@@ -103,3 +103,31 @@ def test_the_scipy_backend_never_warns():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         linear.SymmetricSolver("scipy")
+
+
+@pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
+def test_factors_that_do_not_fit_are_refused_before_they_are_made(monkeypatch):
+    """A cube of 3,000 unknowns on a machine with 3 MB left; the factors of its tangent take some 10 MB."""
+    monkeypatch.setattr(linear, "free_bytes", lambda: 3_000_000)
+    problem = Problem(block((5, 5, 5)), NeoHookean(1.0, 1000.0), [Held(lambda x: x[2] < 1e-9)])
+    with pytest.raises(ReferenceProblem, match=r"unknowns needs 0\.0\d+ GB of memory and 0\.003 GB are free"):
+        equilibrium_path(problem, [1.0])
+
+
+@pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
+def test_the_estimate_of_memory_is_that_of_the_factors():
+    """A full matrix of n unknowns has n (n + 1) / 2 numbers of 8 bytes in its factors; the matrix itself, its
+    indices and workspace make it seven times as much. Twice the unknowns take nearly four times as much."""
+    needed = []
+    for n in (480, 960):
+        solver = linear.SymmetricSolver("pardiso")
+        A = saddle_matrix(n)
+        solver.factor(upper(A))
+        needed.append(solver.factors.needed_bytes())
+        assert 1.0 < needed[-1] / (4 * len(A) * (len(A) + 1)) < 10.0
+        solver.release()
+    assert 3.0 < needed[1] / needed[0] < 4.5
+
+
+def test_free_memory_is_less_than_there_is():
+    assert 0 < linear.free_bytes() < 1e14
