@@ -6,7 +6,7 @@ What is rare (friction, two obstacles at once) has loops of its own in `kernels.
 import math
 
 from massspring.kernels.compiled import compiled
-from massspring.kernels.distances import gap, round_contact
+from massspring.kernels.distances import round_contact, round_gap
 from massspring.kernels.rubbing import release_slipping, release_wedged, rub, wedge
 
 
@@ -32,7 +32,10 @@ def seat(network, motion, drive, step, lam, count):
             r0, r1, r2 = s0 + dt * u0, s1 + dt * u1, s2 + dt * u2
             n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
             a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-            depth = gap(drive.is_plane[o], r0, r1, r2, n0, n1, n2, a0, a1, a2, drive.radius[o])
+            if drive.is_plane[o]:
+                depth = n0 * r0 + n1 * r1 + n2 * r2
+            else:
+                depth = round_gap(r0, r1, r2, a0, a1, a2, drive.radius[o])
             if depth < deepest:
                 deepest = depth
                 lift = -depth
@@ -66,14 +69,18 @@ def find_contacts(network, motion, drive, step, lam):
                 y1 - drive.position[step, o, 1],
                 y2 - drive.position[step, o, 2],
             )
-            n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
-            a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-            nearest = min(nearest, gap(drive.is_plane[o], r0, r1, r2, n0, n1, n2, a0, a1, a2, drive.radius[o]))
+            if drive.is_plane[o]:
+                n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
+                nearest = min(nearest, n0 * r0 + n1 * r1 + n2 * r2)
+            else:
+                a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
+                nearest = min(nearest, round_gap(r0, r1, r2, a0, a1, a2, drive.radius[o]))
         motion.clearance[i] = nearest
         if nearest < 0.0:
             motion.entering[count] = i
             count += 1
-    seat(network, motion, drive, step, lam, count)
+    if count > 0:
+        seat(network, motion, drive, step, lam, count)
     if drive.rough:
         rub(network, motion, drive, step, lam)
     if drive.radius.shape[0] > 1:
@@ -118,13 +125,18 @@ def revise_contacts(network, motion, drive, step, lam, reach):
                 y1 - drive.position[step, o, 1],
                 y2 - drive.position[step, o, 2],
             )
-            n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
-            a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-            if gap(drive.is_plane[o], r0, r1, r2, n0, n1, n2, a0, a1, a2, drive.radius[o]) < 0.0:
+            if drive.is_plane[o]:
+                n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
+                depth = n0 * r0 + n1 * r1 + n2 * r2
+            else:
+                a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
+                depth = round_gap(r0, r1, r2, a0, a1, a2, drive.radius[o])
+            if depth < 0.0:
                 motion.entering[count] = i
                 count += 1
                 break
-    seat(network, motion, drive, step, lam, count)
+    if count > 0:
+        seat(network, motion, drive, step, lam, count)
     return changes + count
 
 

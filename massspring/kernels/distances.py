@@ -28,10 +28,8 @@ def axis_share(r0, r1, r2, s0, s1, s2):
 
 
 @compiled
-def gap(is_plane, r0, r1, r2, n0, n1, n2, a0, a1, a2, radius):
-    """Distance [m], negative inside: of r to the plane n·r = 0, or to the axis 0 … a less a radius (eq. 12)."""
-    if is_plane:
-        return n0 * r0 + n1 * r1 + n2 * r2
+def round_gap(r0, r1, r2, a0, a1, a2, radius):
+    """Distance [m] of r to the axis 0 … a less a radius, negative inside (eq. 12)."""
     share = axis_share(r0, r1, r2, a0, a1, a2)
     r0, r1, r2 = r0 - share * a0, r1 - share * a1, r2 - share * a2
     return math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius
