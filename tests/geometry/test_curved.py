@@ -100,9 +100,9 @@ def test_the_paper_s_meshes_have_its_counts():
         check_surface(mesh.points, mesh.triangles)
 
 
-def test_a_wall_folds_unless_its_inner_nodes_follow():
+def test_a_wall_folds_unless_its_inner_nodes_follow(small):
     """The test of the tests: surfaces curved alone cut through a thin wall."""
-    mesh = organ("stomach", 550)
+    mesh = small["bladder"]
     made = curved(mesh)
     straight = made.points.copy()
     ends = made.cells[:, np.array(PAIRS)]
@@ -112,7 +112,8 @@ def test_a_wall_folds_unless_its_inner_nodes_follow():
     alone = made.points.copy()
     nodes = made.cells[:, 4:].ravel()[inner]
     alone[nodes] = straight[nodes]
-    assert smallest_jacobian(alone, made.cells).min() < 0 < GOOD < made.smallest_jacobian
+    # Measured -3.4 and 0.58; with single nodes moved one by one instead it ends where `unfold` stops, at 0.12.
+    assert smallest_jacobian(alone, made.cells).min() < 0 < 3 * GOOD < made.smallest_jacobian
 
 
 def test_coefficients_bound_the_determinant_and_average_to_it(one):
