@@ -17,19 +17,21 @@ def add_elements(x, elements, parameters, positions, values, residual, tangent):
     x: u at the displacement functions [m], interleaved, then p [Pa], (total,). positions: slots of the packed upper
     triangles. Pi = sum w W(F, p). r_u = w P·grad N, r_p = w (J - 1 - p/kappa) M.
     """
-    dofs, gradients, pressures, weights, functions = elements
-    known, whole = dofs.shape[1], 3 * len(functions) + pressures.shape[1]
+    dofs, gradients, pressures, weights, sizes = elements
+    known, whole = len(sizes.unknowns), 3 * len(sizes.functions) + len(sizes.pressures)
     ue, re = np.zeros(whole), np.empty(whole)
-    K = np.empty((3 * len(functions) + 4, 3 * len(functions) + 4))
+    K = np.empty((whole, whole))
     smallest = np.inf
     for e in range(dofs.shape[0]):
         for a in range(known):
             ue[a] = x[dofs[e, a]]
         if known < whole:
-            ue[known] = mean_pressure(ue, gradients[e], weights[e], functions, parameters)
+            ue[known] = mean_pressure(ue, gradients[e], weights[e], sizes.functions, parameters)
         re[:] = 0.0
         K[:] = 0.0
-        J = integrate_element(ue, gradients[e], pressures, weights[e], functions, parameters, re, K, tangent)
+        J = integrate_element(
+            ue, gradients[e], pressures, weights[e], sizes.functions, sizes.pressures, parameters, re, K, tangent
+        )
         smallest = min(smallest, J)
         if not J > 0.0:
             return J
@@ -46,7 +48,7 @@ def add_elements(x, elements, parameters, positions, values, residual, tangent):
     return smallest
 
 
-@njit(cache=True, fastmath=CONTRACT)
+@njit(cache=True, fastmath=CONTRACT, inline="always")
 def deformation_into(ue, G, functions, F):
     """F = 1 + sum u_a grad N_a (3, 3)."""
     count = len(functions)
@@ -79,7 +81,7 @@ def condense(K, n):
 
 
 @njit(cache=True, fastmath=CONTRACT)
-def integrate_element(ue, gradients, pressures, weights, functions, parameters, re, K, tangent):
+def integrate_element(ue, gradients, pressures, weights, functions, constraints, parameters, re, K, tangent):
     """Adds one element's residual re and upper tangent K; returns its smallest J."""
     F, H, P = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     A, T, scratch = np.empty((9, 9)), np.empty((9, 3 * len(functions))), np.empty((3, 3, 3))
@@ -87,7 +89,7 @@ def integrate_element(ue, gradients, pressures, weights, functions, parameters, 
     smallest = np.inf
     for q in range(weights.shape[0]):
         G, w, p = gradients[q], weights[q], 0.0
-        for a in range(pressures.shape[1]):
+        for a in range(len(constraints)):
             p += pressures[q, a] * ue[3 * count + a]
         deformation_into(ue, G, functions, F)
         J = response_into(F, p, parameters, H, P, A, scratch)
@@ -97,11 +99,11 @@ def integrate_element(ue, gradients, pressures, weights, functions, parameters, 
         for i in range(3):
             for a in range(count):
                 re[count * i + a] += w * (P[i, 0] * G[0, a] + P[i, 1] * G[1, a] + P[i, 2] * G[2, a])
-        for a in range(pressures.shape[1]):
+        for a in range(len(constraints)):
             re[3 * count + a] += w * pressures[q, a] * (J - 1.0 - p / kappa)
         if tangent:
             add_displacement_block(G, A, w, functions, T, K)
-            add_pressure_blocks(G, H, pressures[q], w * J, w / kappa, functions, K)
+            add_pressure_blocks(G, H, pressures[q], w * J, w / kappa, functions, constraints, K)
     return smallest
 
 
@@ -122,22 +124,22 @@ def add_displacement_block(G, A, w, functions, T, K):
 
 
 @njit(cache=True, fastmath=CONTRACT)
-def add_pressure_blocks(G, H, M, wJ, w_kappa, functions, K):
+def add_pressure_blocks(G, H, M, wJ, w_kappa, functions, constraints, K):
     """K[ia, q] += w J H_iJ G_Ja M_q and K[q, r] -= w M_q M_r / kappa."""
     count = len(functions)
     for i in range(3):
         for a in range(count):
             g = wJ * (H[i, 0] * G[0, a] + H[i, 1] * G[1, a] + H[i, 2] * G[2, a])
-            for q in range(M.shape[0]):
+            for q in range(len(constraints)):
                 K[count * i + a, 3 * count + q] += g * M[q]
-    for q in range(M.shape[0]):
-        for r in range(M.shape[0]):
+    for q in range(len(constraints)):
+        for r in range(len(constraints)):
             K[3 * count + q, 3 * count + r] -= w_kappa * M[q] * M[r]
 
 
 def deformation(x, elements: Elements, kappa):
     """F (ne, nq, 3, 3) and p (ne, nq) [Pa] at the quadrature points, in plain NumPy; kappa [Pa] of the material."""
-    known, count = elements.dofs.shape[1], 3 * len(elements.functions)
+    known, count = elements.dofs.shape[1], 3 * len(elements.sizes.functions)
     local = x[elements.dofs]
     u = local[:, :count].reshape(len(local), 3, -1)
     F = np.eye(3) + np.einsum("eia,eqra->eqir", u, elements.gradients)
@@ -156,7 +158,7 @@ def energy(x, elements: Elements, material):
 
 def vertex_pressure(x, elements: Elements, mesh, kappa):
     """Pressure at the vertices [Pa], (N1,): the unknowns themselves, or the mean of the elements around each."""
-    known, count = elements.dofs.shape[1], 3 * len(elements.functions)
+    known, count = elements.dofs.shape[1], 3 * len(elements.sizes.functions)
     if known > count:
         return x[len(x) - mesh.nvertices :].copy()
     _, p = deformation(x, elements, kappa)

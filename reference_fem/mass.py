@@ -34,7 +34,7 @@ def build_mass(system: System) -> Mass:
     """Consistent mass of a system, by the quadrature of its elements."""
     problem, elements = system.problem, system.elements
     local = element_masses(system.element, elements, problem.density, problem.degree)
-    count, width = len(system.nodes), len(elements.functions)
+    count, width = len(system.nodes), len(elements.sizes.functions)
     table = elements.dofs[:, :width].astype(np.int64) // 3
     rows, cols = np.repeat(table, width, axis=1).ravel(), np.tile(table, (1, width)).ravel()
     matrix = sp.csr_matrix((local.ravel(), (rows, cols)), shape=(count, count))
