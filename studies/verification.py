@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from reference_fem import oracles
+from reference_fem import ReferenceProblem, oracles
 from reference_fem.oracles import Check, Curve, Oracle, Outcome, kappa
 from studies.atomic import write_whole
 from studies.plots import verify as convergence
@@ -41,10 +41,18 @@ def run_pack(fast: bool, on_verdict: Callable[[Verdict], None]) -> list[Verdict]
         if fast and not oracle.fast:
             continue
         start = time.perf_counter()
-        verdict = Verdict(oracle, oracle.measure(), time.perf_counter() - start)
+        verdict = Verdict(oracle, measured(oracle), time.perf_counter() - start)
         verdicts.append(verdict)
         on_verdict(verdict)
     return verdicts
+
+
+def measured(oracle: Oracle) -> Outcome:
+    """What an oracle finds; one that cannot be solved fails by a NaN, and the others still have their say."""
+    try:
+        return oracle.measure()
+    except ReferenceProblem as problem:
+        return Outcome((Check(f"not solved: {problem}", "1", 1.0, math.nan, 0.0, "none", 0),))
 
 
 def check_table(verdicts: Sequence[Verdict]) -> pd.DataFrame:

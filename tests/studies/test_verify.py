@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from reference_fem import ReferenceProblem
 from reference_fem.oracles import Check, Curve, Oracle, Outcome, kappa
 from studies import cli, verification
 
@@ -61,3 +62,13 @@ def test_the_fast_half_leaves_the_whole_alone(run, tmp_path):
     assert result.exit_code == 0
     assert not (tmp_path / "verify").exists()
     assert list(pd.read_csv(tmp_path / "smoke" / "verify" / "verify.csv")["oracle"]) == ["quick"]
+
+
+def test_an_oracle_that_cannot_be_solved_fails_without_silencing_the_others(run, tmp_path):
+    def break_off():
+        raise ReferenceProblem("no equilibrium found between t = 0 s and t = 1 s")
+
+    result = run([Oracle("stuck", "Stuck", "a book", break_off), oracle("right", 2.0)])
+    assert result.exit_code == 1
+    assert "off: stuck: not solved: no equilibrium found" in result.stdout
+    assert list(pd.read_csv(tmp_path / "verify" / "verify.csv")["met"]) == ["NO", "yes"]
