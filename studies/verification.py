@@ -52,7 +52,7 @@ def measured(oracle: Oracle) -> Outcome:
     try:
         return oracle.measure()
     except ReferenceProblem as problem:
-        return Outcome((Check(f"not solved: {problem}", "1", 1.0, math.nan, 0.0, "none", 0),))
+        return Outcome((Check(f"not solved: {problem}", "1", 1.0, math.nan, 0.01, "none", 0),))
 
 
 def check_table(verdicts: Sequence[Verdict]) -> pd.DataFrame:
