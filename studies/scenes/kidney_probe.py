@@ -30,5 +30,5 @@ KIDNEY_PROBE = Scene(
     held=(Held("hilum", KIDNEY_REGIONS["hilum"]),),
     probed=Probed("obstacle", 0, INWARD),
     damping=15.0,
-    reference=ReferencePlan("solid", (300, 450, 650)),
+    reference=ReferencePlan("solid", (400, 550, 800)),
 )
