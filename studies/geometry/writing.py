@@ -57,7 +57,7 @@ def write_mesh(mesh: OrganMesh, path: Path, unit: str = "m", curved: CurvedMesh 
     if path.suffix.lower() == ".msh":
         parts = written.cell_data.pop("part")
         written.cell_data = {"gmsh:physical": parts, "gmsh:geometrical": parts}
-        # meshio does not read whole numbers back from a text MSH.
+        # meshio does not read whole numbers back, and writes text that it cannot read: hence binary, and real numbers.
         patches: dict[str, Any] = {name: np.asarray(values, float) for name, values in written.point_data.items()}
         written.point_data = patches
     write_whole(path, content(written, path.suffix.lower()))
@@ -94,7 +94,7 @@ def patch_data(mesh: OrganMesh, count: int) -> dict[str, Any]:
 
 def content(mesh: meshio.Mesh, suffix: str) -> bytes:
     """The bytes of the file: meshio writes to a folder that is thrown away."""
-    options = {".stl": {"binary": True}, ".msh": {"file_format": "gmsh22", "binary": False}}.get(suffix, {})
+    options = {".stl": {"binary": True}, ".msh": {"file_format": "gmsh22", "binary": True}}.get(suffix, {})
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         path = Path(folder, "mesh" + suffix)
         meshio.write(path, mesh, **options)
