@@ -1,7 +1,6 @@
 """The mesh of a reference: the mesher's, finer where it counts, its sides curved onto the true surface and outlines."""
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from reference_fem import Evaluator, curve, facet_nodes, nodes
 from reference_fem.elements import edge_index
 from studies.adapt import mesh_for, patch_nodes
 from studies.distance import distance_to_surface
-from studies.geometry import OrganMesh, ball_octant, curved
+from studies.geometry import OrganMesh, ball_octant, curved, project_ball
 from studies.geometry.jacobian import PAIRS
 from studies.geometry.levelset import Shape, project
 from studies.geometry.mesh import boundary_triangles
@@ -63,10 +62,10 @@ def _straight(organ_mesh: OrganMesh) -> MeshTet:
 
 
 def _curved_octant(scene: Scene, straight: MeshTet) -> MeshTet2:
+    """Moved along the radius: a node of a symmetry plane stays in it to the last bit, or the plane would not hold it."""
     radius = float(scene.organ.parameters["radius"])
-    shape = true_shape(scene.organ)
-    assert shape is not None  # a ball
-    return curve(straight, onto(shape), lambda x: np.linalg.norm(x, axis=0) > radius * (1 - 1e-6))
+    on_sphere = lambda x: np.linalg.norm(x, axis=0) > radius * (1 - 1e-6)  # noqa: E731
+    return curve(straight, lambda x: project_ball(x.T, radius).T, on_sphere)
 
 
 def _curved(body: "Body", coarse: "Body", curved_coarse: MeshTet2) -> MeshTet2:
@@ -101,11 +100,6 @@ def _on_true_shape(organ_mesh: OrganMesh, body: "Body", shape: Shape, helds: tup
 def true_shape(organ: Organ) -> Shape | None:
     """The organ as a level function; None where only a mesh is known."""
     return None if organ.shape == "file" else choose(organ.shape, SHAPES, "organ")(**organ.parameters)
-
-
-def onto(shape: Shape) -> Callable[[np.ndarray], np.ndarray]:
-    """Projection of points (3, N) [m] onto the true surface."""
-    return lambda x: project(shape, np.ascontiguousarray(x.T)).T
 
 
 @dataclass(frozen=True, eq=False)
