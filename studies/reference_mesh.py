@@ -62,7 +62,7 @@ def _straight(organ_mesh: OrganMesh) -> MeshTet:
 
 
 def _curved_octant(scene: Scene, straight: MeshTet) -> MeshTet2:
-    """Moved along the radius: a node of a symmetry plane stays in it to the last bit, or the plane would not hold it."""
+    """Moved along the radius: a node of a symmetry plane stays in it to the last bit, or it would not be held there."""
     radius = float(scene.organ.parameters["radius"])
     on_sphere = lambda x: np.linalg.norm(x, axis=0) > radius * (1 - 1e-6)  # noqa: E731
     return curve(straight, lambda x: project_ball(x.T, radius).T, on_sphere)
