@@ -55,8 +55,9 @@ def test_attachments_are_discs_of_their_true_size(meshes, name):
         assert mesh.patches[patch].max() < mesh.outer_count
         inside = (region.level(points) <= 0)[triangles].mean(axis=1)
         true = (inside * triangle_areas(points, triangles)).sum()
-        # Inscribed facets 11 mm wide on a tip of 14 mm radius lose 2 h^2 / (8 R^2): 15.4 per cent.
-        assert 0.84 * true < triangle_areas(mesh.points, faces).sum() < 1.02 * true
+        # Inscribed facets 11 mm wide on a tip of 14 mm radius lose 2 h^2 / (8 R^2), 15.4 per cent; twice as many half.
+        fine = organ(name, 1100, fill=False)
+        assert 0.92 * true < triangle_areas(fine.points, fine.patch_triangles(patch)).sum() < 1.02 * true
 
 
 @pytest.mark.parametrize(("name", "axis"), [("bladder", 0), ("kidney", 2)])
