@@ -227,12 +227,13 @@ def safe_dt(
     limit = found.limit
     console.print(f"largest frequency  {limit.frequency:.4g} 1/s")
     console.print(f"stability limit    {1e3 * limit.damped:.4g} ms  (without damping {1e3 * limit.undamped:.4g} ms)")
-    console.print(f"dt = auto          {1e3 * found.auto:.4g} ms  (margin {limit.damped / found.auto:.3g})")
+    console.print(f"dt = auto          {1e3 * found.auto:.4g} ms  (margin {found.margin:.3g})")
     for dt, outcome in found.tried:
         console.print(f"run at             {1e3 * dt:.4g} ms  ({dt / limit.damped:.3g} of the limit): {outcome}")
-    console.print(
-        "verified" if found.verified else "not verified: the limit of this scene is not where it was predicted"
-    )
+    if found.bracket is not None:
+        below, above = found.bracket
+        console.print(f"bracket            holds at {1e3 * below:.4g} ms, diverges at {1e3 * above:.4g} ms")
+    console.print(found.verdict)
 
 
 if __name__ == "__main__":

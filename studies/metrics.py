@@ -138,6 +138,16 @@ def inverted_share(run: Run) -> float:
     return PERCENT * float((tetrahedron_volumes(run.field("snapshots")[-1], cells) <= 0).mean())
 
 
+def penetration(run: Run) -> float:
+    """100 × the deepest any node lies inside an obstacle after a frame, over the body's size [%]; NaN without one."""
+    depth = run.field("penetration")
+    return (
+        PERCENT * float(depth.max()) / float(np.linalg.norm(np.ptp(run.field("rest"), axis=0)))
+        if depth.size
+        else np.nan
+    )
+
+
 def pressure_error(run: Run) -> float:
     """100 (lam/p_ref − 1) at the last checkpoint [%]; NaN for a method without a pressure."""
     assert run.reference is not None
@@ -191,6 +201,7 @@ METRICS: tuple[Metric, ...] = (
     Metric("lumen_pressure_error", "%", "-", lumen_pressure_error, "lumen"),
     Metric("min_j", "1", "higher", min_j),
     Metric("inverted_share", "%", "lower", inverted_share),
+    Metric("penetration", "%", "lower", penetration),
     Metric("step_time", "µs", "lower", step_time),
     Metric("frame_time", "ms", "lower", frame_time),
     Metric("frame_time_p99", "ms", "lower", frame_time_p99),

@@ -112,6 +112,7 @@ def _attributes(prepared: Prepared, history: History) -> dict[str, float | int |
         "triangles": len(setup.body.triangles),
         "law": setup.body.law,
         "skipped_steps": history.skipped_steps,
+        "capped_steps": history.capped_steps,
         "volumes": setup.body.kept.count,
         "lumen_column": setup.body.kept.names.index(LUMEN) if LUMEN in setup.body.kept.names else -1,
     }
@@ -127,7 +128,9 @@ def _fields(prepared: Prepared, history: History) -> dict[str, Field]:
         "kinetic": Field(history.kinetic, "J", "kinetic energy"),
         "elastic": Field(history.elastic, "J", "energy of the springs"),
         "contact_force": Field(history.contact_force, "N", "force of each obstacle on the body, mean of the frame"),
+        "penetration": Field(history.penetration, "m", "depth of the deepest surface node in each obstacle"),
         "held_force": Field(history.held_force, "N", "force of each held region on the body, mean of the frame"),
+        "iterations": Field(history.iterations, "1", "for the multipliers: sum of the frame, most in a step"),
         "min_j": Field(history.min_j, "1", "smallest tetrahedron volume ratio; NaN without tetrahedra"),
         "snapshot_frame": Field(
             history.snapshot_frames, "1", "number of the frame after which each snapshot was taken"

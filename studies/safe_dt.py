@@ -1,4 +1,4 @@
-"""The largest time step of a scene: predicted from the largest frequency, then tried just below and just above it."""
+"""The largest time step of a scene: predicted from the largest frequency, then bracketed by runs on either side."""
 
 import warnings
 from dataclasses import dataclass
@@ -11,6 +11,10 @@ from studies.store import Status
 
 BELOW, ABOVE = 0.95, 1.10
 """Fractions of the predicted limit that are run. Contact and large strain move the true limit by a few per cent."""
+WIDER, MOST_RUNS = 1.25, 8
+"""Where the prediction fails the bracket is widened by this factor, a run at a time."""
+STEPS_PER_FRAME = 100
+"""Rounding a frame to whole steps then moves the step by 1 % at most, never up."""
 
 
 @dataclass(frozen=True)
@@ -21,26 +25,58 @@ class SafeStep:
     auto: float
     """The step that dt = "auto" takes [s]."""
     tried: tuple[tuple[float, Status], ...]
-    """(time step [s], how the run ended)."""
+    """(time step [s], how the run ended), ascending."""
+
+    @property
+    def margin(self) -> float:
+        """How many times the step of dt = "auto" fits into the limit [1]."""
+        return self.limit.damped / self.auto
+
+    @property
+    def bracket(self) -> tuple[float, float] | None:
+        """The longest step that held and the next, which diverged [s]; None where no run of either kind was found."""
+        for (below, calm), (above, wild) in zip(self.tried, self.tried[1:], strict=False):
+            if calm != Status.DIVERGED and wild == Status.DIVERGED:
+                return below, above
+        return None
 
     @property
     def verified(self) -> bool:
-        """Whether the run below did not diverge and the one above did."""
-        below, above = (status for _, status in self.tried)
-        return below != Status.DIVERGED and above == Status.DIVERGED
+        """Whether the limit lies where it was predicted: between a step that holds and one that diverges."""
+        found = self.bracket
+        return found is not None and found[0] < self.limit.damped < found[1]
+
+    @property
+    def verdict(self) -> str:
+        """What the runs say of the prediction, in a sentence."""
+        if self.verified:
+            return "verified"
+        if self.bracket is None:
+            return "not verified: no pair of runs was found of which one holds and the next diverges"
+        if self.bracket[0] > self.limit.damped:
+            return "not verified: the limit is longer than predicted; many kept volumes take the stiffest modes away"
+        return f"not verified: the limit is shorter than predicted; keep dt below {1e3 * self.bracket[0]:.3g} ms"
 
 
 def safe_step(case: Case) -> SafeStep:
-    """Predicts and verifies. Raises StudyError or MassSpringError for a case that cannot be prepared."""
+    """Predicts and verifies with the whole scene: contact, damping, constraint and all that moves.
+
+    Where the run below diverges, or the one above does not, shorter or longer steps are tried until a bracket is found.
+    Raises StudyError or MassSpringError for a case that cannot be prepared.
+    """
     prepared = prepare(case)
     limit, auto = prepared.limit, prepared.setup.clock.dt
-    tried = []
-    for fraction in (BELOW, ABOVE):
-        wanted = fraction * limit.damped
-        # One frame holds many steps, so that rounding to whole steps cannot carry the step across the limit.
-        frames = max(1, int(case.scene.duration / (100 * wanted)))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # above the limit is the point of the second run
-            record = measure(case.replaced(dt=wanted, frames=frames))
-        tried.append((float(record.attributes.get("dt", wanted)), record.status))
+    tried = [_tried(case, fraction * limit.damped) for fraction in (BELOW, ABOVE)]
+    while len(tried) < MOST_RUNS and tried[0][1] == Status.DIVERGED:
+        tried.insert(0, _tried(case, tried[0][0] / WIDER))
+    while len(tried) < MOST_RUNS and tried[-1][1] != Status.DIVERGED:
+        tried.append(_tried(case, tried[-1][0] * WIDER))
     return SafeStep(limit, auto, tuple(tried))
+
+
+def _tried(case: Case, dt: float) -> tuple[float, Status]:
+    frames = max(1, int(case.scene.duration / (STEPS_PER_FRAME * dt)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # above the limit is the point of the second run
+        record = measure(case.replaced(dt=dt, frames=frames))
+    return float(record.attributes.get("dt", dt)), record.status

@@ -1,5 +1,6 @@
 """The command line: words in, tables and charts out."""
 
+import re
 from dataclasses import replace
 
 import h5py
@@ -160,5 +161,6 @@ def test_safe_dt_predicts_and_verifies(organbench):
     assert (code, err) == (0, "")
     assert "stability limit" in out
     assert "of the limit): diverged" in out
+    assert re.search(r"bracket +holds at [\d.]+ ms, diverges at [\d.]+ ms", out)
     assert out.strip().endswith("verified")
     assert "not verified" not in out

@@ -54,6 +54,7 @@ def run(final=None, volume=(1.0, 1.0, 1.0, 1.0), force=(0.5, 1.0, 1.5, 2.0), **c
         "pressure": np.full((4, 1), 5.0),
         "contact_force": np.zeros((4, 0, 3)),
         "held_force": held,
+        "penetration": np.zeros((4, 1)),
         "min_j": np.array([1.0, 0.8, 0.6, 0.7]),
         "snapshots": np.stack([POINTS, final]),
         "rest": POINTS,
@@ -135,6 +136,12 @@ def test_without_a_reference_only_the_own_volume_is_judged():
     assert metric("volume_end")(alone) == pytest.approx(-2.0, rel=1e-12)
     assert np.isnan([metric(name)(alone) for name in ("force_error", "surface_error", "silhouette_error")]).all()
     assert np.isnan(metric("volume_worst").floor(alone))
+
+
+def test_penetration_is_the_deepest_of_all_frames_and_obstacles_over_the_size():
+    depth = np.array([[0.0, 0.001], [0.003, 0.0], [0.0, 0.002], [0.0, 0.0]])
+    assert of("penetration", values={"penetration": depth}) == pytest.approx(100 * 0.003 / (EDGE * np.sqrt(3)))
+    assert np.isnan(of("penetration", values={"penetration": np.zeros((4, 0))}))
 
 
 def test_the_truth_has_no_error():

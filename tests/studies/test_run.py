@@ -6,15 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Free, simulate
+from massspring import Free, Ramp, simulate
 from studies import run as module
 from studies.adapt import prepare
+from studies.case import BodyRecipe, Case
 from studies.errors import StudyError
 from studies.run import case_is_current, case_path, checkpoint_frames, judge, measure, replay, run_case
+from studies.scenes import SCENES
 from studies.store import Field, Status, read_record, write_record
 from tests.studies.tiny import FRAMES, diverging_case, tiny_case
 
-SERIES = ("volume", "pressure", "kinetic", "elastic", "contact_force", "min_j")
+SERIES = ("volume", "pressure", "kinetic", "elastic", "contact_force", "penetration", "min_j")
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +45,32 @@ def test_a_good_run_is_complete(ran):
     assert record.attributes["good_frames"] == record.attributes["frames"] == FRAMES
     assert record.attributes["dt"] <= 0.5 * record.attributes["dt_limit"]
     assert all(field.unit and field.description for field in record.fields.values())
+
+
+def test_penetration_is_how_far_the_last_positions_lie_beyond_the_planes(ran):
+    record = read_record(ran[1])
+    z, planes = record.fields["snapshots"].values[-1][:, 2], (0.7 * 0.05, -0.7 * 0.05)
+    upper, lower = record.fields["penetration"].values[-1]
+    # Distances of 35 mm, rounded to 1e-17 m.
+    assert upper == pytest.approx(max(0.0, z.max() - planes[0]), abs=1e-15)
+    assert lower == pytest.approx(max(0.0, planes[1] - z.min()), abs=1e-15)
+
+
+def test_what_the_guards_did_is_stored():
+    """A lumen that is asked to jump to 1.5 times its volume is made up for in parts: the record says how often."""
+    scene = next(scene for scene in SCENES if scene.lumen)
+    jump = Ramp((0.0, 1e-9), (1.0, 1.5))
+    hard = replace(scene, lumen=replace(scene.lumen, filling=jump), duration=0.02, checkpoints=(0.02,))
+    record = measure(Case(hard, BodyRecipe(nodes=400), frames=2))
+    assert record.attributes["capped_steps"] > 0
+    assert measure(tiny_case()).attributes["capped_steps"] == 0
+
+
+def test_iterations_of_an_iterative_solve_are_stored(ran):
+    assert not read_record(ran[1]).fields["iterations"].values.any()
+    most_and_sum = measure(tiny_case(body=BodyRecipe(nodes=60, volumes="nodal"))).fields["iterations"].values
+    assert (most_and_sum[:, 0] >= most_and_sum[:, 1]).all()
+    assert (most_and_sum[:, 1] > 0).all()
 
 
 def test_newton_s_third_law_between_the_planes(ran):

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from massspring import METHODS
+from massspring import METHODS, StepLimit
 from studies import safe_dt as module
+from studies.adapt import prepare
 from studies.case import BodyRecipe, Case
 from studies.errors import StudyError
 from studies.safe_dt import ABOVE, BELOW, SafeStep, safe_step
@@ -44,14 +45,40 @@ def test_stiffer_means_shorter():
     ],
 )
 def test_what_counts_as_verified(below, above, verified):
-    assert SafeStep(None, 1.0, ((0.95, below), (1.1, above))).verified == verified
+    assert SafeStep(StepLimit(2.0, 0.0), 0.5, ((0.95, below), (1.1, above))).verified == verified
 
 
-def test_it_says_so_when_the_limit_is_elsewhere(monkeypatch):
-    """A mutant that predicts half the limit is found out: the run above it is calm."""
-    monkeypatch.setattr(module, "BELOW", 0.5 * BELOW)
-    monkeypatch.setattr(module, "ABOVE", 0.5 * ABOVE)
-    assert not safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60))).verified
+@pytest.mark.parametrize("wrong", [0.5, 1.5])
+def test_a_wrong_prediction_is_found_out_and_the_limit_found_all_the_same(monkeypatch, wrong):
+    """Mutants that predict half the limit, or one and a half of it: the bracket is where the true one is."""
+    right = prepare(Case(SHORT, BodyRecipe("tetrahedral", 60))).limit
+
+    def mutant(case):
+        found = prepare(case)
+        return replace(found, limit=StepLimit(found.limit.frequency / wrong, found.limit.damping))
+
+    monkeypatch.setattr(module, "prepare", mutant)
+    found = safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60)))
+    assert not found.verified and ("longer" if wrong < 1 else "shorter") in found.verdict
+    below, above = found.bracket
+    assert below < right.damped < above
+    # One run to the next is a factor of 1.25, or 1.1/0.95 in the middle; whole steps take up to 1 %.
+    assert above / below < 1.27
+
+
+@pytest.mark.parametrize("volumes", ["whole", "regions", "nodal"])
+def test_constraints_never_shorten_the_limit(volumes):
+    """Cauchy interlacing: volumes take modes away. A few leave the stiffest mode as it is, one per node does not."""
+    found = safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60, volumes=volumes, regions=4)))
+    assert found.bracket[1] > found.limit.damped
+    assert found.verified == (volumes != "nodal")
+    assert ("longer than predicted" in found.verdict) == (not found.verified)
+
+
+def test_a_limit_that_no_run_shows_has_no_bracket():
+    calm = SafeStep(StepLimit(2.0, 0.0), 0.5, ((0.95, Status.OK), (1.1, Status.OK)))
+    assert calm.bracket is None and "no pair of runs" in calm.verdict
+    assert calm.margin == pytest.approx(2.0)
 
 
 def test_what_cannot_be_prepared_is_told():
