@@ -1,6 +1,7 @@
 """Mass-spring bodies that keep their volume: Jung, Hong, Choi (2005). Knows no file, no plot, no scene."""
 
-from massspring.body import Body, Material, surface_body, tetrahedral_body
+from massspring.bodies import surface_body, tetrahedral_body
+from massspring.body import Body, Material
 from massspring.clock import Clock, make_clock
 from massspring.errors import MassSpringError
 from massspring.history import History

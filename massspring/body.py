@@ -5,32 +5,28 @@ from functools import cached_property
 
 import numpy as np
 
-from massspring.axis import closest_virtual_node, virtual_nodes
 from massspring.errors import MassSpringError
 from massspring.kernels.deformation import tetrahedron_volumes_into
-from massspring.kernels.volume import enclosed_volume
-from massspring.springs import (
-    EDGES_OF_TETRAHEDRON,
-    EDGES_OF_TRIANGLE,
-    SpringKind,
-    Springs,
-    bending_pairs,
-    lengths,
-    matched_scale,
-    unique_edges,
-    van_gelder_weights,
-)
+from massspring.kernels.springs import spring_energy, spring_forces_into
+from massspring.kernels.volume import enclosed_volume, volume_gradient_into
+from massspring.springs import Springs, lengths
 from massspring.surface import check_finite, check_surface
 from massspring.volumes import Volumes
 
-AXIS_MASS_SHARE = 0.25
-"""A pyramid over the axis has a quarter of its mass at the apex (linear shape functions)."""
-SURFACE_WEIGHTS = {SpringKind.STRUCTURAL: 1.0, SpringKind.BENDING: 0.5, SpringKind.INNER: 0.5, SpringKind.AXIAL: 1.0}
-"""Relative stiffness of the kinds; their sum is scaled to the shear modulus. The paper names no values."""
-STIFFNESS_LAWS = ("van_gelder", "uniform")
 SAME_VOLUME = 1e-9
 """Relative: both are sums of the same determinants, up to round-off of some million additions."""
+BALANCED = 1e-8
+"""Of the largest force at a node: far above round-off, far below one spring too many."""
 NO_TETRAHEDRA = np.empty((0, 4), dtype=np.uint32)
+
+
+def check_positive(volumes: np.ndarray) -> None:
+    """Raises MassSpringError naming the worst of tetrahedra that are flat or inside-out; `volumes` (k,) [m³]."""
+    if len(volumes) and not (volumes > 0).all():
+        worst = int(np.argmin(volumes))
+        raise MassSpringError(
+            f"tetrahedron {worst} has volume {volumes[worst]:.3g} m³; swap two of its nodes or remove it"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +62,8 @@ class Body:
     """Stiffness law, recorded with every result: it alone moves a force by 12–16 %."""
     volumes: Volumes | None = None
     """What methods keep; None: the whole."""
+    rest_pressure: float = 0.0
+    """Pressure that balances springs without length at rest [Pa]; 0 for springs that rest at their own length."""
 
     def __post_init__(self) -> None:
         check_finite("rest positions", self.rest)
@@ -77,12 +75,7 @@ class Body:
             node = int(np.argmin(self.mass))
             raise MassSpringError(f"node {node} has mass {self.mass[node]:g} kg; every node needs a positive mass")
         self._check_springs()
-        if len(self.tetrahedra) and not (self.tetrahedron_volumes > 0).all():
-            worst = int(np.argmin(self.tetrahedron_volumes))
-            raise MassSpringError(
-                f"tetrahedron {worst} has volume {self.tetrahedron_volumes[worst]:.3g} m³; "
-                "swap two of its nodes or remove it"
-            )
+        check_positive(self.tetrahedron_volumes)
         self._check_volumes()
 
     def _check_volumes(self) -> None:
@@ -108,10 +101,22 @@ class Body:
                 f"a spring ends at node {int(springs.ends.max())}, but there are {len(self.rest)} nodes"
             )
         check_finite("spring stiffnesses", springs.stiffness)
-        if not (springs.rest_length > 0).all():
-            worst = int(np.argmin(springs.rest_length))
+        length = lengths(self.rest, springs.ends) if self.rest_pressure else springs.rest_length
+        if not (length > 0).all():
+            worst = int(np.argmin(length))
+            raise MassSpringError(f"spring {worst} has rest length {length[worst]:g} m; weld its two nodes")
+        if self.rest_pressure:
+            self._check_balance()
+
+    def _check_balance(self) -> None:
+        """Springs that are taut at rest are held apart by the rest pressure, at every node."""
+        springs, pull, gradient = self.springs, np.empty_like(self.rest), np.empty_like(self.rest)
+        spring_forces_into(self.rest, springs.ends, springs.rest_length, springs.stiffness, pull)
+        volume_gradient_into(self.rest, self.triangles, gradient)
+        if np.abs(pull + self.rest_pressure * gradient).max() > BALANCED * np.abs(pull).max():
             raise MassSpringError(
-                f"spring {worst} has rest length {springs.rest_length[worst]:g} m; weld its two nodes"
+                f"a rest pressure of {self.rest_pressure:g} Pa does not balance the springs at rest; "
+                "give springs without length the stiffnesses of the cotangent law, and its mu as the pressure"
             )
 
     @property
@@ -139,6 +144,19 @@ class Body:
         """V0_r [m³] of the kept volumes, (m,)."""
         return self.kept.measure(self.rest)
 
+    @cached_property
+    def rest_lam(self) -> np.ndarray:
+        """What each kept volume takes of the rest pressure [Pa], (m,): Jᵀ rest_lam = rest_pressure · dV/dx."""
+        if not self.rest_pressure:
+            return np.zeros(self.kept.count)
+        return self.rest_pressure * self.kept.parts_of(self.triangles)
+
+    @property
+    def rest_energy(self) -> float:
+        """Energy of springs that are taut at rest [J]; energies are reported above it."""
+        springs = self.springs
+        return float(spring_energy(self.rest, springs.ends, springs.rest_length, springs.stiffness))
+
     @property
     def tetrahedron_volumes(self) -> np.ndarray:
         """Rest volumes [m³], (k,)."""
@@ -157,72 +175,5 @@ class Body:
 
     def stiffened(self, factor: float) -> "Body":
         """The same body with every spring `factor` times as stiff."""
-        return replace(self, springs=replace(self.springs, stiffness=self.springs.stiffness * factor))
-
-
-def tetrahedral_body(
-    points: np.ndarray, triangles: np.ndarray, tetrahedra: np.ndarray, material: Material, law: str = "van_gelder"
-) -> Body:
-    """Springs on the edges of a tetrahedral mesh, matched to the shear modulus.
-
-    `points` (n, 3) [m]; `triangles` (f, 3), its boundary, outward; `tetrahedra` (k, 4), positive; `law` one of
-    `STIFFNESS_LAWS`: "van_gelder" k ∝ Σ V_t/L² (Van Gelder 1998), "uniform" one k for all. Raises MassSpringError.
-    """
-    tetrahedra = np.ascontiguousarray(tetrahedra, dtype=np.uint32)
-    triangles = np.ascontiguousarray(triangles, dtype=np.uint32)
-    points = np.ascontiguousarray(points, dtype=np.float64)
-    if law not in STIFFNESS_LAWS:
-        raise MassSpringError(f"unknown stiffness law '{law}'; known: {', '.join(STIFFNESS_LAWS)}")
-    volumes = np.empty(len(tetrahedra))
-    tetrahedron_volumes_into(points, tetrahedra, volumes)
-    edges = unique_edges(tetrahedra, EDGES_OF_TETRAHEDRON)
-    length = lengths(points, edges)
-    weight = van_gelder_weights(tetrahedra, volumes, edges, length) if law == "van_gelder" else np.ones(len(edges))
-    stiffness = weight * matched_scale(material.shear_modulus, float(volumes.sum()), weight, length)
-    mass = (
-        np.bincount(tetrahedra.ravel(), weights=np.repeat(volumes, 4), minlength=len(points)) * material.density / 4.0
-    )
-    kind = np.full(len(edges), SpringKind.SOLID, dtype=np.uint8)
-    springs = Springs(np.ascontiguousarray(edges, dtype=np.uint32), length, stiffness, kind)
-    return Body(points, mass, springs, triangles, tetrahedra, law)
-
-
-def surface_body(points: np.ndarray, triangles: np.ndarray, material: Material, axis: str = "straight") -> Body:
-    """The paper's body (JHC05, section 3): structural, bending and inner springs, virtual nodes on the dominant axis.
-
-    `points` (n, 3) [m] are the surface nodes, `triangles` (f, 3) outward; `axis` one of `AXES`. The virtual nodes
-    follow the surface nodes; consecutive ones are joined by axial springs, without which the axis could come apart.
-    Raises MassSpringError.
-    """
-    triangles = np.ascontiguousarray(triangles, dtype=np.uint32)
-    points = np.ascontiguousarray(points, dtype=np.float64)
-    check_surface(points, triangles)
-    structural = unique_edges(triangles, EDGES_OF_TRIANGLE)
-    virtual = virtual_nodes(points, triangles, float(lengths(points, structural).mean()), axis)
-    nearest = closest_virtual_node(points, virtual)
-    used, nearest = np.unique(nearest, return_inverse=True)
-    rest = np.vstack([points, virtual[used]])
-    first = len(points)
-    groups = {
-        SpringKind.STRUCTURAL: structural,
-        SpringKind.BENDING: bending_pairs(triangles),
-        SpringKind.INNER: np.column_stack([np.arange(first), first + nearest]),
-        SpringKind.AXIAL: np.column_stack([np.arange(first, len(rest) - 1), np.arange(first + 1, len(rest))]),
-    }
-    ends = np.vstack(list(groups.values())).astype(np.uint32)
-    kind = np.repeat([int(k) for k in groups], [len(g) for g in groups.values()]).astype(np.uint8)
-    length = lengths(rest, ends)
-    weight = np.array([SURFACE_WEIGHTS[SpringKind(k)] for k in range(SpringKind.SOLID)])[kind]
-    volume = float(enclosed_volume(points, triangles))
-    stiffness = weight * matched_scale(material.shear_modulus, volume, weight, length)
-    mass = _surface_mass(points, triangles, nearest, len(used)) * material.density * volume
-    return Body(rest, mass, Springs(ends, length, stiffness, kind), triangles, law="per_kind")
-
-
-def _surface_mass(points: np.ndarray, triangles: np.ndarray, nearest: np.ndarray, axis_nodes: int) -> np.ndarray:
-    """Shares of the mass, (n + a,), summing to 1: by area on the surface, by the area they carry on the axis."""
-    corners = points[triangles]
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    share = np.bincount(triangles.ravel(), weights=np.repeat(area, 3), minlength=len(points)) / (3.0 * area.sum())
-    axis = np.bincount(nearest, weights=share, minlength=axis_nodes)
-    return np.concatenate([(1.0 - AXIS_MASS_SHARE) * share, AXIS_MASS_SHARE * axis])
+        stiffer = replace(self.springs, stiffness=self.springs.stiffness * factor)
+        return replace(self, springs=stiffer, rest_pressure=self.rest_pressure * factor)

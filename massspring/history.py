@@ -27,7 +27,7 @@ class History:
     kinetic: np.ndarray
     """[J], (F,)."""
     elastic: np.ndarray
-    """[J], (F,)."""
+    """Above the rest state [J], (F,)."""
     contact_force: np.ndarray
     """Mean force of each obstacle on the body during the frame [N], (F, o, 3)."""
     penetration: np.ndarray
@@ -68,6 +68,7 @@ class Recorder:
         self.body = body
         self.clock = clock
         self.rest_volumes = body.tetrahedron_volumes
+        self.rest_energy = body.rest_energy
         self.cell_volumes = np.empty_like(self.rest_volumes)
         self.t = clock.frame * np.arange(1, frames + 1)
         self.scalars = {name: np.full(frames, np.nan) for name in ("kinetic", "elastic", "min_j")}
@@ -94,7 +95,7 @@ class Recorder:
         self.volume[frame] = self.volumes.measure(x)
         self.pressure[frame] = state.lam
         self.scalars["kinetic"][frame] = 0.5 * float(net.mass @ np.einsum("ij,ij->i", v, v))
-        self.scalars["elastic"][frame] = spring_energy(x, net.ends, net.rest_length, net.stiffness)
+        self.scalars["elastic"][frame] = spring_energy(x, net.ends, net.rest_length, net.stiffness) - self.rest_energy
         if len(self.rest_volumes):
             tetrahedron_volumes_into(x, self.body.tetrahedra, self.cell_volumes)
             self.scalars["min_j"][frame] = smallest_ratio(self.cell_volumes, self.rest_volumes)

@@ -46,6 +46,7 @@ class Setup:
                 raise MassSpringError(
                     f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
                 )
+        check_held_apart(self.body, self.method)
         for name, ramp in self.targets.items():
             if name not in self.body.kept.names:
                 known = ", ".join(self.body.kept.names[:6])
@@ -90,6 +91,25 @@ class Setup:
         """What each kept volume should be at times `t` (q,) [s], (q, m) [m³]."""
         factors = [self.targets[name](t) if name in self.targets else np.ones(len(t)) for name in self.body.kept.names]
         return np.column_stack(factors) * self.body.rest_volumes
+
+
+def check_held_apart(body: Body, method: Method) -> None:
+    """Springs without length need a volume at every node and a method that starts with their rest pressure.
+
+    One volume for many nodes would let some shrink as others grow. Raises MassSpringError.
+    """
+    if not body.rest_pressure:
+        return
+    if body.kept.count < body.node_count:
+        raise MassSpringError(
+            f"springs of law '{body.law}' pull every part of the body together, and it keeps {body.kept.count} "
+            f"volumes for {body.node_count} nodes; keep one volume per node"
+        )
+    if not getattr(method, "holds_apart", False):
+        raise MassSpringError(
+            f"method '{method.name}' has no pressure at rest to hold springs of law '{body.law}' apart; "
+            "use implicit_volume, or another law"
+        )
 
 
 def starting_depth(obstacle: Obstacle, body: Body) -> float:

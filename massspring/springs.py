@@ -72,16 +72,3 @@ def matched_scale(shear_modulus: float, volume: float, weight: np.ndarray, lengt
     matching mu is right for tissue that a volume constraint makes incompressible.
     """
     return 15.0 * volume * shear_modulus / float(weight @ length**2)
-
-
-def van_gelder_weights(
-    tetrahedra: np.ndarray, volumes: np.ndarray, edges: np.ndarray, length: np.ndarray
-) -> np.ndarray:
-    """k_e ∝ Σ_t∋e V_t/L_e² for `edges` (s, 2) of `tetrahedra` (k, 4), volumes (k,) [m³] (Van Gelder 1998, eq. 15)."""
-    local = np.sort(tetrahedra[:, EDGES_OF_TETRAHEDRON], axis=2).reshape(-1, 2)
-    size = int(tetrahedra.max()) + 1
-    index = np.searchsorted(
-        edges[:, 0].astype(np.int64) * size + edges[:, 1], local[:, 0].astype(np.int64) * size + local[:, 1]
-    )
-    around = np.bincount(index, weights=np.repeat(volumes, len(EDGES_OF_TETRAHEDRON)), minlength=len(edges))
-    return around / length**2

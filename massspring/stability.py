@@ -4,11 +4,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import ArpackError, eigsh
 
 from massspring.body import Body
 from massspring.errors import MassSpringError
+from massspring.stiffness import stiffness_at_rest
 
 LANCZOS_TOLERANCE = 1e-4
 """Relative accuracy of ω²; far below the 1 % to which a nonlinear run knows its limit."""
@@ -16,20 +17,10 @@ LANCZOS_TOLERANCE = 1e-4
 
 def scaled_stiffness(body: Body, held_nodes: np.ndarray) -> csr_array:
     """M^-½ K M^-½ [1/s²] of the free nodes at rest, (3n, 3n); rows of held nodes are zero (eq. 16)."""
-    i, j = body.springs.ends.astype(np.int64).T
-    direction = body.rest[j] - body.rest[i]
-    direction /= np.linalg.norm(direction, axis=1)[:, None]
-    block = body.springs.stiffness[:, None, None] * direction[:, :, None] * direction[:, None, :]
     root = 1.0 / np.sqrt(body.mass)
     root[held_nodes] = 0.0
-    axis = np.arange(3)
-    rows, columns, values = [], [], []
-    for a, b, sign in ((i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)):
-        rows.append(np.broadcast_to(3 * a[:, None, None] + axis[None, :, None], block.shape).ravel())
-        columns.append(np.broadcast_to(3 * b[:, None, None] + axis[None, None, :], block.shape).ravel())
-        values.append((sign * (root[a] * root[b])[:, None, None] * block).ravel())
-    shape = (3 * body.node_count, 3 * body.node_count)
-    return coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape).tocsr()
+    scale = diags_array(np.repeat(root, 3))
+    return csr_array(scale @ stiffness_at_rest(body) @ scale)
 
 
 def largest_frequency(body: Body, held_nodes: np.ndarray | None = None) -> float:

@@ -71,6 +71,21 @@ class Volumes:
         corners = x[self.triangles] - x.mean(axis=0)
         return self.share @ np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
 
+    def parts_of(self, triangles: np.ndarray) -> np.ndarray:
+        """p with Σ_r p_r V_r = the volume inside the closed surface `triangles` (f, 3), (m,).
+
+        Raises MassSpringError where the volumes do not add up to it.
+        """
+        united, place = _united(self.triangles, triangles)
+        rows = _moved(self.share, place[0], len(united))
+        wanted = np.zeros(len(united))
+        wanted[place[1][0]] = place[1][1]
+        start = np.ones(self.count)  # exact for regions and nodes
+        found = lsqr(rows.T, wanted, atol=1e-15, btol=1e-15, iter_lim=10 * self.count + 100, x0=start)[0]
+        if np.abs(rows.T @ found - wanted).max() > DEPENDENT:
+            raise MassSpringError("the kept volumes do not add up to the whole body; keep one volume per node")
+        return found
+
     def joined(self, other: "Volumes") -> "Volumes":
         """Both kinds together. Raises MassSpringError when a volume of `other` is a sum of the rest."""
         triangles, place = _united(self.triangles, other.triangles)

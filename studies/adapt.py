@@ -67,7 +67,9 @@ def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh) -> Body:
     material = Material(scene.tissue.shear_modulus, scene.tissue.density)
     if recipe.kind == "surface":
         outside = mesh.outer() if mesh.hollow else mesh
-        body = surface_body(outside.points[: outside.outer_count], outside.triangles, material, recipe.axis)
+        body = surface_body(
+            outside.points[: outside.outer_count], outside.triangles, material, recipe.axis, recipe.weights
+        )
     else:
         body = tetrahedral_body(mesh.points, mesh.triangles, mesh.tetrahedra, material, recipe.law)
     if recipe.stiffness != 1.0:

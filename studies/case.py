@@ -25,8 +25,9 @@ class BodyRecipe:
     """"surface": the paper's (JHC05); "tetrahedral": springs on the edges of the filled mesh."""
     nodes: int = 550
     """Surface nodes."""
-    law: Literal["van_gelder", "uniform"] = "van_gelder"
-    """Stiffness law of a tetrahedral body."""
+    law: Literal["van_gelder", "uniform", "lloyd", "lloyd_matched", "cotangent"] = "van_gelder"
+    """Stiffness law of a tetrahedral body; "lloyd" as published, the others match the tissue's shear modulus.
+    "cotangent", springs without length, needs nodal volumes."""
     stiffness: float = 1.0
     """Factor on every spring; 1 matches the tissue's shear modulus."""
     volumes: Literal["scene", "whole", "regions", "nodal"] = "scene"
@@ -36,6 +37,8 @@ class BodyRecipe:
     """How many, where volumes is "regions"."""
     axis: Literal["straight", "centre_line"] = "straight"
     """Of a surface body: "centre_line" follows a bent organ."""
+    weights: tuple[float, float, float, float] | None = None
+    """Of a surface body: relative stiffness of structural, bending, inner and axial springs; None for 1, ½, ½, 1."""
 
     @property
     def series(self) -> str:
@@ -89,6 +92,8 @@ class Case:
             parts.append(self.body.axis)
         if self.body.stiffness != 1.0:
             parts.append(f"k{self.body.stiffness:g}")
+        if self.body.weights is not None:
+            parts.append("w" + "_".join(f"{weight:g}" for weight in self.body.weights))
         return "-".join(parts)
 
     @property
@@ -105,12 +110,20 @@ def case_to_dict(case: Case) -> dict[str, Any]:
     """JSON-able form, without `timed`: measuring time changes no physics."""
     return {
         "scene": _scene_adapter().dump_python(case.scene, mode="json"),
-        "body": asdict(case.body),
+        "body": _recipe_to_dict(case.body),
         "method": {"name": case.method.name, "settings": asdict(case.method)},  # pyright: ignore[reportArgumentType]
         "dt": case.dt,
         "dt_fraction": case.dt_fraction,
         "frames": case.frames,
     }
+
+
+def _recipe_to_dict(recipe: BodyRecipe) -> dict[str, Any]:
+    """JSON-able form; without weights where none are chosen, so that records from before they could be stay current."""
+    fields = asdict(recipe)
+    if recipe.weights is None:
+        del fields["weights"]
+    return fields
 
 
 def case_from_json(text: str) -> Case:

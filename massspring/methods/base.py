@@ -10,6 +10,7 @@ from massspring.errors import MassSpringError
 from massspring.kernels.layout import Drive, Motion, Network, Tally, VolumeRows
 from massspring.methods.rows import volume_rows
 from massspring.obstacles import Attachment
+from massspring.springs import lengths
 from massspring.volumes import Volumes
 
 LONGEST_CORRECTION = 0.3
@@ -23,7 +24,8 @@ class State:
     network: Network
     motion: Motion
     lam: np.ndarray
-    """Interior gauge pressure of each kept volume in the last step [Pa], (m,); 0 for methods that keep none."""
+    """Interior gauge pressure of each kept volume in the last step, beyond what it is at rest [Pa], (m,); 0 for
+    methods that keep none."""
     rows: VolumeRows | None = None
     """None where one closed surface is kept: a division needs no rows."""
     tally: Tally = field(default_factory=lambda: new_tally(0, 0))
@@ -118,7 +120,8 @@ def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarra
         held_nodes=held_nodes.astype(np.uint32),
         held_group=np.repeat(np.arange(len(nodes)), [len(h) for h in nodes]).astype(np.uint32),
         held_rest=body.rest[held_nodes],
-        longest_correction=LONGEST_CORRECTION * float(body.springs.rest_length.mean())
+        rest_lam=body.rest_lam,
+        longest_correction=LONGEST_CORRECTION * float(lengths(body.rest, body.springs.ends).mean())
         if body.springs.count
         else np.inf,
     )

@@ -172,6 +172,7 @@ class ImplicitVolume:
     name: ClassVar[str] = "implicit_volume"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 3e-4
+    holds_apart: ClassVar[bool] = True
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""
@@ -179,7 +180,7 @@ class ImplicitVolume:
         if after.rows is None:
             lam = implicit_volume_frame(after.network, after.motion, drive, after.tally, float(after.lam[0]))
             return replace(after, lam=np.array([lam]))
-        after.rows.lam[:] = after.lam
+        after.rows.lam[:] = after.lam + after.network.rest_lam
         accuracy = Accuracy(self.tolerance, self.most_iterations)
         implicit_volumes_frame(after.network, after.rows, after.motion, drive, after.tally, accuracy)
-        return replace(after, lam=after.rows.lam.copy())
+        return replace(after, lam=after.rows.lam - after.network.rest_lam)

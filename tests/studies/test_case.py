@@ -21,6 +21,7 @@ CHANGES = {
     "kind": {"body": BodyRecipe("surface")},
     "nodes": {"body": BodyRecipe(nodes=551)},
     "law": {"body": BodyRecipe(law="uniform")},
+    "weights": {"body": BodyRecipe("surface", weights=(1.0, 0.5, 0.25, 1.0))},
     "stiffness": {"body": BodyRecipe(stiffness=1.01)},
     "method": {"method": Free()},
     "dt": {"dt": 1e-4},
@@ -71,6 +72,13 @@ def test_names_are_readable_and_distinct_within_a_study():
     assert Case(SCENES[0]).name == "ball_squeeze-tetrahedral-550-implicit_volume-dt0.5"
     other = Case(SCENES[0], BodyRecipe(law="uniform", stiffness=4.0), Free(), dt=2e-3)
     assert other.name == "ball_squeeze-tetrahedral-550-free-dt2ms-uniform-k4"
+    weighted = Case(SCENES[0], BodyRecipe("surface", weights=(1.0, 0.5, 0.25, 1.0)), Free())
+    assert weighted.name == "ball_squeeze-surface-550-free-dt0.5-w1_0.5_0.25_1"
+
+
+def test_a_setting_that_is_not_chosen_leaves_old_keys_as_they_were():
+    """The key of the first scene's default case as it was before surface weights could be chosen."""
+    assert "weights" not in json.loads(Case(SCENES[0]).key)["body"]
 
 
 UNREADABLE = {
