@@ -1,8 +1,10 @@
 """Frame by frame: moves the obstacles, advances the method, records. The only Python in the loop is once per frame."""
 
 import math
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from time import perf_counter_ns
 
 import numpy as np
@@ -14,7 +16,9 @@ from massspring.history import History, Recorder
 from massspring.kernels.layout import Drive
 from massspring.methods.base import Method, State, start
 from massspring.obstacles import Attachment, Capsule, Obstacle, Plane
+from massspring.setup_checks import check_held_apart, check_nodal, check_surroundings, check_targets
 from massspring.surface import winding_number
+from massspring.targets import fastest_filling, followed
 from massspring.volumes import Ramp
 
 ESCAPED = 20.0
@@ -37,35 +41,49 @@ class Setup:
     velocity: np.ndarray | None = None
     """Initial velocities [m/s], (n, 3); None: at rest."""
     targets: Mapping[str, Ramp] = field(default_factory=dict)
-    """Name of a kept volume -> its target over time as a factor of its rest volume; unnamed ones stay at 1."""
+    """Name of a kept volume -> its target over time as a factor of its rest volume; unnamed ones stay at 1.
+    What is faster than the body can follow without being thrown apart is ramped, with a warning."""
+    positions: np.ndarray | None = None
+    """Initial positions [m], (n, 3); None: those at rest."""
 
     def __post_init__(self) -> None:
+        check_surroundings(self.gravity, self.damping, self.clock.dt)
+        check_nodal("initial velocities", self.velocity, self.body)
+        check_nodal("initial positions", self.positions, self.body)
+        x = self.body.rest if self.positions is None else self.positions
         for number, obstacle in enumerate(self.obstacles):
-            depth = starting_depth(obstacle, self.body)
+            depth = starting_depth(obstacle, self.body, x)
             if depth > 1e-6 * self.body.size:
                 raise MassSpringError(
                     f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
                 )
         check_held_apart(self.body, self.method)
-        for name, ramp in self.targets.items():
-            if name not in self.body.kept.names:
-                known = ", ".join(self.body.kept.names[:6])
-                raise MassSpringError(f"target '{name}' names no kept volume; the body keeps {known}")
-            if min(ramp.values) <= 0:
-                raise MassSpringError(
-                    f"target '{name}' falls to {min(ramp.values):g} of its rest volume; keep it positive"
-                )
-        if not (np.isfinite(self.damping) and self.damping >= 0):
-            raise MassSpringError(f"damping is {self.damping} 1/s; it must be zero or positive")
-        if self.damping * self.clock.dt >= 1:
-            raise MassSpringError(
-                f"damping {self.damping:g} 1/s turns velocities round within dt = {self.clock.dt:.3g} s; "
-                f"keep dt below {1 / self.damping:.3g} s"
+        check_targets(self.targets, self.body)
+        rate = fastest_filling(self.body)
+        for name in self.ramped:
+            warnings.warn(
+                f"the target of volume '{name}' moves faster than {rate:.3g} of its rest volume a second, which would"
+                " throw the body apart; it is followed at that rate",
+                stacklevel=3,
             )
+
+    @cached_property
+    def followed(self) -> dict[str, Ramp]:
+        """The targets as they are followed (massspring.targets)."""
+        rate = fastest_filling(self.body) if self.targets else 0.0
+        return {name: followed(ramp, rate) for name, ramp in self.targets.items()}
+
+    @property
+    def ramped(self) -> list[str]:
+        """Names of the volumes whose target is too fast to be followed as it is."""
+        return [name for name, ramp in self.followed.items() if ramp is not self.targets[name]]
 
     def start(self) -> State:
         """The state at t = 0."""
-        return start(self.body, self.attachments, self.velocity)
+        state = start(self.body, self.attachments, self.velocity)
+        if self.positions is not None:
+            state.motion.x[:] = self.positions
+        return state
 
     def drive(self, frame: int) -> Drive:
         """The outside world during frame number `frame` (0, 1, …): positions at the end of each of its steps."""
@@ -89,38 +107,19 @@ class Setup:
 
     def volume_targets(self, t: np.ndarray) -> np.ndarray:
         """What each kept volume should be at times `t` (q,) [s], (q, m) [m³]."""
-        factors = [self.targets[name](t) if name in self.targets else np.ones(len(t)) for name in self.body.kept.names]
+        factors = [self.followed[name](t) if name in self.targets else np.ones(len(t)) for name in self.body.kept.names]
         return np.column_stack(factors) * self.body.rest_volumes
 
 
-def check_held_apart(body: Body, method: Method) -> None:
-    """Springs without length need a volume at every node and a method that starts with their rest pressure.
-
-    One volume for many nodes would let some shrink as others grow. Raises MassSpringError.
-    """
-    if not body.rest_pressure:
-        return
-    if body.kept.count < body.node_count:
-        raise MassSpringError(
-            f"springs of law '{body.law}' pull every part of the body together, and it keeps {body.kept.count} "
-            f"volumes for {body.node_count} nodes; keep one volume per node"
-        )
-    if not getattr(method, "holds_apart", False):
-        raise MassSpringError(
-            f"method '{method.name}' has no pressure at rest to hold springs of law '{body.law}' apart; "
-            "use implicit_volume, or another law"
-        )
-
-
-def starting_depth(obstacle: Obstacle, body: Body) -> float:
-    """How deep the body reaches into an obstacle at the start [m]; an obstacle between all nodes counts too."""
-    depth = -float(obstacle.gap(body.rest[body.surface_nodes], 0.0).min())
+def starting_depth(obstacle: Obstacle, body: Body, x: np.ndarray) -> float:
+    """How deep the body at `x` (n, 3) reaches into an obstacle at the start [m]; one between all nodes counts too."""
+    depth = -float(obstacle.gap(x[body.surface_nodes], 0.0).min())
     if isinstance(obstacle, Plane):
         return depth
     ends = [obstacle.anchor + obstacle.path(0.0)]
     if isinstance(obstacle, Capsule):
         ends.append(ends[0] + obstacle.span)
-    inside = any(abs(winding_number(end, body.rest, body.triangles)) > 0.5 for end in ends)
+    inside = any(abs(winding_number(end, x, body.triangles)) > 0.5 for end in ends)
     return max(depth, obstacle.radius) if inside else depth
 
 
@@ -133,12 +132,27 @@ def _tracks(tracks: list[np.ndarray], steps: int) -> np.ndarray:
     return np.ascontiguousarray(np.array(tracks, dtype=np.float64).reshape(-1, steps, 3).transpose(1, 0, 2))
 
 
+def lost(drive: Drive) -> str | None:
+    """Which part of the outside world has no place or no size any more, or None."""
+    for what, values in (
+        ("obstacle", drive.position),
+        ("attachment", drive.held_displacement),
+        ("target of kept volume", drive.volume_target[:, :, None]),
+    ):
+        bad = np.flatnonzero(~np.isfinite(values).all(axis=(0, 2)))
+        if len(bad):
+            return f"{what} {bad[0]} is no longer finite; correct its path"
+    return None
+
+
 def trouble(state: State, body: Body) -> str | None:
     """Why the run cannot go on, or None: values that are not finite, or nodes that have left."""
     far = float(np.abs(state.x - body.rest).max())
-    if np.isfinite(far) and np.isfinite(state.lam).all() and far < ESCAPED * body.size:
-        return None
-    return "positions are no longer finite" if not np.isfinite(far) else f"a node has moved {far:.3g} m from rest"
+    if not np.isfinite(far):
+        return "positions are no longer finite"
+    if not np.isfinite(state.lam).all():
+        return "pressures are no longer finite"
+    return None if far < ESCAPED * body.size else f"a node has moved {far:.3g} m from rest"
 
 
 def simulate(
@@ -159,6 +173,9 @@ def simulate(
     begun = perf_counter_ns()
     for frame in range(setup.clock.frames):
         drive = setup.drive(frame)
+        reason = lost(drive)
+        if reason is not None:
+            return recorder.stopped(frame, "diverged", reason)
         begin = perf_counter_ns()
         state = advance(state, drive)
         elapsed = perf_counter_ns() - begin

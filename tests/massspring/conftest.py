@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
 from massspring import Body, Material, Volumes, surface_body, tetrahedral_body
 
@@ -78,6 +79,19 @@ def icosphere(levels: int, radius: float = 0.05) -> tuple[np.ndarray, np.ndarray
 def block_body() -> Body:
     """3 × 3 × 2 cells, 162 tetrahedra, distorted by 15 %."""
     return tetrahedral_body(*block((3, 3, 2)), SOFT)
+
+
+@pytest.fixture(scope="session")
+def filled_ball() -> Body:
+    """217 nodes on spherical shells, turned against each other so that no four of them lie flat; 734 tetrahedra."""
+    turn, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+    shells = [icosphere(2)[0], 0.68 * icosphere(1)[0] @ turn, 0.36 * icosphere(0)[0] @ turn.T, np.zeros((1, 3))]
+    points = np.vstack(shells)
+    tetrahedra = Delaunay(points).simplices.astype(np.int64)
+    a, b, c, d = points[tetrahedra].transpose(1, 0, 2)
+    negative = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0
+    tetrahedra[negative] = tetrahedra[negative][:, [0, 2, 1, 3]]
+    return tetrahedral_body(points, boundary(tetrahedra), tetrahedra, SOFT)
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,64 @@
+"""What a set-up is checked for before it runs; each complaint is one sentence."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from massspring.body import Body
+from massspring.errors import MassSpringError
+from massspring.methods.base import Method
+from massspring.volumes import Ramp
+
+
+def check_surroundings(gravity: tuple[float, float, float], damping: float, dt: float) -> None:
+    """Raises MassSpringError for gravity [m/s²] or damping [1/s] that no step `dt` [s] could use."""
+    if len(gravity) != 3 or not np.isfinite(gravity).all():
+        raise MassSpringError(f"gravity is {gravity} m/s²; give three finite numbers")
+    if not (np.isfinite(damping) and damping >= 0):
+        raise MassSpringError(f"damping is {damping} 1/s; it must be zero or positive")
+    if damping * dt >= 1:
+        raise MassSpringError(
+            f"damping {damping:g} 1/s turns velocities round within dt = {dt:.3g} s; keep dt below {1 / damping:.3g} s"
+        )
+
+
+def check_nodal(what: str, values: np.ndarray | None, body: Body) -> None:
+    """Raises MassSpringError unless there are none, or three finite numbers for every node."""
+    if values is None:
+        return
+    if np.shape(values) != (body.node_count, 3):
+        raise MassSpringError(
+            f"{what} have shape {np.shape(values)}; the body has {body.node_count} nodes, give ({body.node_count}, 3)"
+        )
+    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if len(bad):
+        raise MassSpringError(f"{what} are not finite at node {bad[0]} and {len(bad) - 1} more; give numbers")
+
+
+def check_targets(targets: Mapping[str, Ramp], body: Body) -> None:
+    """Raises MassSpringError for a target of a volume that is not kept, or one that falls to nothing."""
+    for name, ramp in targets.items():
+        if name not in body.kept.names:
+            known = ", ".join(body.kept.names[:6])
+            raise MassSpringError(f"target '{name}' names no kept volume; the body keeps {known}")
+        if min(ramp.values) <= 0:
+            raise MassSpringError(f"target '{name}' falls to {min(ramp.values):g} of its rest volume; keep it positive")
+
+
+def check_held_apart(body: Body, method: Method) -> None:
+    """Springs without length need a volume at every node and a method that starts with their rest pressure.
+
+    One volume for many nodes would let some shrink as others grow. Raises MassSpringError.
+    """
+    if not body.rest_pressure:
+        return
+    if body.kept.count < body.node_count:
+        raise MassSpringError(
+            f"springs of law '{body.law}' pull every part of the body together, and it keeps {body.kept.count} "
+            f"volumes for {body.node_count} nodes; keep one volume per node"
+        )
+    if not getattr(method, "holds_apart", False):
+        raise MassSpringError(
+            f"method '{method.name}' has no pressure at rest to hold springs of law '{body.law}' apart; "
+            "use implicit_volume, or another law"
+        )
