@@ -5,6 +5,7 @@ from massspring.body import Body, Material
 from massspring.clock import Clock, make_clock
 from massspring.errors import MassSpringError
 from massspring.history import History
+from massspring.membranes import membrane_body
 from massspring.methods import METHODS, Free, ImplicitVolume, Method, State
 from massspring.obstacles import Attachment, Capsule, Obstacle, Path, Plane, Sphere
 from massspring.simulation import Setup, simulate
@@ -33,6 +34,7 @@ __all__ = [
     "StepLimit",
     "Volumes",
     "make_clock",
+    "membrane_body",
     "simulate",
     "step_limit",
     "surface_body",

@@ -7,6 +7,7 @@ import numpy as np
 
 from massspring.errors import MassSpringError
 from massspring.kernels.deformation import tetrahedron_volumes_into
+from massspring.kernels.layout import Membrane
 from massspring.kernels.springs import spring_energy, spring_forces_into
 from massspring.kernels.volume import enclosed_volume, volume_gradient_into
 from massspring.springs import Springs, lengths
@@ -17,6 +18,7 @@ SAME_VOLUME = 1e-9
 """Relative: both are sums of the same determinants, up to round-off of some million additions."""
 BALANCED = 1e-8
 """Of the largest force at a node: far above round-off, far below one spring too many."""
+NO_MEMBRANE = Membrane(np.empty((0, 3), dtype=np.uint32), *(np.empty((0, 3)) for _ in range(3)))
 NO_TETRAHEDRA = np.empty((0, 4), dtype=np.uint32)
 
 
@@ -64,6 +66,8 @@ class Body:
     """What methods keep; None: the whole."""
     rest_pressure: float = 0.0
     """Pressure that balances springs without length at rest [Pa]; 0 for springs that rest at their own length."""
+    membrane: Membrane = NO_MEMBRANE
+    """Triangle springs of a wall."""
 
     def __post_init__(self) -> None:
         check_finite("rest positions", self.rest)
@@ -101,6 +105,13 @@ class Body:
                 f"a spring ends at node {int(springs.ends.max())}, but there are {len(self.rest)} nodes"
             )
         check_finite("spring stiffnesses", springs.stiffness)
+        for values in self.membrane[1:]:
+            check_finite("triangle springs", values)
+        if len(self.membrane.triangles) and int(self.membrane.triangles.max()) >= len(self.rest):
+            raise MassSpringError(
+                f"a triangle spring names node {int(self.membrane.triangles.max())}, "
+                f"but there are {len(self.rest)} nodes"
+            )
         length = lengths(self.rest, springs.ends) if self.rest_pressure else springs.rest_length
         if not (length > 0).all():
             worst = int(np.argmin(length))
@@ -176,4 +187,7 @@ class Body:
     def stiffened(self, factor: float) -> "Body":
         """The same body with every spring `factor` times as stiff."""
         stiffer = replace(self.springs, stiffness=self.springs.stiffness * factor)
-        return replace(self, springs=stiffer, rest_pressure=self.rest_pressure * factor)
+        membrane = self.membrane._replace(
+            stiffness=self.membrane.stiffness * factor, coupling=self.membrane.coupling * factor
+        )
+        return replace(self, springs=stiffer, rest_pressure=self.rest_pressure * factor, membrane=membrane)

@@ -7,6 +7,7 @@ import numpy as np
 from massspring.body import Body
 from massspring.clock import Clock
 from massspring.kernels.deformation import smallest_ratio, tetrahedron_volumes_into
+from massspring.kernels.membrane import membrane_energy
 from massspring.kernels.springs import spring_energy
 from massspring.methods.base import State
 from massspring.obstacles import Obstacle
@@ -95,7 +96,8 @@ class Recorder:
         self.volume[frame] = self.volumes.measure(x)
         self.pressure[frame] = state.lam
         self.scalars["kinetic"][frame] = 0.5 * float(net.mass @ np.einsum("ij,ij->i", v, v))
-        self.scalars["elastic"][frame] = spring_energy(x, net.ends, net.rest_length, net.stiffness) - self.rest_energy
+        taut = spring_energy(x, net.ends, net.rest_length, net.stiffness) - self.rest_energy
+        self.scalars["elastic"][frame] = taut + membrane_energy(x, net.membrane)
         if len(self.rest_volumes):
             tetrahedron_volumes_into(x, self.body.tetrahedra, self.cell_volumes)
             self.scalars["min_j"][frame] = smallest_ratio(self.cell_volumes, self.rest_volumes)

@@ -58,7 +58,7 @@ class StepLimit:
 
 def step_limit(body: Body, damping: float = 0.0, held_nodes: np.ndarray | None = None) -> StepLimit:
     """Limit of a body with mass-proportional `damping` [1/s]. Raises MassSpringError for a body without springs."""
-    frequency = largest_frequency(body, held_nodes) if body.springs.count else 0.0
+    frequency = largest_frequency(body, held_nodes) if body.springs.count or len(body.membrane.triangles) else 0.0
     if not frequency > 0:
         raise MassSpringError("the body has no stiffness, so no largest frequency; give it springs or a dt in seconds")
     return StepLimit(frequency, damping)

@@ -52,9 +52,28 @@ def volume_hessian(triangles: np.ndarray, x: np.ndarray) -> csr_array:
     return blocks(np.concatenate(rows), np.concatenate(columns), np.concatenate(values), len(x))
 
 
+def membrane_stiffness(body: Body) -> csr_array:
+    """Σ_t Σ_ab q_ab ∂Δ_a/∂x ∂Δ_b/∂x [N/m] of triangle springs at rest, (3n, 3n) (eq. 77)."""
+    membrane, n = body.membrane, body.node_count
+    corners = body.rest[membrane.triangles]
+    edge = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    slope = np.zeros((len(edge), 3, 3, 3))  # of Δ_a by the position of corner b
+    for a in range(3):
+        slope[:, a, (a + 1) % 3], slope[:, a, (a + 2) % 3] = -2.0 * edge[:, a], 2.0 * edge[:, a]
+    form = np.zeros((len(edge), 3, 3))
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        form[:, a, a] = membrane.stiffness[:, a]
+        form[:, b, c] = form[:, c, b] = membrane.coupling[:, a]
+    block = np.einsum("tapi,tab,tbqj->tpqij", slope, form, slope)
+    rows = np.repeat(membrane.triangles, 3, axis=1).ravel()
+    columns = np.tile(membrane.triangles, (1, 3)).ravel()
+    return blocks(rows, columns, block.reshape(-1, 3, 3), n)
+
+
 def stiffness_at_rest(body: Body) -> csr_array:
-    """−∂f/∂x [N/m] of springs and rest pressure together at rest, (3n, 3n) (eq. 16, 76)."""
-    springs = spring_stiffness(body, body.rest)
+    """−∂f/∂x [N/m] of springs, triangle springs and rest pressure together at rest, (3n, 3n) (eq. 16, 76)."""
+    springs = csr_array(spring_stiffness(body, body.rest) + membrane_stiffness(body))
     if not body.rest_pressure:
         return springs
     return csr_array(springs - body.rest_pressure * volume_hessian(body.triangles, body.rest))

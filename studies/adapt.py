@@ -12,14 +12,17 @@ from massspring import (
     Setup,
     StepLimit,
     make_clock,
+    membrane_body,
     step_limit,
     surface_body,
     tetrahedral_body,
 )
+from massspring.membranes import MEMBRANE_LAWS
 from massspring.volumes import Volumes
 from studies.case import BodyRecipe, Case
 from studies.errors import StudyError
 from studies.geometry import OrganMesh, fill, organ, read_mesh, scan
+from studies.geometry.mesh import triangle_areas
 from studies.geometry.organs import SHAPES
 from studies.scenes.base import Scene
 from studies.suggest import choose
@@ -65,8 +68,10 @@ def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh) -> Body:
     if not recipe.stiffness > 0:
         raise StudyError(f"the stiffness factor is {recipe.stiffness}; it must be positive")
     material = Material(scene.tissue.shear_modulus, scene.tissue.density)
-    if recipe.kind == "surface":
-        outside = mesh.outer() if mesh.hollow else mesh
+    outside = mesh.outer() if mesh.hollow else mesh
+    if recipe.kind == "membrane":
+        body = wall_for(scene, recipe, mesh, material)
+    elif recipe.kind == "surface":
         body = surface_body(
             outside.points[: outside.outer_count], outside.triangles, material, recipe.axis, recipe.weights
         )
@@ -76,6 +81,19 @@ def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh) -> Body:
         body = body.stiffened(recipe.stiffness)
     volumes = volumes_for(scene, recipe, mesh, body)
     return body if volumes is None else body.keeping(volumes)
+
+
+def wall_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, material: Material) -> Body:
+    """A hollow organ as a membrane on its outer surface, as thick as its wall is in the mean. Raises StudyError."""
+    if not mesh.hollow:
+        raise StudyError(f"scene '{scene.name}' has a solid organ; a membrane is for the wall of a hollow one")
+    if recipe.law not in MEMBRANE_LAWS:
+        raise StudyError(f"law '{recipe.law}' is not for membranes; choose {' or '.join(MEMBRANE_LAWS)}")
+    outside = mesh.outer()
+    thickness = mesh.volume / triangle_areas(outside.points, outside.triangles).sum()
+    # What fills the organ weighs as much as tissue, as in a surface body.
+    content = material.density * (1.0 - mesh.volume / mesh.outer_volume)
+    return membrane_body(outside.points, outside.triangles, float(thickness), material, recipe.law, content)
 
 
 def volumes_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, body: Body) -> Volumes | None:
@@ -127,7 +145,7 @@ def prepare(case: Case) -> Prepared:
     mesh = mesh_for(scene, case.body.nodes, filled=case.body.kind == "tetrahedral" or scene.lumen is not None)
     body = body_for(scene, case.body, mesh)
     targets = targets_for(scene, mesh, body)
-    if case.body.kind == "surface" and mesh.hollow:
+    if case.body.kind != "tetrahedral" and mesh.hollow:
         mesh = mesh.outer()
     attachments = attachments_for(scene, mesh)
     held = np.concatenate([a.nodes for a in attachments]) if attachments else None

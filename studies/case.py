@@ -21,13 +21,14 @@ Seconds = float | Literal["auto"]
 class BodyRecipe:
     """How the mass-spring body is made from the scene's organ."""
 
-    kind: Literal["tetrahedral", "surface"] = "tetrahedral"
-    """"surface": the paper's (JHC05); "tetrahedral": springs on the edges of the filled mesh."""
+    kind: Literal["tetrahedral", "surface", "membrane"] = "tetrahedral"
+    """"surface": the paper's (JHC05); "tetrahedral": springs on the edges of the filled mesh; "membrane": the outer
+    surface of a hollow organ as a thin wall round its content."""
     nodes: int = 550
     """Surface nodes."""
-    law: Literal["van_gelder", "uniform", "lloyd", "lloyd_matched", "cotangent"] = "van_gelder"
-    """Stiffness law of a tetrahedral body; "lloyd" as published, the others match the tissue's shear modulus.
-    "cotangent", springs without length, needs nodal volumes."""
+    law: Literal["van_gelder", "uniform", "lloyd", "lloyd_matched", "cotangent", "delingette"] = "van_gelder"
+    """Stiffness law of a tetrahedral body or a membrane; "lloyd" as published, the others match the tissue's shear
+    modulus. "cotangent", springs without length, needs nodal volumes; a membrane takes "delingette" or "lloyd"."""
     stiffness: float = 1.0
     """Factor on every spring; 1 matches the tissue's shear modulus."""
     volumes: Literal["scene", "whole", "regions", "nodal"] = "scene"
@@ -84,7 +85,7 @@ class Case:
         """Readable; unique within a study together with the hash of the whole case."""
         step = f"dt{self.dt_fraction:g}" if self.dt == "auto" else f"dt{1e3 * float(self.dt):.4g}ms"
         parts = [self.scene.name, self.body.kind, str(self.body.nodes), self.method.name, step]
-        if self.body.kind == "tetrahedral" and self.body.law != "van_gelder":
+        if self.body.kind != "surface" and self.body.law != "van_gelder":
             parts.append(self.body.law)
         if self.body.volumes != "scene":
             parts.append(f"{self.body.regions}regions" if self.body.volumes == "regions" else self.body.volumes)

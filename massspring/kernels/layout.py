@@ -5,6 +5,19 @@ from typing import NamedTuple
 import numpy as np
 
 
+class Membrane(NamedTuple):
+    """t triangle springs; edge a of a triangle lies opposite its node a."""
+
+    triangles: np.ndarray
+    """(t, 3) uint32."""
+    rest_square: np.ndarray
+    """L_a² [m²], (t, 3)."""
+    stiffness: np.ndarray
+    """k_a of each edge [N/m³], (t, 3)."""
+    coupling: np.ndarray
+    """c_a of the two edges that meet at node a [N/m³], (t, 3)."""
+
+
 class Network(NamedTuple):
     """What does not change during a run; s springs, f triangles, n nodes, h held nodes, c surface nodes."""
 
@@ -14,6 +27,8 @@ class Network(NamedTuple):
     """[m], (s,)."""
     stiffness: np.ndarray
     """[N/m], (s,)."""
+    membrane: Membrane
+    """Triangle springs, none in most bodies."""
     triangles: np.ndarray
     """Closed surface of the one volume that is kept, outward, (f, 3) uint32; of the whole where there are several."""
     mass: np.ndarray

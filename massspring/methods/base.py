@@ -10,7 +10,7 @@ from massspring.errors import MassSpringError
 from massspring.kernels.layout import Drive, Motion, Network, Tally, VolumeRows
 from massspring.methods.rows import volume_rows
 from massspring.obstacles import Attachment
-from massspring.springs import lengths
+from massspring.springs import EDGES_OF_TRIANGLE, lengths
 from massspring.volumes import Volumes
 
 LONGEST_CORRECTION = 0.3
@@ -113,6 +113,7 @@ def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarra
         ends=body.springs.ends,
         rest_length=body.springs.rest_length,
         stiffness=body.springs.stiffness,
+        membrane=body.membrane,
         triangles=surface,
         mass=body.mass,
         inverse_mass=inverse_mass,
@@ -121,10 +122,15 @@ def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarra
         held_group=np.repeat(np.arange(len(nodes)), [len(h) for h in nodes]).astype(np.uint32),
         held_rest=body.rest[held_nodes],
         rest_lam=body.rest_lam,
-        longest_correction=LONGEST_CORRECTION * float(lengths(body.rest, body.springs.ends).mean())
-        if body.springs.count
-        else np.inf,
+        longest_correction=LONGEST_CORRECTION * _mean_length(body),
     )
+
+
+def _mean_length(body: Body) -> float:
+    """Of all springs at rest [m], the edges of triangle springs among them."""
+    edges = body.membrane.triangles[:, EDGES_OF_TRIANGLE].reshape(-1, 2)
+    ends = np.concatenate([body.springs.ends, edges])
+    return float(lengths(body.rest, ends).mean()) if len(ends) else np.inf
 
 
 def begin_frame(state: State, drive: Drive) -> State:

@@ -6,6 +6,7 @@ from typing import ClassVar
 from massspring.kernels.compiled import compiled
 from massspring.kernels.contact import find_contacts
 from massspring.kernels.layout import Drive
+from massspring.kernels.membrane import add_membrane_forces
 from massspring.kernels.motion import add_held_impulse, advance, predict_velocity_into, prescribe_velocity_into
 from massspring.kernels.springs import spring_forces_into
 from massspring.methods.base import State, begin_frame
@@ -17,6 +18,7 @@ def free_frame(network, motion, drive, tally):
     dt = drive.dt
     for step in range(drive.position.shape[0]):
         spring_forces_into(motion.x, network.ends, network.rest_length, network.stiffness, motion.force)
+        add_membrane_forces(motion.x, network.membrane, motion.force)
         predict_velocity_into(
             motion.v, motion.force, network.inverse_mass, dt, drive.damping, drive.gravity, motion.v_star
         )

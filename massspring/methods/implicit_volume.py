@@ -20,6 +20,7 @@ import numpy as np
 from massspring.kernels.compiled import compiled
 from massspring.kernels.contact import find_contacts, pressure_reach, revise_contacts
 from massspring.kernels.layout import Accuracy, Drive
+from massspring.kernels.membrane import add_membrane_forces
 from massspring.kernels.motion import (
     add_held_impulse,
     advance,
@@ -55,6 +56,7 @@ def implicit_volume_frame(network, motion, drive, tally, lam):
     lightest = network.inverse_mass.max()
     for step in range(drive.position.shape[0]):
         spring_forces_into(motion.x, network.ends, network.rest_length, network.stiffness, motion.force)
+        add_membrane_forces(motion.x, network.membrane, motion.force)
         predict_velocity_into(
             motion.v, motion.force, network.inverse_mass, dt, drive.damping, drive.gravity, motion.v_star
         )
@@ -136,6 +138,7 @@ def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy):
     dt = drive.dt
     for step in range(drive.position.shape[0]):
         spring_forces_into(motion.x, network.ends, network.rest_length, network.stiffness, motion.force)
+        add_membrane_forces(motion.x, network.membrane, motion.force)
         predict_velocity_into(
             motion.v, motion.force, network.inverse_mass, dt, drive.damping, drive.gravity, motion.v_star
         )

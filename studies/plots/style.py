@@ -35,12 +35,14 @@ BODY_LINES = {
     "surface": (0, (4, 1.6)),
     "tetrahedral, one volume": (0, (1, 1.2)),
     "tetrahedral, nodal volumes": (0, (6, 1.5, 1, 1.5)),
+    "membrane": (0, (2.5, 1)),
 }
 BODY_MARKERS = {
     "tetrahedral": "o",
     "surface": "s",
     "tetrahedral, one volume": "D",
     "tetrahedral, nodal volumes": "^",
+    "membrane": "v",
 }
 """Of the bodies that charts tell apart, by BodyRecipe.series."""
 STATUS_LOOKS: dict[Status, tuple[str, str]] = {

@@ -7,7 +7,7 @@ from studies.adapt import body_for, mesh_for, prepare
 from studies.case import BodyRecipe, Case
 from studies.errors import StudyError
 from studies.run import measure
-from studies.scenes import BALL_SQUEEZE
+from studies.scenes import BALL_SQUEEZE, BLADDER_FILL
 from studies.store import Status
 
 
@@ -50,3 +50,21 @@ def test_stiffness_moves_the_rest_pressure_with_the_springs(mesh):
 def test_a_factor_that_is_not_positive_is_refused(mesh):
     with pytest.raises(StudyError, match="stiffness factor is 0"):
         body_for(BALL_SQUEEZE, BodyRecipe(nodes=300, stiffness=0.0), mesh)
+
+
+def test_a_hollow_organ_can_be_a_membrane():
+    """As thick as the wall is in the mean, as heavy as wall and content, filled like the organ."""
+    case = Case(BLADDER_FILL, BodyRecipe("membrane", nodes=400, law="delingette"), frames=20)
+    prepared = prepare(case)
+    body, mesh = prepared.setup.body, mesh_for(BLADDER_FILL, 400)
+    assert body.mass.sum() == pytest.approx(BLADDER_FILL.tissue.density * mesh.outer_volume, rel=1e-2)
+    assert body.node_count == mesh.outer_count and len(body.membrane.triangles) == len(body.triangles)
+    assert case.name == "bladder_fill-membrane-400-implicit_volume-dt0.5-delingette"
+    (name, ramp), grown = next(iter(prepared.setup.targets.items())), mesh.lumen_volume / mesh.outer_volume
+    assert name == "whole" and ramp.values[-1] == pytest.approx(1 + 0.2 * grown, rel=1e-9)
+
+
+def test_a_membrane_needs_a_wall_and_a_law_of_its_own():
+    for scene, law, words in ((BALL_SQUEEZE, "delingette", "solid organ"), (BLADDER_FILL, "uniform", "not for membr")):
+        record = measure(Case(scene, BodyRecipe("membrane", nodes=400, law=law), frames=20))
+        assert record.status == Status.FAILED and words in record.message
