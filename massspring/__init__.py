@@ -6,7 +6,17 @@ from massspring.clock import Clock, make_clock
 from massspring.errors import MassSpringError
 from massspring.history import History
 from massspring.membranes import membrane_body
-from massspring.methods import METHODS, Free, ImplicitVolume, Method, State
+from massspring.methods import (
+    METHODS,
+    Baumgarte,
+    Free,
+    ImplicitVolume,
+    Method,
+    PostStabilization,
+    Projection,
+    Shake,
+    State,
+)
 from massspring.obstacles import Attachment, Capsule, Obstacle, Path, Plane, Sphere
 from massspring.simulation import Setup, simulate
 from massspring.stability import StepLimit, step_limit
@@ -15,6 +25,7 @@ from massspring.volumes import Ramp, Volumes
 __all__ = [
     "METHODS",
     "Attachment",
+    "Baumgarte",
     "Body",
     "Capsule",
     "Clock",
@@ -27,8 +38,11 @@ __all__ = [
     "Obstacle",
     "Path",
     "Plane",
+    "PostStabilization",
+    "Projection",
     "Ramp",
     "Setup",
+    "Shake",
     "Sphere",
     "State",
     "StepLimit",

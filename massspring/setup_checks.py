@@ -57,7 +57,7 @@ def check_held_apart(body: Body, method: Method) -> None:
             f"springs of law '{body.law}' pull every part of the body together, and it keeps {body.kept.count} "
             f"volumes for {body.node_count} nodes; keep one volume per node"
         )
-    if not getattr(method, "holds_apart", False):
+    if not method.holds_apart:
         raise MassSpringError(
             f"method '{method.name}' has no pressure at rest to hold springs of law '{body.law}' apart; "
             "use implicit_volume, or another law"

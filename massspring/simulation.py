@@ -14,7 +14,7 @@ from massspring.clock import Clock
 from massspring.errors import MassSpringError
 from massspring.history import History, Recorder
 from massspring.kernels.layout import Drive
-from massspring.methods.base import Method, State, start
+from massspring.methods.base import Method, State
 from massspring.obstacles import Attachment, Capsule, Obstacle, Plane
 from massspring.setup_checks import check_held_apart, check_nodal, check_surroundings, check_targets
 from massspring.surface import winding_number
@@ -47,6 +47,9 @@ class Setup:
     """Initial positions [m], (n, 3); None: those at rest."""
 
     def __post_init__(self) -> None:
+        reason = self.method.applies(self.body)
+        if reason is not None:
+            raise MassSpringError(f"method '{self.method.name}' does not apply to this body: {reason}")
         check_surroundings(self.gravity, self.damping, self.clock.dt)
         check_nodal("initial velocities", self.velocity, self.body)
         check_nodal("initial positions", self.positions, self.body)
@@ -80,7 +83,7 @@ class Setup:
 
     def start(self) -> State:
         """The state at t = 0."""
-        state = start(self.body, self.attachments, self.velocity)
+        state = self.method.start(self.body, self.attachments, self.velocity)
         if self.positions is not None:
             state.motion.x[:] = self.positions
         return state

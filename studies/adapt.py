@@ -149,7 +149,7 @@ def prepare(case: Case) -> Prepared:
         mesh = mesh.outer()
     attachments = attachments_for(scene, mesh)
     held = np.concatenate([a.nodes for a in attachments]) if attachments else None
-    limit = step_limit(body, scene.damping, held)
+    limit = step_limit(body, scene.damping, held, case.method.added_stiffness(body))
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
     clock = make_clock(scene.duration, case.frames or scene.frames, dt, limit)
     setup = Setup(body, case.method, clock, scene.obstacles, attachments, scene.gravity, scene.damping, targets=targets)

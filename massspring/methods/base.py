@@ -1,9 +1,10 @@
 """What a method is: settings (a frozen dataclass), claims (class variables), one compiled loop over the steps."""
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from massspring.body import Body
 from massspring.errors import MassSpringError
@@ -30,6 +31,8 @@ class State:
     """None where one closed surface is kept: a division needs no rows."""
     tally: Tally = field(default_factory=lambda: new_tally(0, 0))
     """What the last frame measured of itself."""
+    memory: Any = None
+    """Arrays that only the method knows, made by its `start`."""
 
     @property
     def x(self) -> np.ndarray:
@@ -50,14 +53,30 @@ def new_tally(obstacles: int, attachments: int) -> Tally:
 
 
 class Method(Protocol):
-    """One way to advance time. A new one: a file, and a line in METHODS."""
+    """One way to advance time. A new one derives from this: a file, and a line in METHODS."""
 
     name: ClassVar[str]
     """Word on the command line."""
     order: ClassVar[int]
     """Claim: global error of the trajectory ~ dt^order."""
     volume_tol: ClassVar[float | None]
-    """Claim: |V/V0 − 1| after a quiet step at half the stability limit; None where no volume is kept."""
+    """Claim: |V/V0 − 1| after a quiet step at half the stability limit; None where a step promises no volume."""
+    keeps_spin: ClassVar[bool] = True
+    """Claim: a body in free flight keeps its angular momentum to round-off."""
+    holds_apart: ClassVar[bool] = False
+    """Whether it starts with the pressure that holds springs without length apart at rest."""
+
+    def applies(self, body: Body) -> str | None:
+        """Why the method cannot advance `body`; None when it can."""
+        return None
+
+    def added_stiffness(self, body: Body) -> csr_array | None:
+        """B [√(N/m)], (3n, r): small oscillations about rest feel B Bᵀ beside the springs; None for nothing."""
+        return None
+
+    def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
+        """The body at rest, or with velocities `v` (n, 3) [m/s]. Raises MassSpringError."""
+        return start(body, attachments, v)
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame: as many steps as `drive.position` has rows."""
@@ -131,6 +150,16 @@ def _mean_length(body: Body) -> float:
     edges = body.membrane.triangles[:, EDGES_OF_TRIANGLE].reshape(-1, 2)
     ends = np.concatenate([body.springs.ends, edges])
     return float(lengths(body.rest, ends).mean()) if len(ends) else np.inf
+
+
+def one_whole(body: Body) -> str | None:
+    """Why a method that keeps the one volume inside the body's surface does not apply; None when it does."""
+    kept = body.kept
+    if kept.count > 1:
+        return f"it keeps one volume, the body keeps {kept.count}; keep the whole, or take implicit_volume"
+    if not (np.abs(kept.share.data) == 1.0).all():
+        return "it keeps what one closed surface encloses, the body keeps a share of it; take implicit_volume"
+    return None
 
 
 def begin_frame(state: State, drive: Drive) -> State:

@@ -9,7 +9,7 @@ from massspring.kernels.layout import Drive
 from massspring.kernels.membrane import add_membrane_forces
 from massspring.kernels.motion import add_held_impulse, advance, predict_velocity_into, prescribe_velocity_into
 from massspring.kernels.springs import spring_forces_into
-from massspring.methods.base import State, begin_frame
+from massspring.methods.base import Method, State, begin_frame
 
 
 @compiled
@@ -33,7 +33,7 @@ def free_frame(network, motion, drive, tally):
 
 
 @dataclass(frozen=True)
-class Free:
+class Free(Method):
     """Symplectic Euler, no volume kept."""
 
     name: ClassVar[str] = "free"

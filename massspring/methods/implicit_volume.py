@@ -43,7 +43,7 @@ from massspring.kernels.rows import (
 )
 from massspring.kernels.springs import spring_forces_into
 from massspring.kernels.volume import volume_gradient_into
-from massspring.methods.base import State, begin_frame
+from massspring.methods.base import Method, State, begin_frame
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
@@ -165,7 +165,7 @@ def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy):
 
 
 @dataclass(frozen=True)
-class ImplicitVolume:
+class ImplicitVolume(Method):
     """Keeps each volume with one multiplier (HCJ05): one volume by a division, more by a small solve per step."""
 
     tolerance: float = 1e-6

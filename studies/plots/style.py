@@ -29,7 +29,9 @@ YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 GREY, LIGHT, PALE = "#5A5A5A", "#B5B5B5", "#E4E4E4"
 
 METHOD_COLOURS = {"free": VERMILLION, "implicit_volume": BLUE}
-OTHER_METHODS = (GREEN, PURPLE, ORANGE, SKY)
+# Then the muted scheme of P. Tol, "Colour schemes", 2021.
+MUTED = ("#332288", "#999933", "#882255", "#44AA99", "#DDCC77", "#AA4499", "#117733", "#661100", "#88CCEE", "#CC6677")
+OTHER_METHODS = (GREEN, PURPLE, ORANGE, SKY, *MUTED)
 BODY_LINES = {
     "tetrahedral": "-",
     "surface": (0, (4, 1.6)),

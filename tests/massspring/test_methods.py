@@ -14,6 +14,8 @@ from massspring import (
     Clock,
     Free,
     ImplicitVolume,
+    MassSpringError,
+    Method,
     Path,
     Plane,
     Setup,
@@ -27,8 +29,8 @@ from massspring.methods.base import State, begin_frame, start
 MOMENTUM_TOL = 1e-12  # relative: round-off of some thousand additions per step, over 40 steps
 
 
-def clock_for(body: Body, frames: int, steps: int, fraction: float = 0.5) -> Clock:
-    dt = fraction * step_limit(body).undamped
+def clock_for(body: Body, frames: int, steps: int, fraction: float = 0.5, method: Method | None = None) -> Clock:
+    dt = fraction * step_limit(body, added=method and method.added_stiffness(body)).undamped
     return Clock(frame=steps * dt, frames=frames, steps=steps)
 
 
@@ -49,32 +51,42 @@ def momentum(mass, x, v):
     return mass @ v, np.cross(x, mass[:, None] * v).sum(axis=0)
 
 
-@pytest.fixture(params=METHODS, ids=lambda method: method.name)
-def method(request):
-    return request.param()
+CONTESTANTS = tuple(method() for method in METHODS)
+
+
+@pytest.fixture(params=CONTESTANTS, ids=lambda method: method.name)
+def method(request, kept_body):
+    reason = request.param.applies(kept_body)
+    if reason is not None:
+        with pytest.raises(MassSpringError, match="does not apply to this body"):
+            Setup(kept_body, request.param, Clock(0.01, 1, 10))
+        pytest.skip(reason)
+    return request.param
 
 
 def test_rest_stays_at_rest(kept_body, method):
-    history = simulate(Setup(kept_body, method, clock_for(kept_body, 5, 20)))
+    history = simulate(Setup(kept_body, method, clock_for(kept_body, 5, 20, method=method)))
     assert np.abs(history.final - kept_body.rest).max() < 1e-13 * kept_body.size
     assert np.abs(history.volume / kept_body.rest_volumes - 1).max() < 1e-13
 
 
 def test_free_flight_keeps_momentum_and_spin(kept_body, method):
     v = thrown(kept_body)
-    setup = Setup(kept_body, method, clock_for(kept_body, 2, 20), velocity=v)
+    setup = Setup(kept_body, method, clock_for(kept_body, 2, 20, method=method), velocity=v)
     state = setup.start()
     before = momentum(kept_body.mass, state.x, state.v)
     state = method.advance(state, setup.drive(0))
     after = momentum(kept_body.mass, state.x, state.v)
     scale = np.abs(kept_body.mass[:, None] * v).sum()
     assert np.abs(after[0] - before[0]).max() < MOMENTUM_TOL * scale
-    assert np.abs(after[1] - before[1]).max() < MOMENTUM_TOL * scale * kept_body.size
+    gained = np.abs(after[1] - before[1]).max() / (scale * kept_body.size)
+    # What does not claim it loses a hundred times more than round-off, or it should claim it.
+    assert gained < MOMENTUM_TOL if method.keeps_spin else 100 * MOMENTUM_TOL < gained < 1e-2
 
 
 def test_a_fall_is_a_parabola(kept_body, method):
     """Symplectic Euler falls by g t (t + dt)/2 exactly."""
-    setup = Setup(kept_body, method, clock_for(kept_body, 3, 10), gravity=(0.0, 0.0, -9.81))
+    setup = Setup(kept_body, method, clock_for(kept_body, 3, 10, method=method), gravity=(0.0, 0.0, -9.81))
     history = simulate(setup)
     t = setup.clock.duration
     drop = 9.81 * t * (t + setup.clock.dt) / 2
@@ -85,7 +97,7 @@ def test_moving_and_turning_the_scene_moves_and_turns_the_answer(kept_body, meth
     turn, _ = np.linalg.qr(np.random.default_rng(8).normal(size=(3, 3)))
     turn *= np.sign(np.linalg.det(turn))
     shift = np.array([0.3, -0.2, 0.5])
-    clock = clock_for(kept_body, 10, 10)
+    clock = clock_for(kept_body, 10, 10, method=method)
     planes = squeeze(kept_body, 0.004, clock.duration)
     here = simulate(Setup(kept_body, method, clock, planes, damping=20.0, gravity=(0.0, 0.0, -9.81)))
     there_body = replace(kept_body, rest=kept_body.rest @ turn.T + shift)
@@ -104,7 +116,7 @@ def test_moving_and_turning_the_scene_moves_and_turns_the_answer(kept_body, meth
 
 
 def test_two_runs_are_bitwise_equal_and_leave_their_input_alone(kept_body, method):
-    clock = clock_for(kept_body, 5, 10)
+    clock = clock_for(kept_body, 5, 10, method=method)
     setup = Setup(kept_body, method, clock, squeeze(kept_body, 0.004, clock.duration), damping=20.0)
     rest, mass = kept_body.rest.copy(), kept_body.mass.copy()
     state = setup.start()
@@ -119,7 +131,7 @@ def test_two_runs_are_bitwise_equal_and_leave_their_input_alone(kept_body, metho
 
 def test_frames_are_only_a_way_of_counting(kept_body, method):
     """40 steps in one frame or in eight: the same bits."""
-    one, many = clock_for(kept_body, 1, 40), clock_for(kept_body, 8, 5)
+    one, many = clock_for(kept_body, 1, 40, method=method), clock_for(kept_body, 8, 5, method=method)
     v = thrown(kept_body)
     assert np.array_equal(
         simulate(Setup(kept_body, method, one, velocity=v)).final,
@@ -137,7 +149,7 @@ def test_the_order_is_the_one_claimed(kept_body, method):
     Gravity and damping act from the start: without them symplectic Euler is leapfrog in disguise and shows order 2.
     """
     v = 0.2 * thrown(kept_body)
-    base = clock_for(kept_body, 1, 8, fraction=0.2)
+    base = clock_for(kept_body, 1, 8, fraction=0.2, method=method)
 
     def at(factor: int) -> np.ndarray:
         clock = Clock(base.frame, 1, 8 * factor)
@@ -151,7 +163,7 @@ def test_the_order_is_the_one_claimed(kept_body, method):
 
 def volume_claim_holds(method, body) -> bool:
     """Whether a body blown up by 0.9 % of its volume has it back, as closely as claimed, after each of 20 steps."""
-    setup = Setup(body, method, clock_for(body, 20, 1), damping=30.0)
+    setup = Setup(body, method, clock_for(body, 20, 1, method=method), damping=30.0)
     state = setup.start()
     state.motion.x[:] = 1.003 * body.rest - 0.003 * body.rest.mean(axis=0)
     worst = 0.0
@@ -173,7 +185,7 @@ def replace_claim(method):
 
 
 @dataclass(frozen=True)
-class SixfoldGradient:
+class SixfoldGradient(Method):
     """Deliberately wrong: the volume gradient without its 1/6."""
 
     name: ClassVar[str] = "sixfold_gradient"

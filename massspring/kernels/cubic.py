@@ -1,0 +1,115 @@
+"""The volume along a straight line: an exact cubic in the length of the step (docs/theory.md, section 10)."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from massspring.kernels.compiled import compiled
+from massspring.kernels.distances import allowed_part
+
+POLISHES = 4
+"""Newton steps after the closed form: each doubles the digits that cancellation has left of it."""
+BEYOND = 1e-12
+"""A root this many times farther away than the linear step is round-off of one at infinity."""
+
+
+class Line(NamedTuple):
+    """Where a step would end without pressure, and where a pressure moves it."""
+
+    y: np.ndarray
+    """y = x + dt ṽ [m], (n, 3)."""
+    d: np.ndarray
+    """d = dt² W̃ G, per unit of pressure [m/Pa], (n, 3)."""
+
+
+@compiled
+def line_into(motion, inverse_mass, dt, line):
+    """y = x + dt ṽ [m], d = dt² W̃ G [m/Pa], (n, 3) each: the step ends at y + lam d (eq. 9, 10, 101)."""
+    for i in range(inverse_mass.shape[0]):
+        u0, u1, u2 = motion.v_star[i, 0], motion.v_star[i, 1], motion.v_star[i, 2]
+        push = dt * dt * inverse_mass[i]
+        d0, d1, d2 = push * motion.gradient[i, 0], push * motion.gradient[i, 1], push * motion.gradient[i, 2]
+        if motion.locked[i] > 0:
+            e0, e1, e2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+            u0, u1, u2 = allowed_part(motion.locked[i], e0, e1, e2, u0, u1, u2)
+            u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
+            d0, d1, d2 = allowed_part(motion.locked[i], e0, e1, e2, d0, d1, d2)
+        line.y[i, 0], line.y[i, 1], line.y[i, 2] = (
+            motion.x[i, 0] + dt * u0,
+            motion.x[i, 1] + dt * u1,
+            motion.x[i, 2] + dt * u2,
+        )
+        line.d[i, 0], line.d[i, 1], line.d[i, 2] = d0, d1, d2
+
+
+@compiled
+def triple(a0, a1, a2, b0, b1, b2, c0, c1, c2):
+    """a · (b × c)."""
+    return a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0)
+
+
+@compiled
+def volume_cubic(y, d, triangles):
+    """V(y + a d) = V + a G(y)·d + a² Σ y·g(d) + a³ V[d]: the four coefficients, on a closed surface (eq. 101).
+
+    y is seen from a node of the surface, so that no digits are lost far from the origin.
+    """
+    o0, o1, o2 = y[triangles[0, 0], 0], y[triangles[0, 0], 1], y[triangles[0, 0], 2]
+    k0, k1, k2, k3 = 0.0, 0.0, 0.0, 0.0
+    for f in range(triangles.shape[0]):
+        i, j, k = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+        a0, a1, a2 = y[i, 0] - o0, y[i, 1] - o1, y[i, 2] - o2
+        b0, b1, b2 = y[j, 0] - o0, y[j, 1] - o1, y[j, 2] - o2
+        c0, c1, c2 = y[k, 0] - o0, y[k, 1] - o1, y[k, 2] - o2
+        p0, p1, p2 = d[i, 0], d[i, 1], d[i, 2]
+        q0, q1, q2 = d[j, 0], d[j, 1], d[j, 2]
+        r0, r1, r2 = d[k, 0], d[k, 1], d[k, 2]
+        k0 += triple(a0, a1, a2, b0, b1, b2, c0, c1, c2)
+        k1 += triple(p0, p1, p2, b0, b1, b2, c0, c1, c2)
+        k1 += triple(a0, a1, a2, q0, q1, q2, c0, c1, c2)
+        k1 += triple(a0, a1, a2, b0, b1, b2, r0, r1, r2)
+        k2 += triple(a0, a1, a2, q0, q1, q2, r0, r1, r2)
+        k2 += triple(p0, p1, p2, b0, b1, b2, r0, r1, r2)
+        k2 += triple(p0, p1, p2, q0, q1, q2, c0, c1, c2)
+        k3 += triple(p0, p1, p2, q0, q1, q2, r0, r1, r2)
+    return k0 / 6.0, k1 / 6.0, k2 / 6.0, k3 / 6.0
+
+
+@compiled
+def largest_root(b, c, e):
+    """The real root of t³ + b t² + c t + e of largest modulus (Cardano; three real ones by Viète's cosines)."""
+    q = (b * b - 3.0 * c) / 9.0
+    r = (2.0 * b * b * b - 9.0 * b * c + 27.0 * e) / 54.0
+    if r * r < q * q * q:
+        root = math.sqrt(q)
+        angle = math.acos(min(max(r / (root * root * root), -1.0), 1.0))
+        largest = 0.0
+        for turn in range(3):
+            t = -2.0 * root * math.cos((angle + 2.0 * math.pi * turn) / 3.0) - b / 3.0
+            if abs(t) > abs(largest):
+                largest = t
+        return largest
+    u = -math.copysign(np.cbrt(abs(r) + math.sqrt(max(r * r - q * q * q, 0.0))), r)
+    return u + (q / u if u != 0.0 else 0.0) - b / 3.0
+
+
+@compiled
+def nearest_root(k0, k1, k2, k3):
+    """The real a nearest to 0 with k0 + k1 a + k2 a² + k3 a³ = 0; NaN where there is none (eq. 102).
+
+    In t = s/a with s = −k0/k1, the linear step, it is the largest root of t³ − t² + …: never of lower degree.
+    """
+    if k0 == 0.0:
+        return 0.0
+    scale = -k0 / k1 if k1 != 0.0 else 1.0
+    b, c, e = k1 * scale / k0, k2 * scale * scale / k0, k3 * scale * scale * scale / k0
+    t = largest_root(b, c, e)
+    left = abs(e + t * (c + t * (b + t)))
+    for _ in range(POLISHES):
+        better = t - (e + t * (c + t * (b + t))) / (c + t * (2.0 * b + 3.0 * t))
+        now = abs(e + better * (c + better * (b + better)))
+        if not now < left:
+            break
+        t, left = better, now
+    return scale / t if abs(t) > BEYOND and math.isfinite(t) else math.nan

@@ -1,0 +1,51 @@
+"""Baumgarte's stabilisation: the constraint as a damped oscillator.
+
+Baumgarte, Computer Methods in Applied Mechanics and Engineering 1 (1972): instead of d²V/dt² = 0, which drifts, ask for
+d²(V − V0)/dt² + 2 alpha d(V − V0)/dt + beta² (V − V0) = 0 (docs/theory.md, eq. 104).
+
+Limits: stable for (beta dt)² + 4 alpha dt < 4 and 0 < 2 alpha dt < 2. A wrong volume takes time to mend: the larger
+root of eq. 106 is what a step leaves of it. 2 alpha = beta = 1/dt is HCJ05 with the convective term.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from massspring.body import Body
+from massspring.errors import MassSpringError
+from massspring.kernels.layout import Drive
+from massspring.methods.base import Method, State, one_whole
+from massspring.methods.constraint import Rule, advance_by
+
+
+@dataclass(frozen=True)
+class Baumgarte(Method):
+    """Lets a wrong volume die away like a damped oscillation, at rates per time step."""
+
+    alpha: float = 0.5
+    """alpha dt [1]. alpha = beta is critical damping, Baumgarte's own choice; a half leaves 75 % of a wrong volume
+    after a step and 1 % after 16, with (beta dt)² + 4 alpha dt = 2.25 of the 4 that are stable."""
+    beta: float = 0.5
+    """beta dt [1]."""
+
+    name: ClassVar[str] = "baumgarte"
+    order: ClassVar[int] = 1
+    volume_tol: ClassVar[float | None] = None
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "beta"):
+            value = getattr(self, name)
+            if not 0.0 < value < float("inf"):
+                raise MassSpringError(f"baumgarte's {name} is {value} (times dt); it must be positive and finite")
+
+    @property
+    def stable(self) -> bool:
+        """Whether a wrong volume dies away: (beta dt)² + 4 alpha dt < 4 and 2 alpha dt < 2 (eq. 106)."""
+        return self.beta**2 + 4.0 * self.alpha < 4.0 and 2.0 * self.alpha < 2.0
+
+    def applies(self, body: Body) -> str | None:
+        """Keeps the whole only."""
+        return one_whole(body)
+
+    def advance(self, state: State, drive: Drive) -> State:
+        """One frame."""
+        return advance_by(Rule(self.beta * self.beta, 2.0 * self.alpha, True), state, drive)

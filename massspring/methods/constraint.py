@@ -1,0 +1,146 @@
+"""One loop for the relatives of implicit constraint enforcement that keep one volume (docs/theory.md, section 10).
+
+With ṽ, W̃ of eq. 9 every one of them ends a step at v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺. They differ in where G is
+taken, in how long the step along it is, and in whether a correction of the positions is felt by the velocities.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from massspring.kernels.compiled import compiled
+from massspring.kernels.contact import find_contacts, pressure_reach, revise_contacts
+from massspring.kernels.cubic import Line, line_into, nearest_root, volume_cubic
+from massspring.kernels.distances import allowed_part
+from massspring.kernels.layout import Drive
+from massspring.kernels.motion import (
+    add_held_impulse,
+    advance,
+    capped_error,
+    steepest,
+    surely_short,
+    volume_multiplier,
+)
+from massspring.kernels.prediction import predict
+from massspring.kernels.volume import volume_gradient_into
+from massspring.methods.base import State, begin_frame
+from massspring.methods.implicit_volume import CONTACT_PASSES
+
+
+class Rule(NamedTuple):
+    """The switches. As they stand: HCJ05."""
+
+    pull: float = 1.0
+    """Share of V0 − V that a step makes up for, (beta dt)² [1]."""
+    brake: float = 1.0
+    """Share of dV/dt that a step stops, 2 alpha dt [1]."""
+    convective: bool = False
+    """Whether the change of G along the motion, vᵀ H v, enters."""
+    exact: bool = False
+    """Whether the step ends at V0 exactly, at the nearest root of the cubic, instead of at the linearised V0."""
+    at_prediction: bool = False
+    """Whether G is taken at x + dt v* instead of x; only with `exact`."""
+    stabilised: bool = False
+    """Whether positions, but not velocities, are corrected once more after the step."""
+
+
+@compiled
+def inertial_change(network, motion, rule, dt):
+    """dt (1 − 2 alpha dt) G·v − dt² vᵀHv [m³], what a step leaves of the old change of volume (eq. 104)."""
+    change = 0.0
+    if rule.brake != 1.0:
+        for i in range(motion.v.shape[0]):
+            change += motion.gradient[i, 0] * motion.v[i, 0]
+            change += motion.gradient[i, 1] * motion.v[i, 1]
+            change += motion.gradient[i, 2] * motion.v[i, 2]
+        change *= dt * (1.0 - rule.brake)
+    if rule.convective:
+        _, _, half, _ = volume_cubic(motion.x, motion.v, network.triangles)
+        change -= 2.0 * dt * dt * half
+    return change
+
+
+@compiled
+def exact_multiplier(network, motion, line, target, mobility, dt):
+    """lam [Pa] with V(y + lam d) = V0, the root of smallest modulus (eq. 101, 102), and G·W̃·G; (0, 0) without one."""
+    line_into(motion, network.inverse_mass, dt, line)
+    volume, k1, k2, k3 = volume_cubic(line.y, line.d, network.triangles)
+    lam = nearest_root(volume - target, k1, k2, k3)
+    return (lam, mobility) if lam == lam else (0.0, 0.0)
+
+
+@compiled
+def predicted_gradient_into(network, motion, line, dt):
+    """G at x + dt v* [m²], (n, 3), before contact (eq. 4, 6)."""
+    for i in range(motion.x.shape[0]):
+        for axis in range(3):
+            line.y[i, axis] = motion.x[i, axis] + dt * motion.v_star[i, axis]
+    volume_gradient_into(line.y, network.triangles, motion.gradient)
+
+
+@compiled
+def correct_positions(network, motion, target, dt):
+    """x += W̃ G (V0 − V)/(G·W̃·G), G at x, velocities untouched (eq. 105); whether the correction was cut (eq. 35)."""
+    error = target - volume_gradient_into(motion.x, network.triangles, motion.gradient)
+    _, mobility = volume_multiplier(motion, network.inverse_mass, error, dt)
+    if not mobility > 0.0:
+        return False
+    part = capped_error(error, mobility, steepest(motion.gradient, network.inverse_mass), network.longest_correction)
+    for i in range(motion.x.shape[0]):
+        push = network.inverse_mass[i] * part / mobility
+        p0, p1, p2 = push * motion.gradient[i, 0], push * motion.gradient[i, 1], push * motion.gradient[i, 2]
+        if motion.locked[i] > 0:
+            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+            p0, p1, p2 = allowed_part(motion.locked[i], d0, d1, d2, p0, p1, p2)
+        motion.x[i, 0] += p0
+        motion.x[i, 1] += p1
+        motion.x[i, 2] += p2
+    return part != error
+
+
+@compiled
+def constraint_frame(network, motion, line, drive, tally, lam, rule):
+    """One frame with contact inside the multiplier (eq. 6–13, 101–105); returns the last lam [Pa]."""
+    dt = drive.dt
+    lightest = network.inverse_mass.max()
+    for step in range(drive.position.shape[0]):
+        predict(network, motion, drive, step)
+        target = drive.volume_target[step, 0]
+        error = rule.pull * (target - volume_gradient_into(motion.x, network.triangles, motion.gradient))
+        kept = inertial_change(network, motion, rule, dt)
+        if rule.at_prediction:
+            predicted_gradient_into(network, motion, line, dt)
+        predicted = lam
+        passes = 1
+        if drive.radius.shape[0] > 0:
+            find_contacts(network, motion, drive, step, predicted)
+            passes = CONTACT_PASSES
+        for sweep in range(passes):
+            lam, mobility = volume_multiplier(motion, network.inverse_mass, error + kept, dt)
+            if rule.exact and mobility > 0.0:
+                lam, mobility = exact_multiplier(network, motion, line, target, mobility, dt)
+            elif not rule.exact and not surely_short(error, mobility, lightest, network.longest_correction):
+                reachable = steepest(motion.gradient, network.inverse_mass)
+                part = capped_error(error, mobility, reachable, network.longest_correction)
+                if part != error:
+                    lam, mobility = volume_multiplier(motion, network.inverse_mass, part + kept, dt)
+                    tally.capped[0] += sweep == 0
+            reach = pressure_reach(lam - predicted, mobility, lightest, dt)
+            if sweep + 1 < passes and revise_contacts(network, motion, drive, step, lam, reach) == 0:
+                break
+        if not mobility > 0.0:
+            tally.skipped[0] += 1
+        add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
+        advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
+        if rule.stabilised:
+            tally.capped[0] += correct_positions(network, motion, target, dt)
+    return lam
+
+
+def advance_by(rule: Rule, state: State, drive: Drive) -> State:
+    """One frame by `rule`."""
+    after = begin_frame(state, drive)
+    line = Line(np.empty_like(after.x), np.empty_like(after.x))
+    lam = constraint_frame(after.network, after.motion, line, drive, after.tally, float(after.lam[0]), rule)
+    return replace(after, lam=np.array([lam]))

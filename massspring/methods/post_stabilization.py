@@ -1,0 +1,34 @@
+"""A constraint on the velocities, and a correction of the positions after every step.
+
+Cline and Pai, IEEE International Conference on Robotics and Automation (2003). First dV/dt = 0 at the end of the step,
+then x += W̃ G (V0 − V)/(G·W̃·G) at the new positions, velocities untouched (docs/theory.md, eq. 103, 105).
+
+Limits: the correction does not see the dynamics, it moves nodes that have no such velocity: small kicks in the springs,
+and no exact spin. A target that moves is followed by the positions alone.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from massspring.body import Body
+from massspring.kernels.layout import Drive
+from massspring.methods.base import Method, State, one_whole
+from massspring.methods.constraint import Rule, advance_by
+
+
+@dataclass(frozen=True)
+class PostStabilization(Method):
+    """Keeps the volume's rate by a pressure, and the volume itself by moving nodes afterwards."""
+
+    name: ClassVar[str] = "post_stabilization"
+    order: ClassVar[int] = 1
+    volume_tol: ClassVar[float | None] = 1e-4
+    keeps_spin: ClassVar[bool] = False
+
+    def applies(self, body: Body) -> str | None:
+        """Keeps the whole only."""
+        return one_whole(body)
+
+    def advance(self, state: State, drive: Drive) -> State:
+        """One frame."""
+        return advance_by(Rule(pull=0.0, stabilised=True), state, drive)

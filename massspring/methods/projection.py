@@ -1,0 +1,35 @@
+"""Projection of the predicted positions onto the constant volume.
+
+Promayon, Baconnier, Puech, Computer Graphics Forum 15 (1996) and CVRMed-MRCAS (1997; "PBP97"): move all nodes along
+the volume gradient of the *predicted* shape until the volume is right; velocities follow. The step length is the root
+of the cubic (docs/theory.md, eq. 101–103).
+
+Limits: the pressure acts along a gradient that is a step ahead of the positions, so that under sustained pressure and
+without damping the body gains energy at the rate of eq. 107, and spin where it turns. HCJ05 and SHAKE do neither.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from massspring.body import Body
+from massspring.kernels.layout import Drive
+from massspring.methods.base import Method, State, one_whole
+from massspring.methods.constraint import Rule, advance_by
+
+
+@dataclass(frozen=True)
+class Projection(Method):
+    """Projects each predicted shape onto the right volume, along that shape's own gradient."""
+
+    name: ClassVar[str] = "projection"
+    order: ClassVar[int] = 1
+    volume_tol: ClassVar[float | None] = 1e-12
+    keeps_spin: ClassVar[bool] = False
+
+    def applies(self, body: Body) -> str | None:
+        """Keeps the whole only."""
+        return one_whole(body)
+
+    def advance(self, state: State, drive: Drive) -> State:
+        """One frame."""
+        return advance_by(Rule(exact=True, at_prediction=True), state, drive)

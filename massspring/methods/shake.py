@@ -1,0 +1,31 @@
+"""SHAKE for one enclosed volume: the direction of HCJ05, the step along it to the exact volume.
+
+Ryckaert, Ciccotti, Berendsen, Journal of Computational Physics 23 (1977), for bond lengths; here the constraint is a
+cubic along the line, so its root has a closed form and needs no iteration (docs/theory.md, eq. 101, 102). HCJ05 is one
+Newton step of it.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from massspring.body import Body
+from massspring.kernels.layout import Drive
+from massspring.methods.base import Method, State, one_whole
+from massspring.methods.constraint import Rule, advance_by
+
+
+@dataclass(frozen=True)
+class Shake(Method):
+    """Pushes along the old volume gradient exactly so far that the step ends at V0."""
+
+    name: ClassVar[str] = "shake"
+    order: ClassVar[int] = 1
+    volume_tol: ClassVar[float | None] = 1e-12
+
+    def applies(self, body: Body) -> str | None:
+        """Keeps the whole only."""
+        return one_whole(body)
+
+    def advance(self, state: State, drive: Drive) -> State:
+        """One frame."""
+        return advance_by(Rule(exact=True), state, drive)
