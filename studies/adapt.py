@@ -152,5 +152,15 @@ def prepare(case: Case) -> Prepared:
     limit = step_limit(body, scene.damping, held, case.method.added_stiffness(body))
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
     clock = make_clock(scene.duration, case.frames or scene.frames, dt, limit)
-    setup = Setup(body, case.method, clock, scene.obstacles, attachments, scene.gravity, scene.damping, targets=targets)
+    setup = Setup(
+        body,
+        case.method,
+        clock,
+        scene.obstacles,
+        attachments,
+        scene.gravity,
+        scene.damping,
+        targets=targets,
+        positions=scene.start and scene.start.positions(body.rest),
+    )
     return Prepared(mesh, setup, limit)

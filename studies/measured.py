@@ -71,6 +71,11 @@ class Run:
         return np.unique(self.field("triangles"))
 
     @cached_property
+    def size(self) -> float:
+        """Diagonal of the box of the nodes at rest [m]."""
+        return float(np.linalg.norm(np.ptp(self.field("rest"), axis=0)))
+
+    @cached_property
     def surface_weights(self) -> np.ndarray:
         """Rest area of each material node [m²], 0 inside."""
         triangles = self.field("triangles")

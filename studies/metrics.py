@@ -121,8 +121,7 @@ def silhouette_error(run: Run) -> float:
     # The same polyhedron, moved by the reference: what the facets cut off the true organ is no error of the model.
     truth = rest.copy()
     truth[surface] += run.reference.displacement(rest[surface])
-    size = float(np.linalg.norm(np.ptp(rest, axis=0)))
-    return PERCENT * hausdorff(run.field("snapshots")[-1], triangles, truth, triangles) / size
+    return PERCENT * hausdorff(run.field("snapshots")[-1], triangles, truth, triangles) / run.size
 
 
 def min_j(run: Run) -> float:
@@ -136,6 +135,17 @@ def inverted_share(run: Run) -> float:
     if not len(cells):
         return float("nan")
     return PERCENT * float((tetrahedron_volumes(run.field("snapshots")[-1], cells) <= 0).mean())
+
+
+def rest_distance(run: Run) -> float:
+    """100 × RMS distance of the nodes from their rest shape, moved and turned to fit, over the body's size [%]."""
+    rest, last = run.field("rest"), run.field("snapshots")[-1]
+    mass = run.field("mass") / run.field("mass").sum()
+    wanted, found = rest - mass @ rest, last - mass @ last
+    left, _, right = np.linalg.svd((mass[:, None] * wanted).T @ found)
+    # A turn, never a mirror image (Kabsch 1976).
+    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    return PERCENT * float(np.sqrt(mass @ ((found - wanted @ turn) ** 2).sum(axis=1)) / run.size)
 
 
 def penetration(run: Run) -> float:
@@ -201,6 +211,7 @@ METRICS: tuple[Metric, ...] = (
     Metric("lumen_pressure_error", "%", "-", lumen_pressure_error, "lumen"),
     Metric("min_j", "1", "higher", min_j),
     Metric("inverted_share", "%", "lower", inverted_share),
+    Metric("rest_distance", "%", "lower", rest_distance),
     Metric("penetration", "%", "lower", penetration),
     Metric("step_time", "µs", "lower", step_time),
     Metric("frame_time", "ms", "lower", frame_time),

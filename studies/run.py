@@ -75,7 +75,9 @@ def judge(case: Case, prepared: Prepared, history: History) -> tuple[Status, str
     smallest = float(history.min_j[-1])
     if smallest <= 0:
         return Status.INVERTED, f"a tetrahedron ends inside out (smallest volume ratio {smallest:.3g})"
-    drift = float(np.max(np.abs(history.volume / history.volume_target - 1)))
+    # A body that starts with a wrong volume is judged by the one it ends with.
+    since = 0 if case.scene.start is None else -1
+    drift = float(np.max(np.abs(history.volume[since:] / history.volume_target[since:] - 1)))
     if case.method.volume_tol is not None and drift > DRIFT:
         return (
             Status.DRIFTED,

@@ -2,7 +2,7 @@
 
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.base import Held, Lumen, Organ, Probed, ReferencePlan, Scene, Tissue
+from studies.scenes.base import Held, Lumen, Organ, Probed, ReferencePlan, Scene, Start, Tissue
 from studies.scenes.bladder_fill import BLADDER_FILL
 from studies.scenes.kidney_probe import KIDNEY_PROBE
 from studies.scenes.liver_press import LIVER_PRESS
@@ -40,5 +40,6 @@ __all__ = [
     "Probed",
     "ReferencePlan",
     "Scene",
+    "Start",
     "Tissue",
 ]

@@ -81,6 +81,23 @@ class Probed:
 
 
 @dataclass(frozen=True)
+class Start:
+    """A shape to start from that is not the body at rest, without speed; the mass-spring solver alone reads it."""
+
+    matrix: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    """Linear map of the rest positions about the middle of their box [1], row by row."""
+    scatter: float = 0.0
+    """How far every node is thrown from there, evenly in a cube: over half the longest side of the box [1]."""
+
+    def positions(self, rest: np.ndarray) -> np.ndarray:
+        """(n, 3) [m]; the same nodes are always thrown to the same places."""
+        low, high = rest.min(axis=0), rest.max(axis=0)
+        thrown = np.random.default_rng(0).uniform(-1.0, 1.0, rest.shape) * 0.5 * (high - low).max()
+        middle = 0.5 * (low + high)
+        return middle + (rest - middle) @ np.asarray(self.matrix).T + self.scatter * thrown
+
+
+@dataclass(frozen=True)
 class ReferencePlan:
     """The family of meshes the reference is computed on, coarse to fine; the last one is the reference."""
 
@@ -127,6 +144,8 @@ class Scene:
     """Mass-proportional [1/s]; both models have the same."""
     quantities: tuple[str, ...] = ("force", "surface", "interior", "silhouette", "volume")
     """What may be compared; a scene that leaves a rigid turn free drops "surface" and "interior" (gauge freedom)."""
+    start: Start | None = None
+    """None: at rest."""
     not_for: tuple[tuple[str, str], ...] = ()
     """(method, reason): combinations that make no sense."""
 

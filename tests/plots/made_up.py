@@ -63,6 +63,7 @@ def fields(scene, kind, error, volume_end, good):
         "volume_target": np.full((FRAMES, 1), VOLUME),
         "contact_force": felt["obstacle"],
         "held_force": felt["held"],
+        "min_j": np.where(np.arange(FRAMES) < good, np.linspace(1.0, 0.5 if error < 0.3 else -0.4, FRAMES), np.nan),
         "snapshots": np.stack([final] * len(scene.checkpoints)) if good == FRAMES else np.zeros((0, 7, 3)),
         "rest": POINTS,
         "mass": np.ones(len(POINTS)),

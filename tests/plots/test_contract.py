@@ -11,7 +11,7 @@ from matplotlib.text import Text
 from massspring import Free
 from studies.catalog import STUDIES
 from studies.errors import StudyError
-from studies.plots import accuracy, cost_ratio, force_path, frame_time, squeeze, stability, volume_history
+from studies.plots import accuracy, cost_ratio, force_path, frame_time, recovery, squeeze, stability, volume_history
 from studies.plots import work_precision as work
 from studies.plots.style import DPI, SMALL, styled
 from studies.store import Status
@@ -26,6 +26,7 @@ GOOD = {
     cost_ratio: timed_grid,
     work: timed_grid,
     stability: stability_grid,
+    recovery: grid,
 }
 ODD = {
     "none": list,

@@ -61,7 +61,7 @@ def test_smoke_is_small_and_still_the_same_question(study):
     for case in smoke.cases:
         assert case.body.nodes <= (SMOKE_NODES_HOLLOW if case.scene.lumen else SMOKE_NODES)
         assert case.frames <= SMOKE_FRAMES
-        assert len(case.scene.reference.levels) == 2
+        assert case.scene.reference is None or len(case.scene.reference.levels) == 2
     assert smoke.smoke() == smoke
 
 

@@ -144,6 +144,17 @@ def test_penetration_is_the_deepest_of_all_frames_and_obstacles_over_the_size():
     assert np.isnan(of("penetration", values={"penetration": np.zeros((4, 0))}))
 
 
+def test_rest_distance_sees_no_rigid_motion_but_a_mirror_image():
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    assert of("rest_distance", final=POINTS @ turn + [0.1, 0.2, 0.3]) == pytest.approx(0.0, abs=1e-12)
+    # Two thirds of the 27 coordinates of each axis are ± edge/2, the others 0: that is how far doubling moves them.
+    doubled = of("rest_distance", final=2 * POINTS)
+    assert doubled == pytest.approx(100 * np.sqrt(2 / 3 * 3 * (EDGE / 2) ** 2) / (EDGE * np.sqrt(3)), rel=1e-12)
+    skew = POINTS * [1.0, 2.0, 3.0]
+    assert of("rest_distance", final=skew * [1, 1, -1], values={"rest": skew}) > 10
+
+
 def test_the_truth_has_no_error():
     for name in ("force_error", "force_end", "surface_error", "interior_error", "mean_error", "silhouette_error"):
         # Differences of numbers near 0.1 m and 2 N: rounding alone.

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Free, Ramp, simulate
+from massspring import Free, simulate
 from studies import run as module
 from studies.adapt import prepare
 from studies.case import BodyRecipe, Case
 from studies.errors import StudyError
 from studies.run import case_is_current, case_path, checkpoint_frames, judge, measure, replay, run_case
-from studies.scenes import SCENES
+from studies.scenes.stress import STRESS_SCENES
 from studies.store import Field, Status, read_record, write_record
-from tests.studies.tiny import FRAMES, diverging_case, tiny_case
+from tests.studies.tiny import FRAMES, NODES, diverging_case, tiny_case
 
 SERIES = ("volume", "pressure", "kinetic", "elastic", "contact_force", "penetration", "min_j")
 
@@ -57,13 +57,17 @@ def test_penetration_is_how_far_the_last_positions_lie_beyond_the_planes(ran):
 
 
 def test_what_the_guards_did_is_stored():
-    """A lumen that is asked to jump to 1.5 times its volume is made up for in parts: the record says how often."""
-    scene = next(scene for scene in SCENES if scene.lumen)
-    jump = Ramp((0.0, 1e-9), (1.0, 1.5))
-    hard = replace(scene, lumen=replace(scene.lumen, filling=jump), duration=0.02, checkpoints=(0.02,))
-    record = measure(Case(hard, BodyRecipe(nodes=400), frames=2))
-    assert record.attributes["capped_steps"] > 0
-    assert measure(tiny_case()).attributes["capped_steps"] == 0
+    """A ball that starts at a thousandth of its size comes back in parts, one on a line has nothing to push on."""
+    counts = {}
+    for name in ("shrunk", "line"):
+        scene = next(scene for scene in STRESS_SCENES if scene.name == f"stress_{name}")
+        attributes = measure(Case(scene, BodyRecipe(nodes=NODES), dt_fraction=0.2)).attributes
+        counts[name] = attributes["capped_steps"], attributes["skipped_steps"]
+    steps = attributes["steps"] * attributes["frames"]
+    assert counts["shrunk"][0] > 0 and counts["shrunk"][1] == 0
+    assert counts["line"][1] == steps
+    calm = measure(tiny_case()).attributes
+    assert calm["capped_steps"] == calm["skipped_steps"] == 0
 
 
 def test_iterations_of_an_iterative_solve_are_stored(ran):

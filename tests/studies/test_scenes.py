@@ -15,7 +15,8 @@ from studies.adapt_reference import anchor, kept_obstacles, reference_problem
 from studies.case import BodyRecipe, Case, scene_from_dict, scene_to_json
 from studies.errors import StudyError
 from studies.run import checkpoint_frames
-from studies.scenes import SCENES
+from studies.scenes import SCENES, Start
+from studies.scenes.stress import STRESS_SCENES
 
 SMALL, THIN = 150, 400
 """Surface nodes of a small solid organ, and of a small hollow one: its wall folds on coarser meshes."""
@@ -54,6 +55,26 @@ def test_what_is_deepest_at_the_last_checkpoint_has_stopped_before(scene):
     paths = [o.path for o in scene.obstacles] + [h.path for h in scene.held]
     ramps = [scene.lumen.filling] if scene.lumen else []
     assert max(path.times[-1] for path in paths + ramps) < scene.checkpoints[-1]
+
+
+def test_a_start_is_a_linear_map_about_the_middle_and_always_the_same_throw():
+    rest = np.array([[1.0, 2.0, 3.0], [3.0, 2.0, 3.0], [2.0, 2.0, 4.0]])
+    assert Start().positions(rest) == pytest.approx(rest, abs=1e-15)
+    flat = Start(((1, 0, 0), (0, 1, 0), (0, 0, 0))).positions(rest)
+    assert (flat == [[1, 2, 3.5], [3, 2, 3.5], [2, 2, 3.5]]).all()
+    thrown = Start(scatter=1.0).positions(rest)
+    assert (thrown == Start(scatter=1.0).positions(rest)).all()
+    # The longest side is 2: no node flies farther than 1 along any axis, and some fly.
+    assert 0.1 < np.abs(thrown - rest).max() <= 1.0
+
+
+@pytest.mark.parametrize("scene", STRESS_SCENES, ids=lambda scene: scene.name)
+def test_a_stress_scene_starts_where_it_says_and_is_stored(scene):
+    assert scene_from_dict(json.loads(scene_to_json(scene))) == scene
+    prepared = prepare(small(scene))
+    body = prepared.setup.body
+    assert np.array_equal(prepared.setup.start().x, scene.start.positions(body.rest))
+    assert np.abs(prepared.setup.start().x - body.rest).max() > 0.1 * body.size
 
 
 def test_a_free_turn_leaves_no_displacement_to_compare(scene):

@@ -1,0 +1,23 @@
+"""From which starts does a body find its rest shape again, and what does it need for that?"""
+
+from massspring import Free, ImplicitVolume
+from studies.case import BodyRecipe, Case
+from studies.catalog.base import Chart, Study
+from studies.plots import recovery
+from studies.scenes.stress import STRESS_SCENES
+
+NODES = 230
+"""On the surface: about 316 with those inside, as many as in docs/theory.md, section 5."""
+FRACTION = 0.2
+
+STRESS = Study(
+    name="stress",
+    question=__doc__ or "",
+    cases=tuple(
+        Case(scene, BodyRecipe("tetrahedral", NODES, volumes=volumes), method, dt_fraction=FRACTION)
+        for scene in STRESS_SCENES
+        for method, volumes in ((Free(), "scene"), (ImplicitVolume(), "scene"), (ImplicitVolume(), "nodal"))
+    ),
+    charts=(Chart("recovery.png", recovery.draw),),
+    columns=("inverted_share", "rest_distance", "volume_end", "min_j"),
+)

@@ -1,0 +1,102 @@
+"""Whether a body started from an impossible shape comes back: the smallest volume ratio of its tetrahedra over time."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from studies.metrics import Run
+from studies.plots.page import (
+    blank,
+    body_method_handles,
+    by_scene,
+    finish,
+    good_frames,
+    has_frames,
+    log_axis,
+    page,
+    panels,
+)
+from studies.plots.style import BLACK, BODY_LINES, GREY, SMALL, heading, method_colour, readable, save, styled
+from studies.table import metric
+
+TITLE = "From which starts a body finds its rest shape again"
+LOWEST, HIGHEST = -1.6, 1.15
+COLUMNS = 3
+RETURNED = 0.01
+"""RMS distance from the rest shape over the size [%] up to which a body is back."""
+
+
+@styled
+def figure(runs: Sequence[Run]) -> Figure:
+    """One panel per start."""
+    shown = [run for run in runs if has_frames(run) and len(run.field("tetrahedra"))]
+    if not shown:
+        return blank(TITLE, "no run of a body with tetrahedra has recorded a frame yet")
+    scenes = by_scene(shown)
+    columns = min(COLUMNS, len(scenes))
+    rows = -(-len(scenes) // columns)
+    sheet = page(3.1 * columns + 0.6, 2.7 * rows + 0.3)
+    axes = panels(sheet, rows, columns, sharex=True, sharey=True)
+    for spare in axes.flat[len(scenes) :]:
+        spare.set_axis_off()
+    for panel, (name, group) in zip(axes.flat, scenes.items(), strict=False):
+        _draw_start(panel, group)
+        panel.set_title(heading(name.removeprefix("stress_")))
+    for panel in axes[:, 0]:
+        panel.set_ylabel("smallest J [1]")
+    for panel in axes.flat[max(0, len(scenes) - columns) : len(scenes)]:
+        panel.set_xlabel("time [s]")
+        panel.tick_params(labelbottom=True)
+    notes = [
+        "J is the volume of a tetrahedron over its rest volume: 1 at rest, 0 flat, below 0 inside out. "
+        f"Less than {LOWEST:g} is drawn there.",
+        *_ends(shown),
+    ]
+    return finish(sheet, TITLE, body_method_handles(shown), notes, columns=3)
+
+
+def _draw_start(axes: Axes, group: Sequence[Run]) -> None:
+    axes.axhspan(LOWEST - 1, 0.0, color=GREY, alpha=0.13, linewidth=0)
+    axes.axhline(1.0, color=BLACK, linewidth=0.8)
+    axes.annotate(
+        "inside out",
+        (0.0, 0.0),
+        (6, -4),
+        axes.get_yaxis_transform(),
+        "offset points",
+        va="top",
+        color=GREY,
+        fontsize=SMALL,
+    )
+    for run in group:
+        good = slice(0, good_frames(run))
+        look = {"color": method_colour(run.case.method.name), "linestyle": BODY_LINES[run.case.body.series]}
+        axes.plot(run.field("t")[good], np.maximum(run.field("min_j")[good], LOWEST), **look)
+    axes.set_ylim(LOWEST - 0.05, HIGHEST)
+    log_axis(axes.xaxis)
+
+
+def _ends(shown: Sequence[Run]) -> list[str]:
+    """How many starts each model comes back from."""
+    inverted, distance = metric("inverted_share"), metric("rest_distance")
+    sentences = []
+    for label in dict.fromkeys((run.case.body.series, run.case.method.name) for run in shown):
+        group = [run for run in shown if (run.case.body.series, run.case.method.name) == label]
+        lost = [run for run in group if not distance(run) < RETURNED]
+        shares = np.array([share for share in map(inverted, lost) if share == share])
+        left = ""
+        if len(shares):
+            span = dict.fromkeys(
+                f"{share:.2g}" if share < 10 else f"{share:.0f}" for share in (shares.min(), shares.max())
+            )
+            left = f"; elsewhere {' to '.join(span)} % of tetrahedra stay flat or turned"
+        sentences.append(f"{label[0]}, {readable(label[1])}: back from {len(group) - len(lost)} of {len(group)}{left}.")
+    return sentences
+
+
+def draw(runs: Sequence[Run], path: Path) -> None:
+    """Writes the chart as PNG."""
+    save(figure(runs), path)
