@@ -8,15 +8,16 @@ from studies.scenes.stress import STRESS_SCENES
 
 NODES = 230
 """On the surface: about 316 with those inside, as many as in docs/theory.md, section 5."""
+ONE, MANY = BodyRecipe(nodes=NODES), BodyRecipe(nodes=NODES, volumes="nodal")
 FRACTION = 0.2
 
 STRESS = Study(
     name="stress",
     question=__doc__ or "",
     cases=tuple(
-        Case(scene, BodyRecipe("tetrahedral", NODES, volumes=volumes), method, dt_fraction=FRACTION)
+        Case(scene, body, method, dt_fraction=FRACTION)
         for scene in STRESS_SCENES
-        for method, volumes in ((Free(), "scene"), (ImplicitVolume(), "scene"), (ImplicitVolume(), "nodal"))
+        for body, method in ((ONE, Free()), (ONE, ImplicitVolume()), (MANY, ImplicitVolume()))
     ),
     charts=(Chart("recovery.png", recovery.draw),),
     columns=("inverted_share", "rest_distance", "volume_end", "min_j"),
