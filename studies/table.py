@@ -31,6 +31,7 @@ def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
     row: dict[str, object] = {
         "scene": case.scene.name,
         "body": case.body.series,
+        "law": attributes.get("law", ""),
         "nodes": case.body.nodes,
         "stiffness": case.body.stiffness,
         "method": case.method.name,

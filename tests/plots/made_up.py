@@ -79,7 +79,9 @@ def run(scene=BALL_SQUEEZE, kind="tetrahedral", method=None, status=Status.OK, e
     dt, given = options.get("dt", 1e-3), "dt" in options
     case = Case(
         scene,
-        BodyRecipe(kind, options.get("nodes", 550), stiffness=options.get("stiffness", 1.0)),
+        BodyRecipe(
+            kind, options.get("nodes", 550), stiffness=options.get("stiffness", 1.0), **options.get("recipe", {})
+        ),
         method or ImplicitVolume(),
         dt=dt if given else "auto",
         dt_fraction=options.get("fraction", 0.5),
@@ -95,6 +97,7 @@ def run(scene=BALL_SQUEEZE, kind="tetrahedral", method=None, status=Status.OK, e
         "good_frames": good,
         "nodes": len(POINTS),
         "springs": 18,
+        "law": case.body.law,
     }
     failed = status == Status.FAILED
     record = new_record(
@@ -148,6 +151,16 @@ def stability_grid():
         for method in (Free(), ImplicitVolume())
         for factor in (0.25, 4.0)
         for dt in (5e-4, 1e-3, 2e-3, 4e-3)
+    ]
+
+
+def laws_grid():
+    """Two laws with either kind of volumes on two meshes."""
+    return [
+        run(nodes=nodes, error=error, dt_limit=1.0 / nodes, law=law, volumes=volumes)
+        for law, error in (("van_gelder", 0.1), ("cotangent", -0.02))
+        for volumes in ("scene", "nodal")
+        for nodes in (150, 550)
     ]
 
 

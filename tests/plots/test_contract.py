@@ -11,11 +11,21 @@ from matplotlib.text import Text
 from massspring import Free
 from studies.catalog import STUDIES
 from studies.errors import StudyError
-from studies.plots import accuracy, cost_ratio, force_path, frame_time, recovery, squeeze, stability, volume_history
+from studies.plots import (
+    accuracy,
+    cost_ratio,
+    force_path,
+    frame_time,
+    laws,
+    recovery,
+    squeeze,
+    stability,
+    volume_history,
+)
 from studies.plots import work_precision as work
 from studies.plots.style import DPI, SMALL, styled
 from studies.store import Status
-from tests.plots.made_up import grid, run, stability_grid, timed_grid, without_reference
+from tests.plots.made_up import grid, laws_grid, run, stability_grid, timed_grid, without_reference
 
 GOOD = {
     volume_history: grid,
@@ -27,6 +37,7 @@ GOOD = {
     work: timed_grid,
     stability: stability_grid,
     recovery: grid,
+    laws: laws_grid,
 }
 ODD = {
     "none": list,

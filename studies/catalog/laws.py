@@ -1,0 +1,35 @@
+"""What does the stiffness law do to the force and to the time step, with one volume and with one per node?"""
+
+from massspring import ImplicitVolume
+from studies.case import BodyRecipe, Case
+from studies.catalog.base import Chart, Study
+from studies.plots import laws
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+
+NODES = (150, 300, 550)
+LAWS = ("van_gelder", "uniform", "lloyd", "lloyd_matched")
+
+LAWS_STUDY = Study(
+    name="laws",
+    question=__doc__ or "",
+    cases=(
+        *(
+            Case(BALL_SQUEEZE, BodyRecipe(nodes=nodes, law=law, volumes=volumes), ImplicitVolume())
+            for law in LAWS
+            for volumes in ("scene", "nodal")
+            for nodes in NODES
+        ),
+        # Springs without length need a volume at every node.
+        *(
+            Case(BALL_SQUEEZE, BodyRecipe(nodes=nodes, law="cotangent", volumes="nodal"), ImplicitVolume())
+            for nodes in NODES
+        ),
+        *(
+            Case(BALL_SQUEEZE, BodyRecipe("surface", nodes, weights=weights), ImplicitVolume())
+            for weights in (None, (1.0, 1.0, 1.0, 1.0))
+            for nodes in NODES
+        ),
+    ),
+    charts=(Chart("laws.png", laws.draw),),
+    columns=("force_error", "force_end", "silhouette_error", "pressure_error", "volume_worst", "min_j"),
+)

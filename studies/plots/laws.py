@@ -1,0 +1,135 @@
+"""What the stiffness law does: force error and step limit over mesh size, with one volume and with nodal volumes."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from studies.metrics import COMPARABLE, METRICS, Metric, Run
+from studies.plots.page import (
+    band_handle,
+    blank,
+    by_scene,
+    doubt_mark,
+    doubts,
+    finish,
+    grouped,
+    log_axis,
+    page,
+    panels,
+    remarks,
+)
+from studies.plots.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    heading,
+    readable,
+    remark,
+    save,
+    styled,
+)
+
+TITLE = "Stiffness laws: force and step limit"
+COLOURS = {
+    "van_gelder": BLUE,
+    "uniform": ORANGE,
+    "lloyd": PURPLE,
+    "lloyd_matched": SKY,
+    "cotangent": GREEN,
+    "per_kind": VERMILLION,
+}
+"""Of laws; one that is not named here, as chosen weights, is black."""
+VOLUMES = {
+    "scene": ("one volume", (0, (4, 1.6)), "o"),
+    "whole": ("one volume", (0, (4, 1.6)), "o"),
+    "regions": ("regions", (0, (1, 1.2)), "s"),
+    "nodal": ("one volume per node", "-", "^"),
+}
+"""Of a recipe -> (words, line, marker)."""
+FORCE, MS_PER_S = "force_end", 1e3
+
+
+@styled
+def figure(runs: Sequence[Run]) -> Figure:
+    """One row per scene: force error left, step limit right; a line joins the meshes of one law and its volumes."""
+    shown = [run for run in runs if run.record.status in COMPARABLE]
+    if not shown:
+        return blank(TITLE, "no run has ended yet")
+    (metric,) = (metric for metric in METRICS if metric.name == FORCE)
+    scenes = by_scene(shown)
+    sheet = page(9.6, 3.4 * len(scenes) + 0.4)
+    axes = panels(sheet, len(scenes), 2, sharex="col")
+    sizes = sorted({run.case.body.nodes for run in shown})
+    for row, (name, group) in zip(axes, scenes.items(), strict=True):
+        row[0].set_title(heading(name) + doubt_mark(group, [metric]))
+        row[0].set_ylabel("force error, last checkpoint [%]")
+        row[1].set_ylabel("step limit [ms]")
+        _draw_force(row[0], group, metric)
+        _draw_lines(row[1], group, lambda run: MS_PER_S * run.record.attributes["dt_limit"])
+        log_axis(row[1].yaxis)
+        for panel in row:
+            panel.set_xscale("log")
+            panel.set_xticks(sizes, [f"{size:,}" for size in sizes])
+            panel.set_xticks([], minor=True)
+    for panel in axes[-1]:
+        panel.set_xlabel("surface nodes [1]")
+    notes = ["The step limit is that of symplectic Euler with the scene's damping; volumes do not lower it."]
+    return finish(sheet, TITLE, _handles(shown), [*notes, *doubts(shown, [metric]), *remarks(runs)], columns=4)
+
+
+def _look(run: Run) -> tuple[str, str, tuple]:
+    law = str(run.record.attributes.get("law", run.case.body.law))
+    return law, COLOURS.get(law, BLACK), VOLUMES[run.case.body.volumes]
+
+
+def _draw_lines(axes: Axes, group: Sequence[Run], value) -> int:
+    """Number of points drawn."""
+    drawn = 0
+    for same in grouped(group, _look):
+        points = sorted((run.case.body.nodes, value(run)) for run in same if np.isfinite(value(run)))
+        _, colour, (_, line, marker) = _look(same[0])
+        if points:
+            look = {"linestyle": line, "marker": marker, "markerfacecolor": _face(colour, marker)}
+            axes.plot(*zip(*points, strict=True), color=colour, **look)
+        drawn += len(points)
+    return drawn
+
+
+def _draw_force(axes: Axes, group: Sequence[Run], metric: Metric) -> None:
+    floor = metric.floor(group[0])
+    if floor == floor:
+        axes.axhspan(-floor, floor, color=GREY, alpha=0.3, linewidth=0)
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    if not _draw_lines(axes, group, metric):
+        remark(axes, "no reference, no error" if group[0].reference is None else "not compared in this scene")
+
+
+def _handles(shown: Sequence[Run]) -> list:
+    looks = dict.fromkeys(_look(run) for run in shown)
+    laws = {law: colour for law, colour, _ in looks}
+    volumes = dict.fromkeys(volumes for _, _, volumes in looks)
+    return [
+        *(Line2D([], [], color=colour, linewidth=4, label=readable(law)) for law, colour in laws.items()),
+        *(Line2D([], [], linestyle=line, marker=m, markerfacecolor=_face(BLACK, m), color=BLACK, label=words)
+          for words, line, m in volumes),
+        band_handle("the reference's own uncertainty"),
+    ]  # fmt: skip
+
+
+def _face(colour: str, marker: str) -> str:
+    """Nodal volumes have filled markers."""
+    return colour if marker == "^" else "white"
+
+
+def draw(runs: Sequence[Run], path: Path) -> None:
+    """Writes the chart as PNG."""
+    save(figure(runs), path)
