@@ -45,7 +45,7 @@ def natural_frequencies(body: Body, count: int, keep: bool = True) -> tuple[np.n
         mass = block_array([[mass, None], [None, csr_array((m, m))]])
     # Below all frequencies, near the lowest: that of a shear wave across the body.
     shift = -level / float(body.mass.mean()) * body.node_count ** (-2.0 / 3.0)
-    start = np.random.default_rng(0).standard_normal(stiffness.shape[0])
+    start = np.random.default_rng(0).standard_normal(n + body.kept.count * keep)
     try:
         square, shape = eigsh(stiffness.tocsc(), count, M=mass.tocsc(), sigma=shift, v0=start)
     except (ArpackError, RuntimeError) as error:
