@@ -1,7 +1,6 @@
 """Frames and steps: a frame is what a user sees, a step what the method takes."""
 
 import math
-import warnings
 from dataclasses import dataclass
 
 from massspring.errors import MassSpringError
@@ -32,10 +31,10 @@ class Clock:
         return self.frame * self.frames
 
 
-def make_clock(duration: float, frames: int, dt: float | str, limit: StepLimit) -> Clock:
+def make_clock(duration: float, frames: int, dt: float | str, limit: StepLimit, beyond_limit: bool = False) -> Clock:
     """Frames that fill `duration` [s] exactly, with steps no longer than `dt` [s]; "auto": half the stability limit.
 
-    A number above the limit is obeyed, with a warning that names the limit. Raises MassSpringError for dt ≤ 0.
+    Raises MassSpringError for dt ≤ 0, and for a dt above the limit unless that is wanted (`beyond_limit`).
     """
     if isinstance(dt, str):
         if dt != "auto":
@@ -51,9 +50,9 @@ def make_clock(duration: float, frames: int, dt: float | str, limit: StepLimit) 
         )
     frame = duration / frames
     clock = Clock(frame, frames, max(1, math.ceil(frame / wanted - 1e-9)))
-    if clock.dt > limit.damped:
-        warnings.warn(
-            f"dt = {clock.dt:.3g} s lies above the stability limit of {limit.damped:.3g} s; expect the run to diverge",
-            stacklevel=2,
+    if clock.dt > limit.damped and not beyond_limit:
+        raise MassSpringError(
+            f"dt = {clock.dt:.3g} s lies above the stability limit of {limit.damped:.3g} s; "
+            "take a smaller dt or 'auto', or set beyond_limit to see the run diverge"
         )
     return clock

@@ -124,8 +124,16 @@ class Volumes:
 
     @staticmethod
     def regions(body: "Body", count: int) -> "Volumes":
-        """`count` connected regions of tetrahedra of about equal volume. Raises MassSpringError for too many."""
+        """`count` connected regions of tetrahedra of about equal volume. Raises MassSpringError for too many.
+
+        More volumes than nodes would leave less than two of three motions of a node free: the body locks.
+        """
         _need_tetrahedra(body, "regions")
+        if count > body.node_count:
+            raise MassSpringError(
+                f"{count} regions asked of a mesh of {body.node_count} nodes; more volumes than nodes lock it, "
+                f"give up to {body.node_count} or refine the mesh"
+            )
         region = partition(body.rest, body.tetrahedra.astype(np.int64), body.tetrahedron_volumes, count)
         triangles, first, second = tetrahedron_faces(body.tetrahedra)
         a, b = region[first // 4], np.where(second >= 0, region[second // 4], -1)

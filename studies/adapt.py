@@ -136,7 +136,7 @@ def patch_nodes(mesh: OrganMesh, name: str, region: object) -> np.ndarray:
 
 
 def prepare(case: Case) -> Prepared:
-    """Mesh, body, clock, surroundings of a case. Raises StudyError, MassSpringError; warns of dt above the limit."""
+    """Mesh, body, clock, surroundings of a case. Raises StudyError, MassSpringError."""
     scene = case.scene
     reason = scene.skip(case.method)
     if reason is not None:
@@ -151,7 +151,7 @@ def prepare(case: Case) -> Prepared:
     held = np.concatenate([a.nodes for a in attachments]) if attachments else None
     limit = step_limit(body, scene.damping, held, case.method.added_stiffness(body))
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
-    clock = make_clock(scene.duration, case.frames or scene.frames, dt, limit)
+    clock = make_clock(scene.duration, case.frames or scene.frames, dt, limit, case.beyond_limit)
     setup = Setup(
         body,
         case.method,

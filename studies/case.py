@@ -65,6 +65,8 @@ class Case:
     dt_fraction: float = 0.5
     frames: int | None = None
     """Instead of the scene's number of frames; the duration stays."""
+    beyond_limit: bool = False
+    """Whether a step above the stability limit is wanted; it is refused otherwise."""
     timed: bool = False
     """Whether frame times are measured by the timing protocol."""
 
@@ -116,6 +118,7 @@ def case_to_dict(case: Case) -> dict[str, Any]:
         "dt": case.dt,
         "dt_fraction": case.dt_fraction,
         "frames": case.frames,
+        "beyond_limit": case.beyond_limit,
     }
 
 
@@ -138,6 +141,7 @@ def case_from_json(text: str) -> Case:
             dt=data["dt"],
             dt_fraction=data["dt_fraction"],
             frames=data["frames"],
+            beyond_limit=data["beyond_limit"],
         )
     except (json.JSONDecodeError, KeyError, TypeError, ValidationError) as error:
         raise StudyError(f"the text is no stored case: {_first_line(error)}") from error

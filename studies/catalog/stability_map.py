@@ -22,6 +22,7 @@ STABILITY_MAP = Study(
             method,
             dt=BALL_SQUEEZE.duration / FRAMES / steps,
             frames=FRAMES,
+            beyond_limit=True,
         )
         for method in (Free(), ImplicitVolume())
         for factor in STIFFNESS

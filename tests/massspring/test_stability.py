@@ -97,9 +97,14 @@ def test_a_bad_step_is_refused(dt):
         make_clock(1.0, 10, dt, StepLimit(1000.0, 0.0))
 
 
-def test_a_step_above_the_limit_is_obeyed_with_a_warning():
-    with pytest.warns(UserWarning, match="above the stability limit of 0.002 s"):
-        assert make_clock(1.0, 10, 0.005, StepLimit(1000.0, 0.0)).dt == pytest.approx(0.005)
+def test_a_step_above_the_limit_is_refused_unless_it_is_wanted():
+    limit = StepLimit(1000.0, 0.0)
+    with pytest.raises(
+        MassSpringError, match=r"dt = 0\.005 s lies above the stability limit of 0\.002 s; take a smaller"
+    ):
+        make_clock(1.0, 10, 0.005, limit)
+    assert make_clock(1.0, 10, 0.005, limit, beyond_limit=True).dt == pytest.approx(0.005)
+    assert make_clock(1.0, 10, 0.002, limit).dt == pytest.approx(0.002)
 
 
 def test_a_run_that_diverges_ends_with_nan_tails_and_says_where(ball_body):

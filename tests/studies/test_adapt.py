@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Path
+from massspring import MassSpringError, Path
 from studies.adapt import attachments_for, body_for, mesh_for, patch_nodes, prepare
 from studies.case import BodyRecipe
 from studies.errors import StudyError
@@ -105,10 +105,14 @@ def test_frames_of_the_case_come_before_those_of_the_scene():
     assert prepare(tiny_case(frames=None)).setup.clock.frames == SQUEEZE.frames
 
 
-def test_a_dt_above_the_limit_is_obeyed_with_a_warning_that_names_the_limit():
+def test_a_dt_above_the_limit_is_refused_unless_it_is_wanted():
     limit = prepare(tiny_case()).limit.damped
-    with pytest.warns(UserWarning, match=f"above the stability limit of {limit:.3g} s"):
-        assert prepare(tiny_case(dt=2 * limit, frames=100)).setup.clock.dt > limit
+    case = tiny_case(dt=2 * limit, frames=100)
+    with pytest.raises(MassSpringError, match=f"above the stability limit of {limit:.3g} s; take a smaller dt"):
+        prepare(case)
+    with pytest.raises(MassSpringError, match="above the stability limit"):
+        prepare(tiny_case(dt_fraction=1.5, frames=100))
+    assert prepare(case.replaced(beyond_limit=True)).setup.clock.dt > limit
 
 
 def test_an_unknown_shape_gets_the_nearest_match():

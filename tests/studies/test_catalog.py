@@ -66,7 +66,6 @@ def test_smoke_is_small_and_still_the_same_question(study):
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:dt = .* lies above the stability limit:UserWarning")
 def test_every_kind_of_case_can_be_prepared(study):
     kinds = {(c.scene.name, c.body.kind, c.body.law, c.method): c for c in study.smoke().cases}
     for case in kinds.values():

@@ -1,6 +1,5 @@
 """Whatever happens in a run is a record: how it ended, why, NaN after that; and a replay comes out the same."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -101,7 +100,7 @@ def test_progress_is_told_frame_by_frame():
 
 def test_a_step_beyond_the_limit_diverges_and_says_so():
     record = measure(diverging_case().replaced(frames=200))
-    assert re.search("above the stability limit of .* s; expect the run to diverge", record.attributes["warnings"])
+    assert record.attributes["dt"] > record.attributes["dt_limit"]
     good = record.attributes["good_frames"]
     assert record.status == Status.DIVERGED
     assert f"diverged in frame {good + 1}" in record.message

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Path
+from massspring import Capsule, Path, Sphere
 from studies.adapt import mesh_for
 from studies.case import BodyRecipe
 from studies.geometry import HalfSpace
@@ -106,6 +106,16 @@ def test_millimetres_read_as_metres_warn_with_the_box(tmp_path):
         ({"scene": replace(SQUEEZE, not_for=(("implicit_volume", "no volume"),))}, "does not apply"),
         ({"scene": replace(SQUEEZE, damping=-1.0)}, "damping is -1"),
         ({"scene": replace(SQUEEZE, duration=0.0)}, "positive duration"),
+        ({"scene": replace(SQUEEZE, gravity=(0.0, 0.0, float("nan")))}, "gravity is (0.0, 0.0, nan)"),
+        ({"scene": replace(SQUEEZE, obstacles=(Sphere((0.0, 0.0, 0.0), 1e-3),))}, "0.001 m inside the body"),
+        (
+            {"scene": replace(SQUEEZE, obstacles=(Capsule((0.0, 0.0, 0.02), (0.0, 0.0, 0.3), 1e-3),))},
+            "0.001 m inside the body",
+        ),
+        ({"dt": 1.0}, "lies above the stability limit of"),
+        ({"dt_fraction": 1.2, "frames": 100}, "set beyond_limit to see the run diverge"),
+        ({"body": BodyRecipe(nodes=NODES, volumes="regions", regions=90)}, "more volumes than nodes lock it"),
+        ({"body": BodyRecipe("surface", NODES, volumes="nodal")}, "the body has none; fill its mesh"),
         ({"body": BodyRecipe(nodes=0)}, "nodes"),
         ({"body": BodyRecipe(nodes=NODES, stiffness=0.0)}, "stiffness factor is 0"),
         (

@@ -54,7 +54,7 @@ def tiny_study(**changes) -> Study:
 
 def diverging_case() -> Case:
     """Three times the stability limit."""
-    return tiny_case(dt_fraction=3.0, timed=True)
+    return tiny_case(dt_fraction=3.0, beyond_limit=True, timed=True)
 
 
 def cube(cells: int = 2, edge: float = 0.1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
