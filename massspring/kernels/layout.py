@@ -18,6 +18,47 @@ class Membrane(NamedTuple):
     """c_a of the two edges that meet at node a [N/m³], (t, 3)."""
 
 
+class Slices(NamedTuple):
+    """Who pulls at whom, 64 nodes side by side in S slices; r rows of 64 neighbours.
+
+    The first rows of a slice walk the rings of its nodes: the neighbours on the kept surface in order, first to last.
+    The others are all remaining springs. Shorter lists are filled up with springs of no stiffness. The first `pieces`
+    slices hold pieces of nodes that have too many neighbours for a lane, or several rings.
+    """
+
+    node: np.ndarray
+    """(S, 64) uint32; empty lanes repeat a node of the slice."""
+    lanes: np.ndarray
+    """Lanes in use, (S,) int64."""
+    start: np.ndarray
+    """First row of each slice, (S + 1,) int64."""
+    rings: np.ndarray
+    """How many of its rows are rings, (S,) int64."""
+    neighbour: np.ndarray
+    """(r, 64) uint32."""
+    rest_length: np.ndarray
+    """[m], (r, 64)."""
+    stiffness: np.ndarray
+    """[N/m], (r, 64); 0 where there is no spring."""
+    inverse_mass: np.ndarray
+    """[1/kg], (S, 64)."""
+    pieces: int
+    split_node: np.ndarray
+    """Nodes in pieces, (q,) uint32."""
+    split_start: np.ndarray
+    """Where the pieces of each begin, (q + 1,) int64."""
+    split_piece: np.ndarray
+    """Slice × 64 + lane of each piece, int64."""
+    held_node: np.ndarray
+    """Nodes whose motion is prescribed, ascending, (h,) uint32."""
+    held_start: np.ndarray
+    """(h + 1,) int64."""
+    held_piece: np.ndarray
+    """Slice × 64 + lane of each, or of its pieces, int64."""
+    origin: int
+    """The node from which the volume is seen."""
+
+
 class Network(NamedTuple):
     """What does not change during a run; s springs, f triangles, n nodes, h held nodes, c surface nodes."""
 
@@ -47,6 +88,7 @@ class Network(NamedTuple):
     """What each kept volume takes of the pressure that holds springs without length apart at rest [Pa], (m,)."""
     longest_correction: float
     """How far a step may move a node to make up for a wrong volume [m]; what is left is made up later."""
+    slices: Slices
 
 
 class VolumeRows(NamedTuple):
@@ -125,6 +167,14 @@ class Motion(NamedTuple):
     """Scratch: nodes that would enter an obstacle, (n,) uint32."""
     clearance: np.ndarray
     """Distance to the nearest obstacle at the end of the predicted step [m], (n,)."""
+    places: np.ndarray
+    """Scratch: positions [m] and a zero, (n, 4)."""
+    tile: np.ndarray
+    """Scratch of `kernels.slices`, one row a thread."""
+    pulled: np.ndarray
+    """Scratch: forces and 6 G of the nodes of each slice, (S, 384)."""
+    sums: np.ndarray
+    """Scratch: shares of the slices in 18 V, G·v* and G·W·G, (S + 1, 3) float64; last those of nodes in pieces."""
 
 
 class Drive(NamedTuple):

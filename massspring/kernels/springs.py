@@ -4,7 +4,7 @@ import math
 
 from massspring.kernels.compiled import compiled
 
-SHORTEST = 1e-150  # [m] a collapsed spring has no direction: it pulls with 0 instead of NaN
+SHORTEST = 1e-30  # [m] a collapsed spring has no direction: it pulls with 0 instead of NaN; a float32 can hold it
 
 
 @compiled

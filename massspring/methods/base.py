@@ -9,7 +9,9 @@ from scipy.sparse import csr_array
 from massspring.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.layout import Drive, Motion, Network, Tally, VolumeRows
+from massspring.kernels.slices import RESULT, TILE
 from massspring.methods.rows import volume_rows
+from massspring.neighbours import aligned, slices_of
 from massspring.obstacles import Attachment
 from massspring.springs import EDGES_OF_TRIANGLE, lengths
 from massspring.volumes import Volumes
@@ -93,6 +95,8 @@ def start(body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | 
     velocity = np.zeros((n, 3)) if v is None else np.array(v, dtype=np.float64)
     if velocity.shape != (n, 3):
         raise MassSpringError(f"velocities have shape {velocity.shape}; the body has {n} nodes, give ({n}, 3)")
+    real = np.dtype(np.float64)
+    slices = network.slices
     motion = Motion(
         x=body.rest.copy(),
         v=velocity,
@@ -105,6 +109,10 @@ def start(body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | 
         locked=np.zeros(n, dtype=np.uint8),
         **{name: np.zeros((n, 3)) for name in ("normal", "second_normal", "direction", "goal")},
         clearance=np.zeros(n),
+        places=aligned((n, 4), real),
+        tile=aligned((1, TILE), real),
+        pulled=aligned((len(slices.lanes), RESULT), real),
+        sums=np.zeros((len(slices.lanes) + 1, 3)),
     )
     return State(network, motion, np.zeros(kept.count), None if alone else volume_rows(kept, n))
 
@@ -142,6 +150,7 @@ def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarra
         held_rest=body.rest[held_nodes],
         rest_lam=body.rest_lam,
         longest_correction=LONGEST_CORRECTION * _mean_length(body),
+        slices=slices_of(body.springs, surface, inverse_mass, np.dtype(np.float64)),
     )
 
 

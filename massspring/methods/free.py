@@ -6,9 +6,8 @@ from typing import ClassVar
 from massspring.kernels.compiled import compiled
 from massspring.kernels.contact import find_contacts
 from massspring.kernels.layout import Drive
-from massspring.kernels.membrane import add_membrane_forces
-from massspring.kernels.motion import add_held_impulse, advance, predict_velocity_into, prescribe_velocity_into
-from massspring.kernels.springs import spring_forces_into
+from massspring.kernels.motion import add_held_impulse, advance, prescribe_velocity_into
+from massspring.kernels.slices import gather_and_predict
 from massspring.methods.base import Method, State, begin_frame
 
 
@@ -17,11 +16,7 @@ def free_frame(network, motion, drive, tally):
     """One frame of symplectic Euler with contact (eq. 6, 7, 10, 12)."""
     dt = drive.dt
     for step in range(drive.position.shape[0]):
-        spring_forces_into(motion.x, network.ends, network.rest_length, network.stiffness, motion.force)
-        add_membrane_forces(motion.x, network.membrane, motion.force)
-        predict_velocity_into(
-            motion.v, motion.force, network.inverse_mass, dt, drive.damping, drive.gravity, motion.v_star
-        )
+        gather_and_predict(network, motion, drive, False)
         held = drive.held_displacement[step]
         prescribe_velocity_into(
             motion.x, network.held_nodes, network.held_group, network.held_rest, held, dt, motion.v_star

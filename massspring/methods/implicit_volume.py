@@ -20,12 +20,10 @@ import numpy as np
 from massspring.kernels.compiled import compiled
 from massspring.kernels.contact import find_contacts, pressure_reach, revise_contacts
 from massspring.kernels.layout import Accuracy, Drive
-from massspring.kernels.membrane import add_membrane_forces
 from massspring.kernels.motion import (
     add_held_impulse,
     advance,
     capped_error,
-    predict_velocity_into,
     prescribe_velocity_into,
     steepest,
     surely_short,
@@ -41,8 +39,7 @@ from massspring.kernels.rows import (
     transposed_rows_times_into,
     volumes_of_rows_into,
 )
-from massspring.kernels.springs import spring_forces_into
-from massspring.kernels.volume import volume_gradient_into
+from massspring.kernels.slices import gather_and_predict
 from massspring.methods.base import Method, State, begin_frame
 
 CONTACT_PASSES = 3
@@ -55,16 +52,12 @@ def implicit_volume_frame(network, motion, drive, tally, lam):
     dt = drive.dt
     lightest = network.inverse_mass.max()
     for step in range(drive.position.shape[0]):
-        spring_forces_into(motion.x, network.ends, network.rest_length, network.stiffness, motion.force)
-        add_membrane_forces(motion.x, network.membrane, motion.force)
-        predict_velocity_into(
-            motion.v, motion.force, network.inverse_mass, dt, drive.damping, drive.gravity, motion.v_star
-        )
+        volume, _, _ = gather_and_predict(network, motion, drive, True)
         held = drive.held_displacement[step]
         prescribe_velocity_into(
             motion.x, network.held_nodes, network.held_group, network.held_rest, held, dt, motion.v_star
         )
-        error = drive.volume_target[step, 0] - volume_gradient_into(motion.x, network.triangles, motion.gradient)
+        error = drive.volume_target[step, 0] - volume
         predicted = lam
         passes = 1
         if drive.radius.shape[0] > 0:
@@ -137,11 +130,7 @@ def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy):
     """
     dt = drive.dt
     for step in range(drive.position.shape[0]):
-        spring_forces_into(motion.x, network.ends, network.rest_length, network.stiffness, motion.force)
-        add_membrane_forces(motion.x, network.membrane, motion.force)
-        predict_velocity_into(
-            motion.v, motion.force, network.inverse_mass, dt, drive.damping, drive.gravity, motion.v_star
-        )
+        gather_and_predict(network, motion, drive, False)
         held = drive.held_displacement[step]
         prescribe_velocity_into(
             motion.x, network.held_nodes, network.held_group, network.held_rest, held, dt, motion.v_star
