@@ -17,7 +17,7 @@ from massspring.methods import (
     Shake,
     State,
 )
-from massspring.obstacles import Attachment, Capsule, Obstacle, Path, Plane, Sphere
+from massspring.obstacles import Attachment, Capsule, Obstacle, Path, Plane, Probe, Sphere
 from massspring.simulation import Setup, simulate
 from massspring.stability import StepLimit, step_limit
 from massspring.volumes import Ramp, Volumes
@@ -39,6 +39,7 @@ __all__ = [
     "Path",
     "Plane",
     "PostStabilization",
+    "Probe",
     "Projection",
     "Ramp",
     "Setup",

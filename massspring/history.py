@@ -6,11 +6,12 @@ import numpy as np
 
 from massspring.body import Body
 from massspring.clock import Clock
+from massspring.collision import tip_depth
 from massspring.kernels.deformation import smallest_ratio, tetrahedron_volumes_into
 from massspring.kernels.membrane import membrane_energy
 from massspring.kernels.springs import spring_energy
 from massspring.methods.base import State
-from massspring.obstacles import Obstacle
+from massspring.obstacles import Obstacle, Probe
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,8 @@ class History:
     contact_force: np.ndarray
     """Mean force of each obstacle on the body during the frame [N], (F, o, 3)."""
     penetration: np.ndarray
-    """How deep the deepest surface node lies in each obstacle at the end of the frame [m], (F, o)."""
+    """How deep the deepest surface node, for a thin probe the surface, lies in each obstacle at the end of the frame
+    [m], (F, o)."""
     held_force: np.ndarray
     """Mean force of each attachment on the body during the frame [N], (F, g, 3)."""
     min_j: np.ndarray
@@ -79,6 +81,8 @@ class Recorder:
         )
         self.iterations = np.zeros((frames, 2), dtype=np.int64)
         self.obstacles = obstacles
+        # The impulses of thin probes come last.
+        self.rank = sorted(range(len(obstacles)), key=lambda o: isinstance(obstacles[o], Probe))
         self.surface_nodes = body.surface_nodes
         self.contact_force = np.full((frames, len(obstacles), 3), np.nan)
         self.penetration = np.full((frames, len(obstacles)), np.nan)
@@ -101,9 +105,14 @@ class Recorder:
         if len(self.rest_volumes):
             tetrahedron_volumes_into(x, self.body.tetrahedra, self.cell_volumes)
             self.scalars["min_j"][frame] = smallest_ratio(self.cell_volumes, self.rest_volumes)
-        self.contact_force[frame] = state.tally.contact_impulse / self.clock.frame
+        self.contact_force[frame, self.rank] = state.tally.contact_impulse / self.clock.frame
         for o, obstacle in enumerate(self.obstacles):
-            self.penetration[frame, o] = max(0.0, -obstacle.gap(x[self.surface_nodes], float(self.t[frame])).min())
+            t = float(self.t[frame])
+            if isinstance(obstacle, Probe):
+                depth = tip_depth(obstacle, x, self.body.triangles, t)
+            else:
+                depth = -obstacle.gap(x[self.surface_nodes], t).min()
+            self.penetration[frame, o] = max(0.0, depth)
         self.held_force[frame] = state.tally.held_impulse / self.clock.frame
         self.frame_ns[frame] = elapsed_ns
         self.skipped += int(state.tally.skipped[0])

@@ -151,7 +151,37 @@ class Capsule:
         return np.linalg.norm(from_start - share[:, None] * self.span, axis=1) - self.radius
 
 
-Obstacle = Plane | Sphere | Capsule
+@dataclass(frozen=True)
+class Probe:
+    """The tip of a thin probe: a point, or a ball thinner than a triangle, that no triangle passes however fast it is.
+
+    A sphere or capsule touches nodes, between which something thin would slip; a probe touches triangles, in
+    continuous time and from either side, without friction. Its shaft touches nothing.
+    """
+
+    tip: tuple[float, float, float]
+    """[m], at path displacement 0."""
+    radius: float = 0.0
+    """[m]; the surface stays this far from the tip, and a little off a tip without thickness."""
+    path: Path = STILL
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.radius) and self.radius >= 0):
+            raise MassSpringError(f"the probe has radius {self.radius} m; it must be zero or positive")
+        if not np.isfinite(self.tip).all():
+            raise MassSpringError(f"the tip of the probe lies at {self.tip}; give finite metres")
+
+    @property
+    def anchor(self) -> np.ndarray:
+        """What the path moves [m], (3,)."""
+        return np.asarray(self.tip, dtype=np.float64)
+
+    def gap(self, points: np.ndarray, t: float) -> np.ndarray:
+        """Signed distance [m] of `points` (n, 3) at time `t`, negative inside the obstacle, (n,)."""
+        return np.linalg.norm(points - (self.anchor + self.path(t)), axis=1) - self.radius
+
+
+Obstacle = Plane | Sphere | Capsule | Probe
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from massspring.body import Body
+from massspring.collision import is_inside, mean_edge, tip_depth
 from massspring.errors import MassSpringError
 from massspring.methods.base import Method
+from massspring.obstacles import Probe
 from massspring.volumes import Ramp
 
 
@@ -61,4 +63,31 @@ def check_held_apart(body: Body, method: Method) -> None:
         raise MassSpringError(
             f"method '{method.name}' has no pressure at rest to hold springs of law '{body.law}' apart; "
             "use implicit_volume, or another law"
+        )
+
+
+def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.ndarray) -> None:
+    """Raises MassSpringError for a thin probe that the method does not meet, that starts inside the body at `x` (n, 3)
+    or is too thick for contact with single triangles."""
+    if not getattr(method, "meets_probes", False):
+        raise MassSpringError(
+            f"obstacle {number} is a thin probe, which method '{method.name}' does not meet; "
+            "use a Sphere, or free or implicit_volume"
+        )
+    if body.kept.count > 1:
+        raise MassSpringError(
+            f"obstacle {number} is a thin probe and the body keeps {body.kept.count} volumes; "
+            "contact with a thin probe is solved beside one: keep the whole, or use a Sphere"
+        )
+    edge = mean_edge(body)
+    if probe.radius > edge:
+        raise MassSpringError(
+            f"obstacle {number} is a probe of radius {probe.radius:.3g} m on a surface with edges of {edge:.3g} m; "
+            "use a Sphere, or a finer surface"
+        )
+    inside = is_inside(probe.anchor + probe.path(0.0), x, body.triangles)
+    depth = tip_depth(probe, x, body.triangles, 0.0)
+    if inside or depth > 1e-6 * body.size:
+        raise MassSpringError(
+            f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
         )

@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter_ns
 
@@ -11,12 +11,13 @@ import numpy as np
 
 from massspring.body import Body
 from massspring.clock import Clock
+from massspring.collision import new_probing
 from massspring.errors import MassSpringError
 from massspring.history import History, Recorder
-from massspring.kernels.layout import Drive
+from massspring.kernels.layout import Drive, Tips
 from massspring.methods.base import Method, State
-from massspring.obstacles import Attachment, Capsule, Obstacle, Plane
-from massspring.setup_checks import check_held_apart, check_nodal, check_surroundings, check_targets
+from massspring.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
+from massspring.setup_checks import check_held_apart, check_nodal, check_probe, check_surroundings, check_targets
 from massspring.surface import winding_number
 from massspring.targets import fastest_filling, followed
 from massspring.volumes import Ramp
@@ -55,6 +56,9 @@ class Setup:
         check_nodal("initial positions", self.positions, self.body)
         x = self.body.rest if self.positions is None else self.positions
         for number, obstacle in enumerate(self.obstacles):
+            if isinstance(obstacle, Probe):
+                check_probe(number, obstacle, self.method, self.body, x)
+                continue
             depth = starting_depth(obstacle, self.body, x)
             if depth > 1e-6 * self.body.size:
                 raise MassSpringError(
@@ -70,6 +74,16 @@ class Setup:
                 stacklevel=3,
             )
 
+    @property
+    def probes(self) -> tuple[Probe, ...]:
+        """The thin ones among the obstacles; they have a stage of their own."""
+        return tuple(o for o in self.obstacles if isinstance(o, Probe))
+
+    @property
+    def solids(self) -> tuple[Plane | Sphere | Capsule, ...]:
+        """The obstacles that nodes touch."""
+        return tuple(o for o in self.obstacles if not isinstance(o, Probe))
+
     @cached_property
     def followed(self) -> dict[str, Ramp]:
         """The targets as they are followed (massspring.targets)."""
@@ -84,6 +98,9 @@ class Setup:
     def start(self) -> State:
         """The state at t = 0."""
         state = self.method.start(self.body, self.attachments, self.velocity)
+        if self.probes:
+            probing = new_probing(self.body, state.network.triangles, self.probes, state.tally)
+            state = replace(state, probing=probing)
         if self.positions is not None:
             state.motion.x[:] = self.positions
         return state
@@ -92,20 +109,22 @@ class Setup:
         """The outside world during frame number `frame` (0, 1, …): positions at the end of each of its steps."""
         dt = self.clock.dt
         t = frame * self.clock.frame + dt * np.arange(1, self.clock.steps + 1)
+        solids = self.solids
         return Drive(
             dt=dt,
             damping=float(self.damping),
             gravity=np.asarray(self.gravity, dtype=np.float64),
-            is_plane=np.array([isinstance(o, Plane) for o in self.obstacles], dtype=np.bool_),
-            plane_normal=_rows([o.unit_normal if isinstance(o, Plane) else np.zeros(3) for o in self.obstacles]),
-            radius=np.array([0.0 if isinstance(o, Plane) else o.radius for o in self.obstacles]),
-            span=_rows([o.span if isinstance(o, Capsule) else np.zeros(3) for o in self.obstacles]),
-            friction=np.array([np.inf if o.friction == "no_slip" else float(o.friction) for o in self.obstacles]),
-            rough=any(o.friction != 0 for o in self.obstacles),
-            position=_tracks([o.anchor + o.path(t) for o in self.obstacles], len(t)),
-            velocity=_tracks([(o.path(t) - o.path(t - dt)) / dt for o in self.obstacles], len(t)),
+            is_plane=np.array([isinstance(o, Plane) for o in solids], dtype=np.bool_),
+            plane_normal=_rows([o.unit_normal if isinstance(o, Plane) else np.zeros(3) for o in solids]),
+            radius=np.array([0.0 if isinstance(o, Plane) else o.radius for o in solids]),
+            span=_rows([o.span if isinstance(o, Capsule) else np.zeros(3) for o in solids]),
+            friction=np.array([np.inf if o.friction == "no_slip" else float(o.friction) for o in solids]),
+            rough=any(o.friction != 0 for o in solids),
+            position=_tracks([o.anchor + o.path(t) for o in solids], len(t)),
+            velocity=_tracks([(o.path(t) - o.path(t - dt)) / dt for o in solids], len(t)),
             held_displacement=_tracks([a.path(t) for a in self.attachments], len(t)),
             volume_target=self.volume_targets(t),
+            tips=Tips(*(_tracks([p.anchor + p.path(u) for p in self.probes], len(t)) for u in (t - dt, t))),
         )
 
     def volume_targets(self, t: np.ndarray) -> np.ndarray:
@@ -114,7 +133,7 @@ class Setup:
         return np.column_stack(factors) * self.body.rest_volumes
 
 
-def starting_depth(obstacle: Obstacle, body: Body, x: np.ndarray) -> float:
+def starting_depth(obstacle: Plane | Sphere | Capsule, body: Body, x: np.ndarray) -> float:
     """How deep the body at `x` (n, 3) reaches into an obstacle at the start [m]; one between all nodes counts too."""
     depth = -float(obstacle.gap(x[body.surface_nodes], 0.0).min())
     if isinstance(obstacle, Plane):

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from skfem import MeshTet2
 
-from massspring import Capsule, Obstacle, Plane
+from massspring import Capsule, Obstacle, Plane, Probe
 from reference_fem import Cavity, NeoHookean, Problem, RigidPlane, RigidSphere, nodes
 from reference_fem import Held as HeldPatch
 from studies.errors import StudyError
@@ -85,7 +85,7 @@ def _held(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray]) -> tuple[Held
 
 
 def _rigid(obstacle: Obstacle) -> RigidPlane | RigidSphere:
-    if isinstance(obstacle, Capsule) or obstacle.friction != 0:
+    if isinstance(obstacle, (Capsule, Probe)) or obstacle.friction != 0:
         raise StudyError(f"the reference knows frictionless planes and spheres, not {obstacle}; judge without it")
     if isinstance(obstacle, Plane):
         return RigidPlane(obstacle.point, tuple(obstacle.unit_normal), obstacle.path)

@@ -177,6 +177,15 @@ class Motion(NamedTuple):
     """Scratch: shares of the slices in 18 V, G·v* and G·W·G, (S + 1, 3) float64; last those of nodes in pieces."""
 
 
+class Tips(NamedTuple):
+    """Where the tips of p thin probes are during a frame of q steps."""
+
+    start: np.ndarray
+    """At the start of each step [m], (q, p, 3)."""
+    end: np.ndarray
+    """At the end of each step [m], (q, p, 3)."""
+
+
 class Drive(NamedTuple):
     """One frame's outside world, q steps, o obstacles, g attachments."""
 
@@ -206,6 +215,8 @@ class Drive(NamedTuple):
     """Of the attachments at the end of each step [m], (q, g, 3)."""
     volume_target: np.ndarray
     """What each kept volume should be at the end of each step [m³], (q, m)."""
+    tips: Tips
+    """Of thin probes, which are not among the obstacles above."""
 
 
 class Accuracy(NamedTuple):
@@ -220,7 +231,7 @@ class Tally(NamedTuple):
     """What a frame measures of itself; the loop adds, the caller starts it at zero."""
 
     contact_impulse: np.ndarray
-    """Impulse of each obstacle on the body [N s], (o, 3)."""
+    """Impulse of each obstacle on the body [N s], those of thin probes last, (o + p, 3)."""
     held_impulse: np.ndarray
     """Impulse of each attachment on the body [N s], (g, 3)."""
     skipped: np.ndarray

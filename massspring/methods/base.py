@@ -7,8 +7,10 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from massspring.body import Body
+from massspring.collision import fresh
 from massspring.errors import MassSpringError
 from massspring.kernels.layout import Drive, Motion, Network, Tally, VolumeRows
+from massspring.kernels.probe_layout import Probing
 from massspring.kernels.slices import RESULT, TILE
 from massspring.methods.rows import volume_rows
 from massspring.neighbours import aligned, slices_of
@@ -35,6 +37,8 @@ class State:
     """What the last frame measured of itself."""
     memory: Any = None
     """Arrays that only the method knows, made by its `start`."""
+    probing: Probing | None = None
+    """Of thin probes; None where there are none: the frame is then compiled without their stage."""
 
     @property
     def x(self) -> np.ndarray:
@@ -174,4 +178,6 @@ def one_whole(body: Body) -> str | None:
 def begin_frame(state: State, drive: Drive) -> State:
     """A copy to advance in place, so that the caller's state stays what it was."""
     motion = state.motion._replace(x=state.motion.x.copy(), v=state.motion.v.copy())
-    return replace(state, motion=motion, tally=new_tally(len(drive.radius), drive.held_displacement.shape[1]))
+    tally = new_tally(len(drive.radius) + drive.tips.end.shape[1], drive.held_displacement.shape[1])
+    probing = None if state.probing is None else fresh(state.probing, tally)
+    return replace(state, motion=motion, tally=tally, probing=probing)

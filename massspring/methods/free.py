@@ -7,12 +7,13 @@ from massspring.kernels.compiled import compiled
 from massspring.kernels.contact import find_contacts
 from massspring.kernels.layout import Drive
 from massspring.kernels.motion import add_held_impulse, advance, prescribe_velocity_into
+from massspring.kernels.probing import meet_probes
 from massspring.kernels.slices import gather_and_predict
 from massspring.methods.base import Method, State, begin_frame
 
 
 @compiled
-def free_frame(network, motion, drive, tally):
+def free_frame(network, motion, drive, tally, probing):
     """One frame of symplectic Euler with contact (eq. 6, 7, 10, 12)."""
     dt = drive.dt
     for step in range(drive.position.shape[0]):
@@ -23,6 +24,8 @@ def free_frame(network, motion, drive, tally):
         )
         if drive.radius.shape[0] > 0:
             find_contacts(network, motion, drive, step, 0.0)
+        if probing is not None:
+            meet_probes(network, motion, drive, step, probing, 0.0, 0.0)
         add_held_impulse(network, motion, 0.0, dt, drive.gravity, tally.held_impulse)
         advance(motion, network.mass, network.inverse_mass, 0.0, dt, tally.contact_impulse)
 
@@ -34,9 +37,10 @@ class Free(Method):
     name: ClassVar[str] = "free"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
+    meets_probes: ClassVar[bool] = True
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""
         after = begin_frame(state, drive)
-        free_frame(after.network, after.motion, drive, after.tally)
+        free_frame(after.network, after.motion, drive, after.tally, after.probing)
         return after

@@ -30,6 +30,7 @@ from massspring.kernels.motion import (
     volume_multiplier,
 )
 from massspring.kernels.multipliers import dense_into, solve_dense, solve_iteratively
+from massspring.kernels.probing import meet_probes
 from massspring.kernels.rows import (
     diagonal_into,
     pushed_velocity_into,
@@ -47,7 +48,7 @@ CONTACT_PASSES = 3
 
 
 @compiled
-def implicit_volume_frame(network, motion, drive, tally, lam):
+def implicit_volume_frame(network, motion, drive, tally, lam, probing):
     """One frame of HCJ05 with contact inside the multiplier (eq. 6–13); returns the last lam [Pa]."""
     dt = drive.dt
     lightest = network.inverse_mass.max()
@@ -76,6 +77,8 @@ def implicit_volume_frame(network, motion, drive, tally, lam):
                 break
         if not mobility > 0.0:
             tally.skipped[0] += 1
+        if probing is not None:
+            lam = meet_probes(network, motion, drive, step, probing, lam, mobility)
         add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
         advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
     return lam
@@ -165,12 +168,15 @@ class ImplicitVolume(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 3e-4
     holds_apart: ClassVar[bool] = True
+    meets_probes: ClassVar[bool] = True
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""
         after = begin_frame(state, drive)
         if after.rows is None:
-            lam = implicit_volume_frame(after.network, after.motion, drive, after.tally, float(after.lam[0]))
+            lam = implicit_volume_frame(
+                after.network, after.motion, drive, after.tally, float(after.lam[0]), after.probing
+            )
             return replace(after, lam=np.array([lam]))
         after.rows.lam[:] = after.lam + after.network.rest_lam
         accuracy = Accuracy(self.tolerance, self.most_iterations)

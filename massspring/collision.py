@@ -1,0 +1,93 @@
+"""Thin probes and a closed surface: what the stage of a run needs, and where a tip is (docs/theory.md, section 11)."""
+
+import numpy as np
+
+from massspring.body import Body
+from massspring.kernels.broad_phase import BLOCK
+from massspring.kernels.collision import Pair, nearest_into
+from massspring.kernels.layout import Tally
+from massspring.kernels.probe_layout import Probing, Rows
+from massspring.obstacles import Probe
+from massspring.springs import EDGES_OF_TRIANGLE, lengths, unique_edges
+from massspring.surface import winding_number
+
+SKIN = 0.01
+"""Of the mean edge: how far a surface stays off a tip that has no thickness, so that it always lies on a side."""
+MOST_ROWS = 24
+"""Point contacts of a step. A thin tip in a dimple touches one to eight triangles; what finds no row is carried."""
+
+
+def mean_edge(body: Body) -> float:
+    """Of the surface at rest [m]."""
+    return float(lengths(body.rest, unique_edges(body.triangles, EDGES_OF_TRIANGLE)).mean())
+
+
+def kept_radius(probe: Probe, body: Body) -> float:
+    """How far the surface stays from the tip [m]: the probe's radius, or the skin of one without thickness."""
+    return max(probe.radius, SKIN * mean_edge(body))
+
+
+def new_pair() -> Pair:
+    """One for everything: it is filled anew for each point and triangle."""
+    return Pair(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3))
+
+
+def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tally: Tally) -> Probing:
+    """Everything awake, nothing in contact, for probes on the triangles `surface` (f, 3)."""
+    count, triangles, nodes = len(probes), len(surface), body.node_count
+    rows = Rows(
+        count=np.zeros(1, dtype=np.int64),
+        triangle=np.zeros(MOST_ROWS, dtype=np.uint32),
+        probe=np.zeros(MOST_ROWS, dtype=np.uint32),
+        weight=np.zeros((MOST_ROWS, 3)),
+        direction=np.zeros((MOST_ROWS, 3)),
+        active=np.zeros(MOST_ROWS, dtype=np.bool_),
+        **{name: np.zeros(MOST_ROWS) for name in ("flow", "right", "impulse")},
+        **{name: np.zeros((MOST_ROWS, MOST_ROWS)) for name in ("matrix", "small")},
+        part=np.zeros((2, MOST_ROWS)),
+    )
+    return Probing(
+        radius=np.array([kept_radius(probe, body) for probe in probes]),
+        skipping=True,
+        travel=np.zeros(1),
+        wake=np.full((count, triangles), -np.inf),
+        block_wake=np.full((count, -(-triangles // BLOCK)), -np.inf),
+        near=np.zeros((count, triangles), dtype=np.uint32),
+        near_count=np.zeros(count, dtype=np.int64),
+        rows=rows,
+        push=np.zeros((nodes, 3)),
+        carried=np.zeros(nodes, dtype=np.uint32),
+        pair=new_pair(),
+        tally=tally,
+        counts=np.zeros(6, dtype=np.int64),
+    )
+
+
+def fresh(probing: Probing, tally: Tally) -> Probing:
+    """What a frame may change without changing the state it starts from."""
+    kept = {name: getattr(probing, name).copy() for name in ("travel", "wake", "block_wake", "counts")}
+    return probing._replace(tally=tally, **kept)
+
+
+def tip_depth(probe: Probe, x: np.ndarray, triangles: np.ndarray, t: float) -> float:
+    """How deep the surface lies in a probe at time `t` [m]: its radius less the distance of the tip, behind it more.
+
+    `x` (n, 3) [m]. Negative while they are apart.
+    """
+    tip = probe.anchor + probe.path(t)
+    distance = surface_distance(tip, x, triangles)
+    return probe.radius + distance if is_inside(tip, x, triangles) else probe.radius - distance
+
+
+def surface_distance(point: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> float:
+    """Of a point (3,) to a surface [m]; only triangles whose box is nearer than the nearest node are compared."""
+    corners = x[triangles] - point
+    apart = np.maximum(np.maximum(corners.min(axis=1), -corners.max(axis=1)), 0.0)
+    farthest = np.linalg.norm(corners[:, 0], axis=1).min()
+    weight = np.zeros(3)
+    return min(nearest_into(corner, weight) for corner in corners[np.linalg.norm(apart, axis=1) <= farthest])
+
+
+def is_inside(point: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether the surface goes round the point."""
+    return abs(winding_number(point, x, triangles)) > 0.5

@@ -1,0 +1,78 @@
+"""What the stage for thin probes is given: p probes, f triangles, n nodes, r rows at most."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from massspring.kernels.collision import Pair
+from massspring.kernels.layout import Motion, Network, Tally, Tips
+
+
+class Rows(NamedTuple):
+    """Point contacts of the step: row k presses nodes of one triangle along one direction, with an impulse >= 0."""
+
+    count: np.ndarray
+    """Rows in use, (1,) int64."""
+    triangle: np.ndarray
+    """(r,) uint32."""
+    probe: np.ndarray
+    """(r,) uint32."""
+    weight: np.ndarray
+    """Barycentric weights b of the contact, (r, 3)."""
+    direction: np.ndarray
+    """Unit normal n, from the probe into the tissue, (r, 3)."""
+    flow: np.ndarray
+    """g_k = Σ_i b_i G_i · W̃_i n [m²/kg], how the volume changes with the impulse, (r,)."""
+    matrix: np.ndarray
+    """A [1/kg], (r, r)."""
+    right: np.ndarray
+    """What the rows ask for beyond the motion without them [m/s], (r,)."""
+    impulse: np.ndarray
+    """c >= 0 [N s], (r,)."""
+    active: np.ndarray
+    """Rows that press, (r,) bool."""
+    small: np.ndarray
+    """A of the pressing rows, factored in place, (r, r)."""
+    part: np.ndarray
+    """Right side and solution of the pressing rows, (2, r)."""
+
+
+class Probing(NamedTuple):
+    """Thin probes and a surface: sleeping pairs, the pairs of the step, its contacts."""
+
+    radius: np.ndarray
+    """How far a surface stays from each tip [m], (p,); positive also where the probe has no thickness."""
+    skipping: bool
+    """Whether pairs sleep and boxes are compared; the answer is the same without, bit for bit."""
+    travel: np.ndarray
+    """How far any node can have come nearer to any tip since the start [m], (1,)."""
+    wake: np.ndarray
+    """Travel at which a pair must be looked at again [m], (p, f)."""
+    block_wake: np.ndarray
+    """The smallest of each block of `BLOCK` triangles, (p, ceil(f / BLOCK))."""
+    near: np.ndarray
+    """Triangles that may meet a tip in this step, ascending, (p, f) uint32."""
+    near_count: np.ndarray
+    """(p,) int64."""
+    rows: Rows
+    push: np.ndarray
+    """Impulse of all rows on each node [N s], (n, 3); zero between steps."""
+    carried: np.ndarray
+    """1 + the probe that takes a node along, 0 for none, (n,) uint32; zero between steps."""
+    pair: Pair
+    tally: Tally
+    """Of the frame."""
+    counts: np.ndarray
+    """Steps with contact, passes, steps in which nodes were carried, steps that left a probe behind a triangle, pairs
+    compared, pairs tested; (6,) int64."""
+
+
+class Stage(NamedTuple):
+    """One step as the functions of this stage see it."""
+
+    network: Network
+    motion: Motion
+    tips: Tips
+    probes: Probing
+    step: int
+    dt: float
