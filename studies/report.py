@@ -10,6 +10,7 @@ from studies.atomic import write_whole
 from studies.catalog import Study
 from studies.errors import StudyError
 from studies.geometry import SHAPES, organ
+from studies.kept_volume import kept_volumes
 from studies.machine import write_machine
 from studies.metrics import Run
 from studies.paths import study_folder
@@ -67,6 +68,9 @@ def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]
         written += paths
         remarks += [f"{study.name}: {sentence}" for sentence in missing]
     written += refresh_uncertainty(root, [scene for study in studies for scene in study.scenes])
+    kept = kept_volumes(root, studies)
+    if len(kept):
+        written.append(write_table(root / "kept_volume.csv", kept))
     write_machine(root / "machine.json")
     return written, remarks
 
