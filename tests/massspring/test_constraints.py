@@ -211,37 +211,44 @@ def test_post_stabilization_moves_nodes_and_no_velocity(body):
     assert abs((slope * after.v).sum()) < 1e-12 * (np.abs(slope) * np.abs(after.v)).sum(), "the rate of V is not 0"
 
 
-def filled(body, method, frames, damping):
-    """Frames of 50 steps at dt_c/2 of a body filled to 1.3 V0: by and by where damped, at once where not; frame [s]."""
+CALM_FRAMES = 120
+
+
+def filled(body, method, damping):
+    """Frames of 50 steps at dt_c/2 of a body that is filled to 1.3 V0 within 2 s; damped, it has come to rest then."""
     steps, dt = 50, 0.5 * step_limit(body).undamped
-    grow = Ramp((0.0, 0.5), (1.0, 1.3)) if damping else Ramp((0.0,), (1.3,))
-    setup = Setup(body, method, Clock(steps * dt, frames, steps), damping=damping, targets={"whole": grow})
-    return setup, steps * dt
+    grow = Ramp((0.0, 2.0), (1.0, 1.3))
+    setup = Setup(body, method, Clock(steps * dt, CALM_FRAMES, steps), damping=damping, targets={"whole": grow})
+    assert not setup.ramped
+    return setup
+
+
+def come_to_rest(body, method):
+    """The state at 1.3 V0."""
+    setup = filled(body, method, damping=40.0)
+    state = setup.start()
+    for number in range(CALM_FRAMES):
+        state = method.advance(state, setup.drive(number))
+    return state
 
 
 def kinetic_growth(body, method, seconds):
     """Exponential rate of the kinetic energy [1/s] about the balance of springs and pressure at 1.3 V0, undamped."""
-    setup, frame = filled(body, method, 80, damping=40.0)
-    state = setup.start()
-    for number in range(80):
-        state = method.advance(state, setup.drive(number))
+    state = come_to_rest(body, method)
     state.motion.v[:] += 1e-6 * np.random.default_rng(2).normal(size=body.rest.shape)
-    frames = round(seconds / frame)
-    setup, _ = filled(body, method, frames, damping=0.0)
+    setup = filled(body, method, damping=0.0)
+    frames = round(seconds / setup.clock.frame)
     energy = []
     for number in range(frames):
-        state = method.advance(state, setup.drive(number))
+        state = method.advance(state, setup.drive(CALM_FRAMES + number))
         energy.append(0.5 * float(body.mass @ (state.v**2).sum(axis=1)))
     late = np.arange(frames // 2, frames)
-    return np.polyfit(late * frame, np.log(energy)[late], 1)[0]
+    return np.polyfit(late * setup.clock.frame, np.log(energy)[late], 1)[0]
 
 
 def fastest_mode(body):
     """dt lam max φᵀHφ [1/s] over the modes φ, φᵀMφ = 1, of springs and pressure that keep the volume (eq. 107)."""
-    setup, _ = filled(body, Shake(), 120, damping=40.0)
-    state = setup.start()
-    for number in range(120):
-        state = setup.method.advance(state, setup.drive(number))
+    state = come_to_rest(body, Shake())
     x, size = state.x, body.rest.size
     stiffness, hessian = (m.toarray() for m in (spring_stiffness(body, x), volume_hessian(body.triangles, x)))
     root = np.repeat(1 / np.sqrt(body.mass), 3)
@@ -250,7 +257,7 @@ def fastest_mode(body):
     lam, hessian = state.lam[0], root[:, None] * hessian * root
     scaled = keeps @ (root[:, None] * stiffness * root - lam * hessian) @ keeps
     _, modes = np.linalg.eigh((scaled + scaled.T) / 2)
-    return setup.clock.dt * lam * np.einsum("ij,ik,kj->j", modes, hessian, modes).max()
+    return 0.5 * step_limit(body).undamped * lam * np.einsum("ij,ik,kj->j", modes, hessian, modes).max()
 
 
 def test_projection_gains_energy_under_pressure_as_predicted_and_hcj05_does_not(ball_body):
