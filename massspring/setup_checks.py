@@ -69,7 +69,7 @@ def check_held_apart(body: Body, method: Method) -> None:
 def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.ndarray) -> None:
     """Raises MassSpringError for a thin probe that the method does not meet, that starts inside the body at `x` (n, 3)
     or is too thick for contact with single triangles."""
-    if not getattr(method, "meets_probes", False):
+    if not method.meets_probes:
         raise MassSpringError(
             f"obstacle {number} is a thin probe, which method '{method.name}' does not meet; "
             "use a Sphere, or free or implicit_volume"

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.compiled import compiled
-from massspring.kernels.distances import allowed_part
+from massspring.kernels.prediction import pushed_by_into, unpushed_into
 
 POLISHES = 4
 """Newton steps after the closed form: each doubles the digits that cancellation has left of it."""
@@ -26,21 +26,8 @@ class Line(NamedTuple):
 @compiled
 def line_into(motion, inverse_mass, dt, line):
     """y = x + dt ṽ [m], d = dt² W̃ G [m/Pa], (n, 3) each: the step ends at y + lam d (eq. 9, 10, 101)."""
-    for i in range(inverse_mass.shape[0]):
-        u0, u1, u2 = motion.v_star[i, 0], motion.v_star[i, 1], motion.v_star[i, 2]
-        push = dt * dt * inverse_mass[i]
-        d0, d1, d2 = push * motion.gradient[i, 0], push * motion.gradient[i, 1], push * motion.gradient[i, 2]
-        if motion.locked[i] > 0:
-            e0, e1, e2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-            u0, u1, u2 = allowed_part(motion.locked[i], e0, e1, e2, u0, u1, u2)
-            u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
-            d0, d1, d2 = allowed_part(motion.locked[i], e0, e1, e2, d0, d1, d2)
-        line.y[i, 0], line.y[i, 1], line.y[i, 2] = (
-            motion.x[i, 0] + dt * u0,
-            motion.x[i, 1] + dt * u1,
-            motion.x[i, 2] + dt * u2,
-        )
-        line.d[i, 0], line.d[i, 1], line.d[i, 2] = d0, d1, d2
+    unpushed_into(motion, dt, line.y)
+    pushed_by_into(motion, inverse_mass, dt * dt, motion.gradient, line.d)
 
 
 @compiled

@@ -48,3 +48,23 @@ def volume_gradient_into(x, triangles, gradient):
         gradient[k, 1] += n1
         gradient[k, 2] += n2
     return volume
+
+
+@compiled
+def pyramid_volume(x, mass, triangles):
+    """V = Σ_f (1/3) A_f n_f · (x_f − c) [m³], pyramids over the centre of mass c (eq. 163); closed: eq. 3."""
+    m, o0, o1, o2 = 0.0, 0.0, 0.0, 0.0
+    for i in range(x.shape[0]):
+        m += mass[i]
+        o0 += mass[i] * (x[i, 0] - x[0, 0])
+        o1 += mass[i] * (x[i, 1] - x[0, 1])
+        o2 += mass[i] * (x[i, 2] - x[0, 2])
+    o0, o1, o2 = x[0, 0] + o0 / m, x[0, 1] + o1 / m, x[0, 2] + o2 / m
+    six = 0.0
+    for f in range(triangles.shape[0]):
+        i, j, k = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+        a0, a1, a2 = x[i, 0] - o0, x[i, 1] - o1, x[i, 2] - o2
+        b0, b1, b2 = x[j, 0] - o0, x[j, 1] - o1, x[j, 2] - o2
+        c0, c1, c2 = x[k, 0] - o0, x[k, 1] - o1, x[k, 2] - o2
+        six += a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0)
+    return six / 6.0

@@ -1,24 +1,49 @@
 """The methods, each in its file. Adding one: write the file, add a line to METHODS; the contract test does the rest."""
 
+from massspring.methods.barycentre import Barycentre
 from massspring.methods.base import Method, State, start
 from massspring.methods.baumgarte import Baumgarte
+from massspring.methods.element import Element
 from massspring.methods.free import Free
 from massspring.methods.implicit_volume import ImplicitVolume
+from massspring.methods.penalty import Penalty
 from massspring.methods.post_stabilization import PostStabilization
+from massspring.methods.pressure import Pressure
 from massspring.methods.projection import Projection
+from massspring.methods.pyramid import Pyramid
 from massspring.methods.shake import Shake
+from massspring.methods.xpbd import Xpbd
 
-METHODS: tuple[type[Method], ...] = (Free, ImplicitVolume, Shake, Projection, PostStabilization, Baumgarte)
+METHODS: tuple[type[Method], ...] = (
+    Free,
+    ImplicitVolume,
+    Shake,
+    Projection,
+    PostStabilization,
+    Baumgarte,
+    Penalty,
+    Pressure,
+    Pyramid,
+    Barycentre,
+    Element,
+    Xpbd,
+)
 
 __all__ = [
     "METHODS",
+    "Barycentre",
     "Baumgarte",
+    "Element",
     "Free",
     "ImplicitVolume",
     "Method",
+    "Penalty",
     "PostStabilization",
+    "Pressure",
     "Projection",
+    "Pyramid",
     "Shake",
     "State",
+    "Xpbd",
     "start",
 ]

@@ -72,6 +72,9 @@ class Method(Protocol):
     holds_apart: ClassVar[bool] = False
     """Whether it starts with the pressure that holds springs without length apart at rest."""
 
+    meets_probes: ClassVar[bool] = False
+    """Whether thin probes are met, in continuous time."""
+
     def applies(self, body: Body) -> str | None:
         """Why the method cannot advance `body`; None when it can."""
         return None
@@ -89,7 +92,9 @@ class Method(Protocol):
         ...
 
 
-def start(body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
+def start(
+    body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None, memory: Any = None
+) -> State:
     """The body at rest, or with velocities `v` (n, 3) [m/s]. Raises MassSpringError for bad attachments."""
     kept = body.kept
     alone = kept.count == 1 and bool((np.abs(kept.share.data) == 1.0).all())
@@ -118,7 +123,7 @@ def start(body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | 
         pulled=aligned((len(slices.lanes), RESULT), real),
         sums=np.zeros((len(slices.lanes) + 1, 3)),
     )
-    return State(network, motion, np.zeros(kept.count), None if alone else volume_rows(kept, n))
+    return State(network, motion, np.zeros(kept.count), None if alone else volume_rows(kept, n), memory=memory)
 
 
 def turned(volumes: Volumes) -> np.ndarray:

@@ -105,9 +105,8 @@ def constraint_frame(network, motion, line, drive, tally, lam, rule):
     dt = drive.dt
     lightest = network.inverse_mass.max()
     for step in range(drive.position.shape[0]):
-        predict(network, motion, drive, step)
         target = drive.volume_target[step, 0]
-        error = rule.pull * (target - volume_gradient_into(motion.x, network.triangles, motion.gradient))
+        error = rule.pull * (target - predict(network, motion, drive, step, True))
         kept = inertial_change(network, motion, rule, dt)
         if rule.at_prediction:
             predicted_gradient_into(network, motion, line, dt)

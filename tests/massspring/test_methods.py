@@ -12,6 +12,7 @@ from massspring import (
     Attachment,
     Body,
     Clock,
+    Element,
     Free,
     ImplicitVolume,
     MassSpringError,
@@ -20,6 +21,7 @@ from massspring import (
     Plane,
     Setup,
     Sphere,
+    Xpbd,
     simulate,
     step_limit,
 )
@@ -51,10 +53,15 @@ def momentum(mass, x, v):
     return mass @ v, np.cross(x, mass[:, None] * v).sum(axis=0)
 
 
-CONTESTANTS = tuple(method() for method in METHODS)
+CONTESTANTS = {
+    **{method.name: method() for method in METHODS},
+    "element_hard": Element(hard=True),
+    "xpbd_whole": Xpbd(volumes="whole"),
+}
+"""Every method as it comes, and those with a switch the other way round."""
 
 
-@pytest.fixture(params=CONTESTANTS, ids=lambda method: method.name)
+@pytest.fixture(params=CONTESTANTS.values(), ids=CONTESTANTS.keys())
 def method(request, kept_body):
     reason = request.param.applies(kept_body)
     if reason is not None:
@@ -181,7 +188,7 @@ def test_the_volume_claim(kept_body, method):
 
 
 def replace_claim(method):
-    return type("Claimed", (type(method),), {"volume_tol": ImplicitVolume.volume_tol})()
+    return type("Claimed", (type(method),), {"volume_tol": ImplicitVolume.volume_tol})(**asdict(method))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,185 @@
+"""The volumes of all tetrahedra solved for at the end of a step: together, or one after the other (eq. 166, 167)."""
+
+from massspring.kernels.cells import add_four, cell_slopes
+from massspring.kernels.compiled import compiled
+from massspring.kernels.distances import allowed_part
+from massspring.kernels.prediction import pushed_by_into, unpushed_into
+from massspring.kernels.volume import volume_gradient_into
+
+
+@compiled
+def cell_rows_into(x, cells, out):
+    """J = dV_t/dx into `cells.slope` [m²] and V_t into `out` [m³], (k,) (eq. 5, 164)."""
+    for t in range(cells.tetrahedra.shape[0]):
+        a, b, c, d = cells.tetrahedra[t, 0], cells.tetrahedra[t, 1], cells.tetrahedra[t, 2], cells.tetrahedra[t, 3]
+        volume, p0, p1, p2, q0, q1, q2, r0, r1, r2 = cell_slopes(x, a, b, c, d)
+        s = cells.slope
+        s[t, 0, 0], s[t, 0, 1], s[t, 0, 2] = p0, p1, p2
+        s[t, 1, 0], s[t, 1, 1], s[t, 1, 2] = q0, q1, q2
+        s[t, 2, 0], s[t, 2, 1], s[t, 2, 2] = r0, r1, r2
+        out[t] = volume
+
+
+@compiled
+def cell_forces_into(cells, p, force):
+    """F = Jᵀ p [N], (n, 3)."""
+    force[:] = 0.0
+    for t in range(cells.tetrahedra.shape[0]):
+        a, b, c, d = cells.tetrahedra[t, 0], cells.tetrahedra[t, 1], cells.tetrahedra[t, 2], cells.tetrahedra[t, 3]
+        s = cells.slope
+        p0, p1, p2 = s[t, 0, 0], s[t, 0, 1], s[t, 0, 2]
+        q0, q1, q2 = s[t, 1, 0], s[t, 1, 1], s[t, 1, 2]
+        r0, r1, r2 = s[t, 2, 0], s[t, 2, 1], s[t, 2, 2]
+        add_four(force, a, b, c, d, p[t], p0, p1, p2, q0, q1, q2, r0, r1, r2)
+
+
+@compiled
+def cell_changes_into(cells, u, out):
+    """(J u)_t = Σ_j dV_t/dx_j · u_j, (k,)."""
+    s = cells.slope
+    for t in range(cells.tetrahedra.shape[0]):
+        a = cells.tetrahedra[t, 0]
+        total = 0.0
+        for corner in range(3):
+            i = cells.tetrahedra[t, corner + 1]
+            total += s[t, corner, 0] * (u[i, 0] - u[a, 0])
+            total += s[t, corner, 1] * (u[i, 1] - u[a, 1])
+            total += s[t, corner, 2] * (u[i, 2] - u[a, 2])
+        out[t] = total
+
+
+@compiled
+def mobility_of(motion, inverse_mass, i, g0, g1, g2):
+    """g · W̃ g at node i, with where it moves: (square, W̃ g) (eq. 9)."""
+    w = inverse_mass[i]
+    d0, d1, d2 = w * g0, w * g1, w * g2
+    if motion.locked[i] > 0:
+        e0, e1, e2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+        d0, d1, d2 = allowed_part(motion.locked[i], e0, e1, e2, d0, d1, d2)
+    return g0 * d0 + g1 * d1 + g2 * d2, d0, d1, d2
+
+
+@compiled
+def cell_diagonal_into(motion, inverse_mass, cells, scale, compliance):
+    """dt² S_tt + C V_t0 [m³/Pa], (k,), the diagonal of eq. 166; `scale` is dt²."""
+    s = cells.slope
+    for t in range(cells.tetrahedra.shape[0]):
+        total = 0.0
+        sum0, sum1, sum2 = 0.0, 0.0, 0.0
+        for corner in range(3):
+            g0, g1, g2 = s[t, corner, 0], s[t, corner, 1], s[t, corner, 2]
+            sum0, sum1, sum2 = sum0 - g0, sum1 - g1, sum2 - g2
+            total += mobility_of(motion, inverse_mass, cells.tetrahedra[t, corner + 1], g0, g1, g2)[0]
+        total += mobility_of(motion, inverse_mass, cells.tetrahedra[t, 0], sum0, sum1, sum2)[0]
+        cells.diagonal[t] = scale * total + compliance * cells.rest_volume[t]
+
+
+@compiled
+def apply_cells(motion, inverse_mass, cells, p, scale, compliance, out):
+    """(dt² J W̃ Jᵀ + C V0) p [m³], (k,) (eq. 166); `scale` is dt²."""
+    cell_forces_into(cells, p, cells.gradient)
+    pushed_by_into(motion, inverse_mass, scale, cells.gradient, cells.y)
+    cell_changes_into(cells, cells.y, out)
+    for t in range(p.shape[0]):
+        out[t] += compliance * cells.rest_volume[t] * p[t]
+
+
+@compiled
+def solve_cells(motion, inverse_mass, cells, dt, compliance, accuracy):
+    """(dt² J W̃ Jᵀ + C V0) p = V0 − V − dt J ṽ by conjugate gradients from the last p (eq. 166); their number.
+
+    Ends when |residual|_t ≤ tolerance · V_t0 for every tetrahedron. J at x. `cells.right` comes in as V.
+    """
+    scale = dt * dt
+    unpushed_into(motion, dt, cells.y)
+    for i in range(cells.y.shape[0]):
+        for axis in range(3):
+            cells.y[i, axis] -= motion.x[i, axis]
+    cell_changes_into(cells, cells.y, cells.image)
+    residual, search, image = cells.right, cells.search, cells.image
+    for t in range(residual.shape[0]):
+        residual[t] = cells.rest_volume[t] - residual[t] - image[t]
+        search[t] = 0.0
+    apply_cells(motion, inverse_mass, cells, cells.pressure, scale, compliance, image)
+    cell_diagonal_into(motion, inverse_mass, cells, scale, compliance)
+    worst, before = 0.0, 0.0
+    for t in range(residual.shape[0]):
+        residual[t] -= image[t]
+        worst = max(worst, abs(residual[t]) / cells.rest_volume[t])
+    iteration = 0
+    while worst > accuracy.tolerance and iteration < accuracy.most_iterations:
+        rho = 0.0
+        for t in range(residual.shape[0]):
+            if cells.diagonal[t] > 0.0:
+                rho += residual[t] * residual[t] / cells.diagonal[t]
+        keep = rho / before if iteration > 0 else 0.0
+        before = rho
+        for t in range(residual.shape[0]):
+            if cells.diagonal[t] > 0.0:
+                search[t] = residual[t] / cells.diagonal[t] + keep * search[t]
+        apply_cells(motion, inverse_mass, cells, search, scale, compliance, image)
+        curvature = 0.0
+        for t in range(residual.shape[0]):
+            curvature += search[t] * image[t]
+        if not curvature > 0.0:
+            break
+        worst = 0.0
+        for t in range(residual.shape[0]):
+            cells.pressure[t] += rho / curvature * search[t]
+            residual[t] -= rho / curvature * image[t]
+            worst = max(worst, abs(residual[t]) / cells.rest_volume[t])
+        iteration += 1
+    return iteration
+
+
+@compiled
+def relax_cells(motion, inverse_mass, cells, scale, compliance, force):
+    """One sweep of XPBD: Δp = (V0 − V − C V0 p)/(dt² ∇V·W̃∇V + C V0), cell after cell, at y (eq. 167).
+
+    `cells.y` moves by dt² W̃ ∇V Δp and `force` [N] collects ∇V Δp; `scale` is dt².
+    """
+    y = cells.y
+    for t in range(cells.tetrahedra.shape[0]):
+        a, b, c, d = cells.tetrahedra[t, 0], cells.tetrahedra[t, 1], cells.tetrahedra[t, 2], cells.tetrahedra[t, 3]
+        volume, p0, p1, p2, q0, q1, q2, r0, r1, r2 = cell_slopes(y, a, b, c, d)
+        sa, a0, a1, a2 = mobility_of(motion, inverse_mass, a, -p0 - q0 - r0, -p1 - q1 - r1, -p2 - q2 - r2)
+        sb, b0, b1, b2 = mobility_of(motion, inverse_mass, b, p0, p1, p2)
+        sc, c0, c1, c2 = mobility_of(motion, inverse_mass, c, q0, q1, q2)
+        sd, d0, d1, d2 = mobility_of(motion, inverse_mass, d, r0, r1, r2)
+        soft = compliance * cells.rest_volume[t]
+        stiff = scale * (sa + sb + sc + sd) + soft
+        if not stiff > 0.0:
+            continue
+        change = (cells.rest_volume[t] - volume - soft * cells.pressure[t]) / stiff
+        cells.pressure[t] += change
+        add_four(force, a, b, c, d, change, p0, p1, p2, q0, q1, q2, r0, r1, r2)
+        move = scale * change
+        y[a, 0], y[a, 1], y[a, 2] = y[a, 0] + move * a0, y[a, 1] + move * a1, y[a, 2] + move * a2
+        y[b, 0], y[b, 1], y[b, 2] = y[b, 0] + move * b0, y[b, 1] + move * b1, y[b, 2] + move * b2
+        y[c, 0], y[c, 1], y[c, 2] = y[c, 0] + move * c0, y[c, 1] + move * c1, y[c, 2] + move * c2
+        y[d, 0], y[d, 1], y[d, 2] = y[d, 0] + move * d0, y[d, 1] + move * d1, y[d, 2] + move * d2
+
+
+@compiled
+def relax_whole(network, motion, cells, target, scale, compliance, lam, force):
+    """The same for the one volume of the whole: returns its pressure [Pa] (eq. 167)."""
+    volume = volume_gradient_into(cells.y, network.triangles, cells.gradient)
+    soft = compliance * target
+    stiff = soft
+    for i in range(cells.y.shape[0]):
+        g0, g1, g2 = cells.gradient[i, 0], cells.gradient[i, 1], cells.gradient[i, 2]
+        stiff += scale * mobility_of(motion, network.inverse_mass, i, g0, g1, g2)[0]
+    if not stiff > 0.0:
+        return lam
+    change = (target - volume - soft * lam) / stiff
+    for i in range(cells.y.shape[0]):
+        g0, g1, g2 = cells.gradient[i, 0], cells.gradient[i, 1], cells.gradient[i, 2]
+        _, d0, d1, d2 = mobility_of(motion, network.inverse_mass, i, g0, g1, g2)
+        move = scale * change
+        cells.y[i, 0] += move * d0
+        cells.y[i, 1] += move * d1
+        cells.y[i, 2] += move * d2
+        force[i, 0] += change * g0
+        force[i, 1] += change * g1
+        force[i, 2] += change * g2
+    return lam + change

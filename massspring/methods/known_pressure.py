@@ -1,0 +1,62 @@
+"""One loop for methods whose pressure is a function of the volume now, and acts as one more force.
+
+Contact and held nodes see it as `free` sees its springs: nothing is solved (docs/theory.md, eq. 161, 162).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from massspring.body import Body
+from massspring.errors import MassSpringError
+from massspring.kernels.compiled import compiled
+from massspring.kernels.contact import find_contacts
+from massspring.kernels.layout import Drive
+from massspring.kernels.motion import add_held_impulse, advance
+from massspring.kernels.prediction import predict
+from massspring.kernels.volume import pyramid_volume, volume_gradient_into
+from massspring.methods.base import State, begin_frame
+
+PENALTY, GAS, PYRAMIDS = 0, 1, 2
+
+
+@compiled
+def pressure_frame(network, motion, drive, tally, bulk_modulus, law):
+    """One frame of symplectic Euler with a known pressure (eq. 6, 7, 10, 12, 161); returns the last one [Pa]."""
+    lam, dt = 0.0, drive.dt
+    for step in range(drive.position.shape[0]):
+        target = drive.volume_target[step, 0]
+        volume = predict(network, motion, drive, step, True)
+        if law == PYRAMIDS:
+            volume = pyramid_volume(motion.x, network.mass, network.triangles)
+        lam = bulk_modulus * (target - volume) / (volume if law == GAS else target)
+        if drive.radius.shape[0] > 0:
+            find_contacts(network, motion, drive, step, lam)
+        add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
+        advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
+    return lam
+
+
+def push(state: State, drive: Drive, bulk_modulus: float, law: int) -> State:
+    """One frame by the pressure `law`."""
+    after = begin_frame(state, drive)
+    lam = pressure_frame(after.network, after.motion, drive, after.tally, bulk_modulus, law)
+    return replace(after, lam=np.array([lam]))
+
+
+def volume_stiffness(body: Body, bulk_modulus: float) -> csr_array:
+    """B = √(K/V0) G at rest [√(N/m)], (3n, 1): dlam/dV = −K/V0, so that K_added = (K/V0) G Gᵀ (eq. 162)."""
+    volumes = body.kept
+    gradient = np.zeros_like(body.rest)
+    share = volumes.share.tocoo()
+    triangles = volumes.triangles[share.col]
+    triangles = np.ascontiguousarray(np.where(share.data[:, None] > 0, triangles, triangles[:, ::-1]))
+    volume = volume_gradient_into(body.rest, triangles, gradient)
+    return csr_array(np.sqrt(bulk_modulus / volume) * gradient.reshape(-1, 1))
+
+
+def check_modulus(method: str, name: str, value: float) -> None:
+    """Raises MassSpringError for a modulus that is not positive and finite."""
+    if not 0.0 < value < float("inf"):
+        raise MassSpringError(f"{method}'s {name} is {value} Pa; it must be positive and finite")

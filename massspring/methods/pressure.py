@@ -1,0 +1,46 @@
+"""An ideal gas inside the surface at constant temperature, in an ambient pressure: lam = p0 (V0/V − 1).
+
+Matyka and Ollila, Pressure model of soft body simulation, SIGRAD 2003, with p = nRT/V; nRT = p0 V0 makes the rest shape
+rest (docs/theory.md, eq. 161).
+
+Limits: the volume is not kept, lam/p0 of it is missing as with a penalty; the pressure has no bound as V goes to 0, so
+that a crushed body bursts.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from scipy.sparse import csr_array
+
+from massspring.body import Body
+from massspring.kernels.layout import Drive
+from massspring.methods.base import Method, State, one_whole
+from massspring.methods.known_pressure import GAS, check_modulus, push, volume_stiffness
+
+
+@dataclass(frozen=True)
+class Pressure(Method):
+    """Fills the surface with a gas."""
+
+    ambient: float = 101_325.0
+    """p0 [Pa], the gas's bulk modulus at rest. At sea level: 56 times a liver's shear modulus, and within
+    2 % of the penalty's default."""
+
+    name: ClassVar[str] = "pressure"
+    order: ClassVar[int] = 1
+    volume_tol: ClassVar[float | None] = None
+
+    def __post_init__(self) -> None:
+        check_modulus(self.name, "ambient", self.ambient)
+
+    def applies(self, body: Body) -> str | None:
+        """Keeps the whole only."""
+        return one_whole(body)
+
+    def added_stiffness(self, body: Body) -> csr_array:
+        """(K/V0) G Gᵀ, of rank one."""
+        return volume_stiffness(body, self.ambient)
+
+    def advance(self, state: State, drive: Drive) -> State:
+        """One frame."""
+        return push(state, drive, self.ambient, GAS)
