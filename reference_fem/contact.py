@@ -37,6 +37,9 @@ class Grip(NamedTuple):
 NO_GRIP = Grip(np.zeros((0, 0, 0), dtype=bool), np.zeros((0, 0, 0, 3)), np.zeros((0, 0, 0, 3)))
 
 
+NO_GUESS = np.zeros((0, 0, 0))
+
+
 class Touch(NamedTuple):
     """State of all contacts: no obstacles."""
 
@@ -49,6 +52,8 @@ class Touch(NamedTuple):
     penalty: np.ndarray
     """eps of each facet, (nf,) [Pa/m]."""
     grip: Grip
+    guess: np.ndarray
+    """The pressures that the tangent counts with, (no, nf, nq) [Pa]; of length 0: t itself."""
     pressure: np.ndarray
     """t at every point, overwritten, (no, nf, nq) [Pa]."""
     traction: np.ndarray
@@ -57,10 +62,10 @@ class Touch(NamedTuple):
     """Resultant on the body, overwritten, (no, 3) [N]."""
 
 
-def touch(rows, shift, multiplier, penalty, grip=NO_GRIP) -> Touch:
+def touch(rows, shift, multiplier, penalty, grip=NO_GRIP, guess=NO_GUESS) -> Touch:
     """A Touch with room for its results."""
     zeros = np.zeros_like(multiplier), np.zeros_like(grip.traction), np.zeros((len(rows), 3))
-    return Touch(rows, shift, multiplier, penalty, grip, *zeros)
+    return Touch(rows, shift, multiplier, penalty, grip, guess, *zeros)
 
 
 @njit(cache=True)
@@ -80,7 +85,7 @@ def add_contact(x, surface, touch, values, residual, tangent):
                 for a in range(count):
                     dof = dofs[f, count * i + a]
                     nodes[a, i] = rest[dof] + x[dof]
-            if out_of_reach(touch.rows[o], nodes, touch.multiplier[o, f]):
+            if not counted(touch, o, f) and out_of_reach(touch.rows[o], nodes):
                 continue
             touched = False
             for q in range(weights.shape[1]):
@@ -109,15 +114,21 @@ def add_contact(x, surface, touch, values, residual, tangent):
 
 
 @njit(cache=True)
-def out_of_reach(row, nodes, multiplier):
-    """Whether no point of a facet can feel an obstacle: no multiplier, and farther than the facet extends.
+def counted(touch, o, f):
+    """Whether a point of a facet has a multiplier, or a pressure that the tangent counts with."""
+    for q in range(touch.multiplier.shape[2]):
+        if touch.multiplier[o, f, q] > 0.0 or (len(touch.guess) and touch.guess[o, f, q] > 0.0):
+            return True
+    return False
+
+
+@njit(cache=True)
+def out_of_reach(row, nodes):
+    """Whether no point of a facet without multipliers can feel an obstacle: farther than the facet extends.
 
     The functions of a six-node triangle sum to 5/3 at most in absolute value, so its points stay within twice the
     distance of the nodes from their centre.
     """
-    for q in range(len(multiplier)):
-        if multiplier[q] > 0.0:
-            return False
     centre, n, along, reach = np.zeros(3), np.empty(3), np.empty(3), 0.0
     for a in range(len(nodes)):
         for i in range(3):
@@ -132,35 +143,48 @@ def out_of_reach(row, nodes, multiplier):
 
 @njit(cache=True)
 def press_point(touch, o, f, q, y, push, k):
-    """push = t n + T (3,) and k = -d push/dy (3, 3) at the point y; False when it does not touch."""
+    """push = t n + T (3,) and k = -d push/dy (3, 3) at the point y; False when both are zero.
+
+    With a guess s of the pressure k is that of a point pressed by s, whether or not it touches; not where it is stuck.
+    """
     row, eps = touch.rows[o], touch.penalty[f]
     n, along = np.empty(3), np.empty(3)
     g, curvature = gap_into(row, y, n, along)
-    t = max(0.0, touch.multiplier[o, f, q] - eps * g)
+    t = s = max(0.0, touch.multiplier[o, f, q] - eps * g)
     touch.pressure[o, f, q] = t
-    if t == 0.0:
+    stuck = o < touch.grip.stuck.shape[0] and touch.grip.stuck[o, f, q]
+    if len(touch.guess) and not stuck:
+        s = touch.guess[o, f, q]
+    if t == 0.0 and s == 0.0:
         return False
+    stiff = eps if s > 0.0 else 0.0
     for i in range(3):
         push[i] = t * n[i]
         for j in range(3):
-            k[i, j] = (eps + t * curvature) * n[i] * n[j] + t * curvature * along[i] * along[j]
-        k[i, i] -= t * curvature
-    grip = touch.grip
-    if o < grip.stuck.shape[0] and grip.stuck[o, f, q]:
-        z, sunk = np.empty(3), 0.0
-        for i in range(3):
-            z[i] = row[1 + i] + grip.anchor[o, f, q, i]
-        gap_into(row, z, n, along)
-        for i in range(3):
-            sunk += n[i] * (y[i] - z[i])
-        for i in range(3):
-            T = grip.traction[o, f, q, i] - eps * (y[i] - z[i] - sunk * n[i])
-            touch.traction[o, f, q, i] = T
-            push[i] += T
-            for j in range(3):
-                k[i, j] -= eps * n[i] * n[j]
-            k[i, i] += eps
+            k[i, j] = (stiff + s * curvature) * n[i] * n[j] + s * curvature * along[i] * along[j]
+        k[i, i] -= s * curvature
+    if stuck:
+        hold_point(touch, o, f, q, y, push, k)
     return True
+
+
+@njit(cache=True)
+def hold_point(touch, o, f, q, y, push, k):
+    """push += T (3,) and k -= dT/dy (3, 3) of a stuck point y."""
+    row, grip, eps = touch.rows[o], touch.grip, touch.penalty[f]
+    n, along, z, sunk = np.empty(3), np.empty(3), np.empty(3), 0.0
+    for i in range(3):
+        z[i] = row[1 + i] + grip.anchor[o, f, q, i]
+    gap_into(row, z, n, along)
+    for i in range(3):
+        sunk += n[i] * (y[i] - z[i])
+    for i in range(3):
+        T = grip.traction[o, f, q, i] - eps * (y[i] - z[i] - sunk * n[i])
+        touch.traction[o, f, q, i] = T
+        push[i] += T
+        for j in range(3):
+            k[i, j] -= eps * n[i] * n[j]
+        k[i, i] += eps
 
 
 def first_grip(rows, sticks, surface: Surface, x, near) -> Grip:

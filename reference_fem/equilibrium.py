@@ -1,7 +1,7 @@
 """Loading paths: equilibria at wanted times, with sub-steps that shrink on failure and grow again."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -123,7 +123,6 @@ def advance(system: System, state: State, t, load, path):
         try:
             state = solve_step(system, state, there, load0 + goal * (load - load0))
         except StepFailed as failure:
-            state = replace(state, rate=None)  # a path that turns is not to be continued straight on
             share = 0.5 * (goal - reached)
             if share < system.settings.smallest_step:
                 raise stuck(state, t, failure, path) from failure

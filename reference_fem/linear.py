@@ -92,7 +92,7 @@ class PardisoFactors:
         self.call(22, nothing)
 
     def solve(self, b):
-        return self.call(33, np.ascontiguousarray(b))
+        return self.call(33, np.asfortranarray(b))
 
     def release(self):
         """Give MKL's memory back: it is invisible to Python's collector."""
@@ -151,7 +151,10 @@ class SymmetricSolver:
             ) from problem
 
     def solve(self, b):
-        """x with |K x - b| <= RESIDUAL_LIMIT |b|; one fresh analysis is tried before giving up."""
+        """x with |K x - b| <= RESIDUAL_LIMIT |b|, of the shape of b, (n,) or (n, k) for k right-hand sides at once.
+
+        One fresh analysis is tried before giving up.
+        """
         x = self.factors.solve(b)
         if self.misfit(x, b) > RESIDUAL_LIMIT:
             self.try_factor(afresh=True)
@@ -166,7 +169,7 @@ class SymmetricSolver:
         return x
 
     def misfit(self, x, b):
-        Kx = self.upper @ x + self.upper.T @ x - self.upper.diagonal() * x
+        Kx = self.upper @ x + self.upper.T @ x - (self.upper.diagonal() * x.T).T
         size = np.abs(b).max()
         with np.errstate(invalid="ignore"):
             gap = np.abs(Kx - b).max()

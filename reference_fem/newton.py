@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from reference_fem import contact
+from reference_fem import active_set, contact
+from reference_fem.contact import NO_GUESS
 from reference_fem.state import Loads, State
 from reference_fem.system import System
+from reference_fem.tangent import Tangent
 
 PENALTY_GROWTH = 2.0
 """Factor on the contact penalty at each multiplier update inside a step: plain updates gain little where a facet is
@@ -32,18 +34,18 @@ def solve_step(system: System, state: State, t, load) -> State:
     target, stiffness = system.held_at(t), 1.0
     force, filling = system.force_at(t, load), system.filling_at(t, load)
     loads = Loads(force, system.obstacles_at(t), state.pressure, filling, grip=state.hold)
-    x, found = first_guess(system, state, t, loads)
-    before = None
+    x, found, before = state.x, first_guess(system, state, loads), None
     for iteration in range(1, system.settings.max_iterations + 1):
-        direction = system.step(found, x, target)
-        x, found = search(system, x, direction, loads, before)
+        change, guess = direction(system, found, x, target)
+        loads = loads._replace(guess=guess)
+        x, found = search(system, x, change, loads, before)
         arrived = np.array_equal(x[system.pattern.held], target)
         off = misplaced(system, x, found)
         if arrived and settled(found, system.settings, LOOSE if off else 1.0):
             if not off:
-                rate, hold = rate_of(state, t, x), contact.renewed_grip(found.touch, system.sticks, system.surface, x)
+                hold = contact.renewed_grip(found.touch, system.sticks, system.surface, x)
                 settled_in = State(t, load, x, loads.multiplier, found.touch.pressure, iteration)
-                return replace(settled_in, stiffness=stiffness, rate=rate, grip=loads.grip, hold=hold)
+                return replace(settled_in, stiffness=stiffness, grip=loads.grip, hold=hold)
             stiffness *= PENALTY_GROWTH
             grip = loads.grip._replace(traction=found.touch.traction)
             loads = loads._replace(multiplier=found.touch.pressure, stiffness=stiffness, grip=grip)
@@ -54,24 +56,18 @@ def solve_step(system: System, state: State, t, load) -> State:
     )
 
 
-def first_guess(system, state, t, loads: Loads):
-    """Where Newton starts, and the evaluation its first direction is taken from.
-
-    On the straight line through the last two states: the points that come into contact are then known beforehand.
-    Where there is no such line, or it folds an element: at the old state, with the move of the obstacles linearised.
-    """
-    if state.rate is not None and t > state.t:
-        x = state.x + (t - state.t) * state.rate
-        found = system.evaluate(x, loads)
-        if found.usable:
-            return x, found
+def first_guess(system, state, loads: Loads):
+    """The evaluation that the first direction is taken from: where the body is, with the move of the obstacles
+    linearised."""
     old = system.obstacles_at(state.t)
-    return state.x, system.evaluate(state.x, loads._replace(rows=old, shift=loads.rows[:, 1:4] - old[:, 1:4]))
+    return system.evaluate(state.x, loads._replace(rows=old, shift=loads.rows[:, 1:4] - old[:, 1:4]))
 
 
-def rate_of(state, t, x):
-    """Mean dx/dt since the last state [1/s]; None while time stands still."""
-    return (x - state.x) / (t - state.t) if t > state.t else None
+def direction(system: System, found, x, target):
+    """Newton's change at x, which also takes the held unknowns to their target; and the contact pressures to expect."""
+    tangent = Tangent(system, found)
+    change = tangent.newton(target - x[system.pattern.held])
+    return active_set.settled(system, tangent, x, change) if len(system.rows) else (change, NO_GUESS)
 
 
 def settled(found, settings, slack):

@@ -6,6 +6,7 @@ import numpy as np
 
 from reference_fem.inertia import Motion, MovingSystem
 from reference_fem.state import State
+from reference_fem.tangent import Tangent
 
 
 def held_motion(system: MovingSystem, t, dt):
@@ -32,7 +33,7 @@ def released(system: MovingSystem, state: State, v, dt) -> Motion:
     v = v.copy()
     v[held], held_a = held_motion(system, state.t, dt)
     x = np.concatenate((state.x[:n], np.zeros(system.total - n)))
-    loads = system.loads_of(replace(state, load=1.0, x=x, rate=None))
+    loads = system.loads_of(replace(state, load=1.0, x=x))
     for k, lumen in enumerate(system.lumens):
         if lumen.by_pressure:
             x[system.field_count + k] = loads.filling[k]
@@ -44,10 +45,10 @@ def released(system: MovingSystem, state: State, v, dt) -> Motion:
         y[:n] += sign * dt * v
         found.residual[n:] += system.evaluate(y, loads, tangent=False).residual[n:] / dt**2
     put_mass(system, found.values, dt)
-    solution = system.step(found, x, x[held] + held_a)
+    solution = Tangent(system, found).newton(held_a)
     x[n:] += solution[n:]
     return Motion(
-        replace(state, load=1.0, x=x, rate=None),
+        replace(state, load=1.0, x=x),
         v,
         solution[:n],
         solution[:n].copy(),

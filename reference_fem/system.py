@@ -140,7 +140,7 @@ class System:
         values = np.zeros(self.pattern.size if tangent else 1)
         shift = np.zeros((len(loads.rows), 3)) if loads.shift is None else loads.shift
         penalty = loads.stiffness * self.surface.penalty
-        touch = contact.touch(loads.rows, shift, loads.multiplier, penalty, loads.grip)
+        touch = contact.touch(loads.rows, shift, loads.multiplier, penalty, loads.grip, loads.guess)
         parameters = self.problem.material.parameters
         J = assembly.add_elements(x, self.elements, parameters, self.positions, values, residual, tangent)
         volumes, gradients = np.zeros(len(self.lumens)), np.zeros((len(self.lumens), self.field_count))
@@ -168,30 +168,3 @@ class System:
         for lumen, misfit in zip(self.lumens, residual[m:], strict=True):
             misfits.append(abs(misfit) / (mu if lumen.by_pressure else lumen.volume0))
         return np.array([np.linalg.norm(free[:n]) / max(sizes), max(misfits)])
-
-    def step(self, found: Evaluation, x, target):
-        """Newton direction at x that also takes the held unknowns to their target."""
-        direction, free, held = np.zeros(self.total), self.pattern.free, self.pattern.held
-        lift = target - x[held]
-        self.solver.factor(self.pattern.upper(found.values))
-        direction[free] = self.solver.solve(-found.residual[free] - self.pattern.lifting(found.values) @ lift)
-        direction[held] = lift
-        if self.lumens:
-            self.border(found, direction)
-        return direction
-
-    def border(self, found: Evaluation, direction):
-        """Adds the change of the cavity pressures, and what it does to the fields, to a direction at fixed pressures.
-
-        With K b = dV/dx, the field direction is d + b dp, and dV/dx·(d + b dp) = -misfit gives dp: one more solve for
-        each cavity, no dense row in the pattern (docs/theory.md, eq. 42).
-        """
-        free, m = self.pattern.free, self.field_count
-        columns = np.array([self.solver.solve(gradient[free]) for gradient in found.gradients])
-        matrix = found.gradients[:, free] @ columns.T
-        right = -found.residual[m:] - found.gradients @ direction[:m]
-        for k, lumen in enumerate(self.lumens):
-            if lumen.by_pressure:
-                matrix[k], right[k] = np.eye(len(self.lumens))[k], -found.residual[m + k]
-        direction[m:] = np.linalg.solve(matrix, right)
-        direction[free] += direction[m:] @ columns
