@@ -3,7 +3,7 @@
 With the body and the obstacles' surfaces linearised, the pressures are still t = max(0, m - eps (g + n·d)). Newton's
 tangent takes the points that touch as known; where others touch, its step ends out of balance and points flicker from
 step to step. Each point that changes is a rank-one change eps w b bᵀ of the tangent, b = n N, so that the factors serve
-for any set of points (Sherman, Morrison and Woodbury; Hager, SIAM Review 31, 1989; docs/theory.md, eq. 63), and a
+for any set of points (Sherman, Morrison and Woodbury; Hager, SIAM Review 31, 1989; docs/theory.md, eq. 148), and a
 semismooth Newton iteration finds the set (Hintermüller, Ito and Kunisch, SIAM J. Optim. 13, 2003).
 """
 
@@ -63,7 +63,7 @@ def look_at(rows, y, gap, normal):
 def points_near(system: System, touch: Touch, x, change) -> Points:
     """The points on facets that are, or after the change will be, no farther from an obstacle than their size.
 
-    Stuck points are left as they are.
+    Of a stuck point only the normal part takes part: its traction stays as the tangent has it.
     """
     surface, counted = system.surface, touch.guess if len(touch.guess) else touch.pressure
     y = point_positions(x, surface)
@@ -74,8 +74,6 @@ def points_near(system: System, touch: Touch, x, change) -> Points:
     reach = np.sqrt(surface.weights.sum(axis=1))[:, None]
     close = (np.minimum(gap, after) < reach) | (counted > 0.0)
     near = np.repeat(close.any(axis=2)[..., None], gap.shape[2], axis=2)
-    if touch.grip.stuck.size:
-        near &= ~touch.grip.stuck
     place = o, f, q = np.nonzero(near)
     n, shapes = normal[place], surface.values[q]
     values = (n[:, :, None] * shapes[:, None, :]).ravel()
@@ -150,7 +148,7 @@ def changed(points: Points, gap):
 def pushes(points: Points, chosen, moves, gap):
     """Forces [N] at the points that change, (k,): +w t of those that touch, -w t of those that the tangent holds.
 
-    From t = m - eps (gap + moves·push) (eq. 63); moves (k, k): among themselves.
+    From t = m - eps (gap + moves·push) (eq. 148); moves (k, k): among themselves.
     """
     sign = np.where(points.touching[chosen], -1.0, 1.0)
     eps = points.penalty[chosen]

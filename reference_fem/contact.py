@@ -9,9 +9,7 @@ by the traction T = m_T - eps s, s its slip across the obstacle's normal there; 
 The place is known to the length of a load step: shorter steps for a contact that spreads over what it grips.
 
 Order 4 has as many points to a facet as nodes. More points ask for more than the nodes can give where a facet is
-partly in contact: active points flicker and Newton needs longer (order 8: half as many iterations again). Three points
-need fewer (6 -> 4.5 on a squeezed ball; mid-sides alone 3), but between them the body sinks three to thirty times
-deeper than the thousandth that is allowed.
+partly in contact; between fewer the body sinks in, three to thirty times deeper than a thousandth at three points.
 """
 
 from typing import NamedTuple
@@ -145,15 +143,14 @@ def out_of_reach(row, nodes):
 def press_point(touch, o, f, q, y, push, k):
     """push = t n + T (3,) and k = -d push/dy (3, 3) at the point y; False when both are zero.
 
-    With a guess s of the pressure k is that of a point pressed by s, whether or not it touches; not where it is stuck.
+    With a guess s of the pressure, k and T are those of a point pressed by s, whether or not it touches.
     """
     row, eps = touch.rows[o], touch.penalty[f]
     n, along = np.empty(3), np.empty(3)
     g, curvature = gap_into(row, y, n, along)
     t = s = max(0.0, touch.multiplier[o, f, q] - eps * g)
     touch.pressure[o, f, q] = t
-    stuck = o < touch.grip.stuck.shape[0] and touch.grip.stuck[o, f, q]
-    if len(touch.guess) and not stuck:
+    if len(touch.guess):
         s = touch.guess[o, f, q]
     if t == 0.0 and s == 0.0:
         return False
@@ -163,7 +160,7 @@ def press_point(touch, o, f, q, y, push, k):
         for j in range(3):
             k[i, j] = (stiff + s * curvature) * n[i] * n[j] + s * curvature * along[i] * along[j]
         k[i, i] -= s * curvature
-    if stuck:
+    if s > 0.0 and o < touch.grip.stuck.shape[0] and touch.grip.stuck[o, f, q]:
         hold_point(touch, o, f, q, y, push, k)
     return True
 
@@ -238,6 +235,13 @@ def slippage(touch: Touch):
         return 0.0
     slip = np.linalg.norm(touch.traction - touch.grip.traction, axis=-1) / touch.penalty[:, None]
     return float(np.max(slip, initial=0.0, where=touch.grip.stuck & (touch.pressure > 0.0)))
+
+
+def mistaken(touch: Touch):
+    """Whether a stuck point is held although nothing presses it, or pressed and not held: the guess was wrong."""
+    if not (touch.grip.stuck.size and touch.guess.size):
+        return False
+    return bool(np.any(touch.grip.stuck & ((touch.guess > 0.0) != (touch.pressure > 0.0))))
 
 
 def misplacement(touch: Touch):

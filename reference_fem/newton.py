@@ -21,6 +21,11 @@ LOOSE = 1e4
 """Factor on both tolerances before a multiplier update: solving closer first saves no iteration afterwards."""
 
 
+HESITATION = 8
+"""Iterations in which a stuck point may be let go and held again; then what is let go stays so to the end of the load
+step. Held, some points are not pressed, and let go, they are: without this they would come and go for ever."""
+
+
 class StepFailed(Exception):
     """A load step did not converge; the path tries a smaller one."""
 
@@ -37,7 +42,7 @@ def solve_step(system: System, state: State, t, load) -> State:
     x, found, before = state.x, first_guess(system, state, loads), None
     for iteration in range(1, system.settings.max_iterations + 1):
         change, guess = direction(system, found, x, target)
-        loads = loads._replace(guess=guess)
+        loads = loads._replace(guess=guess, grip=let_go(loads.grip, guess) if iteration > HESITATION else loads.grip)
         x, found = search(system, x, change, loads, before)
         arrived = np.array_equal(x[system.pattern.held], target)
         off = misplaced(system, x, found)
@@ -63,6 +68,11 @@ def first_guess(system, state, loads: Loads):
     return system.evaluate(state.x, loads._replace(rows=old, shift=loads.rows[:, 1:4] - old[:, 1:4]))
 
 
+def let_go(grip: contact.Grip, guess):
+    """The grip without the points that nothing will press."""
+    return grip._replace(stuck=grip.stuck & (guess > 0.0)) if grip.stuck.size else grip
+
+
 def direction(system: System, found, x, target):
     """Newton's change at x, which also takes the held unknowns to their target; and the contact pressures to expect."""
     tangent = Tangent(system, found)
@@ -71,7 +81,9 @@ def direction(system: System, found, x, target):
 
 
 def settled(found, settings, slack):
-    """Whether both relative errors are below their tolerances times slack."""
+    """Whether both relative errors are below their tolerances times slack, and what holds a point also presses it."""
+    if contact.mistaken(found.touch):
+        return False
     return found.errors[0] <= slack * settings.force_tol and found.errors[1] <= slack * settings.volume_tol
 
 

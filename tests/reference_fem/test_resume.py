@@ -60,7 +60,8 @@ def test_a_resumed_path_is_the_uninterrupted_one(kept, stop, tmp_path):
     assert whole[-1].obstacle_force[0, 0] > 0.0  # the grip carries a shear
     for resumed, once in zip(again, whole, strict=True):
         for name in ("u", "p", "obstacle_force", "held_force", "cavity_pressure", "cavity_volume"):
-            np.testing.assert_allclose(getattr(resumed, name), getattr(once, name), rtol=0.0, atol=1e-12)
+            # factors ordered for another first matrix differ by round-off, and contact multiplies it by its penalty
+            np.testing.assert_allclose(getattr(resumed, name), getattr(once, name), rtol=0.0, atol=2e-11)
         assert resumed.newton_iterations == once.newton_iterations
 
 
