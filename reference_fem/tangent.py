@@ -22,7 +22,7 @@ class Tangent:
                 if lumen.by_pressure:
                     self.matrix[k] = np.eye(len(system.lumens))[k]
 
-    def respond(self, forces, misfits=0.0, lifted=0.0):
+    def respond(self, forces, misfits: np.ndarray | float = 0.0, lifted: np.ndarray | float = 0.0):
         """Change of all unknowns (total, ...) that balances forces on the free ones (n, ...) and closes the misfits.
 
         misfits (nc, ...): of the cavities. lifted (m, ...): change of the held unknowns, its forces among `forces`.
