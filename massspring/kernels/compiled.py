@@ -45,13 +45,28 @@ def _keyed_cache() -> Iterator[None]:
         config.CACHE_DIR = before  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def compiled(function: Function) -> Function:
-    """Compile on first call, keep on disk. Division follows IEEE: a zero gives inf, and the run has diverged."""
+OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy"}
+"""Kept on disk; division follows IEEE: a zero gives inf, and the run has diverged."""
+
+
+def _jit(function: Function, **options: Any) -> Function:
     with _keyed_cache():
-        return numba.njit(cache=True, error_model="numpy")(function)  # pyright: ignore[reportReturnType]
+        return numba.njit(**OPTIONS, **options)(function)  # pyright: ignore[reportReturnType]
+
+
+def compiled(function: Function) -> Function:
+    """Compile on first call."""
+    return _jit(function)
+
+
+def lean(function: Function) -> Function:
+    """As `compiled`, without numba's runtime: what would allocate memory or make an array does not compile.
+
+    No references are counted. With them a call that is given a tuple of twenty arrays takes 200 ns, of a step's 15 µs.
+    """
+    return _jit(function, _nrt=False)
 
 
 def inlined(function: Function) -> Function:
-    """As `compiled`, but always part of its caller: a call counts the references of every array given (200 ns)."""
-    with _keyed_cache():
-        return numba.njit(cache=True, error_model="numpy", forceinline=True)(function)  # pyright: ignore[reportReturnType]
+    """As `lean`, and always part of its caller."""
+    return _jit(function, _nrt=False, forceinline=True)

@@ -5,12 +5,12 @@ What is rare (friction, two obstacles at once) has loops of its own in `kernels.
 
 import math
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import lean
 from massspring.kernels.distances import round_contact, round_gap
 from massspring.kernels.rubbing import release_slipping, release_wedged, rub, wedge
 
 
-@compiled
+@lean
 def seat(network, motion, drive, step, lam, count):
     """Puts the first `count` nodes of `motion.entering` on the obstacle each would enter deepest (eq. 12).
 
@@ -48,35 +48,50 @@ def seat(network, motion, drive, step, lam, count):
                 motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = a * n0, a * n1, a * n2
 
 
-@compiled
+@lean
+def plane_clearance(motion, inverse_mass, push, dt, normal, point):
+    """clearance_i = min(clearance_i, n·(y − p)) [m], y = x + dt (v* + push w G), of all nodes, (n,) (eq. 12)."""
+    x, v_star, gradient, clearance = motion.x, motion.v_star, motion.gradient, motion.clearance
+    n0, n1, n2, p0, p1, p2 = normal[0], normal[1], normal[2], point[0], point[1], point[2]
+    for i in range(clearance.shape[0]):
+        w = push * inverse_mass[i]
+        r0 = x[i, 0] + dt * (v_star[i, 0] + w * gradient[i, 0]) - p0
+        r1 = x[i, 1] + dt * (v_star[i, 1] + w * gradient[i, 1]) - p1
+        r2 = x[i, 2] + dt * (v_star[i, 2] + w * gradient[i, 2]) - p2
+        clearance[i] = min(clearance[i], n0 * r0 + n1 * r1 + n2 * r2)
+
+
+@lean
+def round_clearance(motion, inverse_mass, push, dt, start, span, radius):
+    """clearance_i = min(clearance_i, distance of y to a capsule or sphere) [m], of all nodes, (n,) (eq. 12)."""
+    x, v_star, gradient, clearance = motion.x, motion.v_star, motion.gradient, motion.clearance
+    p0, p1, p2, a0, a1, a2 = start[0], start[1], start[2], span[0], span[1], span[2]
+    for i in range(clearance.shape[0]):
+        w = push * inverse_mass[i]
+        r0 = x[i, 0] + dt * (v_star[i, 0] + w * gradient[i, 0]) - p0
+        r1 = x[i, 1] + dt * (v_star[i, 1] + w * gradient[i, 1]) - p1
+        r2 = x[i, 2] + dt * (v_star[i, 2] + w * gradient[i, 2]) - p2
+        clearance[i] = min(clearance[i], round_gap(r0, r1, r2, a0, a1, a2, radius))
+
+
+@lean
 def find_contacts(network, motion, drive, step, lam):
     """Touched nodes of the step when the last pressure acts as a force: u = v* + dt lam W G (eq. 12)."""
-    dt = drive.dt
+    inverse_mass, clearance = network.inverse_mass, motion.clearance
+    motion.touched[:] = 0
+    motion.locked[:] = 0
+    clearance[:] = math.inf
+    push = drive.dt * lam
+    for o in range(drive.radius.shape[0]):
+        point = drive.position[step, o]
+        if drive.is_plane[o]:
+            plane_clearance(motion, inverse_mass, push, drive.dt, drive.plane_normal[o], point)
+        else:
+            round_clearance(motion, inverse_mass, push, drive.dt, point, drive.span[o], drive.radius[o])
     count = 0
     for c in range(network.surface_nodes.shape[0]):
         i = network.surface_nodes[c]
-        motion.touched[i], motion.locked[i] = 0, 0
-        if network.inverse_mass[i] == 0.0:
-            continue
-        push = dt * lam * network.inverse_mass[i]
-        y0 = motion.x[i, 0] + dt * (motion.v_star[i, 0] + push * motion.gradient[i, 0])
-        y1 = motion.x[i, 1] + dt * (motion.v_star[i, 1] + push * motion.gradient[i, 1])
-        y2 = motion.x[i, 2] + dt * (motion.v_star[i, 2] + push * motion.gradient[i, 2])
-        nearest = math.inf
-        for o in range(drive.radius.shape[0]):
-            r0, r1, r2 = (
-                y0 - drive.position[step, o, 0],
-                y1 - drive.position[step, o, 1],
-                y2 - drive.position[step, o, 2],
-            )
-            if drive.is_plane[o]:
-                n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
-                nearest = min(nearest, n0 * r0 + n1 * r1 + n2 * r2)
-            else:
-                a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-                nearest = min(nearest, round_gap(r0, r1, r2, a0, a1, a2, drive.radius[o]))
-        motion.clearance[i] = nearest
-        if nearest < 0.0:
+        if clearance[i] < 0.0 and inverse_mass[i] > 0.0:
             motion.entering[count] = i
             count += 1
     if count > 0:
@@ -87,7 +102,7 @@ def find_contacts(network, motion, drive, step, lam):
         wedge(network, motion, drive, step, lam)
 
 
-@compiled
+@lean
 def revise_contacts(network, motion, drive, step, lam, reach):
     """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 13).
 
@@ -95,15 +110,16 @@ def revise_contacts(network, motion, drive, step, lam, reach):
     obstacles change by no more, so a free node farther away need not be looked at.
     """
     dt = drive.dt
+    nodes, all_locked, clearance = network.surface_nodes, motion.locked, motion.clearance
     count, changes = 0, 0
     if drive.rough:
         changes += release_slipping(network, motion, drive, lam)
     if drive.radius.shape[0] > 1:
         changes += release_wedged(network, motion, drive, lam) + wedge(network, motion, drive, step, lam)
-    for c in range(network.surface_nodes.shape[0]):
-        i = network.surface_nodes[c]
-        locked = motion.locked[i]
-        if network.inverse_mass[i] == 0.0 or locked == 2 or (locked == 0 and motion.clearance[i] > reach):
+    for c in range(nodes.shape[0]):
+        i = nodes[c]
+        locked = all_locked[i]
+        if (locked == 0 and clearance[i] > reach) or locked == 2 or network.inverse_mass[i] == 0.0:
             continue
         push = dt * lam * network.inverse_mass[i]
         u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
@@ -140,7 +156,7 @@ def revise_contacts(network, motion, drive, step, lam, reach):
     return changes + count
 
 
-@compiled
+@lean
 def pressure_reach(lam_change, mobility, lightest, dt):
     """dt² |Δlam| √(max w · Σ w |G|²) ≥ dt² |Δlam| w_i |G_i| [m]: how far a change of pressure moves any free node."""
     return 1.0001 * dt * dt * abs(lam_change) * math.sqrt(max(lightest * mobility, 0.0))

@@ -6,10 +6,10 @@ is given, which costs 200 ns.
 
 import math
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import lean
 
 
-@compiled
+@lean
 def allowed_part(locked, d0, d1, d2, g0, g1, g2):
     """P g, what obstacles leave of a vector: P = I − n nᵀ on one, e eᵀ on two, 0 where a node sticks (eq. 9)."""
     along = g0 * d0 + g1 * d1 + g2 * d2
@@ -20,14 +20,14 @@ def allowed_part(locked, d0, d1, d2, g0, g1, g2):
     return 0.0, 0.0, 0.0
 
 
-@compiled
+@lean
 def axis_share(r0, r1, r2, s0, s1, s2):
     """Where on a segment 0 … s the point nearest to r lies, 0 … 1; 0 where s has no length."""
     square = s0 * s0 + s1 * s1 + s2 * s2
     return min(max((r0 * s0 + r1 * s1 + r2 * s2) / square, 0.0), 1.0) if square > 0.0 else 0.0
 
 
-@compiled
+@lean
 def round_gap(r0, r1, r2, a0, a1, a2, radius):
     """Distance [m] of r to the axis 0 … a less a radius, negative inside (eq. 12)."""
     share = axis_share(r0, r1, r2, a0, a1, a2)
@@ -35,7 +35,7 @@ def round_gap(r0, r1, r2, a0, a1, a2, radius):
     return math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius
 
 
-@compiled
+@lean
 def sphere_contact(s0, s1, s2, r0, r1, r2, radius):
     """(normal, lift) of a node at s now and at r after the predicted step, seen from the centre [m] (eq. 12).
 
@@ -52,7 +52,7 @@ def sphere_contact(s0, s1, s2, r0, r1, r2, radius):
     return r0 / distance, r1 / distance, r2 / distance, radius - distance
 
 
-@compiled
+@lean
 def round_contact(s0, s1, s2, r0, r1, r2, a0, a1, a2, radius):
     """`sphere_contact` with the sphere around the nearest point of an axis 0 … a, a capsule's; a = 0: a sphere's.
 

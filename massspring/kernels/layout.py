@@ -76,6 +76,7 @@ class Network(NamedTuple):
     """[kg], (n,)."""
     inverse_mass: np.ndarray
     """[1/kg], (n,); 0 marks a node whose motion is prescribed."""
+    largest_inverse_mass: float
     surface_nodes: np.ndarray
     """Nodes that obstacles can touch, (c,) uint32."""
     held_nodes: np.ndarray

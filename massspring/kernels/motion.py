@@ -2,12 +2,15 @@
 
 import math
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import lean
 from massspring.kernels.distances import allowed_part
 from massspring.kernels.rubbing import shares
 
+NEGLIGIBLE = 1e-12
+"""A mobility this much smaller than what it was taken from is round-off."""
 
-@compiled
+
+@lean
 def predict_velocity_into(v, force, inverse_mass, dt, damping, gravity, v_star):
     """v* = (1 − c dt) v + dt (W f + g) [m/s], (n, 3) (eq. 6).
 
@@ -21,7 +24,7 @@ def predict_velocity_into(v, force, inverse_mass, dt, damping, gravity, v_star):
         v_star[i, 2] = keep * v[i, 2] + w * force[i, 2] + dt * gravity[2]
 
 
-@compiled
+@lean
 def prescribe_velocity_into(x, held_nodes, held_group, held_rest, displacement, dt, v_star):
     """v*_i = (X_i + d_g − x_i)/dt [m/s] for every held node: it ends the step where its attachment is (eq. 7)."""
     for h in range(held_nodes.shape[0]):
@@ -31,7 +34,7 @@ def prescribe_velocity_into(x, held_nodes, held_group, held_rest, displacement, 
             v_star[i, axis] = (held_rest[h, axis] + displacement[g, axis] - x[i, axis]) / dt
 
 
-@compiled
+@lean
 def volume_multiplier(motion, inverse_mass, volume_error, dt):
     """lam = [(V0 − V) − dt G·ṽ] / (dt² G·W̃·G) [Pa]: one division (eq. 8). Returns (lam, G·W̃·G).
 
@@ -60,7 +63,52 @@ def volume_multiplier(motion, inverse_mass, volume_error, dt):
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
 
 
-@compiled
+@lean
+def multiplier_of_sums(motion, inverse_mass, volume_error, dt, flow, mobility):
+    """The same from G·v* and G·W·G of all nodes, less what obstacles take of the few they touch (eq. 8, 9)."""
+    locked, direction, goal, gradient, v_star = (
+        motion.locked,
+        motion.direction,
+        motion.goal,
+        motion.gradient,
+        motion.v_star,
+    )
+    free = mobility
+    for i in range(locked.shape[0]):
+        if locked[i] > 0:
+            g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
+            v0, v1, v2 = v_star[i, 0], v_star[i, 1], v_star[i, 2]
+            d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
+            p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, g0, g1, g2)
+            mobility -= inverse_mass[i] * (g0 * (g0 - p0) + g1 * (g1 - p1) + g2 * (g2 - p2))
+            p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, v0, v1, v2)
+            flow += g0 * (p0 + goal[i, 0] - v0) + g1 * (p1 + goal[i, 1] - v1) + g2 * (p2 + goal[i, 2] - v2)
+    if mobility <= NEGLIGIBLE * free:
+        return 0.0, 0.0
+    return (volume_error - dt * flow) / (dt * dt * mobility), mobility
+
+
+@lean
+def flow_of(nodes, gradient, v_star):
+    """Σ G·v* [m³/s] over some nodes."""
+    flow = 0.0
+    for h in range(nodes.shape[0]):
+        i = nodes[h]
+        flow += gradient[i, 0] * v_star[i, 0] + gradient[i, 1] * v_star[i, 1] + gradient[i, 2] * v_star[i, 2]
+    return flow
+
+
+@lean
+def prescribe(network, motion, displacement, dt):
+    """v* of held nodes (eq. 7); returns what that changes of G·v* [m³/s]."""
+    before = flow_of(network.held_nodes, motion.gradient, motion.v_star)
+    prescribe_velocity_into(
+        motion.x, network.held_nodes, network.held_group, network.held_rest, displacement, dt, motion.v_star
+    )
+    return flow_of(network.held_nodes, motion.gradient, motion.v_star) - before
+
+
+@lean
 def steepest(gradient, inverse_mass):
     """max_i w_i |G_i| [m²/kg]: how far the node that moves most goes per unit of pressure and dt²."""
     largest = 0.0
@@ -70,7 +118,7 @@ def steepest(gradient, inverse_mass):
     return largest
 
 
-@compiled
+@lean
 def surely_short(volume_error, mobility, lightest, longest):
     """Whether no node moves farther than `longest` [m] to make up for a wrong volume: |e| √(max w / G·W̃·G) ≤ longest.
 
@@ -79,14 +127,14 @@ def surely_short(volume_error, mobility, lightest, longest):
     return volume_error * volume_error * lightest <= longest * longest * mobility
 
 
-@compiled
+@lean
 def capped_error(volume_error, mobility, steepest, longest):
     """V0 − V, at most `longest` · G·W̃·G / max w|G| [m³]: then no node moves farther than `longest` [m] (eq. 35)."""
     most = longest * mobility / steepest if steepest > 0.0 else 0.0
     return min(max(volume_error, -most), most)
 
 
-@compiled
+@lean
 def book(contact_impulse, o, other, k0, k1, k2):
     """Moves an impulse [N s] from the account of one obstacle to another's: a wedge pushes with both."""
     contact_impulse[o, 0] -= k0
@@ -97,39 +145,53 @@ def book(contact_impulse, o, other, k0, k1, k2):
     contact_impulse[other, 2] += k2
 
 
-@compiled
-def advance(motion, mass, inverse_mass, lam, dt, contact_impulse):
-    """v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺ (eq. 10).
+@lean
+def settle(motion, mass, contact_impulse):
+    """v⁺ of the nodes on obstacles (eq. 10), from `v` with what they would do without them, u.
 
-    Adds the impulse of each obstacle, m (v⁺ − u) with u what the node would do without it [N s].
+    Adds the impulse of each obstacle, m (v⁺ − u) [N s].
     """
+    v, locked = motion.v, motion.locked
     for i in range(mass.shape[0]):
-        push = dt * lam * inverse_mass[i]
-        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
-        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
-        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
-        if motion.locked[i] > 0:
-            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-            k0, k1, k2 = -u0, -u1, -u2
-            u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
-            u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
-            o, m = motion.touched[i] - 1, mass[i]
-            k0, k1, k2 = m * (k0 + u0), m * (k1 + u1), m * (k2 + u2)
-            contact_impulse[o, 0] += k0
-            contact_impulse[o, 1] += k1
-            contact_impulse[o, 2] += k2
-            if motion.locked[i] == 2:
-                m0, m1, m2 = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
-                n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-                _, beta = shares(k0, k1, k2, n0, n1, n2, m0, m1, m2)
-                book(contact_impulse, o, motion.second[i] - 1, beta * m0, beta * m1, beta * m2)
-        motion.v[i, 0], motion.v[i, 1], motion.v[i, 2] = u0, u1, u2
-        motion.x[i, 0] += dt * u0
-        motion.x[i, 1] += dt * u1
-        motion.x[i, 2] += dt * u2
+        if locked[i] == 0:
+            continue
+        u0, u1, u2 = v[i, 0], v[i, 1], v[i, 2]
+        d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+        k0, k1, k2 = -u0, -u1, -u2
+        u0, u1, u2 = allowed_part(locked[i], d0, d1, d2, u0, u1, u2)
+        u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
+        o, m = motion.touched[i] - 1, mass[i]
+        k0, k1, k2 = m * (k0 + u0), m * (k1 + u1), m * (k2 + u2)
+        contact_impulse[o, 0] += k0
+        contact_impulse[o, 1] += k1
+        contact_impulse[o, 2] += k2
+        if locked[i] == 2:
+            m0, m1, m2 = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
+            n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+            _, beta = shares(k0, k1, k2, n0, n1, n2, m0, m1, m2)
+            book(contact_impulse, o, motion.second[i] - 1, beta * m0, beta * m1, beta * m2)
+        v[i, 0], v[i, 1], v[i, 2] = u0, u1, u2
 
 
-@compiled
+@lean
+def advance(motion, mass, inverse_mass, lam, dt, contact_impulse):
+    """v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺ (eq. 10); adds the impulse of each obstacle to `contact_impulse`."""
+    x, v, v_star, gradient = motion.x, motion.v, motion.v_star, motion.gradient
+    real = x.dtype.type
+    step, impulse = real(dt), real(dt * lam)
+    for i in range(x.shape[0]):
+        push = impulse * real(inverse_mass[i])
+        v[i, 0] = v_star[i, 0] + push * gradient[i, 0]
+        v[i, 1] = v_star[i, 1] + push * gradient[i, 1]
+        v[i, 2] = v_star[i, 2] + push * gradient[i, 2]
+    settle(motion, mass, contact_impulse)
+    for i in range(x.shape[0]):
+        x[i, 0] += step * v[i, 0]
+        x[i, 1] += step * v[i, 1]
+        x[i, 2] += step * v[i, 2]
+
+
+@lean
 def add_held_impulse(network, motion, lam, dt, gravity, held_impulse):
     """I_g = −dt Σ_i∈g (f_i + lam G_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 11)."""
     for h in range(network.held_nodes.shape[0]):

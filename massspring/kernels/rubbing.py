@@ -2,7 +2,7 @@
 
 import math
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import lean
 from massspring.kernels.distances import allowed_part, axis_share
 
 SLIPS = 1.0 + 1e-9
@@ -11,7 +11,7 @@ PARALLEL = 1e-4
 """Squared sine between two normals (0.6°) below which they count as one: there is no edge to slide along."""
 
 
-@compiled
+@lean
 def rub(network, motion, drive, step, lam):
     """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 36)."""
     for c in range(network.surface_nodes.shape[0]):
@@ -38,7 +38,7 @@ def rub(network, motion, drive, step, lam):
             motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = g0 - lost * s0, g1 - lost * s1, g2 - lost * s2
 
 
-@compiled
+@lean
 def release_slipping(network, motion, drive, lam):
     """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 36)."""
     changes = 0
@@ -63,7 +63,7 @@ def release_slipping(network, motion, drive, lam):
     return changes
 
 
-@compiled
+@lean
 def wedge(network, motion, drive, step, lam):
     """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 37); how many.
 
@@ -121,7 +121,7 @@ def wedge(network, motion, drive, step, lam):
     return changes
 
 
-@compiled
+@lean
 def shares(k0, k1, k2, n0, n1, n2, m0, m1, m2):
     """The parts of k = α n + β n' + rest along two normals that are not parallel: (α, β)."""
     along, other = k0 * n0 + k1 * n1 + k2 * n2, k0 * m0 + k1 * m1 + k2 * m2
@@ -130,7 +130,7 @@ def shares(k0, k1, k2, n0, n1, n2, m0, m1, m2):
     return (along - cosine * other) / square, (other - cosine * along) / square
 
 
-@compiled
+@lean
 def release_wedged(network, motion, drive, lam):
     """Frees nodes in a wedge that one of their obstacles would pull; the next search finds the other (eq. 37)."""
     changes = 0

@@ -8,7 +8,7 @@ name before the loops, because what is taken out of a tuple has its references c
 
 import math
 
-from massspring.kernels.compiled import compiled, inlined
+from massspring.kernels.compiled import inlined, lean
 from massspring.kernels.membrane import add_membrane_forces
 from massspring.kernels.springs import SHORTEST
 
@@ -84,7 +84,7 @@ def close_rings(tile, o0, o1, o2):
         tile[BEFORE + lane] = volume
 
 
-@compiled
+@lean
 def gather(motion, slices, first, last, keeps, tile):
     """f_i [N] (eq. 1) and, where a volume is kept, 6 G_i = Σ_k d_k × d_k+1 [m²] (eq. 108) of some slices, (S, 384).
 
@@ -148,7 +148,7 @@ def put(tile, block, nodes, row, lanes, x):
         x[i, 0], x[i, 1], x[i, 2] = tile[at], tile[at + 1], tile[at + 2]
 
 
-@compiled
+@lean
 def predict_slices(motion, drive, slices, first, last, keeps, tile):
     """v* (eq. 6) and G of some slices, with their shares of G·v* and of G·W·G in `sums`."""
     real = motion.x.dtype.type
@@ -180,7 +180,7 @@ def predict_slices(motion, drive, slices, first, last, keeps, tile):
             sums[s, 1], sums[s, 2] = total(tile, SUMS), total(tile, SUMS + LANES)
 
 
-@compiled
+@lean
 def join_pieces(network, motion, drive, keeps):
     """v* and G of the nodes in pieces, and their shares of G·v* and G·W·G in the last of `sums`."""
     slices = network.slices
@@ -206,7 +206,7 @@ def join_pieces(network, motion, drive, keeps):
     motion.sums[last, 1], motion.sums[last, 2] = flow, mobility
 
 
-@compiled
+@lean
 def add_walls(network, motion, dt):
     """v* += dt W f of the triangle springs [m/s]; returns what that adds to G·v* [m³/s]."""
     flow = 0.0
@@ -220,7 +220,7 @@ def add_walls(network, motion, dt):
     return flow
 
 
-@compiled
+@lean
 def force_on_held(network, motion):
     """Spring forces of the held nodes [N]: what their attachments take."""
     slices = network.slices
@@ -235,7 +235,7 @@ def force_on_held(network, motion):
             motion.force[i, axis] = force
 
 
-@compiled
+@lean
 def gather_and_predict(network, motion, drive, keeps):
     """v* of eq. 6 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
 
@@ -256,7 +256,7 @@ def gather_and_predict(network, motion, drive, keeps):
     return volume, flow, mobility
 
 
-@compiled
+@lean
 def add_up(sums, pieces):
     """(V, G·v*, G·W·G) from the shares of the slices, in double precision and always in the same order."""
     volume, flow, mobility = 0.0, 0.0, 0.0

@@ -153,6 +153,7 @@ def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarra
         triangles=surface,
         mass=body.mass,
         inverse_mass=inverse_mass,
+        largest_inverse_mass=float(inverse_mass.max()),
         surface_nodes=body.surface_nodes,
         held_nodes=held_nodes.astype(np.uint32),
         held_group=np.repeat(np.arange(len(nodes)), [len(h) for h in nodes]).astype(np.uint32),

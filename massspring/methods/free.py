@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import lean
 from massspring.kernels.contact import find_contacts
 from massspring.kernels.layout import Drive
 from massspring.kernels.motion import add_held_impulse, advance, prescribe_velocity_into
@@ -12,7 +12,7 @@ from massspring.kernels.slices import gather_and_predict
 from massspring.methods.base import Method, State, begin_frame
 
 
-@compiled
+@lean
 def free_frame(network, motion, drive, tally, probing):
     """One frame of symplectic Euler with contact (eq. 6, 7, 10, 12)."""
     dt = drive.dt

@@ -17,17 +17,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import compiled, lean
 from massspring.kernels.contact import find_contacts, pressure_reach, revise_contacts
 from massspring.kernels.layout import Accuracy, Drive
 from massspring.kernels.motion import (
     add_held_impulse,
     advance,
     capped_error,
+    multiplier_of_sums,
+    prescribe,
     prescribe_velocity_into,
     steepest,
     surely_short,
-    volume_multiplier,
 )
 from massspring.kernels.multipliers import dense_into, solve_dense, solve_iteratively
 from massspring.kernels.probing import meet_probes
@@ -47,17 +48,14 @@ CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
 
 
-@compiled
+@lean
 def implicit_volume_frame(network, motion, drive, tally, lam, probing):
     """One frame of HCJ05 with contact inside the multiplier (eq. 6–13); returns the last lam [Pa]."""
     dt = drive.dt
-    lightest = network.inverse_mass.max()
+    lightest = network.largest_inverse_mass
     for step in range(drive.position.shape[0]):
-        volume, _, _ = gather_and_predict(network, motion, drive, True)
-        held = drive.held_displacement[step]
-        prescribe_velocity_into(
-            motion.x, network.held_nodes, network.held_group, network.held_rest, held, dt, motion.v_star
-        )
+        volume, flow, mobility = gather_and_predict(network, motion, drive, True)
+        flow += prescribe(network, motion, drive.held_displacement[step], dt)
         error = drive.volume_target[step, 0] - volume
         predicted = lam
         passes = 1
@@ -65,20 +63,20 @@ def implicit_volume_frame(network, motion, drive, tally, lam, probing):
             find_contacts(network, motion, drive, step, predicted)
             passes = CONTACT_PASSES
         for sweep in range(passes):
-            lam, mobility = volume_multiplier(motion, network.inverse_mass, error, dt)
-            if not surely_short(error, mobility, lightest, network.longest_correction):
+            lam, left = multiplier_of_sums(motion, network.inverse_mass, error, dt, flow, mobility)
+            if not surely_short(error, left, lightest, network.longest_correction):
                 reachable = steepest(motion.gradient, network.inverse_mass)
-                part = capped_error(error, mobility, reachable, network.longest_correction)
+                part = capped_error(error, left, reachable, network.longest_correction)
                 if part != error:
-                    lam, mobility = volume_multiplier(motion, network.inverse_mass, part, dt)
+                    lam, _ = multiplier_of_sums(motion, network.inverse_mass, part, dt, flow, mobility)
                     tally.capped[0] += sweep == 0
-            reach = pressure_reach(lam - predicted, mobility, lightest, dt)
+            reach = pressure_reach(lam - predicted, left, lightest, dt)
             if sweep + 1 < passes and revise_contacts(network, motion, drive, step, lam, reach) == 0:
                 break
-        if not mobility > 0.0:
+        if not left > 0.0:
             tally.skipped[0] += 1
         if probing is not None:
-            lam = meet_probes(network, motion, drive, step, probing, lam, mobility)
+            lam = meet_probes(network, motion, drive, step, probing, lam, left)
         add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
         advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
     return lam

@@ -5,7 +5,7 @@ import pytest
 
 from massspring import Attachment, Body, Clock, Free, ImplicitVolume, Setup, Volumes, tetrahedral_body
 from massspring.kernels.membrane import add_membrane_forces
-from massspring.kernels.motion import predict_velocity_into
+from massspring.kernels.motion import multiplier_of_sums, predict_velocity_into, prescribe, volume_multiplier
 from massspring.kernels.slices import LANES, gather_and_predict
 from massspring.kernels.springs import spring_forces_into
 from massspring.kernels.volume import enclosed_volume, volume_gradient_into
@@ -151,3 +151,29 @@ def test_every_spring_is_there_twice_and_little_else(ball_body):
     used = LANES * len(slices.lanes) - slices.lanes.sum()
     longest = (slices.start[1:] - slices.start[:-1]).max()
     assert slices.neighbour.size < 2.4 * springs.count + used * longest
+
+
+def test_the_multiplier_from_sums_is_the_one_over_all_nodes(ball_body):
+    """Touched nodes of every kind and held ones: what they take is taken from the sums."""
+    held = (3, 40, 77)
+    state, drive, (volume, flow, mobility) = gathered(ball_body, moved(ball_body), held=held)
+    net, motion, rng = state.network, state.motion, np.random.default_rng(1)
+    flow += prescribe(net, motion, np.array([[0.01, 0.0, -0.02]]), drive.dt)
+    for kind, nodes in ((1, [5, 6, 50]), (2, [9, 10]), (3, [60, 61])):
+        motion.locked[nodes] = kind
+        motion.direction[nodes] = rng.normal(size=(len(nodes), 3))
+        motion.direction[nodes] /= np.linalg.norm(motion.direction[nodes], axis=1)[:, None]
+        motion.goal[nodes] = rng.normal(size=(len(nodes), 3))
+    error = 0.01 * volume
+    expected = volume_multiplier(motion, net.inverse_mass, error, drive.dt)
+    found = multiplier_of_sums(motion, net.inverse_mass, error, drive.dt, flow, mobility)
+    assert found == pytest.approx(expected, rel=1e-12)
+    assert found[0] != pytest.approx(volume_multiplier(motion, 0.9 * net.inverse_mass, error, drive.dt)[0], rel=1e-3)
+
+
+def test_a_body_that_obstacles_hold_everywhere_has_no_multiplier(ball_body):
+    """What is left of G·W·G is round-off then; dividing by it would be a pressure of any size."""
+    state, drive, (volume, flow, mobility) = gathered(ball_body, moved(ball_body))
+    state.motion.locked[:] = 3
+    args = (state.motion, state.network.inverse_mass, 0.01 * volume, drive.dt, flow, mobility)
+    assert multiplier_of_sums(*args) == (0.0, 0.0)
