@@ -5,6 +5,7 @@ from massspring.methods.base import Method, State, start
 from massspring.methods.baumgarte import Baumgarte
 from massspring.methods.element import Element
 from massspring.methods.free import Free
+from massspring.methods.implicit_springs import ImplicitSprings
 from massspring.methods.implicit_volume import ImplicitVolume
 from massspring.methods.penalty import Penalty
 from massspring.methods.post_stabilization import PostStabilization
@@ -27,6 +28,7 @@ METHODS: tuple[type[Method], ...] = (
     Barycentre,
     Element,
     Xpbd,
+    ImplicitSprings,
 )
 
 __all__ = [
@@ -35,6 +37,7 @@ __all__ = [
     "Baumgarte",
     "Element",
     "Free",
+    "ImplicitSprings",
     "ImplicitVolume",
     "Method",
     "Penalty",

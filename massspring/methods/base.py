@@ -74,6 +74,8 @@ class Method(Protocol):
 
     meets_probes: ClassVar[bool] = False
     """Whether thin probes are met, in continuous time."""
+    limited: ClassVar[bool] = True
+    """Whether steps beyond the stability limit diverge; where not, accuracy alone limits them."""
 
     def applies(self, body: Body) -> str | None:
         """Why the method cannot advance `body`; None when it can."""
