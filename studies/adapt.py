@@ -151,7 +151,8 @@ def prepare(case: Case) -> Prepared:
     held = np.concatenate([a.nodes for a in attachments]) if attachments else None
     limit = step_limit(body, scene.damping, held, case.method.added_stiffness(body))
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
-    clock = make_clock(scene.duration, case.frames or scene.frames, dt, limit, case.beyond_limit)
+    beyond = case.beyond_limit or not case.method.limited
+    clock = make_clock(scene.duration, case.frames or scene.frames, dt, limit, beyond)
     setup = Setup(
         body,
         case.method,

@@ -226,7 +226,8 @@ def safe_dt(
     found = safe_step(case)
     limit = found.limit
     console.print(f"largest frequency  {limit.frequency:.4g} 1/s")
-    console.print(f"stability limit    {1e3 * limit.damped:.4g} ms  (without damping {1e3 * limit.undamped:.4g} ms)")
+    whose = "stability limit" if found.limited else "of explicit ones"
+    console.print(f"{whose:<18} {1e3 * limit.damped:.4g} ms  (without damping {1e3 * limit.undamped:.4g} ms)")
     console.print(f"dt = auto          {1e3 * found.auto:.4g} ms  (margin {found.margin:.3g})")
     for dt, outcome in found.tried:
         console.print(f"run at             {1e3 * dt:.4g} ms  ({dt / limit.damped:.3g} of the limit): {outcome}")

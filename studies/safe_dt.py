@@ -10,6 +10,8 @@ from studies.store import Status
 
 BELOW, ABOVE = 0.95, 1.10
 """Fractions of the predicted limit that are run. Contact and large strain move the true limit by a few per cent."""
+FAR_BEYOND = (2.0, 20.0)
+"""Multiples of the explicit limit at which a method without a limit is run."""
 WIDER, MOST_RUNS = 1.25, 8
 """Where the prediction fails the bracket is widened by this factor, a run at a time."""
 STEPS_PER_FRAME = 100
@@ -25,6 +27,8 @@ class SafeStep:
     """The step that dt = "auto" takes [s]."""
     tried: tuple[tuple[float, Status], ...]
     """(time step [s], how the run ended), ascending."""
+    limited: bool = True
+    """False for a method whose steps have no limit of stability; `limit` is then that of explicit methods."""
 
     @property
     def margin(self) -> float:
@@ -41,13 +45,21 @@ class SafeStep:
 
     @property
     def verified(self) -> bool:
-        """Whether the limit lies where it was predicted: between a step that holds and one that diverges."""
+        """Whether the limit lies where it was predicted: between a step that holds and one that diverges.
+
+        Where there is none, whether no run diverged.
+        """
+        if not self.limited:
+            return all(status != Status.DIVERGED for _, status in self.tried)
         found = self.bracket
         return found is not None and found[0] < self.limit.damped < found[1]
 
     @property
     def verdict(self) -> str:
         """What the runs say of the prediction, in a sentence."""
+        if not self.limited:
+            held = "verified" if self.verified else "not verified"
+            return f"no stability limit, {held}; accuracy alone limits the step: try half of it and compare"
         if self.verified:
             return "verified"
         if self.bracket is None:
@@ -65,6 +77,9 @@ def safe_step(case: Case) -> SafeStep:
     """
     prepared = prepare(case)
     limit, auto = prepared.limit, prepared.setup.clock.dt
+    if not case.method.limited:
+        longer = [_tried(case, factor * limit.damped) for factor in FAR_BEYOND]
+        return SafeStep(limit, auto, tuple(longer), limited=False)
     tried = [_tried(case, fraction * limit.damped) for fraction in (BELOW, ABOVE)]
     while len(tried) < MOST_RUNS and tried[0][1] == Status.DIVERGED:
         tried.insert(0, _tried(case, tried[0][0] / WIDER))

@@ -17,7 +17,7 @@ from tests.studies.tiny import tiny_case
 SHORT = replace(BALL_SQUEEZE, reference=None, duration=1.0, checkpoints=(1.0,))
 
 
-@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+@pytest.mark.parametrize("method", [m for m in METHODS if m.limited], ids=lambda method: method.name)
 def test_below_holds_and_above_breaks(method):
     found = safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60), method()))
     if method is Xpbd:
@@ -31,6 +31,15 @@ def test_below_holds_and_above_breaks(method):
     assert 0.99 * ABOVE <= above / found.limit.damped <= ABOVE * (1 + 1e-9)
     assert (calm, wild) == (Status.OK, Status.DIVERGED)
     assert found.auto <= 0.5 * found.limit.damped
+
+
+@pytest.mark.parametrize("method", [m for m in METHODS if not m.limited], ids=lambda method: method.name)
+def test_a_method_without_a_limit_says_so(method):
+    """Twenty times the explicit limit, and the run holds; a claim that fails is found out."""
+    found = safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60), method()))
+    assert found.verified and "no stability limit" in found.verdict and "accuracy" in found.verdict
+    assert found.tried[-1][0] > 15 * found.limit.damped
+    assert not replace(found, tried=((0.1, Status.DIVERGED),)).verified
 
 
 def test_stiffer_means_shorter():
