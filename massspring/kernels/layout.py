@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring.kernels.ticks import Ticks
+
 
 class Membrane(NamedTuple):
     """t triangle springs; edge a of a triangle lies opposite its node a."""
@@ -241,3 +243,5 @@ class Tally(NamedTuple):
     """Steps that made up for a part only of a wrong volume, (1,) int64."""
     iterations: np.ndarray
     """Iterations for the multipliers: their sum, and the most in one step, (2,) int64; 0 where they are direct."""
+    ticks: Ticks | None = None
+    """Where the time goes; None where nobody asks."""

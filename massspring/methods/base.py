@@ -12,6 +12,7 @@ from massspring.errors import MassSpringError
 from massspring.kernels.layout import Drive, Motion, Network, Tally, VolumeRows
 from massspring.kernels.probe_layout import Probing
 from massspring.kernels.slices import RESULT, TILE
+from massspring.kernels.ticks import Ticks
 from massspring.methods.rows import volume_rows
 from massspring.neighbours import aligned, slices_of
 from massspring.obstacles import Attachment
@@ -51,11 +52,10 @@ class State:
         return self.motion.v
 
 
-def new_tally(obstacles: int, attachments: int) -> Tally:
-    """A tally at zero."""
-    return Tally(
-        np.zeros((obstacles, 3)), np.zeros((attachments, 3)), *(np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
-    )
+def new_tally(obstacles: int, attachments: int, ticks: Ticks | None = None) -> Tally:
+    """A tally at zero; the ticks go on."""
+    counts = (np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
+    return Tally(np.zeros((obstacles, 3)), np.zeros((attachments, 3)), *counts, ticks)
 
 
 class Method(Protocol):
@@ -186,6 +186,7 @@ def one_whole(body: Body) -> str | None:
 def begin_frame(state: State, drive: Drive) -> State:
     """A copy to advance in place, so that the caller's state stays what it was."""
     motion = state.motion._replace(x=state.motion.x.copy(), v=state.motion.v.copy())
-    tally = new_tally(len(drive.radius) + drive.tips.end.shape[1], drive.held_displacement.shape[1])
+    obstacles = len(drive.radius) + drive.tips.end.shape[1]
+    tally = new_tally(obstacles, drive.held_displacement.shape[1], state.tally.ticks)
     probing = None if state.probing is None else fresh(state.probing, tally)
     return replace(state, motion=motion, tally=tally, probing=probing)

@@ -23,6 +23,7 @@ from massspring.kernels.motion import (
     volume_multiplier,
 )
 from massspring.kernels.prediction import predict
+from massspring.kernels.ticks import HELD, INTEGRATION, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, VOLUME, mark
 from massspring.kernels.volume import volume_gradient_into
 from massspring.methods.base import State, begin_frame
 from massspring.methods.implicit_volume import CONTACT_PASSES
@@ -104,16 +105,20 @@ def constraint_frame(network, motion, line, drive, tally, lam, rule):
     """One frame with contact inside the multiplier (eq. 6–13, 101–105); returns the last lam [Pa]."""
     dt = drive.dt
     lightest = network.inverse_mass.max()
+    mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         target = drive.volume_target[step, 0]
         error = rule.pull * (target - predict(network, motion, drive, step, True))
+        mark(tally.ticks, SPRINGS)
         kept = inertial_change(network, motion, rule, dt)
         if rule.at_prediction:
             predicted_gradient_into(network, motion, line, dt)
+        mark(tally.ticks, VOLUME)
         predicted = lam
         passes = 1
         if drive.radius.shape[0] > 0:
             find_contacts(network, motion, drive, step, predicted)
+            mark(tally.ticks, SEARCH)
             passes = CONTACT_PASSES
         for sweep in range(passes):
             lam, mobility = volume_multiplier(motion, network.inverse_mass, error + kept, dt)
@@ -125,15 +130,23 @@ def constraint_frame(network, motion, line, drive, tally, lam, rule):
                 if part != error:
                     lam, mobility = volume_multiplier(motion, network.inverse_mass, part + kept, dt)
                     tally.capped[0] += sweep == 0
+            mark(tally.ticks, MULTIPLIER)
+            if sweep + 1 == passes:
+                break
             reach = pressure_reach(lam - predicted, mobility, lightest, dt)
-            if sweep + 1 < passes and revise_contacts(network, motion, drive, step, lam, reach) == 0:
+            changes = revise_contacts(network, motion, drive, step, lam, reach)
+            mark(tally.ticks, REVISION)
+            if changes == 0:
                 break
         if not mobility > 0.0:
             tally.skipped[0] += 1
         add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
+        mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
+        mark(tally.ticks, INTEGRATION)
         if rule.stabilised:
             tally.capped[0] += correct_positions(network, motion, target, dt)
+            mark(tally.ticks, MULTIPLIER)
     return lam
 
 

@@ -9,6 +9,7 @@ from massspring.kernels.layout import Drive
 from massspring.kernels.motion import add_held_impulse, advance, prescribe_velocity_into
 from massspring.kernels.probing import meet_probes
 from massspring.kernels.slices import gather_and_predict
+from massspring.kernels.ticks import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, mark
 from massspring.methods.base import Method, State, begin_frame
 
 
@@ -16,18 +17,25 @@ from massspring.methods.base import Method, State, begin_frame
 def free_frame(network, motion, drive, tally, probing):
     """One frame of symplectic Euler with contact (eq. 6, 7, 10, 12)."""
     dt = drive.dt
+    mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         gather_and_predict(network, motion, drive, False)
+        mark(tally.ticks, SPRINGS)
         held = drive.held_displacement[step]
         prescribe_velocity_into(
             motion.x, network.held_nodes, network.held_group, network.held_rest, held, dt, motion.v_star
         )
+        mark(tally.ticks, HELD)
         if drive.radius.shape[0] > 0:
             find_contacts(network, motion, drive, step, 0.0)
+            mark(tally.ticks, SEARCH)
         if probing is not None:
             meet_probes(network, motion, drive, step, probing, 0.0, 0.0)
+            mark(tally.ticks, PROBES)
         add_held_impulse(network, motion, 0.0, dt, drive.gravity, tally.held_impulse)
+        mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, 0.0, dt, tally.contact_impulse)
+        mark(tally.ticks, INTEGRATION)
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,18 @@ from massspring.kernels.rows import (
     volumes_of_rows_into,
 )
 from massspring.kernels.slices import gather_and_predict
+from massspring.kernels.ticks import (
+    HELD,
+    INTEGRATION,
+    MULTIPLIER,
+    OUTSIDE,
+    PROBES,
+    REVISION,
+    SEARCH,
+    SPRINGS,
+    VOLUME,
+    mark,
+)
 from massspring.methods.base import Method, State, begin_frame
 
 CONTACT_PASSES = 3
@@ -53,14 +65,18 @@ def implicit_volume_frame(network, motion, drive, tally, lam, probing):
     """One frame of HCJ05 with contact inside the multiplier (eq. 6–13); returns the last lam [Pa]."""
     dt = drive.dt
     lightest = network.largest_inverse_mass
+    mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         volume, flow, mobility = gather_and_predict(network, motion, drive, True)
+        mark(tally.ticks, SPRINGS)
         flow += prescribe(network, motion, drive.held_displacement[step], dt)
+        mark(tally.ticks, HELD)
         error = drive.volume_target[step, 0] - volume
         predicted = lam
         passes = 1
         if drive.radius.shape[0] > 0:
             find_contacts(network, motion, drive, step, predicted)
+            mark(tally.ticks, SEARCH)
             passes = CONTACT_PASSES
         for sweep in range(passes):
             lam, left = multiplier_of_sums(motion, network.inverse_mass, error, dt, flow, mobility)
@@ -70,15 +86,23 @@ def implicit_volume_frame(network, motion, drive, tally, lam, probing):
                 if part != error:
                     lam, _ = multiplier_of_sums(motion, network.inverse_mass, part, dt, flow, mobility)
                     tally.capped[0] += sweep == 0
+            mark(tally.ticks, MULTIPLIER)
+            if sweep + 1 == passes:
+                break
             reach = pressure_reach(lam - predicted, left, lightest, dt)
-            if sweep + 1 < passes and revise_contacts(network, motion, drive, step, lam, reach) == 0:
+            changes = revise_contacts(network, motion, drive, step, lam, reach)
+            mark(tally.ticks, REVISION)
+            if changes == 0:
                 break
         if not left > 0.0:
             tally.skipped[0] += 1
         if probing is not None:
             lam = meet_probes(network, motion, drive, step, probing, lam, left)
+            mark(tally.ticks, PROBES)
         add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
+        mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
+        mark(tally.ticks, INTEGRATION)
     return lam
 
 
@@ -130,28 +154,40 @@ def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy):
     `motion.gradient` holds F = Jᵀ lam [N], so that with a pressure of 1 all shared kernels push with it.
     """
     dt = drive.dt
+    mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         gather_and_predict(network, motion, drive, False)
+        mark(tally.ticks, SPRINGS)
         held = drive.held_displacement[step]
         prescribe_velocity_into(
             motion.x, network.held_nodes, network.held_group, network.held_rest, held, dt, motion.v_star
         )
+        mark(tally.ticks, HELD)
         rows_into(motion.x, rows)
         volumes_of_rows_into(motion.x, rows, rows.volume)
         transposed_rows_times_into(rows, rows.lam, motion.gradient)
+        mark(tally.ticks, VOLUME)
         passes = 1
         if drive.radius.shape[0] > 0:
             find_contacts(network, motion, drive, step, 1.0)
+            mark(tally.ticks, SEARCH)
             passes = CONTACT_PASSES
         for sweep in range(passes):
             capped, idle = set_right_side(network, rows, motion, drive.volume_target[step], dt, accuracy.tolerance)
             solve_multipliers(network, rows, motion, tally, accuracy)
-            if sweep + 1 < passes and revise_contacts(network, motion, drive, step, 1.0, math.inf) == 0:
+            mark(tally.ticks, MULTIPLIER)
+            if sweep + 1 == passes:
+                break
+            changes = revise_contacts(network, motion, drive, step, 1.0, math.inf)
+            mark(tally.ticks, REVISION)
+            if changes == 0:
                 break
         tally.capped[0] += capped
         tally.skipped[0] += idle
         add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
+        mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, 1.0, dt, tally.contact_impulse)
+        mark(tally.ticks, INTEGRATION)
 
 
 @dataclass(frozen=True)
