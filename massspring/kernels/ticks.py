@@ -68,7 +68,7 @@ def now() -> int:
 
 @overload(now)
 def _compiled_now():
-    return lambda: _clock()
+    return lambda: _clock()  # pyright: ignore[reportCallIssue]
 
 
 @inlined

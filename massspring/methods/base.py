@@ -54,8 +54,8 @@ class State:
 
 def new_tally(obstacles: int, attachments: int, ticks: Ticks | None = None) -> Tally:
     """A tally at zero; the ticks go on."""
-    counts = (np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
-    return Tally(np.zeros((obstacles, 3)), np.zeros((attachments, 3)), *counts, ticks)
+    skipped, capped, iterations = (np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
+    return Tally(np.zeros((obstacles, 3)), np.zeros((attachments, 3)), skipped, capped, iterations, ticks)
 
 
 class Method(Protocol):
