@@ -29,22 +29,24 @@ def kept_radius(probe: Probe, body: Body) -> float:
 
 def new_pair() -> Pair:
     """One for everything: it is filled anew for each point and triangle."""
-    return Pair(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3))
+    return Pair(np.zeros((2, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3))
 
 
 def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tally: Tally) -> Probing:
     """Everything awake, nothing in contact, for probes on the triangles `surface` (f, 3)."""
     count, triangles, nodes = len(probes), len(surface), body.node_count
+    many = MOST_ROWS
     rows = Rows(
         count=np.zeros(1, dtype=np.int64),
-        triangle=np.zeros(MOST_ROWS, dtype=np.uint32),
-        probe=np.zeros(MOST_ROWS, dtype=np.uint32),
-        weight=np.zeros((MOST_ROWS, 3)),
-        direction=np.zeros((MOST_ROWS, 3)),
-        active=np.zeros(MOST_ROWS, dtype=np.bool_),
-        **{name: np.zeros(MOST_ROWS) for name in ("flow", "right", "impulse")},
-        **{name: np.zeros((MOST_ROWS, MOST_ROWS)) for name in ("matrix", "small")},
-        part=np.zeros((2, MOST_ROWS)),
+        **{name: np.zeros(many, dtype=np.uint32) for name in ("triangle", "probe")},
+        node=np.zeros((many, 3), dtype=np.uint32),
+        weight=np.zeros((many, 3)),
+        direction=np.zeros((many, 3)),
+        moves=np.zeros((many, 3, 3)),
+        **{name: np.zeros(many) for name in ("flow", "right", "impulse")},
+        active=np.zeros(many, dtype=np.bool_),
+        **{name: np.zeros((many, many)) for name in ("matrix", "small")},
+        part=np.zeros((2, many)),
     )
     return Probing(
         radius=np.array([kept_radius(probe, body) for probe in probes]),
@@ -54,12 +56,14 @@ def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tall
         block_wake=np.full((count, -(-triangles // BLOCK)), -np.inf),
         near=np.zeros((count, triangles), dtype=np.uint32),
         near_count=np.zeros(count, dtype=np.int64),
+        time=np.zeros(triangles),
+        found=np.zeros((triangles, 6)),
         rows=rows,
-        push=np.zeros((nodes, 3)),
+        **{name: np.zeros((nodes, 3)) for name in ("base", "drift", "push", "velocity")},
         carried=np.zeros(nodes, dtype=np.uint32),
         pair=new_pair(),
         tally=tally,
-        counts=np.zeros(6, dtype=np.int64),
+        counts=np.zeros(7, dtype=np.int64),
     )
 
 

@@ -27,6 +27,8 @@ CREEPS = 200
 class Pair(NamedTuple):
     """One point and one triangle during a step, and where they meet."""
 
+    tip: np.ndarray
+    """The point at the start of the step and at its end [m], (2, 3)."""
     begin: np.ndarray
     """Corners seen from the point at the start of the step [m], (3, 3)."""
     end: np.ndarray

@@ -23,21 +23,6 @@ SLACK = 1e-9
 
 
 @compiled
-def free_velocity(stage, i, lam):
-    """u_i = v* + w (dt lam G + Σ b n c) in the directions that obstacles leave to a node [m/s] (eq. 9, 146)."""
-    motion, probes = stage.motion, stage.probes
-    w, push = stage.network.inverse_mass[i], stage.dt * lam
-    u0 = motion.v_star[i, 0] + w * (push * motion.gradient[i, 0] + probes.push[i, 0])
-    u1 = motion.v_star[i, 1] + w * (push * motion.gradient[i, 1] + probes.push[i, 1])
-    u2 = motion.v_star[i, 2] + w * (push * motion.gradient[i, 2] + probes.push[i, 2])
-    if motion.locked[i] > 0:
-        d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-        u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
-        u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
-    return u0, u1, u2
-
-
-@compiled
 def row_of(rows, p, f):
     """The row of a probe and a triangle, or the number of rows."""
     count = rows.count[0]
@@ -48,84 +33,65 @@ def row_of(rows, p, f):
 
 
 @compiled
-def set_row(rows, k, p, f, pair):
-    """Row k is what `pair` has found of probe p and triangle f; whether there is room for it."""
+def set_row(rows, p, f, triangles, pair):
+    """Makes what `pair` has found of probe p and triangle f their row; whether there is room for it."""
+    k = row_of(rows, p, f)
     if k == rows.triangle.shape[0]:
         return False
     rows.count[0] = max(rows.count[0], k + 1)
     rows.probe[k], rows.triangle[k] = p, f
-    rows.weight[k, :] = pair.weight
-    rows.direction[k, :] = pair.direction
+    for q in range(3):
+        rows.node[k, q] = triangles[f, q]
+        rows.weight[k, q] = pair.weight[q]
+        rows.direction[k, q] = pair.direction[q]
     return True
 
 
 @compiled
-def spread_push(stage, share):
-    """push_i += share Σ_k b_ki n_k c_k [N s]; a share of 0 takes all pushes away."""
-    rows, push = stage.probes.rows, stage.probes.push
-    for k in range(rows.count[0]):
-        for q in range(3):
-            i = stage.network.triangles[rows.triangle[k], q]
-            for axis in range(3):
-                b = share * rows.weight[k, q] * rows.impulse[k] * rows.direction[k, axis]
-                push[i, axis] = push[i, axis] + b if share > 0.0 else 0.0
-
-
-@compiled
-def allowed_along(stage, i, d):
-    """W̃_i d [1/kg] for a direction (3,) (eq. 9)."""
-    w, motion = stage.network.inverse_mass[i], stage.motion
-    p0, p1, p2 = d[0], d[1], d[2]
-    if motion.locked[i] > 0:
-        e0, e1, e2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-        p0, p1, p2 = allowed_part(motion.locked[i], e0, e1, e2, p0, p1, p2)
-    return w * p0, w * p1, w * p2
-
-
-@compiled
-def rows_into(stage, lam, mobility):
-    """A, the flows g and the right sides of all rows, with no impulse on any node (eq. 146).
+def aim_rows(stage, keeping):
+    """W̃ n, the flow g and the right side of every row (eq. 146); flows only where a volume is kept.
 
     right_k = [radius − n·(Σ b x − tip⁺)]/dt − n·Σ b u [m/s].
     """
-    rows, triangles, x = stage.probes.rows, stage.network.triangles, stage.motion.x
+    rows, motion, probes = stage.probes.rows, stage.motion, stage.probes
     for k in range(rows.count[0]):
-        p, f, d = rows.probe[k], rows.triangle[k], rows.direction[k]
-        gap, approach, flow = 0.0, 0.0, 0.0
+        p = rows.probe[k]
+        d0, d1, d2 = rows.direction[k, 0], rows.direction[k, 1], rows.direction[k, 2]
+        end = stage.tips.end
+        gap = -(d0 * end[stage.step, p, 0] + d1 * end[stage.step, p, 1] + d2 * end[stage.step, p, 2])
+        approach, flow = 0.0, 0.0
         for q in range(3):
-            i, b = triangles[f, q], rows.weight[k, q]
-            u0, u1, u2 = free_velocity(stage, i, lam)
-            approach += b * (d[0] * u0 + d[1] * u1 + d[2] * u2)
-            for axis in range(3):
-                gap += b * d[axis] * (x[i, axis] - stage.tips.end[stage.step, p, axis])
-            m0, m1, m2 = allowed_along(stage, i, d)
-            g = stage.motion.gradient[i]
-            flow += b * (m0 * g[0] + m1 * g[1] + m2 * g[2])
-        rows.right[k] = (stage.probes.radius[p] - gap) / stage.dt - approach
-        rows.flow[k] = flow if mobility > 0.0 else 0.0
-    for k in range(rows.count[0]):
-        for j in range(k + 1):
-            shared = shared_mobility(stage, k, j)
-            # Without the volume a triangle always moves; with it, and all else held, it may have nowhere to go.
-            volume = rows.flow[k] * rows.flow[j] / mobility if mobility > 0.0 else 0.0
-            least = IDLE * shared if k == j else -1e300
-            rows.matrix[k, j] = max(shared - volume, least)
-            rows.matrix[j, k] = rows.matrix[k, j]
-        rows.matrix[k, k] *= 1.0 + RIGID
+            i, b = rows.node[k, q], rows.weight[k, q]
+            approach += b * (d0 * probes.base[i, 0] + d1 * probes.base[i, 1] + d2 * probes.base[i, 2])
+            flow += b * (d0 * probes.drift[i, 0] + d1 * probes.drift[i, 1] + d2 * probes.drift[i, 2])
+            gap += b * (d0 * motion.x[i, 0] + d1 * motion.x[i, 1] + d2 * motion.x[i, 2])
+            w, m0, m1, m2 = stage.network.inverse_mass[i], d0, d1, d2
+            if motion.locked[i] > 0:
+                e0, e1, e2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+                m0, m1, m2 = allowed_part(motion.locked[i], e0, e1, e2, m0, m1, m2)
+            rows.moves[k, q, 0], rows.moves[k, q, 1], rows.moves[k, q, 2] = w * m0, w * m1, w * m2
+        rows.right[k] = (probes.radius[p] - gap) / stage.dt - approach
+        rows.flow[k] = flow if keeping else 0.0
 
 
 @compiled
-def shared_mobility(stage, k, j):
-    """Σ_i b_ki b_ji n_k·W̃_i n_j [1/kg] over the nodes that two rows share (eq. 146)."""
-    rows, triangles = stage.probes.rows, stage.network.triangles
-    d, total = rows.direction[j], 0.0
-    for q in range(3):
-        i = triangles[rows.triangle[k], q]
-        for r in range(3):
-            if triangles[rows.triangle[j], r] == i:
-                m0, m1, m2 = allowed_along(stage, i, rows.direction[k])
-                total += rows.weight[k, q] * rows.weight[j, r] * (m0 * d[0] + m1 * d[1] + m2 * d[2])
-    return total
+def matrix_into(rows, mobility):
+    """A_kj = Σ_i b_ki b_ji n_k·W̃_i n_j − g_k g_j/(G·W̃·G) [1/kg], both halves (eq. 146)."""
+    for k in range(rows.count[0]):
+        for j in range(k + 1):
+            shared = 0.0
+            for q in range(3):
+                for r in range(3):
+                    if rows.node[k, q] == rows.node[j, r]:
+                        along = 0.0
+                        for axis in range(3):
+                            along += rows.moves[k, q, axis] * rows.direction[j, axis]
+                        shared += rows.weight[k, q] * rows.weight[j, r] * along
+            value = shared - (rows.flow[k] * rows.flow[j] / mobility if mobility > 0.0 else 0.0)
+            if k == j:
+                # Where all else is held the volume may leave a triangle nowhere to go.
+                value = max(value, IDLE * shared) * (1.0 + RIGID)
+            rows.matrix[k, j], rows.matrix[j, k] = value, value
 
 
 @compiled
@@ -180,14 +146,38 @@ def choose_rows(rows):
 
 
 @compiled
+def spread_push(rows, push, inverse_mass):
+    """push_i = Σ_k b_ki c_k W̃_i n_k [m/s] of the corners of all rows; the largest bound w Σ b c on it [m/s]."""
+    clear_push(rows, push)
+    fastest = 0.0
+    for k in range(rows.count[0]):
+        for q in range(3):
+            i, share = rows.node[k, q], rows.weight[k, q] * rows.impulse[k]
+            for axis in range(3):
+                push[i, axis] += share * rows.moves[k, q, axis]
+            fastest += inverse_mass[i] * share
+    return fastest
+
+
+@compiled
+def clear_push(rows, push):
+    """Takes the pushes of all rows away."""
+    for k in range(rows.count[0]):
+        for q in range(3):
+            for axis in range(3):
+                push[rows.node[k, q], axis] = 0.0
+
+
+@compiled
 def solve_rows(stage, lam, mobility):
-    """Impulses of all rows; returns the pressure that keeps the volume, lam − Σ g c/(dt G·W̃·G) [Pa] (eq. 146)."""
+    """Impulses of all rows; returns the pressure that keeps the volume, lam − Σ g c/(dt G·W̃·G) [Pa], and how much
+    faster they make a node at most [m/s] (eq. 146)."""
     rows = stage.probes.rows
-    spread_push(stage, 0.0)
-    rows_into(stage, lam, mobility)
+    aim_rows(stage, mobility > 0.0)
+    matrix_into(rows, mobility)
     choose_rows(rows)
-    spread_push(stage, 1.0)
+    fastest = spread_push(rows, stage.probes.push, stage.network.inverse_mass)
     if mobility > 0.0:
         for k in range(rows.count[0]):
             lam -= rows.flow[k] * rows.impulse[k] / (stage.dt * mobility)
-    return lam
+    return lam, fastest

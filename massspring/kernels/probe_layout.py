@@ -17,10 +17,14 @@ class Rows(NamedTuple):
     """(r,) uint32."""
     probe: np.ndarray
     """(r,) uint32."""
+    node: np.ndarray
+    """Corners of the triangle, (r, 3) uint32."""
     weight: np.ndarray
     """Barycentric weights b of the contact, (r, 3)."""
     direction: np.ndarray
     """Unit normal n, from the probe into the tissue, (r, 3)."""
+    moves: np.ndarray
+    """W̃_i n [1/kg] of each corner, (r, 3, 3)."""
     flow: np.ndarray
     """g_k = Σ_i b_i G_i · W̃_i n [m²/kg], how the volume changes with the impulse, (r,)."""
     matrix: np.ndarray
@@ -54,9 +58,19 @@ class Probing(NamedTuple):
     """Triangles that may meet a tip in this step, ascending, (p, f) uint32."""
     near_count: np.ndarray
     """(p,) int64."""
+    time: np.ndarray
+    """When a tip passes through each near triangle, 0 … 1 of the step, or more, (f,)."""
+    found: np.ndarray
+    """Weights and direction of each passing, (f, 6)."""
     rows: Rows
+    base: np.ndarray
+    """u_i, what a node does without contact [m/s], (n, 3); this and the next three: of corners of near triangles."""
+    drift: np.ndarray
+    """W̃_i G_i, its answer to pressure [m²/kg], (n, 3)."""
     push: np.ndarray
-    """Impulse of all rows on each node [N s], (n, 3); zero between steps."""
+    """Σ_k b_ki c_k W̃_i n_k, what the contacts add [m/s], (n, 3); zero between steps."""
+    velocity: np.ndarray
+    """v⁺_i as the step stands [m/s], (n, 3)."""
     carried: np.ndarray
     """1 + the probe that takes a node along, 0 for none, (n,) uint32; zero between steps."""
     pair: Pair
@@ -64,7 +78,7 @@ class Probing(NamedTuple):
     """Of the frame."""
     counts: np.ndarray
     """Steps with contact, passes, steps in which nodes were carried, steps that left a probe behind a triangle, pairs
-    compared, pairs tested; (6,) int64."""
+    compared, pairs tested, nodes carried; (7,) int64."""
 
 
 class Stage(NamedTuple):

@@ -15,6 +15,7 @@ from massspring import (
     Plane,
     Probe,
     Setup,
+    Shake,
     Sphere,
     Volumes,
     simulate,
@@ -23,6 +24,7 @@ from massspring import (
 from massspring.collision import is_inside, mean_edge, surface_distance
 from massspring.kernels.point_contacts import solve_rows
 from massspring.kernels.probe_layout import Stage
+from massspring.kernels.probing import gather
 from massspring.methods.base import begin_frame
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.test_methods import clock_for, thrown
@@ -119,10 +121,12 @@ def test_contacts_and_volume_equal_the_full_saddle_point_solve():
     lam = 50.0
     u = motion.v_star + dt * lam * net.inverse_mass[:, None] * g
     stage = Stage(net, motion, drive.tips, probing, 0, dt)
-    beside = solve_rows(stage, lam, mobility)
+    probing.near[0], probing.near_count[0] = np.arange(len(net.triangles)), len(net.triangles)
+    gather(stage, lam)
+    beside, _ = solve_rows(stage, lam, mobility)
     impulse = rows.impulse[:count]
     assert (impulse >= 0).all() and (impulse > 0).sum() > 0
-    found = motion.v_star + net.inverse_mass[:, None] * (dt * beside * g + probing.push)
+    found = motion.v_star + net.inverse_mass[:, None] * dt * beside * g + probing.push
 
     c = np.zeros((count, *u.shape))
     for k in range(count):
@@ -254,7 +258,7 @@ BAD = {
     "nan radius": (lambda: Probe((0, 0, 1), np.nan), {}, "zero or positive"),
     "too thick": (lambda: Probe((0, 0, 1), 2 * EDGE), {}, "use a Sphere, or a finer surface"),
     "several volumes": (lambda: Probe((0, 0, 1)), {"regions": True}, "keeps 7 volumes"),
-    "other method": (lambda: Probe((0, 0, 1)), {"method": object()}, "does not meet"),
+    "other method": (lambda: Probe((0, 0, 1)), {"method": Shake()}, "'shake' does not meet"),
 }
 
 
@@ -262,6 +266,6 @@ BAD = {
 def test_bad_probes_are_refused(block_body, name):
     build, other, words = BAD[name]
     body = block_body.keeping(Volumes.regions(block_body, 7)) if "regions" in other else BALL
-    method = type("Other", (), {"name": "other"})() if "method" in other else Free()
+    method = other.get("method", Free())
     with pytest.raises(MassSpringError, match=words):
         Setup(body, method, Clock(0.01, 1, 10), (build(),))
