@@ -28,7 +28,7 @@ from studies.progress import TerminalProgress
 from studies.reference_report import reference_listing
 from studies.run import replay as replay_run
 from studies.safe_dt import safe_step
-from studies.scenes import SCENES
+from studies.scenes import SCENES, UNJUDGED
 from studies.suggest import choose
 from studies.sweep import failed, load_runs, run_studies, standings, warnings_of
 from studies.table import study_table
@@ -66,7 +66,7 @@ def list_all() -> None:
     """Studies, scenes, organs, methods and metrics, a line each."""
     groups = {
         "studies": [(s.name, s.question.strip().split("\n")[0]) for s in STUDIES],
-        "scenes": [(s.name, s.title) for s in SCENES],
+        "scenes": [(s.name, s.title) for s in (*SCENES, *UNJUDGED)],
         "organs": [(name, (make.__doc__ or "").strip().split("\n")[0]) for name, make in SHAPES.items()],
         "methods": [(m.name, (m.__doc__ or "").strip().split("\n")[0]) for m in METHODS],
         "metrics": [(m.name, m.description) for m in METRICS],
@@ -219,7 +219,7 @@ def safe_dt(
     """The stability limit of a scene, predicted and then verified by running just below and just above it."""
     kind = choose(body, ("tetrahedral", "surface"), "body")
     case = Case(
-        scene=choose(scene, {s.name: s for s in SCENES}, "scene"),
+        scene=choose(scene, {s.name: s for s in (*SCENES, *UNJUDGED)}, "scene"),
         body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
         method=choose(method, {m.name: m for m in METHODS}, "method")(),
     )

@@ -13,7 +13,9 @@ from studies.geometry import SHAPES, organ
 from studies.kept_volume import kept_volumes
 from studies.machine import write_machine
 from studies.metrics import Run
+from studies.paper import play, slide_case, squeezed_balls
 from studies.paths import study_folder
+from studies.plots import paper_ball, paper_slide
 from studies.plots.organ_springs import draw_organ_springs
 from studies.plots.organs import draw_organs
 from studies.reference_report import refresh_uncertainty, state_of
@@ -108,12 +110,20 @@ def inputs_of(root: Path, study: Study) -> str:
 
 
 def draw_figures(root: Path) -> list[Path]:
-    """The gallery of all organs, and the springs of the paper's liver and stomach; the paths of the pictures."""
+    """The gallery of all organs, and Figures 1 to 4 of Jung, Hong and Choi (2005) from our runs; their paths."""
     gallery, springs = root / "figures" / "organs.png", root / "figures" / "organ_springs.png"
     make_folder(gallery.parent)
     draw_organs({name: organ(name, FIGURE_NODES) for name in SHAPES}, gallery)
     draw_organ_springs({name: organ(name, nodes, fill=False) for name, nodes in PAPER_NODES.items()}, springs)
-    return [gallery, springs]
+    return [gallery, springs, *draw_paper(gallery.parent)]
+
+
+def draw_paper(folder: Path) -> list[Path]:
+    """The paper's Figures 2 to 4, run now: two balls in seconds, the refined stomach in about a minute."""
+    squeezed, volume, slide = (folder / f"paper_{name}.png" for name in ("squeezed", "volume", "slide"))
+    paper_ball.draw(squeezed_balls(), squeezed, volume)
+    paper_slide.draw(play(slide_case()), slide)
+    return [squeezed, volume, slide]
 
 
 def summary_of(runs_of: dict[str, list[Run]]) -> str:

@@ -78,11 +78,11 @@ def _radius(run: Run) -> float:
 def _words(run: Run) -> tuple[str, list[str]]:
     force = float(run.force[run.checkpoint_frames[-1]])
     error = "" if run.reference is None else f" ({force_end(run):+.0f} %)".replace("-", "−")
-    lines = [_volume(volume_end(run), volume_worst(run)), f"force {force:.2f} N{error}"]
+    lines = [volume_words(volume_end(run), volume_worst(run)), f"force {force:.2f} N{error}"]
     return NAMES.get(run.case.method.name, readable(run.case.method.name)), lines
 
 
-def _volume(end: float, worst: float) -> str:
+def volume_words(end: float, worst: float) -> str:
     """Change at the end [%], or where that shows no digit, the worst on the way."""
     if worst >= KEPT:
         return f"volume {end:+.1f} %".replace("-", "−")
@@ -104,14 +104,14 @@ def _draw_ball(
     planes = [plane for plane in run.case.scene.obstacles if isinstance(plane, Plane)]
     planes.sort(key=lambda plane: plane.point[2])
     for plane in [plane for plane in planes if plane.unit_normal[2] > 0]:
-        _draw_plane(axes, plane, t, size)
+        draw_plane(axes, plane, t, size)
     draw_surface(axes, points, triangles, uniform(colour, len(triangles), PALER), CAMERA)
     for plane in [plane for plane in planes if plane.unit_normal[2] <= 0]:
-        _draw_plane(axes, plane, t, size)
+        draw_plane(axes, plane, t, size)
     frame(axes, np.array([-1.5, -1.5]) * size, np.array([1.5, 1.25]) * size)
 
 
-def _draw_plane(axes: Axes, plane: Plane, t: float, size: float) -> None:
+def draw_plane(axes: Axes, plane: Plane, t: float, size: float) -> None:
     """A disc of glass that ends at the plane."""
     middle = np.asarray(plane.point) + plane.path(t)
     turn = np.linspace(0, 2 * np.pi, 181)

@@ -10,6 +10,7 @@ from studies.scenes.liver_probe import LIVER_PROBE
 from studies.scenes.spleen_sag import SPLEEN_SAG
 from studies.scenes.stomach_press import STOMACH_PRESS
 from studies.scenes.stomach_probe import STOMACH_PROBE
+from studies.scenes.stomach_slide import STOMACH_SLIDE
 
 SCENES: tuple[Scene, ...] = (
     BALL_SQUEEZE,
@@ -23,6 +24,9 @@ SCENES: tuple[Scene, ...] = (
     BLADDER_FILL,
 )
 
+UNJUDGED: tuple[Scene, ...] = (STOMACH_SLIDE,)
+"""Scenes of the mass-spring body alone: found by commands, without a reference, so in no study of accuracy."""
+
 __all__ = [
     "BALL_CLAMPED",
     "BALL_SQUEEZE",
@@ -34,6 +38,8 @@ __all__ = [
     "SPLEEN_SAG",
     "STOMACH_PRESS",
     "STOMACH_PROBE",
+    "STOMACH_SLIDE",
+    "UNJUDGED",
     "Held",
     "Lumen",
     "Organ",

@@ -86,15 +86,15 @@ def test_the_volume_is_kept_beside_the_contact():
 
 @BOTH
 def test_an_attachment_bears_what_presses_on_its_nodes(method):
-    """A point on a triangle with a held node: that node's share of the push goes straight into the reaction."""
-    setup = pressed(method, frames=150)
+    """A point on a triangle with two held nodes: their share of the push goes straight into the reaction."""
+    setup = pressed(method, depth=0.004, frames=150)
     tip = setup.probes[0].anchor
-    near = int(np.argmin(np.linalg.norm(BALL.rest - tip, axis=1)))
+    near = np.argsort(np.linalg.norm(BALL.rest - tip, axis=1))[:2]
     held = Attachment(np.append(setup.attachments[0].nodes, near))
     history = simulate(Setup(BALL, method, setup.clock, setup.obstacles, (held,), damping=60.0))
     contact, reaction = history.contact_force[-1, 0], history.held_force[-1, 0]
     assert contact[2] < -1e-4 * SOFT.shear_modulus * R**2
-    # The springs still creep a little; the share that must not be lost is more than a tenth.
+    # The springs still creep a little; the share that must not be lost is more than half.
     assert np.abs(contact + reaction).max() < 1e-2 * np.abs(contact).max()
 
 

@@ -1,0 +1,89 @@
+"""The paper's scenes on small bodies: the slide is stored and read back, plays, and what it shows is true."""
+
+import json
+
+import numpy as np
+import pytest
+
+from massspring import Free
+from massspring.collision import is_inside
+from studies.case import case_from_json, scene_from_dict, scene_to_json
+from studies.paper import ball_case, moments, play, slide_case, tip_of
+from studies.plots import paper_ball, paper_slide
+from studies.scenes import SCENES, STOMACH_SLIDE, UNJUDGED
+from studies.scenes.stomach_slide import NODES
+
+SMALL = 400
+
+
+@pytest.fixture(scope="module")
+def slide(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ORGANBENCH_CACHE", str(tmp_path_factory.mktemp("meshes")))
+        yield play(slide_case(SMALL))
+
+
+@pytest.fixture(scope="module")
+def balls(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ORGANBENCH_CACHE", str(tmp_path_factory.mktemp("meshes")))
+        yield {name: play(ball_case(method, 150)) for name, method in (("free", Free()), ("implicit_volume", kept()))}
+
+
+def kept():
+    return slide_case(SMALL).method
+
+
+def test_the_slide_is_stored_and_read_back(slide):
+    assert scene_from_dict(json.loads(scene_to_json(STOMACH_SLIDE))) == STOMACH_SLIDE
+    assert case_from_json(slide.case.key) == slide.case
+    assert STOMACH_SLIDE in UNJUDGED and STOMACH_SLIDE not in SCENES
+    assert 2 * NODES - 4 == 38_996  # triangles of a closed surface: the paper's 39,000, rounded
+
+
+def test_the_probe_stays_outside_and_presses_while_it_slides(slide):
+    """The tip of every frame lies outside the surface of that frame; the volume is kept all the way."""
+    triangles = slide.prepared.setup.body.triangles
+    for frame, x in enumerate(slide.history.snapshots):
+        assert not is_inside(tip_of(slide, frame), x, triangles)
+    at = moments(slide)
+    assert at["first contact"] < at["deep"] < at["end of the slide"]
+    assert slide.force[at["deep"]] > 10 * slide.force[at["first contact"]] > 0
+    assert slide.force[at["deep"] : at["end of the slide"]].min() > 0
+    assert np.abs(slide.history.volume / slide.history.volume_target - 1).max() < 1e-4
+
+
+def test_what_is_drawn_of_the_slide_is_the_run(slide):
+    figure = paper_slide.figure(slide)
+    assert len(figure.axes) == 6
+    texts = [text.get_text() for axes in figure.axes for text in axes.texts]
+    for frame in moments(slide).values():
+        assert any(f"force {1e3 * slide.force[frame]:.1f} mN" in text for text in texts)
+    deep = figure.axes[1].collections[0].get_paths()
+    assert len(deep) > 0.3 * len(slide.prepared.setup.body.triangles)  # what faces the eye, and the shaft
+
+
+def test_the_shaft_ends_at_the_tip():
+    tip = np.array([0.01, 0.02, 0.03])
+    corners, normals = paper_slide.rod(tip)
+    assert np.linalg.norm(corners.reshape(-1, 3) - tip, axis=1).min() < 1e-12
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert ((outward * normals).sum(axis=1) >= -1e-15).all()
+
+
+def test_the_curves_are_the_volumes(balls, tmp_path):
+    figure = paper_ball.volume_figure(balls)
+    for line, played in zip(figure.axes[0].lines, balls.values(), strict=True):
+        ratio = played.history.volume[:, 0] / played.history.volume_target[:, 0]
+        assert np.array_equal(line.get_ydata(), 100 * (ratio - 1))
+        assert len(ratio) == 800
+    assert paper_ball.change(balls["free"])[-1] < -5 < -1e-2 < paper_ball.change(balls["implicit_volume"])[-1]
+    paper_ball.draw(balls, tmp_path / "a.png", tmp_path / "b.png")
+    assert (tmp_path / "a.png").stat().st_size > 2000 and (tmp_path / "b.png").stat().st_size > 2000
+
+
+def test_the_squeezed_balls_say_what_they_lost(balls):
+    figure = paper_ball.squeezed_figure(balls)
+    said = "\n".join(text.get_text() for axes in figure.axes for text in axes.texts)
+    assert f"{paper_ball.change(balls['free'])[-1]:+.1f} %".replace("-", "−") in said
+    assert "volume kept within" in said
