@@ -2,7 +2,7 @@
 
 import math
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import lean
 from massspring.kernels.distances import allowed_part
 
 BLOCK = 64
@@ -13,7 +13,7 @@ SAFE = 1.0 + 1e-9
 """Sums of distances over a million steps lose less than this."""
 
 
-@compiled
+@lean
 def fastest_node(network, motion, lam, dt):
     """max_i |v⁺_i| [m/s] of the step as it stands, without thin probes (eq. 10)."""
     fastest = 0.0
@@ -30,7 +30,7 @@ def fastest_node(network, motion, lam, dt):
     return math.sqrt(fastest)
 
 
-@compiled
+@lean
 def box_gap(x, triangles, f, p0, p1, p2):
     """Distance [m] of a point to the axis-aligned box of a triangle: never more than to the triangle (eq. 145)."""
     a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
@@ -40,7 +40,7 @@ def box_gap(x, triangles, f, p0, p1, p2):
     return math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
 
 
-@compiled
+@lean
 def find_near(network, motion, tips, step, probes, reach):
     """Fills `near` with the triangles whose box may come within the radius of a tip in `reach` [m] of motion (eq. 145).
 

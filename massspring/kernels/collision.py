@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import lean
 from massspring.kernels.distances import axis_share
 
 NEVER = 2.0
@@ -41,7 +41,7 @@ class Pair(NamedTuple):
     """Unit vector from the point into the triangle, (3,)."""
 
 
-@compiled
+@lean
 def nearest_into(corner, weight):
     """Weights (3,) of the point of a triangle (3, 3) nearest to the origin; returns its distance [m] (eq. 141).
 
@@ -73,7 +73,7 @@ def nearest_into(corner, weight):
     return math.sqrt(best)
 
 
-@compiled
+@lean
 def triple(p, i, q, j, r, k):
     """p_i · (q_j × r_k) of rows of three arrays (3, 3) [m³]."""
     return (
@@ -83,7 +83,7 @@ def triple(p, i, q, j, r, k):
     )
 
 
-@compiled
+@lean
 def coplanarity(begin, move):
     """Coefficients of (a + t a') · ((b + t b') × (c + t c')) = f0 + f1 t + f2 t² + f3 t³ [m³] (eq. 142).
 
@@ -95,7 +95,7 @@ def coplanarity(begin, move):
     return f0, f1, f2, triple(move, 0, move, 1, move, 2)
 
 
-@compiled
+@lean
 def turning_points(f1, f2, f3):
     """Times in (0, 1) at which f0 + f1 t + f2 t² + f3 t³ turns, ascending; NEVER for one that is not there."""
     root = f2 * f2 - 3.0 * f1 * f3
@@ -110,7 +110,7 @@ def turning_points(f1, f2, f3):
     return min(first, second), max(first, second)
 
 
-@compiled
+@lean
 def single_root(low, high, f0, f1, f2, f3):
     """The root of f0 + f1 t + f2 t² + f3 t³ between `low` and `high`, where its sign differs: halving (eq. 142)."""
     rising = f0 + low * (f1 + low * (f2 + low * f3)) < 0.0
@@ -123,7 +123,7 @@ def single_root(low, high, f0, f1, f2, f3):
     return high
 
 
-@compiled
+@lean
 def at_time(pair, t):
     """Corners at time t of the step, in `pair.corner`."""
     for k in range(3):
@@ -131,7 +131,7 @@ def at_time(pair, t):
             pair.corner[k, axis] = (1.0 - t) * pair.begin[k, axis] + t * pair.end[k, axis]
 
 
-@compiled
+@lean
 def point_along(pair, sign):
     """Makes `direction` the triangle's unit normal times `sign`; without area or sign, against its motion (eq. 143)."""
     y, d = pair.corner, pair.direction
@@ -150,7 +150,7 @@ def point_along(pair, sign):
         d[0], d[1], d[2] = d[0] / length, d[1] / length, d[2] / length
 
 
-@compiled
+@lean
 def touching(pair, radius):
     """First time at which the triangle is within `radius` [m] of the point, by steps that cannot overshoot (eq. 144).
 
@@ -184,7 +184,7 @@ def touching(pair, radius):
     return t
 
 
-@compiled
+@lean
 def crossing(pair):
     """First time at which the point passes through the triangle, or NEVER: roots of (142) at which it lies inside.
 

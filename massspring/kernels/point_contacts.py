@@ -8,7 +8,7 @@ A contact at the weights b of a triangle couples its three nodes. With u the mot
 Eliminating the change of pressure δ leaves A c ≥ right with A_kl = Σ_i b_ki b_li n_k·W̃_i n_l − g_k g_l/(G·W̃·G).
 """
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import lean
 from massspring.kernels.distances import allowed_part
 from massspring.kernels.multipliers import solve_dense
 
@@ -22,7 +22,7 @@ SLACK = 1e-9
 """Share of the largest right side by which a contact that does not press may be missed: round-off."""
 
 
-@compiled
+@lean
 def row_of(rows, p, f):
     """The row of a probe and a triangle, or the number of rows."""
     count = rows.count[0]
@@ -32,7 +32,7 @@ def row_of(rows, p, f):
     return count
 
 
-@compiled
+@lean
 def set_row(rows, p, f, triangles, pair):
     """Makes what `pair` has found of probe p and triangle f their row; whether there is room for it."""
     k = row_of(rows, p, f)
@@ -47,7 +47,7 @@ def set_row(rows, p, f, triangles, pair):
     return True
 
 
-@compiled
+@lean
 def aim_rows(stage, keeping):
     """W̃ n, the flow g and the right side of every row (eq. 146); flows only where a volume is kept.
 
@@ -74,7 +74,7 @@ def aim_rows(stage, keeping):
         rows.flow[k] = flow if keeping else 0.0
 
 
-@compiled
+@lean
 def matrix_into(rows, mobility):
     """A_kj = Σ_i b_ki b_ji n_k·W̃_i n_j − g_k g_j/(G·W̃·G) [1/kg], both halves (eq. 146)."""
     for k in range(rows.count[0]):
@@ -94,7 +94,7 @@ def matrix_into(rows, mobility):
             rows.matrix[k, j], rows.matrix[j, k] = value, value
 
 
-@compiled
+@lean
 def press(rows):
     """A_aa c_a = right_a for the rows that press, the others 0 [N s] (eq. 146)."""
     count, active = 0, rows.active
@@ -116,7 +116,7 @@ def press(rows):
             count += 1
 
 
-@compiled
+@lean
 def choose_rows(rows):
     """c ≥ 0, A c ≥ right, and one of them equal in every row: a contact that would pull is left (eq. 146)."""
     n = rows.count[0]
@@ -145,7 +145,7 @@ def choose_rows(rows):
         rows.impulse[k] = max(rows.impulse[k], 0.0)
 
 
-@compiled
+@lean
 def spread_push(rows, push, inverse_mass):
     """push_i = Σ_k b_ki c_k W̃_i n_k [m/s] of the corners of all rows; the largest bound w Σ b c on it [m/s]."""
     clear_push(rows, push)
@@ -159,7 +159,7 @@ def spread_push(rows, push, inverse_mass):
     return fastest
 
 
-@compiled
+@lean
 def clear_push(rows, push):
     """Takes the pushes of all rows away."""
     for k in range(rows.count[0]):
@@ -168,7 +168,7 @@ def clear_push(rows, push):
                 push[rows.node[k, q], axis] = 0.0
 
 
-@compiled
+@lean
 def solve_rows(stage, lam, mobility):
     """Impulses of all rows; returns the pressure that keeps the volume, lam − Σ g c/(dt G·W̃·G) [Pa], and how much
     faster they make a node at most [m/s] (eq. 146)."""

@@ -8,7 +8,7 @@ import math
 
 from massspring.kernels.broad_phase import ROOM, fastest_node, find_near
 from massspring.kernels.collision import NEVER, crossing, nearest_into, touching
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import lean
 from massspring.kernels.contact import pressure_reach
 from massspring.kernels.distances import allowed_part
 from massspring.kernels.point_contacts import clear_push, row_of, set_row, solve_rows
@@ -26,7 +26,7 @@ LEFT = 1e-9
 """Share of G·W̃·G that nodes that are not carried must have for the volume to be left to them."""
 
 
-@compiled
+@lean
 def gather(stage, lam):
     """u_i and W̃_i G_i of the corners of all near triangles (eq. 9, 10), and v⁺ = u."""
     motion, probes, triangles, weight = stage.motion, stage.probes, stage.network.triangles, stage.network.inverse_mass
@@ -49,7 +49,7 @@ def gather(stage, lam):
                 velocity[i, 0], velocity[i, 1], velocity[i, 2] = base[i, 0], base[i, 1], base[i, 2]
 
 
-@compiled
+@lean
 def move(stage, change):
     """v⁺_i = u_i + push_i + dt δ W̃_i G_i of the near corners, or the tip's where it carries them [m/s] (eq. 146, 147).
 
@@ -71,7 +71,7 @@ def move(stage, change):
                         velocity[i, axis] = way / stage.dt
 
 
-@compiled
+@lean
 def take_tip(stage, p):
     """Makes `pair` that of probe p."""
     tip = stage.probes.pair.tip
@@ -80,7 +80,7 @@ def take_tip(stage, p):
         tip[1, axis] = stage.tips.end[stage.step, p, axis]
 
 
-@compiled
+@lean
 def pair_into(pair, x, velocity, triangles, f, dt):
     """Corners of a triangle seen from the tip of `pair`, at the start of the step and at its end [m]."""
     for k in range(3):
@@ -91,7 +91,7 @@ def pair_into(pair, x, velocity, triangles, f, dt):
             pair.end[k, axis] = pair.begin[k, axis] + way
 
 
-@compiled
+@lean
 def look(stage, p):
     """When and where the tip passes through each near triangle in the step as it stands; the first time, or NEVER."""
     probes, x, triangles, pair = stage.probes, stage.motion.x, stage.network.triangles, stage.probes.pair
@@ -111,7 +111,7 @@ def look(stage, p):
     return first
 
 
-@compiled
+@lean
 def add_crossings(probes, triangles, p, first):
     """A contact for every triangle that the tip passes through at the first time; how many found room.
 
@@ -126,7 +126,7 @@ def add_crossings(probes, triangles, p, first):
     return room
 
 
-@compiled
+@lean
 def add_touches(stage, p):
     """A contact for every triangle that ends the step within the radius, where it first touches; how many found room.
 
@@ -152,7 +152,7 @@ def add_touches(stage, p):
     return room
 
 
-@compiled
+@lean
 def search(stage):
     """Adds what the step as it stands runs into; (contacts that found room, whether a tip crosses)."""
     found, crosses = 0, False
@@ -166,7 +166,7 @@ def search(stage):
     return found, crosses
 
 
-@compiled
+@lean
 def take_along(stage, p):
     """Carries the free corners of all triangles that the tip of probe p passes; what they take of flow and of G·W̃·G."""
     probes, network, motion = stage.probes, stage.network, stage.motion
@@ -188,7 +188,7 @@ def take_along(stage, p):
     return flow, taken
 
 
-@compiled
+@lean
 def carry(stage, lam, mobility, plain, horizon):
     """The last resort: nodes of triangles that a tip would pass move with the tip, so that nothing passes it (eq. 147).
 
@@ -197,7 +197,7 @@ def carry(stage, lam, mobility, plain, horizon):
     probes, dt = stage.probes, stage.dt
     clear_push(probes.rows, probes.push)
     probes.rows.count[0] = 0
-    lightest = stage.network.inverse_mass.max()
+    lightest = stage.network.largest_inverse_mass
     flow, taken, change, reach = 0.0, 0.0, 0.0, plain
     for _ in range(CARRIES):
         before = probes.counts[6]
@@ -223,7 +223,7 @@ def carry(stage, lam, mobility, plain, horizon):
     return lam + change, reach
 
 
-@compiled
+@lean
 def settle_carried(stage, change):
     """Carried nodes end the step with their tip, whose impulse on them is booked [N s]."""
     probes, tally, dt = stage.probes, stage.probes.tally, stage.dt
@@ -239,7 +239,7 @@ def settle_carried(stage, change):
             probes.carried[i] = 0
 
 
-@compiled
+@lean
 def settle(stage):
     """Hands the contacts on to the step: v* takes their pushes; books them for probes and attachments [N s]."""
     probes, network, rows, tally = stage.probes, stage.network, stage.probes.rows, stage.probes.tally
@@ -260,7 +260,7 @@ def settle(stage):
                             tally.held_impulse[network.held_group[h], axis] -= share
 
 
-@compiled
+@lean
 def longest_way(tips, step):
     """Of any tip in the step [m]."""
     longest = 0.0
@@ -272,7 +272,7 @@ def longest_way(tips, step):
     return longest
 
 
-@compiled
+@lean
 def meet_probes(network, motion, drive, step, probes, lam, mobility):
     """Contact with thin probes, once lam and the other contacts of the step are known; the pressure beside it [Pa].
 
@@ -283,7 +283,7 @@ def meet_probes(network, motion, drive, step, probes, lam, mobility):
     plain = dt * fastest_node(network, motion, lam, dt) + longest_way(drive.tips, step)
     if not plain < math.inf:
         return lam
-    lightest = network.inverse_mass.max()
+    lightest = network.largest_inverse_mass
     reach, horizon, beside, crosses = plain, ROOM * plain, lam, False
     find_near(network, motion, drive.tips, step, probes, horizon)
     gather(stage, lam)
