@@ -41,6 +41,10 @@ CONTACT_REVISIONS = 3
 NEGLIGIBLE = 1e-12
 """Contact and held nodes that leave a volume this little of its response leave nothing but round-off."""
 
+SOFTNESS = 1e-10
+"""Relative compliance of volumes that are solved for densely: where some depend on others S stays regular; the next
+pass sees what it leaves."""
+
 
 class Step:
     """One step in the making; arrays of the state are its scratch."""
@@ -120,8 +124,9 @@ class Step:
         able = np.diag(schur) > NEGLIGIBLE * self.response_alone()
         pressure = np.zeros(len(error))
         if able.any():
-            # Volumes that depend on others leave S singular, but consistent.
-            pressure[able] = np.linalg.lstsq(schur[np.ix_(able, able)], error[able], rcond=None)[0]
+            inner = schur[np.ix_(able, able)]
+            inner = inner + SOFTNESS * inner.diagonal().max() * np.eye(len(inner))
+            pressure[able] = np.linalg.solve(inner, error[able])
         self.tally.skipped[0] += not able.all()
         return pressure, np.tensordot(pressure, self.answers, 1)
 
