@@ -15,6 +15,7 @@ from reference_fem import ReferenceProblem
 from studies import report as reports
 from studies.case import BodyRecipe, Case
 from studies.catalog import STUDIES, Study
+from studies.commands.cost import cost
 from studies.commands.mesh import check, mesh
 from studies.commands.verify import verify
 from studies.describe import describe
@@ -205,6 +206,7 @@ def replay(path: Path) -> None:
 
 
 app.command()(verify)
+app.command()(cost)
 app.command()(mesh)
 app.command()(check)
 

@@ -3,11 +3,10 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-import numpy as np
-
 from massspring import Free, simulate
 from studies.adapt import prepare
 from studies.case import Case
+from studies.cost import ROWS, stage_times
 from studies.errors import StudyError
 from studies.machine import machine_id
 from studies.paths import timing_path
@@ -57,16 +56,13 @@ def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[
         groups.setdefault(case.replaced(method=Free()).key, []).append(case)
     with pinned(threads=1) as core:
         for group in groups.values():
-            contestants = {case.key: _contestant(case) for case in group}
+            setups = {case.key: prepare(case).setup for case in group}
+            contestants = {key: (lambda s=setup: simulate(s).frame_ns) for key, setup in setups.items()}
             measured = interleave(contestants, REPEATS)
             for case in group:
-                write_timing(root, study, case, FrameTiming(measured[case.key], core))
+                stage_ns = stage_times(setups[case.key])
+                write_timing(root, study, case, FrameTiming(measured[case.key], core, stage_ns=stage_ns, stages=ROWS))
                 on_case(case.name)
-
-
-def _contestant(case: Case) -> Callable[[], np.ndarray]:
-    setup = prepare(case).setup
-    return lambda: simulate(setup).frame_ns
 
 
 def write_timing(root: Path, study: str, case: Case, timing: FrameTiming) -> None:

@@ -107,3 +107,11 @@ def test_unwritable_timing_is_told(tmp_path):
     timing = FrameTiming(np.full((2, 3), 10))
     with pytest.raises(StudyError, match="was not written"):
         write_timing(tmp_path / "file", "tiny", KEPT, timing)
+
+
+def test_the_time_of_each_stage_is_stored_beside_the_frames(finished_sweep):
+    record = read_record(timing_file(finished_sweep, "tiny", tiny_case(timed=True)))
+    stages, times = record.fields["stages"].values.tolist(), record.fields["stage_ns"].values
+    assert times.shape == (len(stages), record.fields["frame_ns"].values.shape[1])
+    assert (times >= 0).all() and (times[stages.index("springs and prediction")] > 0).all()
+    assert (times[stages.index("contact search")] > 0).all()

@@ -1,0 +1,55 @@
+"""`organbench cost`: where the time of a step goes, what the scene leaves out, and what that saves."""
+
+from pathlib import Path
+from typing import Annotated
+
+import pandas as pd
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from massspring import METHODS
+from studies.case import BodyRecipe, Case
+from studies.cost import FRAME, SKIPPED, STAGE, cost_table
+from studies.scenes import SCENES
+from studies.suggest import choose
+from studies.table import write_table
+
+console = Console(soft_wrap=True)
+HEADINGS = {STAGE: "stages of a step", SKIPPED: "left out here; what it would cost", FRAME: "Python, once per frame"}
+
+
+def cost(
+    scene: str,
+    method: Annotated[str, typer.Option(help="see `organbench list`")] = "implicit_volume",
+    body: Annotated[str, typer.Option(help="tetrahedral or surface")] = "tetrahedral",
+    nodes: Annotated[int, typer.Option(help="surface nodes")] = 550,
+    csv: Annotated[Path | None, typer.Option(help="also write the table there")] = None,
+    json: Annotated[bool, typer.Option("--json", help="print JSON instead of a table")] = False,
+) -> None:
+    """Microseconds per stage of a step, their share, what was skipped and what that saved; on one pinned core."""
+    kind = choose(body, ("tetrahedral", "surface"), "body")
+    case = Case(
+        scene=choose(scene, {s.name: s for s in SCENES}, "scene"),
+        body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
+        method=choose(method, {m.name: m for m in METHODS}, "method")(),
+    )
+    found = cost_table(case)
+    if csv is not None:
+        write_table(csv, found)
+    if json:
+        console.print(found.to_json(orient="records", force_ascii=False), markup=False, highlight=False)
+        return
+    console.print(f"{case.name}, over the whole scene", markup=False, highlight=False)
+    console.print(_drawn(found))
+
+
+def _drawn(found: pd.DataFrame) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading, side in (("", "left"), ("µs per step", "right"), ("share", "right")):
+        table.add_column(heading, justify=side)  # type: ignore[arg-type]
+    for kind, rows in found.groupby("kind", sort=False):
+        table.add_row(HEADINGS[str(kind)], "", "", style="bold")
+        for _, what, cost, share in rows.itertuples(index=False):
+            table.add_row(f"  {what}", f"{cost:.3g}", f"{100 * share:.3g} %")
+    return table

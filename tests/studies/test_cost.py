@@ -1,0 +1,71 @@
+"""The cost table adds up, names what was left out, and what was left out changes no answer."""
+
+import json
+
+import numpy as np
+import pytest
+
+from massspring import Free, ImplicitVolume
+from studies.adapt import prepare
+from studies.cost import FRAME, ROWS, SKIPPED, SKIPS, STAGE, cost_table, run_frames
+from studies.scenes.ball_clamped import BALL_CLAMPED
+from tests.studies.tiny import NODES, tiny_case
+
+
+@pytest.fixture(scope="module")
+def squeezed(mesh_cache):
+    return cost_table(tiny_case(), repeats=2)
+
+
+def cost_of(table, what) -> float:
+    return float(table.set_index("what")["µs per step"][what])
+
+
+def test_stages_and_rest_are_the_whole_step(squeezed):
+    parts = squeezed[(squeezed["kind"] == STAGE) & (squeezed["what"] != "whole step")]
+    whole = cost_of(squeezed, "whole step")
+    assert parts["µs per step"].sum() == pytest.approx(whole, rel=1e-12)
+    assert parts["share of the step"].sum() == pytest.approx(1.0, rel=1e-12)
+    assert set(parts["what"]) <= {*ROWS, "rest, not attributed"}
+    assert cost_of(squeezed, "springs and prediction") > 0 and cost_of(squeezed, "contact search") > 0
+
+
+def test_what_is_left_out_is_named(squeezed):
+    left_out = squeezed[squeezed["kind"] == SKIPPED]["what"].tolist()
+    assert left_out == ["friction: no obstacle has any", "linear solve: one volume is a division"]
+    bare = cost_table(tiny_case(scene=BALL_CLAMPED, method=Free()), repeats=1)
+    assert bare[bare["kind"] == SKIPPED]["what"].tolist() == ["contact: there is no obstacle"]
+    assert "contact search" not in set(bare["what"])
+    assert len(squeezed[squeezed["kind"] == FRAME]) == 2
+
+
+@pytest.mark.parametrize("skip", SKIPS, ids=lambda skip: skip.name.split(":")[0])
+@pytest.mark.parametrize("method", [Free(), ImplicitVolume()], ids=lambda method: method.name)
+def test_leaving_a_stage_out_changes_no_answer(skip, method):
+    """Bit for bit; the small solve in place of the division adds in another order, and differs by round-off."""
+    case = tiny_case(method=method)
+    if skip.name.startswith("contact"):
+        case = case.replaced(scene=BALL_CLAMPED)
+    setup = prepare(case).setup
+    if not skip.applies(setup):
+        pytest.skip("this method does not leave it out")
+    without = run_frames(setup, setup.start())[2]
+    with_stage = run_frames(*skip.included(setup, setup.start()))[2]
+    if skip.name.startswith("linear solve"):
+        assert np.abs(without.x - with_stage.x).max() < 1e-6 * setup.body.size
+    else:
+        assert np.array_equal(without.x, with_stage.x) and np.array_equal(without.v, with_stage.v)
+
+
+def test_the_command_prints_a_table_or_json(organbench, tmp_path):
+    words = ("cost", "ball_clamped", "--nodes", NODES, "--method", "free")
+    code, out, _ = organbench(*words, "--csv", tmp_path / "cost.csv")
+    assert code == 0 and "springs and prediction" in out and "there is no obstacle" in out
+    assert (tmp_path / "cost.csv").read_text(encoding="utf-8").startswith("kind,what,")
+    code, out, _ = organbench(*words, "--json")
+    assert {row["kind"] for row in json.loads(out)} == {STAGE, SKIPPED, FRAME}
+
+
+def test_bad_words_are_refused(refused):
+    assert "did you mean 'ball_squeeze'" in refused("cost", "bal_squeeze")
+    assert "unknown body 'solid'" in refused("cost", "ball_squeeze", "--body", "solid")
