@@ -20,7 +20,7 @@ from massspring import (
 from massspring.membranes import MEMBRANE_LAWS
 from massspring.volumes import Volumes
 from studies.case import BodyRecipe, Case
-from studies.errors import StudyError
+from studies.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh, fill, organ, read_mesh, scan
 from studies.geometry.mesh import triangle_areas
 from studies.geometry.organs import SHAPES
@@ -140,10 +140,13 @@ def prepare(case: Case) -> Prepared:
     scene = case.scene
     reason = scene.skip(case.method)
     if reason is not None:
-        raise StudyError(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
+        raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
     # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.
     mesh = mesh_for(scene, case.body.nodes, filled=case.body.kind == "tetrahedral" or scene.lumen is not None)
     body = body_for(scene, case.body, mesh)
+    reason = case.method.applies(body)
+    if reason is not None:
+        raise DoesNotApply(f"method '{case.method.name}' does not apply to the {case.body.kind} body: {reason}")
     targets = targets_for(scene, mesh, body)
     if case.body.kind != "tetrahedral" and mesh.hollow:
         mesh = mesh.outer()

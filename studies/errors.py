@@ -3,3 +3,7 @@
 
 class StudyError(ValueError):
     """Bad input to a study: the message is one sentence naming the thing, the value, the limit and the way out."""
+
+
+class DoesNotApply(StudyError):
+    """A method does not apply to a scene or a body: no failure, and the message says why."""

@@ -137,6 +137,19 @@ def inverted_share(run: Run) -> float:
     return PERCENT * float((tetrahedron_volumes(run.field("snapshots")[-1], cells) <= 0).mean())
 
 
+def j_spread(run: Run) -> float:
+    """100 × (95th − 5th percentile of J over the rest volume) at the last checkpoint [%]; NaN for a surface body."""
+    cells = run.field("tetrahedra")
+    if not len(cells):
+        return float("nan")
+    rest = tetrahedron_volumes(run.field("rest"), cells)
+    ratio = tetrahedron_volumes(run.field("snapshots")[-1], cells) / rest
+    order = np.argsort(ratio)
+    below = np.cumsum(rest[order]) / rest.sum()
+    low, high = ratio[order][np.searchsorted(below, (0.05, 0.95))]
+    return PERCENT * float(high - low)
+
+
 def rest_distance(run: Run) -> float:
     """100 × RMS distance of the nodes from their rest shape, moved and turned to fit, over the body's size [%]."""
     rest, last = run.field("rest"), run.field("snapshots")[-1]
@@ -210,6 +223,7 @@ METRICS: tuple[Metric, ...] = (
     Metric("pressure_error", "%", "-", pressure_error, "pressure"),
     Metric("lumen_pressure_error", "%", "-", lumen_pressure_error, "lumen"),
     Metric("min_j", "1", "higher", min_j),
+    Metric("j_spread", "%", "lower", j_spread),
     Metric("inverted_share", "%", "lower", inverted_share),
     Metric("rest_distance", "%", "lower", rest_distance),
     Metric("penetration", "%", "lower", penetration),

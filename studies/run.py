@@ -9,7 +9,7 @@ import numpy as np
 from massspring import History, MassSpringError, simulate
 from studies.adapt import LUMEN, Prepared, prepare
 from studies.case import Case, case_from_json
-from studies.errors import StudyError
+from studies.errors import DoesNotApply, StudyError
 from studies.fingerprint import source_fingerprint
 from studies.paths import record_path
 from studies.records import new_record
@@ -51,6 +51,8 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
             prepared = prepare(case)
             # Attachments that overlap, or hold no node, show only when the run starts.
             history = simulate(prepared.setup, checkpoint_frames(case, prepared), on_frame, TIME_LIMIT)
+        except DoesNotApply as reason:
+            return _record(case, Status.SKIPPED, str(reason), {"warnings": _said(caught)}, {})
         except (StudyError, MassSpringError) as error:
             return _record(case, Status.FAILED, str(error), {"warnings": _said(caught)}, {})
     status, message = judge(case, prepared, history)

@@ -35,6 +35,7 @@ class Status(StrEnum):
     NOT_CONVERGED = "not-converged"
     TIMED_OUT = "timed-out"
     FAILED = "failed"
+    SKIPPED = "skipped"
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """The volumes of all tetrahedra solved for at the end of a step: together, or one after the other (eq. 166, 167)."""
 
 from massspring.kernels.cells import add_four, cell_slopes
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import compiled, inlined
 from massspring.kernels.distances import allowed_part
 from massspring.kernels.prediction import pushed_by_into, unpushed_into
 from massspring.kernels.volume import volume_gradient_into
@@ -10,10 +10,10 @@ from massspring.kernels.volume import volume_gradient_into
 @compiled
 def cell_rows_into(x, cells, out):
     """J = dV_t/dx into `cells.slope` [m²] and V_t into `out` [m³], (k,) (eq. 5, 164)."""
-    for t in range(cells.tetrahedra.shape[0]):
-        a, b, c, d = cells.tetrahedra[t, 0], cells.tetrahedra[t, 1], cells.tetrahedra[t, 2], cells.tetrahedra[t, 3]
+    tetrahedra, s = cells.tetrahedra, cells.slope
+    for t in range(tetrahedra.shape[0]):
+        a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
         volume, p0, p1, p2, q0, q1, q2, r0, r1, r2 = cell_slopes(x, a, b, c, d)
-        s = cells.slope
         s[t, 0, 0], s[t, 0, 1], s[t, 0, 2] = p0, p1, p2
         s[t, 1, 0], s[t, 1, 1], s[t, 1, 2] = q0, q1, q2
         s[t, 2, 0], s[t, 2, 1], s[t, 2, 2] = r0, r1, r2
@@ -24,9 +24,9 @@ def cell_rows_into(x, cells, out):
 def cell_forces_into(cells, p, force):
     """F = Jᵀ p [N], (n, 3)."""
     force[:] = 0.0
-    for t in range(cells.tetrahedra.shape[0]):
-        a, b, c, d = cells.tetrahedra[t, 0], cells.tetrahedra[t, 1], cells.tetrahedra[t, 2], cells.tetrahedra[t, 3]
-        s = cells.slope
+    tetrahedra, s = cells.tetrahedra, cells.slope
+    for t in range(tetrahedra.shape[0]):
+        a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
         p0, p1, p2 = s[t, 0, 0], s[t, 0, 1], s[t, 0, 2]
         q0, q1, q2 = s[t, 1, 0], s[t, 1, 1], s[t, 1, 2]
         r0, r1, r2 = s[t, 2, 0], s[t, 2, 1], s[t, 2, 2]
@@ -36,41 +36,43 @@ def cell_forces_into(cells, p, force):
 @compiled
 def cell_changes_into(cells, u, out):
     """(J u)_t = Σ_j dV_t/dx_j · u_j, (k,)."""
-    s = cells.slope
-    for t in range(cells.tetrahedra.shape[0]):
-        a = cells.tetrahedra[t, 0]
+    tetrahedra, s = cells.tetrahedra, cells.slope
+    for t in range(tetrahedra.shape[0]):
+        a = tetrahedra[t, 0]
         total = 0.0
         for corner in range(3):
-            i = cells.tetrahedra[t, corner + 1]
+            i = tetrahedra[t, corner + 1]
             total += s[t, corner, 0] * (u[i, 0] - u[a, 0])
             total += s[t, corner, 1] * (u[i, 1] - u[a, 1])
             total += s[t, corner, 2] * (u[i, 2] - u[a, 2])
         out[t] = total
 
 
-@compiled
-def mobility_of(motion, inverse_mass, i, g0, g1, g2):
-    """g · W̃ g at node i, with where it moves: (square, W̃ g) (eq. 9)."""
+@inlined
+def moved_by(inverse_mass, locked, direction, i, g0, g1, g2):
+    """W̃ g at node i (eq. 9)."""
     w = inverse_mass[i]
     d0, d1, d2 = w * g0, w * g1, w * g2
-    if motion.locked[i] > 0:
-        e0, e1, e2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-        d0, d1, d2 = allowed_part(motion.locked[i], e0, e1, e2, d0, d1, d2)
-    return g0 * d0 + g1 * d1 + g2 * d2, d0, d1, d2
+    if locked[i] > 0:
+        d0, d1, d2 = allowed_part(locked[i], direction[i, 0], direction[i, 1], direction[i, 2], d0, d1, d2)
+    return d0, d1, d2
 
 
 @compiled
 def cell_diagonal_into(motion, inverse_mass, cells, scale, compliance):
     """dt² S_tt + C V_t0 [m³/Pa], (k,), the diagonal of eq. 166; `scale` is dt²."""
-    s = cells.slope
-    for t in range(cells.tetrahedra.shape[0]):
+    s, tetrahedra = cells.slope, cells.tetrahedra
+    locked, direction = motion.locked, motion.direction
+    for t in range(tetrahedra.shape[0]):
         total = 0.0
-        sum0, sum1, sum2 = 0.0, 0.0, 0.0
+        a0, a1, a2 = 0.0, 0.0, 0.0
         for corner in range(3):
             g0, g1, g2 = s[t, corner, 0], s[t, corner, 1], s[t, corner, 2]
-            sum0, sum1, sum2 = sum0 - g0, sum1 - g1, sum2 - g2
-            total += mobility_of(motion, inverse_mass, cells.tetrahedra[t, corner + 1], g0, g1, g2)[0]
-        total += mobility_of(motion, inverse_mass, cells.tetrahedra[t, 0], sum0, sum1, sum2)[0]
+            a0, a1, a2 = a0 - g0, a1 - g1, a2 - g2
+            d0, d1, d2 = moved_by(inverse_mass, locked, direction, tetrahedra[t, corner + 1], g0, g1, g2)
+            total += g0 * d0 + g1 * d1 + g2 * d2
+        d0, d1, d2 = moved_by(inverse_mass, locked, direction, tetrahedra[t, 0], a0, a1, a2)
+        total += a0 * d0 + a1 * d1 + a2 * d2
         cells.diagonal[t] = scale * total + compliance * cells.rest_volume[t]
 
 
@@ -138,20 +140,24 @@ def relax_cells(motion, inverse_mass, cells, scale, compliance, force):
 
     `cells.y` moves by dt² W̃ ∇V Δp and `force` [N] collects ∇V Δp; `scale` is dt².
     """
-    y = cells.y
-    for t in range(cells.tetrahedra.shape[0]):
-        a, b, c, d = cells.tetrahedra[t, 0], cells.tetrahedra[t, 1], cells.tetrahedra[t, 2], cells.tetrahedra[t, 3]
+    y, tetrahedra, pressure, rest_volume = cells.y, cells.tetrahedra, cells.pressure, cells.rest_volume
+    locked, direction = motion.locked, motion.direction
+    for t in range(tetrahedra.shape[0]):
+        a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
         volume, p0, p1, p2, q0, q1, q2, r0, r1, r2 = cell_slopes(y, a, b, c, d)
-        sa, a0, a1, a2 = mobility_of(motion, inverse_mass, a, -p0 - q0 - r0, -p1 - q1 - r1, -p2 - q2 - r2)
-        sb, b0, b1, b2 = mobility_of(motion, inverse_mass, b, p0, p1, p2)
-        sc, c0, c1, c2 = mobility_of(motion, inverse_mass, c, q0, q1, q2)
-        sd, d0, d1, d2 = mobility_of(motion, inverse_mass, d, r0, r1, r2)
-        soft = compliance * cells.rest_volume[t]
-        stiff = scale * (sa + sb + sc + sd) + soft
+        o0, o1, o2 = -p0 - q0 - r0, -p1 - q1 - r1, -p2 - q2 - r2
+        a0, a1, a2 = moved_by(inverse_mass, locked, direction, a, o0, o1, o2)
+        b0, b1, b2 = moved_by(inverse_mass, locked, direction, b, p0, p1, p2)
+        c0, c1, c2 = moved_by(inverse_mass, locked, direction, c, q0, q1, q2)
+        d0, d1, d2 = moved_by(inverse_mass, locked, direction, d, r0, r1, r2)
+        mobility = o0 * a0 + o1 * a1 + o2 * a2 + p0 * b0 + p1 * b1 + p2 * b2
+        mobility += q0 * c0 + q1 * c1 + q2 * c2 + r0 * d0 + r1 * d1 + r2 * d2
+        soft = compliance * rest_volume[t]
+        stiff = scale * mobility + soft
         if not stiff > 0.0:
             continue
-        change = (cells.rest_volume[t] - volume - soft * cells.pressure[t]) / stiff
-        cells.pressure[t] += change
+        change = (rest_volume[t] - volume - soft * pressure[t]) / stiff
+        pressure[t] += change
         add_four(force, a, b, c, d, change, p0, p1, p2, q0, q1, q2, r0, r1, r2)
         move = scale * change
         y[a, 0], y[a, 1], y[a, 2] = y[a, 0] + move * a0, y[a, 1] + move * a1, y[a, 2] + move * a2
@@ -163,23 +169,23 @@ def relax_cells(motion, inverse_mass, cells, scale, compliance, force):
 @compiled
 def relax_whole(network, motion, cells, target, scale, compliance, lam, force):
     """The same for the one volume of the whole: returns its pressure [Pa] (eq. 167)."""
-    volume = volume_gradient_into(cells.y, network.triangles, cells.gradient)
+    y, gradient, inverse_mass = cells.y, cells.gradient, network.inverse_mass
+    locked, direction = motion.locked, motion.direction
+    volume = volume_gradient_into(y, network.triangles, gradient)
     soft = compliance * target
     stiff = soft
-    for i in range(cells.y.shape[0]):
-        g0, g1, g2 = cells.gradient[i, 0], cells.gradient[i, 1], cells.gradient[i, 2]
-        stiff += scale * mobility_of(motion, network.inverse_mass, i, g0, g1, g2)[0]
+    for i in range(y.shape[0]):
+        g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
+        d0, d1, d2 = moved_by(inverse_mass, locked, direction, i, g0, g1, g2)
+        stiff += scale * (g0 * d0 + g1 * d1 + g2 * d2)
     if not stiff > 0.0:
         return lam
     change = (target - volume - soft * lam) / stiff
-    for i in range(cells.y.shape[0]):
-        g0, g1, g2 = cells.gradient[i, 0], cells.gradient[i, 1], cells.gradient[i, 2]
-        _, d0, d1, d2 = mobility_of(motion, network.inverse_mass, i, g0, g1, g2)
-        move = scale * change
-        cells.y[i, 0] += move * d0
-        cells.y[i, 1] += move * d1
-        cells.y[i, 2] += move * d2
-        force[i, 0] += change * g0
-        force[i, 1] += change * g1
+    move = scale * change
+    for i in range(y.shape[0]):
+        g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
+        d0, d1, d2 = moved_by(inverse_mass, locked, direction, i, g0, g1, g2)
+        y[i, 0], y[i, 1], y[i, 2] = y[i, 0] + move * d0, y[i, 1] + move * d1, y[i, 2] + move * d2
+        force[i, 0], force[i, 1] = force[i, 0] + change * g0, force[i, 1] + change * g1
         force[i, 2] += change * g2
     return lam + change

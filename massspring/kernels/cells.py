@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import compiled, inlined
 from massspring.kernels.springs import SHORTEST
 
 
@@ -36,7 +36,7 @@ class Cells(NamedTuple):
     """Node vectors, scratch, (n, 3)."""
 
 
-@compiled
+@inlined
 def cell_slopes(x, a, b, c, d):
     """V_t [m³] and dV_t/dx of b, c, d [m²]: (1/6) (x_c − x_a) × (x_d − x_a) and its rotations (eq. 5, 164)."""
     b0, b1, b2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
@@ -48,7 +48,7 @@ def cell_slopes(x, a, b, c, d):
     return b0 * p0 + b1 * p1 + b2 * p2, p0, p1, p2, q0, q1, q2, r0, r1, r2
 
 
-@compiled
+@inlined
 def add_four(out, a, b, c, d, f, p0, p1, p2, q0, q1, q2, r0, r1, r2):
     """Adds f p, f q, f r to nodes b, c, d and minus their sum to a: nothing that would push the body about."""
     p0, p1, p2 = f * p0, f * p1, f * p2
@@ -71,15 +71,16 @@ def add_four(out, a, b, c, d, f, p0, p1, p2, q0, q1, q2, r0, r1, r2):
 @compiled
 def add_volume_forces(x, cells, bulk_modulus, force):
     """f_j = Σ_t p_t dV_t/dx_j, p_t = K (V_t0 − V_t)/V_t0 [N], (n, 3) (eq. 164)."""
-    for t in range(cells.tetrahedra.shape[0]):
-        a, b, c, d = cells.tetrahedra[t, 0], cells.tetrahedra[t, 1], cells.tetrahedra[t, 2], cells.tetrahedra[t, 3]
+    tetrahedra = cells.tetrahedra
+    for t in range(tetrahedra.shape[0]):
+        a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
         volume, p0, p1, p2, q0, q1, q2, r0, r1, r2 = cell_slopes(x, a, b, c, d)
         pressure = bulk_modulus * (1.0 - volume / cells.rest_volume[t])
         cells.pressure[t] = pressure
         add_four(force, a, b, c, d, pressure, p0, p1, p2, q0, q1, q2, r0, r1, r2)
 
 
-@compiled
+@inlined
 def unit(r0, r1, r2):
     """(|r|, r/|r|); a node on the barycentre has no direction."""
     length = max(math.sqrt(r0 * r0 + r1 * r1 + r2 * r2), SHORTEST)
@@ -92,8 +93,9 @@ def add_barycentre_forces(x, cells, bulk_modulus, force):
 
     Without the mean, as published, a cell that is not regular would push itself about.
     """
-    for t in range(cells.tetrahedra.shape[0]):
-        a, b, c, d = cells.tetrahedra[t, 0], cells.tetrahedra[t, 1], cells.tetrahedra[t, 2], cells.tetrahedra[t, 3]
+    tetrahedra = cells.tetrahedra
+    for t in range(tetrahedra.shape[0]):
+        a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
         b0, b1, b2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
         c0, c1, c2 = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
         d0, d1, d2 = x[d, 0] - x[a, 0], x[d, 1] - x[a, 1], x[d, 2] - x[a, 2]

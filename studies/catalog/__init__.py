@@ -3,12 +3,22 @@
 from studies.catalog.base import Chart, Study
 from studies.catalog.frame_rate import FRAME_RATE
 from studies.catalog.laws import LAWS_STUDY
+from studies.catalog.methods import METHODS_STUDY
 from studies.catalog.organs import ORGANS
 from studies.catalog.stability_map import STABILITY_MAP
 from studies.catalog.stress import STRESS
 from studies.catalog.volume_loss import VOLUME_LOSS
 from studies.catalog.work_precision import WORK_PRECISION
 
-STUDIES: tuple[Study, ...] = (VOLUME_LOSS, FRAME_RATE, WORK_PRECISION, STABILITY_MAP, ORGANS, STRESS, LAWS_STUDY)
+STUDIES: tuple[Study, ...] = (
+    VOLUME_LOSS,
+    FRAME_RATE,
+    WORK_PRECISION,
+    STABILITY_MAP,
+    ORGANS,
+    STRESS,
+    LAWS_STUDY,
+    METHODS_STUDY,
+)
 
 __all__ = ["STUDIES", "Chart", "Study"]

@@ -55,6 +55,7 @@ STATUS_LOOKS: dict[Status, tuple[str, str]] = {
     Status.NOT_CONVERGED: (ORANGE, "P"),
     Status.TIMED_OUT: (SKY, "s"),
     Status.FAILED: (LIGHT, "*"),
+    Status.SKIPPED: (GREY, "_"),
 }
 """Colour and marker; none is the colour of one of the first two methods."""
 

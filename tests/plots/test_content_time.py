@@ -52,7 +52,7 @@ def test_stability_shows_every_status_by_marker_and_colour_and_the_limit():
     assert limit.get_xdata() == pytest.approx([6.0, 1.5])  # ms: 3 ms over the root of the factor
     assert list(limit.get_ydata()) == [0.25, 4.0]
     legend = words(stability.figure(stability_grid()).legends[0])
-    assert all(status.replace("-", " ") in legend for status in Status if status != Status.FAILED)
+    assert all(status.replace("-", " ") in legend for status in Status if status not in (Status.FAILED, Status.SKIPPED))
     assert "made up to be failed" in words(stability.figure(stability_grid()))
 
 
@@ -101,3 +101,27 @@ def test_made_up_frames_are_what_the_tests_above_think():
     times = frame_ns(1.0)
     assert times.shape == (5, FRAMES)
     assert np.median(times) == pytest.approx(1.02e6)
+
+
+def test_methods_are_told_apart_by_their_settings():
+    from massspring import Element, Xpbd
+    from studies.plots import methods
+
+    chosen = [Free(), ImplicitVolume(), Element(), Element(bulk_modulus=1e6, hard=True), Xpbd("whole", 2)]
+    names = ["free", "implicit volume", "element", "element (bulk modulus 1e+06, hard)"]
+    assert [methods.label(method) for method in chosen][:4] == names
+    assert methods.label(chosen[4]) == "xpbd (volumes whole, iterations 2)"
+    figure = methods.figure([run(method=method, frame_ms=1.0, nodes=200) for method in chosen[:2]])
+    rows = [text.get_text() for text in figure.axes[0].get_yticklabels()]
+    assert rows == names[:2]
+
+
+def test_a_method_s_cost_and_errors_stand_in_its_row():
+    from studies.plots import methods
+
+    runs = [run(method=Free(), frame_ms=2.0, error=0.4), run(frame_ms=1.0, error=0.1)]
+    figure = methods.figure(runs)
+    panels = {axes.get_xlabel(): axes for axes in figure.axes}
+    drawn = points(panels[methods.COST], BLUE)
+    assert [height for _, height, _ in drawn] == [0.0, 1.0]
+    assert [value for value, _, _ in drawn] == pytest.approx([methods.cost(each) for each in runs])

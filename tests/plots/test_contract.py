@@ -17,6 +17,7 @@ from studies.plots import (
     force_path,
     frame_time,
     laws,
+    methods,
     recovery,
     squeeze,
     stability,
@@ -38,6 +39,7 @@ GOOD = {
     stability: stability_grid,
     recovery: grid,
     laws: laws_grid,
+    methods: timed_grid,
 }
 ODD = {
     "none": list,

@@ -227,6 +227,13 @@ def test_pressure_against_the_mean_of_the_reference():
     assert np.isnan(of("pressure_error", values={"pressure": 0 * pressure}))
 
 
+def test_the_spread_of_j_is_that_of_the_bulk_of_the_volume():
+    """Half of an octahedron twice as long: J is 2 there and 1 in the other half. Even growth spreads nothing."""
+    assert of("j_spread", final=1.1 * POINTS) == pytest.approx(0.0, abs=1e-10)
+    stretched = np.where(POINTS > 0, [[2, 1, 1]], 1.0) * POINTS
+    assert of("j_spread", final=stretched) == pytest.approx(100.0, rel=1e-12)
+
+
 def test_local_volume():
     assert of("min_j") == 0.6
     assert of("inverted_share") == 0.0

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Free, simulate
+from massspring import Element, Free, Xpbd, simulate
 from studies import run as module
 from studies.adapt import prepare
 from studies.case import BodyRecipe, Case
@@ -192,3 +192,12 @@ def test_only_runs_are_replayed(ran, tmp_path):
     write_record(tmp_path / "a.h5", replace(record, kind="timing"))
     with pytest.raises(StudyError, match="only a run can be replayed"):
         replay(tmp_path / "a.h5")
+
+
+@pytest.mark.parametrize("method", [Element(), Xpbd()], ids=lambda method: method.name)
+def test_a_method_that_does_not_apply_is_skipped_with_its_reason(mesh_cache, method):
+    """No failure: a study may hold such cases, and they do not run again."""
+    record = measure(Case(tiny_case().scene, BodyRecipe("surface", nodes=NODES), method))
+    assert record.status == Status.SKIPPED
+    assert f"method '{method.name}' does not apply to the surface body" in record.message
+    assert "fill its mesh" in record.message

@@ -1,0 +1,66 @@
+"""Which way to keep a volume is how accurate, and what does it cost, on one body at one share of its step limit?"""
+
+from massspring import (
+    Barycentre,
+    Baumgarte,
+    Element,
+    Free,
+    ImplicitVolume,
+    Method,
+    Penalty,
+    PostStabilization,
+    Pressure,
+    Projection,
+    Pyramid,
+    Shake,
+    Xpbd,
+)
+from studies.case import BodyRecipe, Case
+from studies.catalog.base import Chart, Study
+from studies.plots import methods, work_precision
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scenes.liver_press import LIVER_PRESS
+
+NODES = 200
+"""So coarse that the dearest, a volume for every tetrahedron, is done in seconds; the same for all."""
+CONTESTANTS: tuple[Method, ...] = (
+    Free(),
+    ImplicitVolume(),
+    Shake(),
+    Projection(),
+    PostStabilization(),
+    Baumgarte(),
+    Penalty(),
+    Pressure(),
+    Pyramid(),
+    Barycentre(),
+    Element(),
+    Element(bulk_modulus=1e6, hard=True),
+    Xpbd(),
+    Xpbd("whole", iterations=2),
+)
+SCENES = (BALL_SQUEEZE, LIVER_PRESS)
+
+METHODS_STUDY = Study(
+    name="methods",
+    question=__doc__ or "",
+    cases=(
+        *(Case(scene, BodyRecipe(nodes=NODES), method, timed=True) for scene in SCENES for method in CONTESTANTS),
+        # One volume per node, beside one for the whole and one per tetrahedron.
+        *(Case(scene, BodyRecipe(nodes=NODES, volumes="nodal"), timed=True) for scene in SCENES),
+    ),
+    charts=(Chart("methods.png", methods.draw), Chart("work_precision.png", work_precision.draw)),
+    columns=(
+        "force_error",
+        "force_end",
+        "silhouette_error",
+        "interior_error",
+        "pressure_error",
+        "volume_worst",
+        "min_j",
+        "j_spread",
+        "step_time",
+        "frame_time",
+        "real_time",
+    ),
+)

@@ -1,0 +1,135 @@
+"""Every method on the same body: one row per method, one panel per quantity, one marker per scene."""
+
+from collections.abc import Sequence
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator
+
+from massspring import Method
+from studies.metrics import COMPARABLE, METRICS, Metric, Run
+from studies.plots.page import blank, by_scene, doubt_mark, doubts, finish, log_axis, page, panels, remarks
+from studies.plots.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, heading, readable, save, styled
+from studies.plots.work_precision import cost
+
+TITLE = "Ways to keep a volume, on the same bodies at the same share of their step limits"
+QUANTITIES = {
+    "force_error": "force error [%]",
+    "interior_error": "displacement error [%]",
+    "silhouette_error": "silhouette error [%]",
+    "volume_worst": "worst volume error [%]",
+    "j_spread": "spread of J [%]",
+}
+COST = "computing time [ms/s]"
+SCENE_LOOKS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"))
+LEAST = 1e-4
+"""Volume errors below a millionth are drawn there, with an arrow [%]."""
+APART = 0.12
+"""How far the scenes of a row stand above and below its middle."""
+
+
+def label(method: Method) -> str:
+    """Its name, and the settings that are not as they come: "element (bulk modulus 1e+06, hard)"."""
+    said = []
+    for setting in fields(method):  # pyright: ignore[reportArgumentType]
+        value = getattr(method, setting.name)
+        if setting.default is MISSING or value == setting.default:
+            continue
+        number = f" {value:g}" if not isinstance(value, (bool, str)) else f" {value}" if isinstance(value, str) else ""
+        said.append(readable(setting.name) + number)
+    return readable(method.name) + (f" ({', '.join(said)})" if said else "")
+
+
+@styled
+def figure(runs: Sequence[Run]) -> Figure:
+    """Panels side by side share the rows; error bars of the reference are dotted lines of the scene's colour."""
+    shown = [run for run in runs if run.record.status in COMPARABLE]
+    if not shown:
+        return blank(TITLE, "no run has ended yet")
+    rows = list(dict.fromkeys(label(run.case.method) for run in shown))
+    metrics = [metric for name in QUANTITIES for metric in METRICS if metric.name == name]
+    timed = any(run.timing is not None for run in shown)
+    scenes = by_scene(shown)
+    columns = -(-(len(metrics) + timed) // 2)
+    sheet = page(3.1 * columns + 2.4, 2 * (0.27 * len(rows) + 1.0))
+    axes = panels(sheet, 2, columns, sharey=True)
+    for panel, metric in zip(axes.flat, metrics, strict=False):
+        panel.set_xlabel(QUANTITIES[metric.name])
+        _draw(panel, rows, scenes, metric)
+    if timed:
+        axes.flat[len(metrics)].set_xlabel(COST)
+        _draw(axes.flat[len(metrics)], rows, scenes, None)
+    for spare in axes.flat[len(metrics) + timed :]:
+        spare.set_axis_off()
+    for panel in axes[:, 0]:
+        panel.set_yticks(range(len(rows)), rows)
+        panel.set_ylim(len(rows) - 0.5, -0.5)
+    return finish(sheet, TITLE, _handles(scenes, metrics), _notes(shown, metrics, runs), columns=4)
+
+
+def _draw(axes: Axes, rows: Sequence[str], scenes: dict[str, list[Run]], metric: Metric | None) -> None:
+    """One quantity; None is the computing time."""
+    drawn: list[float] = []
+    for number, group in enumerate(scenes.values()):
+        colour, marker = SCENE_LOOKS[number % len(SCENE_LOOKS)]
+        floor = metric.floor(group[0]) if metric is not None and metric.name != "volume_worst" else float("nan")
+        if floor == floor:
+            axes.axvline(floor, color=colour, linestyle=":", linewidth=1.5)
+            drawn.append(floor)
+        for run in group:
+            value = _value(run, metric)
+            if value != value:
+                continue
+            least = max(LEAST, floor) if floor == floor else LEAST
+            row = rows.index(label(run.case.method)) + APART * (2 * number - len(scenes) + 1)
+            shape = marker if value > least else "<"
+            face = "white" if metric is not None and metric.doubtful(run) else colour
+            axes.plot(max(value, least), row, marker=shape, color=colour, markerfacecolor=face, markersize=6)
+            drawn.append(max(value, least))
+    if drawn:
+        log_axis(axes.xaxis)
+        axes.set_xlim(0.6 * min(drawn), 1.7 * max(drawn))
+        if max(drawn) > 1e4 * min(drawn):
+            axes.xaxis.set_major_locator(LogLocator(numticks=6))
+    axes.set_axisbelow(True)
+    axes.tick_params(axis="x", labelsize=SMALL)
+    axes.tick_params(axis="y", length=0, labelsize=SMALL)
+
+
+def _value(run: Run, metric: Metric | None) -> float:
+    if metric is not None:
+        return abs(metric(run))
+    return cost(run) if run.timing is not None else float("nan")
+
+
+def _handles(scenes: dict[str, list[Run]], metrics: Sequence[Metric]) -> list:
+    entries = []
+    for number, (name, group) in enumerate(scenes.items()):
+        colour, marker = SCENE_LOOKS[number % len(SCENE_LOOKS)]
+        said = heading(name) + doubt_mark(group, metrics)
+        entries.append(Line2D([], [], color=colour, marker=marker, linestyle="", markersize=7, label=said))
+    dotted = Line2D([], [], color=GREY, linestyle=":", label="the reference's own uncertainty")
+    hollow = {"marker": "o", "linestyle": "", "markerfacecolor": "white", "color": GREY, "markersize": 7}
+    return [*entries, dotted, Line2D([], [], label="hollow: the reference is not ten times better", **hollow)]
+
+
+def _notes(shown: Sequence[Run], metrics: Sequence[Metric], runs: Sequence[Run]) -> list[str]:
+    bodies = dict.fromkeys(
+        f"{run.case.body.series}, {run.case.body.nodes:,} surface nodes, dt {run.case.dt_fraction:g} of the limit"
+        for run in shown
+    )
+    return [
+        f"Body: {'; '.join(bodies)}; the limit counts what a method adds to the springs. Force: over all checkpoints. "
+        "Displacement: volume-weighted relative L2, not compared where a rigid turn is free. J: 5th to 95th percentile "
+        "at the last checkpoint. Computing time per simulated second, one core. Arrows: less than can be drawn.",
+        *doubts(shown, metrics),
+        *remarks(runs),
+    ]
+
+
+def draw(runs: Sequence[Run], path: Path) -> None:
+    """Writes the chart as PNG."""
+    save(figure(runs), path)
