@@ -43,13 +43,18 @@ def label(method: Method) -> str:
     return readable(method.name) + (f" ({', '.join(said)})" if said else "")
 
 
+def row(run: Run) -> str:
+    """The method, and the volumes that it keeps where the body says which."""
+    return label(run.case.method) + run.case.body.series.removeprefix(run.case.body.kind)
+
+
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
     """Panels side by side share the rows; error bars of the reference are dotted lines of the scene's colour."""
     shown = [run for run in runs if run.record.status in COMPARABLE]
     if not shown:
         return blank(TITLE, "no run has ended yet")
-    rows = list(dict.fromkeys(label(run.case.method) for run in shown))
+    rows = list(dict.fromkeys(row(run) for run in shown))
     metrics = [metric for name in QUANTITIES for metric in METRICS if metric.name == name]
     timed = any(run.timing is not None for run in shown)
     scenes = by_scene(shown)
@@ -84,10 +89,10 @@ def _draw(axes: Axes, rows: Sequence[str], scenes: dict[str, list[Run]], metric:
             if value != value:
                 continue
             least = max(LEAST, floor) if floor == floor else LEAST
-            row = rows.index(label(run.case.method)) + APART * (2 * number - len(scenes) + 1)
+            height = rows.index(row(run)) + APART * (2 * number - len(scenes) + 1)
             shape = marker if value > least else "<"
             face = "white" if metric is not None and metric.doubtful(run) else colour
-            axes.plot(max(value, least), row, marker=shape, color=colour, markerfacecolor=face, markersize=6)
+            axes.plot(max(value, least), height, marker=shape, color=colour, markerfacecolor=face, markersize=6)
             drawn.append(max(value, least))
     if drawn:
         log_axis(axes.xaxis)
@@ -118,7 +123,7 @@ def _handles(scenes: dict[str, list[Run]], metrics: Sequence[Metric]) -> list:
 
 def _notes(shown: Sequence[Run], metrics: Sequence[Metric], runs: Sequence[Run]) -> list[str]:
     bodies = dict.fromkeys(
-        f"{run.case.body.series}, {run.case.body.nodes:,} surface nodes, dt {run.case.dt_fraction:g} of the limit"
+        f"{run.case.body.kind}, {run.case.body.nodes:,} surface nodes, dt {run.case.dt_fraction:g} of the limit"
         for run in shown
     )
     return [
