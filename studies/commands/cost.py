@@ -11,7 +11,7 @@ from rich.table import Table
 from massspring import METHODS
 from studies.case import BodyRecipe, Case
 from studies.cost import FRAME, SKIPPED, STAGE, cost_table
-from studies.scenes import SCENES
+from studies.scenes import SCENES, UNJUDGED
 from studies.suggest import choose
 from studies.table import write_table
 
@@ -30,7 +30,7 @@ def cost(
     """Microseconds per stage of a step, their share, what was skipped and what that saved; on one pinned core."""
     kind = choose(body, ("tetrahedral", "surface"), "body")
     case = Case(
-        scene=choose(scene, {s.name: s for s in SCENES}, "scene"),
+        scene=choose(scene, {s.name: s for s in (*SCENES, *UNJUDGED)}, "scene"),
         body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
         method=choose(method, {m.name: m for m in METHODS}, "method")(),
     )
