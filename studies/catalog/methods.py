@@ -17,7 +17,7 @@ from massspring import (
 )
 from studies.case import BodyRecipe, Case
 from studies.catalog.base import Chart, Study
-from studies.plots import methods, work_precision
+from studies.plots import methods
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.scenes.liver_press import LIVER_PRESS
 
@@ -49,7 +49,7 @@ METHODS_STUDY = Study(
         # One volume per node, beside one for the whole and one per tetrahedron.
         *(Case(scene, BodyRecipe(nodes=NODES, volumes="nodal"), timed=True) for scene in SCENES),
     ),
-    charts=(Chart("methods.png", methods.draw), Chart("work_precision.png", work_precision.draw)),
+    charts=(Chart("methods.png", methods.draw),),
     columns=(
         "force_error",
         "force_end",
