@@ -96,7 +96,7 @@ class Recorder:
 
     def record(self, frame: int, state: State, elapsed_ns: int) -> None:
         """Reads the state after frame number `frame` (0, 1, …)."""
-        net, x, v = state.network, state.x, state.v
+        net, x, v = state.network, state.x.astype(np.float64, copy=False), state.v.astype(np.float64, copy=False)
         self.volume[frame] = self.volumes.measure(x)
         self.pressure[frame] = state.lam
         self.scalars["kinetic"][frame] = 0.5 * float(net.mass @ np.einsum("ij,ij->i", v, v))

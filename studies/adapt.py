@@ -166,5 +166,6 @@ def prepare(case: Case) -> Prepared:
         scene.damping,
         targets=targets,
         positions=scene.start and scene.start.positions(body.rest),
+        precision=case.precision,
     )
     return Prepared(mesh, setup, limit)

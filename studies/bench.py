@@ -1,7 +1,6 @@
 """The promised numbers, measured: `make bench` on a quiet machine. Prints a table, writes results/bench.csv."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,82 +8,25 @@ import pandas as pd
 from rich.console import Console
 
 from massspring import (
-    Attachment,
-    Clock,
     Free,
     ImplicitVolume,
-    Material,
-    Method,
-    Plane,
-    Setup,
-    simulate,
-    step_limit,
-    surface_body,
 )
-from massspring import Path as Motion
 from reference_fem import bench as reference_bench
 from reference_fem import crosscheck, equilibrium_path
 from reference_fem.crosscheck.bench import iteration_ratio
 from reference_fem.exact import BALL_BETWEEN_PLANES
 from studies.adapt_reference import reference_problem, whole_forces
+from studies.bench_line import Line
+from studies.bench_massspring import growth_lines, large_lines, step_lines, volumes_lines
 from studies.case import BodyRecipe, Case
-from studies.geometry import ball
 from studies.geometry import bench as geometry_bench
 from studies.report import write_table
 from studies.run import measure
 from studies.scenes.ball_squeeze import BALL_SQUEEZE, PRESS_END, RADIUS
-from studies.spread import kernel_ns, ratio_with_spread
-from studies.timing import interleave, pinned
+from studies.timing import pinned
 
-FRAMES, STEPS, REPEATS = 200, 20, 7
 APPROACHES = (0.10, 0.20, 0.30)
 """Of the planes over the diameter, at which the reference is held against the converged solution."""
-
-
-@dataclass(frozen=True)
-class Line:
-    """A promised number beside the measured one."""
-
-    what: str
-    measured: float
-    unit: str
-    target: float
-    at_most: bool = True
-    note: str = ""
-
-    @property
-    def met(self) -> bool:
-        """Whether the target is reached."""
-        return self.measured <= self.target if self.at_most else self.measured >= self.target
-
-
-def squeezed_setup(method: Method) -> Setup:
-    """The paper's 550-node surface body, held below and pressed by one plane from above; frames of 20 steps."""
-    mesh = ball(550, fill=False)
-    body = surface_body(mesh.points, mesh.triangles, Material(1800.0, 1060.0))
-    clock = Clock(STEPS * 0.5 * step_limit(body).undamped, FRAMES, STEPS)
-    press = Motion((0.0, 0.5 * clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.3 * RADIUS)))
-    plane = Plane((0.0, 0.0, RADIUS), (0.0, 0.0, -1.0), press)
-    held = Attachment(np.flatnonzero(mesh.points[:, 2] < -0.8 * RADIUS))
-    return Setup(body, method, clock, (plane,), (held,), damping=40.0)
-
-
-def step_lines() -> list[Line]:
-    """Cost of a step of the 550-node surface body, and of its volume constraint, by turns in one run."""
-    setups = {method.name: squeezed_setup(method) for method in (Free(), ImplicitVolume())}
-    with pinned(threads=1):
-        times = interleave({name: (lambda s=s: simulate(s).frame_ns) for name, s in setups.items()}, REPEATS)
-    pressed = {name: ns[:, FRAMES // 4 :] for name, ns in times.items()}
-    cost = {name: 1e-3 * kernel_ns(ns) / STEPS for name, ns in pressed.items()}
-    ratio = ratio_with_spread(pressed["implicit_volume"], pressed["free"])
-    springs = setups["free"].body.springs.count
-    return [
-        Line(
-            "step, 550 surface nodes, m = 1, one plane", cost["implicit_volume"], "µs", 40.0, note=f"{springs} springs"
-        ),
-        Line("the same without the constraint", cost["free"], "µs", 40.0),
-        Line("constraint on / off", ratio.median, "1", 1.35, note=f"interval {ratio.low:.3g} to {ratio.high:.3g}"),
-    ]
 
 
 def volume_lines() -> list[Line]:
@@ -167,6 +109,9 @@ def main() -> None:
     """Measures everything; the table says for each number whether it is met."""
     stages: tuple[Callable[[], list[Line]], ...] = (
         step_lines,
+        large_lines,
+        growth_lines,
+        volumes_lines,
         volume_lines,
         reference_lines,
         speed_lines,

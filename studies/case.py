@@ -67,6 +67,8 @@ class Case:
     """Instead of the scene's number of frames; the duration stays."""
     beyond_limit: bool = False
     """Whether a step above the stability limit is wanted; it is refused otherwise."""
+    precision: Literal["float64", "float32"] = "float64"
+    """Of the mass-spring state."""
     timed: bool = False
     """Whether frame times are measured by the timing protocol."""
 
@@ -81,6 +83,8 @@ class Case:
             )
         if self.frames is not None and (type(self.frames) is not int or self.frames < 1):
             raise StudyError(f"frames is {self.frames!r}; give a whole number from 1 on, or None for the scene's own")
+        if self.precision not in ("float64", "float32"):
+            raise StudyError(f"the precision is '{self.precision}'; choose float64 or float32")
 
     @property
     def name(self) -> str:
@@ -95,6 +99,8 @@ class Case:
             parts.append(self.body.axis)
         if self.body.stiffness != 1.0:
             parts.append(f"k{self.body.stiffness:g}")
+        if self.precision != "float64":
+            parts.append(self.precision)
         if self.body.weights is not None:
             parts.append("w" + "_".join(f"{weight:g}" for weight in self.body.weights))
         return "-".join(parts)
@@ -110,7 +116,8 @@ class Case:
 
 
 def case_to_dict(case: Case) -> dict[str, Any]:
-    """JSON-able form, without `timed`: measuring time changes no physics."""
+    """JSON-able form, without `timed`: measuring time changes no physics; `precision` where it is not float64."""
+    chosen = {} if case.precision == "float64" else {"precision": case.precision}
     return {
         "scene": _scene_adapter().dump_python(case.scene, mode="json"),
         "body": _recipe_to_dict(case.body),
@@ -119,6 +126,7 @@ def case_to_dict(case: Case) -> dict[str, Any]:
         "dt_fraction": case.dt_fraction,
         "frames": case.frames,
         "beyond_limit": case.beyond_limit,
+        **chosen,
     }
 
 
@@ -142,6 +150,7 @@ def case_from_json(text: str) -> Case:
             dt_fraction=data["dt_fraction"],
             frames=data["frames"],
             beyond_limit=data["beyond_limit"],
+            precision=data.get("precision", "float64"),
         )
     except (json.JSONDecodeError, KeyError, TypeError, ValidationError) as error:
         raise StudyError(f"the text is no stored case: {_first_line(error)}") from error

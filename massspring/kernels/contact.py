@@ -52,7 +52,10 @@ def seat(network, motion, drive, step, lam, count):
 def plane_clearance(motion, inverse_mass, push, dt, normal, point):
     """clearance_i = min(clearance_i, n·(y − p)) [m], y = x + dt (v* + push w G), of all nodes, (n,) (eq. 12)."""
     x, v_star, gradient, clearance = motion.x, motion.v_star, motion.gradient, motion.clearance
-    n0, n1, n2, p0, p1, p2 = normal[0], normal[1], normal[2], point[0], point[1], point[2]
+    real = x.dtype.type
+    push, dt = real(push), real(dt)
+    n0, n1, n2 = real(normal[0]), real(normal[1]), real(normal[2])
+    p0, p1, p2 = real(point[0]), real(point[1]), real(point[2])
     for i in range(clearance.shape[0]):
         w = push * inverse_mass[i]
         r0 = x[i, 0] + dt * (v_star[i, 0] + w * gradient[i, 0]) - p0
@@ -65,7 +68,10 @@ def plane_clearance(motion, inverse_mass, push, dt, normal, point):
 def round_clearance(motion, inverse_mass, push, dt, start, span, radius):
     """clearance_i = min(clearance_i, distance of y to a capsule or sphere) [m], of all nodes, (n,) (eq. 12)."""
     x, v_star, gradient, clearance = motion.x, motion.v_star, motion.gradient, motion.clearance
-    p0, p1, p2, a0, a1, a2 = start[0], start[1], start[2], span[0], span[1], span[2]
+    real = x.dtype.type
+    push, dt, radius = real(push), real(dt), real(radius)
+    p0, p1, p2 = real(start[0]), real(start[1]), real(start[2])
+    a0, a1, a2 = real(span[0]), real(span[1]), real(span[2])
     for i in range(clearance.shape[0]):
         w = push * inverse_mass[i]
         r0 = x[i, 0] + dt * (v_star[i, 0] + w * gradient[i, 0]) - p0

@@ -115,7 +115,7 @@ def set_right_side(network, rows, motion, target, dt, tolerance):
     pushed_velocity_into(motion, network.inverse_mass, dt, rows.node_vector)
     rows_times_into(rows, rows.node_vector, rows.right)
     diagonal_into(rows, motion, network.inverse_mass, rows.diagonal)
-    lightest = network.inverse_mass.max()
+    lightest = network.largest_inverse_mass
     capped, idle = False, False
     for r in range(target.shape[0]):
         error = target[r] - rows.volume[r]
@@ -137,7 +137,8 @@ def solve_multipliers(network, rows, motion, tally, accuracy):
     if rows.matrix.shape[0] > 0:
         dense_into(rows, motion, network.inverse_mass, rows.matrix)
         solve_dense(rows.matrix, rows.right, rows.search)
-        rows.lam[:] += rows.search
+        for r in range(rows.lam.shape[0]):
+            rows.lam[r] += rows.search[r]
     else:
         count = solve_iteratively(rows, motion, network.inverse_mass, rows.lam, rows.allowed, accuracy.most_iterations)
         tally.iterations[0] += count

@@ -27,6 +27,7 @@ CHANGES = {
     "dt": {"dt": 1e-4},
     "dt_fraction": {"dt_fraction": 0.51},
     "frames": {"frames": 801},
+    "precision": {"precision": "float32"},
 }
 ALL_CASES = [case for study in STUDIES for case in study.cases]
 
@@ -43,7 +44,7 @@ def changed(edit) -> str:
 def test_key_read_back_is_the_same_case(scene, method):
     for case in (
         Case(scene, method=method()),
-        Case(scene, BodyRecipe("surface", 80, stiffness=2.5), method(), 1e-3, 0.7, 12),
+        Case(scene, BodyRecipe("surface", 80, stiffness=2.5), method(), 1e-3, 0.7, 12, precision="float32"),
     ):
         again = case_from_json(case.key)
         assert again == case
@@ -79,6 +80,7 @@ def test_names_are_readable_and_distinct_within_a_study():
 def test_a_setting_that_is_not_chosen_leaves_old_keys_as_they_were():
     """The key of the first scene's default case as it was before surface weights could be chosen."""
     assert "weights" not in json.loads(Case(SCENES[0]).key)["body"]
+    assert "precision" not in json.loads(Case(SCENES[0]).key)
 
 
 UNREADABLE = {

@@ -1,0 +1,44 @@
+"""A state in single precision: half the memory to move, twice the numbers in a vector register."""
+
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from massspring.errors import MassSpringError
+from massspring.methods.base import State
+from massspring.neighbours import aligned
+
+Precision = Literal["float64", "float32"]
+KEPT_DOUBLE = frozenset({"sums", "volume", "lam", "right", "diagonal", "matrix", "search", "image", "allowed"})
+"""Sums over many nodes and what is solved with them: as long as there are slices or volumes, so they cost nothing."""
+
+
+def check_precision(precision: str) -> None:
+    """Raises MassSpringError for what is neither float64 nor float32."""
+    if precision not in ("float64", "float32"):
+        raise MassSpringError(f"unknown precision '{precision}'; choose float64 or float32")
+
+
+def in_precision(state: State, precision: Precision) -> State:
+    """`state` with the arrays of its nodes, springs and volumes as `precision`; float64 leaves it as it is.
+
+    What a method or a thin probe remembers of its own stays in double precision.
+    """
+    if precision == "float64":
+        return state
+    rows = None if state.rows is None else _cast(state.rows, np.dtype(np.float32))
+    network, motion = (_cast(part, np.dtype(np.float32)) for part in (state.network, state.motion))
+    return replace(state, network=network, motion=motion, rows=rows)
+
+
+def _cast(part: Any, real: np.dtype) -> Any:
+    """A tuple of arrays, with tuples inside, whose arrays of float64 are `real`."""
+    changed = {}
+    for name, value in part._asdict().items():
+        if isinstance(value, tuple):
+            changed[name] = _cast(value, real)
+        elif isinstance(value, np.ndarray) and value.dtype == np.float64 and name not in KEPT_DOUBLE:
+            changed[name] = aligned(value.shape, real)
+            changed[name][...] = value
+    return part._replace(**changed)
