@@ -47,11 +47,11 @@ def squeezed_setup(method: Method) -> Setup:
 
 
 def probed_setup(nodes: int, method: Method | None = None) -> Setup:
-    """A surface body with a sphere that has gone in by a tenth of the radius and slides over it sideways."""
+    """A surface body into which a sphere goes by 6 % of the radius while it slides sideways by 10 %."""
     body = _surface(nodes)
     clock = Clock(LARGE_STEPS * 0.5 * step_limit(body).undamped, LARGE_FRAMES, LARGE_STEPS)
     size = 0.15 * RADIUS
-    slide = Motion((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.2 * RADIUS, 0.0, -0.02 * RADIUS)))
+    slide = Motion((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.1 * RADIUS, 0.0, -0.06 * RADIUS)))
     sphere = Sphere((0.0, 0.0, RADIUS + size), size, slide)
     return Setup(body, method or ImplicitVolume(), clock, (sphere,), (_bottom(body),), damping=40.0)
 
