@@ -4,6 +4,7 @@ Every material is W = iso(F) + p (J - 1) - p²/(2 kappa): p is positive in tensi
 plus p, and the pressure is zero at rest. The compiled law has two terms; a neo-Hookean solid has only the first.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,7 @@ def check_modulus(name, value):
         )
 
 
-class TwoTermLaw:
+class TwoTermLaw(ABC):
     """What every material here shares: all that follows from its `parameters`."""
 
     mu: float
@@ -30,9 +31,9 @@ class TwoTermLaw:
     """Bulk modulus [Pa]."""
 
     @property
+    @abstractmethod
     def parameters(self) -> np.ndarray:
         """What the compiled law reads: (2 c1, 2 c2, kappa) [Pa]."""
-        raise NotImplementedError
 
     def energy_density(self, F, p):
         """W [J/m³] for F (..., 3, 3) and p (...) [Pa]; written apart from the kernel, to check it."""

@@ -165,7 +165,8 @@ def prepare(case: Case) -> Prepared:
         scene.gravity,
         scene.damping,
         targets=targets,
-        positions=scene.start and scene.start.positions(body.rest),
+        velocity=scene.start and scene.start.velocities(body.rest),
+        positions=scene.start.positions(body.rest) if scene.start and scene.start.shaped else None,
         precision=case.precision,
     )
     return Prepared(mesh, setup, limit)

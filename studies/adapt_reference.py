@@ -5,7 +5,7 @@ from scipy.spatial import KDTree
 from skfem import MeshTet2
 
 from massspring import Capsule, Obstacle, Plane, Probe
-from reference_fem import Cavity, NeoHookean, Problem, RigidPlane, RigidSphere, nodes
+from reference_fem import Cavity, NeoHookean, Problem, RigidCapsule, RigidPlane, RigidSphere, nodes
 from reference_fem import Held as HeldPatch
 from studies.errors import StudyError
 from studies.reference_mesh import reference_mesh
@@ -26,7 +26,7 @@ def reference_problem(scene: Scene, level: float) -> Problem:
         mesh=mesh,
         material=NeoHookean(tissue.shear_modulus, tissue.shear_modulus * tissue.bulk_over_shear),
         held=_symmetry_planes() if scene.symmetric else _held(scene, mesh, patches),
-        obstacles=tuple(_rigid(o) for o in kept_obstacles(scene)),
+        obstacles=tuple(rigid(o) for o in kept_obstacles(scene)),
         gravity=scene.gravity,
         density=tissue.density,
         cavities=(_cavity(scene, lumen),) if scene.filled else (),
@@ -84,9 +84,21 @@ def _held(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray]) -> tuple[Held
     )
 
 
-def _rigid(obstacle: Obstacle) -> RigidPlane | RigidSphere:
-    if isinstance(obstacle, (Capsule, Probe)) or obstacle.friction != 0:
-        raise StudyError(f"the reference knows frictionless planes and spheres, not {obstacle}; judge without it")
+def rigid(obstacle: Obstacle) -> RigidPlane | RigidSphere | RigidCapsule:
+    """The obstacle as the reference knows it. Raises StudyError for one it does not."""
+    if isinstance(obstacle, Probe):
+        raise StudyError(
+            f"the reference knows planes, spheres and capsules, not the thin probe at {obstacle.tip}; "
+            f"use a sphere wider than its elements, or a scene without reference"
+        )
+    if obstacle.friction not in (0, "no_slip"):
+        raise StudyError(
+            f"an obstacle has friction {obstacle.friction}, and the reference knows contact without friction (0) or "
+            f"without slip ('no_slip'); choose one of the two, or a scene without reference"
+        )
+    slip = "no_slip" if obstacle.friction == "no_slip" else "frictionless"
     if isinstance(obstacle, Plane):
-        return RigidPlane(obstacle.point, tuple(obstacle.unit_normal), obstacle.path)
-    return RigidSphere(obstacle.centre, obstacle.radius, obstacle.path)
+        return RigidPlane(obstacle.point, tuple(obstacle.unit_normal), obstacle.path, slip)
+    if isinstance(obstacle, Capsule):
+        return RigidCapsule(obstacle.start, obstacle.end, obstacle.radius, obstacle.path, slip)
+    return RigidSphere(obstacle.centre, obstacle.radius, obstacle.path, slip)

@@ -16,6 +16,8 @@ from studies.distance import hausdorff
 from studies.errors import StudyError
 from studies.geometry.mesh import boundary_triangles, tetrahedron_volumes, triangle_areas
 from studies.reference_solve import VARIANTS
+from studies.ringing import ringing_frequency
+from studies.scenes.base import allowed
 
 if TYPE_CHECKING:
     from studies.reference import Solution
@@ -70,6 +72,13 @@ class View:
     def u(self) -> np.ndarray:
         """Displacement at the last checkpoint [m], (m, 3)."""
         return self.solution.displacement(self.places.points)
+
+    @cached_property
+    def frequency(self) -> float:
+        """Of the ringing [Hz]; NaN for a scene that does not start with a speed."""
+        scene, points = self.solution.scene, self.places.points
+        moved = np.array([self.solution.displacement(points, k) for k in range(len(scene.checkpoints))])
+        return ringing_frequency(scene, np.array(scene.checkpoints), points, moved, self.places.areas)
 
     @property
     def force(self) -> np.ndarray:
@@ -138,6 +147,11 @@ def pressure(a: View, b: View) -> float:
     return float(abs(a.series("pressure")[-1] / b.series("pressure")[-1] - 1))
 
 
+def frequency(a: View, b: View) -> float:
+    """|f_a/f_b − 1| of the ringing."""
+    return abs(a.frequency / b.frequency - 1)
+
+
 def lumen(a: View, b: View) -> float:
     """|p_a/p_b − 1| of the lumen at the last checkpoint."""
     return float(abs(a.series("lumen_pressure")[-1] / b.series("lumen_pressure")[-1] - 1))
@@ -148,6 +162,7 @@ NUMBERS: dict[str, tuple[Measure, Callable[[View], np.ndarray]]] = {
     "force_end": (force_end, lambda view: view.force[-1:]),
     "volume": (volume, lambda view: view.series("volume")),
     "pressure": (pressure, lambda view: view.series("pressure")[-1:]),
+    "frequency": (frequency, lambda view: np.array([view.frequency])),
     "lumen": (lumen, lambda view: view.series("lumen_pressure")[-1:]),
 }
 """Numbers and series of them: how a change is measured, and the values."""
@@ -178,7 +193,7 @@ def uncertainties(
     family = views[:FAMILY]
     found = {}
     for name, measure in QUANTITIES.items():
-        if name == "lumen" and not finest.scene.filled:
+        if not allowed(finest.scene, name):
             continue
         mesh = _of_mesh(name, family)
         shares = {key: setting_error(measure(views[-1], view), VARIANTS[key][1]) for key, view in better.items()}

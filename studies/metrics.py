@@ -8,13 +8,11 @@ import numpy as np
 from studies.distance import hausdorff
 from studies.geometry.mesh import tetrahedron_volumes
 from studies.measured import Run
+from studies.ringing import ringing_frequency
+from studies.scenes.base import ALWAYS, allowed
 from studies.store import Status
 
 PERCENT = 100.0
-ALWAYS = ("volume",)
-"""Quantities with a truth of their own: a volume is compared with the body's own rest volume."""
-GAUGE_FREE = ("pressure", "lumen")
-"""Quantities that every scene with a reference allows: a rigid turn does not change them."""
 DOUBT = 0.1
 """An error with more than this share of uncertainty in it is doubtful (docs/theory.md, the reference)."""
 COMPARABLE = (Status.OK, Status.INVERTED, Status.DRIFTED)
@@ -59,10 +57,7 @@ class Metric:
         """Whether there is something to compare with, and the scene says that it may be."""
         if self.quantity is None or self.quantity in ALWAYS:
             return True
-        word = self.quantity.split("_")[0]
-        if word == "lumen" and not run.case.scene.filled:
-            return False
-        return run.reference is not None and (word in GAUGE_FREE or word in run.case.scene.quantities)
+        return run.reference is not None and allowed(run.case.scene, self.quantity)
 
 
 def volume_worst(run: Run) -> float:
@@ -178,6 +173,18 @@ def pressure_error(run: Run) -> float:
     return PERCENT * (lam / float(run.reference.field("pressure")[-1]) - 1) if lam else float("nan")
 
 
+def frequency_error(run: Run) -> float:
+    """100 (f/f_ref − 1) of the ringing, both read off the displacement of the same points [%]."""
+    assert run.reference is not None
+    rest, weights, scene = run.field("rest")[run.material_nodes], run.surface_weights, run.case.scene
+    t = run.field("t")[run.checkpoint_frames]
+    own = run.field("snapshots")[:, run.material_nodes] - rest
+    truth = np.array([run.reference.displacement(rest, k) for k in range(len(t))])
+    times = np.array(scene.checkpoints)
+    found, wanted = (ringing_frequency(scene, at, rest, u, weights) for at, u in ((t, own), (times, truth)))
+    return PERCENT * (found / wanted - 1)
+
+
 def lumen_pressure_error(run: Run) -> float:
     """100 (lam/p_ref − 1) of the lumen at the last checkpoint [%]; NaN where the lumen is no volume of its own."""
     assert run.reference is not None
@@ -221,6 +228,7 @@ METRICS: tuple[Metric, ...] = (
     Metric("mean_error", "%", "lower", mean_error, "surface_mean"),
     Metric("silhouette_error", "%", "lower", silhouette_error, "silhouette"),
     Metric("pressure_error", "%", "-", pressure_error, "pressure"),
+    Metric("frequency_error", "%", "-", frequency_error, "frequency"),
     Metric("lumen_pressure_error", "%", "-", lumen_pressure_error, "lumen"),
     Metric("min_j", "1", "higher", min_j),
     Metric("j_spread", "%", "lower", j_spread),

@@ -1,14 +1,16 @@
 """What of an equilibrium path is stored."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from reference_fem import Equilibrium, Problem, nodes
+from reference_fem import Equilibrium, Moment, Problem, nodes
 from studies.adapt_reference import whole_forces
 from studies.scenes.base import Scene
 from studies.store import Field
 
 
-def fields_of(scene: Scene, problem: Problem, found: list[Equilibrium]) -> dict[str, Field]:
+def fields_of(scene: Scene, problem: Problem, found: Sequence[Equilibrium]) -> dict[str, Field]:
     """The equilibria at the checkpoints, one row each; NaN where the path did not get there."""
     count = len(scene.checkpoints)
     x, tetrahedra = nodes(problem.mesh), problem.mesh.t.T.astype(np.int64)
@@ -36,10 +38,17 @@ def fields_of(scene: Scene, problem: Problem, found: list[Equilibrium]) -> dict[
         "max_j": series([e.max_J for e in found], "1", "largest J at a quadrature point"),
         "penetration": series([e.penetration for e in found], "m", "deepest penetration of an obstacle"),
         "newton": series([float(e.newton_iterations) for e in found], "1", "Newton iterations"),
+        "energy": series([e.energy for e in found], "J", "strain energy"),
+        "kinetic": series([_of_motion(e, "kinetic") for e in found], "J", "kinetic energy; NaN without motion"),
+        "balance": series([_of_motion(e, "balance") for e in found], "J", "energy gained by the time steps themselves"),
         "displacement": series([e.u for e in found], "m", "displacement of the second-order nodes"),
         "nodes": Field(x, "m", "rest positions of the second-order nodes"),
         "tetrahedra": Field(tetrahedra, "1", "vertices of each tetrahedron"),
     }
+
+
+def _of_motion(equilibrium: Equilibrium, name: str) -> float:
+    return getattr(equilibrium, name) if isinstance(equilibrium, Moment) else np.nan
 
 
 def mean_pressure(tetrahedra: np.ndarray, equilibrium: Equilibrium) -> float:

@@ -72,7 +72,11 @@ def reference_listing(root: Path, scenes: Iterable[Scene]) -> pd.DataFrame:
                 begun = kept(path, piece.stamp)
                 known = {"steps_done": len([e for e in begun.path if e.t in scene.checkpoints]) if begun else 0}
             finest = plan is not None and not piece.variant and piece.level == plan.levels[-1]
-            floor = references[scene.name].floor["force"] if finest and scene.name in references else float("nan")
+            floor = (
+                references[scene.name].floor.get("force", float("nan"))
+                if finest and scene.name in references
+                else float("nan")
+            )
             rows.append(
                 {
                     "scene": scene.name,

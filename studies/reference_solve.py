@@ -6,10 +6,21 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from reference_fem import Equilibrium, NewtonSettings, Problem, ReferenceProblem, equilibrium_path, nodes
+from reference_fem import (
+    DynamicsSettings,
+    Equilibrium,
+    Moment,
+    NewtonSettings,
+    Problem,
+    ReferenceProblem,
+    equilibrium_path,
+    motion_path,
+    nodes,
+)
 from studies.adapt_reference import reference_problem
 from studies.case import scene_to_json
 from studies.checkpoints import drop, keep, kept
+from studies.errors import StudyError
 from studies.fingerprint import source_fingerprint
 from studies.paths import record_path
 from studies.records import new_record
@@ -38,25 +49,28 @@ class Piece:
 
     @property
     def key(self) -> str:
-        """What the solution depends on, besides the code: not the frames, the damping or the other meshes."""
+        """What the solution depends on, besides the code: not the frames or the other meshes; without motion not the
+        damping or the start."""
         scene, plan = self.scene, self.scene.reference
         assert plan is not None  # a piece belongs to a plan
-        plain = Scene(
-            name=scene.name,
+        plain = replace(
+            scene,
             title="",
-            organ=scene.organ,
-            tissue=scene.tissue,
             duration=0.0,
             frames=0,
-            checkpoints=scene.checkpoints,
-            probed=scene.probed,
             reference=replace(plan, levels=(self.level, self.level), variants=()),
-            obstacles=scene.obstacles,
-            held=scene.held,
-            gravity=scene.gravity,
+            quantities=(),
+            not_for=(),
         )
+        if plan.dt is None:
+            plain = replace(plain, damping=0.0, start=None)
         data = {"scene": json.loads(scene_to_json(plain)), "level": self.level, "variant": self.variant}
         return json.dumps(data, sort_keys=True, ensure_ascii=False)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is a motion in time; a load path builds no mass."""
+        return self.scene.reference is not None and self.scene.reference.dt is not None
 
     def path(self, root: Path) -> Path:
         """Where it lies."""
@@ -100,8 +114,8 @@ def variants(scene: Scene) -> list[str]:
     return [name for name in scene.reference.variants if name != "contact" or scene.obstacles]
 
 
-JUDGES = ("bench.py", "crosscheck", "dynamics", "exact.py", "modes.py", "motion", "oracles/", "uncertainty.py")
-"""Beginnings of the solver's files that no equilibrium is computed with: they judge it, or move bodies in time."""
+JUDGES = ("bench.py", "crosscheck", "exact.py", "modes.py", "oracles/", "uncertainty.py")
+"""Beginnings of the solver's files that no reference is computed with: they judge it."""
 
 
 def reference_fingerprint() -> str:
@@ -164,9 +178,12 @@ def solve(root: Path, piece: Piece) -> Path:
     started = time.monotonic()
     status, message = Status.OK, ""
     try:
-        path = equilibrium_path(
-            problem, times, settings, on_checkpoint=lambda c: keep(record_file, stamp, c), resume=before
-        )
+        if piece.moves:
+            path = motion(piece, *work)
+        else:
+            path = equilibrium_path(
+                problem, times, settings, on_checkpoint=lambda c: keep(record_file, stamp, c), resume=before
+            )
     except ReferenceProblem as error:
         path = error.converged
         status, message = Status.NOT_CONVERGED, str(error)
@@ -184,6 +201,20 @@ def solve(root: Path, piece: Piece) -> Path:
     write_record(record_file, record)
     drop(record_file)
     return record_file
+
+
+def motion(piece: Piece, problem: Problem, times: tuple[float, ...], settings: NewtonSettings) -> list[Moment]:
+    """The scene's motion from its start, with its damping. Raises ReferenceProblem; StudyError for another shape."""
+    scene, plan = piece.scene, piece.scene.reference
+    assert plan is not None and plan.dt is not None  # it moves
+    if scene.start is not None and scene.start.shaped:
+        raise StudyError(
+            f"scene '{scene.name}' starts in a shape of its own, and the reference from rest or with a speed; "
+            f"give it a speed, or no reference"
+        )
+    dt = plan.dt / (STEP_FACTOR if piece.variant == "steps" else 1.0)
+    velocity = None if scene.start is None else scene.start.velocities(nodes(problem.mesh))
+    return motion_path(problem, times, DynamicsSettings(dt, scene.damping, newton=settings), velocity)
 
 
 def _attributes(piece: Piece, problem: Problem, found: list[Equilibrium], seconds: float) -> dict:

@@ -1,6 +1,7 @@
 """The scenes, one file each. Adding one: a file and a line in SCENES, where tests, commands and charts find it."""
 
 from studies.scenes.ball_clamped import BALL_CLAMPED
+from studies.scenes.ball_ringing import BALL_RINGING
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.scenes.base import Held, Lumen, Organ, Probed, ReferencePlan, Scene, Start, Tissue
 from studies.scenes.bladder_fill import BLADDER_FILL
@@ -15,6 +16,7 @@ from studies.scenes.stomach_slide import STOMACH_SLIDE
 SCENES: tuple[Scene, ...] = (
     BALL_SQUEEZE,
     BALL_CLAMPED,
+    BALL_RINGING,
     LIVER_PRESS,
     LIVER_PROBE,
     KIDNEY_PROBE,
@@ -29,6 +31,7 @@ UNJUDGED: tuple[Scene, ...] = (STOMACH_SLIDE,)
 
 __all__ = [
     "BALL_CLAMPED",
+    "BALL_RINGING",
     "BALL_SQUEEZE",
     "BLADDER_FILL",
     "KIDNEY_PROBE",

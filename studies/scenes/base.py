@@ -82,12 +82,25 @@ class Probed:
 
 @dataclass(frozen=True)
 class Start:
-    """A shape to start from that is not the body at rest, without speed; the mass-spring solver alone reads it."""
+    """How a body starts that is not at rest. A shape is for the mass-spring solver alone, a speed for both."""
 
     matrix: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     """Linear map of the rest positions about the middle of their box [1], row by row."""
     scatter: float = 0.0
     """How far every node is thrown from there, evenly in a cube: over half the longest side of the box [1]."""
+
+    speed: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    """Linear map from rest positions about the origin to velocities [1/s], row by row; without trace, or it asks an
+    incompressible body to swell."""
+
+    def velocities(self, rest: np.ndarray) -> np.ndarray | None:
+        """(n, 3) [m/s]; None where all is still."""
+        return rest @ np.asarray(self.speed).T if np.any(self.speed) else None
+
+    @property
+    def shaped(self) -> bool:
+        """Whether it begins in another shape than that at rest."""
+        return self.scatter != 0.0 or not np.array_equal(self.matrix, np.eye(3))
 
     def positions(self, rest: np.ndarray) -> np.ndarray:
         """(n, 3) [m]; the same nodes are always thrown to the same places."""
@@ -112,11 +125,16 @@ class ReferencePlan:
     at_contact: int = 0
     """Times the elements at the surface that an obstacle will reach are halved."""
 
+    dt: float | None = None
+    """Largest time step of a motion [s]; None: a load path without inertia, as slow as it takes."""
+
     def __post_init__(self) -> None:
         if self.mesh not in ("solid", "octant") or len(self.levels) < 2:
             raise StudyError(
                 "a reference needs a 'solid' or 'octant' mesh and at least two levels, or it has no error bar"
             )
+        if self.dt is not None and not 0.0 < self.dt < np.inf:
+            raise StudyError(f"a reference plan has dt = {self.dt} s; give a positive time step, or None for no motion")
 
 
 @dataclass(frozen=True)
@@ -172,6 +190,21 @@ class Scene:
         """The probed force [N], (…,), of forces on the body (…, o, 3) and (…, g, 3): positive for a press."""
         force = contact_force if self.probed.what == "obstacle" else held_force
         return force[..., self.probed.number, :] @ np.asarray(self.probed.direction)
+
+
+ALWAYS = ("volume",)
+"""Quantities with a truth of their own: a volume is compared with the body's own rest volume."""
+GAUGE_FREE = ("pressure", "lumen")
+"""Quantities that every scene at rest allows: a rigid turn does not change them."""
+
+
+def allowed(scene: Scene, quantity: str) -> bool:
+    """Whether the scene says that a quantity of its reference may be compared."""
+    word = quantity.split("_")[0]
+    if word == "lumen" and not scene.filled:
+        return False
+    moves = scene.reference is not None and scene.reference.dt is not None
+    return word in ALWAYS or word in scene.quantities or (word in GAUGE_FREE and not moves)
 
 
 KIDNEY = Tissue(4900.0, 1050.0, "kidney, MR elastography at 45 Hz: 4.9 ± 0.5 kPa; density about 1,050 kg/m³")

@@ -54,6 +54,9 @@ def test_what_is_deepest_at_the_last_checkpoint_has_stopped_before(scene):
     """Otherwise the last checkpoint would show ringing instead of equilibrium."""
     paths = [o.path for o in scene.obstacles] + [h.path for h in scene.held]
     ramps = [scene.lumen.filling] if scene.lumen else []
+    if scene.reference.dt is not None:
+        assert "frequency" in scene.quantities  # ringing is what it shows
+        return
     assert max(path.times[-1] for path in paths + ramps) < scene.checkpoints[-1]
 
 
@@ -158,7 +161,7 @@ def load_gap(drive_scene, problem_scene) -> float:
             lumen = setup.body.kept.names.index("lumen")
             factor = drive.volume_target[-1, lumen] / setup.body.rest_volumes[lumen]
             gaps.append(np.full(3, factor - cavity.volume(t)) * np.cbrt(setup.body.rest_volumes[lumen]))
-    return float(np.abs(gaps).max())
+    return float(np.abs(gaps).max(initial=0.0))
 
 
 def moves(scene) -> bool:
@@ -214,9 +217,9 @@ def test_both_solvers_hold_the_same_region(scene):
 
 
 @pytest.mark.parametrize(
-    "obstacle", [Plane((0, 0, 1), (0, 0, -1), friction="no_slip"), Capsule((0, 0, 1), (0, 0, 2), 0.1)]
+    "obstacle", [Plane((0, 0, 1), (0, 0, -1), friction=0.2), Capsule((0, 0, 1), (0, 0, 2), 0.1, friction=0.5)]
 )
 def test_an_obstacle_that_the_reference_does_not_know_is_refused(obstacle):
     liver = next(s for s in SCENES if s.name == "liver_press")
-    with pytest.raises(StudyError, match="the reference knows frictionless planes and spheres"):
+    with pytest.raises(StudyError, match="the reference knows contact without friction"):
         reference_problem(replace(liver, obstacles=(obstacle,)), 150)
