@@ -103,6 +103,7 @@ class Case:
             parts.append(self.precision)
         if self.body.weights is not None:
             parts.append("w" + "_".join(f"{weight:g}" for weight in self.body.weights))
+        parts += _settings(self.method)
         return "-".join(parts)
 
     @property
@@ -113,6 +114,16 @@ class Case:
     def replaced(self, **changes: Any) -> "Case":
         """A copy with some fields changed."""
         return replace(self, **changes)
+
+
+def _settings(method: Method) -> list[str]:
+    """The settings that are not the method's defaults, as words of a name: "hard", "iterations2"."""
+    usual, words = asdict(type(method)()), []  # pyright: ignore[reportArgumentType]
+    for name, value in asdict(method).items():  # pyright: ignore[reportArgumentType]
+        if value != usual[name]:
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            words.append(f"{name}{value:g}" if number else name if value is True else str(value))
+    return words
 
 
 def case_to_dict(case: Case) -> dict[str, Any]:

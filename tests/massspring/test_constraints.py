@@ -87,15 +87,22 @@ def test_every_step_ends_at_the_exact_volume(body, method):
 
 
 def test_hcj05_is_one_rule_of_the_family(body):
-    """The same bits as the loop that knows nothing else, contact, held nodes and guards included."""
+    """What the loop that knows nothing else does, contact, held nodes and guards included.
+
+    The two sum forces and gradients in another order; 200 steps with changing contacts make round-off 1e-12.
+    """
     setup = pressed(body, ImplicitVolume(), clock_for(body, 10, 20))
     mine, other = setup.start(), setup.start()
     mine.motion.x[:] *= 0.8  # so that the guard cuts
     other.motion.x[:] = mine.x
     for frame in range(10):
         mine, other = advance_by(Rule(), mine, setup.drive(frame)), setup.method.advance(other, setup.drive(frame))
-        assert np.array_equal(mine.x, other.x) and np.array_equal(mine.lam, other.lam)
-        for name in ("contact_impulse", "held_impulse", "capped", "skipped"):
+        assert np.abs(mine.x - other.x).max() < 1e-11 * body.size
+        assert mine.lam == pytest.approx(other.lam, rel=1e-8)
+        for name in ("contact_impulse", "held_impulse"):
+            expected = getattr(other.tally, name)
+            assert np.allclose(getattr(mine.tally, name), expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+        for name in ("capped", "skipped"):
             assert np.array_equal(getattr(mine.tally, name), getattr(other.tally, name))
 
 

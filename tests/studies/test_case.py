@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from massspring import METHODS, Free, ImplicitVolume
+from massspring import METHODS, Element, Free, ImplicitVolume, Xpbd
 from studies.case import BodyRecipe, Case, case_from_json, case_to_dict
 from studies.catalog import STUDIES
 from studies.errors import StudyError
@@ -123,3 +123,9 @@ def test_a_case_without_a_clock_cannot_be_made(bad):
     (name,) = bad
     with pytest.raises(StudyError, match=rf"{name} is .*; "):
         Case(SCENES[0], method=ImplicitVolume(), **bad)
+
+
+def test_settings_of_a_method_that_are_not_its_defaults_stand_in_the_name():
+    assert Case(SCENES[0], method=Element(bulk_modulus=1e6, hard=True)).name.endswith("-bulk_modulus1e+06-hard")
+    assert Case(SCENES[0], method=Xpbd("whole", iterations=2)).name.endswith("-whole-iterations2")
+    assert Case(SCENES[0], method=Xpbd()).name == "ball_squeeze-tetrahedral-550-xpbd-dt0.5"

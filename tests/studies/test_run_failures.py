@@ -103,7 +103,6 @@ def test_millimetres_read_as_metres_warn_with_the_box(tmp_path):
         ),
         ({"scene": file_scene("organ.stl", unit="inch")}, "'inch' is not known"),
         ({"scene": replace(SQUEEZE, organ=replace(SQUEEZE.organ, shape="bal"))}, "did you mean 'ball'"),
-        ({"scene": replace(SQUEEZE, not_for=(("implicit_volume", "no volume"),))}, "does not apply"),
         ({"scene": replace(SQUEEZE, damping=-1.0)}, "damping is -1"),
         ({"scene": replace(SQUEEZE, duration=0.0)}, "positive duration"),
         ({"scene": replace(SQUEEZE, gravity=(0.0, 0.0, float("nan")))}, "gravity is (0.0, 0.0, nan)"),
