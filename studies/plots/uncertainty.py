@@ -1,6 +1,6 @@
 """How far each quantity of each reference may be from the truth, and what that comes from."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +39,10 @@ PERCENT = 100.0
 
 @styled
 def figure(known: Mapping[str, Mapping[str, Uncertainty]]) -> Figure:
-    """One panel per scene, a row per quantity: its shares, and a bar up to their sum."""
+    """One panel per scene, a row per quantity: its shares, and a bar up to their sum.
+
+    Panels share their rows: one that its scene does not allow stays empty.
+    """
     if not known:
         return blank(TITLE, "no reference has been solved on its family of meshes yet")
     columns = min(2, len(known))
@@ -48,9 +51,11 @@ def figure(known: Mapping[str, Mapping[str, Uncertainty]]) -> Figure:
     axes = panels(sheet, rows, columns, sharex=True, sharey=True)
     for spare in axes.flat[len(known) :]:
         spare.set_axis_off()
+    longest_first = sorted(known.values(), key=len, reverse=True)
+    names = list(dict.fromkeys(name for quantities in longest_first for name in quantities))
     for panel, (scene, quantities) in zip(axes.flat, known.items(), strict=False):
         panel.set_title(heading(scene))
-        _draw(panel, quantities)
+        _draw(panel, names, quantities)
     top = max(PERCENT * u.total for quantities in known.values() for u in quantities.values())
     log_axis(axes[0, 0].xaxis)
     axes[0, 0].set_xlim(0.5 * LOWEST, 3 * max(top, LOWEST))
@@ -60,8 +65,9 @@ def figure(known: Mapping[str, Mapping[str, Uncertainty]]) -> Figure:
     return finish(sheet, TITLE, _handles(), _notes(known), columns=3)
 
 
-def _draw(axes: Axes, quantities: Mapping[str, Uncertainty]) -> None:
-    for row, uncertainty in enumerate(quantities.values()):
+def _draw(axes: Axes, names: Sequence[str], quantities: Mapping[str, Uncertainty]) -> None:
+    for quantity, uncertainty in quantities.items():
+        row = names.index(quantity)
         total = PERCENT * uncertainty.total
         axes.plot([0.5 * LOWEST, max(total, LOWEST)], [row, row], color=LIGHT, linewidth=9, solid_capstyle="butt")
         for name, share in uncertainty.shares.items():
@@ -71,7 +77,7 @@ def _draw(axes: Axes, quantities: Mapping[str, Uncertainty]) -> None:
             axes.plot(at, row, marker=marker, color=colour, markerfacecolor=face, markersize=7, markeredgewidth=1.5)
         place = {"xytext": (7, 0), "textcoords": "offset points", "va": "center", "size": SMALL}
         axes.annotate(f"{total:.2g}", (max(total, LOWEST), row), **place)
-    axes.set_yticks(range(len(quantities)), [readable(name) for name in quantities])
+    axes.set_yticks(range(len(names)), [readable(name) for name in names])
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
 

@@ -151,6 +151,17 @@ def test_shares_of_an_error_bar_are_drawn_where_they_are():
     assert panel.get_ylim()[0] > panel.get_ylim()[1]
 
 
+def test_error_bars_stand_in_the_row_of_their_name():
+    """A scene that allows fewer quantities leaves rows empty; it does not move up into another's."""
+    names = ("force", "surface", "silhouette")
+    full, part = {name: known() for name in names}, {name: known(mesh=0.02) for name in ("force", "silhouette")}
+    figure = uncertainty.figure({"ball_squeeze": part, "ball_clamped": full})
+    few, all_of_them = figure.axes
+    assert [label.get_text() for label in few.get_yticklabels()] == list(names)
+    assert [names[int(y)] for _, y, _ in points(few, BLUE)] == ["force", "silhouette"]
+    assert [names[int(y)] for _, y, _ in points(all_of_them, BLUE)] == list(names)
+
+
 def test_error_bars_without_references_say_so(tmp_path):
     assert "no reference" in words(uncertainty.figure({}))
     uncertainty.draw({"ball_squeeze": {"force": known()}}, tmp_path / "a.png")
