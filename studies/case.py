@@ -107,6 +107,11 @@ class Case:
         return "-".join(parts)
 
     @property
+    def method_words(self) -> str:
+        """The method and its chosen settings: "element bulk_modulus1e+06 hard"."""
+        return " ".join([self.method.name, *_settings(self.method)])
+
+    @property
     def key(self) -> str:
         """Canonical JSON; equal text means equal case."""
         return json.dumps(case_to_dict(self), sort_keys=True, ensure_ascii=False)
@@ -116,13 +121,18 @@ class Case:
         return replace(self, **changes)
 
 
+def chosen_settings(method: Method) -> dict[str, Any]:
+    """The settings of a method that are not its defaults, by name."""
+    usual = asdict(type(method)())  # pyright: ignore[reportArgumentType]
+    return {name: value for name, value in asdict(method).items() if value != usual[name]}  # pyright: ignore[reportArgumentType]
+
+
 def _settings(method: Method) -> list[str]:
-    """The settings that are not the method's defaults, as words of a name: "hard", "iterations2"."""
-    usual, words = asdict(type(method)()), []  # pyright: ignore[reportArgumentType]
-    for name, value in asdict(method).items():  # pyright: ignore[reportArgumentType]
-        if value != usual[name]:
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            words.append(f"{name}{value:g}" if number else name if value is True else str(value))
+    """The chosen settings as words of a name: "hard", "iterations2", "whole"."""
+    words = []
+    for name, value in chosen_settings(method).items():
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        words.append(f"{name}{value:g}" if number else name if value is True else str(value))
     return words
 
 

@@ -34,7 +34,7 @@ def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
         "law": attributes.get("law", ""),
         "nodes": case.body.nodes,
         "stiffness": case.body.stiffness,
-        "method": case.method.name,
+        "method": case.method_words,
         "dt [ms]": 1e3 * attributes["dt"] if "dt" in attributes else float("nan"),
         "dt/dt_c": attributes["dt"] / attributes["dt_limit"] if "dt" in attributes else float("nan"),
         "status": str(run.record.status),

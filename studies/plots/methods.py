@@ -1,7 +1,6 @@
 """Every method on the same body: one row per method, one panel per quantity, one marker per scene."""
 
 from collections.abc import Sequence
-from dataclasses import MISSING, fields
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -10,6 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from massspring import Method
+from studies.case import chosen_settings
 from studies.metrics import COMPARABLE, METRICS, Metric, Run
 from studies.plots.page import blank, by_scene, doubt_mark, doubts, finish, log_axis, page, panels, remarks
 from studies.plots.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, heading, readable, save, styled
@@ -34,12 +34,9 @@ APART = 0.12
 def label(method: Method) -> str:
     """Its name, and the settings that are not as they come: "element (bulk modulus 1e+06, hard)"."""
     said = []
-    for setting in fields(method):  # pyright: ignore[reportArgumentType]
-        value = getattr(method, setting.name)
-        if setting.default is MISSING or value == setting.default:
-            continue
+    for name, value in chosen_settings(method).items():
         number = f" {value:g}" if not isinstance(value, (bool, str)) else f" {value}" if isinstance(value, str) else ""
-        said.append(readable(setting.name) + number)
+        said.append(readable(name) + number)
     return readable(method.name) + (f" ({', '.join(said)})" if said else "")
 
 
