@@ -29,5 +29,5 @@ LIVER_PROBE = Scene(
     held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),
     probed=Probed("obstacle", 0, INWARD),
     damping=8.0,
-    reference=ReferencePlan("solid", (150, 230, 360), at_outlines=3, at_contact=3),
+    reference=ReferencePlan("solid", (230, 360, 550), at_outlines=3, at_contact=3),
 )
