@@ -72,15 +72,6 @@ def move(stage, change):
 
 
 @lean
-def take_tip(stage, p):
-    """Makes `pair` that of probe p."""
-    tip = stage.probes.pair.tip
-    for axis in range(3):
-        tip[0, axis] = stage.tips.start[stage.step, p, axis]
-        tip[1, axis] = stage.tips.end[stage.step, p, axis]
-
-
-@lean
 def pair_into(pair, x, velocity, triangles, f, dt):
     """Corners of a triangle seen from the tip of `pair`, at the start of the step and at its end [m]."""
     for k in range(3):
