@@ -12,6 +12,7 @@ from massspring.kernels.contact import find_contacts
 from massspring.kernels.layout import Drive
 from massspring.kernels.motion import add_held_impulse, advance
 from massspring.kernels.prediction import add_to_prediction, predict
+from massspring.kernels.ticks import HELD, INTEGRATION, OUTSIDE, SEARCH, SPRINGS, VOLUME, mark
 from massspring.methods.base import State, begin_frame, one_whole
 
 
@@ -53,18 +54,24 @@ def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_ar
 def cells_frame(network, cells, motion, drive, tally, bulk_modulus, barycentric):
     """One frame of symplectic Euler with a known pressure in every cell (eq. 6, 7, 10, 12, 164, 165)."""
     dt = drive.dt
+    mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         predict(network, motion, drive, step, False)
+        mark(tally.ticks, SPRINGS)
         cells.gradient[:] = 0.0
         if barycentric:
             add_barycentre_forces(motion.x, cells, bulk_modulus, cells.gradient)
         else:
             add_volume_forces(motion.x, cells, bulk_modulus, cells.gradient)
         add_to_prediction(network, motion, cells.gradient, dt)
+        mark(tally.ticks, VOLUME)
         if drive.radius.shape[0] > 0:
             find_contacts(network, motion, drive, step, 0.0)
+            mark(tally.ticks, SEARCH)
         add_held_impulse(network, motion, 0.0, dt, drive.gravity, tally.held_impulse)
+        mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, 0.0, dt, tally.contact_impulse)
+        mark(tally.ticks, INTEGRATION)
     return mean_pressure(cells)
 
 

@@ -24,6 +24,7 @@ from massspring.kernels.contact import find_contacts, revise_contacts
 from massspring.kernels.layout import Accuracy, Drive
 from massspring.kernels.motion import add_held_impulse, advance
 from massspring.kernels.prediction import predict
+from massspring.kernels.ticks import HELD, INTEGRATION, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, VOLUME, mark
 from massspring.methods.base import Method, State, begin_frame, start
 from massspring.methods.cells import cell_stiffness, cells_of, one_filled, own_cells, push_cells
 from massspring.methods.implicit_volume import CONTACT_PASSES
@@ -35,13 +36,17 @@ from massspring.obstacles import Attachment
 def hard_frame(network, cells, motion, drive, tally, compliance, accuracy):
     """One frame, all cells and contact inside the solve (eq. 6–13, 166); F = Jᵀ p is pushed with a pressure of 1."""
     dt = drive.dt
+    mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         predict(network, motion, drive, step, False)
+        mark(tally.ticks, SPRINGS)
         cell_rows_into(motion.x, cells, cells.right)
         cell_forces_into(cells, cells.pressure, motion.gradient)
+        mark(tally.ticks, VOLUME)
         passes = 1
         if drive.radius.shape[0] > 0:
             find_contacts(network, motion, drive, step, 1.0)
+            mark(tally.ticks, SEARCH)
             passes = CONTACT_PASSES
         for sweep in range(passes):
             cell_rows_into(motion.x, cells, cells.right)
@@ -49,10 +54,17 @@ def hard_frame(network, cells, motion, drive, tally, compliance, accuracy):
             tally.iterations[0] += count
             tally.iterations[1] = max(tally.iterations[1], count)
             cell_forces_into(cells, cells.pressure, motion.gradient)
-            if sweep + 1 < passes and revise_contacts(network, motion, drive, step, 1.0, np.inf) == 0:
+            mark(tally.ticks, MULTIPLIER)
+            if sweep + 1 == passes:
+                break
+            changes = revise_contacts(network, motion, drive, step, 1.0, np.inf)
+            mark(tally.ticks, REVISION)
+            if changes == 0:
                 break
         add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
+        mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, 1.0, dt, tally.contact_impulse)
+        mark(tally.ticks, INTEGRATION)
     return mean_pressure(cells)
 
 

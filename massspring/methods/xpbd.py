@@ -24,6 +24,7 @@ from massspring.kernels.contact import find_contacts, revise_contacts
 from massspring.kernels.layout import Drive
 from massspring.kernels.motion import add_held_impulse, advance
 from massspring.kernels.prediction import predict, unpushed_into
+from massspring.kernels.ticks import HELD, INTEGRATION, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, mark
 from massspring.methods.base import Method, State, begin_frame, one_whole, start
 from massspring.methods.cells import cells_of, one_filled, own_cells
 from massspring.methods.implicit_volume import CONTACT_PASSES
@@ -34,11 +35,14 @@ from massspring.obstacles import Attachment
 def xpbd_frame(network, cells, motion, drive, tally, compliance, iterations, whole):
     """One frame (eq. 6–13, 167): F in the place of lam G, pushed with a pressure of 1; returns the last one [Pa]."""
     lam, dt = 0.0, drive.dt
+    mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         predict(network, motion, drive, step, False)
+        mark(tally.ticks, SPRINGS)
         passes = 1
         if drive.radius.shape[0] > 0:
             find_contacts(network, motion, drive, step, 1.0)
+            mark(tally.ticks, SEARCH)
             passes = CONTACT_PASSES
         for sweep in range(passes):
             unpushed_into(motion, dt, cells.y)
@@ -51,12 +55,19 @@ def xpbd_frame(network, cells, motion, drive, tally, compliance, iterations, who
                     lam = relax_whole(network, motion, cells, target, dt * dt, compliance, lam, motion.gradient)
                 else:
                     relax_cells(motion, network.inverse_mass, cells, dt * dt, compliance, motion.gradient)
-            if sweep + 1 < passes and revise_contacts(network, motion, drive, step, 1.0, np.inf) == 0:
+            mark(tally.ticks, MULTIPLIER)
+            if sweep + 1 == passes:
+                break
+            changes = revise_contacts(network, motion, drive, step, 1.0, np.inf)
+            mark(tally.ticks, REVISION)
+            if changes == 0:
                 break
         tally.iterations[0] += iterations
         tally.iterations[1] = iterations
         add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
+        mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, 1.0, dt, tally.contact_impulse)
+        mark(tally.ticks, INTEGRATION)
     return lam if whole else mean_pressure(cells)
 
 
