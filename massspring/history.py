@@ -1,5 +1,6 @@
 """What a run leaves behind, frame by frame."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,16 +8,21 @@ import numpy as np
 from massspring.body import Body
 from massspring.clock import Clock
 from massspring.collision import tip_depth
+from massspring.errors import MassSpringError
 from massspring.kernels.deformation import smallest_ratio, tetrahedron_volumes_into
 from massspring.kernels.membrane import membrane_energy
 from massspring.kernels.springs import spring_energy
 from massspring.methods.base import State
 from massspring.obstacles import Obstacle, Probe
 
+EXTRA = ("kinetic", "elastic")
+"""Fields that can be left out: a sweep over all nodes and springs after every frame, which only an energy balance
+reads."""
+
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """F frames; entries after an early end are NaN."""
+    """F frames; entries after an early end are NaN, and so are extra fields that were not asked for."""
 
     t: np.ndarray
     """End of each frame [s], (F,)."""
@@ -62,12 +68,23 @@ class History:
 
 
 class Recorder:
-    """Fills the arrays of a History; a minimum J is only looked for where there are tetrahedra."""
+    """Fills the arrays of a History; a minimum J is only looked for where there are tetrahedra, and of `EXTRA` only
+    what is asked for is computed. Raises MassSpringError for an unknown extra field."""
 
     def __init__(
-        self, body: Body, clock: Clock, obstacles: tuple[Obstacle, ...], attachments: int, keep: frozenset[int]
+        self,
+        body: Body,
+        clock: Clock,
+        obstacles: tuple[Obstacle, ...],
+        attachments: int,
+        keep: frozenset[int],
+        extra: Collection[str] = EXTRA,
     ) -> None:
         frames = clock.frames
+        unknown = sorted(set(extra) - set(EXTRA))
+        if unknown:
+            raise MassSpringError(f"no extra field is called '{unknown[0]}'; there are {', '.join(EXTRA)}")
+        self.extra = frozenset(extra)
         self.body = body
         self.clock = clock
         self.rest_volumes = body.tetrahedron_volumes
@@ -99,9 +116,11 @@ class Recorder:
         net, x, v = state.network, state.x.astype(np.float64, copy=False), state.v.astype(np.float64, copy=False)
         self.volume[frame] = self.volumes.measure(x)
         self.pressure[frame] = state.lam
-        self.scalars["kinetic"][frame] = 0.5 * float(net.mass @ np.einsum("ij,ij->i", v, v))
-        taut = spring_energy(x, net.ends, net.rest_length, net.stiffness) - self.rest_energy
-        self.scalars["elastic"][frame] = taut + membrane_energy(x, net.membrane)
+        if "kinetic" in self.extra:
+            self.scalars["kinetic"][frame] = 0.5 * float(net.mass @ np.einsum("ij,ij->i", v, v))
+        if "elastic" in self.extra:
+            taut = spring_energy(x, net.ends, net.rest_length, net.stiffness) - self.rest_energy
+            self.scalars["elastic"][frame] = taut + membrane_energy(x, net.membrane)
         if len(self.rest_volumes):
             tetrahedron_volumes_into(x, self.body.tetrahedra, self.cell_volumes)
             self.scalars["min_j"][frame] = smallest_ratio(self.cell_volumes, self.rest_volumes)

@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter_ns
@@ -13,7 +13,7 @@ from massspring.body import Body
 from massspring.clock import Clock
 from massspring.collision import new_probing
 from massspring.errors import MassSpringError
-from massspring.history import History, Recorder
+from massspring.history import EXTRA, History, Recorder
 from massspring.kernels.layout import Drive, Tips
 from massspring.methods.base import Method, State
 from massspring.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
@@ -186,13 +186,16 @@ def simulate(
     snapshots: Iterable[int] = (),
     on_frame: Callable[[int], object] | None = None,
     time_limit: float = math.inf,
+    extra: Collection[str] = EXTRA,
 ) -> History:
     """Runs all frames, or up to the first that diverges, and returns what happened.
 
     `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is told after each.
-    A run longer than `time_limit` [s] of wall time ends early. Frame times are those of `advance` alone.
+    A run longer than `time_limit` [s] of wall time ends early. `extra`: which of `history.EXTRA` are recorded; raises
+    MassSpringError for another name. Frame times are those of `advance` alone.
     """
-    recorder = Recorder(setup.body, setup.clock, setup.obstacles, len(setup.attachments), frozenset(snapshots))
+    keep = frozenset(snapshots)
+    recorder = Recorder(setup.body, setup.clock, setup.obstacles, len(setup.attachments), keep, extra)
     recorder.volume_target[:] = setup.volume_targets(recorder.t)
     state = setup.start()
     advance = setup.method.advance

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 
 from massspring import METHODS, ImplicitVolume, Method
+from massspring.history import EXTRA
 from studies.errors import StudyError
 from studies.scenes.base import Scene
 from studies.suggest import choose
@@ -69,6 +70,8 @@ class Case:
     """Whether a step above the stability limit is wanted; it is refused otherwise."""
     precision: Literal["float64", "float32"] = "float64"
     """Of the mass-spring state."""
+    recorded: tuple[str, ...] = ()
+    """Fields beside those that metrics read: of `massspring.history.EXTRA`, the energies."""
     timed: bool = False
     """Whether frame times are measured by the timing protocol."""
 
@@ -85,6 +88,9 @@ class Case:
             raise StudyError(f"frames is {self.frames!r}; give a whole number from 1 on, or None for the scene's own")
         if self.precision not in ("float64", "float32"):
             raise StudyError(f"the precision is '{self.precision}'; choose float64 or float32")
+        unknown = sorted(set(self.recorded) - set(EXTRA))
+        if unknown:
+            raise StudyError(f"no extra field is called '{unknown[0]}'; there are {', '.join(EXTRA)}")
 
     @property
     def name(self) -> str:
@@ -137,8 +143,10 @@ def _settings(method: Method) -> list[str]:
 
 
 def case_to_dict(case: Case) -> dict[str, Any]:
-    """JSON-able form, without `timed`: measuring time changes no physics; `precision` where it is not float64."""
-    chosen = {} if case.precision == "float64" else {"precision": case.precision}
+    """JSON-able form, without `timed`: measuring time changes no physics; `precision` and `recorded` where chosen."""
+    chosen: dict[str, Any] = {} if case.precision == "float64" else {"precision": case.precision}
+    if case.recorded:
+        chosen["recorded"] = list(case.recorded)
     return {
         "scene": _scene_adapter().dump_python(case.scene, mode="json"),
         "body": _recipe_to_dict(case.body),
@@ -172,6 +180,7 @@ def case_from_json(text: str) -> Case:
             frames=data["frames"],
             beyond_limit=data["beyond_limit"],
             precision=data.get("precision", "float64"),
+            recorded=tuple(data.get("recorded", ())),
         )
     except (json.JSONDecodeError, KeyError, TypeError, ValidationError) as error:
         raise StudyError(f"the text is no stored case: {_first_line(error)}") from error

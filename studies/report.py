@@ -61,10 +61,10 @@ def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]
 
     A study of which nothing is stored keeps the charts that are there.
     """
-    written, remarks = [], []
+    written, remarks, absent = [], [], []
     for study in studies:
         if not any(case_path(root, study.name, case).exists() for case in study.cases):
-            remarks.append(f"{study.name}: not run here; `organbench run {study.name}` runs it")
+            absent.append(study.name)
             continue
         paths, missing = refresh(root, study)
         written += paths
@@ -74,6 +74,8 @@ def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]
     if len(kept):
         written.append(write_table(root / "kept_volume.csv", kept))
     write_machine(root / "machine.json")
+    if absent:
+        remarks.append(f"not run here, what is drawn of them stays: {', '.join(absent)}; make study-NAME runs one")
     return written, remarks
 
 

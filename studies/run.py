@@ -50,14 +50,14 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
         try:
             prepared = prepare(case)
             # Attachments that overlap, or hold no node, show only when the run starts.
-            history = simulate(prepared.setup, checkpoint_frames(case, prepared), on_frame, TIME_LIMIT)
+            history = simulate(prepared.setup, checkpoint_frames(case, prepared), on_frame, TIME_LIMIT, case.recorded)
         except DoesNotApply as reason:
             return _record(case, Status.SKIPPED, str(reason), {"warnings": _said(caught)}, {})
         except (StudyError, MassSpringError) as error:
             return _record(case, Status.FAILED, str(error), {"warnings": _said(caught)}, {})
     status, message = judge(case, prepared, history)
     attributes = {**_attributes(prepared, history), "warnings": _said(caught)}
-    return _record(case, status, message, attributes, _fields(prepared, history))
+    return _record(case, status, message, attributes, _fields(case, prepared, history))
 
 
 def _said(caught: list[warnings.WarningMessage]) -> str:
@@ -122,15 +122,18 @@ def _attributes(prepared: Prepared, history: History) -> dict[str, float | int |
     }
 
 
-def _fields(prepared: Prepared, history: History) -> dict[str, Field]:
+def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field]:
     body = prepared.setup.body
+    energies = {
+        "kinetic": Field(history.kinetic, "J", "kinetic energy"),
+        "elastic": Field(history.elastic, "J", "energy of the springs"),
+    }
     return {
+        **{name: energies[name] for name in case.recorded},
         "t": Field(history.t, "s", "end of each frame"),
         "volume": Field(history.volume, "m^3", "enclosed volume, one column per kept volume"),
         "volume_target": Field(history.volume_target, "m^3", "what each kept volume should be"),
         "pressure": Field(history.pressure, "Pa", "multiplier of each kept volume in the last step of the frame"),
-        "kinetic": Field(history.kinetic, "J", "kinetic energy"),
-        "elastic": Field(history.elastic, "J", "energy of the springs"),
         "contact_force": Field(history.contact_force, "N", "force of each obstacle on the body, mean of the frame"),
         "penetration": Field(history.penetration, "m", "depth of the deepest surface node in each obstacle"),
         "held_force": Field(history.held_force, "N", "force of each held region on the body, mean of the frame"),

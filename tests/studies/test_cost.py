@@ -7,7 +7,7 @@ import pytest
 
 from massspring import Free, ImplicitVolume
 from studies.adapt import prepare
-from studies.cost import FRAME, ROWS, SKIPPED, SKIPS, STAGE, cost_table, run_frames
+from studies.cost import ENERGIES, FRAME, ROWS, SKIPPED, SKIPS, STAGE, cost_table, run_frames
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from tests.studies.tiny import NODES, tiny_case
 
@@ -32,9 +32,9 @@ def test_stages_and_rest_are_the_whole_step(squeezed):
 
 def test_what_is_left_out_is_named(squeezed):
     left_out = squeezed[squeezed["kind"] == SKIPPED]["what"].tolist()
-    assert left_out == ["friction: no obstacle has any", "linear solve: one volume is a division"]
+    assert left_out == ["friction: no obstacle has any", "linear solve: one volume is a division", ENERGIES]
     bare = cost_table(tiny_case(scene=BALL_CLAMPED, method=Free()), repeats=1)
-    assert bare[bare["kind"] == SKIPPED]["what"].tolist() == ["contact: there is no obstacle"]
+    assert bare[bare["kind"] == SKIPPED]["what"].tolist() == ["contact: there is no obstacle", ENERGIES]
     assert "contact search" not in set(bare["what"])
     assert len(squeezed[squeezed["kind"] == FRAME]) == 2
 

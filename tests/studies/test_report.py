@@ -62,6 +62,13 @@ def test_report_writes_everything_and_names_what_is_missing(results):
     assert {path: path.read_bytes() for path in results.rglob("*.*")} == before
 
 
+def test_studies_that_were_not_run_are_named_in_one_line(results):
+    _, remarks = report(results, [tiny_study(), *(replace(tiny_study(), name=name) for name in ("other", "third"))])
+    assert [remark for remark in remarks if "not run" in remark] == [
+        "not run here, what is drawn of them stays: other, third; make study-NAME runs one"
+    ]
+
+
 def test_summary_without_results():
     assert "make study" in summary_of({})
 

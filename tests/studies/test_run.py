@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from massspring import Element, Free, Xpbd, simulate
+from massspring.history import EXTRA
 from studies import run as module
 from studies.adapt import prepare
 from studies.case import BodyRecipe, Case
@@ -15,7 +16,7 @@ from studies.scenes.stress import STRESS_SCENES
 from studies.store import Field, Status, read_record, write_record
 from tests.studies.tiny import FRAMES, NODES, diverging_case, tiny_case
 
-SERIES = ("volume", "pressure", "kinetic", "elastic", "contact_force", "penetration", "min_j")
+SERIES = ("volume", "pressure", "contact_force", "penetration", "min_j")
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +45,28 @@ def test_a_good_run_is_complete(ran):
     assert record.attributes["good_frames"] == record.attributes["frames"] == FRAMES
     assert record.attributes["dt"] <= 0.5 * record.attributes["dt_limit"]
     assert all(field.unit and field.description for field in record.fields.values())
+
+
+def test_energies_are_recorded_where_the_case_asks_and_change_nothing_else(ran):
+    plain = read_record(ran[1])
+    full = measure(tiny_case().replaced(recorded=EXTRA))
+    assert set(full.fields) - set(plain.fields) == set(EXTRA) == {"kinetic", "elastic"}
+    for name, field in plain.fields.items():
+        assert np.array_equal(field.values, full.fields[name].values, equal_nan=field.values.dtype.kind == "f"), name
+    # A ball that is being squeezed holds more and more energy, most of it in its springs.
+    kinetic, elastic = (full.fields[name].values for name in ("kinetic", "elastic"))
+    assert np.all(kinetic > 0) and np.all(np.diff(elastic[: FRAMES // 2]) > 0) and elastic[-1] > kinetic[-1]
+
+
+def test_a_record_with_energies_replays_with_them(tmp_path, mesh_cache):
+    path = run_case(tmp_path, "tiny", tiny_case().replaced(recorded=("elastic",)))
+    stored, new, gap = replay(path)
+    assert gap is None and "elastic" in stored.fields and "elastic" in new.fields and "kinetic" not in new.fields
+
+
+def test_a_field_that_nobody_can_record_is_refused():
+    with pytest.raises(StudyError, match="no extra field is called 'enstrophy'; there are kinetic, elastic"):
+        tiny_case().replaced(recorded=("enstrophy",))
 
 
 def test_penetration_is_how_far_the_last_positions_lie_beyond_the_planes(ran):
