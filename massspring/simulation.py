@@ -55,7 +55,7 @@ class Setup:
         if reason is not None:
             raise MassSpringError(f"method '{self.method.name}' does not apply to this body: {reason}")
         check_precision(self.precision)
-        check_surroundings(self.gravity, self.damping, self.clock.dt)
+        check_surroundings(self.gravity, self.damping, self.clock.dt if self.method.limited else 0.0)
         check_nodal("initial velocities", self.velocity, self.body)
         check_nodal("initial positions", self.positions, self.body)
         x = self.body.rest if self.positions is None else self.positions

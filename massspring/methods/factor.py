@@ -5,10 +5,11 @@ sides. A is positive definite also where single weights of a cotangent network a
 """
 
 import numpy as np
-from scipy.sparse import coo_array, diags_array
+from scipy.sparse import coo_array, csc_array, diags_array, tril
 from scipy.sparse.linalg import splu
 
-from massspring.kernels.layout import Motion, Network
+from massspring.kernels.layout import Network
+from massspring.kernels.triangular import Triangular, respond_into
 
 
 class Factor:
@@ -21,29 +22,55 @@ class Factor:
         weights = np.concatenate([network.stiffness, network.stiffness, -network.stiffness, -network.stiffness])
         springs = coo_array((weights, (rows, columns)), shape=(n, n)).tocsr()
         matrix = diags_array((1.0 + damping * dt) * network.mass) + dt * dt * springs
-        self.free = np.flatnonzero(network.inverse_mass > 0.0)
-        self.nodes = n
-        inner = matrix.tocsr()[self.free][:, self.free].tocsc()
+        free = np.flatnonzero(network.inverse_mass > 0.0)
         self.diagonal = np.where(network.inverse_mass > 0.0, matrix.diagonal(), np.inf)
         """Of A [kg], (n,); inf where held."""
-        options = {"SymmetricMode": True}
-        self._solve = splu(inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).solve
-        self._columns: dict[int, np.ndarray] = {}
+        self._triangular = triangular(matrix.tocsr()[free][:, free].tocsc(), free)
+        self._place = np.full(n, -1)
+        self._columns = np.empty((0, n))
+        self._known = 0
 
     def respond(self, forces: np.ndarray) -> np.ndarray:
-        """A⁻¹ `forces`, (n, q)."""
-        moved = np.zeros_like(forces)
-        moved[self.free] = self._solve(np.ascontiguousarray(forces[self.free]))
+        """A⁻¹ `forces`, (n, 3) each."""
+        moved = np.empty_like(forces)
+        respond_into(self._triangular, forces, moved)
         return moved
 
     def columns(self, nodes: np.ndarray) -> np.ndarray:
-        """A⁻¹ e_i of each of `nodes` (c,), (n, c); a node's is solved for when it is first touched."""
-        for node in nodes.tolist():
-            if node not in self._columns:
-                unit = np.zeros((self.nodes, 1))
-                unit[node] = 1.0
-                self._columns[node] = self.respond(unit)[:, 0]
-        return np.column_stack([self._columns[node] for node in nodes.tolist()])
+        """A⁻¹ e_i of each of `nodes` (c,), as rows, (c, n); a node's is solved for when it is first touched."""
+        new = np.unique(nodes[self._place[nodes] < 0])
+        self._make_room(len(new))
+        for three in (new[k : k + 3] for k in range(0, len(new), 3)):
+            units = np.zeros((len(self._place), 3))
+            units[three, np.arange(len(three))] = 1.0
+            last = self._known + len(three)
+            self._columns[self._known : last] = self.respond(units).T[: len(three)]
+            self._place[three] = np.arange(self._known, last)
+            self._known = last
+        return self._columns[self._place[nodes]]
+
+    def _make_room(self, count: int) -> None:
+        """Doubles the store of columns until `count` more fit."""
+        while self._known + count > len(self._columns):
+            more = np.empty((max(64, len(self._columns)), len(self._place)))
+            self._columns = np.concatenate([self._columns, more])
+
+
+def triangular(matrix: csc_array, nodes: np.ndarray) -> Triangular:
+    """L D Lᵀ of a positive definite matrix whose columns belong to `nodes`, ordered by least degree."""
+    options = {"SymmetricMode": True}
+    found = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    assert np.array_equal(found.perm_r, found.perm_c)  # without a threshold no row leaves the diagonal
+    below = csc_array(tril(found.L, -1))
+    below.sort_indices()
+    return Triangular(
+        start=below.indptr.astype(np.uint32),
+        row=below.indices.astype(np.uint32),
+        value=below.data,
+        inverse_pivot=1.0 / found.U.diagonal(),
+        node=nodes[np.argsort(found.perm_c)].astype(np.uint32),
+        scratch=np.zeros((len(nodes), 4)),
+    )
 
 
 class Factors:
@@ -57,43 +84,3 @@ class Factors:
         if (dt, damping) not in self._known:
             self._known[dt, damping] = Factor(network, dt, damping)
         return self._known[dt, damping]
-
-
-class Touching:
-    """The directions that obstacles take in a step, as rows C of unit vectors at nodes, and their Schur complement."""
-
-    def __init__(self, factor: Factor, motion: Motion, surface_nodes: np.ndarray, dt: float) -> None:
-        locked = motion.locked[surface_nodes]
-        slides, wedged, sticks = (surface_nodes[locked == kind].astype(np.int64) for kind in (1, 2, 3))
-        axes = np.tile(np.eye(3), (len(sticks), 1))
-        self.nodes = np.concatenate([slides, wedged, wedged, np.repeat(sticks, 3)])
-        self.direction = np.concatenate(
-            [motion.normal[slides], motion.normal[wedged], motion.second_normal[wedged], axes]
-        )
-        self.obstacle = motion.touched[self.nodes].astype(np.int64) - 1
-        second = len(slides) + len(wedged) + np.arange(len(wedged))
-        self.obstacle[second] = motion.second[wedged].astype(np.int64) - 1
-        self.place = np.einsum("ci,ci->c", self.direction, motion.x[self.nodes] + dt * motion.goal[self.nodes])
-        """Where each row ends the step, along its direction [m], (c,)."""
-        if len(self.nodes):
-            self._columns = factor.columns(self.nodes)
-            schur = self._columns[self.nodes] * (self.direction @ self.direction.T)
-            self._inverse = np.linalg.inv(schur)
-
-    def along(self, field: np.ndarray) -> np.ndarray:
-        """C u, (c,)."""
-        return np.einsum("ci,ci->c", self.direction, field[self.nodes])
-
-    def impulses(self, missing: np.ndarray) -> np.ndarray:
-        """γ = (C A⁻¹ Cᵀ)⁻¹ `missing` [kg m], (c,): what moves the rows by `missing` [m] (eq. 93)."""
-        return self._inverse @ missing
-
-    def moved_by(self, impulses: np.ndarray) -> np.ndarray:
-        """A⁻¹ Cᵀ γ [m], (n, 3)."""
-        return self._columns @ (impulses[:, None] * self.direction)
-
-    def without(self, field: np.ndarray) -> np.ndarray:
-        """A response `field` (n, 3) with the part that obstacles take removed: the response of W̃."""
-        if not len(self.nodes):
-            return field
-        return field + self.moved_by(self.impulses(-self.along(field)))

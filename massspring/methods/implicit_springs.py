@@ -6,7 +6,7 @@ its quadratic model bounds the energy of the springs from above, so that passes
 
     A δ = M dt v + dt² (f(p) + m g) − (1 + c dt) M (p − x) + dt² Jᵀ lam + Cᵀ γ,   p ← p + δ
 
-descend whatever the step is. Volumes are linearised at p and cost a back-solve each, Y = A⁻¹ Jᵀ; contact is eliminated
+descend whatever the step is. Volumes, linearised at p, cost a back-solve a step, Y = A⁻¹ Jᵀ; contact is eliminated
 with the columns of A⁻¹ at touched nodes, so that W̃ = A⁻¹ − A⁻¹ Cᵀ (C A⁻¹ Cᵀ)⁻¹ C A⁻¹ stands where W̃ stands in HCJ05.
 
 Limits: no step is unstable, but long ones lose energy, and few passes slow down turning; Python once per pass.
@@ -19,21 +19,26 @@ from typing import ClassVar
 import numpy as np
 
 from massspring.body import Body
-from massspring.errors import MassSpringError
-from massspring.kernels.implicit_contact import seat_entering
+from massspring.kernels.implicit_step import imbalance_into
 from massspring.kernels.layout import Drive
 from massspring.kernels.motion import add_held_impulse
-from massspring.kernels.rows import (
-    rows_into,
-    rows_times_into,
-    transposed_rows_times_into,
-    volumes_of_rows_into,
-)
-from massspring.kernels.rubbing import wedge
+from massspring.kernels.rows import rows_times_into, transposed_rows_times_into
 from massspring.kernels.springs import spring_forces_into
+from massspring.kernels.ticks import (
+    HELD,
+    INTEGRATION,
+    MULTIPLIER,
+    OUTSIDE,
+    REVISION,
+    SEARCH,
+    SPRINGS,
+    VOLUME,
+    mark,
+)
 from massspring.methods.base import Method, State, begin_frame, start
-from massspring.methods.factor import Factor, Factors, Touching
+from massspring.methods.factor import Factor, Factors
 from massspring.methods.rows import DENSE_UP_TO, volume_rows
+from massspring.methods.touching import Contact, Touching
 from massspring.obstacles import Attachment
 
 CONTACT_REVISIONS = 3
@@ -53,16 +58,13 @@ class Step:
         assert state.rows is not None  # start() made them
         self.method, self.drive, self.step, self.factor = method, drive, step, factor
         self.network, self.motion, self.rows, self.tally = state.network, state.motion, state.rows, state.tally
-        self.dt = drive.dt
-        mass = self.network.mass[:, None]
-        self.inertia = mass * (self.dt * self.motion.v + self.dt**2 * drive.gravity)
-        self.heavy = (1.0 + drive.damping * self.dt) * mass
         # Without gravity: passes that start from balance must stay there, or a sum of few would be biased.
-        self.p = self.motion.x + self.dt * self.motion.v
+        self.p = self.motion.x + drive.dt * self.motion.v
         held = self.network.held_nodes
         self.p[held] = self.network.held_rest + drive.held_displacement[step][self.network.held_group]
-        self.motion.locked[self.network.surface_nodes] = 0
-        self.motion.touched[self.network.surface_nodes] = 0
+        self.few = len(self.rows.lam) <= DENSE_UP_TO
+        self.contact = Contact(self.network, self.motion, drive, step)
+        self.answers: np.ndarray | None = None
 
     def times(self, field: np.ndarray) -> np.ndarray:
         """J u [m³], (m,)."""
@@ -76,51 +78,77 @@ class Step:
         transposed_rows_times_into(self.rows, pressure, force)
         return force
 
+    def mark(self, stage: int) -> None:
+        """Books the time since the last mark, where somebody asks."""
+        if self.tally.ticks is not None:
+            mark(self.tally.ticks, stage)
+
     def take(self) -> None:
         """All passes; then v⁺ = (x⁺ − x)/dt."""
-        touching = Touching(self.factor, self.motion, self.network.surface_nodes, self.dt)
-        impulses = np.zeros(0)
-        for _ in range(self.method.passes):
-            residual = self.linearise()
-            free = self.factor.respond(residual)
-            self.answers = self.answers_of_all()
+        touching, impulses = self.touch(), np.zeros(0)
+        obstacles = len(self.drive.radius) > 0
+        if obstacles:
+            self.mark(SEARCH)
+        for number in range(self.method.passes):
+            if number > 0 and self.contact.rub(self.p, touching, impulses):
+                touching = self.touch()
+            free = self.factor.respond(self.imbalance())
+            self.mark(SPRINGS)
+            if number == 0 and self.few:
+                self.answers = self.answers_of_all()
+                self.reach(touching)
+                self.mark(VOLUME)
             for revision in range(CONTACT_REVISIONS):
                 change, impulses = self.solve(free, touching)
-                if revision + 1 == CONTACT_REVISIONS or not self.revise(self.p + change, touching, impulses):
+                self.mark(MULTIPLIER)
+                if not obstacles or revision + 1 == CONTACT_REVISIONS:
                     break
-                touching = Touching(self.factor, self.motion, self.network.surface_nodes, self.dt)
-            self.p = self.p + change
+                revised = self.contact.revise(self.p + change, touching, impulses)
+                touching = self.touch() if revised else touching
+                self.mark(REVISION)
+                if not revised:
+                    break
+            self.p += change
             self.rows.lam[:] += self.rows.search
         self.book(touching, impulses)
-        self.motion.v[:] = (self.p - self.motion.x) / self.dt
+        self.mark(HELD)
+        self.motion.v[:] = (self.p - self.motion.x) / self.drive.dt
         self.motion.x[:] = self.p
+        self.mark(INTEGRATION)
 
-    def linearise(self) -> np.ndarray:
+    def touch(self) -> Touching:
+        """The touched nodes of the moment, and how volumes answer their pressures past them."""
+        touching = Touching(self.factor, self.motion, self.network.surface_nodes, self.drive.dt)
+        if self.answers is not None:
+            self.reach(touching)
+        return touching
+
+    def reach(self, touching: Touching) -> None:
+        """dt² W̃ J_rᵀ [m/Pa], (m, n, 3)."""
+        assert self.answers is not None
+        self.reached = np.stack([touching.without(answer) for answer in self.answers])
+
+    def imbalance(self) -> np.ndarray:
         """J, V at p, and the right-hand side for the pressures of the moment [kg m], (n, 3) (eq. 92)."""
-        net, force = self.network, self.motion.force
-        spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, force)
-        rows_into(self.p, self.rows)
-        volumes_of_rows_into(self.p, self.rows, self.rows.volume)
-        known = self.dt**2 * (force + self.pushed(self.rows.lam))
-        return self.inertia + known - self.heavy * (self.p - self.motion.x)
+        out = np.empty_like(self.p)
+        imbalance_into(self.network, self.motion, self.rows, self.p, self.drive, out)
+        return out
 
     def solve(self, free: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
         """(δ [m], contact impulses γ [kg m]) that end the pass at V0 and on the obstacles; `rows.search` is Δlam."""
-        missing = touching.place - touching.along(self.p)
-        change = touching.without(free)
-        if len(missing):
-            change = change + touching.moved_by(touching.impulses(missing))
+        if self.drive.rough:
+            free = free + self.factor.respond(self.contact.rubbed)
+        missing = touching.place - touching.along(self.p + free)
+        change = free + touching.moved_by(touching.impulses(missing)) if len(missing) else free
         error = self.drive.volume_target[self.step] - self.rows.volume - self.times(change)
-        few = len(error) <= DENSE_UP_TO
-        self.rows.search[:], answer = (self.directly if few else self.iteratively)(error, touching)
-        change = change + touching.without(answer)
-        impulses = touching.impulses(missing - touching.along(free + answer)) if len(missing) else missing
-        return change, impulses
+        self.rows.search[:], answer = self.directly(error) if self.few else self.iteratively(error, touching)
+        reached = np.tensordot(self.rows.search, self.reached, 1) if self.few else touching.without(answer)
+        return change + reached, touching.impulses(missing - touching.along(answer))
 
-    def directly(self, error: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
+    def directly(self, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(Δlam, dt² A⁻¹ Jᵀ Δlam) of few volumes by a dense solve (eq. 93)."""
-        reached = np.stack([touching.without(answer) for answer in self.answers])
-        schur = np.column_stack([self.times(field) for field in reached])
+        assert self.answers is not None
+        schur = np.column_stack([self.times(field) for field in self.reached])
         able = np.diag(schur) > NEGLIGIBLE * self.response_alone()
         pressure = np.zeros(len(error))
         if able.any():
@@ -131,17 +159,17 @@ class Step:
         return pressure, np.tensordot(pressure, self.answers, 1)
 
     def answers_of_all(self) -> np.ndarray:
-        """dt² A⁻¹ J_rᵀ [m/Pa] before contact, one back-solve of three columns each, (m, n, 3)."""
-        m, n = len(self.rows.lam), len(self.p)
-        if m > DENSE_UP_TO:
-            return np.empty((0, n, 3))
-        units = np.stack([self.pushed(unit) for unit in np.eye(m)], axis=1)
-        return self.dt**2 * self.factor.respond(units.reshape(n, 3 * m)).reshape(n, m, 3).swapaxes(0, 1)
+        """dt² A⁻¹ J_rᵀ [m/Pa] before contact, a back-solve each, (m, n, 3).
+
+        Once a step, with J where the passes start: what Jᵀ turns by after that, the next pass makes up for.
+        """
+        units = np.eye(len(self.rows.lam))
+        return self.drive.dt**2 * np.stack([self.factor.respond(self.pushed(unit)) for unit in units])
 
     def response_alone(self) -> np.ndarray:
         """dt² Σ_j |J_rj|²/A_jj [m³/Pa], (m,): how far a volume answers its pressure where each node is alone."""
         each = (self.rows.value**2).sum(axis=1) / self.factor.diagonal[self.rows.column]
-        return self.dt**2 * np.add.reduceat(each, self.rows.row_start[:-1].astype(np.int64))
+        return self.drive.dt**2 * np.add.reduceat(each, self.rows.row_start[:-1].astype(np.int64))
 
     def iteratively(self, error: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
         """(Δlam, dt² A⁻¹ Jᵀ Δlam) of many volumes by conjugate gradients, one back-solve an iteration (eq. 34)."""
@@ -153,7 +181,7 @@ class Step:
             scaled = residual / diagonal
             rho = float(residual @ scaled)
             search = scaled + (rho / before if count else 0.0) * search
-            response = self.factor.respond(self.dt**2 * self.pushed(search))
+            response = self.drive.dt**2 * self.factor.respond(self.pushed(search))
             image = self.times(touching.without(response))
             step = rho / float(search @ image)
             pressure, answer, residual = pressure + step * search, answer + step * response, residual - step * image
@@ -162,45 +190,17 @@ class Step:
         self.tally.iterations[1] = max(int(self.tally.iterations[1]), count)
         return pressure, answer
 
-    def revise(self, end: np.ndarray, touching: Touching, impulses: np.ndarray) -> bool:
-        """Releases nodes that an obstacle would pull, seats those that would enter one; whether any was (eq. 13)."""
-        if not len(self.drive.radius):
-            return False
-        motion = self.motion
-        motion.v_star[:] = (end - motion.x) / self.dt
-        nodes, sticks = touching.nodes, motion.locked[touching.nodes] == 3
-        inward = np.einsum("ci,ci->c", touching.direction, motion.normal[nodes]) * impulses
-        stuck = np.bincount(nodes, weights=np.where(sticks, inward, 0.0), minlength=len(end))
-        leaving = np.unique(nodes[np.where(sticks, stuck[nodes], impulses) < 0.0])
-        motion.locked[leaving], motion.touched[leaving] = 0, 0
-        entered = self.seat(leaving)
-        return bool(len(leaving) or entered)
-
-    def seat(self, leaving: np.ndarray) -> int:
-        """Seats nodes that would enter an obstacle, but for those just let go; how many."""
-        motion, drive = self.motion, self.drive
-        motion.locked[leaving] = 4  # out of sight
-        count = seat_entering(self.network, motion, drive, self.step)
-        motion.locked[leaving] = 0
-        if drive.rough:
-            new = motion.entering[:count].astype(np.int64)
-            obstacle = motion.touched[new].astype(np.int64) - 1
-            rough = np.isinf(drive.friction[obstacle])
-            new, carried = new[rough], drive.velocity[self.step][obstacle[rough]]
-            along = np.einsum("ci,ci->c", motion.normal[new], carried)[:, None] * motion.normal[new]
-            motion.locked[new] = 3
-            motion.goal[new] += carried - along
-        if len(drive.radius) > 1:
-            count += wedge(self.network, motion, drive, self.step, 0.0)
-        return count
-
     def book(self, touching: Touching, impulses: np.ndarray) -> None:
         """Impulses of obstacles and attachments [N s] (eq. 11)."""
-        motion, net = self.motion, self.network
-        np.add.at(self.tally.contact_impulse, touching.obstacle, impulses[:, None] / self.dt * touching.direction)
+        motion, net, dt = self.motion, self.network, self.drive.dt
+        given = self.tally.contact_impulse
+        np.add.at(given, touching.obstacle, impulses[:, None] / dt * touching.direction)
+        if self.drive.rough:
+            rubbed = np.flatnonzero(self.contact.rubbed.any(axis=1))
+            np.add.at(given, motion.touched[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
         spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, motion.force)
         motion.gradient[:] = self.pushed(self.rows.lam)
-        add_held_impulse(net, motion, 1.0, self.dt, self.drive.gravity, self.tally.held_impulse)
+        add_held_impulse(net, motion, 1.0, dt, self.drive.gravity, self.tally.held_impulse)
 
 
 @dataclass(frozen=True)
@@ -231,17 +231,13 @@ class ImplicitSprings(Method):
         return replace(state, rows=rows, memory=Factors())
 
     def advance(self, state: State, drive: Drive) -> State:
-        """One frame. Raises MassSpringError for Coulomb friction."""
-        slippery = (drive.friction > 0.0) & np.isfinite(drive.friction)
-        if slippery.any():
-            raise MassSpringError(
-                f"method 'implicit_springs' takes friction 0 or 'no_slip', obstacle {int(np.argmax(slippery))} has "
-                f"{drive.friction[slippery][0]:g}; take implicit_volume"
-            )
+        """One frame."""
         after = begin_frame(state, drive)
         assert after.rows is not None  # start() made them
         after.rows.lam[:] = after.lam + after.network.rest_lam
         factor = after.memory.at(after.network, drive.dt, drive.damping)
+        if after.tally.ticks is not None:
+            mark(after.tally.ticks, OUTSIDE)
         for step in range(len(drive.position)):
             Step(self, after, drive, step, factor).take()
         return replace(after, lam=after.rows.lam - after.network.rest_lam)

@@ -5,6 +5,7 @@ from massspring import (
     Baumgarte,
     Element,
     Free,
+    ImplicitSprings,
     ImplicitVolume,
     Method,
     Penalty,
@@ -40,6 +41,8 @@ CONTESTANTS: tuple[Method, ...] = (
     Xpbd("whole", iterations=2),
 )
 SCENES = (BALL_SQUEEZE, LIVER_PRESS)
+LONG = (0.02, 0.1)
+"""Steps of the implicit springs [s]: 6 and 28 limits of the ball, 3 and 16 of the liver; frames as long as steps."""
 
 METHODS_STUDY = Study(
     name="methods",
@@ -48,6 +51,12 @@ METHODS_STUDY = Study(
         *(Case(scene, BodyRecipe(nodes=NODES), method, timed=True) for scene in SCENES for method in CONTESTANTS),
         # One volume per node, beside one for the whole and one per tetrahedron.
         *(Case(scene, BodyRecipe(nodes=NODES, volumes="nodal"), timed=True) for scene in SCENES),
+        # No limit holds for implicit springs: what does a long step cost, and bring?
+        *(
+            Case(scene, BodyRecipe(nodes=NODES), ImplicitSprings(), dt, frames=round(scene.duration / dt), timed=True)
+            for scene in SCENES
+            for dt in LONG
+        ),
     ),
     charts=(Chart("methods.png", methods.draw),),
     columns=(

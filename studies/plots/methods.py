@@ -15,7 +15,7 @@ from studies.plots.page import blank, by_scene, doubt_mark, doubts, finish, log_
 from studies.plots.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, heading, readable, save, styled
 from studies.plots.work_precision import cost
 
-TITLE = "Ways to keep a volume, on the same bodies at the same share of their step limits"
+TITLE = "Ways to keep a volume, on the same bodies, at one share of their step limits unless a step is named"
 QUANTITIES = {
     "force_error": "force error [%]",
     "interior_error": "displacement error [%]",
@@ -41,8 +41,9 @@ def label(method: Method) -> str:
 
 
 def row(run: Run) -> str:
-    """The method, and the volumes that it keeps where the body says which."""
-    return label(run.case.method) + run.case.body.series.removeprefix(run.case.body.kind)
+    """The method, the volumes that it keeps where the body says which, and its step where that was chosen."""
+    step = "" if run.case.dt == "auto" else f", steps of {1e3 * run.case.dt:g} ms"
+    return label(run.case.method) + run.case.body.series.removeprefix(run.case.body.kind) + step
 
 
 @styled
