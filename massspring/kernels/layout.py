@@ -101,8 +101,12 @@ class VolumeRows(NamedTuple):
     """(f, 3) uint32."""
     normal: np.ndarray
     """Of the triangles, twice their area long [m²], (f, 3)."""
+    summed: np.ndarray
+    """Entries of J that are summed from terms, (c,) uint32; the others are the negative of one of these."""
+    twin: np.ndarray
+    """Which is the negative of each of these; the entry itself where none is, (c,) uint32."""
     term_start: np.ndarray
-    """First term of each entry of J, (e + 1,) uint32; a term is a triangle at its node that bounds its volume."""
+    """First term of each summed entry, (c + 1,) uint32; a term is a triangle at its node that bounds its volume."""
     term_triangle: np.ndarray
     """(t,) uint32."""
     term_share: np.ndarray
@@ -117,8 +121,12 @@ class VolumeRows(NamedTuple):
     """Entries node by node, volumes ascending, (e,) uint32."""
     node_row: np.ndarray
     """Their volumes, (e,) uint32."""
+    place: np.ndarray
+    """Where each entry stands in the two, (e,) uint32."""
     value: np.ndarray
-    """J_rj [m²], (e, 3)."""
+    """J_rj [m²], (e, 4); the fourth number is 0 and fills a vector register."""
+    node_value: np.ndarray
+    """The same node by node, (e, 4)."""
     volume: np.ndarray
     """V_r [m³], (m,)."""
     lam: np.ndarray
@@ -136,7 +144,7 @@ class VolumeRows(NamedTuple):
     allowed: np.ndarray
     """Residual at which the iteration ends, (m,)."""
     node_vector: np.ndarray
-    """(n, 3)."""
+    """(n, 4); the fourth number is 0."""
 
 
 class Motion(NamedTuple):

@@ -4,7 +4,7 @@ import math
 
 from massspring.kernels.compiled import compiled
 from massspring.kernels.distances import allowed_part
-from massspring.kernels.rows import NEGLIGIBLE, mobilise, rows_times_into, transposed_rows_times_into
+from massspring.kernels.rows import NEGLIGIBLE, mobilised_into, padded_rows_times_into
 
 
 @compiled
@@ -67,9 +67,8 @@ def solve_dense(matrix, right, change):
 @compiled
 def apply_schur(rows, motion, inverse_mass, p, product):
     """S p = J (W̃ (Jᵀ p)), (m,) (eq. 33)."""
-    transposed_rows_times_into(rows, p, rows.node_vector)
-    mobilise(motion, inverse_mass, rows.node_vector)
-    rows_times_into(rows, rows.node_vector, product)
+    mobilised_into(rows, motion, inverse_mass, p, rows.node_vector)
+    padded_rows_times_into(rows, rows.node_vector, product)
 
 
 @compiled

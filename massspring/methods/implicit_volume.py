@@ -34,9 +34,9 @@ from massspring.kernels.multipliers import dense_into, solve_dense, solve_iterat
 from massspring.kernels.probing import meet_probes
 from massspring.kernels.rows import (
     diagonal_into,
+    padded_rows_times_into,
     pushed_velocity_into,
     rows_into,
-    rows_times_into,
     steepest_of_row,
     transposed_rows_times_into,
     volumes_of_rows_into,
@@ -113,7 +113,7 @@ def set_right_side(network, rows, motion, target, dt, tolerance):
     Returns whether a volume was capped, and whether a wrong one had nothing to push on.
     """
     pushed_velocity_into(motion, network.inverse_mass, dt, rows.node_vector)
-    rows_times_into(rows, rows.node_vector, rows.right)
+    padded_rows_times_into(rows, rows.node_vector, rows.right)
     diagonal_into(rows, motion, network.inverse_mass, rows.diagonal)
     lightest = network.largest_inverse_mass
     capped, idle = False, False

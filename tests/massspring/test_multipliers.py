@@ -100,7 +100,7 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
     jacobian = np.zeros((several.kept.count, n, 3))
     for r in range(several.kept.count):
         entries = slice(rows.row_start[r], rows.row_start[r + 1])
-        jacobian[r, rows.column[entries]] = rows.value[entries]
+        jacobian[r, rows.column[entries]] = rows.value[entries, :3]
     rectangle = np.vstack(
         [dt * jacobian.reshape(len(jacobian), -1), *[_single_row(n, i, axis) for i, axis, _ in fixed]]
     )
