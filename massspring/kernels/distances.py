@@ -22,9 +22,14 @@ def allowed_part(locked, d0, d1, d2, g0, g1, g2):
 
 @lean
 def axis_share(r0, r1, r2, s0, s1, s2):
-    """Where on a segment 0 … s the point nearest to r lies, 0 … 1; 0 where s has no length."""
+    """Where on a segment 0 … s the point nearest to r lies, 0 … 1; 0 where s has no length.
+
+    Constants of the type of its numbers: a double among floats makes the loop over all nodes three times slower.
+    """
     square = s0 * s0 + s1 * s1 + s2 * s2
-    return min(max((r0 * s0 + r1 * s1 + r2 * s2) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    real = type(square)
+    zero, one = real(0.0), real(1.0)
+    return min(max((r0 * s0 + r1 * s1 + r2 * s2) / square, zero), one) if square > zero else zero
 
 
 @lean

@@ -8,6 +8,7 @@ from numba.core.runtime import _nrt_python as _nrt
 from numba.core.runtime import rtsys
 
 from massspring import Attachment, Free, ImplicitVolume, MassSpringError, Setup, simulate
+from massspring.kernels.distances import round_gap
 from massspring.kernels.slices import gather_and_predict
 from massspring.methods.base import start
 from massspring.precision import KEPT_DOUBLE, in_precision
@@ -33,6 +34,20 @@ def test_float32_gives_the_answer_of_float64_to_its_digits(kept_body, method):
     assert np.abs(single.final - double.final).max() > 1e-12 * kept_body.size, "both ran in double precision"
     scale = np.abs(double.contact_force).max()
     assert scale > 0 and np.abs(single.contact_force - double.contact_force)[-1].max() < 1e-3 * scale
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 0.0), (0.01, 0.0, 0.03)], ids=["sphere", "capsule"])
+def test_the_search_of_round_obstacles_stays_in_single_precision(axis):
+    """Against the distance in double precision; a double in between would slow the loop, and show in the digits."""
+    span, radius = np.array(axis, dtype=np.float32), np.float32(0.02)
+    places = np.random.default_rng(1).uniform(-0.1, 0.1, size=(200, 3)).astype(np.float32)
+    gaps = np.array([float(round_gap(*r, *span, radius)) for r in places])
+    r, a = places.astype(np.float64), span.astype(np.float64)
+    share = np.clip(r @ a / (a @ a), 0.0, 1.0)[:, None] if a.any() else 0.0
+    exact = np.linalg.norm(r - share * a, axis=1) - float(radius)
+    # Some six roundings of the distance and of the share of the axis, half a bit each, of 0.2 m at most.
+    assert np.abs(gaps - exact).max() < 4 * SINGLE * 0.2
+    assert np.array_equal(gaps, gaps.astype(np.float32)), "computed in double precision"
 
 
 def test_float32_meets_the_volume_to_1e_5(kept_body):
