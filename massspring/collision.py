@@ -6,7 +6,7 @@ from massspring.body import Body
 from massspring.kernels.broad_phase import BLOCK
 from massspring.kernels.collision import Pair, nearest_into
 from massspring.kernels.layout import Tally
-from massspring.kernels.probe_layout import Probing, Rows
+from massspring.kernels.probe_layout import COUNTS, Probing, Rows
 from massspring.obstacles import Probe
 from massspring.springs import EDGES_OF_TRIANGLE, lengths, unique_edges
 from massspring.surface import winding_number
@@ -35,7 +35,7 @@ def new_pair() -> Pair:
 def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tally: Tally) -> Probing:
     """Everything awake, nothing in contact, for probes on the triangles `surface` (f, 3)."""
     count, triangles, nodes = len(probes), len(surface), body.node_count
-    many = MOST_ROWS
+    many, kept = MOST_ROWS, body.kept.count
     rows = Rows(
         count=np.zeros(1, dtype=np.int64),
         **{name: np.zeros(many, dtype=np.uint32) for name in ("triangle", "probe")},
@@ -43,7 +43,8 @@ def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tall
         weight=np.zeros((many, 3)),
         direction=np.zeros((many, 3)),
         moves=np.zeros((many, 3, 3)),
-        **{name: np.zeros(many) for name in ("flow", "right", "impulse")},
+        **{name: np.zeros((many, kept)) for name in ("flow", "answer")},
+        **{name: np.zeros(many) for name in ("right", "impulse")},
         active=np.zeros(many, dtype=np.bool_),
         **{name: np.zeros((many, many)) for name in ("matrix", "small")},
         part=np.zeros((2, many)),
@@ -59,17 +60,20 @@ def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tall
         time=np.zeros(triangles),
         found=np.zeros((triangles, 6)),
         rows=rows,
-        **{name: np.zeros((nodes, 3)) for name in ("base", "drift", "push", "velocity")},
-        carried=np.zeros(nodes, dtype=np.uint32),
+        **{name: np.zeros((nodes, 3)) for name in ("base", "push", "velocity")},
+        change=np.zeros(kept),
+        **{name: np.zeros(nodes, dtype=np.uint32) for name in ("carried", "taken")},
+        taken_count=np.zeros(1, dtype=np.int64),
+        passed=np.zeros(count, dtype=np.int64),
         pair=new_pair(),
         tally=tally,
-        counts=np.zeros(7, dtype=np.int64),
+        counts=np.zeros(len(COUNTS), dtype=np.int64),
     )
 
 
 def fresh(probing: Probing, tally: Tally) -> Probing:
     """What a frame may change without changing the state it starts from."""
-    kept = {name: getattr(probing, name).copy() for name in ("travel", "wake", "block_wake", "counts")}
+    kept = {name: getattr(probing, name).copy() for name in ("travel", "wake", "block_wake", "passed", "counts")}
     return probing._replace(tally=tally, **kept)
 
 

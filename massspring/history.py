@@ -11,6 +11,7 @@ from massspring.collision import tip_depth
 from massspring.errors import MassSpringError
 from massspring.kernels.deformation import smallest_ratio, tetrahedron_volumes_into
 from massspring.kernels.membrane import membrane_energy
+from massspring.kernels.probe_layout import COUNTS
 from massspring.kernels.springs import spring_energy
 from massspring.methods.base import State
 from massspring.obstacles import Obstacle, Probe
@@ -54,7 +55,7 @@ class History:
     frame_ns: np.ndarray
     """Wall time of each frame's steps [ns], (F,); 0 after an early end."""
     outcome: str
-    """"finished", "diverged" or "timed-out"."""
+    """"finished", "diverged", "blocked" (a thin probe met tissue that had nowhere to go) or "timed-out"."""
     good_frames: int
     """Frames before the early end, F when there was none."""
     message: str
@@ -65,6 +66,8 @@ class History:
     """Steps that made up for a part only of a wrong volume."""
     iterations: np.ndarray
     """For the multipliers of each frame: their sum over its steps, and the most in one step, (F, 2) int64."""
+    probe_counts: np.ndarray
+    """What thin probes did in each frame, one column for each of kernels.probe_layout.COUNTS, (F, 7) int64."""
 
 
 class Recorder:
@@ -97,6 +100,7 @@ class Recorder:
             np.full((frames, self.volumes.count), np.nan) for _ in range(3)
         )
         self.iterations = np.zeros((frames, 2), dtype=np.int64)
+        self.probe_counts = np.zeros((frames, len(COUNTS)), dtype=np.int64)
         self.obstacles = obstacles
         # The impulses of thin probes come last.
         self.rank = sorted(range(len(obstacles)), key=lambda o: isinstance(obstacles[o], Probe))
@@ -137,6 +141,8 @@ class Recorder:
         self.skipped += int(state.tally.skipped[0])
         self.capped += int(state.tally.capped[0])
         self.iterations[frame] = state.tally.iterations
+        if state.probing is not None:
+            self.probe_counts[frame] = state.probing.counts - self.probe_counts[:frame].sum(axis=0)
         self.final = x
         if frame + 1 in self.keep:
             self.kept[frame + 1] = x
@@ -173,4 +179,5 @@ class Recorder:
             skipped_steps=self.skipped,
             capped_steps=self.capped,
             iterations=self.iterations,
+            probe_counts=self.probe_counts,
         )

@@ -74,11 +74,6 @@ def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.nda
             f"obstacle {number} is a thin probe, which method '{method.name}' does not meet; "
             "use a Sphere, or free or implicit_volume"
         )
-    if body.kept.count > 1:
-        raise MassSpringError(
-            f"obstacle {number} is a thin probe and the body keeps {body.kept.count} volumes; "
-            "contact with a thin probe is solved beside one: keep the whole, or use a Sphere"
-        )
     edge = mean_edge(body)
     if probe.radius > edge:
         raise MassSpringError(

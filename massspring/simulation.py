@@ -181,6 +181,20 @@ def trouble(state: State, body: Body) -> str | None:
     return None if far < ESCAPED * body.size else f"a node has moved {far:.3g} m from rest"
 
 
+def pierced(state: State, obstacles: tuple[Obstacle, ...]) -> str | None:
+    """Which thin probe was driven through tissue that had nowhere to go, or None."""
+    if state.probing is None or not state.probing.passed.any():
+        return None
+    thin = [number for number, obstacle in enumerate(obstacles) if isinstance(obstacle, Probe)]
+    p = int(np.flatnonzero(state.probing.passed)[0])
+    triangle = int(state.probing.passed[p]) - 1
+    held = int((state.network.inverse_mass[state.network.triangles[triangle]] == 0.0).sum())
+    return (
+        f"the thin probe that is obstacle {thin[p]} was driven through triangle {triangle}, {held} of whose corners "
+        "are attached; lead its path past attached tissue, or attach fewer nodes"
+    )
+
+
 def simulate(
     setup: Setup,
     snapshots: Iterable[int] = (),
@@ -211,6 +225,9 @@ def simulate(
         reason = trouble(state, setup.body)
         if reason is not None:
             return recorder.stopped(frame, "diverged", reason)
+        reason = pierced(state, setup.obstacles)
+        if reason is not None:
+            return recorder.stopped(frame, "blocked", reason)
         recorder.record(frame, state, elapsed)
         if on_frame is not None:
             on_frame(frame + 1)

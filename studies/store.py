@@ -33,6 +33,7 @@ class Status(StrEnum):
     INVERTED = "inverted"
     DRIFTED = "drifted"
     NOT_CONVERGED = "not-converged"
+    BLOCKED = "blocked"
     TIMED_OUT = "timed-out"
     FAILED = "failed"
     SKIPPED = "skipped"

@@ -4,6 +4,7 @@ import math
 
 from massspring.kernels.compiled import lean
 from massspring.kernels.distances import allowed_part
+from massspring.kernels.probe_layout import COMPARED
 
 BLOCK = 64
 """Triangles that share one look: 39,000 triangles are 610 numbers a step while all sleep."""
@@ -59,7 +60,7 @@ def find_near(network, motion, tips, step, probes, reach):
                 if not probes.skipping or probes.wake[p, f] <= horizon:
                     gap = box_gap(motion.x, triangles, f, p0, p1, p2) - probes.radius[p]
                     probes.wake[p, f] = probes.travel[0] + gap
-                    probes.counts[4] += 1
+                    probes.counts[COMPARED] += 1
                     if not probes.skipping or gap <= SAFE * reach:
                         probes.near[p, count] = f
                         count += 1

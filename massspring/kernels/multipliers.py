@@ -30,11 +30,18 @@ def dense_into(rows, motion, inverse_mass, matrix):
 
 @compiled
 def solve_dense(matrix, right, change):
-    """S Δlam = rhs by Cholesky, L over S in place (eq. 33).
+    """S Δlam = rhs by Cholesky, L over S in place (eq. 33)."""
+    factor_dense(matrix)
+    substitute(matrix, right, change)
 
-    A volume that is held by its nodes, or depends on those before it, has a pivot of round-off: Δlam_r = 0.
+
+@compiled
+def factor_dense(matrix):
+    """S = L Lᵀ, L over the lower triangle of S (eq. 33).
+
+    A volume that is held by its nodes, or depends on those before it, has a pivot of round-off: its column is 0.
     """
-    m = right.shape[0]
+    m = matrix.shape[0]
     for k in range(m):
         diagonal = matrix[k, k]
         pivot = diagonal
@@ -52,16 +59,22 @@ def solve_dense(matrix, right, change):
             matrix[k, k] = 0.0
             for i in range(k + 1, m):
                 matrix[i, k] = 0.0
+
+
+@compiled
+def substitute(factor, right, change):
+    """L Lᵀ Δlam = rhs; Δlam_r = 0 where a pivot was round-off (eq. 33)."""
+    m = right.shape[0]
     for k in range(m):
         total = right[k]
         for q in range(k):
-            total -= matrix[k, q] * change[q]
-        change[k] = total / matrix[k, k] if matrix[k, k] > 0.0 else 0.0
+            total -= factor[k, q] * change[q]
+        change[k] = total / factor[k, k] if factor[k, k] > 0.0 else 0.0
     for k in range(m - 1, -1, -1):
         total = change[k]
         for i in range(k + 1, m):
-            total -= matrix[i, k] * change[i]
-        change[k] = total / matrix[k, k] if matrix[k, k] > 0.0 else 0.0
+            total -= factor[i, k] * change[i]
+        change[k] = total / factor[k, k] if factor[k, k] > 0.0 else 0.0
 
 
 @compiled

@@ -5,12 +5,13 @@ A contact at the weights b of a triangle couples its three nodes. With u the mot
     v⁺_i = u_i + W̃_i (Σ_k b_ki n_k c_k + dt δ G_i),  n_k·(Σ_i b_ki x⁺_i − tip⁺) ≥ radius,  c_k ≥ 0,
     Σ G_i·(v⁺_i − u_i) = 0.
 
-Eliminating the change of pressure δ leaves A c ≥ right with A_kl = Σ_i b_ki b_li n_k·W̃_i n_l − g_k g_l/(G·W̃·G).
+Eliminating the change of pressure δ leaves A c ≥ right with A_kl = Σ_i b_ki b_li n_k·W̃_i n_l − g_k·S⁻¹ g_l.
 """
 
 from massspring.kernels.compiled import lean
 from massspring.kernels.distances import allowed_part
 from massspring.kernels.multipliers import solve_dense
+from massspring.kernels.probe_pressure import answer_into, change_of_rows, flow_into
 
 RIGID = 1e-10
 """Added share of A's diagonal: two contacts on one edge are one, and the weaker of them goes."""
@@ -48,8 +49,8 @@ def set_row(rows, p, f, triangles, pair):
 
 
 @lean
-def aim_rows(stage, keeping):
-    """W̃ n, the flow g and the right side of every row (eq. 146); flows only where a volume is kept.
+def aim_rows(stage):
+    """W̃ n and the right side of every row (eq. 146).
 
     right_k = [radius − n·(Σ b x − tip⁺)]/dt − n·Σ b u [m/s].
     """
@@ -59,11 +60,10 @@ def aim_rows(stage, keeping):
         d0, d1, d2 = rows.direction[k, 0], rows.direction[k, 1], rows.direction[k, 2]
         end = stage.tips.end
         gap = -(d0 * end[stage.step, p, 0] + d1 * end[stage.step, p, 1] + d2 * end[stage.step, p, 2])
-        approach, flow = 0.0, 0.0
+        approach = 0.0
         for q in range(3):
             i, b = rows.node[k, q], rows.weight[k, q]
             approach += b * (d0 * probes.base[i, 0] + d1 * probes.base[i, 1] + d2 * probes.base[i, 2])
-            flow += b * (d0 * probes.drift[i, 0] + d1 * probes.drift[i, 1] + d2 * probes.drift[i, 2])
             gap += b * (d0 * motion.x[i, 0] + d1 * motion.x[i, 1] + d2 * motion.x[i, 2])
             w, m0, m1, m2 = stage.network.inverse_mass[i], d0, d1, d2
             if motion.locked[i] > 0:
@@ -71,12 +71,11 @@ def aim_rows(stage, keeping):
                 m0, m1, m2 = allowed_part(motion.locked[i], e0, e1, e2, m0, m1, m2)
             rows.moves[k, q, 0], rows.moves[k, q, 1], rows.moves[k, q, 2] = w * m0, w * m1, w * m2
         rows.right[k] = (probes.radius[p] - gap) / stage.dt - approach
-        rows.flow[k] = flow if keeping else 0.0
 
 
 @lean
-def matrix_into(rows, mobility):
-    """A_kj = Σ_i b_ki b_ji n_k·W̃_i n_j − g_k g_j/(G·W̃·G) [1/kg], both halves (eq. 146)."""
+def matrix_into(rows):
+    """A_kj = Σ_i b_ki b_ji n_k·W̃_i n_j − g_k·S⁻¹ g_j [1/kg], both halves (eq. 146)."""
     for k in range(rows.count[0]):
         for j in range(k + 1):
             shared = 0.0
@@ -87,7 +86,9 @@ def matrix_into(rows, mobility):
                         for axis in range(3):
                             along += rows.moves[k, q, axis] * rows.direction[j, axis]
                         shared += rows.weight[k, q] * rows.weight[j, r] * along
-            value = shared - (rows.flow[k] * rows.flow[j] / mobility if mobility > 0.0 else 0.0)
+            value = shared
+            for r in range(rows.flow.shape[1]):
+                value -= rows.flow[k, r] * rows.answer[j, r]
             if k == j:
                 # Where all else is held the volume may leave a triangle nowhere to go.
                 value = max(value, IDLE * shared) * (1.0 + RIGID)
@@ -169,15 +170,14 @@ def clear_push(rows, push):
 
 
 @lean
-def solve_rows(stage, lam, mobility):
-    """Impulses of all rows; returns the pressure that keeps the volume, lam − Σ g c/(dt G·W̃·G) [Pa], and how much
-    faster they make a node at most [m/s] (eq. 146)."""
+def solve_rows(stage, volumes):
+    """Impulses of all rows and the change of pressures beside them; how much faster they make a node at most [m/s]
+    (eq. 146)."""
     rows = stage.probes.rows
-    aim_rows(stage, mobility > 0.0)
-    matrix_into(rows, mobility)
+    aim_rows(stage)
+    for k in range(rows.count[0]):
+        flow_into(stage, volumes, k)
+        answer_into(stage, volumes, rows.flow[k], rows.answer[k])
+    matrix_into(rows)
     choose_rows(rows)
-    fastest = spread_push(rows, stage.probes.push, stage.network.inverse_mass)
-    if mobility > 0.0:
-        for k in range(rows.count[0]):
-            lam -= rows.flow[k] * rows.impulse[k] / (stage.dt * mobility)
-    return lam, fastest
+    return spread_push(rows, stage.probes.push, stage.network.inverse_mass) + change_of_rows(stage)

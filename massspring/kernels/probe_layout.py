@@ -1,11 +1,23 @@
-"""What the stage for thin probes is given: p probes, f triangles, n nodes, r rows at most."""
+"""What the stage for thin probes is given: p probes, f triangles, n nodes, m volumes, r rows at most."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from massspring.kernels.collision import Pair
-from massspring.kernels.layout import Motion, Network, Tally, Tips
+from massspring.kernels.layout import Motion, Network, Tally, Tips, VolumeRows
+
+COUNTS = (
+    "steps in contact",
+    "rounds of search",
+    "steps that carried nodes",
+    "steps that left a triangle behind",
+    "boxes compared",
+    "pairs tested",
+    "nodes carried",
+)
+"""What `Probing.counts` counts."""
+IN_CONTACT, ROUNDS, CARRYING, LEFT_BEHIND, COMPARED, TESTED, CARRIED = range(len(COUNTS))
 
 
 class Rows(NamedTuple):
@@ -26,7 +38,9 @@ class Rows(NamedTuple):
     moves: np.ndarray
     """W̃_i n [1/kg] of each corner, (r, 3, 3)."""
     flow: np.ndarray
-    """g_k = Σ_i b_i G_i · W̃_i n [m²/kg], how the volume changes with the impulse, (r,)."""
+    """g_k = Σ_i b_i J_i W̃_i n [m²/kg], how the volumes change with the impulse, (r, m)."""
+    answer: np.ndarray
+    """S⁻¹ g_k [1/m²], the pressures that undo it, (r, m)."""
     matrix: np.ndarray
     """A [1/kg], (r, r)."""
     right: np.ndarray
@@ -64,21 +78,27 @@ class Probing(NamedTuple):
     """Weights and direction of each passing, (f, 6)."""
     rows: Rows
     base: np.ndarray
-    """u_i, what a node does without contact [m/s], (n, 3); this and the next three: of corners of near triangles."""
-    drift: np.ndarray
-    """W̃_i G_i, its answer to pressure [m²/kg], (n, 3)."""
+    """u_i, what a node does without contact [m/s], (n, 3); of corners of near triangles."""
     push: np.ndarray
-    """Σ_k b_ki c_k W̃_i n_k, what the contacts add [m/s], (n, 3); zero between steps."""
+    """Σ_k b_ki c_k W̃_i n_k, what the contacts add, or how much faster than its tip a carried node goes [m/s], (n, 3);
+    zero between steps."""
     velocity: np.ndarray
     """v⁺_i as the step stands [m/s], (n, 3)."""
+    change: np.ndarray
+    """δ, of the pressures of the kept volumes [Pa], (m,)."""
     carried: np.ndarray
     """1 + the probe that takes a node along, 0 for none, (n,) uint32; zero between steps."""
+    taken: np.ndarray
+    """The carried nodes, in the order in which they were taken, (n,) uint32."""
+    taken_count: np.ndarray
+    """(1,) int64."""
+    passed: np.ndarray
+    """1 + the first triangle that a tip was driven through, 0 for none, (p,) int64."""
     pair: Pair
     tally: Tally
     """Of the frame."""
     counts: np.ndarray
-    """Steps with contact, passes, steps in which nodes were carried, steps that left a probe behind a triangle, pairs
-    compared, pairs tested, nodes carried; (7,) int64."""
+    """COUNTS since the start, (7,) int64."""
 
 
 class Stage(NamedTuple):
@@ -88,5 +108,9 @@ class Stage(NamedTuple):
     motion: Motion
     tips: Tips
     probes: Probing
+    volumes: VolumeRows | None
+    """None where one volume is kept or none."""
+    mobility: float
+    """G·W̃·G of the one volume [m⁴/kg]; 0 where none is kept, or several."""
     step: int
     dt: float

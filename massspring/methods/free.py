@@ -30,7 +30,7 @@ def free_frame(network, motion, drive, tally, probing):
             find_contacts(network, motion, drive, step, 0.0)
             mark(tally.ticks, SEARCH)
         if probing is not None:
-            meet_probes(network, motion, drive, step, probing, 0.0, 0.0)
+            meet_probes(network, motion, drive, step, probing, 0.0, 0.0, None)
             mark(tally.ticks, PROBES)
         add_held_impulse(network, motion, 0.0, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)

@@ -97,7 +97,7 @@ def implicit_volume_frame(network, motion, drive, tally, lam, probing):
         if not left > 0.0:
             tally.skipped[0] += 1
         if probing is not None:
-            lam = meet_probes(network, motion, drive, step, probing, lam, left)
+            lam = meet_probes(network, motion, drive, step, probing, lam, left, None)
             mark(tally.ticks, PROBES)
         add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
@@ -149,7 +149,7 @@ def solve_multipliers(network, rows, motion, tally, accuracy):
 
 
 @compiled
-def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy):
+def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy, probing):
     """One frame of HCJ05 with several volumes (eq. 6–13, 32–35); `rows.lam` [Pa] comes in and goes out.
 
     `motion.gradient` holds F = Jᵀ lam [N], so that with a pressure of 1 all shared kernels push with it.
@@ -185,6 +185,9 @@ def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy):
                 break
         tally.capped[0] += capped
         tally.skipped[0] += idle
+        if probing is not None:
+            meet_probes(network, motion, drive, step, probing, 1.0, 0.0, rows)
+            mark(tally.ticks, PROBES)
         add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, 1.0, dt, tally.contact_impulse)
@@ -215,5 +218,5 @@ class ImplicitVolume(Method):
             return replace(after, lam=np.array([lam]))
         after.rows.lam[:] = after.lam + after.network.rest_lam
         accuracy = Accuracy(self.tolerance, self.most_iterations)
-        implicit_volumes_frame(after.network, after.rows, after.motion, drive, after.tally, accuracy)
+        implicit_volumes_frame(after.network, after.rows, after.motion, drive, after.tally, accuracy, after.probing)
         return replace(after, lam=after.rows.lam - after.network.rest_lam)

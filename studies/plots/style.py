@@ -53,6 +53,7 @@ STATUS_LOOKS: dict[Status, tuple[str, str]] = {
     Status.DRIFTED: (YELLOW, "D"),
     Status.DIVERGED: (BLACK, "X"),
     Status.NOT_CONVERGED: (ORANGE, "P"),
+    Status.BLOCKED: (ORANGE, "s"),
     Status.TIMED_OUT: (SKY, "s"),
     Status.FAILED: (LIGHT, "*"),
     Status.SKIPPED: (GREY, "_"),

@@ -1,14 +1,17 @@
 """The cost table adds up, names what was left out, and what was left out changes no answer."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 from massspring import Free, ImplicitVolume
 from studies.adapt import prepare
+from studies.case import BodyRecipe
 from studies.cost import ENERGIES, FRAME, ROWS, SKIPPED, SKIPS, STAGE, cost_table, run_frames
 from studies.scenes.ball_clamped import BALL_CLAMPED
+from studies.scenes.stomach_slide import STOMACH_SLIDE
 from tests.studies.tiny import NODES, tiny_case
 
 
@@ -46,6 +49,8 @@ def test_leaving_a_stage_out_changes_no_answer(skip, method):
     case = tiny_case(method=method)
     if skip.name.startswith("contact"):
         case = case.replaced(scene=BALL_CLAMPED)
+    if skip.name.startswith("pairs"):
+        case = case.replaced(scene=STOMACH_SLIDE, body=BodyRecipe("surface", 300))
     setup = prepare(case).setup
     if not skip.applies(setup):
         pytest.skip("this method does not leave it out")
@@ -55,6 +60,15 @@ def test_leaving_a_stage_out_changes_no_answer(skip, method):
         assert np.abs(without.x - with_stage.x).max() < 1e-6 * setup.body.size
     else:
         assert np.array_equal(without.x, with_stage.x) and np.array_equal(without.v, with_stage.v)
+
+
+def test_the_table_counts_the_pairs_that_sleep(mesh_cache):
+    """Of the thin probe on the stomach nearly all pairs sleep, and the line says what was still compared."""
+    table = cost_table(tiny_case(scene=STOMACH_SLIDE, body=BodyRecipe("surface", 300)), repeats=1)
+    (line,) = (what for what in table["what"] if what.startswith("pairs of tips"))
+    pairs, boxes = re.search(r"of ([0-9,]+) a step ([0-9.e+]+) boxes compared", line).groups()
+    assert 0 < float(boxes) < 0.5 * int(pairs.replace(",", ""))
+    assert line.endswith("left behind 0")
 
 
 def test_the_command_prints_a_table_or_json(organbench, tmp_path):
