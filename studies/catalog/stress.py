@@ -1,6 +1,6 @@
 """From which starts does a body find its rest shape again, and what does it need for that?"""
 
-from massspring import Free, ImplicitVolume
+from massspring import Free, ImplicitVolume, Shake
 from studies.case import BodyRecipe, Case
 from studies.catalog.base import Chart, Study
 from studies.plots import recovery
@@ -17,7 +17,7 @@ STRESS = Study(
     cases=tuple(
         Case(scene, body, method, dt_fraction=FRACTION)
         for scene in STRESS_SCENES
-        for body, method in ((ONE, Free()), (ONE, ImplicitVolume()), (MANY, ImplicitVolume()))
+        for body, method in ((ONE, Free()), (ONE, ImplicitVolume()), (ONE, Shake()), (MANY, ImplicitVolume()))
     ),
     charts=(Chart("recovery.png", recovery.draw),),
     columns=("inverted_share", "rest_distance", "volume_end", "min_j"),
