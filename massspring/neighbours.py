@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from massspring.kernels.layout import Slices
-from massspring.kernels.slices import LANES
+from massspring.kernels.tiles import LANES
 from massspring.springs import Springs
 
 LONGEST, PIECE = 24, 10
@@ -164,7 +164,10 @@ def slices_of(springs: Springs, triangles: np.ndarray, inverse_mass: np.ndarray,
     pieces = np.flatnonzero(used[: slots.pieces])
     split_node, split_piece, split_start = _by_node(node.reshape(-1)[pieces], pieces)
     held = np.flatnonzero(used & (inverse_mass[node] == 0.0))
-    held_node, held_piece, held_start = _by_node(node.reshape(-1)[held], held)
+    held = held[held >= slots.pieces * LANES]
+    different, stiffness_row = np.unique(stiffness, axis=0, return_inverse=True)
+    shared = aligned(different.shape, real)
+    shared[...] = different
     return Slices(
         node=node.astype(np.uint32),
         lanes=slots.lanes,
@@ -172,14 +175,14 @@ def slices_of(springs: Springs, triangles: np.ndarray, inverse_mass: np.ndarray,
         rings=ring_rows,
         neighbour=neighbour,
         rest_length=rest_length,
-        stiffness=stiffness,
+        stiffness=shared,
+        stiffness_row=stiffness_row.reshape(-1).astype(np.uint32),
         inverse_mass=inverse_mass[node].astype(real),
         pieces=slots.pieces,
         split_node=split_node.astype(np.uint32),
         split_start=split_start,
         split_piece=split_piece,
-        held_node=held_node.astype(np.uint32),
-        held_start=held_start,
-        held_piece=held_piece,
+        held_start=np.searchsorted(held, LANES * np.arange(slices + 1)),
+        held_lane=held % LANES,
         origin=int(triangles[0, 0]),
     )

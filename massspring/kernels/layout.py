@@ -41,7 +41,9 @@ class Slices(NamedTuple):
     rest_length: np.ndarray
     """[m], (r, 64)."""
     stiffness: np.ndarray
-    """[N/m], (r, 64); 0 where there is no spring."""
+    """[N/m], (u, 64), each different row once: few where a law gives all springs of a kind the same; 0 for no spring."""
+    stiffness_row: np.ndarray
+    """Which of them each row has, (r,) uint32."""
     inverse_mass: np.ndarray
     """[1/kg], (S, 64)."""
     pieces: int
@@ -51,12 +53,10 @@ class Slices(NamedTuple):
     """Where the pieces of each begin, (q + 1,) int64."""
     split_piece: np.ndarray
     """Slice × 64 + lane of each piece, int64."""
-    held_node: np.ndarray
-    """Nodes whose motion is prescribed, ascending, (h,) uint32."""
     held_start: np.ndarray
-    """(h + 1,) int64."""
-    held_piece: np.ndarray
-    """Slice × 64 + lane of each, or of its pieces, int64."""
+    """Where in `held_lane` each slice begins, (S + 1,) int64."""
+    held_lane: np.ndarray
+    """Lanes of the nodes whose motion is prescribed, but for those in pieces, int64."""
     origin: int
     """The node from which the volume is seen."""
 
@@ -183,7 +183,7 @@ class Motion(NamedTuple):
     tile: np.ndarray
     """Scratch of `kernels.slices`, one row a thread."""
     pulled: np.ndarray
-    """Scratch: forces and 6 G of the nodes of each slice, (S, 384)."""
+    """Scratch: forces and 6 G of the slices of pieces, (pieces, 384)."""
     sums: np.ndarray
     """Scratch: shares of the slices in 18 V, G·v* and G·W·G, (S + 1, 3) float64; last those of nodes in pieces."""
 

@@ -11,7 +11,7 @@ from massspring.collision import fresh
 from massspring.errors import MassSpringError
 from massspring.kernels.layout import Drive, Motion, Network, Tally, VolumeRows
 from massspring.kernels.probe_layout import Probing
-from massspring.kernels.slices import RESULT, TILE
+from massspring.kernels.tiles import RESULT, TILE
 from massspring.kernels.ticks import Ticks
 from massspring.methods.rows import volume_rows
 from massspring.neighbours import aligned, slices_of
@@ -122,7 +122,7 @@ def start(
         clearance=np.zeros(n),
         places=aligned((n, 4), real),
         tile=aligned((1, TILE), real),
-        pulled=aligned((len(slices.lanes), RESULT), real),
+        pulled=aligned((slices.pieces, RESULT), real),
         sums=np.zeros((len(slices.lanes) + 1, 3)),
     )
     return State(network, motion, np.zeros(kept.count), None if alone else volume_rows(kept, n), memory=memory)
