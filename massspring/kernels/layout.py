@@ -41,7 +41,7 @@ class Slices(NamedTuple):
     rest_length: np.ndarray
     """[m], (r, 64)."""
     stiffness: np.ndarray
-    """[N/m], (u, 64), each different row once: few where a law gives all springs of a kind the same; 0 for no spring."""
+    """[N/m], (u, 64), each different row once: few where all springs of a kind have the same; 0 for no spring."""
     stiffness_row: np.ndarray
     """Which of them each row has, (r,) uint32."""
     inverse_mass: np.ndarray

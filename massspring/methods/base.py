@@ -11,8 +11,8 @@ from massspring.collision import fresh
 from massspring.errors import MassSpringError
 from massspring.kernels.layout import Drive, Motion, Network, Tally, VolumeRows
 from massspring.kernels.probe_layout import Probing
-from massspring.kernels.tiles import RESULT, TILE
 from massspring.kernels.ticks import Ticks
+from massspring.kernels.tiles import RESULT, TILE
 from massspring.methods.rows import volume_rows
 from massspring.neighbours import aligned, slices_of
 from massspring.obstacles import Attachment

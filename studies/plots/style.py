@@ -53,7 +53,7 @@ STATUS_LOOKS: dict[Status, tuple[str, str]] = {
     Status.DRIFTED: (YELLOW, "D"),
     Status.DIVERGED: (BLACK, "X"),
     Status.NOT_CONVERGED: (ORANGE, "P"),
-    Status.BLOCKED: (ORANGE, "s"),
+    Status.BLOCKED: (MUTED[2], "^"),
     Status.TIMED_OUT: (SKY, "s"),
     Status.FAILED: (LIGHT, "*"),
     Status.SKIPPED: (GREY, "_"),

@@ -7,8 +7,8 @@ from massspring import Attachment, Body, Clock, Free, ImplicitVolume, Setup, Vol
 from massspring.kernels.membrane import add_membrane_forces
 from massspring.kernels.motion import multiplier_of_sums, predict_velocity_into, prescribe, volume_multiplier
 from massspring.kernels.slices import gather_and_predict
-from massspring.kernels.tiles import LANES
 from massspring.kernels.springs import spring_forces_into
+from massspring.kernels.tiles import LANES
 from massspring.kernels.volume import enclosed_volume, volume_gradient_into
 from massspring.methods.base import start
 from massspring.neighbours import LONGEST, rings, slices_of
