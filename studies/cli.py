@@ -12,6 +12,7 @@ from rich.table import Table
 
 from massspring import METHODS, MassSpringError
 from reference_fem import ReferenceProblem
+from studies import interrupts
 from studies import report as reports
 from studies.case import BodyRecipe, Case
 from studies.catalog import STUDIES, Study
@@ -45,21 +46,35 @@ errors = Console(stderr=True, soft_wrap=True)
 Results = Annotated[Path, typer.Option("--results", envvar="ORGANBENCH_RESULTS", help="folder of the results")]
 StudyName = Annotated[str, typer.Argument(help="a study (see `organbench list`), or a FILE.py that defines STUDY")]
 SMOKE = "smoke"
-INTERRUPTED = 130
 
 
 def main() -> None:
     """Entry point: exit code 0 done, 2 bad input, 130 interrupted."""
     warnings.showwarning = lambda message, *_: errors.print(f"warning: {message}", markup=False, highlight=False)  # type: ignore[assignment]
     try:
+        code = _exit_code()
+    except KeyboardInterrupt:  # between two lines of it
+        code = interrupts.CODE
+    if code == interrupts.CODE:
+        interrupts.close_ears()
+        errors.print("organbench: interrupted; what is finished is stored, the same command goes on from there")
+    sys.exit(code)
+
+
+def _exit_code() -> str | int | None:
+    """Runs the command. Whatever came of it, once Ctrl-C was pressed it counts as interrupted."""
+    code: str | int | None = 0
+    try:
         app()
-    except (StudyError, MassSpringError, ReferenceProblem) as error:
-        errors.print(f"organbench: {error}", markup=False, highlight=False)
-        sys.exit(2)
-    except SystemExit as stop:
-        if stop.code == INTERRUPTED:  # typer turns KeyboardInterrupt into this code
-            errors.print("organbench: interrupted; what is finished is stored, the same command goes on from there")
-        raise
+    except SystemExit as stop:  # typer ends with it always, and turns KeyboardInterrupt into interrupts.CODE
+        code = stop.code
+    except Exception as error:
+        if not interrupts.pressed():
+            if not isinstance(error, (StudyError, MassSpringError, ReferenceProblem)):
+                raise
+            errors.print(f"organbench: {error}", markup=False, highlight=False)
+            code = 2
+    return interrupts.CODE if interrupts.pressed() else code
 
 
 @app.command("list")
@@ -237,7 +252,3 @@ def safe_dt(
         below, above = found.bracket
         console.print(f"bracket            holds at {1e3 * below:.4g} ms, diverges at {1e3 * above:.4g} ms")
     console.print(found.verdict)
-
-
-if __name__ == "__main__":
-    main()

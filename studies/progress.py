@@ -6,6 +6,8 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from studies.interrupts import stop_if_pressed
+
 QUIET_SECONDS = 10.0
 """Without a terminal (a log file), a line at most this often."""
 
@@ -39,7 +41,8 @@ class TerminalProgress:
             self.tasks[what] = self.bars.add_task(what, total=total, note="")
 
     def advance(self, what: str, note: str) -> None:
-        """One piece is done."""
+        """One piece is done; a Ctrl-C that was lost on the way counts here."""
+        stop_if_pressed()
         self.bars.update(self.tasks[what], advance=1, note=note)
         self.totals[what][0] += 1
         done, total = self.totals[what]

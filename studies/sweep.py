@@ -2,11 +2,11 @@
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Protocol
 
@@ -14,6 +14,7 @@ from studies.atomic import write_whole
 from studies.case import Case
 from studies.catalog import Study
 from studies.errors import StudyError
+from studies.interrupts import die_quietly, died_of_it, held_back
 from studies.metrics import Run
 from studies.reference import Reference, load_reference
 from studies.reference_solve import Piece, pieces, solve
@@ -95,16 +96,26 @@ def perform(tasks: list[Task], jobs: int, progress: Progress) -> None:
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # read by the libraries when a worker loads them
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_die_quietly)
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=die_quietly)
+    workers: list[BaseProcess] = []
     try:
-        futures: dict[Future[Path], Task] = {pool.submit(task.perform): task for task in tasks}
+        with held_back():
+            futures: dict[Future[Path], Task] = {pool.submit(task.perform): task for task in tasks}
+            workers = multiprocessing.active_children()
         for future in as_completed(futures):
             future.result()
             progress.advance("physics", futures[future].label)
     except BrokenProcessPool as error:
+        pool.shutdown()  # waits until every exit code is known
+        if any(died_of_it(worker.exitcode) for worker in workers):
+            raise KeyboardInterrupt from error  # ours is still under way
         raise StudyError(
             "a computing process died (out of memory, or killed); what is finished is stored, run the command again"
         ) from error
+    except KeyboardInterrupt:
+        for worker in workers:  # a signal to this process alone did not reach them
+            worker.terminate()
+        raise
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         for name, value in before.items():
@@ -112,11 +123,6 @@ def perform(tasks: list[Task], jobs: int, progress: Progress) -> None:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
-
-
-def _die_quietly() -> None:
-    """A worker ends at once at Ctrl-C, without a traceback: the case it was at runs again next time."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def run_studies(

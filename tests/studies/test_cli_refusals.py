@@ -189,7 +189,7 @@ def test_from_the_shell(tmp_path):
     """The real process: exit code, and nothing but the sentence."""
     for words, code in ((["run", "volume_los"], 2), (["list"], 0)):
         done = subprocess.run(
-            [sys.executable, "-m", "studies.cli", *words], cwd=REPOSITORY, capture_output=True, text=True, timeout=120
+            [sys.executable, "-m", "studies", *words], cwd=REPOSITORY, capture_output=True, text=True, timeout=120
         )
         assert done.returncode == code
         assert len(done.stderr.splitlines()) == (1 if code else 0)

@@ -2,32 +2,19 @@
 
 import os
 import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from studies import sweep as module
 from studies import timed
 from studies.errors import StudyError
-from studies.paths import record_files
 from studies.run import case_path
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.store import Status, peek, read_record, write_record
+from studies.store import Status, read_record, write_record
 from studies.sweep import Task, failed, load_runs, perform, run_studies, standings, tasks_of
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
-
-REPOSITORY = Path(__file__).parents[2]
-SLOW_STUDY = """
-from tests.studies.tiny import tiny_case, tiny_study
-
-STUDY = tiny_study(name="slow", cases=tuple(tiny_case(dt_fraction=0.004 + 1e-5 * k) for k in range(5)))
-"""
-"""Five cases of about half a second: time enough to be interrupted between the first and the last."""
 
 
 def content(folder):
@@ -152,59 +139,3 @@ def test_the_number_of_threads_is_given_back(monkeypatch, tmp_path):
     perform([Task(tmp_path, "tiny", tiny_case(body=replace(tiny_case().body, stiffness=-1.0)))], 1, Silent())
     assert os.environ["OMP_NUM_THREADS"] == "7"
     assert "MKL_NUM_THREADS" not in os.environ
-
-
-def interrupted(tmp_path, number) -> subprocess.Popen:
-    """`organbench run` of five slow cases, sent signal `number` after the first is stored; results below tmp_path."""
-    file = tmp_path / "slow_study.py"
-    file.write_text(SLOW_STUDY)
-    command = [
-        sys.executable,
-        "-m",
-        "studies.cli",
-        "run",
-        str(file),
-        "--results",
-        str(tmp_path / "results"),
-        "--jobs",
-        "1",
-    ]
-    process = subprocess.Popen(
-        command, cwd=REPOSITORY, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
-    )
-    until = time.monotonic() + 60  # only a sweep that is stuck needs so long
-    while not record_files(tmp_path / "results", "slow") and process.poll() is None and time.monotonic() < until:
-        time.sleep(0.02)
-    os.killpg(process.pid, number)
-    return process
-
-
-def finish(tmp_path):
-    """What was stored by then, byte for byte; the second run does exactly the rest."""
-    folder, total = tmp_path / "results" / "slow", 5
-    kept = {path.name: path.read_bytes() for path in record_files(tmp_path / "results", "slow")}
-    assert 1 <= len(kept) < total
-    assert {peek(folder / name).status for name in kept} == {Status.OK}
-    study = tiny_study(name="slow", cases=tuple(tiny_case(dt_fraction=0.004 + 1e-5 * k) for k in range(5)))
-    assert run_studies(tmp_path / "results", [study], 1, Silent()) == total - len(kept)
-    assert kept.items() <= content(folder).items()
-    assert counts(tmp_path / "results", study) == {"ok": total}
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(os.name != "posix", reason="process groups")
-def test_killed_half_way_goes_on_where_it_was(tmp_path):
-    process = interrupted(tmp_path, signal.SIGKILL)
-    process.communicate(timeout=60)
-    assert process.returncode == -signal.SIGKILL
-    finish(tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(os.name != "posix", reason="process groups")
-def test_ctrl_c_half_way_goes_on_where_it_was(tmp_path):
-    process = interrupted(tmp_path, signal.SIGINT)
-    _, said = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert said.strip() == "organbench: interrupted; what is finished is stored, the same command goes on from there"
-    finish(tmp_path)

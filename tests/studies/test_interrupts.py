@@ -1,0 +1,195 @@
+"""Ctrl-C at any moment: exit code 130, one sentence, and what is finished stays."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from studies import cli, interrupts
+from studies.errors import StudyError
+from studies.paths import record_files
+from studies.store import Status, peek
+from studies.sweep import perform, run_studies, standings
+from tests.studies.tiny import Silent, tiny_case, tiny_study
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and process groups")
+REPOSITORY = Path(__file__).parents[2]
+SAID = "organbench: interrupted; what is finished is stored, the same command goes on from there"
+SLOW_STUDY = """
+from tests.studies.tiny import tiny_case, tiny_study
+
+STUDY = tiny_study(name="slow", cases=tuple(tiny_case(dt_fraction=0.004 + 1e-5 * k) for k in range(5)))
+"""
+"""Five cases of about half a second: time enough to be interrupted between the first and the last."""
+AT_EVENT = """
+import os, signal, sys
+
+moment, count = int(sys.argv.pop(1)), 0
+
+def press(event, arguments):
+    global count
+    count += 1
+    if count == moment:
+        os.kill(os.getpid(), signal.SIGINT)
+
+from studies import __main__ as entry
+
+sys.addaudithook(press)
+entry.main()
+"""
+"""The command line, interrupted at an event (import, file opened, process started ...) of a given number."""
+
+
+def press():
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+class PressedInWorker:
+    """A task whose process gets the signal before the main process does."""
+
+    label = "pressed"
+
+    def perform(self):
+        press()
+
+
+def test_a_worker_that_dies_of_it_first_is_an_interruption():
+    with pytest.raises(KeyboardInterrupt):
+        perform([PressedInWorker()], 1, Silent())
+
+
+def test_held_back_it_waits_and_is_not_lost():
+    reached = False
+    with pytest.raises(KeyboardInterrupt), interrupts.held_back():
+        press()
+        reached = True
+    assert reached
+
+
+@pytest.mark.parametrize(("ready", "code"), [("", 0), ("interrupts.die_quietly(); ", -signal.SIGINT)])
+def test_a_process_that_starts_meanwhile_waits_until_it_is_ready(ready, code):
+    program = f"import os, signal; from studies import interrupts; os.kill(os.getpid(), signal.SIGINT); {ready}"
+    with interrupts.held_back():
+        done = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (code, b"")
+
+
+class Swallowing:
+    """An exception inside a destructor is told and forgotten by Python."""
+
+    def __del__(self):
+        press()
+
+
+def finished():
+    pass
+
+
+def left():
+    raise SystemExit(0)
+
+
+def refused():
+    raise StudyError("the mesher ended with code -2")
+
+
+def broken():
+    raise RuntimeError("what a library makes of it")
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("end", [finished, left, refused, broken, press, interrupts.stop_if_pressed])
+def test_once_pressed_nothing_else_is_told(end, organbench, monkeypatch):
+    def app():
+        Swallowing()
+        end()
+
+    monkeypatch.setattr(cli, "app", app)
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        with interrupts.listening():
+            code, out, err = organbench("run")
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert (code, out, err.strip()) == (130, "", SAID)
+
+
+def test_without_it_all_stays_as_it_was(organbench, monkeypatch):
+    monkeypatch.setattr(cli, "app", broken)
+    before = signal.getsignal(signal.SIGINT)
+    with interrupts.listening(), pytest.raises(RuntimeError):
+        organbench("run")
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_job_in_the_background_goes_on_ignoring_it():
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with interrupts.listening():
+            press()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert not interrupts.pressed()
+
+
+def interrupted(tmp_path, number) -> subprocess.Popen:
+    """`organbench run` of five slow cases, sent signal `number` after the first is stored; results below tmp_path."""
+    file = tmp_path / "slow_study.py"
+    file.write_text(SLOW_STUDY)
+    words = ["run", str(file), "--results", str(tmp_path / "results"), "--jobs", "1"]
+    command = [sys.executable, "-m", "studies", *words]
+    process = subprocess.Popen(
+        command, cwd=REPOSITORY, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+    )
+    until = time.monotonic() + 60  # only a sweep that is stuck needs so long
+    while not record_files(tmp_path / "results", "slow") and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.02)
+    os.killpg(process.pid, number)
+    return process
+
+
+def finish(tmp_path):
+    """What was stored by then, byte for byte; the second run does exactly the rest."""
+    folder, total = tmp_path / "results" / "slow", 5
+    kept = {path.name: path.read_bytes() for path in record_files(tmp_path / "results", "slow")}
+    assert 1 <= len(kept) < total
+    assert {peek(folder / name).status for name in kept} == {Status.OK}
+    study = tiny_study(name="slow", cases=tuple(tiny_case(dt_fraction=0.004 + 1e-5 * k) for k in range(5)))
+    assert run_studies(tmp_path / "results", [study], 1, Silent()) == total - len(kept)
+    assert kept.items() <= {path.name: path.read_bytes() for path in folder.iterdir()}.items()
+    assert [standing.status for standing in standings(tmp_path / "results", study)] == ["ok"] * total
+
+
+@pytest.mark.slow
+def test_killed_half_way_goes_on_where_it_was(tmp_path):
+    process = interrupted(tmp_path, signal.SIGKILL)
+    process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGKILL
+    finish(tmp_path)
+
+
+@pytest.mark.slow
+def test_ctrl_c_half_way_goes_on_where_it_was(tmp_path):
+    process = interrupted(tmp_path, signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said.strip() == SAID
+    finish(tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("moment", [1, 1_000, 20_000, 47_000, 48_500, 49_000])
+def test_from_the_first_import_to_the_last_timing(moment, tiny_file, tmp_path):
+    root = tmp_path / "results"
+    words = [str(moment), "run", str(tiny_file), "--results", str(root), "--jobs", "1"]
+    done = subprocess.run(
+        [sys.executable, "-c", AT_EVENT, *words], cwd=REPOSITORY, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 130
+    assert done.stderr.strip() in (SAID, "organbench: interrupted before anything was begun")
+    assert {peek(path).status for path in record_files(root, "tiny")} <= {Status.OK, Status.DIVERGED}
