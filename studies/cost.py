@@ -4,8 +4,7 @@ The stages are those that the method's own frame loop marks (massspring.kernels.
 one pinned core. The same frames without marks are run in turns; what they take beyond the stages is the rest.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from time import perf_counter_ns
 
@@ -13,91 +12,41 @@ import numba
 import numpy as np
 import pandas as pd
 
-from massspring import ImplicitVolume, MassSpringError, Setup, Sphere, State
+from massspring import MassSpringError, Setup, State
 from massspring.history import EXTRA, Recorder
-from massspring.kernels.probe_layout import COMPARED, IN_CONTACT, LEFT_BEHIND, TESTED
 from massspring.kernels.ticks import INTEGRATION, OUTSIDE, STAGES, Ticks, mark, new_ticks
-from massspring.methods.rows import volume_rows
 from massspring.simulation import trouble
 from studies.adapt import prepare
 from studies.case import Case
+from studies.skips import SKIPS
 from studies.timing import pinned
 
 FRAMES, REPEATS = 100, 5
+PATIENCE = 5.0
+"""Run time [s] after which a run is not repeated once more: what takes so long is far from the noise."""
 MARKS = 100_000
 """Marks in a row, to learn what one costs."""
 CALL = "call of the frame"
 """From Python into compiled code and back, with the copies that leave the old state as it was."""
 ROWS = (*STAGES, CALL)
-FAR = Sphere((1e3, 0.0, 0.0), 1e-3)
-"""An obstacle that nothing reaches."""
 PATHS, RECORDING = "paths of obstacles and targets", "recording"
 ENERGIES = "energies: no metric reads them"
 """Left out of recording, unless a case asks for them."""
+PLAIN, TICKED = "as it is", "with marks"
 STAGE, SKIPPED, FRAME = "stage", "skipped", "per frame"
 
 
-@dataclass(frozen=True)
-class Skip:
-    """A stage that a scene may not need."""
-
-    name: str
-    applies: Callable[[Setup], bool]
-    """Whether a set-up leaves it out."""
-    included: Callable[[Setup, State], tuple[Setup, State]]
-    """The same run with the stage."""
-    told: Callable[[Setup, State], str] = lambda setup, state: ""
-    """How much was left out, from the state after the run; comes after the name."""
+Run = tuple[np.ndarray, np.ndarray, State]
+"""Time of each frame [ns], (F,); of its ROWS, with what marking cost taken off, (rows, F); the last state."""
 
 
-def _with_far(setup: Setup, state: State) -> tuple[Setup, State]:
-    return replace(setup, obstacles=(*setup.obstacles, FAR)), state
-
-
-def _with_friction(setup: Setup, state: State) -> tuple[Setup, State]:
-    rubbing = tuple(replace(o, friction=1e-300) if o in setup.solids else o for o in setup.obstacles)
-    return replace(setup, obstacles=rubbing), state
-
-
-def _with_rows(setup: Setup, state: State) -> tuple[Setup, State]:
-    return setup, replace(state, rows=volume_rows(setup.body.kept, setup.body.node_count))
-
-
-def _awake(setup: Setup, state: State) -> tuple[Setup, State]:
-    assert state.probing is not None
-    return setup, replace(state, probing=state.probing._replace(skipping=False))
-
-
-def _pairs(setup: Setup, state: State) -> str:
-    """Boxes compared, pairs tested and triangles left behind, of all pairs of tips and triangles."""
-    assert state.probing is not None
-    steps = setup.clock.frames * setup.clock.steps
-    pairs, counts = state.probing.wake.size, state.probing.counts
-    return (
-        f": of {pairs:,} a step {counts[COMPARED] / steps:.3g} boxes compared, {counts[TESTED] / steps:.3g} pairs "
-        f"tested; in contact {counts[IN_CONTACT]} of {steps} steps, left behind {counts[LEFT_BEHIND]}"
-    )
-
-
-def _is_division(setup: Setup) -> bool:
-    return isinstance(setup.method, ImplicitVolume) and setup.start().rows is None
-
-
-SKIPS: tuple[Skip, ...] = (
-    Skip("contact: there is no obstacle", lambda s: not s.solids, _with_far),
-    Skip("friction: no obstacle has any", lambda s: bool(s.solids) and not s.drive(0).rough, _with_friction),
-    Skip("linear solve: one volume is a division", _is_division, _with_rows),
-    Skip("pairs of tips and triangles out of reach", lambda s: bool(s.probes), _awake, _pairs),
-)
-
-
-def run_frames(setup: Setup, state: State, ticks: Ticks | None = None) -> tuple[np.ndarray, np.ndarray, State]:
-    """Time of each frame [ns], (F,); of its ROWS, with what marking cost taken off, (rows, F); the last state."""
+def run_frames(setup: Setup, state: State, ticks: Ticks | None = None, frames: int | None = None) -> Run:
+    """Runs the first `frames` of a set-up, or all. Raises MassSpringError for a run that breaks off."""
     state = replace(state, tally=state.tally._replace(ticks=ticks))
-    clock = setup.clock
-    frame_ns, stage_ns = np.zeros(clock.frames), np.zeros((len(ROWS), clock.frames))
+    frames = setup.clock.frames if frames is None else frames
+    frame_ns, stage_ns = np.zeros(frames), np.zeros((len(ROWS), frames))
     price = mark_ns() if ticks is not None else 0.0
-    for frame in range(clock.frames):
+    for frame in range(frames):
         drive = setup.drive(frame)
         if ticks is not None:
             ticks.spent[:], ticks.marks[:] = 0, 0
@@ -115,8 +64,8 @@ def run_frames(setup: Setup, state: State, ticks: Ticks | None = None) -> tuple[
 
 
 def stage_times(setup: Setup) -> np.ndarray:
-    """Time of each of ROWS in each frame [ns], (rows, F): the second of two runs, the first one compiles."""
-    run_frames(setup, setup.start(), new_ticks())
+    """Time of each of ROWS in each frame [ns], (rows, F); compiled before."""
+    run_frames(setup, setup.start(), new_ticks(), frames=1)
     return run_frames(setup, setup.start(), new_ticks())[1]
 
 
@@ -136,45 +85,51 @@ def mark_ns() -> float:
 
 
 def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS) -> pd.DataFrame:
-    """Rows of stages, rest and the whole step [µs per step], skipped stages with what they would cost, and what Python
-    does once per frame, over as many steps. Raises StudyError or MassSpringError for a case that cannot run."""
+    """Rows of stages, rest and the whole step [µs per step], skipped stages with what they would cost and how much of
+    them was skipped, and what Python does once per frame, over as many steps.
+
+    Raises StudyError or MassSpringError for a case that cannot run."""
     setup = prepare(case.replaced(frames=min(frames, case.frames or case.scene.frames))).setup
     skipped = [skip for skip in SKIPS if skip.applies(setup)]
-    runs = {"": (setup, setup.start())}
-    for skip in skipped:
-        runs[skip.name] = skip.included(setup, setup.start())
-    ends: dict[str, State] = {}
-    plain: dict[str, list[np.ndarray]] = {name: [] for name in runs}
-    ticked: list[tuple[np.ndarray, np.ndarray]] = []
+    runs = {skip.name: partial(run_frames, *skip.included(setup, setup.start())) for skip in skipped}
+    runs |= {PLAIN: partial(run_frames, setup, setup.start()), TICKED: partial(_ticked, setup)}
     with pinned(threads=1):
-        for turn in range(-1, repeats):  # the first round compiles and is thrown away
-            for name, (contestant, state) in runs.items():
-                found, _, ends[name] = run_frames(contestant, state)
-                if turn >= 0:
-                    plain[name].append(found)
-            marked = run_frames(setup, setup.start(), new_ticks())
-            if turn >= 0:
-                ticked.append(marked[:2])
+        found = _in_turns(runs, repeats)
         outside = _per_frame(setup)
     to_step = 1e-3 / setup.clock.steps
-    whole = {name: to_step * float(np.min(times, axis=0).mean()) for name, times in plain.items()}
-    stages = to_step * _fastest(ticked).mean(axis=1)
-    rows = [(STAGE, name, cost, cost / whole[""]) for name, cost in zip(ROWS, stages, strict=True) if cost > 0]
-    rest = whole[""] - float(stages.sum())
-    rows += [(STAGE, "rest, not attributed", rest, rest / whole[""]), (STAGE, "whole step", whole[""], 1.0)]
-    for skip in skipped:
-        saved = whole[skip.name] - whole[""]
-        rows.append((SKIPPED, skip.name + skip.told(setup, ends[""]), saved, saved / whole[""]))
-    for name, ns in outside.items():
-        kind = SKIPPED if name == ENERGIES else FRAME
-        rows.append((kind, name, to_step * ns, to_step * ns / whole[""]))
-    return pd.DataFrame(rows, columns=["kind", "what", "µs per step", "share of the step"])
+    whole = {name: to_step * float(np.min([r[0] for r in results], axis=0).mean()) for name, results in found.items()}
+    step = whole[PLAIN]
+    stages = to_step * _fastest(found[TICKED]).mean(axis=1)
+    rows = [(STAGE, name, cost, "") for name, cost in zip(ROWS, stages, strict=True) if cost > 0]
+    rows += [(STAGE, "rest, not attributed", step - float(stages.sum()), ""), (STAGE, "whole step", step, "")]
+    end = found[PLAIN][0][2]
+    rows += [(SKIPPED, skip.name, whole[skip.name] - step, skip.told(setup, end)) for skip in skipped]
+    rows += [(SKIPPED if name == ENERGIES else FRAME, name, to_step * ns, "") for name, ns in outside.items()]
+    table = pd.DataFrame(rows, columns=["kind", "what", "µs per step", "how much"])
+    table.insert(3, "share of the step", table["µs per step"] / step)
+    return table
 
 
-def _fastest(ticked: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+def _ticked(setup: Setup, frames: int | None = None) -> Run:
+    return run_frames(setup, setup.start(), new_ticks(), frames)
+
+
+def _in_turns(runs: dict[str, partial[Run]], repeats: int) -> dict[str, list[Run]]:
+    """Every run up to `repeats` times, in turns, compiled before; one that takes long, less often."""
+    for run in runs.values():
+        run(frames=1)
+    found: dict[str, list[Run]] = {name: [] for name in runs}
+    for _ in range(repeats):
+        for name, run in runs.items():
+            if sum(frame_ns.sum() for frame_ns, _, _ in found[name]) < 1e9 * PATIENCE:
+                found[name].append(run())
+    return found
+
+
+def _fastest(ticked: list[Run]) -> np.ndarray:
     """Times of ROWS in the fastest repeat of each frame, (rows, F)."""
-    quickest = np.argmin([frame_ns for frame_ns, _ in ticked], axis=0)
-    stages = np.stack([stage_ns for _, stage_ns in ticked])
+    quickest = np.argmin([frame_ns for frame_ns, _, _ in ticked], axis=0)
+    stages = np.stack([stage_ns for _, stage_ns, _ in ticked])
     return stages[quickest, :, np.arange(stages.shape[2])].T
 
 

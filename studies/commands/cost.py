@@ -16,7 +16,7 @@ from studies.suggest import choose
 from studies.table import write_table
 
 console = Console(soft_wrap=True)
-HEADINGS = {STAGE: "stages of a step", SKIPPED: "left out here; what it would cost", FRAME: "Python, once per frame"}
+HEADINGS = {STAGE: "stages of a step", SKIPPED: "left out here; what it would cost", FRAME: "Python between two frames"}
 
 
 def cost(
@@ -34,7 +34,8 @@ def cost(
         body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
         method=choose(method, {m.name: m for m in METHODS}, "method")(),
     )
-    found = cost_table(case)
+    with Console(stderr=True).status("measuring (the first time most goes into compiling) ..."):
+        found = cost_table(case)
     if csv is not None:
         write_table(csv, found)
     if json:
@@ -42,6 +43,9 @@ def cost(
         return
     console.print(f"{case.name}, over the whole scene", markup=False, highlight=False)
     console.print(_drawn(found))
+    for what, told in found[["what", "how much"]].itertuples(index=False):
+        if told:
+            console.print(f"{what}: {told}", markup=False, highlight=False)
 
 
 def _drawn(found: pd.DataFrame) -> Table:
@@ -50,6 +54,6 @@ def _drawn(found: pd.DataFrame) -> Table:
         table.add_column(heading, justify=side)  # type: ignore[arg-type]
     for kind, rows in found.groupby("kind", sort=False):
         table.add_row(HEADINGS[str(kind)], "", "", style="bold")
-        for _, what, cost, share in rows.itertuples(index=False):
-            table.add_row(f"  {what}", f"{cost:.3g}", f"{100 * share:.3g} %")
+        for what, cost, share in rows[["what", "µs per step", "share of the step"]].itertuples(index=False):
+            table.add_row(f"  {what}", f"{cost:.2f}", f"{100 * share:.1f} %")
     return table

@@ -9,10 +9,13 @@ import pytest
 from massspring import Free, ImplicitVolume
 from studies.adapt import prepare
 from studies.case import BodyRecipe
-from studies.cost import ENERGIES, FRAME, ROWS, SKIPPED, SKIPS, STAGE, cost_table, run_frames
+from studies.cost import ENERGIES, FRAME, ROWS, SKIPPED, STAGE, cost_table, run_frames
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.stomach_slide import STOMACH_SLIDE
+from studies.skips import SKIPS
 from tests.studies.tiny import NODES, tiny_case
+
+NO_CONTACT = "contact of nodes: no plane, sphere or capsule"
 
 
 @pytest.fixture(scope="module")
@@ -35,9 +38,11 @@ def test_stages_and_rest_are_the_whole_step(squeezed):
 
 def test_what_is_left_out_is_named(squeezed):
     left_out = squeezed[squeezed["kind"] == SKIPPED]["what"].tolist()
-    assert left_out == ["friction: no obstacle has any", "linear solve: one volume is a division", ENERGIES]
+    missing = ["thin probe: none", "gravity: none in this scene"]
+    one = "linear solve: one volume is a division"
+    assert left_out == [*missing, "friction: no obstacle has any", one, ENERGIES]
     bare = cost_table(tiny_case(scene=BALL_CLAMPED, method=Free()), repeats=1)
-    assert bare[bare["kind"] == SKIPPED]["what"].tolist() == ["contact: there is no obstacle", ENERGIES]
+    assert bare[bare["kind"] == SKIPPED]["what"].tolist() == [NO_CONTACT, *missing, ENERGIES]
     assert "contact search" not in set(bare["what"])
     assert len(squeezed[squeezed["kind"] == FRAME]) == 2
 
@@ -65,8 +70,9 @@ def test_leaving_a_stage_out_changes_no_answer(skip, method):
 def test_the_table_counts_the_pairs_that_sleep(mesh_cache):
     """Of the thin probe on the stomach nearly all pairs sleep, and the line says what was still compared."""
     table = cost_table(tiny_case(scene=STOMACH_SLIDE, body=BodyRecipe("surface", 300)), repeats=1)
-    (line,) = (what for what in table["what"] if what.startswith("pairs of tips"))
-    pairs, boxes = re.search(r"of ([0-9,]+) a step ([0-9.e+]+) boxes compared", line).groups()
+    assert "thin probe: none" not in set(table["what"])
+    (line,) = (told for told in table["how much"] if told)
+    pairs, boxes = re.search(r"of ([0-9,]+) pairs a step ([0-9.e+]+) boxes compared", line).groups()
     assert 0 < float(boxes) < 0.5 * int(pairs.replace(",", ""))
     assert line.endswith("left behind 0")
 
@@ -74,7 +80,7 @@ def test_the_table_counts_the_pairs_that_sleep(mesh_cache):
 def test_the_command_prints_a_table_or_json(organbench, tmp_path):
     words = ("cost", "ball_clamped", "--nodes", NODES, "--method", "free")
     code, out, _ = organbench(*words, "--csv", tmp_path / "cost.csv")
-    assert code == 0 and "springs and prediction" in out and "there is no obstacle" in out
+    assert code == 0 and "springs and prediction" in out and NO_CONTACT in out
     assert (tmp_path / "cost.csv").read_text(encoding="utf-8").startswith("kind,what,")
     code, out, _ = organbench(*words, "--json")
     assert {row["kind"] for row in json.loads(out)} == {STAGE, SKIPPED, FRAME}
