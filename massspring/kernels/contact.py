@@ -5,7 +5,8 @@ What is rare (friction, two obstacles at once) has loops of its own in `kernels.
 
 import math
 
-from massspring.kernels.compiled import lean
+from massspring.kernels.clearance import clearances_into
+from massspring.kernels.compiled import inlined, lean
 from massspring.kernels.distances import round_contact, round_gap
 from massspring.kernels.rubbing import release_slipping, release_wedged, rub, wedge
 
@@ -49,56 +50,20 @@ def seat(network, motion, drive, step, lam, count):
 
 
 @lean
-def plane_clearance(motion, inverse_mass, push, dt, normal, point):
-    """clearance_i = min(clearance_i, n·(y − p)) [m], y = x + dt (v* + push w G), of all nodes, (n,) (eq. 12)."""
-    x, v_star, gradient, clearance = motion.x, motion.v_star, motion.gradient, motion.clearance
-    real = x.dtype.type
-    push, dt = real(push), real(dt)
-    n0, n1, n2 = real(normal[0]), real(normal[1]), real(normal[2])
-    p0, p1, p2 = real(point[0]), real(point[1]), real(point[2])
-    for i in range(clearance.shape[0]):
-        w = push * inverse_mass[i]
-        r0 = x[i, 0] + dt * (v_star[i, 0] + w * gradient[i, 0]) - p0
-        r1 = x[i, 1] + dt * (v_star[i, 1] + w * gradient[i, 1]) - p1
-        r2 = x[i, 2] + dt * (v_star[i, 2] + w * gradient[i, 2]) - p2
-        clearance[i] = min(clearance[i], n0 * r0 + n1 * r1 + n2 * r2)
-
-
-@lean
-def round_clearance(motion, inverse_mass, push, dt, start, span, radius):
-    """clearance_i = min(clearance_i, distance of y to a capsule or sphere) [m], of all nodes, (n,) (eq. 12)."""
-    x, v_star, gradient, clearance = motion.x, motion.v_star, motion.gradient, motion.clearance
-    real = x.dtype.type
-    push, dt, radius = real(push), real(dt), real(radius)
-    p0, p1, p2 = real(start[0]), real(start[1]), real(start[2])
-    a0, a1, a2 = real(span[0]), real(span[1]), real(span[2])
-    for i in range(clearance.shape[0]):
-        w = push * inverse_mass[i]
-        r0 = x[i, 0] + dt * (v_star[i, 0] + w * gradient[i, 0]) - p0
-        r1 = x[i, 1] + dt * (v_star[i, 1] + w * gradient[i, 1]) - p1
-        r2 = x[i, 2] + dt * (v_star[i, 2] + w * gradient[i, 2]) - p2
-        clearance[i] = min(clearance[i], round_gap(r0, r1, r2, a0, a1, a2, radius))
-
-
-@lean
 def find_contacts(network, motion, drive, step, lam):
     """Touched nodes of the step when the last pressure acts as a force: u = v* + dt lam W G (eq. 12)."""
-    inverse_mass, clearance = network.inverse_mass, motion.clearance
-    motion.touched[:] = 0
-    motion.locked[:] = 0
-    clearance[:] = math.inf
-    push = drive.dt * lam
-    for o in range(drive.radius.shape[0]):
-        point = drive.position[step, o]
-        if drive.is_plane[o]:
-            plane_clearance(motion, inverse_mass, push, drive.dt, drive.plane_normal[o], point)
-        else:
-            round_clearance(motion, inverse_mass, push, drive.dt, point, drive.span[o], drive.radius[o])
+    clearances_into(network, motion, drive, step, lam, 0, motion.x.shape[0])
+    enter(network, motion, drive, step, lam)
+
+
+@inlined
+def enter(network, motion, drive, step, lam):
+    """Seats the nodes whose clearance is negative (eq. 12)."""
+    touchable, clearance, entering = network.touchable, motion.clearance, motion.entering
     count = 0
-    for c in range(network.surface_nodes.shape[0]):
-        i = network.surface_nodes[c]
-        if clearance[i] < 0.0 and inverse_mass[i] > 0.0:
-            motion.entering[count] = i
+    for i in range(clearance.shape[0]):
+        if clearance[i] < 0.0 and touchable[i] > 0:
+            entering[count] = i
             count += 1
     if count > 0:
         seat(network, motion, drive, step, lam, count)
@@ -108,6 +73,41 @@ def find_contacts(network, motion, drive, step, lam):
         wedge(network, motion, drive, step, lam)
 
 
+@inlined
+def revised(network, motion, drive, step, lam, i):
+    """-1 where the obstacle would pull node i, which is let go; 1 where the free node would enter one; else 0."""
+    dt = drive.dt
+    push = dt * lam * network.inverse_mass[i]
+    u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
+    u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
+    u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+    if motion.locked[i] > 0:
+        n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+        a = motion.goal[i, 0] * n0 + motion.goal[i, 1] * n1 + motion.goal[i, 2] * n2
+        if a >= u0 * n0 + u1 * n1 + u2 * n2:
+            return 0
+        motion.touched[i], motion.locked[i] = 0, 0
+        # A released node is looked at again, whatever the pressure becomes.
+        motion.clearance[i] = 0.0
+        return -1
+    y0, y1, y2 = motion.x[i, 0] + dt * u0, motion.x[i, 1] + dt * u1, motion.x[i, 2] + dt * u2
+    for o in range(drive.radius.shape[0]):
+        r0, r1, r2 = (
+            y0 - drive.position[step, o, 0],
+            y1 - drive.position[step, o, 1],
+            y2 - drive.position[step, o, 2],
+        )
+        if drive.is_plane[o]:
+            n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
+            depth = n0 * r0 + n1 * r1 + n2 * r2
+        else:
+            a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
+            depth = round_gap(r0, r1, r2, a0, a1, a2, drive.radius[o])
+        if depth < 0.0:
+            return 1
+    return 0
+
+
 @lean
 def revise_contacts(network, motion, drive, step, lam, reach):
     """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 13).
@@ -115,51 +115,23 @@ def revise_contacts(network, motion, drive, step, lam, reach):
     `reach` [m] is how far the new pressure can have moved a node from where `clearance` was measured: distances to
     obstacles change by no more, so a free node farther away need not be looked at.
     """
-    dt = drive.dt
-    nodes, all_locked, clearance = network.surface_nodes, motion.locked, motion.clearance
+    touchable, locked, clearance = network.touchable, motion.locked, motion.clearance
     count, changes = 0, 0
     if drive.rough:
         changes += release_slipping(network, motion, drive, lam)
     if drive.radius.shape[0] > 1:
         changes += release_wedged(network, motion, drive, lam) + wedge(network, motion, drive, step, lam)
-    for c in range(nodes.shape[0]):
-        i = nodes[c]
-        locked = all_locked[i]
-        if (locked == 0 and clearance[i] > reach) or locked == 2 or network.inverse_mass[i] == 0.0:
+    for i in range(clearance.shape[0]):
+        if (locked[i] == 0 and clearance[i] > reach) or locked[i] == 2 or touchable[i] == 0:
             continue
-        push = dt * lam * network.inverse_mass[i]
-        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
-        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
-        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
-        if locked > 0:
-            n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-            a = motion.goal[i, 0] * n0 + motion.goal[i, 1] * n1 + motion.goal[i, 2] * n2
-            if a < u0 * n0 + u1 * n1 + u2 * n2:
-                motion.touched[i], motion.locked[i] = 0, 0
-                # A released node is looked at again, whatever the pressure becomes.
-                motion.clearance[i] = 0.0
-                changes += 1
-            continue
-        y0, y1, y2 = motion.x[i, 0] + dt * u0, motion.x[i, 1] + dt * u1, motion.x[i, 2] + dt * u2
-        for o in range(drive.radius.shape[0]):
-            r0, r1, r2 = (
-                y0 - drive.position[step, o, 0],
-                y1 - drive.position[step, o, 1],
-                y2 - drive.position[step, o, 2],
-            )
-            if drive.is_plane[o]:
-                n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
-                depth = n0 * r0 + n1 * r1 + n2 * r2
-            else:
-                a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-                depth = round_gap(r0, r1, r2, a0, a1, a2, drive.radius[o])
-            if depth < 0.0:
-                motion.entering[count] = i
-                count += 1
-                break
+        found = revised(network, motion, drive, step, lam, i)
+        if found > 0:
+            motion.entering[count] = i
+            count += 1
+        changes += found != 0
     if count > 0:
         seat(network, motion, drive, step, lam, count)
-    return changes + count
+    return changes
 
 
 @lean

@@ -80,7 +80,9 @@ class Network(NamedTuple):
     """[1/kg], (n,); 0 marks a node whose motion is prescribed."""
     largest_inverse_mass: float
     surface_nodes: np.ndarray
-    """Nodes that obstacles can touch, (c,) uint32."""
+    """Nodes on the surface, (c,) uint32."""
+    touchable: np.ndarray
+    """1 for nodes that obstacles can touch: on the surface and not held, (n,) uint8."""
     held_nodes: np.ndarray
     """(h,) uint32."""
     held_group: np.ndarray

@@ -2,8 +2,10 @@
 
 import math
 
-from massspring.kernels.compiled import lean
+from massspring.kernels.blocks import BLOCK, any_locked
+from massspring.kernels.compiled import inlined, lean
 from massspring.kernels.distances import allowed_part
+from massspring.kernels.flat import flat
 from massspring.kernels.rubbing import shares
 
 NEGLIGIBLE = 1e-12
@@ -73,39 +75,37 @@ def multiplier_of_sums(motion, inverse_mass, volume_error, dt, flow, mobility):
         motion.gradient,
         motion.v_star,
     )
-    free = mobility
-    for i in range(locked.shape[0]):
-        if locked[i] > 0:
-            g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
-            v0, v1, v2 = v_star[i, 0], v_star[i, 1], v_star[i, 2]
-            d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
-            p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, g0, g1, g2)
-            mobility -= inverse_mass[i] * (g0 * (g0 - p0) + g1 * (g1 - p1) + g2 * (g2 - p2))
-            p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, v0, v1, v2)
-            flow += g0 * (p0 + goal[i, 0] - v0) + g1 * (p1 + goal[i, 1] - v1) + g2 * (p2 + goal[i, 2] - v2)
+    free, count = mobility, locked.shape[0]
+    for begin in range(0, count, BLOCK):
+        if not any_locked(locked, begin):
+            continue
+        for i in range(begin, min(begin + BLOCK, count)):
+            if locked[i] > 0:
+                g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
+                v0, v1, v2 = v_star[i, 0], v_star[i, 1], v_star[i, 2]
+                d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
+                p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, g0, g1, g2)
+                mobility -= inverse_mass[i] * (g0 * (g0 - p0) + g1 * (g1 - p1) + g2 * (g2 - p2))
+                p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, v0, v1, v2)
+                flow += g0 * (p0 + goal[i, 0] - v0) + g1 * (p1 + goal[i, 1] - v1) + g2 * (p2 + goal[i, 2] - v2)
     if mobility <= NEGLIGIBLE * free:
         return 0.0, 0.0
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
 
 
 @lean
-def flow_of(nodes, gradient, v_star):
-    """Σ G·v* [m³/s] over some nodes."""
-    flow = 0.0
-    for h in range(nodes.shape[0]):
-        i = nodes[h]
-        flow += gradient[i, 0] * v_star[i, 0] + gradient[i, 1] * v_star[i, 1] + gradient[i, 2] * v_star[i, 2]
-    return flow
-
-
-@lean
 def prescribe(network, motion, displacement, dt):
     """v* of held nodes (eq. 7); returns what that changes of G·v* [m³/s]."""
-    before = flow_of(network.held_nodes, motion.gradient, motion.v_star)
-    prescribe_velocity_into(
-        motion.x, network.held_nodes, network.held_group, network.held_rest, displacement, dt, motion.v_star
-    )
-    return flow_of(network.held_nodes, motion.gradient, motion.v_star) - before
+    nodes, groups, rest = network.held_nodes, network.held_group, network.held_rest
+    x, v_star, gradient = motion.x, motion.v_star, motion.gradient
+    flow = 0.0
+    for h in range(nodes.shape[0]):
+        i, g = nodes[h], groups[h]
+        for axis in range(3):
+            held = (rest[h, axis] + displacement[g, axis] - x[i, axis]) / dt
+            flow += gradient[i, axis] * (held - v_star[i, axis])
+            v_star[i, axis] = held
+    return flow
 
 
 @lean
@@ -145,58 +145,99 @@ def book(contact_impulse, o, other, k0, k1, k2):
     contact_impulse[other, 2] += k2
 
 
-@lean
-def settle(motion, mass, contact_impulse):
-    """v⁺ of the nodes on obstacles (eq. 10), from `v` with what they would do without them, u.
+@inlined
+def settled(motion, i, u0, u1, u2):
+    """What obstacles make of the velocity of a node they touch [m/s], P u + goal (eq. 10)."""
+    d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+    p0, p1, p2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
+    return p0 + motion.goal[i, 0], p1 + motion.goal[i, 1], p2 + motion.goal[i, 2]
 
-    Adds the impulse of each obstacle, m (v⁺ − u) [N s].
-    """
-    v, locked = motion.v, motion.locked
-    for i in range(mass.shape[0]):
-        if locked[i] == 0:
+
+@lean
+def book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse):
+    """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 10); u is what a node would do without them."""
+    v_star, gradient, locked = motion.v_star, motion.gradient, motion.locked
+    real, count = motion.x.dtype.type, locked.shape[0]
+    impulse = real(dt * lam)
+    for begin in range(0, count, BLOCK):
+        if not any_locked(locked, begin):
             continue
-        u0, u1, u2 = v[i, 0], v[i, 1], v[i, 2]
-        d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-        k0, k1, k2 = -u0, -u1, -u2
-        u0, u1, u2 = allowed_part(locked[i], d0, d1, d2, u0, u1, u2)
-        u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
-        o, m = motion.touched[i] - 1, mass[i]
-        k0, k1, k2 = m * (k0 + u0), m * (k1 + u1), m * (k2 + u2)
-        contact_impulse[o, 0] += k0
-        contact_impulse[o, 1] += k1
-        contact_impulse[o, 2] += k2
-        if locked[i] == 2:
-            m0, m1, m2 = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
-            n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-            _, beta = shares(k0, k1, k2, n0, n1, n2, m0, m1, m2)
-            book(contact_impulse, o, motion.second[i] - 1, beta * m0, beta * m1, beta * m2)
-        v[i, 0], v[i, 1], v[i, 2] = u0, u1, u2
+        for i in range(begin, min(begin + BLOCK, count)):
+            if locked[i] == 0:
+                continue
+            push = impulse * real(inverse_mass[i])
+            u0, u1 = v_star[i, 0] + push * gradient[i, 0], v_star[i, 1] + push * gradient[i, 1]
+            u2 = v_star[i, 2] + push * gradient[i, 2]
+            w0, w1, w2 = settled(motion, i, u0, u1, u2)
+            o, m = motion.touched[i] - 1, mass[i]
+            k0, k1, k2 = m * (w0 - u0), m * (w1 - u1), m * (w2 - u2)
+            contact_impulse[o, 0] += k0
+            contact_impulse[o, 1] += k1
+            contact_impulse[o, 2] += k2
+            if locked[i] == 2:
+                m0, m1, m2 = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
+                n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+                _, beta = shares(k0, k1, k2, n0, n1, n2, m0, m1, m2)
+                book(contact_impulse, o, motion.second[i] - 1, beta * m0, beta * m1, beta * m2)
+
+
+@lean
+def advance_nodes(motion, inverse_mass, lam, dt, first, last):
+    """v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺ (eq. 10) of some nodes; `places` holds the x of the step's start."""
+    flat_x, flat_v = flat(motion.x, first, last), flat(motion.v, first, last)
+    flat_v_star, flat_gradient = flat(motion.v_star, first, last), flat(motion.gradient, first, last)
+    weights, locked, real = flat(inverse_mass, first, last), motion.locked, motion.x.dtype.type
+    step, impulse = real(dt), real(dt * lam)
+    for i in range(weights.shape[0]):
+        push = impulse * real(weights[i])
+        for axis in range(3):
+            u = flat_v_star[3 * i + axis] + push * flat_gradient[3 * i + axis]
+            flat_v[3 * i + axis] = u
+            flat_x[3 * i + axis] += step * u
+    x, v, places = motion.x, motion.v, motion.places
+    for block in range(first, last, BLOCK):
+        if not any_locked(locked, block):
+            continue
+        for i in range(block, min(block + BLOCK, last)):
+            if locked[i] > 0:
+                v[i, 0], v[i, 1], v[i, 2] = settled(motion, i, v[i, 0], v[i, 1], v[i, 2])
+                for axis in range(3):
+                    x[i, axis] = places[i, axis] + step * v[i, axis]
 
 
 @lean
 def advance(motion, mass, inverse_mass, lam, dt, contact_impulse):
-    """v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺ (eq. 10); adds the impulse of each obstacle to `contact_impulse`."""
-    x, v, v_star, gradient = motion.x, motion.v, motion.v_star, motion.gradient
-    real = x.dtype.type
-    step, impulse = real(dt), real(dt * lam)
-    for i in range(x.shape[0]):
-        push = impulse * real(inverse_mass[i])
-        v[i, 0] = v_star[i, 0] + push * gradient[i, 0]
-        v[i, 1] = v_star[i, 1] + push * gradient[i, 1]
-        v[i, 2] = v_star[i, 2] + push * gradient[i, 2]
-    settle(motion, mass, contact_impulse)
-    for i in range(x.shape[0]):
-        x[i, 0] += step * v[i, 0]
-        x[i, 1] += step * v[i, 1]
-        x[i, 2] += step * v[i, 2]
+    """The end of a step of all nodes (eq. 10); adds the impulse of each obstacle to `contact_impulse`."""
+    book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse)
+    advance_nodes(motion, inverse_mass, lam, dt, 0, motion.x.shape[0])
+
+
+@lean
+def places_into(motion, first, last):
+    """The positions of some nodes in fours, as one move of memory fetches them, (n, 4)."""
+    x, places = flat(motion.x, first, last), flat(motion.places, first, last)
+    zero = motion.x.dtype.type(0)
+    for i in range(last - first):
+        places[4 * i], places[4 * i + 1] = x[3 * i], x[3 * i + 1]
+        places[4 * i + 2], places[4 * i + 3] = x[3 * i + 2], zero
 
 
 @lean
 def add_held_impulse(network, motion, lam, dt, gravity, held_impulse):
     """I_g = −dt Σ_i∈g (f_i + lam G_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 11)."""
-    for h in range(network.held_nodes.shape[0]):
-        i = network.held_nodes[h]
-        g = network.held_group[h]
-        for axis in range(3):
-            inside = motion.force[i, axis] + lam * motion.gradient[i, axis] + network.mass[i] * gravity[axis]
-            held_impulse[g, axis] -= dt * inside
+    nodes, groups, mass = network.held_nodes, network.held_group, network.mass
+    force, gradient = motion.force, motion.gradient
+    h, count = 0, nodes.shape[0]
+    while h < count:
+        g = groups[h]
+        k0, k1, k2, carried = 0.0, 0.0, 0.0, 0.0
+        while h < count and groups[h] == g:
+            i = nodes[h]
+            k0 += force[i, 0] + lam * gradient[i, 0]
+            k1 += force[i, 1] + lam * gradient[i, 1]
+            k2 += force[i, 2] + lam * gradient[i, 2]
+            carried += mass[i]
+            h += 1
+        held_impulse[g, 0] -= dt * (k0 + carried * gravity[0])
+        held_impulse[g, 1] -= dt * (k1 + carried * gravity[1])
+        held_impulse[g, 2] -= dt * (k2 + carried * gravity[2])

@@ -7,6 +7,7 @@ Arrays get a name before the loops, because what is taken out of a tuple has its
 import math
 
 from massspring.kernels.compiled import inlined, lean
+from massspring.kernels.motion import places_into
 from massspring.kernels.pieces import add_walls, join_pieces
 from massspring.kernels.springs import SHORTEST
 from massspring.kernels.tiles import (
@@ -126,30 +127,28 @@ def pass_slices(motion, drive, slices, first, last, keeps, tile):
 
 
 @lean
-def places_into(motion):
-    """The positions in fours, as `fetch` reads them, (n, 4)."""
-    x, places = motion.x, motion.places
-    for i in range(x.shape[0]):
-        places[i, 0], places[i, 1], places[i, 2] = x[i, 0], x[i, 1], x[i, 2]
-
-
-@lean
-def gather_and_predict(network, motion, drive, keeps):
+def predict_from_places(network, motion, drive, keeps):
     """v* of eq. 6 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
 
-    Of the forces only those of held nodes are written out.
+    `places` holds the positions. Of the forces only those of held nodes are written out.
     """
     slices = network.slices
     walls = network.membrane.triangles.shape[0] > 0
     if walls:
         motion.force[:] = 0
-    places_into(motion)
     pass_slices(motion, drive, slices, 0, slices.lanes.shape[0], keeps, motion.tile[0])
     join_pieces(network, motion, drive, keeps)
     volume, flow, mobility = add_up(motion.sums, slices.pieces)
     if walls:
         flow += add_walls(network, motion, drive.dt)
     return volume, flow, mobility
+
+
+@lean
+def gather_and_predict(network, motion, drive, keeps):
+    """The same from `x`; leaves the positions in `places`, where `advance` looks for them."""
+    places_into(motion, 0, motion.x.shape[0])
+    return predict_from_places(network, motion, drive, keeps)
 
 
 @lean

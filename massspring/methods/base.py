@@ -147,6 +147,9 @@ def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarra
         raise MassSpringError("two attachments hold the same node; their motions could contradict each other")
     inverse_mass = 1.0 / body.mass
     inverse_mass[held_nodes] = 0.0
+    touchable = np.zeros(body.node_count, dtype=np.uint8)
+    touchable[body.surface_nodes] = 1
+    touchable[held_nodes] = 0
     return Network(
         ends=body.springs.ends,
         rest_length=body.springs.rest_length,
@@ -157,12 +160,13 @@ def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarra
         inverse_mass=inverse_mass,
         largest_inverse_mass=float(inverse_mass.max()),
         surface_nodes=body.surface_nodes,
+        touchable=touchable,
         held_nodes=held_nodes.astype(np.uint32),
         held_group=np.repeat(np.arange(len(nodes)), [len(h) for h in nodes]).astype(np.uint32),
         held_rest=body.rest[held_nodes],
         rest_lam=body.rest_lam,
         longest_correction=LONGEST_CORRECTION * _mean_length(body),
-        slices=slices_of(body.springs, surface, inverse_mass, np.dtype(np.float64)),
+        slices=slices_of(body.springs, surface, inverse_mass, body.rest),
     )
 
 

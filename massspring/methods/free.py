@@ -6,9 +6,9 @@ from typing import ClassVar
 from massspring.kernels.compiled import lean
 from massspring.kernels.contact import find_contacts
 from massspring.kernels.layout import Drive
-from massspring.kernels.motion import add_held_impulse, advance, prescribe_velocity_into
+from massspring.kernels.motion import add_held_impulse, advance, places_into, prescribe_velocity_into
 from massspring.kernels.probing import meet_probes
-from massspring.kernels.slices import gather_and_predict
+from massspring.kernels.slices import predict_from_places
 from massspring.kernels.ticks import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, mark
 from massspring.methods.base import Method, State, begin_frame
 
@@ -18,8 +18,9 @@ def free_frame(network, motion, drive, tally, probing):
     """One frame of symplectic Euler with contact (eq. 6, 7, 10, 12)."""
     dt = drive.dt
     mark(tally.ticks, OUTSIDE)
+    places_into(motion, 0, motion.x.shape[0])
     for step in range(drive.position.shape[0]):
-        gather_and_predict(network, motion, drive, False)
+        predict_from_places(network, motion, drive, False)
         mark(tally.ticks, SPRINGS)
         held = drive.held_displacement[step]
         prescribe_velocity_into(
@@ -35,6 +36,7 @@ def free_frame(network, motion, drive, tally, probing):
         add_held_impulse(network, motion, 0.0, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, 0.0, dt, tally.contact_impulse)
+        places_into(motion, 0, motion.x.shape[0])
         mark(tally.ticks, INTEGRATION)
 
 

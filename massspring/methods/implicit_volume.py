@@ -25,6 +25,7 @@ from massspring.kernels.motion import (
     advance,
     capped_error,
     multiplier_of_sums,
+    places_into,
     prescribe,
     prescribe_velocity_into,
     steepest,
@@ -41,7 +42,7 @@ from massspring.kernels.rows import (
     transposed_rows_times_into,
     volumes_of_rows_into,
 )
-from massspring.kernels.slices import gather_and_predict
+from massspring.kernels.slices import gather_and_predict, predict_from_places
 from massspring.kernels.ticks import (
     HELD,
     INTEGRATION,
@@ -66,8 +67,9 @@ def implicit_volume_frame(network, motion, drive, tally, lam, probing):
     dt = drive.dt
     lightest = network.largest_inverse_mass
     mark(tally.ticks, OUTSIDE)
+    places_into(motion, 0, motion.x.shape[0])
     for step in range(drive.position.shape[0]):
-        volume, flow, mobility = gather_and_predict(network, motion, drive, True)
+        volume, flow, mobility = predict_from_places(network, motion, drive, True)
         mark(tally.ticks, SPRINGS)
         flow += prescribe(network, motion, drive.held_displacement[step], dt)
         mark(tally.ticks, HELD)
@@ -102,6 +104,7 @@ def implicit_volume_frame(network, motion, drive, tally, lam, probing):
         add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
+        places_into(motion, 0, motion.x.shape[0])
         mark(tally.ticks, INTEGRATION)
     return lam
 

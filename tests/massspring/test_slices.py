@@ -146,7 +146,7 @@ def test_a_volume_enclosed_by_part_of_the_surface(hollow_body):
 def test_every_spring_is_there_twice_and_little_else(ball_body):
     """What fills up short lists costs as much as springs do."""
     springs = ball_body.springs
-    slices = slices_of(springs, ball_body.triangles, 1.0 / ball_body.mass, np.dtype(float))
+    slices = slices_of(springs, ball_body.triangles, 1.0 / ball_body.mass, ball_body.rest)
     stiffness = slices.stiffness[slices.stiffness_row]
     assert int((stiffness > 0).sum()) == 2 * springs.count
     assert stiffness.sum() == pytest.approx(2 * springs.stiffness.sum(), rel=1e-12)

@@ -4,6 +4,7 @@ import os
 import numba
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
 from studies.errors import StudyError
 from studies.store import SCHEMA, Record, Status, read_record, write_record
@@ -26,6 +27,28 @@ def test_pinned_to_one_core_and_one_thread_and_back():
         raise RuntimeError("inside")
     assert os.sched_getaffinity(0) == before
     assert numba.get_num_threads() == threads
+
+
+def test_linear_algebra_uses_no_more_threads_than_were_asked_for():
+    """A pool that waits for work on the pinned core takes every other slice of time from what is measured."""
+    np.ones((2, 2)) @ np.ones((2, 2))
+    with pinned(threads=1):
+        pools = threadpool_info()
+        assert pools
+        assert all(pool["num_threads"] == 1 for pool in pools)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="this system cannot pin")
+def test_as_many_cores_as_threads():
+    allowed = os.sched_getaffinity(0)
+    if len(allowed) < 2 or numba.config.NUMBA_NUM_THREADS < 2:
+        pytest.skip("this process may use one core only")
+    with pinned(threads=2) as core:
+        assert len(os.sched_getaffinity(0)) == 2
+        assert core in os.sched_getaffinity(0)
+        assert numba.get_num_threads() == 2
+    with pytest.raises(StudyError, match="threads need as many cores"), pinned(threads=len(allowed) + 1):
+        pass
 
 
 def test_turns_are_taken_and_the_warm_up_is_thrown_away():

@@ -1,0 +1,62 @@
+"""Rows as flat arrays, the order of nodes along a curve, and passing over blocks without contact."""
+
+import numpy as np
+import pytest
+from numba.core.errors import TypingError
+
+from massspring.kernels.blocks import BLOCK, any_locked
+from massspring.kernels.compiled import lean
+from massspring.kernels.flat import flat
+from massspring.neighbours import along_curve
+
+
+@lean
+def doubled(table, first, last):
+    rows = flat(table, first, last)
+    for entry in range(rows.shape[0]):
+        rows[entry] *= 2
+    return rows.shape[0]
+
+
+@lean
+def block_with(locked, begin):
+    return any_locked(locked, begin)
+
+
+@pytest.mark.parametrize("real", [np.float64, np.float32, np.uint8])
+@pytest.mark.parametrize("shape", [(7,), (7, 3), (7, 4)])
+def test_flat_rows_are_those_rows_and_no_copy(shape, real):
+    table = np.arange(np.prod(shape), dtype=real).reshape(shape)
+    expected = table.copy()
+    expected[2:5] *= 2
+    assert doubled(table, 2, 5) == expected[2:5].size
+    assert np.array_equal(table, expected)
+    assert np.array_equal(flat(table, 2, 5), expected[2:5].ravel())
+    assert doubled(table, 7, 7) == 0
+
+
+def test_what_is_not_contiguous_has_no_flat_rows():
+    with pytest.raises(TypingError, match="flat"):
+        doubled(np.zeros((4, 6))[:, ::2], 0, 4)
+
+
+@pytest.mark.parametrize("where", [0, BLOCK - 1, BLOCK, 2 * BLOCK - 1])
+def test_a_block_is_passed_over_only_where_nothing_touches_it(where):
+    locked = np.zeros(2 * BLOCK + 5, dtype=np.uint8)
+    locked[where] = 1
+    assert [bool(block_with(locked, begin)) for begin in (0, BLOCK)] == [where < BLOCK, where >= BLOCK]
+    assert block_with(locked, 2 * BLOCK)  # the last one is not full and always looked through
+
+
+def test_neighbours_in_space_are_neighbours_on_the_curve():
+    """4,096 random points of a cube: one step of the curve leads no farther than a few times their spacing 1/16."""
+    x = np.random.default_rng(1).uniform(size=(4096, 3))
+    place = along_curve(x)
+    assert sorted(place) == list(range(4096))
+    steps = np.linalg.norm(np.diff(x[np.argsort(place)], axis=0), axis=1)
+    assert np.median(steps) < 2 / 16
+    assert np.median(np.linalg.norm(np.diff(x, axis=0), axis=1)) > 0.5
+
+
+def test_points_in_one_place_have_an_order_too():
+    assert sorted(along_curve(np.ones((5, 3)))) == list(range(5))
