@@ -22,8 +22,8 @@ from studies.skips import SKIPS
 from studies.timing import pinned
 
 FRAMES, REPEATS = 100, 5
-PATIENCE = 5.0
-"""Run time [s] after which a run is not repeated once more: what takes so long is far from the noise."""
+DEAR = 5.0
+"""Times the run as it is, from where one with a stage is run once only: that is far from the noise."""
 MARKS = 100_000
 """Marks in a row, to learn what one costs."""
 CALL = "call of the frame"
@@ -91,8 +91,8 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS) -> pd.D
     Raises StudyError or MassSpringError for a case that cannot run."""
     setup = prepare(case.replaced(frames=min(frames, case.frames or case.scene.frames))).setup
     skipped = [skip for skip in SKIPS if skip.applies(setup)]
-    runs = {skip.name: partial(run_frames, *skip.included(setup, setup.start())) for skip in skipped}
-    runs |= {PLAIN: partial(run_frames, setup, setup.start()), TICKED: partial(_ticked, setup)}
+    runs = {PLAIN: partial(run_frames, setup, setup.start()), TICKED: partial(_ticked, setup)}
+    runs |= {skip.name: partial(run_frames, *skip.included(setup, setup.start())) for skip in skipped}
     with pinned(threads=1):
         found = _in_turns(runs, repeats)
         outside = _per_frame(setup)
@@ -115,14 +115,18 @@ def _ticked(setup: Setup, frames: int | None = None) -> Run:
 
 
 def _in_turns(runs: dict[str, partial[Run]], repeats: int) -> dict[str, list[Run]]:
-    """Every run up to `repeats` times, in turns, compiled before; one that takes long, less often."""
+    """Every run `repeats` times, in turns, compiled before; one that is `DEAR`, once."""
     for run in runs.values():
         run(frames=1)
     found: dict[str, list[Run]] = {name: [] for name in runs}
-    for _ in range(repeats):
+    shortest = dict.fromkeys(runs, 0.0)
+    for turn in range(repeats):
         for name, run in runs.items():
-            if sum(frame_ns.sum() for frame_ns, _, _ in found[name]) < 1e9 * PATIENCE:
-                found[name].append(run())
+            if shortest[name] > DEAR * shortest[PLAIN]:
+                continue
+            found[name].append(run())
+            took = float(found[name][-1][0].sum())
+            shortest[name] = min(took, shortest[name]) if turn else took
     return found
 
 
