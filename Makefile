@@ -29,8 +29,9 @@ smoke: setup-run ## every study with its smallest settings: does it all hang tog
 test: setup-test ## every test
 	$(PYTEST)
 
+# Asked for both, `make check test` leaves the fast tests to `test`.
 check: lint setup-dev ## lint, types, import contracts and the fast tests
-	$(PYTEST) -m "not slow"
+	$(if $(filter test,$(MAKECMDGOALS)),,$(PYTEST) -m "not slow")
 
 lint: setup-dev ## ruff, pyright and the import contracts alone
 	$(BIN)/ruff check .

@@ -77,3 +77,15 @@ def test_make_alone_lists_the_targets():
     text = subprocess.run(["make", "-s"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for target in ("study", "study-%", "smoke", "test", "check", "figures", "bench", "clean", "results/%.png"):
         assert re.search(rf"^  {re.escape(target)} +\S", text, re.MULTILINE), target
+
+
+@pytest.mark.parametrize(("goals", "fast", "all_of_them"), [("check", 1, 0), ("test", 0, 1), ("check test", 0, 1)])
+def test_tests_run_once_also_where_check_and_test_are_asked_for(goals, fast, all_of_them):
+    command = ["make", "--dry-run", "--silent", *goals.split()]
+    lines = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+    runs = [line for line in lines if "pytest" in line]
+    assert [sum("not slow" in line for line in runs), sum("not slow" not in line for line in runs)] == [
+        fast,
+        all_of_them,
+    ]
+    assert any("ruff check" in line for line in lines) == ("check" in goals)

@@ -13,20 +13,6 @@ NEGLIGIBLE = 1e-12
 
 
 @lean
-def predict_velocity_into(v, force, inverse_mass, dt, damping, gravity, v_star):
-    """v* = (1 − c dt) v + dt (W f + g) [m/s], (n, 3) (eq. 6).
-
-    Damping acts before the forces: the other way round it would bias the balance of springs and pressure by 1 − c dt.
-    """
-    keep = 1.0 - damping * dt
-    for i in range(v.shape[0]):
-        w = dt * inverse_mass[i]
-        v_star[i, 0] = keep * v[i, 0] + w * force[i, 0] + dt * gravity[0]
-        v_star[i, 1] = keep * v[i, 1] + w * force[i, 1] + dt * gravity[1]
-        v_star[i, 2] = keep * v[i, 2] + w * force[i, 2] + dt * gravity[2]
-
-
-@lean
 def prescribe_velocity_into(x, held_nodes, held_group, held_rest, displacement, dt, v_star):
     """v*_i = (X_i + d_g − x_i)/dt [m/s] for every held node: it ends the step where its attachment is (eq. 7)."""
     for h in range(held_nodes.shape[0]):

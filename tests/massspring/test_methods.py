@@ -25,6 +25,8 @@ from massspring import (
     simulate,
     step_limit,
 )
+from massspring.kernels.contact import find_contacts
+from massspring.kernels.prediction import predict
 from massspring.kernels.volume import enclosed_volume, volume_gradient_into
 from massspring.methods.base import State, begin_frame, start
 
@@ -205,14 +207,7 @@ class SixfoldGradient(Method):
         after = begin_frame(state, drive)
         net, mo = after.network, after.motion
         for step in range(len(drive.position)):
-            from massspring.kernels.contact import find_contacts
-            from massspring.kernels.springs import spring_forces_into
-
-            spring_forces_into(mo.x, net.ends, net.rest_length, net.stiffness, mo.force)
-            motion_kernels.predict_velocity_into(
-                mo.v, mo.force, net.inverse_mass, drive.dt, drive.damping, drive.gravity, mo.v_star
-            )
-            error = drive.volume_target[step, 0] - volume_gradient_into(mo.x, net.triangles, mo.gradient)
+            error = drive.volume_target[step, 0] - predict(net, mo, drive, step, True)
             mo.gradient[:] *= 6
             find_contacts(net, mo, drive, step, 0.0)
             lam, _ = motion_kernels.volume_multiplier(mo, net.inverse_mass, error, drive.dt)
