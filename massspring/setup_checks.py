@@ -37,8 +37,14 @@ def check_nodal(what: str, values: np.ndarray | None, body: Body) -> None:
         raise MassSpringError(f"{what} are not finite at node {bad[0]} and {len(bad) - 1} more; give numbers")
 
 
-def check_targets(targets: Mapping[str, Ramp], body: Body) -> None:
-    """Raises MassSpringError for a target of a volume that is not kept, or one that falls to nothing."""
+def check_targets(targets: Mapping[str, Ramp], body: Body, method: Method) -> None:
+    """Raises MassSpringError for a target that the method would not read, of a volume that is not kept, or one that
+    falls to nothing."""
+    if targets and not method.follows_targets:
+        raise MassSpringError(
+            f"a target is given for volume '{next(iter(targets))}', which method '{method.name}' does not follow; "
+            "leave it out, or take implicit_volume"
+        )
     for name, ramp in targets.items():
         if name not in body.kept.names:
             known = ", ".join(body.kept.names[:6])

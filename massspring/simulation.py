@@ -69,7 +69,7 @@ class Setup:
                     f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
                 )
         check_held_apart(self.body, self.method)
-        check_targets(self.targets, self.body)
+        check_targets(self.targets, self.body, self.method)
         rate = fastest_filling(self.body)
         for name in self.ramped:
             warnings.warn(

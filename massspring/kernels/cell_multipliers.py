@@ -6,6 +6,9 @@ from massspring.kernels.distances import allowed_part
 from massspring.kernels.prediction import pushed_by_into, unpushed_into
 from massspring.kernels.volume import volume_gradient_into
 
+WRONG = 1e-6
+"""Of a volume: an error that is counted where nothing can mend it; 1 % of what a kept volume may be off."""
+
 
 @compiled
 def cell_rows_into(x, cells, out):
@@ -87,6 +90,16 @@ def apply_cells(motion, inverse_mass, cells, p, scale, compliance, out):
 
 
 @compiled
+def any_idle(cells, compliance, tolerance):
+    """Whether a cell whose volume is still wrong has nothing to push on; for the diagonal and right side of a solve."""
+    for t in range(cells.diagonal.shape[0]):
+        rest = cells.rest_volume[t]
+        if not cells.diagonal[t] > compliance * rest and abs(cells.right[t]) > tolerance * rest:
+            return True
+    return False
+
+
+@compiled
 def solve_cells(motion, inverse_mass, cells, dt, compliance, accuracy):
     """(dt² J W̃ Jᵀ + C V0) p = V0 − V − dt J ṽ by conjugate gradients from the last p (eq. 166); their number.
 
@@ -100,7 +113,7 @@ def solve_cells(motion, inverse_mass, cells, dt, compliance, accuracy):
     cell_changes_into(cells, cells.y, cells.image)
     residual, search, image = cells.right, cells.search, cells.image
     for t in range(residual.shape[0]):
-        residual[t] = cells.rest_volume[t] - residual[t] - image[t]
+        residual[t] = cells.filling[0] * cells.rest_volume[t] - residual[t] - image[t]
         search[t] = 0.0
     apply_cells(motion, inverse_mass, cells, cells.pressure, scale, compliance, image)
     cell_diagonal_into(motion, inverse_mass, cells, scale, compliance)
@@ -138,8 +151,10 @@ def solve_cells(motion, inverse_mass, cells, dt, compliance, accuracy):
 def relax_cells(motion, inverse_mass, cells, scale, compliance, force):
     """One sweep of XPBD: Δp = (V0 − V − C V0 p)/(dt² ∇V·W̃∇V + C V0), cell after cell, at y (eq. 167).
 
-    `cells.y` moves by dt² W̃ ∇V Δp and `force` [N] collects ∇V Δp; `scale` is dt².
+    `cells.y` moves by dt² W̃ ∇V Δp and `force` [N] collects ∇V Δp; `scale` is dt². Returns whether a wrong volume had
+    nothing to push on.
     """
+    idle = False
     y, tetrahedra, pressure, rest_volume = cells.y, cells.tetrahedra, cells.pressure, cells.rest_volume
     locked, direction = motion.locked, motion.direction
     for t in range(tetrahedra.shape[0]):
@@ -154,9 +169,11 @@ def relax_cells(motion, inverse_mass, cells, scale, compliance, force):
         mobility += q0 * c0 + q1 * c1 + q2 * c2 + r0 * d0 + r1 * d1 + r2 * d2
         soft = compliance * rest_volume[t]
         stiff = scale * mobility + soft
+        error = cells.filling[0] * rest_volume[t] - volume
+        idle |= not mobility > 0.0 and abs(error) > WRONG * rest_volume[t]
         if not stiff > 0.0:
             continue
-        change = (rest_volume[t] - volume - soft * pressure[t]) / stiff
+        change = (error - soft * pressure[t]) / stiff
         pressure[t] += change
         add_four(force, a, b, c, d, change, p0, p1, p2, q0, q1, q2, r0, r1, r2)
         move = scale * change
@@ -164,11 +181,12 @@ def relax_cells(motion, inverse_mass, cells, scale, compliance, force):
         y[b, 0], y[b, 1], y[b, 2] = y[b, 0] + move * b0, y[b, 1] + move * b1, y[b, 2] + move * b2
         y[c, 0], y[c, 1], y[c, 2] = y[c, 0] + move * c0, y[c, 1] + move * c1, y[c, 2] + move * c2
         y[d, 0], y[d, 1], y[d, 2] = y[d, 0] + move * d0, y[d, 1] + move * d1, y[d, 2] + move * d2
+    return idle
 
 
 @compiled
 def relax_whole(network, motion, cells, target, scale, compliance, lam, force):
-    """The same for the one volume of the whole: returns its pressure [Pa] (eq. 167)."""
+    """The same for the one volume of the whole: returns its pressure [Pa] as well, first (eq. 167)."""
     y, gradient, inverse_mass = cells.y, cells.gradient, network.inverse_mass
     locked, direction = motion.locked, motion.direction
     volume = volume_gradient_into(y, network.triangles, gradient)
@@ -178,8 +196,9 @@ def relax_whole(network, motion, cells, target, scale, compliance, lam, force):
         g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
         d0, d1, d2 = moved_by(inverse_mass, locked, direction, i, g0, g1, g2)
         stiff += scale * (g0 * d0 + g1 * d1 + g2 * d2)
+    idle = not stiff > soft and abs(target - volume) > WRONG * target
     if not stiff > 0.0:
-        return lam
+        return lam, idle
     change = (target - volume - soft * lam) / stiff
     move = scale * change
     for i in range(y.shape[0]):
@@ -188,4 +207,4 @@ def relax_whole(network, motion, cells, target, scale, compliance, lam, force):
         y[i, 0], y[i, 1], y[i, 2] = y[i, 0] + move * d0, y[i, 1] + move * d1, y[i, 2] + move * d2
         force[i, 0], force[i, 1] = force[i, 0] + change * g0, force[i, 1] + change * g1
         force[i, 2] += change * g2
-    return lam + change
+    return lam + change, idle

@@ -18,6 +18,10 @@ class Cells(NamedTuple):
     """V_t0 [m³], (k,)."""
     rest_reach: np.ndarray
     """Σ_j |r_j| at rest, r_j from the barycentre to node j [m], (k,)."""
+    rest_whole: float
+    """The kept volume at rest [m³]: what targets refer to."""
+    filling: np.ndarray
+    """What every cell should have of its rest volume [1], (1,)."""
     pressure: np.ndarray
     """p_t [Pa], (k,)."""
     slope: np.ndarray
@@ -69,15 +73,27 @@ def add_four(out, a, b, c, d, f, p0, p1, p2, q0, q1, q2, r0, r1, r2):
 
 
 @compiled
+def fill(cells, drive, step):
+    """The target of the whole in this step, as what every cell should have of its rest volume."""
+    cells.filling[0] = drive.volume_target[step, 0] / cells.rest_whole
+
+
+@compiled
 def add_volume_forces(x, cells, bulk_modulus, force):
-    """f_j = Σ_t p_t dV_t/dx_j, p_t = K (V_t0 − V_t)/V_t0 [N], (n, 3) (eq. 164)."""
-    tetrahedra = cells.tetrahedra
+    """f_j = Σ_t p_t dV_t/dx_j, p_t = K (V_t0 − V_t)/V_t0 [N], (n, 3) (eq. 164).
+
+    Returns whether a cell has collapsed so far that its volume has no gradient.
+    """
+    tetrahedra, filling, idle = cells.tetrahedra, cells.filling[0], False
     for t in range(tetrahedra.shape[0]):
         a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
         volume, p0, p1, p2, q0, q1, q2, r0, r1, r2 = cell_slopes(x, a, b, c, d)
-        pressure = bulk_modulus * (1.0 - volume / cells.rest_volume[t])
+        pressure = bulk_modulus * (filling - volume / cells.rest_volume[t])
         cells.pressure[t] = pressure
+        if volume == 0.0:
+            idle |= p0 == p1 == p2 == q0 == q1 == q2 == r0 == r1 == r2 == 0.0
         add_four(force, a, b, c, d, pressure, p0, p1, p2, q0, q1, q2, r0, r1, r2)
+    return idle
 
 
 @inlined
@@ -93,7 +109,7 @@ def add_barycentre_forces(x, cells, bulk_modulus, force):
 
     Without the mean, as published, a cell that is not regular would push itself about.
     """
-    tetrahedra = cells.tetrahedra
+    tetrahedra, wider = cells.tetrahedra, np.cbrt(cells.filling[0])
     for t in range(tetrahedra.shape[0]):
         a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
         b0, b1, b2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
@@ -105,7 +121,7 @@ def add_barycentre_forces(x, cells, bulk_modulus, force):
         lc, c0, c1, c2 = unit(c0 - m0, c1 - m1, c2 - m2)
         ld, d0, d1, d2 = unit(d0 - m0, d1 - m1, d2 - m2)
         reach, volume = cells.rest_reach[t], cells.rest_volume[t]
-        stretch = la + lb + lc + ld - reach
+        stretch = la + lb + lc + ld - wider * reach
         push = -9.0 * bulk_modulus * volume * stretch / (reach * reach)
         cells.pressure[t] = push * reach / (3.0 * volume)
         m0, m1, m2 = 0.25 * (a0 + b0 + c0 + d0), 0.25 * (a1 + b1 + c1 + d1), 0.25 * (a2 + b2 + c2 + d2)

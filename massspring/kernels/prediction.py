@@ -8,13 +8,16 @@ from massspring.kernels.slices import gather_and_predict
 
 @compiled
 def predict(network, motion, drive, step, keeps):
-    """v* of springs, damping, gravity and held nodes (eq. 1, 6, 7) and, where a volume is kept, G; returns V [m³]."""
-    volume, _, _ = gather_and_predict(network, motion, drive, keeps)
+    """v* of springs, damping, gravity and held nodes (eq. 1, 6, 7) and, where a volume is kept, G.
+
+    Returns V [m³] and G·W·G [m⁴/kg].
+    """
+    volume, _, mobility = gather_and_predict(network, motion, drive, keeps)
     held = drive.held_displacement[step]
     prescribe_velocity_into(
         motion.x, network.held_nodes, network.held_group, network.held_rest, held, drive.dt, motion.v_star
     )
-    return volume
+    return volume, mobility
 
 
 @compiled

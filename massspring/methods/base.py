@@ -1,7 +1,7 @@
 """What a method is: settings (a frozen dataclass), claims (class variables), one compiled loop over the steps."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -21,6 +21,10 @@ from massspring.volumes import Volumes
 
 LONGEST_CORRECTION = 0.3
 """How far a step moves a node to make up for a wrong volume, in mean spring lengths: too little to turn a triangle."""
+
+
+Remedy = Literal["capped", "whole", "force"]
+"""What a step does about a volume that is far off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +76,13 @@ class Method(Protocol):
     holds_apart: ClassVar[bool] = False
     """Whether it starts with the pressure that holds springs without length apart at rest."""
 
+    remedy: ClassVar[Remedy | None] = None
+    """Claim: what a step does about a volume that is far off. "capped": each volume moves a node by no more than
+    `longest_correction` to make up for it (eq. 35), the rest is left to later steps; "whole": all of it is made up for
+    at once; "force": a force whose size only the length of a stable step bounds. None where no volume is kept, at most
+    something that stands for it. With a remedy, steps in which a volume has nothing to push on are counted."""
+    follows_targets: ClassVar[bool] = True
+    """Whether the target of a kept volume is followed where it changes."""
     meets_probes: ClassVar[bool] = False
     """Whether thin probes are met, in continuous time."""
     limited: ClassVar[bool] = True

@@ -13,7 +13,7 @@ from typing import ClassVar
 from massspring.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.layout import Drive
-from massspring.methods.base import Method, State, one_whole
+from massspring.methods.base import Method, Remedy, State, one_whole
 from massspring.methods.constraint import Rule, advance_by
 
 
@@ -30,6 +30,7 @@ class Baumgarte(Method):
     name: ClassVar[str] = "baumgarte"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
+    remedy: ClassVar[Remedy | None] = "capped"
 
     def __post_init__(self) -> None:
         for name in ("alpha", "beta"):

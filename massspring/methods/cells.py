@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from massspring.body import SAME_VOLUME, Body
-from massspring.kernels.cells import Cells, add_barycentre_forces, add_volume_forces, mean_pressure
+from massspring.kernels.cells import Cells, add_barycentre_forces, add_volume_forces, fill, mean_pressure
 from massspring.kernels.compiled import compiled
 from massspring.kernels.contact import find_contacts
 from massspring.kernels.layout import Drive
@@ -24,6 +24,8 @@ def cells_of(body: Body) -> Cells:
     return Cells(
         tetrahedra=body.tetrahedra,
         rest_volume=body.tetrahedron_volumes,
+        rest_whole=float(body.rest_volumes[0]),
+        filling=np.ones(1),
         rest_reach=reach,
         slope=np.zeros((k, 3, 3)),
         **{name: np.zeros(k) for name in ("pressure", "right", "diagonal", "search", "image")},
@@ -56,13 +58,14 @@ def cells_frame(network, cells, motion, drive, tally, bulk_modulus, barycentric)
     dt = drive.dt
     mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
+        fill(cells, drive, step)
         predict(network, motion, drive, step, False)
         mark(tally.ticks, SPRINGS)
         cells.gradient[:] = 0.0
         if barycentric:
             add_barycentre_forces(motion.x, cells, bulk_modulus, cells.gradient)
         else:
-            add_volume_forces(motion.x, cells, bulk_modulus, cells.gradient)
+            tally.skipped[0] += add_volume_forces(motion.x, cells, bulk_modulus, cells.gradient)
         add_to_prediction(network, motion, cells.gradient, dt)
         mark(tally.ticks, VOLUME)
         if drive.radius.shape[0] > 0:
@@ -77,7 +80,7 @@ def cells_frame(network, cells, motion, drive, tally, bulk_modulus, barycentric)
 
 def own_cells(state: State) -> Cells:
     """The state's cells, what they remember copied, so that a frame leaves the old state as it was."""
-    return state.memory._replace(pressure=state.memory.pressure.copy())
+    return state.memory._replace(pressure=state.memory.pressure.copy(), filling=state.memory.filling.copy())
 
 
 def push_cells(state: State, drive: Drive, bulk_modulus: float, barycentric: bool) -> State:

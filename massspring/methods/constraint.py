@@ -108,7 +108,8 @@ def constraint_frame(network, motion, line, drive, tally, lam, rule):
     mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         target = drive.volume_target[step, 0]
-        error = rule.pull * (target - predict(network, motion, drive, step, True))
+        volume, _ = predict(network, motion, drive, step, True)
+        error = rule.pull * (target - volume)
         mark(tally.ticks, SPRINGS)
         kept = inertial_change(network, motion, rule, dt)
         if rule.at_prediction:
@@ -124,7 +125,7 @@ def constraint_frame(network, motion, line, drive, tally, lam, rule):
             lam, mobility = volume_multiplier(motion, network.inverse_mass, error + kept, dt)
             if rule.exact and mobility > 0.0:
                 lam, mobility = exact_multiplier(network, motion, line, target, mobility, dt)
-            elif not rule.exact and not surely_short(error, mobility, lightest, network.longest_correction):
+            elif mobility > 0.0 and not surely_short(error, mobility, lightest, network.longest_correction):
                 reachable = steepest(motion.gradient, network.inverse_mass)
                 part = capped_error(error, mobility, reachable, network.longest_correction)
                 if part != error:

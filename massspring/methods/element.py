@@ -17,15 +17,15 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from massspring.body import Body
-from massspring.kernels.cell_multipliers import cell_forces_into, cell_rows_into, solve_cells
-from massspring.kernels.cells import mean_pressure
+from massspring.kernels.cell_multipliers import any_idle, cell_forces_into, cell_rows_into, solve_cells
+from massspring.kernels.cells import fill, mean_pressure
 from massspring.kernels.compiled import compiled
 from massspring.kernels.contact import find_contacts, revise_contacts
 from massspring.kernels.layout import Accuracy, Drive
 from massspring.kernels.motion import add_held_impulse, advance
 from massspring.kernels.prediction import predict
 from massspring.kernels.ticks import HELD, INTEGRATION, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, VOLUME, mark
-from massspring.methods.base import Method, State, begin_frame, start
+from massspring.methods.base import Method, Remedy, State, begin_frame, start
 from massspring.methods.cells import cell_stiffness, cells_of, one_filled, own_cells, push_cells
 from massspring.methods.implicit_volume import CONTACT_PASSES
 from massspring.methods.known_pressure import check_modulus
@@ -38,6 +38,7 @@ def hard_frame(network, cells, motion, drive, tally, compliance, accuracy):
     dt = drive.dt
     mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
+        fill(cells, drive, step)
         predict(network, motion, drive, step, False)
         mark(tally.ticks, SPRINGS)
         cell_rows_into(motion.x, cells, cells.right)
@@ -61,6 +62,7 @@ def hard_frame(network, cells, motion, drive, tally, compliance, accuracy):
             mark(tally.ticks, REVISION)
             if changes == 0:
                 break
+        tally.skipped[0] += any_idle(cells, compliance, accuracy.tolerance)
         add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, 1.0, dt, tally.contact_impulse)
@@ -84,6 +86,7 @@ class Element(Method):
     name: ClassVar[str] = "element"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
+    remedy: ClassVar[Remedy | None] = "force"
 
     def __post_init__(self) -> None:
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array, tril
 from scipy.sparse.linalg import splu
 
-from massspring.kernels.layout import Network
+from massspring.kernels.layout import Network, VolumeRows
 from massspring.kernels.triangular import Triangular, respond_into
 
 
@@ -35,6 +35,13 @@ class Factor:
         moved = np.empty_like(forces)
         respond_into(self._triangular, forces, moved)
         return moved
+
+    def alone(self, rows: VolumeRows) -> tuple[np.ndarray, np.ndarray]:
+        """Σ_j |J_rj|²/A_jj [m⁴/kg] and max_j |J_rj|/A_jj [m²/kg], (m,): how a volume answers its pressure, and how far
+        the node that moves most does, where each node is alone."""
+        begin, square = rows.row_start[:-1].astype(np.int64), (rows.value**2).sum(axis=1)
+        stiff = self.diagonal[rows.column]
+        return np.add.reduceat(square / stiff, begin), np.maximum.reduceat(np.sqrt(square) / stiff, begin)
 
     def columns(self, nodes: np.ndarray) -> np.ndarray:
         """A⁻¹ e_i of each of `nodes` (c,), as rows, (c, n); a node's is solved for when it is first touched."""

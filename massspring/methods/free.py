@@ -47,6 +47,7 @@ class Free(Method):
     name: ClassVar[str] = "free"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
+    follows_targets: ClassVar[bool] = False
     meets_probes: ClassVar[bool] = True
 
     def advance(self, state: State, drive: Drive) -> State:

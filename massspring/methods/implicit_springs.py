@@ -22,7 +22,7 @@ from massspring.body import Body
 from massspring.kernels.implicit_step import imbalance_into
 from massspring.kernels.layout import Drive
 from massspring.kernels.motion import add_held_impulse
-from massspring.kernels.rows import rows_times_into, transposed_rows_times_into
+from massspring.kernels.rows import rows_into, rows_times_into, transposed_rows_times_into, volumes_of_rows_into
 from massspring.kernels.springs import spring_forces_into
 from massspring.kernels.ticks import (
     HELD,
@@ -35,7 +35,7 @@ from massspring.kernels.ticks import (
     VOLUME,
     mark,
 )
-from massspring.methods.base import Method, State, begin_frame, start
+from massspring.methods.base import Method, Remedy, State, begin_frame, start
 from massspring.methods.factor import Factor, Factors
 from massspring.methods.rows import DENSE_UP_TO, volume_rows
 from massspring.methods.touching import Contact, Touching
@@ -63,6 +63,12 @@ class Step:
         held = self.network.held_nodes
         self.p[held] = self.network.held_rest + drive.held_displacement[step][self.network.held_group]
         self.few = len(self.rows.lam) <= DENSE_UP_TO
+        self.target = drive.volume_target[step]
+        """What the volumes are to be at the end of the step [m³], (m,); nearer to what they are where that is far."""
+        self.far_off = False
+        """Whether a volume is so far off that only a part of it is made up for."""
+        self.idle = False
+        """Whether a volume has had nothing to push on."""
         self.contact = Contact(self.network, self.motion, drive, step)
         self.answers: np.ndarray | None = None
 
@@ -85,6 +91,9 @@ class Step:
 
     def take(self) -> None:
         """All passes; then v⁺ = (x⁺ − x)/dt."""
+        rows_into(self.motion.x, self.rows)
+        volumes_of_rows_into(self.motion.x, self.rows, self.rows.volume)
+        begun = self.rows.volume.copy()
         touching, impulses = self.touch(), np.zeros(0)
         obstacles = len(self.drive.radius) > 0
         if obstacles:
@@ -98,6 +107,10 @@ class Step:
                 self.answers = self.answers_of_all()
                 self.reach(touching)
                 self.mark(VOLUME)
+            if self.few:
+                self.answer()
+            if number == 0:
+                self.cap(begun)
             for revision in range(CONTACT_REVISIONS):
                 change, impulses = self.solve(free, touching)
                 self.mark(MULTIPLIER)
@@ -110,6 +123,9 @@ class Step:
                     break
             self.p += change
             self.rows.lam[:] += self.rows.search
+            if self.far_off:
+                break  # the pressure of one linear step along J where it began says nothing about J where it ended
+        self.tally.skipped[0] += self.idle
         self.book(touching, impulses)
         self.mark(HELD)
         self.motion.v[:] = (self.p - self.motion.x) / self.drive.dt
@@ -121,12 +137,32 @@ class Step:
         touching = Touching(self.factor, self.motion, self.network.surface_nodes, self.drive.dt)
         if self.answers is not None:
             self.reach(touching)
+            self.answer()
         return touching
 
     def reach(self, touching: Touching) -> None:
         """dt² W̃ J_rᵀ [m/Pa], (m, n, 3)."""
         assert self.answers is not None
         self.reached = np.stack([touching.without(answer) for answer in self.answers])
+
+    def answer(self) -> None:
+        """dt² J W̃ Jᵀ [m³/Pa] with J at p, (m, m)."""
+        self.schur = np.column_stack([self.times(field) for field in self.reached])
+
+    def cap(self, begun: np.ndarray) -> None:
+        """Cuts what the step makes up for of volumes that are `begun` (m,) [m³] at its start: each alone moves no node
+        farther than 0.3 L by it (eq. 35)."""
+        if self.few:
+            gained, moved = np.diag(self.schur), np.linalg.norm(self.reached, axis=2).max(axis=1)
+        else:
+            gained, moved = self.factor.alone(self.rows)
+        longest = self.network.longest_correction
+        most = np.divide(longest * gained, moved, out=np.zeros_like(moved), where=moved > 0.0)
+        error = self.target - begun
+        cut = (np.abs(error) > most) & (most > 0.0)
+        self.far_off = bool(cut.any())
+        self.tally.capped[0] += self.far_off
+        self.target = np.where(cut, begun + np.clip(error, -most, most), self.target)
 
     def imbalance(self) -> np.ndarray:
         """J, V at p, and the right-hand side for the pressures of the moment [kg m], (n, 3) (eq. 92)."""
@@ -140,7 +176,7 @@ class Step:
             free = free + self.factor.respond(self.contact.rubbed)
         missing = touching.place - touching.along(self.p + free)
         change = free + touching.moved_by(touching.impulses(missing)) if len(missing) else free
-        error = self.drive.volume_target[self.step] - self.rows.volume - self.times(change)
+        error = self.target - self.rows.volume - self.times(change)
         self.rows.search[:], answer = self.directly(error) if self.few else self.iteratively(error, touching)
         reached = np.tensordot(self.rows.search, self.reached, 1) if self.few else touching.without(answer)
         return change + reached, touching.impulses(missing - touching.along(answer))
@@ -148,14 +184,13 @@ class Step:
     def directly(self, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(Δlam, dt² A⁻¹ Jᵀ Δlam) of few volumes by a dense solve (eq. 93)."""
         assert self.answers is not None
-        schur = np.column_stack([self.times(field) for field in self.reached])
-        able = np.diag(schur) > NEGLIGIBLE * self.response_alone()
+        able = np.diag(self.schur) > NEGLIGIBLE * self.drive.dt**2 * self.factor.alone(self.rows)[0]
         pressure = np.zeros(len(error))
         if able.any():
-            inner = schur[np.ix_(able, able)]
+            inner = self.schur[np.ix_(able, able)]
             inner = inner + SOFTNESS * inner.diagonal().max() * np.eye(len(inner))
             pressure[able] = np.linalg.solve(inner, error[able])
-        self.tally.skipped[0] += not able.all()
+        self.idle |= not able.all()
         return pressure, np.tensordot(pressure, self.answers, 1)
 
     def answers_of_all(self) -> np.ndarray:
@@ -166,15 +201,13 @@ class Step:
         units = np.eye(len(self.rows.lam))
         return self.drive.dt**2 * np.stack([self.factor.respond(self.pushed(unit)) for unit in units])
 
-    def response_alone(self) -> np.ndarray:
-        """dt² Σ_j |J_rj|²/A_jj [m³/Pa], (m,): how far a volume answers its pressure where each node is alone."""
-        each = (self.rows.value**2).sum(axis=1) / self.factor.diagonal[self.rows.column]
-        return self.drive.dt**2 * np.add.reduceat(each, self.rows.row_start[:-1].astype(np.int64))
-
     def iteratively(self, error: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
         """(Δlam, dt² A⁻¹ Jᵀ Δlam) of many volumes by conjugate gradients, one back-solve an iteration (eq. 34)."""
-        allowed = self.method.tolerance * self.drive.volume_target[self.step]
-        diagonal = self.response_alone()
+        diagonal = self.drive.dt**2 * self.factor.alone(self.rows)[0]
+        able = diagonal > 0.0
+        self.idle |= not able.all()
+        diagonal = np.where(able, diagonal, np.inf)
+        allowed = np.where(able, self.method.tolerance * self.drive.volume_target[self.step], np.inf)
         pressure, answer, residual = np.zeros_like(error), np.zeros_like(self.p), error.copy()
         search, before, count = np.zeros_like(error), math.inf, 0
         while (np.abs(residual) > allowed).any() and count < self.method.most_iterations:
@@ -216,6 +249,7 @@ class ImplicitSprings(Method):
     name: ClassVar[str] = "implicit_springs"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-6
+    remedy: ClassVar[Remedy | None] = "capped"
     keeps_spin: ClassVar[bool] = False
     holds_apart: ClassVar[bool] = True
     limited: ClassVar[bool] = False

@@ -55,7 +55,7 @@ from massspring.kernels.ticks import (
     VOLUME,
     mark,
 )
-from massspring.methods.base import Method, State, begin_frame
+from massspring.methods.base import Method, Remedy, State, begin_frame
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
@@ -82,7 +82,7 @@ def implicit_volume_frame(network, motion, drive, tally, lam, probing):
             passes = CONTACT_PASSES
         for sweep in range(passes):
             lam, left = multiplier_of_sums(motion, network.inverse_mass, error, dt, flow, mobility)
-            if not surely_short(error, left, lightest, network.longest_correction):
+            if left > 0.0 and not surely_short(error, left, lightest, network.longest_correction):
                 reachable = steepest(motion.gradient, network.inverse_mass)
                 part = capped_error(error, left, reachable, network.longest_correction)
                 if part != error:
@@ -208,6 +208,7 @@ class ImplicitVolume(Method):
     name: ClassVar[str] = "implicit_volume"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 3e-4
+    remedy: ClassVar[Remedy | None] = "capped"
     holds_apart: ClassVar[bool] = True
     meets_probes: ClassVar[bool] = True
 

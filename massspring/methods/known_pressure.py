@@ -1,5 +1,7 @@
 """One loop for methods whose pressure is a function of the volume now, and acts as one more force.
 
+A penalty is bounded by its modulus. A gas without room is not, so that the guard of the constraints holds for it: it
+moves no node farther than 0.3 L within a step (eq. 35). A surface without gradient is not pushed at all.
 Contact and held nodes see it as `free` sees its springs: nothing is solved (docs/theory.md, eq. 161, 162).
 """
 
@@ -13,8 +15,9 @@ from massspring.errors import MassSpringError
 from massspring.kernels.compiled import compiled
 from massspring.kernels.contact import find_contacts
 from massspring.kernels.layout import Drive
-from massspring.kernels.motion import add_held_impulse, advance
+from massspring.kernels.motion import add_held_impulse, advance, capped_error, steepest, surely_short
 from massspring.kernels.prediction import predict
+from massspring.kernels.ticks import HELD, INTEGRATION, OUTSIDE, SEARCH, SPRINGS, VOLUME, mark
 from massspring.kernels.volume import pyramid_volume, volume_gradient_into
 from massspring.methods.base import State, begin_frame
 
@@ -22,19 +25,51 @@ PENALTY, GAS, PYRAMIDS = 0, 1, 2
 
 
 @compiled
+def known_pressure(network, motion, bulk_modulus, law, volume, target):
+    """lam [Pa] of the volume now (eq. 161, 163)."""
+    if law == GAS:
+        return bulk_modulus * (target / volume - 1.0) if volume > 0.0 else np.inf
+    if law == PYRAMIDS:
+        volume = pyramid_volume(motion.x, network.mass, network.triangles)
+    return bulk_modulus * (target - volume) / target
+
+
+@compiled
+def cut_pressure(network, motion, lam, mobility, dt, tally):
+    """lam, or the most that moves no node farther than 0.3 L [Pa] (eq. 35)."""
+    unit = dt * dt * mobility
+    made = lam * unit
+    if surely_short(made, mobility, network.largest_inverse_mass, network.longest_correction):
+        return lam
+    part = capped_error(made, mobility, steepest(motion.gradient, network.inverse_mass), network.longest_correction)
+    if part == made:
+        return lam
+    tally.capped[0] += 1
+    return part / unit
+
+
+@compiled
 def pressure_frame(network, motion, drive, tally, bulk_modulus, law):
     """One frame of symplectic Euler with a known pressure (eq. 6, 7, 10, 12, 161); returns the last one [Pa]."""
     lam, dt = 0.0, drive.dt
+    mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
-        target = drive.volume_target[step, 0]
-        volume = predict(network, motion, drive, step, True)
-        if law == PYRAMIDS:
-            volume = pyramid_volume(motion.x, network.mass, network.triangles)
-        lam = bulk_modulus * (target - volume) / (volume if law == GAS else target)
+        volume, mobility = predict(network, motion, drive, step, True)
+        mark(tally.ticks, SPRINGS)
+        lam = known_pressure(network, motion, bulk_modulus, law, volume, drive.volume_target[step, 0])
+        if not mobility > 0.0:
+            lam = 0.0
+            tally.skipped[0] += 1
+        elif law == GAS:
+            lam = cut_pressure(network, motion, lam, mobility, dt, tally)
+        mark(tally.ticks, VOLUME)
         if drive.radius.shape[0] > 0:
             find_contacts(network, motion, drive, step, lam)
+            mark(tally.ticks, SEARCH)
         add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
+        mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
+        mark(tally.ticks, INTEGRATION)
     return lam
 
 

@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 
 from massspring.body import Body
 from massspring.kernels.layout import Drive
-from massspring.methods.base import Method, State, one_whole
+from massspring.methods.base import Method, Remedy, State, one_whole
 from massspring.methods.known_pressure import PENALTY, check_modulus, push, volume_stiffness
 
 
@@ -29,6 +29,7 @@ class Penalty(Method):
     name: ClassVar[str] = "penalty"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
+    remedy: ClassVar[Remedy | None] = "force"
 
     def __post_init__(self) -> None:
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)

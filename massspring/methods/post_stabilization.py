@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from massspring.body import Body
 from massspring.kernels.layout import Drive
-from massspring.methods.base import Method, State, one_whole
+from massspring.methods.base import Method, Remedy, State, one_whole
 from massspring.methods.constraint import Rule, advance_by
 
 
@@ -23,6 +23,7 @@ class PostStabilization(Method):
     name: ClassVar[str] = "post_stabilization"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-4
+    remedy: ClassVar[Remedy | None] = "capped"
     keeps_spin: ClassVar[bool] = False
 
     def applies(self, body: Body) -> str | None:

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 from massspring.body import Body
 from massspring.kernels.layout import Drive
-from massspring.methods.base import Method, State, one_whole
+from massspring.methods.base import Method, Remedy, State, one_whole
 from massspring.methods.constraint import Rule, advance_by
 
 
@@ -24,6 +24,7 @@ class Projection(Method):
     name: ClassVar[str] = "projection"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-12
+    remedy: ClassVar[Remedy | None] = "whole"
     keeps_spin: ClassVar[bool] = False
 
     def applies(self, body: Body) -> str | None:

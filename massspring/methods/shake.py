@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from massspring.body import Body
 from massspring.kernels.layout import Drive
-from massspring.methods.base import Method, State, one_whole
+from massspring.methods.base import Method, Remedy, State, one_whole
 from massspring.methods.constraint import Rule, advance_by
 
 
@@ -21,6 +21,7 @@ class Shake(Method):
     name: ClassVar[str] = "shake"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-12
+    remedy: ClassVar[Remedy | None] = "whole"
 
     def applies(self, body: Body) -> str | None:
         """Keeps the whole only."""

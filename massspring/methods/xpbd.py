@@ -18,14 +18,14 @@ import numpy as np
 from massspring.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.cell_multipliers import relax_cells, relax_whole
-from massspring.kernels.cells import mean_pressure
+from massspring.kernels.cells import fill, mean_pressure
 from massspring.kernels.compiled import compiled
 from massspring.kernels.contact import find_contacts, revise_contacts
 from massspring.kernels.layout import Drive
 from massspring.kernels.motion import add_held_impulse, advance
 from massspring.kernels.prediction import predict, unpushed_into
 from massspring.kernels.ticks import HELD, INTEGRATION, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, mark
-from massspring.methods.base import Method, State, begin_frame, one_whole, start
+from massspring.methods.base import Method, Remedy, State, begin_frame, one_whole, start
 from massspring.methods.cells import cells_of, one_filled, own_cells
 from massspring.methods.implicit_volume import CONTACT_PASSES
 from massspring.obstacles import Attachment
@@ -34,9 +34,10 @@ from massspring.obstacles import Attachment
 @compiled
 def xpbd_frame(network, cells, motion, drive, tally, compliance, iterations, whole):
     """One frame (eq. 6–13, 167): F in the place of lam G, pushed with a pressure of 1; returns the last one [Pa]."""
-    lam, dt = 0.0, drive.dt
+    lam, idle, dt = 0.0, False, drive.dt
     mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
+        fill(cells, drive, step)
         predict(network, motion, drive, step, False)
         mark(tally.ticks, SPRINGS)
         passes = 1
@@ -48,13 +49,13 @@ def xpbd_frame(network, cells, motion, drive, tally, compliance, iterations, who
             unpushed_into(motion, dt, cells.y)
             motion.gradient[:] = 0.0
             cells.pressure[:] = 0.0
-            lam = 0.0
+            lam, idle = 0.0, False
             target = drive.volume_target[step, 0]
             for _ in range(iterations):
                 if whole:
-                    lam = relax_whole(network, motion, cells, target, dt * dt, compliance, lam, motion.gradient)
+                    lam, idle = relax_whole(network, motion, cells, target, dt * dt, compliance, lam, motion.gradient)
                 else:
-                    relax_cells(motion, network.inverse_mass, cells, dt * dt, compliance, motion.gradient)
+                    idle = relax_cells(motion, network.inverse_mass, cells, dt * dt, compliance, motion.gradient)
             mark(tally.ticks, MULTIPLIER)
             if sweep + 1 == passes:
                 break
@@ -62,6 +63,7 @@ def xpbd_frame(network, cells, motion, drive, tally, compliance, iterations, who
             mark(tally.ticks, REVISION)
             if changes == 0:
                 break
+        tally.skipped[0] += idle
         tally.iterations[0] += iterations
         tally.iterations[1] = iterations
         add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
@@ -86,6 +88,7 @@ class Xpbd(Method):
     name: ClassVar[str] = "xpbd"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-3
+    remedy: ClassVar[Remedy | None] = "whole"
     keeps_spin: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
