@@ -7,7 +7,10 @@ import warnings
 import pytest
 
 from studies import cli
+from studies.reference import load_reference
+from studies.reference_solve import pieces, solve
 from studies.sweep import run_studies
+from tests.studies.octant import SCENE
 from tests.studies.tiny import TINY, Silent, tiny_study
 
 
@@ -26,6 +29,21 @@ def finished_sweep(mesh_cache, tmp_path_factory):
     root = tmp_path_factory.mktemp("finished")
     run_studies(root, [tiny_study()], 1, Silent())
     return root
+
+
+@pytest.fixture(scope="session")
+def solved(mesh_cache, tmp_path_factory):
+    """Results folder with the reference of the octant, piece by piece."""
+    root = tmp_path_factory.mktemp("reference")
+    for piece in pieces(SCENE):
+        solve(root, piece)
+    return root
+
+
+@pytest.fixture(scope="session")
+def found(solved):
+    """That reference."""
+    return load_reference(solved, SCENE)
 
 
 @pytest.fixture

@@ -1,0 +1,9 @@
+"""An octant of the squeezed ball on three very coarse meshes: a reference that takes seconds."""
+
+from dataclasses import replace
+
+from studies.scenes import ReferencePlan
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+
+LEVELS = (0.5, 0.4, 0.32)
+SCENE = replace(BALL_SQUEEZE, reference=ReferencePlan("octant", LEVELS), checkpoints=(1.0, 4.0))
