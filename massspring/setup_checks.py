@@ -75,10 +75,10 @@ def check_held_apart(body: Body, method: Method) -> None:
 def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.ndarray) -> None:
     """Raises MassSpringError for a thin probe that the method does not meet, that starts inside the body at `x` (n, 3)
     or is too thick for contact with single triangles."""
-    if not method.meets_probes:
+    if method.misses_probes is not None:
         raise MassSpringError(
-            f"obstacle {number} is a thin probe, which method '{method.name}' does not meet; "
-            "use a Sphere, or free or implicit_volume"
+            f"obstacle {number} is a thin probe, which method '{method.name}' does not meet: {method.misses_probes}; "
+            "use a Sphere, or implicit_volume"
         )
     edge = mean_edge(body)
     if probe.radius > edge:

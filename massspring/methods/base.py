@@ -83,8 +83,8 @@ class Method(Protocol):
     something that stands for it. With a remedy, steps in which a volume has nothing to push on are counted."""
     follows_targets: ClassVar[bool] = True
     """Whether the target of a kept volume is followed where it changes."""
-    meets_probes: ClassVar[bool] = False
-    """Whether thin probes are met, in continuous time."""
+    misses_probes: ClassVar[str | None] = "its steps have no stage for them"
+    """Why thin probes are not met; None where they are, in continuous time."""
     limited: ClassVar[bool] = True
     """Whether steps beyond the stability limit diverge; where not, accuracy alone limits them."""
 

@@ -31,6 +31,7 @@ class Baumgarte(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
     remedy: ClassVar[Remedy | None] = "capped"
+    misses_probes: ClassVar[str | None] = None
 
     def __post_init__(self) -> None:
         for name in ("alpha", "beta"):

@@ -2,6 +2,10 @@
 
 With ṽ, W̃ of eq. 9 every one of them ends a step at v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺. They differ in where G is
 taken, in how long the step along it is, and in whether a correction of the positions is felt by the velocities.
+
+A thin probe's contacts come after the multiplier and leave G·v⁺ as it is (eq. 146): what a rule asks of the rate of V
+stays true. An exact root is then true to first order in what the contacts move; the next step starts from the true V,
+so that nothing adds up. Nothing may move after that stage: a correction of the positions would not be looked at.
 """
 
 from dataclasses import replace
@@ -23,7 +27,19 @@ from massspring.kernels.motion import (
     volume_multiplier,
 )
 from massspring.kernels.prediction import predict
-from massspring.kernels.ticks import HELD, INTEGRATION, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, VOLUME, mark
+from massspring.kernels.probing import meet_probes
+from massspring.kernels.ticks import (
+    HELD,
+    INTEGRATION,
+    MULTIPLIER,
+    OUTSIDE,
+    PROBES,
+    REVISION,
+    SEARCH,
+    SPRINGS,
+    VOLUME,
+    mark,
+)
 from massspring.kernels.volume import volume_gradient_into
 from massspring.methods.base import State, begin_frame
 from massspring.methods.implicit_volume import CONTACT_PASSES
@@ -101,7 +117,7 @@ def correct_positions(network, motion, target, dt):
 
 
 @compiled
-def constraint_frame(network, motion, line, drive, tally, lam, rule):
+def constraint_frame(network, motion, line, drive, tally, lam, rule, probing):
     """One frame with contact inside the multiplier (eq. 6–13, 101–105); returns the last lam [Pa]."""
     dt = drive.dt
     lightest = network.inverse_mass.max()
@@ -141,6 +157,9 @@ def constraint_frame(network, motion, line, drive, tally, lam, rule):
                 break
         if not mobility > 0.0:
             tally.skipped[0] += 1
+        if probing is not None:
+            lam = meet_probes(network, motion, drive, step, probing, lam, mobility, None)
+            mark(tally.ticks, PROBES)
         add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
@@ -155,5 +174,6 @@ def advance_by(rule: Rule, state: State, drive: Drive) -> State:
     """One frame by `rule`."""
     after = begin_frame(state, drive)
     line = Line(np.empty_like(after.x), np.empty_like(after.x))
-    lam = constraint_frame(after.network, after.motion, line, drive, after.tally, float(after.lam[0]), rule)
+    start = float(after.lam[0])
+    lam = constraint_frame(after.network, after.motion, line, drive, after.tally, start, rule, after.probing)
     return replace(after, lam=np.array([lam]))

@@ -87,6 +87,7 @@ class Element(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
     remedy: ClassVar[Remedy | None] = "force"
+    misses_probes: ClassVar[str | None] = "what a contact does to the volumes of all tetrahedra is not solved for"
 
     def __post_init__(self) -> None:
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)

@@ -48,7 +48,7 @@ class Free(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
     follows_targets: ClassVar[bool] = False
-    meets_probes: ClassVar[bool] = True
+    misses_probes: ClassVar[str | None] = None
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""

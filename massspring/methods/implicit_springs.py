@@ -250,6 +250,7 @@ class ImplicitSprings(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-6
     remedy: ClassVar[Remedy | None] = "capped"
+    misses_probes: ClassVar[str | None] = "a contact there moves all nodes at once, which is solved for at nodes only"
     keeps_spin: ClassVar[bool] = False
     holds_apart: ClassVar[bool] = True
     limited: ClassVar[bool] = False

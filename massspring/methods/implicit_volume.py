@@ -210,7 +210,7 @@ class ImplicitVolume(Method):
     volume_tol: ClassVar[float | None] = 3e-4
     remedy: ClassVar[Remedy | None] = "capped"
     holds_apart: ClassVar[bool] = True
-    meets_probes: ClassVar[bool] = True
+    misses_probes: ClassVar[str | None] = None
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""

@@ -17,7 +17,8 @@ from massspring.kernels.contact import find_contacts
 from massspring.kernels.layout import Drive
 from massspring.kernels.motion import add_held_impulse, advance, capped_error, steepest, surely_short
 from massspring.kernels.prediction import predict
-from massspring.kernels.ticks import HELD, INTEGRATION, OUTSIDE, SEARCH, SPRINGS, VOLUME, mark
+from massspring.kernels.probing import meet_probes
+from massspring.kernels.ticks import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, VOLUME, mark
 from massspring.kernels.volume import pyramid_volume, volume_gradient_into
 from massspring.methods.base import State, begin_frame
 
@@ -49,7 +50,7 @@ def cut_pressure(network, motion, lam, mobility, dt, tally):
 
 
 @compiled
-def pressure_frame(network, motion, drive, tally, bulk_modulus, law):
+def pressure_frame(network, motion, drive, tally, bulk_modulus, law, probing):
     """One frame of symplectic Euler with a known pressure (eq. 6, 7, 10, 12, 161); returns the last one [Pa]."""
     lam, dt = 0.0, drive.dt
     mark(tally.ticks, OUTSIDE)
@@ -66,6 +67,9 @@ def pressure_frame(network, motion, drive, tally, bulk_modulus, law):
         if drive.radius.shape[0] > 0:
             find_contacts(network, motion, drive, step, lam)
             mark(tally.ticks, SEARCH)
+        if probing is not None:  # the pressure is a force that no contact changes: no mobility
+            meet_probes(network, motion, drive, step, probing, lam, 0.0, None)
+            mark(tally.ticks, PROBES)
         add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
         advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
@@ -76,7 +80,7 @@ def pressure_frame(network, motion, drive, tally, bulk_modulus, law):
 def push(state: State, drive: Drive, bulk_modulus: float, law: int) -> State:
     """One frame by the pressure `law`."""
     after = begin_frame(state, drive)
-    lam = pressure_frame(after.network, after.motion, drive, after.tally, bulk_modulus, law)
+    lam = pressure_frame(after.network, after.motion, drive, after.tally, bulk_modulus, law, after.probing)
     return replace(after, lam=np.array([lam]))
 
 

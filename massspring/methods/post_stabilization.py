@@ -24,6 +24,7 @@ class PostStabilization(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-4
     remedy: ClassVar[Remedy | None] = "capped"
+    misses_probes: ClassVar[str | None] = "it moves nodes once more after the step, where no probe is looked for"
     keeps_spin: ClassVar[bool] = False
 
     def applies(self, body: Body) -> str | None:

@@ -31,6 +31,7 @@ class Pressure(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
     remedy: ClassVar[Remedy | None] = "capped"
+    misses_probes: ClassVar[str | None] = None
 
     def __post_init__(self) -> None:
         check_modulus(self.name, "ambient", self.ambient)

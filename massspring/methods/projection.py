@@ -25,6 +25,7 @@ class Projection(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-12
     remedy: ClassVar[Remedy | None] = "whole"
+    misses_probes: ClassVar[str | None] = None
     keeps_spin: ClassVar[bool] = False
 
     def applies(self, body: Body) -> str | None:

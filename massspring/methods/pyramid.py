@@ -29,6 +29,7 @@ class Pyramid(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
     remedy: ClassVar[Remedy | None] = "force"
+    misses_probes: ClassVar[str | None] = None
 
     def __post_init__(self) -> None:
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)

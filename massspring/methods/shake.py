@@ -22,6 +22,7 @@ class Shake(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-12
     remedy: ClassVar[Remedy | None] = "whole"
+    misses_probes: ClassVar[str | None] = None
 
     def applies(self, body: Body) -> str | None:
         """Keeps the whole only."""

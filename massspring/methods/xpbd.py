@@ -89,6 +89,7 @@ class Xpbd(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-3
     remedy: ClassVar[Remedy | None] = "whole"
+    misses_probes: ClassVar[str | None] = "what a contact does to the volumes that it has mended is not made up for"
     keeps_spin: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
