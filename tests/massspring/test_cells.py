@@ -19,7 +19,7 @@ from massspring import (
     Xpbd,
     simulate,
 )
-from massspring.kernels.cells import add_barycentre_forces, add_volume_forces, cell_slopes
+from massspring.kernels.cells import add_barycentre_forces, add_volume_forces, cell_slopes, mean_pressure
 from massspring.kernels.deformation import tetrahedron_volumes_into
 from massspring.kernels.volume import enclosed_volume, pyramid_volume
 from massspring.methods.cells import cells_of
@@ -92,6 +92,21 @@ def test_cells_push_nothing_about(block_body, kind):
         push = -9 * BULK * cells.rest_volume * (length.sum(axis=1) - cells.rest_reach) / cells.rest_reach**2
         published = push[:, None, None] * spokes / length[:, :, None]
         assert np.abs(published.sum(axis=(0, 1))).max() > 1e-4 * scale
+
+
+def test_a_swollen_cell_has_the_pressure_of_its_bulk_modulus(block_body):
+    """All edges longer by e: springs from the barycentre resist as K does, −3 K e, in every cell whatever its shape."""
+    cells, e = cells_of(block_body), 1e-3
+    add_barycentre_forces((1 + e) * block_body.rest, cells, BULK, np.zeros_like(block_body.rest))
+    assert np.allclose(cells.pressure, -3 * BULK * e, rtol=1e-9)
+
+
+def test_large_cells_count_more_in_the_mean_pressure(block_body):
+    cells = cells_of(block_body)
+    cells.pressure[:] = np.random.default_rng(0).normal(size=len(cells.pressure))
+    weighted = np.average(cells.pressure, weights=block_body.tetrahedron_volumes)
+    assert mean_pressure(cells) == pytest.approx(weighted, rel=1e-12)
+    assert abs(weighted / cells.pressure.mean() - 1) > 0.01  # the cells differ enough to tell
 
 
 def test_the_pyramids_fill_the_surface(body):
