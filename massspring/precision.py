@@ -7,10 +7,11 @@ import numpy as np
 
 from massspring.errors import MassSpringError
 from massspring.methods.base import State
+from massspring.methods.rows import OF_EACH_VOLUME
 from massspring.neighbours import aligned
 
 Precision = Literal["float64", "float32"]
-KEPT_DOUBLE = frozenset({"sums", "volume", "lam", "right", "diagonal", "matrix", "search", "image", "allowed"})
+KEPT_DOUBLE = frozenset({"sums", "matrix", *OF_EACH_VOLUME})
 """Sums over many nodes and what is solved with them: as long as there are slices or volumes, so they cost nothing."""
 
 

@@ -70,3 +70,8 @@ def lean(function: Function) -> Function:
 def inlined(function: Function) -> Function:
     """As `lean`, and always part of its caller."""
     return _jit(function, _nrt=False, forceinline=True)
+
+
+def summing(function: Function) -> Function:
+    """As `inlined`, for sums along arrays: terms may be added in any order, so that a vector register adds several."""
+    return _jit(function, _nrt=False, forceinline=True, fastmath={"reassoc", "contract"})

@@ -1,7 +1,7 @@
 """What a pass of the implicit springs starts from."""
 
 from massspring.kernels.compiled import compiled
-from massspring.kernels.rows import rows_into, transposed_rows_times_into, volumes_of_rows_into
+from massspring.kernels.rows import rows_into, transposed_rows_times_into
 from massspring.kernels.springs import spring_forces_into
 
 
@@ -10,8 +10,7 @@ def imbalance_into(network, motion, rows, p, drive, out):
     """dt M v + dt² (f(p) + Jᵀ lam + m g) − (1 + c dt) M (p − x) [kg m], (n, 3) (eq. 92); J, V at p go to `rows`."""
     dt = drive.dt
     spring_forces_into(p, network.ends, network.rest_length, network.stiffness, motion.force)
-    rows_into(p, rows)
-    volumes_of_rows_into(p, rows, rows.volume)
+    rows_into(p, network.inverse_mass, rows)
     transposed_rows_times_into(rows, rows.lam, out)
     for i in range(p.shape[0]):
         m = network.mass[i]

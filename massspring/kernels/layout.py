@@ -97,22 +97,17 @@ class Network(NamedTuple):
 
 
 class VolumeRows(NamedTuple):
-    """m volumes over f oriented triangles: J = dV/dx as sparse rows with e entries, its transpose, and scratch."""
+    """m volumes: J = dV/dx as sparse rows with e entries, its transpose, and scratch."""
 
-    triangles: np.ndarray
-    """(f, 3) uint32."""
-    normal: np.ndarray
-    """Of the triangles, twice their area long [m²], (f, 3)."""
-    summed: np.ndarray
-    """Entries of J that are summed from terms, (c,) uint32; the others are the negative of one of these."""
-    twin: np.ndarray
-    """Which is the negative of each of these; the entry itself where none is, (c,) uint32."""
-    term_start: np.ndarray
-    """First term of each summed entry, (c + 1,) uint32; a term is a triangle at its node that bounds its volume."""
-    term_triangle: np.ndarray
-    """(t,) uint32."""
-    term_share: np.ndarray
-    """s_rf / 6 [1], (t,)."""
+    target: np.ndarray
+    """Of each entry of J that is summed from areas its place among all, its place node by node, and the same two of the
+    entry that is its negative (again its own where none is), (c, 4) uint32."""
+    ring_start: np.ndarray
+    """First quadrangle in the ring of each summed entry, (c + 1,) uint32."""
+    corner: np.ndarray
+    """Nodes round a quadrangle, the last one the first again where it is a triangle, (q, 4) uint32."""
+    corner_share: np.ndarray
+    """s_rf / 6 [1], (q,)."""
     row_start: np.ndarray
     """First entry of each volume, (m + 1,) uint32."""
     column: np.ndarray
@@ -123,8 +118,6 @@ class VolumeRows(NamedTuple):
     """Entries node by node, volumes ascending, (e,) uint32."""
     node_row: np.ndarray
     """Their volumes, (e,) uint32."""
-    place: np.ndarray
-    """Where each entry stands in the two, (e,) uint32."""
     value: np.ndarray
     """J_rj [m²], (e, 4); the fourth number is 0 and fills a vector register."""
     node_value: np.ndarray
@@ -135,8 +128,12 @@ class VolumeRows(NamedTuple):
     """Multipliers, on the way in those of the last step [Pa], (m,)."""
     right: np.ndarray
     """What the multipliers of the moment leave of the right-hand side [m³/s²], (m,)."""
+    free_diagonal: np.ndarray
+    """S_rr without contact [m⁴/kg], (m,)."""
     diagonal: np.ndarray
     """S_rr [m⁴/kg], (m,)."""
+    per_diagonal: np.ndarray
+    """1/S_rr, 0 for what nothing can push [kg/m⁴], (m,)."""
     matrix: np.ndarray
     """S [m⁴/kg], (m, m); (0, 0) where it is solved iteratively."""
     search: np.ndarray

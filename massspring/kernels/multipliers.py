@@ -2,7 +2,7 @@
 
 import math
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import compiled, inlined, lean, summing
 from massspring.kernels.distances import allowed_part
 from massspring.kernels.rows import NEGLIGIBLE, mobilised_into, padded_rows_times_into
 
@@ -77,52 +77,67 @@ def substitute(factor, right, change):
         change[k] = total / factor[k, k] if factor[k, k] > 0.0 else 0.0
 
 
-@compiled
+@lean
 def apply_schur(rows, motion, inverse_mass, p, product):
     """S p = J (W̃ (Jᵀ p)), (m,) (eq. 33)."""
     mobilised_into(rows, motion, inverse_mass, p, rows.node_vector)
     padded_rows_times_into(rows, rows.node_vector, product)
 
 
-@compiled
+@summing
+def dot(a, b):
+    """a · b."""
+    total = 0.0
+    for r in range(a.shape[0]):
+        total += a[r] * b[r]
+    return total
+
+
+@summing
+def judged(residual, allowed, per_diagonal):
+    """residual · D⁻¹ residual, and how many volumes are farther off than allowed."""
+    rho, beyond = 0.0, 0
+    for r in range(residual.shape[0]):
+        rho += residual[r] * residual[r] * per_diagonal[r]
+        beyond += abs(residual[r]) > allowed[r]
+    return rho, beyond
+
+
+@inlined
+def along(search, image, alpha, lam, residual):
+    """One step of the iteration: lam += alpha search, residual −= alpha S search."""
+    for r in range(search.shape[0]):
+        lam[r] += alpha * search[r]
+        residual[r] -= alpha * image[r]
+
+
+@lean
 def solve_iteratively(rows, motion, inverse_mass, lam, allowed, most):
     """lam += S⁻¹ rhs by conjugate gradients with the diagonal as preconditioner (eq. 34).
 
     Ends when |rhs − S Δlam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number. A volume
     without a diagonal has nothing to push on and is left out.
     """
-    m = lam.shape[0]
-    residual, search, image = rows.right, rows.search, rows.image
-    rho = 0.0
-    worst = 0.0
-    for r in range(m):
-        if not rows.diagonal[r] > 0.0:
-            residual[r] = 0.0
+    residual, search, image, per_diagonal = rows.right, rows.search, rows.image, rows.per_diagonal
+    for r in range(search.shape[0]):
         search[r] = 0.0
-        worst = max(worst, abs(residual[r]) - allowed[r])
+        if rows.diagonal[r] > 0.0:
+            per_diagonal[r] = 1.0 / rows.diagonal[r]
+        else:
+            residual[r], per_diagonal[r], allowed[r] = 0.0, 0.0, math.inf
+    rho, beyond = judged(residual, allowed, per_diagonal)
+    keep = 0.0
     iteration = 0
-    while worst > 0.0 and iteration < most:
-        before = rho
-        rho = 0.0
-        for r in range(m):
-            if rows.diagonal[r] > 0.0:
-                rho += residual[r] * residual[r] / rows.diagonal[r]
-        keep = rho / before if iteration > 0 else 0.0
-        for r in range(m):
-            if rows.diagonal[r] > 0.0:
-                search[r] = residual[r] / rows.diagonal[r] + keep * search[r]
+    while beyond > 0 and iteration < most:
+        for r in range(search.shape[0]):
+            search[r] = per_diagonal[r] * residual[r] + keep * search[r]
         apply_schur(rows, motion, inverse_mass, search, image)
-        curvature = 0.0
-        for r in range(m):
-            curvature += search[r] * image[r]
+        curvature = dot(search, image)
         if not curvature > 0.0:
             break
-        alpha = rho / curvature
-        worst = 0.0
-        for r in range(m):
-            lam[r] += alpha * search[r]
-            if rows.diagonal[r] > 0.0:
-                residual[r] -= alpha * image[r]
-            worst = max(worst, abs(residual[r]) - allowed[r])
+        along(search, image, rho / curvature, lam, residual)
+        before = rho
+        rho, beyond = judged(residual, allowed, per_diagonal)
+        keep = rho / before
         iteration += 1
     return iteration

@@ -2,61 +2,43 @@
 
 import math
 
-from massspring.kernels.compiled import compiled, inlined
+from massspring.kernels.compiled import compiled, lean
 from massspring.kernels.distances import allowed_part
-from massspring.kernels.lanes import sum_of_products, sum_of_scaled
+from massspring.kernels.lanes import copy_scaled, sum_of_areas, sum_of_products, sum_of_scaled, sums_from_origin
 
 NEGLIGIBLE = 1e-12
 """A diagonal or pivot this much smaller than what it was summed from is round-off."""
 
 
 @compiled
-def rows_into(x, rows):
-    """J_rj = Σ_f∋j s_rf (1/6) (x_b − x_a) × (x_c − x_a) [m²], the non-zero entries (e, 4), padded with 0 (eq. 32).
+def rows_into(x, inverse_mass, rows):
+    """J_rj [m²], the non-zero entries (e, 4), padded with 0, V_r [m³] (eq. 32, 39) and S_rr without contact [m⁴/kg]."""
+    places = rows.node_vector
+    for i in range(x.shape[0]):
+        places[i, 0], places[i, 1], places[i, 2] = x[i, 0], x[i, 1], x[i, 2]
+    areas_into(rows, places)
+    for r in range(rows.volume.shape[0]):
+        first, last = rows.row_start[r], rows.row_start[r + 1]
+        three, square = 0.0, 0.0
+        if last > first:
+            three, square = sums_from_origin(first, last, rows.column, rows.value, places, inverse_mass)
+        rows.volume[r], rows.free_diagonal[r] = three / 3.0, square
 
-    One area vector a triangle serves its three nodes in every volume it bounds. Σ_j J_rj = 0. Where J_jr = −J_rj
-    always, one of the two is summed.
+
+@lean
+def areas_into(rows, places):
+    """J_rj = Σ_q c_q (x_2 − x_0) × (x_3 − x_1) [m²], the area of the ring of node j in volume r (eq. 39).
+
+    Σ_j J_rj = 0. Where J_jr = −J_rj always, one of the two is summed.
     """
-    normal = rows.normal
-    for f in range(rows.triangles.shape[0]):
-        a, b, c = rows.triangles[f, 0], rows.triangles[f, 1], rows.triangles[f, 2]
-        a0, a1, a2 = x[a, 0], x[a, 1], x[a, 2]
-        b0, b1, b2 = x[b, 0] - a0, x[b, 1] - a1, x[b, 2] - a2
-        c0, c1, c2 = x[c, 0] - a0, x[c, 1] - a1, x[c, 2] - a2
-        normal[f, 0], normal[f, 1], normal[f, 2] = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
-    for k in range(rows.summed.shape[0]):
-        e, twin = rows.summed[k], rows.twin[k]
-        g0, g1, g2 = 0.0, 0.0, 0.0
-        for t in range(rows.term_start[k], rows.term_start[k + 1]):
-            f, share = rows.term_triangle[t], rows.term_share[t]
-            g0 += share * normal[f, 0]
-            g1 += share * normal[f, 1]
-            g2 += share * normal[f, 2]
-        # An entry without a twin is its own: the second writing then stands.
-        _write(rows, twin, -g0, -g1, -g2)
-        _write(rows, e, g0, g1, g2)
-
-
-@inlined
-def _write(rows, e, g0, g1, g2):
-    rows.value[e, 0], rows.value[e, 1], rows.value[e, 2] = g0, g1, g2
-    k = rows.place[e]
-    rows.node_value[k, 0], rows.node_value[k, 1], rows.node_value[k, 2] = g0, g1, g2
-
-
-@compiled
-def volumes_of_rows_into(x, rows, volume):
-    """V_r = (1/3) Σ_j (x_j − x_o) · J_rj [m³], (m,) (eq. 32); o is a node of the volume, so that no digits are lost."""
-    for r in range(volume.shape[0]):
-        o = rows.column[rows.row_start[r]]
-        o0, o1, o2 = x[o, 0], x[o, 1], x[o, 2]
-        three = 0.0
-        for e in range(rows.row_start[r], rows.row_start[r + 1]):
-            j = rows.column[e]
-            three += (x[j, 0] - o0) * rows.value[e, 0]
-            three += (x[j, 1] - o1) * rows.value[e, 1]
-            three += (x[j, 2] - o2) * rows.value[e, 2]
-        volume[r] = three / 3.0
+    value, node_value, target = rows.value, rows.node_value, rows.target
+    for k in range(target.shape[0]):
+        e, twin = target[k, 0], target[k, 2]
+        sum_of_areas(rows.ring_start[k], rows.ring_start[k + 1], rows.corner, rows.corner_share, places, value, e)
+        copy_scaled(1.0, value, e, node_value, target[k, 1])
+        if twin != e:
+            copy_scaled(-1.0, value, e, value, twin)
+            copy_scaled(-1.0, value, e, node_value, target[k, 3])
 
 
 @compiled
@@ -70,19 +52,21 @@ def rows_times_into(rows, u, product):
         product[r] = total
 
 
-@compiled
+@lean
 def padded_rows_times_into(rows, u, product):
     """(J u)_r as above for `u` (n, 4) with 0 as fourth number, twice as fast."""
+    value, column, start = rows.value, rows.column, rows.row_start
     for r in range(product.shape[0]):
-        product[r] = sum_of_products(rows.row_start[r], rows.row_start[r + 1], rows.column, rows.value, u)
+        product[r] = sum_of_products(start[r], start[r + 1], column, value, u)
 
 
-@compiled
+@lean
 def transposed_rows_times_into(rows, p, out):
     """(Jᵀ p)_j = Σ_r J_rj p_r, (n, 3): with pressures p [Pa] the force of all volumes on each node [N]."""
-    u = rows.node_vector
+    u, start, row, value = rows.node_vector, rows.node_start, rows.node_row, rows.node_value
     for j in range(out.shape[0]):
-        sum_of_scaled(rows.node_start[j], rows.node_start[j + 1], rows.node_row, rows.node_value, p, u, j)
+        sum_of_scaled(start[j], start[j + 1], row, value, p, 1.0, u, j)
+    for j in range(out.shape[0]):
         out[j, 0], out[j, 1], out[j, 2] = u[j, 0], u[j, 1], u[j, 2]
 
 
@@ -101,35 +85,43 @@ def pushed_velocity_into(motion, inverse_mass, dt, u):
         u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
 
 
-@compiled
+@lean
 def mobilised_into(rows, motion, inverse_mass, p, u):
     """u = W̃ Jᵀ p, (n, 4): no motion of a held node, none into an obstacle (eq. 9)."""
+    start, row, value, locked, direction = (
+        rows.node_start,
+        rows.node_row,
+        rows.node_value,
+        motion.locked,
+        motion.direction,
+    )
     for i in range(u.shape[0]):
-        sum_of_scaled(rows.node_start[i], rows.node_start[i + 1], rows.node_row, rows.node_value, p, u, i)
-        w = inverse_mass[i]
-        u0, u1, u2 = w * u[i, 0], w * u[i, 1], w * u[i, 2]
-        if motion.locked[i] > 0:
-            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-            u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
-        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+        sum_of_scaled(start[i], start[i + 1], row, value, p, inverse_mass[i], u, i)
+    for i in range(u.shape[0]):
+        if locked[i] > 0:
+            d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
+            u[i, 0], u[i, 1], u[i, 2] = allowed_part(locked[i], d0, d1, d2, u[i, 0], u[i, 1], u[i, 2])
 
 
 @compiled
 def diagonal_into(rows, motion, inverse_mass, diagonal):
-    """S_rr = Σ_j J_rj · W̃_j J_rj [m⁴/kg], (m,); 0 where contact and held nodes leave nothing but round-off."""
+    """S_rr = Σ_j J_rj · W̃_j J_rj [m⁴/kg], (m,), from what it is without contact (eq. 9).
+
+    0 where contact and held nodes leave nothing but round-off.
+    """
     for r in range(diagonal.shape[0]):
-        total, free = 0.0, 0.0
-        for e in range(rows.row_start[r], rows.row_start[r + 1]):
-            j = rows.column[e]
-            g0, g1, g2 = rows.value[e, 0], rows.value[e, 1], rows.value[e, 2]
-            square = g0 * g0 + g1 * g1 + g2 * g2
-            free += square * inverse_mass[j]
-            if motion.locked[j] > 0:
-                d0, d1, d2 = motion.direction[j, 0], motion.direction[j, 1], motion.direction[j, 2]
+        diagonal[r] = rows.free_diagonal[r]
+    for j in range(inverse_mass.shape[0]):
+        if motion.locked[j] > 0:
+            d0, d1, d2 = motion.direction[j, 0], motion.direction[j, 1], motion.direction[j, 2]
+            for k in range(rows.node_start[j], rows.node_start[j + 1]):
+                g0, g1, g2 = rows.node_value[k, 0], rows.node_value[k, 1], rows.node_value[k, 2]
                 p0, p1, p2 = allowed_part(motion.locked[j], d0, d1, d2, g0, g1, g2)
-                square = g0 * p0 + g1 * p1 + g2 * p2
-            total += inverse_mass[j] * square
-        diagonal[r] = total if total > NEGLIGIBLE * free else 0.0
+                taken = g0 * (g0 - p0) + g1 * (g1 - p1) + g2 * (g2 - p2)
+                diagonal[rows.node_row[k]] -= inverse_mass[j] * taken
+    for r in range(diagonal.shape[0]):
+        if not diagonal[r] > NEGLIGIBLE * rows.free_diagonal[r]:
+            diagonal[r] = 0.0
 
 
 @compiled

@@ -22,7 +22,7 @@ from massspring.body import Body
 from massspring.kernels.implicit_step import imbalance_into
 from massspring.kernels.layout import Drive
 from massspring.kernels.motion import add_held_impulse
-from massspring.kernels.rows import rows_into, rows_times_into, transposed_rows_times_into, volumes_of_rows_into
+from massspring.kernels.rows import rows_into, rows_times_into, transposed_rows_times_into
 from massspring.kernels.springs import spring_forces_into
 from massspring.kernels.ticks import (
     HELD,
@@ -91,8 +91,7 @@ class Step:
 
     def take(self) -> None:
         """All passes; then v⁺ = (x⁺ − x)/dt."""
-        rows_into(self.motion.x, self.rows)
-        volumes_of_rows_into(self.motion.x, self.rows, self.rows.volume)
+        rows_into(self.motion.x, self.network.inverse_mass, self.rows)
         begun = self.rows.volume.copy()
         touching, impulses = self.touch(), np.zeros(0)
         obstacles = len(self.drive.radius) > 0

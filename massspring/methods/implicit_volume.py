@@ -40,7 +40,6 @@ from massspring.kernels.rows import (
     rows_into,
     steepest_of_row,
     transposed_rows_times_into,
-    volumes_of_rows_into,
 )
 from massspring.kernels.slices import gather_and_predict, predict_from_places
 from massspring.kernels.ticks import (
@@ -118,7 +117,7 @@ def set_right_side(network, rows, motion, target, dt, tolerance):
     pushed_velocity_into(motion, network.inverse_mass, dt, rows.node_vector)
     padded_rows_times_into(rows, rows.node_vector, rows.right)
     diagonal_into(rows, motion, network.inverse_mass, rows.diagonal)
-    lightest = network.largest_inverse_mass
+    lightest, per_second = network.largest_inverse_mass, 1.0 / dt
     capped, idle = False, False
     for r in range(target.shape[0]):
         error = target[r] - rows.volume[r]
@@ -129,8 +128,8 @@ def set_right_side(network, rows, motion, target, dt, tolerance):
             part = capped_error(error, rows.diagonal[r], reachable, network.longest_correction)
             capped |= part != error
             error = part
-        rows.right[r] = (error / dt - rows.right[r]) / dt
-        rows.allowed[r] = tolerance * target[r] / (dt * dt)
+        rows.right[r] = (error * per_second - rows.right[r]) * per_second
+        rows.allowed[r] = tolerance * target[r] * per_second * per_second
     return capped, idle
 
 
@@ -167,8 +166,7 @@ def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy, probin
             motion.x, network.held_nodes, network.held_group, network.held_rest, held, dt, motion.v_star
         )
         mark(tally.ticks, HELD)
-        rows_into(motion.x, rows)
-        volumes_of_rows_into(motion.x, rows, rows.volume)
+        rows_into(motion.x, network.inverse_mass, rows)
         transposed_rows_times_into(rows, rows.lam, motion.gradient)
         mark(tally.ticks, VOLUME)
         passes = 1

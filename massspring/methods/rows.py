@@ -5,14 +5,15 @@ from scipy.sparse import csr_array
 
 from massspring.kernels.lanes import LANES
 from massspring.kernels.layout import VolumeRows
+from massspring.methods.quadrangles import edge_chains, quadrangles
 from massspring.neighbours import aligned
 from massspring.volumes import Volumes
 
 DENSE_UP_TO = 64
 """Volumes up to which S is factored densely; beyond it conjugate gradients from the last multipliers are cheaper."""
 
-OPPOSITE = 1e-12
-"""Sum of two entries, over the area vectors in them, that is round-off: they are opposite at all positions."""
+OF_EACH_VOLUME = ("volume", "lam", "right", "free_diagonal", "diagonal", "per_diagonal", "search", "image", "allowed")
+"""Arrays with one number for each volume, double in either precision."""
 
 
 def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
@@ -31,48 +32,46 @@ def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
         (np.repeat(terms.data, 3)[by_entry] / 6.0, np.repeat(triangle, 3)[by_entry], _starts(place, len(entries))),
         shape=(len(entries), len(volumes.triangles)),
     )
-    summed, twin = _twins(row, column, sums, volumes.triangles, nodes)
-    kept = sums[summed]
+    chains, edges = edge_chains(sums, volumes.triangles)
+    summed, twin = _twins(row, column, chains, nodes)
+    ring, corner, share = quadrangles(chains[summed], edges)
+    sizes = np.bincount(ring, minlength=len(summed))
+    # Alike ones one after the other: the processor then knows what comes.
+    order = np.lexsort((sizes, twin != summed))
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    by_order = np.argsort(rank[ring], kind="stable")
+    place = np.argsort(by_node)
     dense = m if m <= DENSE_UP_TO else 0
     return VolumeRows(
-        triangles=volumes.triangles,
-        normal=np.zeros((len(volumes.triangles), 3)),
-        summed=summed.astype(np.uint32),
-        twin=twin.astype(np.uint32),
-        term_start=kept.indptr.astype(np.uint32),
-        term_triangle=kept.indices.astype(np.uint32),
-        term_share=kept.data,
+        target=np.column_stack([summed, place[summed], twin, place[twin]])[order].astype(np.uint32),
+        ring_start=np.concatenate([[0], np.cumsum(sizes[order])]).astype(np.uint32),
+        corner=corner[by_order],
+        corner_share=share[by_order],
         row_start=_starts(row, m),
         column=column.astype(np.uint32),
         node_start=_starts(column, nodes),
         node_entry=by_node.astype(np.uint32),
         node_row=row[by_node].astype(np.uint32),
-        place=np.argsort(by_node).astype(np.uint32),
         value=aligned((len(entries), LANES), np.dtype(np.float64)),
         node_value=aligned((len(entries), LANES), np.dtype(np.float64)),
         matrix=np.zeros((dense, dense)),
         node_vector=aligned((nodes, LANES), np.dtype(np.float64)),
-        **{name: np.zeros(m) for name in ("volume", "lam", "right", "diagonal", "search", "image", "allowed")},
+        **{name: np.zeros(m) for name in OF_EACH_VOLUME},
     )
 
 
-def _twins(
-    row: np.ndarray, column: np.ndarray, sums: csr_array, triangles: np.ndarray, nodes: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _twins(row: np.ndarray, column: np.ndarray, chains: csr_array, nodes: int) -> tuple[np.ndarray, np.ndarray]:
     """Entries to sum, and the entry that is the negative of each (itself where none is), (c,) and (c,).
 
     The volumes of two nodes inside a body push each other's node with opposite areas: the ring of tetrahedra around
-    their edge closes. Entries are polynomials of the positions, so that opposite ones at random positions are opposite
-    at all.
+    their edge closes, and is passed the other way round.
     """
-    x = np.random.default_rng(0).uniform(-1.0, 1.0, (nodes, 3))
-    a, b, c = (x[triangles[:, corner]] for corner in range(3))
-    value = sums @ np.cross(b - a, c - a)
     key, mirrored = row * nodes + column, column * nodes + row
     partner = np.minimum(np.searchsorted(key, mirrored), len(key) - 1)
-    sizes = abs(sums) @ np.ones(len(triangles))
-    opposite = np.abs(value + value[partner]).max(axis=1) <= OPPOSITE * sizes
-    found = (key[partner] == mirrored) & (row != column) & opposite
+    both = csr_array(chains + chains[partner])
+    both.eliminate_zeros()
+    found = (key[partner] == mirrored) & (np.diff(both.indptr) == 0)
     entry = np.arange(len(key))
     summed = np.flatnonzero(~found | (row < column))
     return summed, np.where(found, partner, entry)[summed]

@@ -18,7 +18,8 @@ from massspring import (
 )
 from massspring.kernels.deformation import tetrahedron_volumes_into
 from massspring.kernels.layout import Accuracy
-from massspring.kernels.rows import rows_into, transposed_rows_times_into, volumes_of_rows_into
+from massspring.kernels.multipliers import solve_iteratively
+from massspring.kernels.rows import diagonal_into, rows_into, transposed_rows_times_into
 from massspring.methods.base import new_tally, start
 from massspring.methods.implicit_volume import set_right_side, solve_multipliers
 from massspring.methods.rows import volume_rows
@@ -38,8 +39,7 @@ def several(request: pytest.FixtureRequest, block_body: Body, hollow_body: Body)
 def test_rows_are_the_derivative_of_the_volumes(several):
     rows = volume_rows(several.kept, several.node_count)
     x = moved(several)
-    rows_into(x, rows)
-    volumes_of_rows_into(x, rows, rows.volume)
+    rows_into(x, 1.0 / several.mass, rows)
     assert np.allclose(rows.volume, several.kept.measure(x), rtol=1e-12)
     random = np.random.default_rng(2)
     direction, pressure = random.uniform(-1, 1, x.shape), random.uniform(-1, 1, several.kept.count)
@@ -79,8 +79,7 @@ def touched_and_held(body: Body, dt: float):
     fixed += [(stuck, axis, float(axis @ mo.goal[stuck])) for axis in np.eye(3)]
     fixed += [(i, mo.normal[i], a) for i, a in zip(touched, approach, strict=True)]
     fixed += [(i, axis, float(axis @ mo.v_star[i])) for i in held for axis in np.eye(3)]
-    rows_into(mo.x, rows)
-    volumes_of_rows_into(mo.x, rows, rows.volume)
+    rows_into(mo.x, state.network.inverse_mass, rows)
     return state, fixed
 
 
@@ -116,6 +115,31 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
     motion_kernels.advance(mo, several.mass, network.inverse_mass, 1.0, dt, np.zeros((2, 3)))
     assert np.allclose(mo.v.ravel(), solution[: 3 * n], atol=1e-7)  # a millionth of the velocities of 0.1 m/s
     assert (tally.iterations[1] > 0) != dense
+
+
+def test_an_iteration_ends_as_soon_as_a_residual_is_no_number(block_body, monkeypatch):
+    monkeypatch.setattr(rows_module, "DENSE_UP_TO", 0)
+    state, _ = touched_and_held(block_body.keeping(Volumes.nodal(block_body)), 1e-3)
+    rows = state.rows
+    diagonal_into(rows, state.motion, state.network.inverse_mass, rows.diagonal)
+    rows.right[:], rows.right[7] = 1.0, np.nan
+    count = solve_iteratively(rows, state.motion, state.network.inverse_mass, rows.lam, rows.allowed, 10**9)
+    assert count <= 1 and np.isnan(rows.right).any()
+
+
+@pytest.mark.parametrize("kind", ["hollow", "regions"])
+def test_conjugate_directions_need_no_more_iterations_than_volumes(kind, block_body, hollow_body, monkeypatch):
+    """Two for wall and lumen, seven for seven regions, and what is then left is round-off."""
+    monkeypatch.setattr(rows_module, "DENSE_UP_TO", 0)
+    body = hollow_body if kind == "hollow" else block_body.keeping(Volumes.regions(block_body, 7))
+    state, _ = touched_and_held(body, 1e-3)
+    rows = state.rows
+    diagonal_into(rows, state.motion, state.network.inverse_mass, rows.diagonal)
+    rows.right[:] = -np.random.default_rng(1).uniform(0.5, 1.0, body.kept.count)
+    rows.allowed[:] = 1e-9  # the residuals start at 1; round-off of seven iterations is some 1e-14
+    count = solve_iteratively(rows, state.motion, state.network.inverse_mass, rows.lam, rows.allowed, 100)
+    assert 1 < count <= body.kept.count
+    assert np.abs(rows.right).max() <= 1e-9
 
 
 def _single_row(nodes: int, node: int, direction: np.ndarray) -> np.ndarray:
@@ -202,8 +226,11 @@ def test_a_crushed_body_comes_back(kind, request, block_body, hollow_body):
     assert np.abs(body.kept.measure(state.x) / body.rest_volumes - 1).max() < 1e-3
 
 
-def test_a_volume_held_by_its_nodes_is_left_alone(block_body):
+@pytest.mark.parametrize("dense", [True, False], ids=["dense", "iterative"])
+def test_a_volume_held_by_its_nodes_is_left_alone(block_body, dense, monkeypatch):
     """All nodes of some cells are held: their volumes have nothing to push on, the others are kept."""
+    if not dense:
+        monkeypatch.setattr(rows_module, "DENSE_UP_TO", 0)
     body = block_body.keeping(Volumes.nodal(block_body))
     held = Attachment(np.flatnonzero(block_body.rest[:, 2] < 0.03))
     clock = clock_for(body, 20, 10)

@@ -1,4 +1,4 @@
-"""The rows of several volumes: products four numbers at a time, and entries that are each other's negative."""
+"""The rows of several volumes: sums four numbers at a time, areas of rings, entries that are each other's negative."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,15 @@ from scipy.sparse import csr_array
 
 from massspring import Body, Volumes
 from massspring.kernels.compiled import compiled
-from massspring.kernels.lanes import sum_of_products, sum_of_scaled
+from massspring.kernels.lanes import copy_scaled, sum_of_areas, sum_of_products, sum_of_scaled, sums_from_origin
+from massspring.kernels.layout import VolumeRows
 from massspring.kernels.multipliers import apply_schur
-from massspring.kernels.rows import rows_into
+from massspring.kernels.rows import diagonal_into, rows_into
 from massspring.methods.base import start
+from massspring.methods.quadrangles import quadrangles
 from massspring.methods.rows import volume_rows
+from massspring.precision import in_precision
+from tests.massspring.conftest import icosphere
 from tests.massspring.test_kernels import moved
 
 MANY = 1e-14
@@ -21,7 +25,7 @@ MANY = 1e-14
 def scaled_sums(starts, index, value, factor, out):
     """What the plain function does, compiled."""
     for r in range(starts.shape[0] - 1):
-        sum_of_scaled(starts[r], starts[r + 1], index, value, factor, out, r)
+        sum_of_scaled(starts[r], starts[r + 1], index, value, factor, 2.5, out, r)
 
 
 @compiled
@@ -45,12 +49,67 @@ def test_sums_in_registers_equal_the_plain_ones(real):
     sums_of_products(starts, index, value, field, sums)
     round_off = 10 * float(np.finfo(real).eps)
     matrix = csr_array((np.ones(len(index)), np.arange(len(index)), starts), shape=(5, len(index)))
-    assert np.abs(out - matrix @ (factor[index, None] * value)).max() < round_off
+    assert np.abs(out - 2.5 * matrix @ (factor[index, None] * value)).max() < round_off
     assert np.abs(sums - matrix @ (field[index] * value).sum(axis=1)).max() < round_off
     for r in range(5):
-        sum_of_scaled(starts[r], starts[r + 1], index, value, factor, plain, r)
+        sum_of_scaled(starts[r], starts[r + 1], index, value, factor, 2.5, plain, r)
         assert sum_of_products(starts[r], starts[r + 1], index, value, field) == pytest.approx(sums[r], abs=round_off)
     assert np.abs(out - plain).max() < round_off
+
+
+@compiled
+def sums_seen_from_the_first(starts, index, value, places, weight, out):
+    """What the plain function does, compiled."""
+    for r in range(starts.shape[0] - 1):
+        if starts[r] < starts[r + 1]:
+            out[r] = sums_from_origin(starts[r], starts[r + 1], index, value, places, weight)
+
+
+@compiled
+def sums_of_areas(starts, corner, share, places, out):
+    """What the plain functions do, compiled: each sum, and −3 times it further down."""
+    for r in range(starts.shape[0] - 1):
+        sum_of_areas(starts[r], starts[r + 1], corner, share, places, out, r)
+        copy_scaled(-3.0, out, r, out, r + 5)
+
+
+@pytest.mark.parametrize("real", [np.float64, np.float32])
+def test_what_a_row_says_of_a_volume_equals_the_plain_sums(real):
+    """In double whatever the arrays are, and 1e4 from the origin: differences of such places are exact."""
+    random = np.random.default_rng(1)
+    starts = np.concatenate([[0], np.cumsum([3, 0, 6, 1, 4])]).astype(np.uint32)
+    index = random.integers(0, 9, starts[-1]).astype(np.uint32)
+    value, places = random.normal(size=(len(index), 4)).astype(real), (1e4 + random.normal(size=(9, 4))).astype(real)
+    weight = random.uniform(1.0, 2.0, 9).astype(real)
+    out = np.zeros((5, 2))
+    sums_seen_from_the_first(starts, index, value, places, weight, out)
+    for r in np.flatnonzero(np.diff(starts.astype(int))):
+        e = np.arange(starts[r], starts[r + 1])
+        away = places[index[e]].astype(np.float64) - places[index[e[0]]]
+        squares = (value[e].astype(np.float64) ** 2).sum(axis=1)
+        exact = (away * value[e]).sum(), (weight[index[e]] * squares).sum()
+        plain = sums_from_origin(starts[r], starts[r + 1], index, value, places, weight)
+        assert np.abs(out[r] - exact).max() < 100 * MANY and np.abs(np.subtract(plain, exact)).max() < 100 * MANY
+
+
+@pytest.mark.parametrize("real", [np.float64, np.float32])
+def test_sums_of_areas_equal_the_plain_ones(real):
+    """Rows of 0 to 6 quadrangles; what is written further down is −3 times each."""
+    random = np.random.default_rng(1)
+    starts = np.concatenate([[0], np.cumsum([3, 0, 6, 1, 4])]).astype(np.uint32)
+    corner = random.integers(0, 9, (starts[-1], 4)).astype(np.uint32)
+    share, places = random.normal(size=len(corner)).astype(real), np.zeros((9, 4), dtype=real)
+    places[:, :3] = random.normal(size=(9, 3))
+    out, plain = np.ones((10, 4), dtype=real), np.ones((10, 4), dtype=real)
+    sums_of_areas(starts, corner, share, places, out)
+    for r in range(5):
+        sum_of_areas(starts[r], starts[r + 1], corner, share, places, plain, r)
+        copy_scaled(-3.0, plain, r, plain, r + 5)
+    assert np.abs(out - plain).max() < 100 * float(np.finfo(real).eps)
+    x = places[corner[9], :3].astype(np.float64)
+    assert starts[3] == 9  # the row of a single quadrangle
+    assert np.abs(out[3, :3] - share[9] * np.cross(x[2] - x[0], x[3] - x[1])).max() < 100 * float(np.finfo(real).eps)
+    assert (out[:, 3] == 0).all()
 
 
 def nodal(body: Body) -> Body:
@@ -58,15 +117,118 @@ def nodal(body: Body) -> Body:
     return body.keeping(Volumes.nodal(body))
 
 
+def dense(rows: VolumeRows, nodes: int) -> np.ndarray:
+    """J with its zeros, (m, n, 3), as the rows hold it; the copy node by node is the same."""
+    by_row, by_node = np.zeros((2, len(rows.lam), nodes, 3))
+    row = np.repeat(np.arange(len(rows.lam)), np.diff(rows.row_start.astype(np.int64)))
+    by_row[row, rows.column] = rows.value[:, :3]
+    node = np.repeat(np.arange(nodes), np.diff(rows.node_start.astype(np.int64)))
+    by_node[rows.node_row, node] = rows.node_value[:, :3]
+    assert np.array_equal(by_row, by_node)
+    return by_row
+
+
+def defined(volumes: Volumes, x: np.ndarray) -> np.ndarray:
+    """J as eq. 32 says it, triangle by triangle, (m, n, 3)."""
+    jacobian = np.zeros((volumes.count, len(x), 3))
+    share = volumes.share.toarray()
+    for f, triangle in enumerate(volumes.triangles.astype(np.int64)):
+        a, b, c = x[triangle]
+        jacobian[:, triangle] += share[:, f, None, None] / 6 * np.cross(b - a, c - a)
+    return jacobian
+
+
+FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+"""Of a tetrahedron, outward."""
+
+
+def joined_tetrahedra(kind: str) -> Volumes:
+    """One volume of two tetrahedra that meet in a node, in an edge, or in an edge with shares of their own."""
+    first, second = np.array([0, 1, 2, 3]), np.array([0, 4, 5, 6] if kind == "node" else [0, 4, 5, 3])
+    share = np.repeat([1.0, 0.3 if kind == "shares" else 1.0], 4)
+    triangles = np.vstack([first[FACES], second[FACES]]).astype(np.uint32)
+    return Volumes((kind,), triangles, csr_array(share[None]))
+
+
+@pytest.mark.parametrize("kind", ["nodal", "regions", "hollow", "node", "edge", "shares"])
+def test_rings_have_the_areas_of_their_triangles(kind, block_body, hollow_body):
+    """Also where a node has two rings, which may meet or count differently."""
+    body = hollow_body if kind == "hollow" else block_body
+    several = {
+        "nodal": Volumes.nodal,
+        "regions": lambda body: Volumes.regions(body, 7),
+        "hollow": lambda body: body.kept,
+    }
+    volumes = several[kind](body) if kind in several else joined_tetrahedra(kind)
+    x = moved(body)
+    rows = volume_rows(volumes, len(x))
+    rows_into(x, np.ones(len(x)), rows)
+    exact = defined(volumes, x)
+    assert np.abs(dense(rows, len(x)) - exact).max() < 1e-13 * np.abs(exact).max()  # some ten products each
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_any_closed_chains_have_the_area_of_their_edges(seed):
+    """Rounds over few nodes, which meet, cross and count differently: Σ u × v over the edges, in any order."""
+    random = np.random.default_rng(seed)
+    edges = np.array([(i, j) for i in range(7) for j in range(i + 1, 7)])
+    x, chains = np.zeros((7, 4)), np.zeros((4, len(edges)))
+    x[:, :3] = random.normal(size=(7, 3))
+    for chain in chains:
+        for share in (0.25, 0.25, 1.0):
+            walk = random.permutation(7)[: random.integers(3, 8)]
+            for i, j in zip(walk, np.roll(walk, -1), strict=True):
+                chain[(edges == sorted((i, j))).all(axis=1)] += share if i < j else -share
+    row, corner, share = quadrangles(csr_array(chains), edges)
+    found = np.zeros((4, 3))
+    x, u, v = x[:, :3], *x[edges.T, :3]
+    np.add.at(
+        found, row, share[:, None] * np.cross(x[corner[:, 2]] - x[corner[:, 0]], x[corner[:, 3]] - x[corner[:, 1]])
+    )
+    assert np.abs(found - chains @ np.cross(u, v)).max() < 1e-13  # some forty products of size 1
+    assert (np.diff(row) >= 0).all()
+
+
+def test_a_ring_takes_half_as_many_quadrangles_as_it_has_nodes():
+    """⌈(k − 2)/2⌉ for each node of a sphere with k neighbours."""
+    points, triangles = icosphere(1)
+    rows = volume_rows(Volumes(("whole",), triangles, csr_array(np.ones((1, len(triangles))))), len(points))
+    neighbours = np.bincount(triangles.ravel())
+    wanted = np.empty_like(neighbours)
+    wanted[rows.column[rows.target[:, 0]]] = np.diff(rows.ring_start.astype(np.int64))
+    assert set(neighbours) == {5, 6} and np.array_equal(wanted, (neighbours - 1) // 2)
+
+
+@pytest.mark.parametrize("precision", ["float64", "float32"])
+def test_the_diagonal_knows_of_contact(block_body, precision):
+    """Nodes that slide, lie in a wedge or stick, one held; and a volume of which every node sticks."""
+    state = in_precision(start(nodal(block_body)), precision)
+    motion, rows, weight = state.motion, state.rows, state.network.inverse_mass
+    assert rows is not None
+    motion.x[:] = moved(block_body)
+    weight[12] = 0.0
+    rows_into(motion.x, weight, rows)
+    jacobian = dense(rows, block_body.node_count)
+    stuck = np.flatnonzero(np.abs(jacobian[0]).max(axis=1))
+    axes = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    motion.locked[[30, 31]], motion.locked[35], motion.locked[stuck] = 1, 2, 3
+    motion.direction[[30, 31, 35]] = axes
+    mobile = weight[:, None, None] * np.eye(3)
+    mobile[[30, 31]] -= weight[[30, 31], None, None] * axes[:2, :, None] * axes[:2, None, :]
+    mobile[35], mobile[stuck] = weight[35] * np.outer(axes[2], axes[2]), 0.0
+    exact = np.einsum("rja,jab,rjb->r", jacobian, mobile, jacobian)
+    diagonal_into(rows, motion, weight, rows.diagonal)
+    assert np.abs(rows.diagonal - exact).max() < 10 * float(np.finfo(precision).eps) * exact.max()
+    assert rows.diagonal[0] == 0.0 < rows.free_diagonal[0]
+
+
 def test_the_product_of_all_volumes_equals_dense_matrices(block_body):
     """S p against J W Jᵀ p written out, with nodes held and free of contact; nothing is left in the fourth numbers."""
     state = start(nodal(block_body))
     rows, n = state.rows, block_body.node_count
     assert rows is not None
-    rows_into(moved(block_body), rows)
-    jacobian = np.zeros((n, n, 3))
-    row = np.repeat(np.arange(n), np.diff(rows.row_start.astype(np.int64)))
-    jacobian[row, rows.column] = rows.value[:, :3]
+    rows_into(moved(block_body), state.network.inverse_mass, rows)
+    jacobian = dense(rows, n)
     matrix = np.einsum("rja,j,sja->rs", jacobian, state.network.inverse_mass, jacobian)
     p, product = np.random.default_rng(3).normal(size=n), np.empty(n)
     apply_schur(rows, state.motion, state.network.inverse_mass, p, product)
@@ -81,11 +243,11 @@ def test_volumes_inside_a_body_push_each_others_nodes_oppositely(block_body):
     pairs = np.array([(i, j) for i in range(4) for j in range(i + 1, 4)])
     edges = np.unique(np.sort(body.tetrahedra.astype(np.int64)[:, pairs].reshape(-1, 2), axis=1), axis=0)
     outer = np.sort(body.triangles.astype(np.int64)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    assert len(rows.value) - len(rows.summed) == len(edges) - len(np.unique(outer, axis=0))
-    assert (rows.twin != rows.summed).sum() == len(edges) - len(np.unique(outer, axis=0))
+    assert len(rows.value) - len(rows.target) == len(edges) - len(np.unique(outer, axis=0))
+    assert (rows.target[:, 2] != rows.target[:, 0]).sum() == len(edges) - len(np.unique(outer, axis=0))
 
 
 def test_volumes_that_are_no_nodes_spare_nothing(block_body):
     rows = volume_rows(Volumes.regions(block_body, 7), block_body.node_count)
-    assert np.array_equal(rows.summed, np.arange(len(rows.value)))
-    assert np.array_equal(rows.twin, rows.summed)
+    assert np.array_equal(np.sort(rows.target[:, 0]), np.arange(len(rows.value)))
+    assert np.array_equal(rows.target[:, 2], rows.target[:, 0])
