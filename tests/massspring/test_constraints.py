@@ -64,6 +64,8 @@ def test_roots_at_the_edge():
     assert nearest_root(-2.0, 4.0, 0.0, 0.0) == 0.5
     assert nearest_root(-8.0, 0.0, 0.0, 1.0) == pytest.approx(2.0, rel=1e-14)
     assert nearest_root(-6.0, 11.0, -6.0, 1.0) == pytest.approx(1.0, rel=1e-13)  # of 1, 2, 3
+    near, two = 0.5 * 0.5005, 0.5 + 0.5005  # of 0.5, 0.5005, 0.7: a pair on the edge between one real root and three
+    assert nearest_root(-0.7 * near, near + 0.7 * two, -0.7 - two, 1.0) == pytest.approx(0.5, rel=1e-9)
     assert nearest_root(1e-9, -1.0, 0.5, 2.0) == pytest.approx(1e-9, rel=1e-8)
     assert np.isnan(nearest_root(1.0, 0.0, 0.0, 0.0))
     assert np.isnan(nearest_root(1.0, 0.0, 1.0, 0.0))
