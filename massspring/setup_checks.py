@@ -6,6 +6,7 @@ import numpy as np
 
 from massspring.body import Body
 from massspring.collision import is_inside, mean_edge, tip_depth
+from massspring.crew import cores
 from massspring.errors import MassSpringError
 from massspring.methods.base import Method
 from massspring.obstacles import Probe
@@ -92,3 +93,13 @@ def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.nda
         raise MassSpringError(
             f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
         )
+
+
+def check_threads(threads: int, method: Method) -> None:
+    """Raises MassSpringError for what is no number of threads, for more than cores, and where `method` has no use."""
+    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise MassSpringError(f"{threads!r} is no number of threads; give 1 or more")
+    if threads > cores():
+        raise MassSpringError(f"{threads} threads need as many cores, this process may use {cores()}; give fewer")
+    if threads > 1 and not method.threaded:
+        raise MassSpringError(f"method '{method.name}' runs on one thread; leave threads at 1")

@@ -17,7 +17,7 @@ from reference_fem.crosscheck.bench import iteration_ratio
 from reference_fem.exact import BALL_BETWEEN_PLANES
 from studies.adapt_reference import reference_problem, whole_forces
 from studies.bench_line import Line
-from studies.bench_massspring import growth_lines, large_lines, step_lines, volumes_lines
+from studies.bench_massspring import growth_lines, large_lines, step_lines, threads_lines, volumes_lines
 from studies.bench_slide import slide_lines
 from studies.case import BodyRecipe, Case
 from studies.geometry import bench as geometry_bench
@@ -111,6 +111,7 @@ def main() -> None:
     stages: tuple[Callable[[], list[Line]], ...] = (
         step_lines,
         large_lines,
+        threads_lines,
         slide_lines,
         growth_lines,
         volumes_lines,

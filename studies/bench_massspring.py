@@ -24,6 +24,7 @@ from massspring import (
     tetrahedral_body,
 )
 from massspring import Path as Motion
+from massspring.crew import cores
 from studies.bench_line import Line
 from studies.geometry import ball
 from studies.scenes.ball_squeeze import RADIUS
@@ -76,9 +77,9 @@ def _bottom(body: Body) -> Attachment:
     return Attachment(body.surface_nodes[body.rest[body.surface_nodes, 2] < -0.8 * RADIUS].astype(np.int64))
 
 
-def _timed(setups: Mapping[str, Setup], repeats: int) -> dict[str, np.ndarray]:
-    """Frame times of the second three quarters of each run [ns], (repeats, F), by turns on one pinned core."""
-    with pinned(threads=1):
+def _timed(setups: Mapping[str, Setup], repeats: int, threads: int = 1) -> dict[str, np.ndarray]:
+    """Frame times of the second three quarters of each run [ns], (repeats, F), by turns on as many pinned cores."""
+    with pinned(threads=threads):
         times = interleave({name: (lambda s=s: simulate(s).frame_ns) for name, s in setups.items()}, repeats)
     return {name: ns[:, ns.shape[1] // 4 :] for name, ns in times.items()}
 
@@ -116,6 +117,23 @@ def large_lines() -> list[Line]:
     late = percentiles(times["double"])["p99"] * 1e-9 / double.clock.frame
     needs = f"p99 of computing over simulated time, dt = {double.clock.dt:.3g} s; at most 1 to keep up"
     return [*lines, Line("its frames: wall over simulated time", late, "1", 1.0, note=needs)]
+
+
+def threads_lines() -> list[Line]:
+    """The same step on two cores, where there are two: the paper's refined stomach again, both precisions."""
+    if cores() < 2:
+        return []
+    lines = []
+    for precision in ("float64", "float32"):
+        one = replace(probed_setup(LARGE), precision=precision)
+        setups = {"one": one, "two": replace(one, threads=2)}
+        times = _timed(setups, LARGE_REPEATS, threads=2)
+        ratio = ratio_with_spread(times["one"], times["two"])
+        note = f"{precision}; interval {ratio.low:.3g} to {ratio.high:.3g}"
+        lines.append(
+            Line(f"how much faster on two threads, {LARGE} nodes", ratio.median, "1", 1.6, at_most=False, note=note)
+        )
+    return lines
 
 
 def spiral_setup(nodes: int) -> Setup:

@@ -45,8 +45,8 @@ def _keyed_cache() -> Iterator[None]:
         config.CACHE_DIR = before  # pyright: ignore[reportAttributeAccessIssue]
 
 
-OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy"}
-"""Kept on disk; division follows IEEE: a zero gives inf, and the run has diverged."""
+OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True}
+"""Kept on disk; division follows IEEE: a zero gives inf, and the run has diverged; other threads run meanwhile."""
 
 
 def _jit(function: Function, **options: Any) -> Function:

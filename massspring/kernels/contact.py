@@ -9,6 +9,7 @@ from massspring.kernels.clearance import clearances_into
 from massspring.kernels.compiled import inlined, lean
 from massspring.kernels.distances import round_contact, round_gap
 from massspring.kernels.rubbing import release_slipping, release_wedged, rub, wedge
+from massspring.kernels.team import SEARCH, call, join
 
 
 @lean
@@ -49,10 +50,21 @@ def seat(network, motion, drive, step, lam, count):
                 motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = a * n0, a * n1, a * n2
 
 
+@inlined
+def clear_all(network, motion, drive, step, lam, team):
+    """`clearances_into` of all nodes, by as many threads as there are."""
+    if team is None:
+        clearances_into(network, motion, drive, step, lam, 0, motion.x.shape[0])
+    else:
+        call(team, SEARCH, step, lam)
+        clearances_into(network, motion, drive, step, lam, team.nodes[0], team.nodes[1])
+        join(team)
+
+
 @lean
 def find_contacts(network, motion, drive, step, lam):
     """Touched nodes of the step when the last pressure acts as a force: u = v* + dt lam W G (eq. 12)."""
-    clearances_into(network, motion, drive, step, lam, 0, motion.x.shape[0])
+    clear_all(network, motion, drive, step, lam, motion.team)
     enter(network, motion, drive, step, lam)
 
 

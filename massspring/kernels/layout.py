@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring.kernels.team import Team
 from massspring.kernels.ticks import Ticks
 
 
@@ -185,6 +186,8 @@ class Motion(NamedTuple):
     """Scratch: forces and 6 G of the slices of pieces, (pieces, 384)."""
     sums: np.ndarray
     """Scratch: shares of the slices in 18 V, G·v* and G·W·G, (S + 1, 3) float64; last those of nodes in pieces."""
+    team: Team | None = None
+    """Threads that share the longest loops; None for one thread: nothing is compiled for them then."""
 
 
 class Tips(NamedTuple):

@@ -7,6 +7,7 @@ from massspring.kernels.compiled import inlined, lean
 from massspring.kernels.distances import allowed_part
 from massspring.kernels.flat import flat
 from massspring.kernels.rubbing import shares
+from massspring.kernels.team import MOVE, call, join
 
 NEGLIGIBLE = 1e-12
 """A mobility this much smaller than what it was taken from is round-off."""
@@ -84,11 +85,11 @@ def prescribe(network, motion, displacement, dt):
     """v* of held nodes (eq. 7); returns what that changes of G·v* [m³/s]."""
     nodes, groups, rest = network.held_nodes, network.held_group, network.held_rest
     x, v_star, gradient = motion.x, motion.v_star, motion.gradient
-    flow = 0.0
+    flow, per_step = 0.0, 1.0 / dt
     for h in range(nodes.shape[0]):
         i, g = nodes[h], groups[h]
         for axis in range(3):
-            held = (rest[h, axis] + displacement[g, axis] - x[i, axis]) / dt
+            held = per_step * (rest[h, axis] + displacement[g, axis] - x[i, axis])
             flow += gradient[i, axis] * (held - v_star[i, axis])
             v_star[i, axis] = held
     return flow
@@ -196,6 +197,26 @@ def advance(motion, mass, inverse_mass, lam, dt, contact_impulse):
     """The end of a step of all nodes (eq. 10); adds the impulse of each obstacle to `contact_impulse`."""
     book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse)
     advance_nodes(motion, inverse_mass, lam, dt, 0, motion.x.shape[0])
+
+
+@lean
+def advance_to_places(motion, mass, inverse_mass, lam, dt, contact_impulse):
+    """The same, by as many threads as there are; `places` holds the new positions too."""
+    book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse)
+    move_all(motion, inverse_mass, lam, dt, motion.team)
+
+
+@inlined
+def move_all(motion, inverse_mass, lam, dt, team):
+    """`advance_nodes` and `places_into` of all nodes, by as many threads as there are."""
+    if team is None:
+        advance_nodes(motion, inverse_mass, lam, dt, 0, motion.x.shape[0])
+        places_into(motion, 0, motion.x.shape[0])
+    else:
+        call(team, MOVE, 0, lam)
+        advance_nodes(motion, inverse_mass, lam, dt, team.nodes[0], team.nodes[1])
+        places_into(motion, team.nodes[0], team.nodes[1])
+        join(team)
 
 
 @lean

@@ -10,6 +10,7 @@ from massspring.kernels.compiled import inlined, lean
 from massspring.kernels.motion import places_into
 from massspring.kernels.pieces import add_walls, join_pieces
 from massspring.kernels.springs import SHORTEST
+from massspring.kernels.team import SPRINGS, SPRINGS_AND_VOLUME, call, join
 from massspring.kernels.tiles import (
     AREA,
     BEFORE,
@@ -126,6 +127,17 @@ def pass_slices(motion, drive, slices, first, last, keeps, tile):
             sums[s, 1], sums[s, 2] = total(tile, SUMS), total(tile, SUMS + LANES)
 
 
+@inlined
+def pass_all(motion, drive, slices, keeps, team):
+    """`pass_slices` of all slices, by as many threads as there are."""
+    if team is None:
+        pass_slices(motion, drive, slices, 0, slices.lanes.shape[0], keeps, motion.tile[0])
+    else:
+        call(team, SPRINGS_AND_VOLUME if keeps else SPRINGS, 0, 0.0)
+        pass_slices(motion, drive, slices, team.slices[0], team.slices[1], keeps, motion.tile[0])
+        join(team)
+
+
 @lean
 def predict_from_places(network, motion, drive, keeps):
     """v* of eq. 6 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
@@ -136,7 +148,7 @@ def predict_from_places(network, motion, drive, keeps):
     walls = network.membrane.triangles.shape[0] > 0
     if walls:
         motion.force[:] = 0
-    pass_slices(motion, drive, slices, 0, slices.lanes.shape[0], keeps, motion.tile[0])
+    pass_all(motion, drive, slices, keeps, motion.team)
     join_pieces(network, motion, drive, keeps)
     volume, flow, mobility = add_up(motion.sums, slices.pieces)
     if walls:

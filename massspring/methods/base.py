@@ -1,5 +1,7 @@
 """What a method is: settings (a frozen dataclass), claims (class variables), one compiled loop over the steps."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, Protocol
 
@@ -8,6 +10,7 @@ from scipy.sparse import csr_array
 
 from massspring.body import Body
 from massspring.collision import fresh
+from massspring.crew import crew
 from massspring.errors import MassSpringError
 from massspring.kernels.layout import Drive, Motion, Network, Tally, VolumeRows
 from massspring.kernels.probe_layout import Probing
@@ -85,6 +88,8 @@ class Method(Protocol):
     """Whether the target of a kept volume is followed where it changes."""
     misses_probes: ClassVar[str | None] = "its steps have no stage for them"
     """Why thin probes are not met; None where they are, in continuous time."""
+    threaded: ClassVar[bool] = False
+    """Whether a frame can be shared by several threads."""
     limited: ClassVar[bool] = True
     """Whether steps beyond the stability limit diverge; where not, accuracy alone limits them."""
 
@@ -129,7 +134,10 @@ def start(
         second=np.zeros(n, dtype=np.uint32),
         entering=np.zeros(n, dtype=np.uint32),
         locked=np.zeros(n, dtype=np.uint8),
-        **{name: np.zeros((n, 3)) for name in ("normal", "second_normal", "direction", "goal")},
+        normal=np.zeros((n, 3)),
+        second_normal=np.zeros((n, 3)),
+        direction=np.zeros((n, 3)),
+        goal=np.zeros((n, 3)),
         clearance=np.zeros(n),
         places=aligned((n, 4), real),
         tile=aligned((1, TILE), real),
@@ -205,3 +213,11 @@ def begin_frame(state: State, drive: Drive) -> State:
     tally = new_tally(obstacles, drive.held_displacement.shape[1], state.tally.ticks)
     probing = None if state.probing is None else fresh(state.probing, tally)
     return replace(state, motion=motion, tally=tally, probing=probing)
+
+
+@contextmanager
+def begun(state: State, drive: Drive) -> Iterator[State]:
+    """A copy to advance in place; inside, all threads of the state are there."""
+    after = begin_frame(state, drive)
+    with crew(after.network, after.motion, drive):
+        yield after

@@ -6,11 +6,11 @@ from typing import ClassVar
 from massspring.kernels.compiled import lean
 from massspring.kernels.contact import find_contacts
 from massspring.kernels.layout import Drive
-from massspring.kernels.motion import add_held_impulse, advance, places_into, prescribe_velocity_into
+from massspring.kernels.motion import add_held_impulse, advance_to_places, places_into, prescribe_velocity_into
 from massspring.kernels.probing import meet_probes
 from massspring.kernels.slices import predict_from_places
 from massspring.kernels.ticks import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, mark
-from massspring.methods.base import Method, State, begin_frame
+from massspring.methods.base import Method, State, begun
 
 
 @lean
@@ -35,8 +35,7 @@ def free_frame(network, motion, drive, tally, probing):
             mark(tally.ticks, PROBES)
         add_held_impulse(network, motion, 0.0, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, 0.0, dt, tally.contact_impulse)
-        places_into(motion, 0, motion.x.shape[0])
+        advance_to_places(motion, network.mass, network.inverse_mass, 0.0, dt, tally.contact_impulse)
         mark(tally.ticks, INTEGRATION)
 
 
@@ -49,9 +48,10 @@ class Free(Method):
     volume_tol: ClassVar[float | None] = None
     follows_targets: ClassVar[bool] = False
     misses_probes: ClassVar[str | None] = None
+    threaded: ClassVar[bool] = True
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""
-        after = begin_frame(state, drive)
-        free_frame(after.network, after.motion, drive, after.tally, after.probing)
+        with begun(state, drive) as after:
+            free_frame(after.network, after.motion, drive, after.tally, after.probing)
         return after

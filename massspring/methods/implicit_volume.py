@@ -23,6 +23,7 @@ from massspring.kernels.layout import Accuracy, Drive
 from massspring.kernels.motion import (
     add_held_impulse,
     advance,
+    advance_to_places,
     capped_error,
     multiplier_of_sums,
     places_into,
@@ -54,7 +55,7 @@ from massspring.kernels.ticks import (
     VOLUME,
     mark,
 )
-from massspring.methods.base import Method, Remedy, State, begin_frame
+from massspring.methods.base import Method, Remedy, State, begun
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
@@ -102,8 +103,7 @@ def implicit_volume_frame(network, motion, drive, tally, lam, probing):
             mark(tally.ticks, PROBES)
         add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
-        places_into(motion, 0, motion.x.shape[0])
+        advance_to_places(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
         mark(tally.ticks, INTEGRATION)
     return lam
 
@@ -209,16 +209,17 @@ class ImplicitVolume(Method):
     remedy: ClassVar[Remedy | None] = "capped"
     holds_apart: ClassVar[bool] = True
     misses_probes: ClassVar[str | None] = None
+    threaded: ClassVar[bool] = True
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""
-        after = begin_frame(state, drive)
-        if after.rows is None:
-            lam = implicit_volume_frame(
-                after.network, after.motion, drive, after.tally, float(after.lam[0]), after.probing
-            )
-            return replace(after, lam=np.array([lam]))
-        after.rows.lam[:] = after.lam + after.network.rest_lam
-        accuracy = Accuracy(self.tolerance, self.most_iterations)
-        implicit_volumes_frame(after.network, after.rows, after.motion, drive, after.tally, accuracy, after.probing)
-        return replace(after, lam=after.rows.lam - after.network.rest_lam)
+        with begun(state, drive) as after:
+            if after.rows is None:
+                lam = implicit_volume_frame(
+                    after.network, after.motion, drive, after.tally, float(after.lam[0]), after.probing
+                )
+                return replace(after, lam=np.array([lam]))
+            after.rows.lam[:] = after.lam + after.network.rest_lam
+            accuracy = Accuracy(self.tolerance, self.most_iterations)
+            implicit_volumes_frame(after.network, after.rows, after.motion, drive, after.tally, accuracy, after.probing)
+            return replace(after, lam=after.rows.lam - after.network.rest_lam)

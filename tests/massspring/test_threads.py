@@ -1,0 +1,134 @@
+"""Several threads at one frame: the same bits as one, whatever the number; and they go home after every frame."""
+
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import (
+    Attachment,
+    Clock,
+    Free,
+    ImplicitVolume,
+    MassSpringError,
+    Setup,
+    Sphere,
+    Volumes,
+    simulate,
+    surface_body,
+)
+from massspring import Path as Motion
+from massspring.crew import crew, shared
+from massspring.kernels.blocks import BLOCK
+from massspring.kernels.team import JOB, REST, team_of
+from massspring.stability import step_limit
+from tests.massspring.conftest import SOFT, icosphere
+
+RADIUS = 0.05
+
+
+@pytest.fixture(scope="module")
+def ball():
+    """642 nodes in ten slices: every thread of three has some, and the last block of nodes is not full."""
+    return surface_body(*icosphere(3, RADIUS), SOFT)
+
+
+@pytest.fixture(autouse=True)
+def many_cores(monkeypatch):
+    """The number of cores decides what pays, not what is right: threads on one core take turns."""
+    monkeypatch.setattr("massspring.setup_checks.cores", lambda: 4)
+
+
+def slid(body, method, **options) -> Setup:
+    """A ball into which a sphere goes by a tenth of the radius while it slides; 4 frames of 10 steps."""
+    clock = Clock(10 * 0.5 * step_limit(body).undamped, 4, 10)
+    way = Motion((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.2 * RADIUS, 0.0, -0.1 * RADIUS)))
+    sphere = Sphere((0.0, 0.0, 1.3 * RADIUS), 0.3 * RADIUS, way, friction=0.3)
+    held = (Attachment(np.flatnonzero(body.rest[:, 2] < -0.8 * RADIUS)),)
+    return Setup(body, method, clock, (sphere,), held, gravity=(0.0, 0.0, -9.81), damping=40.0, **options)
+
+
+CASES = [(Free(), "float64"), (ImplicitVolume(), "float64"), (ImplicitVolume(), "float32")]
+
+
+@pytest.mark.parametrize(("method", "precision"), CASES, ids=["free", "kept", "kept in float32"])
+def test_threads_change_no_bit(ball, method, precision):
+    alone = simulate(slid(ball, method, precision=precision))
+    assert np.abs(alone.contact_force).max() > 0
+    for threads in (2, 3):
+        together = simulate(slid(ball, method, precision=precision, threads=threads))
+        for name in ("final", "volume", "pressure", "contact_force", "held_force"):
+            assert np.array_equal(getattr(together, name), getattr(alone, name)), (threads, name)
+
+
+def test_threads_change_no_bit_of_several_volumes(filled_ball):
+    body = filled_ball.keeping(Volumes.regions(filled_ball, 3))
+    alone, together = (simulate(slid(body, ImplicitVolume(), threads=threads)) for threads in (1, 2))
+    assert np.array_equal(alone.final, together.final)
+    assert np.array_equal(alone.pressure, together.pressure)
+
+
+def test_every_slice_and_node_has_one_thread():
+    rows = np.array([0, 10, 11, 40, 41, 42, 80])
+    for threads in (2, 3, 7):
+        team = team_of(threads, rows, 3 * BLOCK + 5, BLOCK)
+        for borders, end in ((team.slices, 6), (team.nodes, 3 * BLOCK + 5)):
+            assert borders[0] == 0 and borders[-1] == end and (np.diff(borders) >= 0).all()
+        assert (team.nodes[1:-1] % BLOCK == 0).all()
+
+
+def test_the_load_is_even():
+    rows = np.r_[0, np.cumsum(np.random.default_rng(2).integers(5, 20, 300))]
+    team = team_of(4, rows, 64 * 300, BLOCK)
+    load = np.diff(rows[team.slices])
+    assert np.ptp(load) <= 2 * 20, "more than a slice too many at either end"
+
+
+def test_a_frame_that_fails_sends_the_threads_home(ball):
+    setup = slid(ball, ImplicitVolume(), threads=2)
+    state, drive = setup.start(), setup.drive(0)
+    with pytest.raises(RuntimeError, match="halfway"), crew(state.network, state.motion, drive):
+        raise RuntimeError("halfway")
+    assert state.motion.team is not None and state.motion.team.signal[JOB] == REST
+    before = time.thread_time_ns(), time.process_time_ns()
+    time.sleep(0.2)
+    spent = time.process_time_ns() - before[1] - (time.thread_time_ns() - before[0])
+    assert spent < 0.1e9, "a thread still looks for work"
+    # And the next frame finds them again.
+    after = setup.method.advance(state, drive)
+    assert np.array_equal(after.x, setup.method.advance(slid(ball, ImplicitVolume()).start(), drive).x)
+
+
+def test_without_threads_none_is_made(ball):
+    before = threading.active_count()
+    setup = slid(ball, ImplicitVolume())
+    assert setup.start().motion.team is None
+    simulate(setup)
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, True, "2"])
+def test_what_is_no_number_of_threads(ball, threads):
+    with pytest.raises(MassSpringError, match="no number of threads"):
+        slid(ball, Free(), threads=threads)
+
+
+def test_more_threads_than_cores(ball):
+    with pytest.raises(MassSpringError, match="5 threads need as many cores, this process may use 4"):
+        slid(ball, Free(), threads=5)
+
+
+def test_a_method_that_runs_on_one_thread(ball):
+    from massspring import Shake
+
+    with pytest.raises(MassSpringError, match="'shake' runs on one thread"):
+        slid(ball, Shake(), threads=2)
+
+
+def test_scratch_of_its_own_for_each_thread(ball):
+    state = slid(ball, Free()).start()
+    motion = shared(state.motion, state.network, 3)
+    assert motion.tile.shape[0] == 3 and motion.tile.dtype == state.motion.tile.dtype
+    assert replace(state, motion=motion).x is state.x
