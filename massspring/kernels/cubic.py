@@ -94,7 +94,10 @@ def nearest_root(k0, k1, k2, k3):
     t = largest_root(b, c, e)
     left = abs(e + t * (c + t * (b + t)))
     for _ in range(POLISHES):
-        better = t - (e + t * (c + t * (b + t))) / (c + t * (2.0 * b + 3.0 * t))
+        slope = c + t * (2.0 * b + 3.0 * t)
+        if slope == 0.0:
+            break
+        better = t - (e + t * (c + t * (b + t))) / slope
         now = abs(e + better * (c + better * (b + better)))
         if not now < left:
             break
