@@ -81,7 +81,7 @@ class Plane:
 
     def gap(self, points: np.ndarray, t: float) -> np.ndarray:
         """Signed distance [m] of `points` (n, 3) at time `t`, negative inside the obstacle, (n,)."""
-        return (points - (self.anchor + self.path(t))) @ self.unit_normal
+        return np.einsum("ij,j->i", points - (self.anchor + self.path(t)), self.unit_normal)
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class Capsule:
     def gap(self, points: np.ndarray, t: float) -> np.ndarray:
         """Signed distance [m] of `points` (n, 3) at time `t`, negative inside the obstacle, (n,)."""
         from_start = points - (self.anchor + self.path(t))
-        share = np.clip(from_start @ self.span / (self.span @ self.span), 0.0, 1.0)
+        share = np.clip(np.einsum("ij,j->i", from_start, self.span) / (self.span @ self.span), 0.0, 1.0)
         return np.linalg.norm(from_start - share[:, None] * self.span, axis=1) - self.radius
 
 

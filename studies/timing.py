@@ -56,7 +56,7 @@ class FrameTiming:
 @contextmanager
 def pinned(threads: int = 1) -> Iterator[int | None]:
     """Inside, all threads of this process stay on as many cores as `threads` (the last allowed ones: the first serves
-    interrupts), and compiled code and linear algebra use no more. Gives the last core's number, or None where the
+    interrupts); compiled code uses no more, linear algebra one. Gives the last core's number, or None where the
     system cannot pin. Raises StudyError where the process may use fewer cores.
 
     A pool of a linear algebra library that waits for work keeps its core busy for 0.1 s: beside it, on one core, a
@@ -68,7 +68,7 @@ def pinned(threads: int = 1) -> Iterator[int | None]:
     before_threads = numba.get_num_threads()
     numba.set_num_threads(threads)
     try:
-        with threadpool_limits(limits=threads):
+        with threadpool_limits(limits=1):
             if not hasattr(os, "sched_setaffinity"):
                 yield None
                 return
