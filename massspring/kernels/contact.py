@@ -61,7 +61,7 @@ def clear_all(network, motion, drive, step, lam, team):
         join(team)
 
 
-@lean
+@inlined
 def find_contacts(network, motion, drive, step, lam):
     """Touched nodes of the step when the last pressure acts as a force: u = v* + dt lam W G (eq. 12)."""
     clear_all(network, motion, drive, step, lam, motion.team)
@@ -120,7 +120,7 @@ def revised(network, motion, drive, step, lam, i):
     return 0
 
 
-@lean
+@inlined
 def revise_contacts(network, motion, drive, step, lam, reach):
     """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 13).
 
@@ -146,7 +146,7 @@ def revise_contacts(network, motion, drive, step, lam, reach):
     return changes
 
 
-@lean
+@inlined
 def pressure_reach(lam_change, mobility, lightest, dt):
     """dt² |Δlam| √(max w · Σ w |G|²) ≥ dt² |Δlam| w_i |G_i| [m]: how far a change of pressure moves any free node."""
     return 1.0001 * dt * dt * abs(lam_change) * math.sqrt(max(lightest * mobility, 0.0))

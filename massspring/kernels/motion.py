@@ -52,7 +52,7 @@ def volume_multiplier(motion, inverse_mass, volume_error, dt):
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
 
 
-@lean
+@inlined
 def multiplier_of_sums(motion, inverse_mass, volume_error, dt, flow, mobility):
     """The same from G·v* and G·W·G of all nodes, less what obstacles take of the few they touch (eq. 8, 9)."""
     locked, direction, goal, gradient, v_star = (
@@ -80,7 +80,7 @@ def multiplier_of_sums(motion, inverse_mass, volume_error, dt, flow, mobility):
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
 
 
-@lean
+@inlined
 def prescribe(network, motion, displacement, dt):
     """v* of held nodes (eq. 7); returns what that changes of G·v* [m³/s]."""
     nodes, groups, rest = network.held_nodes, network.held_group, network.held_rest
@@ -105,7 +105,7 @@ def steepest(gradient, inverse_mass):
     return largest
 
 
-@lean
+@inlined
 def surely_short(volume_error, mobility, lightest, longest):
     """Whether no node moves farther than `longest` [m] to make up for a wrong volume: |e| √(max w / G·W̃·G) ≤ longest.
 
@@ -114,7 +114,7 @@ def surely_short(volume_error, mobility, lightest, longest):
     return volume_error * volume_error * lightest <= longest * longest * mobility
 
 
-@lean
+@inlined
 def capped_error(volume_error, mobility, steepest, longest):
     """V0 − V, at most `longest` · G·W̃·G / max w|G| [m³]: then no node moves farther than `longest` [m] (eq. 35)."""
     most = longest * mobility / steepest if steepest > 0.0 else 0.0
@@ -140,7 +140,7 @@ def settled(motion, i, u0, u1, u2):
     return p0 + motion.goal[i, 0], p1 + motion.goal[i, 1], p2 + motion.goal[i, 2]
 
 
-@lean
+@inlined
 def book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse):
     """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 10); u is what a node would do without them."""
     v_star, gradient, locked = motion.v_star, motion.gradient, motion.locked
@@ -168,7 +168,7 @@ def book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse):
                 book(contact_impulse, o, motion.second[i] - 1, beta * m0, beta * m1, beta * m2)
 
 
-@lean
+@inlined
 def advance_nodes(motion, inverse_mass, lam, dt, first, last):
     """v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺ (eq. 10) of some nodes; `places` holds the x of the step's start."""
     flat_x, flat_v = flat(motion.x, first, last), flat(motion.v, first, last)
@@ -199,7 +199,7 @@ def advance(motion, mass, inverse_mass, lam, dt, contact_impulse):
     advance_nodes(motion, inverse_mass, lam, dt, 0, motion.x.shape[0])
 
 
-@lean
+@inlined
 def advance_to_places(motion, mass, inverse_mass, lam, dt, contact_impulse):
     """The same, by as many threads as there are; `places` holds the new positions too."""
     book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse)
@@ -219,7 +219,7 @@ def move_all(motion, inverse_mass, lam, dt, team):
         join(team)
 
 
-@lean
+@inlined
 def places_into(motion, first, last):
     """The positions of some nodes in fours, as one move of memory fetches them, (n, 4)."""
     x, places = flat(motion.x, first, last), flat(motion.places, first, last)
@@ -229,7 +229,7 @@ def places_into(motion, first, last):
         places[4 * i + 2], places[4 * i + 3] = x[3 * i + 2], zero
 
 
-@lean
+@inlined
 def add_held_impulse(network, motion, lam, dt, gravity, held_impulse):
     """I_g = −dt Σ_i∈g (f_i + lam G_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 11)."""
     nodes, groups, mass = network.held_nodes, network.held_group, network.mass

@@ -102,7 +102,7 @@ def keep_held(slices, s, force, tile):
             force[i, axis] = tile[FORCE + axis * LANES + lane]
 
 
-@lean
+@inlined
 def pass_slices(motion, drive, slices, first, last, keeps, tile):
     """v* and G of some slices, with their shares of 18 V, G·v* and G·W·G in `sums`; of pieces f and 6 G alone."""
     real = motion.x.dtype.type
@@ -138,7 +138,7 @@ def pass_all(motion, drive, slices, keeps, team):
         join(team)
 
 
-@lean
+@inlined
 def predict_from_places(network, motion, drive, keeps):
     """v* of eq. 6 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
 
@@ -163,7 +163,7 @@ def gather_and_predict(network, motion, drive, keeps):
     return predict_from_places(network, motion, drive, keeps)
 
 
-@lean
+@inlined
 def add_up(sums, pieces):
     """(V, G·v*, G·W·G) from the shares of the slices, in double precision and always in the same order."""
     volume, flow, mobility = 0.0, 0.0, 0.0
