@@ -26,7 +26,7 @@ LONGEST_CORRECTION = 0.3
 """How far a step moves a node to make up for a wrong volume, in mean spring lengths: too little to turn a triangle."""
 
 
-Remedy = Literal["capped", "whole", "force"]
+Remedy = Literal["capped", "whole", "force", "unbounded"]
 """What a step does about a volume that is far off."""
 
 
@@ -82,7 +82,8 @@ class Method(Protocol):
     remedy: ClassVar[Remedy | None] = None
     """Claim: what a step does about a volume that is far off. "capped": each volume moves a node by no more than
     `longest_correction` to make up for it (eq. 35), the rest is left to later steps; "whole": all of it is made up for
-    at once; "force": a force whose size only the length of a stable step bounds. None where no volume is kept, at most
+    at once; "force": a force whose size only the length of a stable step bounds; "unbounded": one that nothing bounds
+    as a volume goes to 0, so that a crushed body bursts and the run has diverged. None where no volume is kept, at most
     something that stands for it. With a remedy, steps in which a volume has nothing to push on are counted."""
     follows_targets: ClassVar[bool] = True
     """Whether the target of a kept volume is followed where it changes."""

@@ -1,7 +1,8 @@
 """One loop for methods whose pressure is a function of the volume now, and acts as one more force.
 
-A penalty is bounded by its modulus. A gas without room is not, so that the guard of the constraints holds for it: it
-moves no node farther than 0.3 L within a step (eq. 35). A surface without gradient is not pushed at all.
+A penalty is bounded by its modulus, a gas without room is not: it bursts, and the run has diverged. Cut off like a
+correction of constraints it would come back, but steps beyond the limit would rattle under the cut and seem stable. A
+surface without gradient is not pushed at all.
 Contact and held nodes see it as `free` sees its springs: nothing is solved (docs/theory.md, eq. 161, 162).
 """
 
@@ -15,7 +16,7 @@ from massspring.errors import MassSpringError
 from massspring.kernels.compiled import compiled
 from massspring.kernels.contact import find_contacts
 from massspring.kernels.layout import Drive
-from massspring.kernels.motion import add_held_impulse, advance, capped_error, steepest, surely_short
+from massspring.kernels.motion import add_held_impulse, advance
 from massspring.kernels.prediction import predict
 from massspring.kernels.probing import meet_probes
 from massspring.kernels.ticks import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, VOLUME, mark
@@ -36,20 +37,6 @@ def known_pressure(network, motion, bulk_modulus, law, volume, target):
 
 
 @compiled
-def cut_pressure(network, motion, lam, mobility, dt, tally):
-    """lam, or the most that moves no node farther than 0.3 L [Pa] (eq. 35)."""
-    unit = dt * dt * mobility
-    made = lam * unit
-    if surely_short(made, mobility, network.largest_inverse_mass, network.longest_correction):
-        return lam
-    part = capped_error(made, mobility, steepest(motion.gradient, network.inverse_mass), network.longest_correction)
-    if part == made:
-        return lam
-    tally.capped[0] += 1
-    return part / unit
-
-
-@compiled
 def pressure_frame(network, motion, drive, tally, bulk_modulus, law, probing):
     """One frame of symplectic Euler with a known pressure (eq. 6, 7, 10, 12, 161); returns the last one [Pa]."""
     lam, dt = 0.0, drive.dt
@@ -61,8 +48,6 @@ def pressure_frame(network, motion, drive, tally, bulk_modulus, law, probing):
         if not mobility > 0.0:
             lam = 0.0
             tally.skipped[0] += 1
-        elif law == GAS:
-            lam = cut_pressure(network, motion, lam, mobility, dt, tally)
         mark(tally.ticks, VOLUME)
         if drive.radius.shape[0] > 0:
             find_contacts(network, motion, drive, step, lam)

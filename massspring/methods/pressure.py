@@ -3,9 +3,8 @@
 Matyka and Ollila, Pressure model of soft body simulation, SIGRAD 2003, with p = nRT/V; nRT = p0 V0 makes the rest shape
 rest (docs/theory.md, eq. 161).
 
-Limits: the volume is not kept, lam/p0 of it is missing as with a penalty; the pressure has no bound as V goes to 0.
-What a step would push farther than 0.3 L is cut and counted (eq. 35), so that a crushed body comes back instead of
-bursting; with steps too long for the gas, but not for the springs, the volume rattles under that cut.
+Limits: the volume is not kept, lam/p0 of it is missing as with a penalty; the pressure has no bound as V goes to 0,
+so that a crushed body bursts.
 """
 
 from dataclasses import dataclass
@@ -30,7 +29,7 @@ class Pressure(Method):
     name: ClassVar[str] = "pressure"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
-    remedy: ClassVar[Remedy | None] = "capped"
+    remedy: ClassVar[Remedy | None] = "unbounded"
     misses_probes: ClassVar[str | None] = None
 
     def __post_init__(self) -> None:

@@ -207,7 +207,7 @@ class SixfoldGradient(Method):
         after = begin_frame(state, drive)
         net, mo = after.network, after.motion
         for step in range(len(drive.position)):
-            error = drive.volume_target[step, 0] - predict(net, mo, drive, step, True)
+            error = drive.volume_target[step, 0] - predict(net, mo, drive, step, True)[0]
             mo.gradient[:] *= 6
             find_contacts(net, mo, drive, step, 0.0)
             lam, _ = motion_kernels.volume_multiplier(mo, net.inverse_mass, error, drive.dt)
@@ -274,6 +274,7 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     assert lam == pytest.approx(solution[n], rel=1e-9)  # the row is dt G, so its multiplier is the pressure
 
     x = mo.x.copy()
+    mo.places[:, :3] = x
     motion_kernels.advance(mo, net.mass, net.inverse_mass, lam, dt, np.zeros((1, 3)))
     assert np.allclose(mo.v.ravel(), solution[:n], atol=1e-12)
     assert np.allclose(mo.x, x + dt * mo.v)

@@ -48,6 +48,14 @@ def press():
     os.kill(os.getpid(), signal.SIGINT)
 
 
+@pytest.fixture(autouse=True)
+def heard():
+    """A shell's background job, and what it starts, ignores the signal; here it is meant."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 class PressedInWorker:
     """A task whose process gets the signal before the main process does."""
 
