@@ -118,6 +118,13 @@ def kept_body(request: pytest.FixtureRequest) -> Body:
     return request.getfixturevalue(f"{kind}_body")
 
 
+@pytest.fixture(params=["hollow", "regions", "nodal"])
+def several(request: pytest.FixtureRequest, block_body: Body, hollow_body: Body) -> Body:
+    """Bodies that keep more than one volume."""
+    kinds = {"regions": Volumes.regions(block_body, 7), "nodal": Volumes.nodal(block_body)}
+    return hollow_body if request.param == "hollow" else block_body.keeping(kinds[request.param])
+
+
 @pytest.fixture(params=["block", "ball"])
 def body(request: pytest.FixtureRequest) -> Body:
     """Either kind of body."""

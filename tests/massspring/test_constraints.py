@@ -8,67 +8,19 @@ import pytest
 from massspring import (
     Attachment,
     Baumgarte,
-    Clock,
     ImplicitVolume,
     MassSpringError,
     PostStabilization,
     Projection,
-    Ramp,
     Setup,
     Shake,
     simulate,
-    step_limit,
 )
-from massspring.kernels.cubic import nearest_root, volume_cubic
-from massspring.kernels.volume import enclosed_volume, volume_gradient_into
+from massspring.kernels.volume import enclosed_volume
 from massspring.methods.base import begin_frame
 from massspring.methods.constraint import Rule, advance_by, correct_positions
-from massspring.stiffness import spring_stiffness, volume_hessian
+from tests.massspring.test_cubic import gradient
 from tests.massspring.test_methods import clock_for, squeeze, thrown
-
-
-def gradient(x, triangles):
-    """(V, G)."""
-    out = np.empty_like(x)
-    return volume_gradient_into(x, triangles, out), out
-
-
-def test_the_volume_along_a_line_is_the_cubic(body):
-    rng = np.random.default_rng(3)
-    y = body.rest + 0.1 * body.size * rng.normal(size=body.rest.shape) + 5.0
-    d = rng.normal(size=y.shape)
-    coefficients = volume_cubic(y, d, body.triangles)
-    for a in (-0.7, 0.01, 0.4, 2.0):
-        expected = enclosed_volume(y + a * d, body.triangles)
-        terms = [k * a**power for power, k in enumerate(coefficients)]
-        assert sum(terms) == pytest.approx(expected, abs=1e-12 * np.abs(terms).sum())
-    volume, slope = gradient(y, body.triangles)
-    assert coefficients[0] == pytest.approx(volume, rel=1e-12)
-    assert coefficients[1] == pytest.approx((slope * d).sum(), rel=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_nearest_root_is_that_of_a_general_solver(seed):
-    """numpy's eigenvalue solver as the other code; magnitudes over six decades."""
-    rng = np.random.default_rng(seed)
-    for _ in range(200):
-        k = rng.normal(size=4) * 10.0 ** rng.uniform(-3, 3, size=4)
-        roots = np.roots(k[::-1])
-        real = roots[np.abs(roots.imag) < 1e-9 * np.abs(roots)].real
-        truth = real[np.argmin(np.abs(real))]
-        assert nearest_root(*k) == pytest.approx(truth, rel=1e-7)
-
-
-def test_roots_at_the_edge():
-    assert nearest_root(0.0, 1.0, 2.0, 3.0) == 0.0
-    assert nearest_root(-2.0, 4.0, 0.0, 0.0) == 0.5
-    assert nearest_root(-8.0, 0.0, 0.0, 1.0) == pytest.approx(2.0, rel=1e-14)
-    assert nearest_root(-6.0, 11.0, -6.0, 1.0) == pytest.approx(1.0, rel=1e-13)  # of 1, 2, 3
-    near, two = 0.5 * 0.5005, 0.5 + 0.5005  # of 0.5, 0.5005, 0.7: a pair on the edge between one real root and three
-    assert nearest_root(-0.7 * near, near + 0.7 * two, -0.7 - two, 1.0) == pytest.approx(0.5, rel=1e-9)
-    assert nearest_root(1e-9, -1.0, 0.5, 2.0) == pytest.approx(1e-9, rel=1e-8)
-    assert np.isnan(nearest_root(1.0, 0.0, 0.0, 0.0))
-    assert np.isnan(nearest_root(1.0, 0.0, 1.0, 0.0))
 
 
 def pressed(body, method, clock):
@@ -213,64 +165,6 @@ def test_post_stabilization_moves_nodes_and_no_velocity(body):
     after = setup.method.advance(state, setup.drive(0))
     _, slope = gradient(body.rest, body.triangles)
     assert abs((slope * after.v).sum()) < 1e-12 * (np.abs(slope) * np.abs(after.v)).sum(), "the rate of V is not 0"
-
-
-CALM_FRAMES = 120
-
-
-def filled(body, method, damping):
-    """Frames of 50 steps at dt_c/2 of a body that is filled to 1.3 V0 within 2 s; damped, it has come to rest then."""
-    steps, dt = 50, 0.5 * step_limit(body).undamped
-    grow = Ramp((0.0, 2.0), (1.0, 1.3))
-    setup = Setup(body, method, Clock(steps * dt, CALM_FRAMES, steps), damping=damping, targets={"whole": grow})
-    assert not setup.ramped
-    return setup
-
-
-def come_to_rest(body, method):
-    """The state at 1.3 V0."""
-    setup = filled(body, method, damping=40.0)
-    state = setup.start()
-    for number in range(CALM_FRAMES):
-        state = method.advance(state, setup.drive(number))
-    return state
-
-
-def kinetic_growth(body, method, seconds):
-    """Exponential rate of the kinetic energy [1/s] about the balance of springs and pressure at 1.3 V0, undamped."""
-    state = come_to_rest(body, method)
-    state.motion.v[:] += 1e-6 * np.random.default_rng(2).normal(size=body.rest.shape)
-    setup = filled(body, method, damping=0.0)
-    frames = round(seconds / setup.clock.frame)
-    energy = []
-    for number in range(frames):
-        state = method.advance(state, setup.drive(CALM_FRAMES + number))
-        energy.append(0.5 * float(body.mass @ (state.v**2).sum(axis=1)))
-    late = np.arange(frames // 2, frames)
-    return np.polyfit(late * setup.clock.frame, np.log(energy)[late], 1)[0]
-
-
-def fastest_mode(body):
-    """dt lam max φᵀHφ [1/s] over the modes φ, φᵀMφ = 1, of springs and pressure that keep the volume (eq. 107)."""
-    state = come_to_rest(body, Shake())
-    x, size = state.x, body.rest.size
-    stiffness, hessian = (m.toarray() for m in (spring_stiffness(body, x), volume_hessian(body.triangles, x)))
-    root = np.repeat(1 / np.sqrt(body.mass), 3)
-    normal = gradient(x, body.triangles)[1].ravel() * root
-    keeps = np.eye(size) - np.outer(normal, normal) / (normal @ normal)
-    lam, hessian = state.lam[0], root[:, None] * hessian * root
-    scaled = keeps @ (root[:, None] * stiffness * root - lam * hessian) @ keeps
-    _, modes = np.linalg.eigh((scaled + scaled.T) / 2)
-    return 0.5 * step_limit(body).undamped * lam * np.einsum("ij,ik,kj->j", modes, hessian, modes).max()
-
-
-def test_projection_gains_energy_under_pressure_as_predicted_and_hcj05_does_not(ball_body):
-    """A gradient one step ahead is a negative damping dt lam H; in the end the fastest mode is what one sees."""
-    predicted = fastest_mode(ball_body)
-    assert predicted > 1.0
-    assert kinetic_growth(ball_body, Projection(), 3.0) == pytest.approx(predicted, rel=0.15)
-    for method in (ImplicitVolume(), Shake(), PostStabilization(), Baumgarte()):
-        assert abs(kinetic_growth(ball_body, method, 3.0)) < 0.05 * predicted
 
 
 def test_a_body_crushed_to_a_thousandth_comes_back_in_one_step_of_shake(body):

@@ -5,8 +5,6 @@ import pytest
 from scipy.sparse import csr_array
 
 from massspring import Body, Volumes
-from massspring.kernels.compiled import compiled
-from massspring.kernels.lanes import copy_scaled, sum_of_areas, sum_of_products, sum_of_scaled, sums_from_origin
 from massspring.kernels.layout import VolumeRows
 from massspring.kernels.multipliers import apply_schur
 from massspring.kernels.rows import diagonal_into, rows_into
@@ -19,97 +17,6 @@ from tests.massspring.test_kernels import moved
 
 MANY = 1e-14
 """Round-off of a sum of some ten terms, over their size."""
-
-
-@compiled
-def scaled_sums(starts, index, value, factor, out):
-    """What the plain function does, compiled."""
-    for r in range(starts.shape[0] - 1):
-        sum_of_scaled(starts[r], starts[r + 1], index, value, factor, 2.5, out, r)
-
-
-@compiled
-def sums_of_products(starts, index, value, field, out):
-    """What the plain function does, compiled."""
-    for r in range(starts.shape[0] - 1):
-        out[r] = sum_of_products(starts[r], starts[r + 1], index, value, field)
-
-
-@pytest.mark.parametrize("real", [np.float64, np.float32])
-def test_sums_in_registers_equal_the_plain_ones(real):
-    """Rows of 0 to 6 entries, the last one up to the end of the arrays."""
-    random = np.random.default_rng(1)
-    starts = np.concatenate([[0], np.cumsum([3, 0, 6, 1, 4])]).astype(np.uint32)
-    index = random.integers(0, 9, starts[-1]).astype(np.uint32)
-    value, field = (random.normal(size=(size, 4)).astype(real) for size in (len(index), 9))
-    factor = random.normal(size=9)
-    out, plain = np.ones((5, 4), dtype=real), np.ones((5, 4), dtype=real)
-    sums = np.ones(5)
-    scaled_sums(starts, index, value, factor, out)
-    sums_of_products(starts, index, value, field, sums)
-    round_off = 10 * float(np.finfo(real).eps)
-    matrix = csr_array((np.ones(len(index)), np.arange(len(index)), starts), shape=(5, len(index)))
-    assert np.abs(out - 2.5 * matrix @ (factor[index, None] * value)).max() < round_off
-    assert np.abs(sums - matrix @ (field[index] * value).sum(axis=1)).max() < round_off
-    for r in range(5):
-        sum_of_scaled(starts[r], starts[r + 1], index, value, factor, 2.5, plain, r)
-        assert sum_of_products(starts[r], starts[r + 1], index, value, field) == pytest.approx(sums[r], abs=round_off)
-    assert np.abs(out - plain).max() < round_off
-
-
-@compiled
-def sums_seen_from_the_first(starts, index, value, places, weight, out):
-    """What the plain function does, compiled."""
-    for r in range(starts.shape[0] - 1):
-        if starts[r] < starts[r + 1]:
-            out[r] = sums_from_origin(starts[r], starts[r + 1], index, value, places, weight)
-
-
-@compiled
-def sums_of_areas(starts, corner, share, places, out):
-    """What the plain functions do, compiled: each sum, and −3 times it further down."""
-    for r in range(starts.shape[0] - 1):
-        sum_of_areas(starts[r], starts[r + 1], corner, share, places, out, r)
-        copy_scaled(-3.0, out, r, out, r + 5)
-
-
-@pytest.mark.parametrize("real", [np.float64, np.float32])
-def test_what_a_row_says_of_a_volume_equals_the_plain_sums(real):
-    """In double whatever the arrays are, and 1e4 from the origin: differences of such places are exact."""
-    random = np.random.default_rng(1)
-    starts = np.concatenate([[0], np.cumsum([3, 0, 6, 1, 4])]).astype(np.uint32)
-    index = random.integers(0, 9, starts[-1]).astype(np.uint32)
-    value, places = random.normal(size=(len(index), 4)).astype(real), (1e4 + random.normal(size=(9, 4))).astype(real)
-    weight = random.uniform(1.0, 2.0, 9).astype(real)
-    out = np.zeros((5, 2))
-    sums_seen_from_the_first(starts, index, value, places, weight, out)
-    for r in np.flatnonzero(np.diff(starts.astype(int))):
-        e = np.arange(starts[r], starts[r + 1])
-        away = places[index[e]].astype(np.float64) - places[index[e[0]]]
-        squares = (value[e].astype(np.float64) ** 2).sum(axis=1)
-        exact = (away * value[e]).sum(), (weight[index[e]] * squares).sum()
-        plain = sums_from_origin(starts[r], starts[r + 1], index, value, places, weight)
-        assert np.abs(out[r] - exact).max() < 100 * MANY and np.abs(np.subtract(plain, exact)).max() < 100 * MANY
-
-
-@pytest.mark.parametrize("real", [np.float64, np.float32])
-def test_sums_of_areas_equal_the_plain_ones(real):
-    """Rows of 0 to 6 quadrangles; what is written further down is −3 times each."""
-    random = np.random.default_rng(1)
-    starts = np.concatenate([[0], np.cumsum([3, 0, 6, 1, 4])]).astype(np.uint32)
-    corner = random.integers(0, 9, (starts[-1], 4)).astype(np.uint32)
-    share, places = random.normal(size=len(corner)).astype(real), np.zeros((9, 4), dtype=real)
-    places[:, :3] = random.normal(size=(9, 3))
-    out, plain = np.ones((10, 4), dtype=real), np.ones((10, 4), dtype=real)
-    sums_of_areas(starts, corner, share, places, out)
-    for r in range(5):
-        sum_of_areas(starts[r], starts[r + 1], corner, share, places, plain, r)
-        copy_scaled(-3.0, plain, r, plain, r + 5)
-    assert np.abs(out - plain).max() < 100 * float(np.finfo(real).eps)
-    x = places[corner[9], :3].astype(np.float64)
-    assert starts[3] == 9  # the row of a single quadrangle
-    assert np.abs(out[3, :3] - share[9] * np.cross(x[2] - x[0], x[3] - x[1])).max() < 100 * float(np.finfo(real).eps)
-    assert (out[:, 3] == 0).all()
 
 
 def nodal(body: Body) -> Body:

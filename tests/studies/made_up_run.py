@@ -1,0 +1,86 @@
+"""A run whose numbers are known beforehand: four frames of a cube that is shifted and stretched."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from studies.case import BodyRecipe, Case
+from studies.metrics import Run
+from studies.records import new_record
+from studies.scenes.ball_clamped import BALL_CLAMPED
+from studies.store import Field, Status
+from studies.table import metric
+from tests.studies.tiny import cube
+
+EDGE = 0.1
+
+
+POINTS, TRIANGLES, CELLS = cube(2, EDGE)
+
+
+T = np.array([1.0, 2.0, 3.0, 4.0])
+
+
+SCENE = replace(BALL_CLAMPED, checkpoints=(2.0, 4.0), duration=4.0)
+
+
+SHIFT = np.array([0.03, 0.0, 0.0])
+
+
+FLOORS = ("force", "force_end", "surface", "interior", "silhouette", "volume", "pressure", "lumen", "frequency")
+
+
+def bend(x, checkpoint=-1):
+    """A displacement that varies: a rigid shift and a tenth of stretch along z, whenever asked."""
+    return SHIFT + np.column_stack([0 * x[:, 0], 0 * x[:, 1], 0.1 * x[:, 2]])
+
+
+def reference(motion=bend, force=(1.0, 2.0), pressure=(10.0, 20.0)):
+    """What Reference promises, with a displacement that is a formula."""
+    return SimpleNamespace(
+        displacement=motion,
+        force=np.array(force),
+        surface=lambda: (POINTS + motion(POINTS), TRIANGLES),
+        field=lambda name: {"pressure": np.array(pressure), "lumen_pressure": np.array(pressure)}[name],
+        floor={name: 0.01 * (k + 1) for k, name in enumerate(FLOORS)},
+    )
+
+
+def run(final=None, volume=(1.0, 1.0, 1.0, 1.0), force=(0.5, 1.0, 1.5, 2.0), **changes) -> Run:
+    """A run of four frames on a cube that ends at `final` [m]; the force is felt by the upper cap, against z."""
+    final = POINTS + bend(POINTS) if final is None else final
+    held = np.zeros((4, 2, 3))
+    held[:, 1, 2] = -np.array(force)
+    values = {
+        "t": T,
+        "volume": EDGE**3 * np.array(volume)[:, None],
+        "volume_target": np.full((len(volume), 1), EDGE**3),
+        "pressure": np.full((4, 1), 5.0),
+        "contact_force": np.zeros((4, 0, 3)),
+        "held_force": held,
+        "penetration": np.zeros((4, 1)),
+        "min_j": np.array([1.0, 0.8, 0.6, 0.7]),
+        "snapshots": np.stack([POINTS, final]),
+        "rest": POINTS,
+        "mass": np.full(len(POINTS), 1.0),
+        "triangles": TRIANGLES,
+        "tetrahedra": CELLS,
+    } | changes.pop("values", {})
+    record = new_record(
+        kind="run",
+        key="{}",
+        name="made up",
+        status=changes.pop("status", Status.OK),
+        message="",
+        fingerprint="",
+        attributes={"rest_volume": EDGE**3, "steps": 20, "frame": 1.0, "dt": 0.05, "dt_limit": 0.1}
+        | changes.pop("attributes", {}),
+        fields={name: Field(np.asarray(v), "1", "made up") for name, v in values.items()},
+    )
+    case = Case(changes.pop("scene", SCENE), BodyRecipe())
+    return Run(case, record, changes.pop("reference", reference()), changes.pop("timing", None))
+
+
+def of(name: str, **changes) -> float:
+    return metric(name)(run(**changes))
