@@ -3,7 +3,7 @@
 import numpy as np
 
 from massspring.body import Body
-from massspring.kernels.broad_phase import BLOCK
+from massspring.kernels.broad_phase import TRIANGLE_BLOCK
 from massspring.kernels.collision import Pair, nearest_into
 from massspring.kernels.layout import Tally
 from massspring.kernels.probe_layout import COUNTS, Probing, Rows
@@ -54,7 +54,7 @@ def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tall
         skipping=True,
         travel=np.zeros(1),
         wake=np.full((count, triangles), -np.inf),
-        block_wake=np.full((count, -(-triangles // BLOCK)), -np.inf),
+        block_wake=np.full((count, -(-triangles // TRIANGLE_BLOCK)), -np.inf),
         near=np.zeros((count, triangles), dtype=np.uint32),
         near_count=np.zeros(count, dtype=np.int64),
         time=np.zeros(triangles),

@@ -14,10 +14,10 @@ from massspring import METHODS, MassSpringError
 from reference_fem import ReferenceProblem
 from studies import interrupts
 from studies import report as reports
-from studies.case import BodyRecipe, Case
 from studies.catalog import STUDIES, Study
 from studies.commands.cost import cost
 from studies.commands.mesh import check, mesh
+from studies.commands.safe_dt import safe_dt
 from studies.commands.verify import verify
 from studies.describe import describe
 from studies.errors import StudyError
@@ -29,7 +29,6 @@ from studies.paths import study_folder
 from studies.progress import TerminalProgress
 from studies.reference_report import reference_listing
 from studies.run import replay as replay_run
-from studies.safe_dt import safe_step
 from studies.scenes import SCENES, UNJUDGED
 from studies.suggest import choose
 from studies.sweep import failed, load_runs, run_studies, standings, warnings_of
@@ -224,31 +223,4 @@ app.command()(verify)
 app.command()(cost)
 app.command()(mesh)
 app.command()(check)
-
-
-@app.command("safe-dt")
-def safe_dt(
-    scene: str,
-    method: Annotated[str, typer.Option(help="see `organbench list`")] = "implicit_volume",
-    body: Annotated[str, typer.Option(help="tetrahedral or surface")] = "tetrahedral",
-    nodes: Annotated[int, typer.Option(help="surface nodes")] = 550,
-) -> None:
-    """The stability limit of a scene, predicted and then verified by running just below and just above it."""
-    kind = choose(body, ("tetrahedral", "surface"), "body")
-    case = Case(
-        scene=choose(scene, {s.name: s for s in (*SCENES, *UNJUDGED)}, "scene"),
-        body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
-        method=choose(method, {m.name: m for m in METHODS}, "method")(),
-    )
-    found = safe_step(case)
-    limit = found.limit
-    console.print(f"largest frequency  {limit.frequency:.4g} 1/s")
-    whose = "stability limit" if found.limited else "of explicit ones"
-    console.print(f"{whose:<18} {1e3 * limit.damped:.4g} ms  (without damping {1e3 * limit.undamped:.4g} ms)")
-    console.print(f"dt = auto          {1e3 * found.auto:.4g} ms  (margin {found.margin:.3g})")
-    for dt, outcome in found.tried:
-        console.print(f"run at             {1e3 * dt:.4g} ms  ({dt / limit.damped:.3g} of the limit): {outcome}")
-    if found.bracket is not None:
-        below, above = found.bracket
-        console.print(f"bracket            holds at {1e3 * below:.4g} ms, diverges at {1e3 * above:.4g} ms")
-    console.print(found.verdict)
+app.command("safe-dt")(safe_dt)

@@ -3,6 +3,7 @@
 from massspring.kernels.compiled import inlined
 
 BLOCK = 64
+"""Nodes."""
 
 
 @inlined

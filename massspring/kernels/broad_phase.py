@@ -6,7 +6,7 @@ from massspring.kernels.compiled import lean
 from massspring.kernels.distances import allowed_part
 from massspring.kernels.probe_layout import COMPARED
 
-BLOCK = 64
+TRIANGLE_BLOCK = 64
 """Triangles that share one look: 39,000 triangles are 610 numbers a step while all sleep."""
 ROOM = 3.0
 """How much farther pairs are looked for than the motion without contact goes: pushes add to it."""
@@ -56,7 +56,7 @@ def find_near(network, motion, tips, step, probes, reach):
             if probes.skipping and probes.block_wake[p, block] > horizon:
                 continue
             earliest = math.inf
-            for f in range(BLOCK * block, min(BLOCK * (block + 1), triangles.shape[0])):
+            for f in range(TRIANGLE_BLOCK * block, min(TRIANGLE_BLOCK * (block + 1), triangles.shape[0])):
                 if not probes.skipping or probes.wake[p, f] <= horizon:
                     gap = box_gap(motion.x, triangles, f, p0, p1, p2) - probes.radius[p]
                     probes.wake[p, f] = probes.travel[0] + gap

@@ -33,7 +33,7 @@ def cell_forces_into(cells, p, force):
         p0, p1, p2 = s[t, 0, 0], s[t, 0, 1], s[t, 0, 2]
         q0, q1, q2 = s[t, 1, 0], s[t, 1, 1], s[t, 1, 2]
         r0, r1, r2 = s[t, 2, 0], s[t, 2, 1], s[t, 2, 2]
-        add_four(force, a, b, c, d, p[t], p0, p1, p2, q0, q1, q2, r0, r1, r2)
+        add_four(force, (a, b, c, d), p[t], (p0, p1, p2), (q0, q1, q2), (r0, r1, r2))
 
 
 @compiled
@@ -175,7 +175,7 @@ def relax_cells(motion, inverse_mass, cells, scale, compliance, force):
             continue
         change = (error - soft * pressure[t]) / stiff
         pressure[t] += change
-        add_four(force, a, b, c, d, change, p0, p1, p2, q0, q1, q2, r0, r1, r2)
+        add_four(force, (a, b, c, d), change, (p0, p1, p2), (q0, q1, q2), (r0, r1, r2))
         move = scale * change
         y[a, 0], y[a, 1], y[a, 2] = y[a, 0] + move * a0, y[a, 1] + move * a1, y[a, 2] + move * a2
         y[b, 0], y[b, 1], y[b, 2] = y[b, 0] + move * b0, y[b, 1] + move * b1, y[b, 2] + move * b2

@@ -53,11 +53,12 @@ def cell_slopes(x, a, b, c, d):
 
 
 @inlined
-def add_four(out, a, b, c, d, f, p0, p1, p2, q0, q1, q2, r0, r1, r2):
-    """Adds f p, f q, f r to nodes b, c, d and minus their sum to a: nothing that would push the body about."""
-    p0, p1, p2 = f * p0, f * p1, f * p2
-    q0, q1, q2 = f * q0, f * q1, f * q2
-    r0, r1, r2 = f * r0, f * r1, f * r2
+def add_four(out, nodes, f, p, q, r):
+    """Adds f p, f q, f r to the last three of four nodes and minus their sum to the first: nobody is pushed about."""
+    a, b, c, d = nodes
+    p0, p1, p2 = f * p[0], f * p[1], f * p[2]
+    q0, q1, q2 = f * q[0], f * q[1], f * q[2]
+    r0, r1, r2 = f * r[0], f * r[1], f * r[2]
     out[a, 0] -= p0 + q0 + r0
     out[a, 1] -= p1 + q1 + r1
     out[a, 2] -= p2 + q2 + r2
@@ -92,7 +93,7 @@ def add_volume_forces(x, cells, bulk_modulus, force):
         cells.pressure[t] = pressure
         if volume == 0.0:
             idle |= p0 == p1 == p2 == q0 == q1 == q2 == r0 == r1 == r2 == 0.0
-        add_four(force, a, b, c, d, pressure, p0, p1, p2, q0, q1, q2, r0, r1, r2)
+        add_four(force, (a, b, c, d), pressure, (p0, p1, p2), (q0, q1, q2), (r0, r1, r2))
     return idle
 
 
@@ -128,7 +129,7 @@ def add_barycentre_forces(x, cells, bulk_modulus, force):
         b0, b1, b2 = b0 - m0, b1 - m1, b2 - m2
         c0, c1, c2 = c0 - m0, c1 - m1, c2 - m2
         d0, d1, d2 = d0 - m0, d1 - m1, d2 - m2
-        add_four(force, a, b, c, d, push, b0, b1, b2, c0, c1, c2, d0, d1, d2)
+        add_four(force, (a, b, c, d), push, (b0, b1, b2), (c0, c1, c2), (d0, d1, d2))
 
 
 @compiled

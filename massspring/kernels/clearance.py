@@ -16,78 +16,56 @@ def clearances_into(network, motion, drive, step, lam, first, last):
 
     Of the nodes from `first` to `last`, those that nothing can touch among them.
     """
-    push, dt = drive.dt * lam, drive.dt
+    real = motion.x.dtype.type
+    x, v_star = flat(motion.x, first, last), flat(motion.v_star, first, last)
+    gradient, inverse_mass = flat(motion.gradient, first, last), flat(network.inverse_mass, first, last)
+    course = x, v_star, gradient, inverse_mass, real(drive.dt), real(drive.dt * lam)
     touched, locked = flat(motion.touched, first, last), flat(motion.locked, first, last)
     clearance = flat(motion.clearance, first, last)
     for i in range(clearance.shape[0]):
         touched[i], locked[i], clearance[i] = 0, 0, math.inf
     for o in range(drive.radius.shape[0]):
-        point, span, radius = drive.position[step, o], drive.span[o], drive.radius[o]
+        place, span, radius = drive.position[step, o], drive.span[o], real(drive.radius[o])
+        p0, p1, p2 = real(place[0]), real(place[1]), real(place[2])
         if drive.is_plane[o]:
-            plane_clearance(motion, network.inverse_mass, push, dt, drive.plane_normal[o], point, first, last)
+            normal = drive.plane_normal[o]
+            plane_clearance(course, clearance, p0, p1, p2, real(normal[0]), real(normal[1]), real(normal[2]))
         elif span[0] == 0.0 and span[1] == 0.0 and span[2] == 0.0:
-            sphere_clearance(motion, network.inverse_mass, push, dt, point, radius, first, last)
+            sphere_clearance(course, clearance, p0, p1, p2, radius)
         else:
-            capsule_clearance(motion, network.inverse_mass, push, dt, point, span, radius, first, last)
+            capsule_clearance(course, clearance, p0, p1, p2, real(span[0]), real(span[1]), real(span[2]), radius)
 
 
 @inlined
-def plane_clearance(motion, inverse_mass, push, dt, normal, point, first, last):
+def way_from(p0, p1, p2, course, i):
+    """y − p [m] of a node, y = x + dt (v* + dt lam W G)."""
+    x, v_star, gradient, inverse_mass, dt, push = course
+    w = push * inverse_mass[i]
+    r0 = x[3 * i] + dt * (v_star[3 * i] + w * gradient[3 * i]) - p0
+    r1 = x[3 * i + 1] + dt * (v_star[3 * i + 1] + w * gradient[3 * i + 1]) - p1
+    r2 = x[3 * i + 2] + dt * (v_star[3 * i + 2] + w * gradient[3 * i + 2]) - p2
+    return r0, r1, r2
+
+
+@inlined
+def plane_clearance(course, clearance, p0, p1, p2, n0, n1, n2):
     """n·(y − p) [m]."""
-    x, v_star, gradient = (
-        flat(motion.x, first, last),
-        flat(motion.v_star, first, last),
-        flat(motion.gradient, first, last),
-    )
-    clearance, inverse_mass = flat(motion.clearance, first, last), flat(inverse_mass, first, last)
-    real = motion.x.dtype.type
-    push, dt = real(push), real(dt)
-    n0, n1, n2 = real(normal[0]), real(normal[1]), real(normal[2])
-    p0, p1, p2 = real(point[0]), real(point[1]), real(point[2])
     for i in range(clearance.shape[0]):
-        w = push * inverse_mass[i]
-        r0 = x[3 * i] + dt * (v_star[3 * i] + w * gradient[3 * i]) - p0
-        r1 = x[3 * i + 1] + dt * (v_star[3 * i + 1] + w * gradient[3 * i + 1]) - p1
-        r2 = x[3 * i + 2] + dt * (v_star[3 * i + 2] + w * gradient[3 * i + 2]) - p2
+        r0, r1, r2 = way_from(p0, p1, p2, course, i)
         clearance[i] = min(clearance[i], n0 * r0 + n1 * r1 + n2 * r2)
 
 
 @inlined
-def sphere_clearance(motion, inverse_mass, push, dt, centre, radius, first, last):
+def sphere_clearance(course, clearance, c0, c1, c2, radius):
     """|y − c| − R [m]."""
-    x, v_star, gradient = (
-        flat(motion.x, first, last),
-        flat(motion.v_star, first, last),
-        flat(motion.gradient, first, last),
-    )
-    clearance, inverse_mass = flat(motion.clearance, first, last), flat(inverse_mass, first, last)
-    real = motion.x.dtype.type
-    push, dt, radius = real(push), real(dt), real(radius)
-    c0, c1, c2 = real(centre[0]), real(centre[1]), real(centre[2])
     for i in range(clearance.shape[0]):
-        w = push * inverse_mass[i]
-        r0 = x[3 * i] + dt * (v_star[3 * i] + w * gradient[3 * i]) - c0
-        r1 = x[3 * i + 1] + dt * (v_star[3 * i + 1] + w * gradient[3 * i + 1]) - c1
-        r2 = x[3 * i + 2] + dt * (v_star[3 * i + 2] + w * gradient[3 * i + 2]) - c2
+        r0, r1, r2 = way_from(c0, c1, c2, course, i)
         clearance[i] = min(clearance[i], math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius)
 
 
 @inlined
-def capsule_clearance(motion, inverse_mass, push, dt, start, span, radius, first, last):
-    """Distance of y to the axis less R [m]."""
-    x, v_star, gradient = (
-        flat(motion.x, first, last),
-        flat(motion.v_star, first, last),
-        flat(motion.gradient, first, last),
-    )
-    clearance, inverse_mass = flat(motion.clearance, first, last), flat(inverse_mass, first, last)
-    real = motion.x.dtype.type
-    push, dt, radius = real(push), real(dt), real(radius)
-    p0, p1, p2 = real(start[0]), real(start[1]), real(start[2])
-    a0, a1, a2 = real(span[0]), real(span[1]), real(span[2])
+def capsule_clearance(course, clearance, p0, p1, p2, a0, a1, a2, radius):
+    """Distance of y to the axis p … p + a less R [m]."""
     for i in range(clearance.shape[0]):
-        w = push * inverse_mass[i]
-        r0 = x[3 * i] + dt * (v_star[3 * i] + w * gradient[3 * i]) - p0
-        r1 = x[3 * i + 1] + dt * (v_star[3 * i + 1] + w * gradient[3 * i + 1]) - p1
-        r2 = x[3 * i + 2] + dt * (v_star[3 * i + 2] + w * gradient[3 * i + 2]) - p2
+        r0, r1, r2 = way_from(p0, p1, p2, course, i)
         clearance[i] = min(clearance[i], round_gap(r0, r1, r2, a0, a1, a2, radius))

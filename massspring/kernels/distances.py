@@ -1,7 +1,7 @@
 """Where a node is beside an obstacle, and what motion an obstacle leaves it.
 
-These functions take numbers, not tuples of arrays: a call that is not inlined counts the references of every array it
-is given, which costs 200 ns.
+These functions know numbers alone, no arrays: the same ones serve a node, a point of a probe, and loops over all nodes,
+in either precision.
 """
 
 import math

@@ -67,7 +67,7 @@ class Probing(NamedTuple):
     wake: np.ndarray
     """Travel at which a pair must be looked at again [m], (p, f)."""
     block_wake: np.ndarray
-    """The smallest of each block of `BLOCK` triangles, (p, ceil(f / BLOCK))."""
+    """The smallest of each block of triangles, (p, ceil(f / TRIANGLE_BLOCK))."""
     near: np.ndarray
     """Triangles that may meet a tip in this step, ascending, (p, f) uint32."""
     near_count: np.ndarray

@@ -2,7 +2,7 @@
 
 import math
 
-from massspring.kernels.compiled import lean
+from massspring.kernels.compiled import inlined, lean
 from massspring.kernels.distances import allowed_part, axis_share
 
 SLIPS = 1.0 + 1e-9
@@ -63,6 +63,22 @@ def release_slipping(network, motion, drive, lam):
     return changes
 
 
+@inlined
+def gap_and_normal(drive, step, o, y0, y1, y2):
+    """Distance [m] of y to obstacle o, negative inside, and its normal there; a round one's axis has none."""
+    m0, m1, m2 = y0 - drive.position[step, o, 0], y1 - drive.position[step, o, 1], y2 - drive.position[step, o, 2]
+    if drive.is_plane[o]:
+        n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
+        return n0 * m0 + n1 * m1 + n2 * m2, n0, n1, n2
+    a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
+    share = axis_share(m0, m1, m2, a0, a1, a2)
+    m0, m1, m2 = m0 - share * a0, m1 - share * a1, m2 - share * a2
+    distance = math.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
+    if not distance > 0.0:
+        return math.inf, 0.0, 0.0, 0.0
+    return distance - drive.radius[o], m0 / distance, m1 / distance, m2 / distance
+
+
 @lean
 def wedge(network, motion, drive, step, lam):
     """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 37); how many.
@@ -87,20 +103,7 @@ def wedge(network, motion, drive, step, lam):
         for o in range(drive.radius.shape[0]):
             if o + 1 == motion.touched[i]:
                 continue
-            p0, p1, p2 = drive.position[step, o, 0], drive.position[step, o, 1], drive.position[step, o, 2]
-            if drive.is_plane[o]:
-                m0, m1, m2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
-                gap = m0 * (y0 - p0) + m1 * (y1 - p1) + m2 * (y2 - p2)
-            else:
-                a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-                m0, m1, m2 = y0 - p0, y1 - p1, y2 - p2
-                share = axis_share(m0, m1, m2, a0, a1, a2)
-                m0, m1, m2 = m0 - share * a0, m1 - share * a1, m2 - share * a2
-                distance = math.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
-                if not distance > 0.0:
-                    continue
-                gap = distance - drive.radius[o]
-                m0, m1, m2 = m0 / distance, m1 / distance, m2 / distance
+            gap, m0, m1, m2 = gap_and_normal(drive, step, o, y0, y1, y2)
             e0, e1, e2 = n1 * m2 - n2 * m1, n2 * m0 - n0 * m2, n0 * m1 - n1 * m0
             square = e0 * e0 + e1 * e1 + e2 * e2
             if gap < deepest and square > PARALLEL:

@@ -1,7 +1,6 @@
 """Springs, volume gradient and prediction of all nodes: one pass over their neighbours, 64 nodes at a time.
 
 Each spring is computed at both of its ends: nothing is scattered, and all lanes of a vector register do the same.
-Arrays get a name before the loops, because what is taken out of a tuple has its references counted each time.
 """
 
 import math

@@ -25,7 +25,9 @@ PATIENCE = 20_000
 
 
 class Team(NamedTuple):
-    """How T threads share the work. Loops end at these borders whatever the number of threads."""
+    """How T threads share the work: each has the slices and the nodes between two borders of its own.
+
+    Borders depend on T, sums do not: a slice is always summed by itself, and slices in their order."""
 
     signal: np.ndarray
     """Round number, parts done, job, step, whether all is compiled; one line of the cache each, int64."""

@@ -217,7 +217,7 @@ def begin_frame(state: State, drive: Drive) -> State:
 
 
 @contextmanager
-def begun(state: State, drive: Drive) -> Iterator[State]:
+def crewed_frame(state: State, drive: Drive) -> Iterator[State]:
     """A copy to advance in place; inside, all threads of the state are there."""
     after = begin_frame(state, drive)
     with crew(after.network, after.motion, drive):

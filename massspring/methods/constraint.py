@@ -79,6 +79,22 @@ def inertial_change(network, motion, rule, dt):
 
 
 @compiled
+def linear_multiplier(network, motion, error, kept, dt, whole):
+    """lam [Pa] and G·W̃·G of a step that makes up for `error` [m³] and stops `kept` [m³]; whether the error was cut.
+
+    It is not where the `whole` of it is wanted (eq. 8, 35, 104).
+    """
+    lam, mobility = volume_multiplier(motion, network.inverse_mass, error + kept, dt)
+    lightest, longest = network.largest_inverse_mass, network.longest_correction
+    if whole or not mobility > 0.0 or surely_short(error, mobility, lightest, longest):
+        return lam, mobility, False
+    part = capped_error(error, mobility, steepest(motion.gradient, network.inverse_mass), longest)
+    if part != error:
+        lam, mobility = volume_multiplier(motion, network.inverse_mass, part + kept, dt)
+    return lam, mobility, part != error
+
+
+@compiled
 def exact_multiplier(network, motion, line, target, mobility, dt):
     """lam [Pa] with V(y + lam d) = V0, the root of smallest modulus (eq. 101, 102), and G·W̃·G; (0, 0) without one."""
     line_into(motion, network.inverse_mass, dt, line)
@@ -120,7 +136,7 @@ def correct_positions(network, motion, target, dt):
 def constraint_frame(network, motion, line, drive, tally, lam, rule, probing):
     """One frame with contact inside the multiplier (eq. 6–13, 101–105); returns the last lam [Pa]."""
     dt = drive.dt
-    lightest = network.inverse_mass.max()
+    lightest = network.largest_inverse_mass
     mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         target = drive.volume_target[step, 0]
@@ -138,15 +154,10 @@ def constraint_frame(network, motion, line, drive, tally, lam, rule, probing):
             mark(tally.ticks, SEARCH)
             passes = CONTACT_PASSES
         for sweep in range(passes):
-            lam, mobility = volume_multiplier(motion, network.inverse_mass, error + kept, dt)
+            lam, mobility, capped = linear_multiplier(network, motion, error, kept, dt, rule.exact)
             if rule.exact and mobility > 0.0:
                 lam, mobility = exact_multiplier(network, motion, line, target, mobility, dt)
-            elif mobility > 0.0 and not surely_short(error, mobility, lightest, network.longest_correction):
-                reachable = steepest(motion.gradient, network.inverse_mass)
-                part = capped_error(error, mobility, reachable, network.longest_correction)
-                if part != error:
-                    lam, mobility = volume_multiplier(motion, network.inverse_mass, part + kept, dt)
-                    tally.capped[0] += sweep == 0
+            tally.capped[0] += capped and sweep == 0
             mark(tally.ticks, MULTIPLIER)
             if sweep + 1 == passes:
                 break

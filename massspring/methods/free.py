@@ -10,7 +10,7 @@ from massspring.kernels.motion import add_held_impulse, advance_to_places, place
 from massspring.kernels.probing import meet_probes
 from massspring.kernels.slices import predict_from_places
 from massspring.kernels.ticks import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, mark
-from massspring.methods.base import Method, State, begun
+from massspring.methods.base import Method, State, crewed_frame
 
 
 @lean
@@ -52,6 +52,6 @@ class Free(Method):
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""
-        with begun(state, drive) as after:
+        with crewed_frame(state, drive) as after:
             free_frame(after.network, after.motion, drive, after.tally, after.probing)
         return after

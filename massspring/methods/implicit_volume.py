@@ -55,7 +55,7 @@ from massspring.kernels.ticks import (
     VOLUME,
     mark,
 )
-from massspring.methods.base import Method, Remedy, State, begun
+from massspring.methods.base import Method, Remedy, State, crewed_frame
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
@@ -213,7 +213,7 @@ class ImplicitVolume(Method):
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""
-        with begun(state, drive) as after:
+        with crewed_frame(state, drive) as after:
             if after.rows is None:
                 lam = implicit_volume_frame(
                     after.network, after.motion, drive, after.tally, float(after.lam[0]), after.probing

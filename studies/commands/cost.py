@@ -8,11 +8,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from massspring import METHODS
-from studies.case import BodyRecipe, Case
+from studies.commands.chosen import BodyKind, MethodName, SurfaceNodes, chosen_case
 from studies.cost import FRAME, SKIPPED, STAGE, cost_table
-from studies.scenes import SCENES, UNJUDGED
-from studies.suggest import choose
 from studies.table import write_table
 
 console = Console(soft_wrap=True)
@@ -21,19 +18,14 @@ HEADINGS = {STAGE: "stages of a step", SKIPPED: "left out here; what it would co
 
 def cost(
     scene: str,
-    method: Annotated[str, typer.Option(help="see `organbench list`")] = "implicit_volume",
-    body: Annotated[str, typer.Option(help="tetrahedral or surface")] = "tetrahedral",
-    nodes: Annotated[int, typer.Option(help="surface nodes")] = 550,
+    method: MethodName = "implicit_volume",
+    body: BodyKind = "tetrahedral",
+    nodes: SurfaceNodes = 550,
     csv: Annotated[Path | None, typer.Option(help="also write the table there")] = None,
     json: Annotated[bool, typer.Option("--json", help="print JSON instead of a table")] = False,
 ) -> None:
     """Microseconds per stage of a step, their share, what was skipped and what that saved; on one pinned core."""
-    kind = choose(body, ("tetrahedral", "surface"), "body")
-    case = Case(
-        scene=choose(scene, {s.name: s for s in (*SCENES, *UNJUDGED)}, "scene"),
-        body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
-        method=choose(method, {m.name: m for m in METHODS}, "method")(),
-    )
+    case = chosen_case(scene, method, body, nodes)
     with Console(stderr=True).status("measuring (the first time most goes into compiling) ..."):
         found = cost_table(case)
     if csv is not None:
