@@ -1,7 +1,8 @@
 # `make` alone prints this list. Every target does its own set-up (.ci/setup), instant when nothing changed.
 BIN := .venv/bin
 STUDIES := volume_loss frame_rate work_precision stability_map
-PYTEST := $(BIN)/python -m pytest -q -n 2
+# A file stays with one process: kernels that only it needs are compiled once.
+PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
