@@ -1,0 +1,214 @@
+"""The rules of contact node by node, against the geometry of obstacles and dense 3 × 3 solves (eq. 12, 13, 36, 37)."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from massspring import Capsule, Clock, ImplicitVolume, Path, Plane, Setup, Sphere, surface_body
+from massspring.kernels.contact import find_contacts, pressure_reach, revise_contacts
+from tests.massspring.conftest import SOFT, icosphere
+
+DT = 1e-3
+LAM = 40.0
+ROUND_OFF = 1e-12
+"""m, of places of some centimetres, and m/s, of some metres per second."""
+ALONG = Path((0.0, 1.0), ((0.0, 0.0, 0.0), (1.3, -0.7, 0.4)))
+FLOOR, WALL = Plane((0.0, 0.0, -0.0501), (0.0, 0.0, 1.0)), Plane((-0.0501, 0.0, 0.0), (1.0, 0.0, 0.0))
+ABOVE = (-0.02, -0.02, -0.0500), (0.02, 0.02, -0.0475)
+OBSTACLES: dict[str, tuple[tuple, tuple]] = {
+    "a floor": ((FLOOR,), ABOVE),
+    "a sphere": ((Sphere((0.0, 0.0, -0.0702), 0.02),), ABOVE),
+    "a corner": ((FLOOR, WALL), ((-0.050, -0.02, -0.050), (-0.0475, 0.02, -0.0475))),
+    "two spheres": (
+        (Sphere((0.0195, 0.001, -0.0702), 0.02), Sphere((-0.0195, 0.0, -0.0702), 0.02)),
+        ((-0.003, -0.003, -0.066), (0.003, 0.003, -0.062)),
+    ),
+    "a rod on a floor": (
+        (Plane((0, 0, -0.0687), (0, 0, 1)), Capsule((-0.04, 0.001, -0.0602), (0.04, -0.001, -0.0602), 0.01)),
+        ((-0.02, 0.003, -0.0687), (0.02, 0.008, -0.0665)),
+    ),
+    "almost one plane": ((FLOOR, Plane((0.0, 0.0, -0.0501), (0.005, 0.0, 1.0))), ABOVE),
+}
+"""Obstacles, and the box above or between them in which nodes fly about."""
+
+
+@pytest.fixture(scope="module")
+def shell():
+    return surface_body(*icosphere(3, 0.05), SOFT)
+
+
+class Scene:
+    """Nodes close above obstacles fly about: some would enter them within the step, and pressure pushes any way."""
+
+    def __init__(self, shell, obstacles, box=ABOVE) -> None:
+        self.obstacles = obstacles
+        setup = Setup(shell, ImplicitVolume(), Clock(DT, 1, 1), obstacles)
+        state, self.drive = setup.start(), setup.drive(0)
+        self.network, self.motion, random = state.network, state.motion, np.random.default_rng(4)
+        self.nodes = self.network.surface_nodes.astype(np.int64)
+        self.motion.x[:] = random.uniform(*box, self.x.shape)
+        self.motion.v_star[:] = 2.0 * random.normal(size=self.x.shape)
+        size = 1.0 / (DT * LAM * self.network.inverse_mass[:, None])
+        self.motion.gradient[:] = 2.0 * size * random.normal(size=self.x.shape)
+
+    @property
+    def x(self) -> np.ndarray:
+        return self.motion.x
+
+    def free_velocity(self, lam: float) -> np.ndarray:
+        """u (n, 3) [m/s]."""
+        return self.motion.v_star + DT * lam * self.network.inverse_mass[:, None] * self.motion.gradient
+
+    def velocity(self, lam: float) -> np.ndarray:
+        """v⁺ = P u + goal (n, 3) [m/s] (eq. 9, 10)."""
+        mo, u = self.motion, self.free_velocity(lam)
+        kept = {
+            0: u,
+            1: u - (u * mo.normal).sum(axis=1)[:, None] * mo.normal,
+            2: (u * mo.direction).sum(axis=1)[:, None] * mo.direction,
+            3: 0 * u,
+        }
+        return np.choose(mo.locked[:, None], list(kept.values())) + np.where(mo.locked[:, None] > 0, mo.goal, 0.0)
+
+    def gaps(self, y: np.ndarray) -> np.ndarray:
+        """(obstacles, n) [m] at the end of the step."""
+        return np.array([obstacle.gap(y, DT) for obstacle in self.obstacles])
+
+    def find(self, lam: float = LAM) -> "Scene":
+        find_contacts(self.network, self.motion, self.drive, 0, lam)
+        return self
+
+    def revise(self, lam: float, found_at: float = LAM) -> int:
+        square = (self.motion.gradient**2).sum(axis=1)
+        mobility = float(self.network.inverse_mass @ square)
+        reach = pressure_reach(lam - found_at, mobility, self.network.largest_inverse_mass, DT)
+        return revise_contacts(self.network, self.motion, self.drive, 0, lam, reach)
+
+
+def slopes(obstacle: Any, y: np.ndarray) -> np.ndarray:
+    """Outward normals of an obstacle at y (n, 3), by central differences of its gap: good to 1e-6."""
+    step = 1e-6 * np.eye(3)
+    found = np.stack([(obstacle.gap(y + e, DT) - obstacle.gap(y - e, DT)) / 2e-6 for e in step], axis=1)
+    return found / np.linalg.norm(found, axis=1)[:, None]
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_nodes_sit_on_the_obstacle_that_they_would_enter_deepest(shell, name):
+    scene = Scene(shell, *OBSTACLES[name]).find()
+    gaps = scene.gaps(scene.x + DT * scene.free_velocity(LAM))
+    inner = np.setdiff1d(np.arange(len(scene.x)), scene.nodes)
+    assert np.abs(scene.motion.clearance[:] - gaps.min(axis=0)).max() < ROUND_OFF
+    wanted = np.where(gaps.min(axis=0) < 0, gaps.argmin(axis=0) + 1, 0)
+    wanted[inner] = 0
+    assert (scene.motion.touched == wanted).all() and len(np.unique(wanted)) == len(scene.obstacles) + 1
+    one = np.flatnonzero(scene.motion.locked == 1)
+    ends = scene.gaps(scene.x + DT * scene.velocity(LAM))[wanted[one] - 1, one]
+    exact = [not isinstance(scene.obstacles[o], Capsule) for o in wanted[one] - 1]
+    assert np.abs(ends[exact]).max() < ROUND_OFF  # round the end of a rod nodes may end on the tangent plane
+
+
+def test_the_next_step_knows_nothing_of_the_last(shell):
+    """Obstacles gone: no clearance, no touch is left of them."""
+    scene = Scene(shell, *OBSTACLES["two spheres"]).find()
+    assert scene.motion.touched.any()
+    scene.drive.position[:] -= 1.0
+    scene.find()
+    assert not scene.motion.touched.any() and not scene.motion.locked.any()
+    assert scene.motion.clearance.min() > 0.9
+
+
+@pytest.mark.parametrize("name", ["a floor", "a sphere"])
+@pytest.mark.parametrize("way", [(1.5, 0.2, 1.0), (-1.0, 2.5, -1.0, 1.0), (0.0, 1.2, 3.0)])
+def test_revised_contacts_are_those_of_the_new_pressure(shell, name, way):
+    """Pulled nodes are let go, free ones that would enter sit down; so is a node that was let go before."""
+    scene, changed, again = Scene(shell, *OBSTACLES[name]).find(), 0, 0
+    let_go = np.zeros(len(scene.x), dtype=bool)
+    for lam in LAM * np.array(way):
+        held = scene.motion.locked == 1
+        u = scene.free_velocity(lam)
+        pulled = held & (((scene.motion.goal - u) * scene.motion.normal).sum(axis=1) < 0)
+        enters = ~held & (scene.gaps(scene.x + DT * u)[0] < 0)
+        enters[np.setdiff1d(np.arange(len(u)), scene.nodes)] = False
+        count = scene.revise(lam)
+        assert count == pulled.sum() + enters.sum()
+        assert np.array_equal(scene.motion.locked == 1, (held & ~pulled) | enters)
+        changed, again, let_go = changed + count, again + (enters & let_go).sum(), let_go | pulled
+    assert changed > 10 and again > 0
+
+
+@pytest.mark.parametrize("friction", [0.5, 1.5])
+@pytest.mark.parametrize("name", ["a floor", "a sphere"])
+def test_slip_loses_what_coulomb_says(shell, name, friction):
+    """Beside an obstacle that moves: v⁺ = w + s max(0, 1 − mu p/|s|) along it, p what it pushes by."""
+    (still,), _ = OBSTACLES[name]
+    smooth, rough = (Scene(shell, (type(still)(*_shape(still), ALONG, mu),)).find() for mu in (0.0, friction))
+    on = np.flatnonzero(smooth.motion.locked == 1)
+    n, u = smooth.motion.normal[on], smooth.free_velocity(LAM)[on]
+    p = ((smooth.motion.goal[on] - u) * n).sum(axis=1)
+    w = np.array(ALONG.displacements[1])
+    slip = u - w - ((u - w) * n).sum(axis=1)[:, None] * n
+    left = np.maximum(0.0, 1 - friction * p / np.linalg.norm(slip, axis=1))
+    across = (smooth.motion.goal[on] * n).sum(axis=1)[:, None] * n
+    expected = w - (n @ w)[:, None] * n + left[:, None] * slip + across
+    assert np.abs(rough.velocity(LAM)[on] - expected).max() < ROUND_OFF
+    assert np.array_equal(rough.motion.locked[on] == 3, left == 0)
+    assert 0 < (left == 0).sum() < len(on), "all of them slip, or none"
+
+
+def _shape(obstacle) -> tuple:
+    return (obstacle.point, obstacle.normal) if isinstance(obstacle, Plane) else (obstacle.centre, obstacle.radius)
+
+
+def test_what_sticks_too_hard_at_the_new_pressure_slips(shell):
+    """k = v⁺ − u is what sticking takes; of its part along the obstacle mu times the other is left (eq. 36)."""
+    mu, lam = 1.2, 0.4 * LAM
+    scene = Scene(shell, (Plane((0, 0, -0.0501), (0, 0, 1), ALONG, mu),)).find()
+    sticks = np.flatnonzero(scene.motion.locked == 3)
+    u = scene.free_velocity(lam)[sticks]
+    k, n = scene.motion.goal[sticks] - u, scene.motion.normal[sticks]
+    p = (k * n).sum(axis=1)
+    aside = k - p[:, None] * n
+    asked = np.linalg.norm(aside, axis=1)
+    pushed, slips = p > 0, (p > 0) & (asked > mu * p)
+    scene.revise(lam)
+    locked = scene.motion.locked[sticks]
+    assert np.array_equal(locked == 1, slips) and np.array_equal(locked == 3, pushed & ~slips)
+    expected = u + p[:, None] * n + (mu * p / asked)[:, None] * aside
+    assert np.abs(scene.velocity(lam)[sticks] - expected)[slips].max() < ROUND_OFF
+    assert slips.sum() > 3 and (pushed & ~slips).sum() > 3 and (~pushed).sum() > 3
+
+
+@pytest.mark.parametrize("name", [name for name, several in OBSTACLES.items() if len(several[0]) == 2])
+def test_between_two_obstacles_nodes_keep_both(shell, name):
+    """n·v⁺ as beside the first alone, m·v⁺ up to the second, free along n × m; without an edge the first counts."""
+    obstacles, box = OBSTACLES[name]
+    scene, wedged = Scene(shell, obstacles, box).find(), 0
+    for first, second in ((0, 1), (1, 0)):
+        alone = Scene(shell, (obstacles[first],), box).find()
+        on = np.flatnonzero(scene.motion.touched == first + 1)
+        v = alone.velocity(LAM)
+        y = alone.x + DT * v
+        n, gap = alone.motion.normal[on], obstacles[second].gap(y, DT)[on]
+        m = slopes(obstacles[second], y[on])
+        edge = np.cross(n, m)
+        both = (gap < 0) & (np.linalg.norm(edge, axis=1) > 0.01)
+        assert np.array_equal(scene.motion.locked[on] == 2, both)
+        new = scene.velocity(LAM)[on]
+        assert np.abs(new - v[on])[~both].max(initial=0.0) < ROUND_OFF
+        for k in np.flatnonzero(both):
+            right = [n[k] @ v[on[k]], m[k] @ v[on[k]] - gap[k] / DT, edge[k] @ v[on[k]]]
+            expected = np.linalg.solve(np.array([n[k], m[k], edge[k]]), right)
+            assert np.abs(new[k] - expected).max() < 1e-4  # normals are known to 1e-6, edges as short as 0.01
+            assert scene.motion.second[on[k]] == second + 1
+        wedged += both.sum()
+    assert wedged == 0 if name == "almost one plane" else wedged > 3
+
+
+def test_a_node_that_slides_fast_round_a_sphere_is_not_between_it_and_itself(shell):
+    """Its normal turns by more than counts as parallel within the step, and it ends on the sphere but for round-off."""
+    far = Sphere((0.0, 0.0, 1.0), 0.02)
+    scene = Scene(shell, (*OBSTACLES["a sphere"][0], far))
+    scene.motion.v_star[:, :2] += 3.0
+    scene.find()
+    assert (scene.motion.locked == 1).sum() > 10 and not (scene.motion.locked == 2).any()
