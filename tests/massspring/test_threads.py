@@ -72,11 +72,11 @@ def test_threads_change_no_bit_of_several_volumes(filled_ball):
 
 def test_every_slice_and_node_has_one_thread():
     rows = np.array([0, 10, 11, 40, 41, 42, 80])
-    for threads in (2, 3, 7):
-        team = team_of(threads, rows, 3 * BLOCK + 5, BLOCK)
-        for borders, end in ((team.slices, 6), (team.nodes, 3 * BLOCK + 5)):
+    for threads, nodes in ((2, 3 * BLOCK + 5), (3, 3 * BLOCK + 5), (7, 3 * BLOCK + 5), (30, BLOCK + BLOCK // 2 + 5)):
+        team = team_of(threads, rows, nodes, BLOCK)
+        for borders, end in ((team.slices, 6), (team.nodes, nodes)):
             assert borders[0] == 0 and borders[-1] == end and (np.diff(borders) >= 0).all()
-        assert (team.nodes[1:-1] % BLOCK == 0).all()
+        assert np.isin(team.nodes, [*range(0, nodes, BLOCK), nodes]).all()
 
 
 def test_the_load_is_even():
@@ -84,6 +84,7 @@ def test_the_load_is_even():
     team = team_of(4, rows, 64 * 300, BLOCK)
     load = np.diff(rows[team.slices])
     assert np.ptp(load) <= 2 * 20, "more than a slice too many at either end"
+    assert np.array_equal(np.diff(team.nodes), [64 * 75] * 4)
 
 
 def test_a_frame_that_fails_sends_the_threads_home(ball):

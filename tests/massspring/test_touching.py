@@ -1,0 +1,98 @@
+"""Friction of long steps, node by node: who slides, who sticks, and what rubs it (eq. 94)."""
+
+import numpy as np
+import pytest
+
+from massspring import Clock, ImplicitSprings, Path, Plane, Setup
+from massspring.methods.touching import SLIDES, STICKS, STILL, Contact, Touching
+
+DT, MU = 5e-3, 0.5
+CARRIED = np.array([0.3, -0.2, 0.0])
+ALONG = Path((0.0, 1.0), ((0.0, 0.0, 0.0), tuple(CARRIED)))
+
+
+class Sole:
+    """A block that sinks into a rough floor which moves along itself: the nodes of its sole stick at first."""
+
+    def __init__(self, body) -> None:
+        floor = Plane((0, 0, float(body.rest[:, 2].min())), (0, 0, 1), ALONG, MU)
+        fall = np.tile([0.0, 0.0, -1.0], (body.node_count, 1))
+        setup = Setup(body, ImplicitSprings(), Clock(DT, 1, 1), (floor,), velocity=fall)
+        state, self.drive = setup.start(), setup.drive(0)
+        self.network, self.motion = state.network, state.motion
+        self.factor = state.memory.at(self.network, DT, 0.0)
+        self.contact = Contact(self.network, self.motion, self.drive, 0)
+        self.nodes = np.flatnonzero(self.motion.locked == STICKS)
+
+    def touching(self) -> Touching:
+        return Touching(self.factor, self.motion, self.network.surface_nodes, DT)
+
+    def slide(self) -> None:
+        self.motion.locked[self.nodes] = SLIDES
+        self.motion.goal[self.nodes, :2] = 0.0
+
+    def end(self, slip: np.ndarray) -> np.ndarray:
+        """Where nodes end that slip on the floor by so much [m/s]."""
+        end = self.motion.x.copy()
+        end[self.nodes] += DT * (CARRIED + slip)
+        return end
+
+
+@pytest.fixture
+def sole(block_body):
+    return Sole(block_body)
+
+
+@pytest.mark.parametrize(("asked", "slips"), [(0.98 * MU, False), (1.02 * MU, True)])
+def test_a_node_sticks_up_to_what_its_friction_can_take(sole, asked, slips):
+    touching, (first, *others) = sole.touching(), sole.nodes
+    impulses = np.zeros((len(touching.nodes) // 3, 3))
+    assert np.array_equal(touching.nodes[::3], sole.nodes)
+    impulses[:] = (0.1 * MU, 0.0, 1.0)
+    impulses[0] = (0.0, asked, 1.0)
+    changed = sole.contact.revise(sole.end(np.zeros(3)), touching, impulses.ravel())
+    assert changed == slips
+    assert sole.motion.locked[first] == (SLIDES if slips else STICKS)
+    assert (sole.motion.locked[others] == STICKS).all()
+    rubbed = [0.0, MU, 0.0] if slips else [0.0, 0.0, 0.0]
+    assert np.allclose(sole.contact.rubbed[first], rubbed, rtol=0, atol=1e-15)
+
+
+def test_friction_acts_against_the_slip(sole):
+    """By mu times what the floor pushes, and that is never less than nothing."""
+    sole.slide()
+    touching, slip = sole.touching(), np.array([-0.03, 0.04, 0.0])
+    impulses = np.linspace(-1.0, 2.0, len(sole.nodes))
+    assert not sole.contact.rub(sole.end(slip), touching, impulses)
+    expected = -MU * np.maximum(impulses, 0.0)[:, None] * slip / 0.05
+    # A way of 0.25 mm is known to 1e-17 m.
+    assert np.abs(sole.contact.rubbed[sole.nodes] - expected).max() < 1e-11
+    assert (sole.motion.locked[sole.nodes] == SLIDES).all()
+
+
+def test_what_friction_would_drive_sticks(sole):
+    """A node that goes the way its friction of the last pass points is carried along, without friction."""
+    sole.slide()
+    first, *others = sole.nodes
+    slip = np.array([-0.03, 0.04, 0.0])
+    sole.contact.rubbed[sole.nodes] = -slip
+    sole.contact.rubbed[first] = slip
+    assert sole.contact.rub(sole.end(slip), sole.touching(), np.ones(len(sole.nodes)))
+    assert sole.motion.locked[first] == STICKS and (sole.motion.locked[others] == SLIDES).all()
+    assert (sole.contact.rubbed[first] == 0).all()
+    assert np.allclose(sole.motion.goal[first, :2], CARRIED[:2], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(("way", "sticks"), [(0.0, True), (0.5, True), (2.0, False)])
+def test_a_slip_that_is_round_off_is_none(sole, way, sticks):
+    """Just below and just above the bound: its direction would be chance, and its friction as large as any."""
+    sole.slide()
+    slip = np.array([0.6, -0.8, 0.0]) * way * STILL * sole.network.longest_correction / DT
+    sole.motion.x[sole.nodes] = 0.0  # so that the way is known as closely as it is asked
+    carried = sole.drive.velocity[0, 0]
+    carried[:] = 0.0
+    end = sole.motion.x.copy()
+    end[sole.nodes] = DT * slip
+    assert sole.contact.rub(end, sole.touching(), np.ones(len(sole.nodes))) == sticks
+    assert (sole.motion.locked[sole.nodes] == (STICKS if sticks else SLIDES)).all()
+    assert np.linalg.norm(sole.contact.rubbed, axis=1).max() == pytest.approx(0.0 if sticks else MU, rel=1e-9)
