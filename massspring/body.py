@@ -145,7 +145,7 @@ class Body:
         """Rest volume V0 [m³]."""
         return float(enclosed_volume(self.rest, self.triangles))
 
-    @property
+    @cached_property
     def kept(self) -> Volumes:
         """The volumes that methods keep: `volumes`, or the whole."""
         return Volumes.whole(self) if self.volumes is None else self.volumes

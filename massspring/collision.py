@@ -3,10 +3,12 @@
 import numpy as np
 
 from massspring.body import Body
+from massspring.curve import along_curve
 from massspring.kernels.broad_phase import TRIANGLE_BLOCK
-from massspring.kernels.collision import Pair, nearest_into
+from massspring.kernels.collision import Pair
 from massspring.kernels.layout import Tally
 from massspring.kernels.probe_layout import COUNTS, Probing, Rows
+from massspring.kernels.sides import distance_to
 from massspring.obstacles import Probe
 from massspring.springs import EDGES_OF_TRIANGLE, lengths, unique_edges
 from massspring.surface import winding_number
@@ -35,6 +37,7 @@ def new_pair() -> Pair:
 def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tally: Tally) -> Probing:
     """Everything awake, nothing in contact, for probes on the triangles `surface` (f, 3)."""
     count, triangles, nodes = len(probes), len(surface), body.node_count
+    number = np.argsort(along_curve(body.rest[surface].mean(axis=1)))
     many, kept = MOST_ROWS, body.kept.count
     rows = Rows(
         count=np.zeros(1, dtype=np.int64),
@@ -53,8 +56,9 @@ def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tall
         radius=np.array([kept_radius(probe, body) for probe in probes]),
         skipping=True,
         travel=np.zeros(1),
-        wake=np.full((count, triangles), -np.inf),
-        block_wake=np.full((count, -(-triangles // TRIANGLE_BLOCK)), -np.inf),
+        surface=np.ascontiguousarray(surface[number]),
+        number=number.astype(np.uint32),
+        wake=np.full((count, -(-triangles // TRIANGLE_BLOCK)), -np.inf),
         near=np.zeros((count, triangles), dtype=np.uint32),
         near_count=np.zeros(count, dtype=np.int64),
         time=np.zeros(triangles),
@@ -73,7 +77,7 @@ def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tall
 
 def fresh(probing: Probing, tally: Tally) -> Probing:
     """What a frame may change without changing the state it starts from."""
-    kept = {name: getattr(probing, name).copy() for name in ("travel", "wake", "block_wake", "passed", "counts")}
+    kept = {name: getattr(probing, name).copy() for name in ("travel", "wake", "passed", "counts")}
     return probing._replace(tally=tally, **kept)
 
 
@@ -88,12 +92,8 @@ def tip_depth(probe: Probe, x: np.ndarray, triangles: np.ndarray, t: float) -> f
 
 
 def surface_distance(point: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> float:
-    """Of a point (3,) to a surface [m]; only triangles whose box is nearer than the nearest node are compared."""
-    corners = x[triangles] - point
-    apart = np.maximum(np.maximum(corners.min(axis=1), -corners.max(axis=1)), 0.0)
-    farthest = np.linalg.norm(corners[:, 0], axis=1).min()
-    weight = np.zeros(3)
-    return min(nearest_into(corner, weight) for corner in corners[np.linalg.norm(apart, axis=1) <= farthest])
+    """Of a point (3,) to a surface [m]."""
+    return float(distance_to(point, x, triangles, np.zeros((3, 3)), np.zeros(3)))
 
 
 def is_inside(point: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> bool:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from massspring.curve import along_curve
 from massspring.kernels.layout import Slices
 from massspring.kernels.tiles import LANES
 from massspring.springs import Springs
@@ -12,7 +13,6 @@ LONGEST, PIECE = 24, 10
 """Springs beside its ring up to which a node has a lane of its own; beyond it is cut into pieces of so many. A virtual
 node joined to forty others would make 63 lanes wait for it."""
 CACHE_LINE = 64  # bytes
-CURVE_BITS = 10  # per axis: a thousandth of the body
 WINDOW = 2048
 """Nodes, along a curve that fills space, among which lists of like length are put together. Wider windows have slices
 whose neighbours are all over the body and fall out of the nearest cache, narrower ones have more empty places."""
@@ -24,23 +24,6 @@ def aligned(shape: tuple[int, ...], real: np.dtype) -> np.ndarray:
     room = np.zeros(size + CACHE_LINE, dtype=np.uint8)
     begin = -room.ctypes.data % CACHE_LINE
     return room[begin : begin + size].view(real).reshape(shape)
-
-
-def along_curve(x: np.ndarray) -> np.ndarray:
-    """Place of each point on a curve through all of them that seldom leaves a neighbourhood: Morton's order, (n,).
-
-    The bits of the three coordinates x [m], (n, 3), take turns (Morton 1966).
-    """
-    cells = 1 << CURVE_BITS
-    size = max(float(np.ptp(x, axis=0).max()), np.finfo(float).tiny)
-    cell = np.minimum((x - x.min(axis=0)) / size * cells, cells - 1).astype(np.int64)
-    key = np.zeros(len(x), dtype=np.int64)
-    for bit in range(CURVE_BITS):
-        for axis in range(3):
-            key |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
-    place = np.empty(len(x), dtype=np.int64)
-    place[np.argsort(key, kind="stable")] = np.arange(len(x))
-    return place
 
 
 @dataclass(frozen=True)

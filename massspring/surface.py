@@ -3,6 +3,7 @@
 import numpy as np
 
 from massspring.errors import MassSpringError
+from massspring.kernels.sides import turns_round
 from massspring.kernels.volume import enclosed_volume
 from massspring.springs import EDGES_OF_TRIANGLE
 
@@ -10,14 +11,9 @@ from massspring.springs import EDGES_OF_TRIANGLE
 def winding_number(point: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> float:
     """How often a closed surface goes round `point` (3,): 1 inside, 0 outside, its solid angle over 4 pi.
 
-    `points` (n, 3) [m], `triangles` (f, 3). Van Oosterom and Strackee (1983), equation 8.
+    `points` (n, 3) [m], `triangles` (f, 3).
     """
-    a, b, c = (points[triangles] - point).transpose(1, 0, 2)
-    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-    dot_ab, dot_bc, dot_ca = (np.einsum("ij,ij->i", v, w) for v, w in ((a, b), (b, c), (c, a)))
-    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
-    angle = np.arctan2(triple, la * lb * lc + dot_ab * lc + dot_bc * la + dot_ca * lb)
-    return float(2.0 * angle.sum() / (4.0 * np.pi))
+    return float(turns_round(np.asarray(point, dtype=np.float64), points, triangles))
 
 
 def check_finite(what: str, values: np.ndarray) -> None:

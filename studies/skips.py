@@ -58,7 +58,7 @@ def _pairs(setup: Setup, state: State) -> str:
     """Boxes compared, pairs tested and triangles left behind, of all pairs of tips and triangles."""
     assert state.probing is not None
     steps = setup.clock.frames * setup.clock.steps
-    pairs, counts = state.probing.wake.size, state.probing.counts
+    pairs, counts = state.probing.near.size, state.probing.counts
     return (
         f"of {pairs:,} pairs a step {counts[COMPARED] / steps:.3g} boxes compared, {counts[TESTED] / steps:.3g} pairs "
         f"tested; in contact {counts[IN_CONTACT]} of {steps} steps, left behind {counts[LEFT_BEHIND]}"

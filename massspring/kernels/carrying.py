@@ -50,7 +50,7 @@ def lead(stage, p, n):
     f = probes.near[p, n]
     square, free, length, shift = 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)
     for k in range(3):
-        i, b = stage.network.triangles[f, k], probes.found[n, k]
+        i, b = probes.surface[f, k], probes.found[n, k]
         if probes.carried[i] > 0:
             square += b * b
             free += b
@@ -69,7 +69,7 @@ def lead(stage, p, n):
     # And a radius more, so that it does not end on the tip.
     farther = (1.0 + radius / (stage.dt * length)) / square
     for k in range(3):
-        i = stage.network.triangles[f, k]
+        i = probes.surface[f, k]
         if probes.carried[i] > 0:
             b = farther * probes.found[n, k]
             probes.push[i, 0] += b * shift[0]
@@ -89,7 +89,7 @@ def take_along(stage, p):
             continue
         fresh = False
         for k in range(3):
-            i = network.triangles[probes.near[p, n], k]
+            i = probes.surface[probes.near[p, n], k]
             if network.inverse_mass[i] > 0.0 and motion.locked[i] == 0:
                 take(stage, p, i)
                 fresh = True
@@ -158,7 +158,7 @@ def carry(stage, volumes, lam, plain, horizon):
         reach = plain + stage.dt * (fastest + give_way(stage, volumes))
         if reach > horizon:
             horizon = ROOM * reach
-            find_near(stage.network, stage.motion, stage.tips, stage.step, probes, horizon)
+            find_near(stage.motion, stage.tips, stage.step, probes, horizon)
             gather(stage, lam)
     probes.counts[CARRYING] += 1
     note_passed(stage)
@@ -178,7 +178,7 @@ def note_passed(stage):
             passed = True
             for n in range(probes.near_count[p]):
                 if probes.time[n] == first and probes.passed[p] == 0:
-                    probes.passed[p] = 1 + probes.near[p, n]
+                    probes.passed[p] = 1 + probes.number[probes.near[p, n]]
     probes.counts[LEFT_BEHIND] += passed
 
 

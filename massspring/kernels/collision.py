@@ -185,6 +185,30 @@ def touching(pair, radius):
 
 
 @lean
+def passes_by(pair):
+    """Whether one coordinate of all corners keeps its sign through the step: nothing crosses then (eq. 142)."""
+    apart, size = 0.0, 0.0
+    for axis in range(3):
+        low = min(pair.begin[0, axis], pair.begin[1, axis], pair.begin[2, axis])
+        low = min(low, pair.end[0, axis], pair.end[1, axis], pair.end[2, axis])
+        high = max(pair.begin[0, axis], pair.begin[1, axis], pair.begin[2, axis])
+        high = max(high, pair.end[0, axis], pair.end[1, axis], pair.end[2, axis])
+        apart, size = max(apart, low, -high), max(size, -low, high)
+    return apart > 2.0 * ON * size
+
+
+@lean
+def stays_off(corner, distance):
+    """Whether a coordinate of all corners (3, 3) alone keeps them more than `distance` [m] from the origin."""
+    apart = 0.0
+    for axis in range(3):
+        low = min(corner[0, axis], corner[1, axis], corner[2, axis])
+        high = max(corner[0, axis], corner[1, axis], corner[2, axis])
+        apart = max(apart, low, -high)
+    return apart * (1.0 - ON) > distance
+
+
+@lean
 def crossing(pair):
     """First time at which the point passes through the triangle, or NEVER: roots of (142) at which it lies inside.
 

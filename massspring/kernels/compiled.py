@@ -72,6 +72,11 @@ def inlined(function: Function) -> Function:
     return _jit(function, _nrt=False, forceinline=True)
 
 
+def comparing(function: Function) -> Function:
+    """As `inlined`, for maxima along arrays of numbers: a vector register compares several. NaN makes them anything."""
+    return _jit(function, _nrt=False, forceinline=True, fastmath={"nnan", "nsz"})
+
+
 def summing(function: Function) -> Function:
     """As `inlined`, for sums along arrays: terms may be added in any order, so that a vector register adds several."""
     return _jit(function, _nrt=False, forceinline=True, fastmath={"reassoc", "contract"})

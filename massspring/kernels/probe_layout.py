@@ -1,4 +1,7 @@
-"""What the stage for thin probes is given: p probes, f triangles, n nodes, m volumes, r rows at most."""
+"""What the stage for thin probes is given: p probes, f triangles, n nodes, m volumes, r rows at most.
+
+Triangles are numbered along a curve through the body (`Probing.surface`), so that a block of them lies together.
+"""
 
 from typing import NamedTuple
 
@@ -64,10 +67,12 @@ class Probing(NamedTuple):
     """Whether pairs sleep and boxes are compared; the answer is the same without, bit for bit."""
     travel: np.ndarray
     """How far any node can have come nearer to any tip since the start [m], (1,)."""
+    surface: np.ndarray
+    """The triangles along the curve, (f, 3) uint32."""
+    number: np.ndarray
+    """What the body calls them, (f,) uint32."""
     wake: np.ndarray
-    """Travel at which a pair must be looked at again [m], (p, f)."""
-    block_wake: np.ndarray
-    """The smallest of each block of triangles, (p, ceil(f / TRIANGLE_BLOCK))."""
+    """Travel at which the next triangle of a block must be looked at again [m], (p, ceil(f / TRIANGLE_BLOCK))."""
     near: np.ndarray
     """Triangles that may meet a tip in this step, ascending, (p, f) uint32."""
     near_count: np.ndarray
@@ -93,7 +98,7 @@ class Probing(NamedTuple):
     taken_count: np.ndarray
     """(1,) int64."""
     passed: np.ndarray
-    """1 + the first triangle that a tip was driven through, 0 for none, (p,) int64."""
+    """1 + the body's number of the first triangle that a tip was driven through, 0 for none, (p,) int64."""
     pair: Pair
     tally: Tally
     """Of the frame."""

@@ -10,7 +10,7 @@ from massspring.kernels.probe_pressure import swelling
 @lean
 def gather(stage, lam):
     """u_i of the corners of all near triangles (eq. 9, 10), and v⁺ = u."""
-    motion, probes, triangles, weight = stage.motion, stage.probes, stage.network.triangles, stage.network.inverse_mass
+    motion, probes, triangles, weight = stage.motion, stage.probes, stage.probes.surface, stage.network.inverse_mass
     v, g, base, velocity = motion.v_star, motion.gradient, probes.base, probes.velocity
     for p in range(probes.radius.shape[0]):
         for n in range(probes.near_count[p]):
@@ -41,7 +41,7 @@ def carried_speed(stage, i):
 @lean
 def move(stage, volumes):
     """v⁺_i = u_i + push_i + dt W̃_i (Jᵀ δ)_i of the near corners, or as they are carried [m/s] (eq. 146, 147)."""
-    probes, triangles, base, push = stage.probes, stage.network.triangles, stage.probes.base, stage.probes.push
+    probes, triangles, base, push = stage.probes, stage.probes.surface, stage.probes.base, stage.probes.push
     for p in range(probes.radius.shape[0]):
         for n in range(probes.near_count[p]):
             for k in range(3):

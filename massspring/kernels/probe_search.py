@@ -1,6 +1,6 @@
 """What a thin tip runs into in the step as it stands: triangles passed or too near (docs/theory.md, section 11)."""
 
-from massspring.kernels.collision import NEVER, crossing, nearest_into, touching
+from massspring.kernels.collision import NEVER, crossing, nearest_into, passes_by, stays_off, touching
 from massspring.kernels.compiled import lean
 from massspring.kernels.point_contacts import row_of, set_row
 from massspring.kernels.probe_layout import TESTED
@@ -25,14 +25,14 @@ def pair_into(pair, x, velocity, triangles, f, dt):
 @lean
 def look(stage, p):
     """When and where the tip passes through each near triangle in the step as it stands; the first time, or NEVER."""
-    probes, x, triangles, pair = stage.probes, stage.motion.x, stage.network.triangles, stage.probes.pair
+    probes, x, triangles, pair = stage.probes, stage.motion.x, stage.probes.surface, stage.probes.pair
     for axis in range(3):
         pair.tip[0, axis] = stage.tips.start[stage.step, p, axis]
         pair.tip[1, axis] = stage.tips.end[stage.step, p, axis]
     first = NEVER
     for n in range(probes.near_count[p]):
         pair_into(pair, x, probes.velocity, triangles, probes.near[p, n], stage.dt)
-        t = crossing(pair)
+        t = NEVER if passes_by(pair) else crossing(pair)
         probes.time[n] = t
         if t <= 1.0:
             first = min(first, t)
@@ -43,7 +43,7 @@ def look(stage, p):
 
 
 @lean
-def add_crossings(probes, triangles, p, first):
+def add_crossings(probes, p, first):
     """A contact for every triangle that the tip passes through at the first time; how many found room.
 
     What lies beyond it would be met only by a tip that nothing had stopped.
@@ -53,7 +53,7 @@ def add_crossings(probes, triangles, p, first):
         if probes.time[n] <= first + SAME_TIME:
             for k in range(3):
                 probes.pair.weight[k], probes.pair.direction[k] = probes.found[n, k], probes.found[n, 3 + k]
-            room += set_row(probes.rows, p, probes.near[p, n], triangles, probes.pair)
+            room += set_row(probes.rows, p, probes.near[p, n], probes.surface, probes.pair)
     return room
 
 
@@ -63,10 +63,12 @@ def add_touches(stage, p):
 
     A triangle that has its contact and turned away under it gets the direction of the end of the step.
     """
-    room, probes, pair, triangles = 0, stage.probes, stage.probes.pair, stage.network.triangles
+    room, probes, pair, triangles = 0, stage.probes, stage.probes.pair, stage.probes.surface
     for n in range(probes.near_count[p]):
         f = probes.near[p, n]
         pair_into(pair, stage.motion.x, probes.velocity, triangles, f, stage.dt)
+        if stays_off(pair.end, probes.radius[p]):
+            continue
         distance = nearest_into(pair.end, pair.weight)
         if distance >= probes.radius[p]:
             continue
@@ -91,7 +93,7 @@ def search(stage):
         first = look(stage, p)
         if first <= 1.0:
             crosses = True
-            found += add_crossings(stage.probes, stage.network.triangles, p, first)
+            found += add_crossings(stage.probes, p, first)
         else:
             found += add_touches(stage, p)
     return found, crosses

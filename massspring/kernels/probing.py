@@ -6,7 +6,7 @@ contact, and the search begins again until nothing crosses (docs/theory.md, sect
 
 import math
 
-from massspring.kernels.broad_phase import ROOM, fastest_node, find_near
+from massspring.kernels.broad_phase import ROOM, SAFE, fastest_node, find_near
 from massspring.kernels.carrying import carry
 from massspring.kernels.compiled import lean
 from massspring.kernels.point_contacts import solve_rows
@@ -32,7 +32,7 @@ def meet_probes(network, motion, drive, step, probes, lam, mobility, volumes):
     if not plain < math.inf:
         return lam
     reach, horizon, crosses = plain, ROOM * plain, False
-    find_near(network, motion, drive.tips, step, probes, horizon)
+    find_near(motion, drive.tips, step, probes, horizon)
     gather(stage, lam)
     probes.rows.count[0] = 0
     for sweep in range(PASSES):
@@ -45,7 +45,7 @@ def meet_probes(network, motion, drive, step, probes, lam, mobility, volumes):
         probes.counts[ROUNDS] += 1
         if reach > horizon:
             horizon = ROOM * reach
-            find_near(network, motion, drive.tips, step, probes, horizon)
+            find_near(motion, drive.tips, step, probes, horizon)
             gather(stage, lam)
         move(stage, volumes)
     probes.counts[IN_CONTACT] += probes.rows.count[0] > 0
@@ -54,5 +54,5 @@ def meet_probes(network, motion, drive, step, probes, lam, mobility, volumes):
     elif probes.rows.count[0] > 0:
         settle(stage)
         lam = pressed_on(stage, volumes, lam)
-    probes.travel[0] += reach
+    probes.travel[0] += SAFE * reach
     return lam

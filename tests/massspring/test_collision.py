@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from massspring.collision import new_pair, surface_distance
+from massspring.collision import is_inside, new_pair, surface_distance
 from massspring.kernels.collision import NEVER, crossing, nearest_into, touching
+from massspring.surface import winding_number
 from tests.massspring.conftest import icosphere
 
 FLAT = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -175,3 +176,24 @@ def test_the_distance_to_a_surface():
     centre = points[faces[5]].mean(axis=0)
     normal = np.cross(*(points[faces[5]][1:] - points[faces[5]][0]))
     assert surface_distance(centre + 0.004 * normal / np.linalg.norm(normal), points, faces) == pytest.approx(0.004)
+
+
+def test_which_side_of_a_surface_a_point_is_on():
+    """Just inside and just outside a face, an edge, a corner; inside out, the surface goes round backwards."""
+    points, faces = icosphere(2)
+    a, b, c = points[faces[5]]
+    for place in ((a + b + c) / 3, (a + b) / 2, a, 0.9 * a + 0.05 * b + 0.05 * c):
+        assert winding_number(place * (1 - 1e-7), points, faces) == pytest.approx(1.0, abs=1e-6)
+        assert winding_number(place * (1 + 1e-7), points, faces) == pytest.approx(0.0, abs=1e-6)
+        assert winding_number(place * (1 - 1e-7), points, faces[:, ::-1]) == pytest.approx(-1.0, abs=1e-6)
+    twice = np.concatenate([faces, faces])
+    assert winding_number(np.zeros(3), points, twice) == pytest.approx(2.0, abs=1e-12)
+    assert is_inside(0.5 * a, points, faces) and not is_inside(1.5 * a, points, faces)
+
+
+def test_the_distance_to_a_surface_against_every_triangle():
+    points, faces = icosphere(2)
+    rng, weight = np.random.default_rng(8), np.zeros(3)
+    points = points + 0.01 * rng.normal(size=points.shape)
+    for tip in 0.06 * rng.normal(size=(50, 3)):
+        assert surface_distance(tip, points, faces) == min(nearest_into(points[f] - tip, weight) for f in faces)

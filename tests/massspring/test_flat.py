@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
+from massspring.curve import along_curve
 from massspring.kernels.blocks import BLOCK, any_locked
 from massspring.kernels.compiled import lean
 from massspring.kernels.flat import flat
-from massspring.neighbours import along_curve
 
 
 @lean

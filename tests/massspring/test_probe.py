@@ -129,7 +129,7 @@ def test_contacts_and_volume_equal_the_full_saddle_point_solve():
     c = np.zeros((count, *u.shape))
     for k in range(count):
         for q in range(3):
-            c[k, net.triangles[rows.triangle[k], q]] += rows.weight[k, q] * rows.direction[k]
+            c[k, probing.surface[rows.triangle[k], q]] += rows.weight[k, q] * rows.direction[k]
     tip = drive.tips.end[0, rows.probe[:count]]
     ask = (
         probing.radius[rows.probe[:count]]

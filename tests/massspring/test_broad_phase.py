@@ -1,0 +1,101 @@
+"""What lets a thin probe pass over most triangles never passes over one that it meets."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import Free, ImplicitVolume
+from massspring.kernels.broad_phase import TRIANGLE_BLOCK, fastest_node
+from massspring.kernels.collision import NEVER, crossing, nearest_into, passes_by, stays_off
+from tests.massspring.test_collision import pair_of
+from tests.massspring.test_probe import BALL, EDGE, pressed
+
+
+def test_triangles_of_a_block_are_neighbours():
+    probing = pressed(Free()).start().probing
+    number = probing.number
+    assert np.array_equal(np.sort(number), np.arange(len(BALL.triangles)))
+    assert np.array_equal(probing.surface, BALL.triangles[number])
+    x = BALL.rest[probing.surface].mean(axis=1)
+    spans = [np.linalg.norm(np.ptp(x[k : k + TRIANGLE_BLOCK], axis=0)) for k in range(0, len(x), TRIANGLE_BLOCK)]
+    shuffled = np.random.default_rng(0).permutation(x)
+    strewn = [
+        np.linalg.norm(np.ptp(shuffled[k : k + TRIANGLE_BLOCK], axis=0)) for k in range(0, len(x), TRIANGLE_BLOCK)
+    ]
+    assert np.median(spans) < 0.5 * np.median(strewn)
+
+
+@pytest.mark.parametrize("precision", ["float64", "float32"])
+@pytest.mark.parametrize("fast", ["free", "held by an obstacle"])
+def test_no_node_is_faster_than_the_fastest(fast, precision):
+    """Outside truth: v⁺ of all nodes by numpy; the node that is fastest is free, or slides on an obstacle."""
+    setup = replace(pressed(ImplicitVolume()), precision=precision)
+    state, dt, lam, rng = setup.start(), setup.clock.dt, 30.0, np.random.default_rng(3)
+    net, motion = state.network, state.motion
+    for trial in range(20):
+        motion.v_star[:], motion.gradient[:] = rng.normal(size=(2, *motion.x.shape)) * [[[1.0]], [[1e-4]]]
+        motion.locked[:] = 0
+        chosen = rng.choice(BALL.node_count, 5, replace=False)
+        motion.locked[chosen] = [1, 1, 2, 3, 3]
+        motion.direction[chosen] = np.eye(3)[rng.integers(3, size=5)]
+        motion.goal[chosen] = 0.1 * rng.normal(size=(5, 3))
+        if fast == "free":
+            motion.v_star[np.setdiff1d(np.arange(BALL.node_count), chosen)[trial]] *= 10.0
+        else:
+            motion.goal[chosen[trial % 5]] *= 100.0
+        u = motion.v_star + dt * lam * net.inverse_mass[:, None] * motion.gradient
+        for i in chosen:
+            d = motion.direction[i]
+            kept = {1: np.eye(3) - np.outer(d, d), 2: np.outer(d, d), 3: np.zeros((3, 3))}[int(motion.locked[i])]
+            u[i] = kept @ u[i] + motion.goal[i]
+        truth = np.linalg.norm(u, axis=1).max()
+        found = fastest_node(net, motion, lam, dt)
+        assert found >= truth * (1 - 1e-6)  # what SAFE makes up for
+        assert found <= truth * (1 + 1e-6)  # the fastest is made to stand out: the bound is sharp
+
+
+def test_a_pair_is_passed_over_only_where_nothing_crosses():
+    rng = np.random.default_rng(5)
+    over = crossed = 0
+    for _ in range(4000):
+        begin = rng.normal(size=(3, 3)) + 0.6 * rng.normal(size=3)
+        pair = pair_of(begin, begin + rng.normal(size=3) + 0.2 * rng.normal(size=(3, 3)))
+        t = crossing(pair)
+        crossed += t <= 1.0
+        if passes_by(pair):
+            over += 1
+            assert t == NEVER
+    assert over > 1500 and crossed > 100, "the pairs show nothing"
+
+
+def test_a_corner_that_the_tip_just_grazes_is_not_passed_over():
+    """The triangle lies in x ≥ 0 throughout, and has a corner at the tip's x: a crossing through its rim."""
+    corners, up, right = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0]]), np.eye(3)[2], np.eye(3)[0]
+    pair = pair_of(corners + up, corners - up)
+    assert not passes_by(pair)
+    assert crossing(pair) == pytest.approx(0.5, abs=1e-9)
+    assert passes_by(pair_of(corners + up + 1e-6 * right, corners - up + 1e-6 * right))
+
+
+def test_what_stays_off_is_farther_than_the_radius():
+    rng = np.random.default_rng(6)
+    weight, off = np.zeros(3), 0
+    for _ in range(2000):
+        corners = rng.normal(size=(3, 3)) + rng.normal(size=3)
+        if stays_off(corners, 0.3):
+            off += 1
+            assert nearest_into(corners, weight) > 0.3
+    assert 500 < off < 1900
+    near = np.array([[0.3, -1.0, -1.0], [0.3, 1.0, -1.0], [0.3, 0.0, 1.0]])
+    assert not stays_off(near, 0.3)  # touches: its distance is the radius
+    assert stays_off(near + 1e-6 * np.eye(3)[0], 0.3)
+
+
+def test_a_probe_in_contact_compares_few_boxes_and_solves_few_pairs():
+    """In a dimple of the ball the pairs that are tested are those round the tip: a tenth of the triangles at most."""
+    setup = pressed(Free(), 0.3 * EDGE, frames=20)
+    state = setup.start()
+    for frame in range(setup.clock.frames):
+        state = setup.method.advance(state, setup.drive(frame))
+    assert 0 < state.probing.near_count[0] < 0.1 * len(BALL.triangles)
