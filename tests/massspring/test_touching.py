@@ -7,15 +7,16 @@ from massspring import Clock, ImplicitSprings, Path, Plane, Setup
 from massspring.methods.touching import SLIDES, STICKS, STILL, Contact, Touching
 
 DT, MU = 5e-3, 0.5
+BELOW = 1e-3
 CARRIED = np.array([0.3, -0.2, 0.0])
 ALONG = Path((0.0, 1.0), ((0.0, 0.0, 0.0), tuple(CARRIED)))
 
 
 class Sole:
-    """A block that sinks into a rough floor which moves along itself: the nodes of its sole stick at first."""
+    """A block that falls onto a rough floor which moves along itself: the nodes of its sole stick at first."""
 
     def __init__(self, body) -> None:
-        floor = Plane((0, 0, float(body.rest[:, 2].min())), (0, 0, 1), ALONG, MU)
+        floor = Plane((0, 0, float(body.rest[:, 2].min()) - BELOW), (0, 0, 1), ALONG, MU)
         fall = np.tile([0.0, 0.0, -1.0], (body.node_count, 1))
         setup = Setup(body, ImplicitSprings(), Clock(DT, 1, 1), (floor,), velocity=fall)
         state, self.drive = setup.start(), setup.drive(0)
@@ -23,6 +24,8 @@ class Sole:
         self.factor = state.memory.at(self.network, DT, 0.0)
         self.contact = Contact(self.network, self.motion, self.drive, 0)
         self.nodes = np.flatnonzero(self.motion.locked == STICKS)
+        self.place = (floor.point[2] - self.motion.x[self.nodes, 2]) / DT
+        """Speed [m/s] that ends the step on the floor."""
 
     def touching(self) -> Touching:
         return Touching(self.factor, self.motion, self.network.surface_nodes, DT)
@@ -54,6 +57,9 @@ def test_a_node_sticks_up_to_what_its_friction_can_take(sole, asked, slips):
     assert changed == slips
     assert sole.motion.locked[first] == (SLIDES if slips else STICKS)
     assert (sole.motion.locked[others] == STICKS).all()
+    # Up to the floor within the step; along it with the floor, or freely.
+    expected = [*(0.0 * CARRIED[:2] if slips else CARRIED[:2]), sole.place[0]]
+    assert np.allclose(sole.motion.goal[first], expected, rtol=0, atol=1e-12)
     rubbed = [0.0, MU, 0.0] if slips else [0.0, 0.0, 0.0]
     assert np.allclose(sole.contact.rubbed[first], rubbed, rtol=0, atol=1e-15)
 
