@@ -2,7 +2,7 @@
 
 import numpy as np
 
-CURVE_BITS = 10  # per axis: a thousandth of the body
+CURVE_BITS = 20  # per axis: a millionth of the body, so that no two nodes share a cell
 
 
 def along_curve(x: np.ndarray) -> np.ndarray:

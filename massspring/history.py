@@ -117,15 +117,16 @@ class Recorder:
 
     def record(self, frame: int, state: State, elapsed_ns: int) -> None:
         """Reads the state after frame number `frame` (0, 1, …)."""
-        net, x, v = state.network, state.x.astype(np.float64, copy=False), state.v.astype(np.float64, copy=False)
+        net, x = state.network, state.x.astype(np.float64, copy=False)
+        inside_x, v = (part.astype(np.float64, copy=False) for part in (state.motion.x, state.motion.v))
         self.volume[frame] = self.volumes.measure(x)
         self.pressure[frame] = state.lam
         if "kinetic" in self.extra:
             # Not by `@`: a pool of threads that has computed a product waits for the next at the expense of frames.
             self.scalars["kinetic"][frame] = 0.5 * float(np.einsum("i,ij,ij->", net.mass, v, v))
         if "elastic" in self.extra:
-            taut = spring_energy(x, net.ends, net.rest_length, net.stiffness) - self.rest_energy
-            self.scalars["elastic"][frame] = taut + membrane_energy(x, net.membrane)
+            taut = spring_energy(inside_x, net.ends, net.rest_length, net.stiffness) - self.rest_energy
+            self.scalars["elastic"][frame] = taut + membrane_energy(inside_x, net.membrane)
         if len(self.rest_volumes):
             tetrahedron_volumes_into(x, self.body.tetrahedra, self.cell_volumes)
             self.scalars["min_j"][frame] = smallest_ratio(self.cell_volumes, self.rest_volumes)

@@ -144,6 +144,19 @@ def _by_node(node: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return found, piece[order], np.r_[start, len(node)].astype(np.int64)
 
 
+def places_in_slices(springs: Springs, triangles: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Place of each node when those of a slice follow each other, and nodes in pieces come last, (n,).
+
+    `triangles` (f, 3): the kept surface; `rest` (n, 3) [m]. Nodes so numbered are found in their places again.
+    """
+    slots = _slots(*_lists_of(springs, triangles, len(rest)), along_curve(rest))
+    used = np.arange(LANES) < slots.lanes[:, None]
+    whole, split = (slots.node[part][used[part]] for part in (np.s_[slots.pieces :], np.s_[: slots.pieces]))
+    place = np.empty(len(rest), dtype=np.int64)
+    place[np.concatenate([whole, np.unique(split)])] = np.arange(len(rest))
+    return place
+
+
 def slices_of(springs: Springs, triangles: np.ndarray, inverse_mass: np.ndarray, rest: np.ndarray) -> Slices:
     """The layout for `springs` and the kept surface `triangles` (f, 3) on nodes of `inverse_mass` (n,) [1/kg].
 
@@ -169,6 +182,7 @@ def slices_of(springs: Springs, triangles: np.ndarray, inverse_mass: np.ndarray,
         row, lane, spring = (part[lists.spring >= 0] for part in (row, lane, lists.spring))
         rest_length[row, lane], stiffness[row, lane] = springs.rest_length[spring], springs.stiffness[spring]
     used = np.arange(LANES) < slots.lanes[:, None]
+    in_a_row = used.all(axis=1) & (np.diff(node, axis=1) == 1).all(axis=1)
     pieces = np.flatnonzero(used[: slots.pieces])
     split_node, split_piece, split_start = _by_node(node.reshape(-1)[pieces], pieces)
     held = np.flatnonzero(used & (inverse_mass[node] == 0.0))
@@ -179,6 +193,7 @@ def slices_of(springs: Springs, triangles: np.ndarray, inverse_mass: np.ndarray,
     return Slices(
         node=node.astype(np.uint32),
         lanes=slots.lanes,
+        first=np.where(in_a_row, node[:, 0], -1),
         start=start,
         rings=ring_rows,
         neighbour=neighbour,

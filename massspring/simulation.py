@@ -17,6 +17,7 @@ from massspring.errors import MassSpringError
 from massspring.history import EXTRA, History, Recorder
 from massspring.kernels.layout import Drive, Tips
 from massspring.methods.base import Method, State
+from massspring.numbering import Numbered, numbered
 from massspring.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
 from massspring.precision import Precision, check_precision, in_precision
 from massspring.setup_checks import (
@@ -110,14 +111,19 @@ class Setup:
         """Names of the volumes whose target is too fast to be followed as it is."""
         return [name for name, ramp in self.followed.items() if ramp is not self.targets[name]]
 
+    @cached_property
+    def inside(self) -> Numbered:
+        """The body with the numbers its nodes have during a run."""
+        return numbered(self.body)
+
     def start(self) -> State:
         """The state at t = 0."""
-        state = self.method.start(self.body, self.attachments, self.velocity)
+        state = self.inside.start(self.method, self.attachments, self.velocity)
         if self.probes:
-            probing = new_probing(self.body, state.network.triangles, self.probes, state.tally)
+            probing = new_probing(self.inside.body, state.network.triangles, self.probes, state.tally)
             state = replace(state, probing=probing)
         if self.positions is not None:
-            state.motion.x[:] = self.positions
+            state = state.moved_to(self.positions)
         state = in_precision(state, self.precision)
         if self.threads == 1:
             return state

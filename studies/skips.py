@@ -46,7 +46,7 @@ def _with_friction(setup: Setup, state: State) -> tuple[Setup, State]:
 
 
 def _with_rows(setup: Setup, state: State) -> tuple[Setup, State]:
-    return setup, replace(state, rows=volume_rows(setup.body.kept, setup.body.node_count))
+    return setup, replace(state, rows=volume_rows(setup.inside.body.kept, setup.body.node_count))
 
 
 def _awake(setup: Setup, state: State) -> tuple[Setup, State]:

@@ -33,6 +33,8 @@ class Slices(NamedTuple):
     """(S, 64) uint32; empty lanes repeat a node of the slice."""
     lanes: np.ndarray
     """Lanes in use, (S,) int64."""
+    first: np.ndarray
+    """Of a full slice whose nodes follow each other in memory the first, else -1, (S,) int64."""
     start: np.ndarray
     """First row of each slice, (S + 1,) int64."""
     rings: np.ndarray

@@ -27,6 +27,7 @@ from massspring.kernels.tiles import (
     pull,
     put,
     sweep,
+    take,
     total,
     way,
 )
@@ -41,7 +42,7 @@ def gather(places, slices, s, keeps, shortest, o0, o1, o2, tile):
     """
     neighbour, rest_length = slices.neighbour, slices.rest_length
     stiffness, stiffness_row = slices.stiffness, slices.stiffness_row
-    begin(places, slices.node, s, tile)
+    begin(places, slices, s, tile)
     first, last = slices.start[s], slices.start[s + 1]
     ring_end = first + (slices.rings[s] if keeps else 0)
     for row in range(first, ring_end):
@@ -75,9 +76,12 @@ def predict_slice(motion, slices, s, dt, keep, a0, a1, a2, tile):
     """v* (eq. 6) and G of the nodes of a slice in place of x and 6 G, and their shares of G·v* and G·W·G."""
     v, node, inverse_mass = motion.v, slices.node, slices.inverse_mass
     sixth = motion.x.dtype.type(1.0 / 6.0)
-    for lane in range(LANES):
-        i, at = node[s, lane], SPEED + 3 * lane
-        tile[at], tile[at + 1], tile[at + 2] = v[i, 0], v[i, 1], v[i, 2]
+    if slices.first[s] >= 0:
+        take(v, slices.first[s], 3, tile)
+    else:
+        for lane in range(LANES):
+            i, at = node[s, lane], SPEED + 3 * lane
+            tile[at], tile[at + 1], tile[at + 2] = v[i, 0], v[i, 1], v[i, 2]
     for lane in range(LANES):
         at, w = SPEED + 3 * lane, inverse_mass[s, lane]
         v0 = keep * tile[at] + dt * w * tile[FORCE + lane] + a0
@@ -108,7 +112,7 @@ def pass_slices(motion, drive, slices, first, last, keeps, tile):
     dt, keep = real(drive.dt), real(1.0 - drive.damping * drive.dt)
     a0, a1, a2 = real(drive.dt * drive.gravity[0]), real(drive.dt * drive.gravity[1]), real(drive.dt * drive.gravity[2])
     places, pulled, sums, v_star, gradient = motion.places, motion.pulled, motion.sums, motion.v_star, motion.gradient
-    node, lanes, shortest = slices.node, slices.lanes, real(SHORTEST)
+    shortest = real(SHORTEST)
     o0, o1, o2 = places[slices.origin, 0], places[slices.origin, 1], places[slices.origin, 2]
     for s in range(first, last):
         share = gather(places, slices, s, keeps, shortest, o0, o1, o2, tile)
@@ -119,10 +123,10 @@ def pass_slices(motion, drive, slices, first, last, keeps, tile):
             continue
         keep_held(slices, s, motion.force, tile)
         predict_slice(motion, slices, s, dt, keep, a0, a1, a2, tile)
-        put(tile, HERE, node, s, lanes[s], v_star)
+        put(tile, HERE, slices, s, v_star)
         # Empty lanes have springs of no stiffness and no ring: they add zeros.
         if keeps:
-            put(tile, AREA, node, s, lanes[s], gradient)
+            put(tile, AREA, slices, s, gradient)
             sums[s, 1], sums[s, 2] = total(tile, SUMS), total(tile, SUMS + LANES)
 
 

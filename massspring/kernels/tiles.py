@@ -5,6 +5,7 @@ instructions: the blocks of one array cannot overlap, and 64 nodes later a copy 
 """
 
 from massspring.kernels.compiled import inlined
+from massspring.kernels.flat import flat
 
 LANES = 64
 """Nodes side by side; with 8 or 16 the tile waits for its own stores, 32 to 128 are equally fast."""
@@ -54,9 +55,20 @@ def sweep(tile, lane, d0, d1, d2):
 
 
 @inlined
-def begin(places, node, s, tile):
+def take(x, first, width, tile):
+    """The rows of 64 nodes that follow each other in memory, `width` numbers each, into `THERE`."""
+    rows = flat(x, first, first + LANES)
+    for k in range(width * LANES):
+        tile[THERE + k] = rows[k]
+
+
+@inlined
+def begin(places, slices, s, tile):
     """x_i of the nodes of a slice, nothing pulls yet."""
-    fetch(places, node, s, tile)
+    if slices.first[s] >= 0:
+        take(places, slices.first[s], 4, tile)
+    else:
+        fetch(places, slices.node, s, tile)
     for lane in range(LANES):
         at = THERE + 4 * lane
         tile[HERE + lane], tile[HERE + LANES + lane] = tile[at], tile[at + 1]
@@ -91,12 +103,18 @@ def total(tile, at):
 
 
 @inlined
-def put(tile, block, nodes, row, lanes, x):
+def put(tile, block, slices, s, x):
     """x_i = the block of the tile, for the lanes in use."""
     for lane in range(LANES):
         at = THERE + 3 * lane
         tile[at], tile[at + 1] = tile[block + lane], tile[block + LANES + lane]
         tile[at + 2] = tile[block + 2 * LANES + lane]
-    for lane in range(lanes):
-        i, at = nodes[row, lane], THERE + 3 * lane
+    first, node = slices.first[s], slices.node
+    if first >= 0:
+        rows = flat(x, first, first + LANES)
+        for k in range(VECTOR):
+            rows[k] = tile[THERE + k]
+        return
+    for lane in range(slices.lanes[s]):
+        i, at = node[s, lane], THERE + 3 * lane
         x[i, 0], x[i, 1], x[i, 2] = tile[at], tile[at + 1], tile[at + 2]

@@ -47,16 +47,24 @@ class State:
     """Arrays that only the method knows, made by its `start`."""
     probing: Probing | None = None
     """Of thin probes; None where there are none: the frame is then compiled without their stage."""
+    place: np.ndarray | None = None
+    """Where each node is in `network` and `motion`, (n,); None where they have the numbers of the body."""
 
     @property
     def x(self) -> np.ndarray:
         """Positions [m], (n, 3)."""
-        return self.motion.x
+        return self.motion.x if self.place is None else self.motion.x[self.place]
 
     @property
     def v(self) -> np.ndarray:
         """Velocities [m/s], (n, 3)."""
-        return self.motion.v
+        return self.motion.v if self.place is None else self.motion.v[self.place]
+
+    def moved_to(self, x: np.ndarray) -> "State":
+        """The same at positions `x` (n, 3) [m]."""
+        motion = self.motion._replace(x=self.motion.x.copy())
+        motion.x[slice(None) if self.place is None else self.place] = x
+        return replace(self, motion=motion)
 
 
 def new_tally(obstacles: int, attachments: int, ticks: Ticks | None = None) -> Tally:
@@ -115,11 +123,8 @@ def start(
     body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None, memory: Any = None
 ) -> State:
     """The body at rest, or with velocities `v` (n, 3) [m/s]. Raises MassSpringError for bad attachments."""
-    kept = body.kept
-    alone = kept.count == 1 and bool((np.abs(kept.share.data) == 1.0).all())
-    surface = turned(kept) if alone else body.triangles
-    network = _network(body, attachments, surface)
-    n = body.node_count
+    kept, n = body.kept, body.node_count
+    network = _network(body, attachments, swept_surface(body))
     velocity = np.zeros((n, 3)) if v is None else np.array(v, dtype=np.float64)
     if velocity.shape != (n, 3):
         raise MassSpringError(f"velocities have shape {velocity.shape}; the body has {n} nodes, give ({n}, 3)")
@@ -128,9 +133,9 @@ def start(
     motion = Motion(
         x=body.rest.copy(),
         v=velocity,
-        v_star=np.zeros((n, 3)),
+        v_star=aligned((n, 3), real),
         force=np.zeros((n, 3)),
-        gradient=np.zeros((n, 3)),
+        gradient=aligned((n, 3), real),
         touched=np.zeros(n, dtype=np.uint32),
         second=np.zeros(n, dtype=np.uint32),
         entering=np.zeros(n, dtype=np.uint32),
@@ -145,7 +150,18 @@ def start(
         pulled=aligned((slices.pieces, RESULT), real),
         sums=np.zeros((len(slices.lanes) + 1, 3)),
     )
-    return State(network, motion, np.zeros(kept.count), None if alone else volume_rows(kept, n), memory=memory)
+    rows = None if keeps_one(kept) else volume_rows(kept, n)
+    return State(network, motion, np.zeros(kept.count), rows, memory=memory)
+
+
+def keeps_one(volumes: Volumes) -> bool:
+    """Whether a division is enough: one closed surface."""
+    return volumes.count == 1 and bool((np.abs(volumes.share.data) == 1.0).all())
+
+
+def swept_surface(body: Body) -> np.ndarray:
+    """The closed surface on whose rings the springs are gathered, the one volume kept where it is one, (f, 3)."""
+    return turned(body.kept) if keeps_one(body.kept) else body.triangles
 
 
 def turned(volumes: Volumes) -> np.ndarray:
@@ -155,16 +171,22 @@ def turned(volumes: Volumes) -> np.ndarray:
     return np.ascontiguousarray(np.where(share.data[:, None] > 0, triangles, triangles[:, ::-1]))
 
 
-def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarray) -> Network:
+def nodes_of(attachments: tuple[Attachment, ...], body: Body) -> list[np.ndarray]:
+    """Which nodes each attachment holds. Raises MassSpringError where they are none, not there or held twice."""
     nodes = [np.asarray(a.nodes, dtype=np.int64) for a in attachments]
     for number, held in enumerate(nodes):
         if not len(held):
             raise MassSpringError(f"attachment {number} holds no node; widen its region or refine the mesh")
         if held.min() < 0 or held.max() >= body.node_count:
             raise MassSpringError(f"attachment {number} names node {held.max()}; the body has {body.node_count} nodes")
-    held_nodes = np.concatenate(nodes) if nodes else np.empty(0, dtype=np.int64)
-    if len(np.unique(held_nodes)) != len(held_nodes):
+    if len(np.unique(np.concatenate([[], *nodes]))) != sum(map(len, nodes)):
         raise MassSpringError("two attachments hold the same node; their motions could contradict each other")
+    return nodes
+
+
+def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarray) -> Network:
+    nodes = nodes_of(attachments, body)
+    held_nodes = np.concatenate(nodes) if nodes else np.empty(0, dtype=np.int64)
     inverse_mass = 1.0 / body.mass
     inverse_mass[held_nodes] = 0.0
     touchable = np.zeros(body.node_count, dtype=np.uint8)
