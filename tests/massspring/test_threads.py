@@ -21,7 +21,7 @@ from massspring import (
 from massspring import Path as Motion
 from massspring.crew import crew, shared
 from massspring.kernels.blocks import BLOCK
-from massspring.kernels.team import JOB, REST, team_of
+from massspring.kernels.team import JOB, REST, SPRINGS, call, join, team_of
 from massspring.stability import step_limit
 from tests.massspring.conftest import SOFT, icosphere
 
@@ -60,6 +60,26 @@ def test_threads_change_no_bit(ball, method, precision):
         together = simulate(slid(ball, method, precision=precision, threads=threads))
         for name in ("final", "volume", "pressure", "contact_force", "held_force"):
             assert np.array_equal(getattr(together, name), getattr(alone, name)), (threads, name)
+
+
+def test_threads_search_all_nodes_where_obstacles_are_in_that_step(ball):
+    """Also those that nothing comes near: their distances tell whether somebody looked."""
+    found = []
+    for threads in (1, 2, 3):
+        setup = slid(ball, Free(), threads=threads)
+        found.append(setup.method.advance(setup.start(), setup.drive(0)).motion.clearance)
+    assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
+
+
+def test_each_thread_writes_on_scratch_of_its_own(ball):
+    setup = slid(ball, Free(), threads=2)
+    state = setup.start()
+    motion, untouched = state.motion, -7.0
+    motion.tile[:] = untouched
+    with crew(state.network, motion, setup.drive(0)):
+        call(motion.team, SPRINGS, 0, 0.0)
+        join(motion.team)
+    assert (motion.tile[0] == untouched).all() and not (motion.tile[1] == untouched).all()
 
 
 def test_threads_change_no_bit_of_several_volumes(filled_ball):
