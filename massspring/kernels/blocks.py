@@ -1,17 +1,21 @@
 """Looking for the few among many: 64 nodes are passed over at once where none of them is meant."""
 
 from massspring.kernels.compiled import inlined
+from massspring.kernels.flat import flat
 
 BLOCK = 64
 """Nodes."""
 
 
 @inlined
-def any_locked(locked, begin):
-    """Whether an obstacle holds any node of the block; a block that is not full is always looked through."""
-    if begin + BLOCK > locked.shape[0]:
+def any_within(clearance, begin, reach):
+    """Whether any node of the block is no farther than `reach` [m]; a block that is not full is always looked through.
+
+    What is not a number counts as near.
+    """
+    if begin + BLOCK > clearance.shape[0]:
         return True
-    found = False
-    for i in range(begin, begin + BLOCK):
-        found |= locked[i] > 0
-    return found
+    block, found = flat(clearance, begin, begin + BLOCK), 0
+    for i in range(BLOCK):
+        found += not block[i] > reach
+    return found > 0

@@ -12,7 +12,7 @@ from massspring.kernels.flat import flat
 
 @inlined
 def clearances_into(network, motion, drive, step, lam, first, last):
-    """clearance_i = min over obstacles of the distance of y = x + dt (v* + dt lam W G) [m] (eq. 12); none is touched.
+    """clearance_i = min over obstacles of the distance of y = x + dt (v* + dt lam W G) [m] (eq. 12).
 
     Of the nodes from `first` to `last`, those that nothing can touch among them.
     """
@@ -20,10 +20,9 @@ def clearances_into(network, motion, drive, step, lam, first, last):
     x, v_star = flat(motion.x, first, last), flat(motion.v_star, first, last)
     gradient, inverse_mass = flat(motion.gradient, first, last), flat(network.inverse_mass, first, last)
     course = x, v_star, gradient, inverse_mass, real(drive.dt), real(drive.dt * lam)
-    touched, locked = flat(motion.touched, first, last), flat(motion.locked, first, last)
     clearance = flat(motion.clearance, first, last)
     for i in range(clearance.shape[0]):
-        touched[i], locked[i], clearance[i] = 0, 0, math.inf
+        clearance[i] = math.inf
     for o in range(drive.radius.shape[0]):
         place, span, radius = drive.position[step, o], drive.span[o], real(drive.radius[o])
         p0, p1, p2 = real(place[0]), real(place[1]), real(place[2])

@@ -5,6 +5,7 @@ What is rare (friction, two obstacles at once) has loops of its own in `kernels.
 
 import math
 
+from massspring.kernels.blocks import BLOCK, any_within
 from massspring.kernels.clearance import clearances_into
 from massspring.kernels.compiled import inlined, lean
 from massspring.kernels.distances import round_contact, round_gap
@@ -51,6 +52,41 @@ def seat(network, motion, drive, step, lam, count):
 
 
 @inlined
+def let_go(motion):
+    """No node is touched."""
+    for k in range(motion.touching_count[0]):
+        i = motion.touching[k]
+        motion.touched[i], motion.locked[i] = 0, 0
+    motion.touching_count[0] = 0
+
+
+@inlined
+def admit(motion, count):
+    """Lists those of the first `count` nodes of `motion.entering` that have been seated; their clearance is settled."""
+    touching, entering, locked = motion.touching, motion.entering, motion.locked
+    listed = motion.touching_count[0]
+    for k in range(count):
+        i = entering[k]
+        if locked[i] > 0:
+            touching[listed] = i
+            motion.clearance[i] = math.inf
+            listed += 1
+    motion.touching_count[0] = listed
+
+
+@inlined
+def forget_released(motion):
+    """Takes nodes that have been released from the list, so that one that comes back is in it once."""
+    touching, locked, kept = motion.touching, motion.locked, 0
+    for k in range(motion.touching_count[0]):
+        i = touching[k]
+        if locked[i] > 0:
+            touching[kept] = i
+            kept += 1
+    motion.touching_count[0] = kept
+
+
+@inlined
 def clear_all(network, motion, drive, step, lam, team):
     """`clearances_into` of all nodes, by as many threads as there are."""
     if team is None:
@@ -64,6 +100,7 @@ def clear_all(network, motion, drive, step, lam, team):
 @inlined
 def find_contacts(network, motion, drive, step, lam):
     """Touched nodes of the step when the last pressure acts as a force: u = v* + dt lam W G (eq. 12)."""
+    let_go(motion)
     clear_all(network, motion, drive, step, lam, motion.team)
     enter(network, motion, drive, step, lam)
 
@@ -73,12 +110,16 @@ def enter(network, motion, drive, step, lam):
     """Seats the nodes whose clearance is negative (eq. 12)."""
     touchable, clearance, entering = network.touchable, motion.clearance, motion.entering
     count = 0
-    for i in range(clearance.shape[0]):
-        if clearance[i] < 0.0 and touchable[i] > 0:
-            entering[count] = i
-            count += 1
+    for begin in range(0, clearance.shape[0], BLOCK):
+        if not any_within(clearance, begin, 0.0):
+            continue
+        for i in range(begin, min(begin + BLOCK, clearance.shape[0])):
+            if clearance[i] < 0.0 and touchable[i] > 0:
+                entering[count] = i
+                count += 1
     if count > 0:
         seat(network, motion, drive, step, lam, count)
+        admit(motion, count)
     if drive.rough:
         rub(network, motion, drive, step, lam)
     if drive.radius.shape[0] > 1:
@@ -86,22 +127,33 @@ def enter(network, motion, drive, step, lam):
 
 
 @inlined
-def revised(network, motion, drive, step, lam, i):
-    """-1 where the obstacle would pull node i, which is let go; 1 where the free node would enter one; else 0."""
+def release_pulled(network, motion, drive, lam):
+    """Releases nodes that their one obstacle would pull (eq. 13); how many."""
+    changes = 0
+    for k in range(motion.touching_count[0]):
+        i = motion.touching[k]
+        if motion.locked[i] == 0 or motion.locked[i] == 2:
+            continue
+        push = drive.dt * lam * network.inverse_mass[i]
+        n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+        u = (motion.v_star[i, 0] + push * motion.gradient[i, 0]) * n0
+        u += (motion.v_star[i, 1] + push * motion.gradient[i, 1]) * n1
+        u += (motion.v_star[i, 2] + push * motion.gradient[i, 2]) * n2
+        if motion.goal[i, 0] * n0 + motion.goal[i, 1] * n1 + motion.goal[i, 2] * n2 < u:
+            # A released node is looked at again in the next pass, whatever the pressure becomes.
+            motion.touched[i], motion.locked[i], motion.clearance[i] = 0, 0, 0.0
+            changes += 1
+    return changes
+
+
+@inlined
+def enters(network, motion, drive, step, lam, i):
+    """Whether the free node i would end the step in an obstacle (eq. 12)."""
     dt = drive.dt
     push = dt * lam * network.inverse_mass[i]
     u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
     u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
     u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
-    if motion.locked[i] > 0:
-        n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        a = motion.goal[i, 0] * n0 + motion.goal[i, 1] * n1 + motion.goal[i, 2] * n2
-        if a >= u0 * n0 + u1 * n1 + u2 * n2:
-            return 0
-        motion.touched[i], motion.locked[i] = 0, 0
-        # A released node is looked at again, whatever the pressure becomes.
-        motion.clearance[i] = 0.0
-        return -1
     y0, y1, y2 = motion.x[i, 0] + dt * u0, motion.x[i, 1] + dt * u1, motion.x[i, 2] + dt * u2
     for o in range(drive.radius.shape[0]):
         r0, r1, r2 = (
@@ -116,8 +168,8 @@ def revised(network, motion, drive, step, lam, i):
             a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
             depth = round_gap(r0, r1, r2, a0, a1, a2, drive.radius[o])
         if depth < 0.0:
-            return 1
-    return 0
+            return True
+    return False
 
 
 @inlined
@@ -127,23 +179,28 @@ def revise_contacts(network, motion, drive, step, lam, reach):
     `reach` [m] is how far the new pressure can have moved a node from where `clearance` was measured: distances to
     obstacles change by no more, so a free node farther away need not be looked at.
     """
-    touchable, locked, clearance = network.touchable, motion.locked, motion.clearance
+    touchable, clearance, entering = network.touchable, motion.clearance, motion.entering
     count, changes = 0, 0
     if drive.rough:
         changes += release_slipping(network, motion, drive, lam)
     if drive.radius.shape[0] > 1:
         changes += release_wedged(network, motion, drive, lam) + wedge(network, motion, drive, step, lam)
-    for i in range(clearance.shape[0]):
-        if (locked[i] == 0 and clearance[i] > reach) or locked[i] == 2 or touchable[i] == 0:
+    for begin in range(0, clearance.shape[0], BLOCK):
+        if not any_within(clearance, begin, reach):
             continue
-        found = revised(network, motion, drive, step, lam, i)
-        if found > 0:
-            motion.entering[count] = i
-            count += 1
-        changes += found != 0
+        for i in range(begin, min(begin + BLOCK, clearance.shape[0])):
+            if clearance[i] > reach or motion.locked[i] > 0 or touchable[i] == 0:
+                continue
+            if enters(network, motion, drive, step, lam, i):
+                entering[count] = i
+                count += 1
+    changes += release_pulled(network, motion, drive, lam)
+    if changes > 0:
+        forget_released(motion)
     if count > 0:
         seat(network, motion, drive, step, lam, count)
-    return changes
+        admit(motion, count)
+    return changes + count
 
 
 @inlined

@@ -176,10 +176,14 @@ class Motion(NamedTuple):
     """The normal of a node that slides, the edge of one in a wedge, (n, 3)."""
     goal: np.ndarray
     """Velocity that ends the step on the obstacles, in the directions taken, less what friction takes [m/s], (n, 3)."""
+    touching: np.ndarray
+    """The touched nodes, in the order in which they were found, (n,) uint32; released ones among them."""
+    touching_count: np.ndarray
+    """(1,) int64."""
     entering: np.ndarray
     """Scratch: nodes that would enter an obstacle, (n,) uint32."""
     clearance: np.ndarray
-    """Distance to the nearest obstacle at the end of the predicted step [m], (n,)."""
+    """Distance to the nearest obstacle at the end of the predicted step [m], inf for touched nodes, (n,)."""
     places: np.ndarray
     """Scratch: positions [m] and a zero, (n, 4)."""
     tile: np.ndarray

@@ -2,7 +2,6 @@
 
 import math
 
-from massspring.kernels.blocks import BLOCK, any_locked
 from massspring.kernels.compiled import inlined, lean
 from massspring.kernels.distances import allowed_part
 from massspring.kernels.flat import flat
@@ -62,19 +61,17 @@ def multiplier_of_sums(motion, inverse_mass, volume_error, dt, flow, mobility):
         motion.gradient,
         motion.v_star,
     )
-    free, count = mobility, locked.shape[0]
-    for begin in range(0, count, BLOCK):
-        if not any_locked(locked, begin):
-            continue
-        for i in range(begin, min(begin + BLOCK, count)):
-            if locked[i] > 0:
-                g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
-                v0, v1, v2 = v_star[i, 0], v_star[i, 1], v_star[i, 2]
-                d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
-                p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, g0, g1, g2)
-                mobility -= inverse_mass[i] * (g0 * (g0 - p0) + g1 * (g1 - p1) + g2 * (g2 - p2))
-                p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, v0, v1, v2)
-                flow += g0 * (p0 + goal[i, 0] - v0) + g1 * (p1 + goal[i, 1] - v1) + g2 * (p2 + goal[i, 2] - v2)
+    free = mobility
+    for k in range(motion.touching_count[0]):
+        i = motion.touching[k]
+        if locked[i] > 0:
+            g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
+            v0, v1, v2 = v_star[i, 0], v_star[i, 1], v_star[i, 2]
+            d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
+            p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, g0, g1, g2)
+            mobility -= inverse_mass[i] * (g0 * (g0 - p0) + g1 * (g1 - p1) + g2 * (g2 - p2))
+            p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, v0, v1, v2)
+            flow += g0 * (p0 + goal[i, 0] - v0) + g1 * (p1 + goal[i, 1] - v1) + g2 * (p2 + goal[i, 2] - v2)
     if mobility <= NEGLIGIBLE * free:
         return 0.0, 0.0
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
@@ -144,28 +141,26 @@ def settled(motion, i, u0, u1, u2):
 def book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse):
     """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 10); u is what a node would do without them."""
     v_star, gradient, locked = motion.v_star, motion.gradient, motion.locked
-    real, count = motion.x.dtype.type, locked.shape[0]
+    real = motion.x.dtype.type
     impulse = real(dt * lam)
-    for begin in range(0, count, BLOCK):
-        if not any_locked(locked, begin):
+    for k in range(motion.touching_count[0]):
+        i = motion.touching[k]
+        if locked[i] == 0:
             continue
-        for i in range(begin, min(begin + BLOCK, count)):
-            if locked[i] == 0:
-                continue
-            push = impulse * real(inverse_mass[i])
-            u0, u1 = v_star[i, 0] + push * gradient[i, 0], v_star[i, 1] + push * gradient[i, 1]
-            u2 = v_star[i, 2] + push * gradient[i, 2]
-            w0, w1, w2 = settled(motion, i, u0, u1, u2)
-            o, m = motion.touched[i] - 1, mass[i]
-            k0, k1, k2 = m * (w0 - u0), m * (w1 - u1), m * (w2 - u2)
-            contact_impulse[o, 0] += k0
-            contact_impulse[o, 1] += k1
-            contact_impulse[o, 2] += k2
-            if locked[i] == 2:
-                m0, m1, m2 = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
-                n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-                _, beta = shares(k0, k1, k2, n0, n1, n2, m0, m1, m2)
-                book(contact_impulse, o, motion.second[i] - 1, beta * m0, beta * m1, beta * m2)
+        push = impulse * real(inverse_mass[i])
+        u0, u1 = v_star[i, 0] + push * gradient[i, 0], v_star[i, 1] + push * gradient[i, 1]
+        u2 = v_star[i, 2] + push * gradient[i, 2]
+        w0, w1, w2 = settled(motion, i, u0, u1, u2)
+        o, m = motion.touched[i] - 1, mass[i]
+        k0, k1, k2 = m * (w0 - u0), m * (w1 - u1), m * (w2 - u2)
+        contact_impulse[o, 0] += k0
+        contact_impulse[o, 1] += k1
+        contact_impulse[o, 2] += k2
+        if locked[i] == 2:
+            m0, m1, m2 = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
+            n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+            _, beta = shares(k0, k1, k2, n0, n1, n2, m0, m1, m2)
+            book(contact_impulse, o, motion.second[i] - 1, beta * m0, beta * m1, beta * m2)
 
 
 @inlined
@@ -182,14 +177,12 @@ def advance_nodes(motion, inverse_mass, lam, dt, first, last):
             flat_v[3 * i + axis] = u
             flat_x[3 * i + axis] += step * u
     x, v, places = motion.x, motion.v, motion.places
-    for block in range(first, last, BLOCK):
-        if not any_locked(locked, block):
-            continue
-        for i in range(block, min(block + BLOCK, last)):
-            if locked[i] > 0:
-                v[i, 0], v[i, 1], v[i, 2] = settled(motion, i, v[i, 0], v[i, 1], v[i, 2])
-                for axis in range(3):
-                    x[i, axis] = places[i, axis] + step * v[i, axis]
+    for k in range(motion.touching_count[0]):
+        i = motion.touching[k]
+        if first <= i < last and locked[i] > 0:
+            v[i, 0], v[i, 1], v[i, 2] = settled(motion, i, v[i, 0], v[i, 1], v[i, 2])
+            for axis in range(3):
+                x[i, axis] = places[i, axis] + step * v[i, axis]
 
 
 @lean

@@ -14,8 +14,8 @@ PARALLEL = 1e-4
 @lean
 def rub(network, motion, drive, step, lam):
     """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 36)."""
-    for c in range(network.surface_nodes.shape[0]):
-        i = network.surface_nodes[c]
+    for k in range(motion.touching_count[0]):
+        i = motion.touching[k]
         if motion.locked[i] != 1 or not drive.friction[motion.touched[i] - 1] > 0.0:
             continue
         o = motion.touched[i] - 1
@@ -42,8 +42,8 @@ def rub(network, motion, drive, step, lam):
 def release_slipping(network, motion, drive, lam):
     """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 36)."""
     changes = 0
-    for c in range(network.surface_nodes.shape[0]):
-        i = network.surface_nodes[c]
+    for k in range(motion.touching_count[0]):
+        i = motion.touching[k]
         if motion.locked[i] != 3:
             continue
         push = drive.dt * lam * network.inverse_mass[i]
@@ -87,8 +87,8 @@ def wedge(network, motion, drive, step, lam):
     """
     changes = 0
     dt = drive.dt
-    for c in range(network.surface_nodes.shape[0]):
-        i = network.surface_nodes[c]
+    for k in range(motion.touching_count[0]):
+        i = motion.touching[k]
         if motion.locked[i] != 1:
             continue
         push = dt * lam * network.inverse_mass[i]
@@ -137,8 +137,8 @@ def shares(k0, k1, k2, n0, n1, n2, m0, m1, m2):
 def release_wedged(network, motion, drive, lam):
     """Frees nodes in a wedge that one of their obstacles would pull; the next search finds the other (eq. 37)."""
     changes = 0
-    for c in range(network.surface_nodes.shape[0]):
-        i = network.surface_nodes[c]
+    for k in range(motion.touching_count[0]):
+        i = motion.touching[k]
         if motion.locked[i] != 2:
             continue
         push = drive.dt * lam * network.inverse_mass[i]

@@ -60,6 +60,7 @@ def test_a_wedge_lets_go_of_a_node_that_either_side_would_pull(shell, first, sec
     motion.normal[node], motion.second_normal[node] = n, m
     motion.goal[node] = u + first * n + second * m
     motion.touched[node], motion.second[node], motion.locked[node] = 1, 2, 2
+    motion.touching[0], motion.touching_count[0] = node, 1
     free = first < 0 or second < 0
     assert release_wedged(state.network, motion, drive, lam) == int(free)
     assert motion.locked[node] == (0 if free else 2)
