@@ -8,6 +8,7 @@ from massspring.kernels.rubbing import release_wedged
 from massspring.stability import step_limit
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.test_rubbing import wedge_of
+from tests.massspring.touched import list_touched
 
 ROUND_OFF = 1e-12  # m/s, of some 0.1
 
@@ -60,7 +61,7 @@ def test_a_wedge_lets_go_of_a_node_that_either_side_would_pull(shell, first, sec
     motion.normal[node], motion.second_normal[node] = n, m
     motion.goal[node] = u + first * n + second * m
     motion.touched[node], motion.second[node], motion.locked[node] = 1, 2, 2
-    motion.touching[0], motion.touching_count[0] = node, 1
+    list_touched(motion)
     free = first < 0 or second < 0
     assert release_wedged(state.network, motion, drive, lam) == int(free)
     assert motion.locked[node] == (0 if free else 2)

@@ -15,6 +15,7 @@ from massspring.neighbours import LONGEST, rings, slices_of
 from massspring.springs import Springs
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.test_kernels import DIFFERENCE, STEP, moved
+from tests.massspring.touched import list_touched
 
 ROUND_OFF = 1e-14  # relative to the largest: sums of at most some hundred doubles in another order
 
@@ -171,6 +172,7 @@ def test_the_multiplier_from_sums_is_the_one_over_all_nodes(ball_body):
         motion.direction[nodes] = rng.normal(size=(len(nodes), 3))
         motion.direction[nodes] /= np.linalg.norm(motion.direction[nodes], axis=1)[:, None]
         motion.goal[nodes] = rng.normal(size=(len(nodes), 3))
+    list_touched(motion)
     error = 0.01 * volume
     expected = volume_multiplier(motion, net.inverse_mass, error, drive.dt)
     found = multiplier_of_sums(motion, net.inverse_mass, error, drive.dt, flow, mobility)
@@ -182,5 +184,6 @@ def test_a_body_that_obstacles_hold_everywhere_has_no_multiplier(ball_body):
     """What is left of G·W·G is round-off then; dividing by it would be a pressure of any size."""
     state, drive, (volume, flow, mobility) = gathered(ball_body, moved(ball_body))
     state.motion.locked[:] = 3
+    list_touched(state.motion)
     args = (state.motion, state.network.inverse_mass, 0.01 * volume, drive.dt, flow, mobility)
     assert multiplier_of_sums(*args) == (0.0, 0.0)
