@@ -2,7 +2,6 @@
 
 import math
 
-from massspring.kernels.blocks import BLOCK, any_locked
 from massspring.kernels.compiled import comparing, lean
 from massspring.kernels.flat import flat
 from massspring.kernels.motion import settled
@@ -36,15 +35,13 @@ def fastest_node(network, motion, lam, dt):
     v_star, gradient = flat(motion.v_star, 0, n), flat(motion.gradient, 0, n)
     weight = flat(network.inverse_mass, 0, n)
     fastest = float(fastest_free(v_star, gradient, weight, real(dt * lam)))
-    for begin in range(0, n, BLOCK):
-        if not any_locked(locked, begin):
-            continue
-        for i in range(begin, min(begin + BLOCK, n)):
-            if locked[i] > 0:
-                w = dt * lam * weight[i]
-                u0, u1 = v_star[3 * i] + w * gradient[3 * i], v_star[3 * i + 1] + w * gradient[3 * i + 1]
-                u0, u1, u2 = settled(motion, i, u0, u1, v_star[3 * i + 2] + w * gradient[3 * i + 2])
-                fastest = max(fastest, u0 * u0 + u1 * u1 + u2 * u2)
+    for k in range(motion.touching_count[0]):
+        i = motion.touching[k]
+        if locked[i] > 0:
+            w = dt * lam * weight[i]
+            u0, u1 = v_star[3 * i] + w * gradient[3 * i], v_star[3 * i + 1] + w * gradient[3 * i + 1]
+            u0, u1, u2 = settled(motion, i, u0, u1, v_star[3 * i + 2] + w * gradient[3 * i + 2])
+            fastest = max(fastest, u0 * u0 + u1 * u1 + u2 * u2)
     return math.sqrt(fastest)
 
 
