@@ -10,6 +10,7 @@ from massspring.kernels.broad_phase import TRIANGLE_BLOCK, fastest_node
 from massspring.kernels.collision import NEVER, crossing, nearest_into, passes_by, stays_off
 from tests.massspring.test_collision import pair_of
 from tests.massspring.test_probe import BALL, EDGE, pressed
+from tests.massspring.touched import list_touched
 
 
 def test_triangles_of_a_block_are_neighbours():
@@ -38,6 +39,7 @@ def test_no_node_is_faster_than_the_fastest(fast, precision):
         motion.locked[:] = 0
         chosen = rng.choice(BALL.node_count, 5, replace=False)
         motion.locked[chosen] = [1, 1, 2, 3, 3]
+        list_touched(motion)
         motion.direction[chosen] = np.eye(3)[rng.integers(3, size=5)]
         motion.goal[chosen] = 0.1 * rng.normal(size=(5, 3))
         if fast == "free":

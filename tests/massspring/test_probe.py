@@ -109,6 +109,7 @@ def test_contacts_and_volume_equal_the_full_saddle_point_solve():
     motion.v_star[:] = 0.02 * rng.normal(size=motion.v_star.shape)
     motion.v_star[net.held_nodes] = 0.0
     motion.locked[:] = 0
+    motion.touching_count[0] = 0
     rows = probing.rows
     count = int(rows.count[0])
     rows.direction[:count] += 0.3 * rng.normal(size=(count, 3))
