@@ -154,7 +154,7 @@ def interrupted(tmp_path, number) -> subprocess.Popen:
     process = subprocess.Popen(
         command, cwd=REPOSITORY, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
     )
-    until = time.monotonic() + 60  # only a sweep that is stuck needs so long
+    until = time.monotonic() + 300  # compiling comes first; only a sweep that is stuck needs so long
     while not record_files(tmp_path / "results", "slow") and process.poll() is None and time.monotonic() < until:
         time.sleep(0.02)
     os.killpg(process.pid, number)
