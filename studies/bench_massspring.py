@@ -1,6 +1,7 @@
 """The mass-spring lines of `make bench`: what a step costs, how that grows, and what memory it takes."""
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
@@ -77,9 +78,9 @@ def _bottom(body: Body) -> Attachment:
     return Attachment(body.surface_nodes[body.rest[body.surface_nodes, 2] < -0.8 * RADIUS].astype(np.int64))
 
 
-def _timed(setups: Mapping[str, Setup], repeats: int, threads: int = 1) -> dict[str, np.ndarray]:
-    """Frame times of the second three quarters of each run [ns], (repeats, F), by turns on as many pinned cores."""
-    with pinned(threads=threads):
+def _timed(setups: Mapping[str, Setup], repeats: int) -> dict[str, np.ndarray]:
+    """Frame times of the second three quarters of each run [ns], (repeats, F), by turns on one pinned core."""
+    with pinned():
         times = interleave({name: (lambda s=s: simulate(s).frame_ns) for name, s in setups.items()}, repeats)
     return {name: ns[:, ns.shape[1] // 4 :] for name, ns in times.items()}
 
@@ -126,14 +127,28 @@ def threads_lines() -> list[Line]:
     lines = []
     for precision in ("float64", "float32"):
         one = replace(probed_setup(LARGE), precision=precision)
-        setups = {"one": one, "two": replace(one, threads=2)}
-        times = _timed(setups, LARGE_REPEATS, threads=2)
-        ratio = ratio_with_spread(times["one"], times["two"])
-        note = f"{precision}; interval {ratio.low:.3g} to {ratio.high:.3g}"
-        lines.append(
-            Line(f"how much faster on two threads, {LARGE} nodes", ratio.median, "1", 1.6, at_most=False, note=note)
-        )
+        two = replace(one, threads=2)
+        runs = {
+            "one": lambda s=one: simulate(s).frame_ns,
+            "two": lambda s=two: simulate(s).frame_ns,
+            "at once": lambda s=one: _beside_another(s),
+        }
+        with pinned(threads=2):
+            times = {name: ns[:, LARGE_FRAMES // 4 :] for name, ns in interleave(runs, LARGE_REPEATS).items()}
+        for name, cores_used, what in (
+            ("two", 1.0, f"how much faster on two threads, {LARGE} nodes"),
+            ("at once", 2.0, "the same of two runs that share nothing: the limit of the machine"),
+        ):
+            ratio = ratio_with_spread(times["one"], times[name])
+            note = f"{precision}; interval {cores_used * ratio.low:.3g} to {cores_used * ratio.high:.3g}"
+            lines.append(Line(what, cores_used * ratio.median, "1", 1.6, at_most=False, note=note))
     return lines
+
+
+def _beside_another(setup: Setup) -> np.ndarray:
+    """Frame times of a run while another like it runs on the other core [ns], (F,), mean of both."""
+    with ThreadPoolExecutor(2) as pool:
+        return np.mean(list(pool.map(lambda _: simulate(setup).frame_ns, range(2))), axis=0)
 
 
 def spiral_setup(nodes: int) -> Setup:

@@ -97,6 +97,7 @@ def test_nodes_of_a_full_slice_follow_each_other(ball):
         inside = numbered(body)
         assert sorted(inside.place) == list(range(body.node_count))
         slices = start(inside.body).network.slices
+        assert slices.split_node.min() == body.node_count - len(slices.split_node)
         assert (slices.first[slices.pieces :] >= 0).sum() == (body.node_count - len(slices.split_node)) // LANES
         for s in np.flatnonzero(slices.first >= 0):
             assert np.array_equal(slices.node[s], slices.first[s] + np.arange(LANES))
