@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Free, ImplicitVolume
+from massspring import Clock, Free, ImplicitVolume, Path, Probe, Setup
 from massspring.kernels.broad_phase import TRIANGLE_BLOCK, fastest_node
 from massspring.kernels.collision import NEVER, crossing, nearest_into, passes_by, stays_off
+from massspring.kernels.probe_layout import IN_CONTACT
 from tests.massspring.test_collision import pair_of
-from tests.massspring.test_probe import BALL, EDGE, pressed
+from tests.massspring.test_probe import BALL, EDGE, R, pressed
 from tests.massspring.touched import list_touched
 
 
@@ -101,3 +102,24 @@ def test_a_probe_in_contact_compares_few_boxes_and_solves_few_pairs():
     for frame in range(setup.clock.frames):
         state = setup.method.advance(state, setup.drive(frame))
     assert 0 < state.probing.near_count[0] < 0.1 * len(BALL.triangles)
+
+
+@pytest.mark.parametrize("way", [0.1, 1.0, 2.2])
+def test_a_tip_from_afar_wakes_what_it_meets(way):
+    """Far pairs sleep while tip and ball come nearer, slowly or not, then the tip crosses: no bit is lost.
+
+    `way`: of the tip in a step, in radii of the ball.
+    """
+    dt = pressed(Free()).clock.dt
+    down = Path((6 * dt, 6 * dt + 4.0 / way * dt), ((0, 0, 0), (0.1 * R, 0.05 * R, -4.0 * R)))
+    velocity = np.full(BALL.rest.shape, 0.05 * R / dt) * [0.3, -0.2, 0.5]
+    probe = Probe((0.1 * R, 0.2 * R, 2.5 * R), 0.1 * EDGE, down)
+    setup, ends = Setup(BALL, Free(), Clock(dt, 6 + int(np.ceil(2.6 / way)), 1), (probe,), velocity=velocity), []
+    for skipping in (True, False):
+        state = setup.start()
+        state = replace(state, probing=state.probing._replace(skipping=skipping))
+        for frame in range(setup.clock.frames):
+            state = setup.method.advance(state, setup.drive(frame))
+        ends.append((state.x, state.v, state.tally.contact_impulse))
+        assert state.probing.counts[IN_CONTACT] > 0
+    assert all(np.array_equal(a, b) for a, b in zip(*ends, strict=True))
