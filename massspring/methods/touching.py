@@ -140,6 +140,8 @@ class Contact:
             rough = drive.friction[obstacle] > 0.0
             self._stick(new[rough], drive.velocity[self.step][obstacle[rough]])
         if len(drive.radius) > 1:
+            touched = np.flatnonzero(motion.locked)
+            motion.touching[: len(touched)], motion.touching_count[0] = touched, len(touched)
             count += wedge(self.network, motion, drive, self.step, 0.0)
             self.rubbed[motion.locked == WEDGED] = 0.0
         return count

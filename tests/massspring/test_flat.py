@@ -5,7 +5,7 @@ import pytest
 from numba.core.errors import TypingError
 
 from massspring.curve import along_curve
-from massspring.kernels.blocks import BLOCK, any_locked
+from massspring.kernels.blocks import BLOCK, any_within
 from massspring.kernels.compiled import lean
 from massspring.kernels.flat import flat
 
@@ -19,8 +19,8 @@ def doubled(table, first, last):
 
 
 @lean
-def block_with(locked, begin):
-    return any_locked(locked, begin)
+def block_with(clearance, begin, reach):
+    return any_within(clearance, begin, reach)
 
 
 @pytest.mark.parametrize("real", [np.float64, np.float32, np.uint8])
@@ -40,12 +40,15 @@ def test_what_is_not_contiguous_has_no_flat_rows():
         doubled(np.zeros((4, 6))[:, ::2], 0, 4)
 
 
+@pytest.mark.parametrize("real", [np.float64, np.float32])
+@pytest.mark.parametrize("near", [-1.0, 0.25, np.nan])
 @pytest.mark.parametrize("where", [0, BLOCK - 1, BLOCK, 2 * BLOCK - 1])
-def test_a_block_is_passed_over_only_where_nothing_touches_it(where):
-    locked = np.zeros(2 * BLOCK + 5, dtype=np.uint8)
-    locked[where] = 1
-    assert [bool(block_with(locked, begin)) for begin in (0, BLOCK)] == [where < BLOCK, where >= BLOCK]
-    assert block_with(locked, 2 * BLOCK)  # the last one is not full and always looked through
+def test_a_block_is_passed_over_only_where_nothing_is_near(where, near, real):
+    clearance = np.full(2 * BLOCK + 5, 0.5, dtype=real)
+    clearance[0 if where >= BLOCK else BLOCK] = np.inf
+    clearance[where] = near
+    assert [bool(block_with(clearance, begin, 0.25)) for begin in (0, BLOCK)] == [where < BLOCK, where >= BLOCK]
+    assert block_with(clearance, 2 * BLOCK, 0.25)  # the last one is not full and always looked through
 
 
 def test_neighbours_in_space_are_neighbours_on_the_curve():

@@ -23,6 +23,7 @@ from massspring.methods.implicit_volume import set_right_side, solve_multipliers
 from massspring.methods.rows import volume_rows
 from tests.massspring.test_kernels import ROUND_OFF, directional, moved
 from tests.massspring.test_methods import clock_for, squeeze
+from tests.massspring.touched import list_touched
 
 
 def test_rows_are_the_derivative_of_the_volumes(several):
@@ -61,6 +62,7 @@ def touched_and_held(body: Body, dt: float):
     edge, wedged, stuck = np.linalg.qr(random.normal(size=(3, 3)))[0], 31, 40
     mo.touched[[wedged, stuck]] = 1
     mo.locked[[wedged, stuck]] = 2, 3
+    list_touched(mo)
     mo.direction[wedged] = edge[0]
     mo.goal[wedged] = 0.03 * edge[1] - 0.02 * edge[2]
     mo.goal[stuck] = [0.01, -0.02, 0.03]
