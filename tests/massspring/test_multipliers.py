@@ -23,7 +23,7 @@ from massspring.methods.implicit_volume import set_right_side, solve_multipliers
 from massspring.methods.rows import volume_rows
 from tests.massspring.test_kernels import ROUND_OFF, directional, moved
 from tests.massspring.test_methods import clock_for, squeeze
-from tests.massspring.touched import list_touched
+from tests.massspring.touched import list_touched, seat
 
 
 def test_rows_are_the_derivative_of_the_volumes(several):
@@ -53,12 +53,7 @@ def touched_and_held(body: Body, dt: float):
     mo, rows = state.motion, state.rows
     mo.v_star[:] = state.v
     mo.v_star[held] = [0.02, 0.0, -0.01]
-    normals = random.normal(size=(3, 3))
-    mo.normal[touched] = normals / np.linalg.norm(normals, axis=1)[:, None]
-    approach = 0.05 * random.normal(size=3)
-    mo.touched[touched], mo.locked[touched] = 1, 1
-    mo.direction[touched] = mo.normal[touched]
-    mo.goal[touched] = approach[:, None] * mo.normal[touched]
+    approach = seat(mo, touched, random)
     edge, wedged, stuck = np.linalg.qr(random.normal(size=(3, 3)))[0], 31, 40
     mo.touched[[wedged, stuck]] = 1
     mo.locked[[wedged, stuck]] = 2, 3

@@ -15,7 +15,7 @@ from massspring import (
 from massspring.kernels.volume import enclosed_volume, volume_gradient_into
 from massspring.methods.base import start
 from tests.massspring.test_methods import clock_for, squeeze, thrown
-from tests.massspring.touched import list_touched
+from tests.massspring.touched import seat
 
 
 def test_the_one_step_residual_is_exact(body):
@@ -42,13 +42,7 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     mo.v_star[:] = state.v
     mo.v_star[net.held_nodes] = [0.02, 0.0, -0.01]
     touched = np.array([40, 41, 90])
-    normals = rng.normal(size=(3, 3))
-    mo.normal[touched] = normals / np.linalg.norm(normals, axis=1)[:, None]
-    approach = 0.05 * rng.normal(size=3)
-    mo.touched[touched], mo.locked[touched] = 1, 1
-    mo.direction[touched] = mo.normal[touched]
-    mo.goal[touched] = approach[:, None] * mo.normal[touched]
-    list_touched(mo)
+    approach = seat(mo, touched, rng)
     wanted = 1.02 * body.volume
     error = wanted - volume_gradient_into(mo.x, net.triangles, mo.gradient)
     lam, _ = motion_kernels.volume_multiplier(mo, net.inverse_mass, error, dt)
