@@ -1,12 +1,13 @@
-"""How far every node ends the predicted step from the nearest obstacle: all nodes, side by side.
+"""How far nodes end the predicted step from obstacles: all of them side by side, or one.
 
-Literals such as 0.0 are avoided: they turn a loop over single numbers into one over double ones.
+In the loops over all nodes literals such as 0.0 are avoided: they turn one over single numbers into one over double
+ones.
 """
 
 import math
 
 from massspring.kernels.compiled import inlined
-from massspring.kernels.distances import round_gap
+from massspring.kernels.distances import axis_share, round_gap
 from massspring.kernels.flat import flat
 
 
@@ -68,3 +69,29 @@ def capsule_clearance(course, clearance, p0, p1, p2, a0, a1, a2, radius):
     for i in range(clearance.shape[0]):
         r0, r1, r2 = way_from(p0, p1, p2, course, i)
         clearance[i] = min(clearance[i], round_gap(r0, r1, r2, a0, a1, a2, radius))
+
+
+@inlined
+def pushed_velocity(network, motion, drive, lam, i):
+    """u = v* + dt lam W G of node i when the pressure acts as a force [m/s] (eq. 12)."""
+    push = drive.dt * lam * network.inverse_mass[i]
+    u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
+    u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
+    u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+    return u0, u1, u2
+
+
+@inlined
+def gap_and_normal(drive, o, r0, r1, r2):
+    """Distance [m] of r to obstacle o, negative inside, and its normal there; r is seen from the obstacle's position.
+
+    On the axis of a round one the normal is not a number.
+    """
+    if drive.is_plane[o]:
+        n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
+        return n0 * r0 + n1 * r1 + n2 * r2, n0, n1, n2
+    a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
+    share = axis_share(r0, r1, r2, a0, a1, a2)
+    r0, r1, r2 = r0 - share * a0, r1 - share * a1, r2 - share * a2
+    distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+    return distance - drive.radius[o], r0 / distance, r1 / distance, r2 / distance

@@ -6,9 +6,9 @@ What is rare (friction, two obstacles at once) has loops of its own in `kernels.
 import math
 
 from massspring.kernels.blocks import BLOCK, any_within
-from massspring.kernels.clearance import clearances_into
+from massspring.kernels.clearance import clearances_into, gap_and_normal, pushed_velocity
 from massspring.kernels.compiled import inlined, lean
-from massspring.kernels.distances import round_contact, round_gap
+from massspring.kernels.distances import round_contact
 from massspring.kernels.rubbing import release_slipping, release_wedged, rub, wedge
 from massspring.kernels.team import SEARCH, call, join
 
@@ -23,26 +23,18 @@ def seat(network, motion, drive, step, lam, count):
     dt = drive.dt
     for k in range(count):
         i = motion.entering[k]
-        push = dt * lam * network.inverse_mass[i]
-        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
-        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
-        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
         deepest = 0.0
         for o in range(drive.radius.shape[0]):
             s0 = motion.x[i, 0] - drive.position[step, o, 0]
             s1 = motion.x[i, 1] - drive.position[step, o, 1]
             s2 = motion.x[i, 2] - drive.position[step, o, 2]
             r0, r1, r2 = s0 + dt * u0, s1 + dt * u1, s2 + dt * u2
-            n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
-            a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-            if drive.is_plane[o]:
-                depth = n0 * r0 + n1 * r1 + n2 * r2
-            else:
-                depth = round_gap(r0, r1, r2, a0, a1, a2, drive.radius[o])
+            depth, n0, n1, n2 = gap_and_normal(drive, o, r0, r1, r2)
             if depth < deepest:
-                deepest = depth
-                lift = -depth
+                deepest, lift = depth, -depth
                 if not drive.is_plane[o]:
+                    a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
                     n0, n1, n2, lift = round_contact(s0, s1, s2, r0, r1, r2, a0, a1, a2, drive.radius[o])
                 a = n0 * u0 + n1 * u1 + n2 * u2 + lift / dt
                 motion.touched[i], motion.locked[i] = o + 1, 1
@@ -134,12 +126,9 @@ def release_pulled(network, motion, drive, lam):
         i = motion.touching[k]
         if motion.locked[i] == 0 or motion.locked[i] == 2:
             continue
-        push = drive.dt * lam * network.inverse_mass[i]
         n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        u = (motion.v_star[i, 0] + push * motion.gradient[i, 0]) * n0
-        u += (motion.v_star[i, 1] + push * motion.gradient[i, 1]) * n1
-        u += (motion.v_star[i, 2] + push * motion.gradient[i, 2]) * n2
-        if motion.goal[i, 0] * n0 + motion.goal[i, 1] * n1 + motion.goal[i, 2] * n2 < u:
+        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
+        if motion.goal[i, 0] * n0 + motion.goal[i, 1] * n1 + motion.goal[i, 2] * n2 < u0 * n0 + u1 * n1 + u2 * n2:
             # A released node is looked at again in the next pass, whatever the pressure becomes.
             motion.touched[i], motion.locked[i], motion.clearance[i] = 0, 0, 0.0
             changes += 1
@@ -150,24 +139,11 @@ def release_pulled(network, motion, drive, lam):
 def enters(network, motion, drive, step, lam, i):
     """Whether the free node i would end the step in an obstacle (eq. 12)."""
     dt = drive.dt
-    push = dt * lam * network.inverse_mass[i]
-    u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
-    u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
-    u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+    u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
     y0, y1, y2 = motion.x[i, 0] + dt * u0, motion.x[i, 1] + dt * u1, motion.x[i, 2] + dt * u2
     for o in range(drive.radius.shape[0]):
-        r0, r1, r2 = (
-            y0 - drive.position[step, o, 0],
-            y1 - drive.position[step, o, 1],
-            y2 - drive.position[step, o, 2],
-        )
-        if drive.is_plane[o]:
-            n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
-            depth = n0 * r0 + n1 * r1 + n2 * r2
-        else:
-            a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-            depth = round_gap(r0, r1, r2, a0, a1, a2, drive.radius[o])
-        if depth < 0.0:
+        p0, p1, p2 = drive.position[step, o, 0], drive.position[step, o, 1], drive.position[step, o, 2]
+        if gap_and_normal(drive, o, y0 - p0, y1 - p1, y2 - p2)[0] < 0.0:
             return True
     return False
 

@@ -2,8 +2,9 @@
 
 import math
 
-from massspring.kernels.compiled import inlined, lean
-from massspring.kernels.distances import allowed_part, axis_share
+from massspring.kernels.clearance import gap_and_normal, pushed_velocity
+from massspring.kernels.compiled import lean
+from massspring.kernels.distances import allowed_part
 
 SLIPS = 1.0 + 1e-9
 """Round-off must not turn a node that just sticks into one that slips."""
@@ -19,11 +20,8 @@ def rub(network, motion, drive, step, lam):
         if motion.locked[i] != 1 or not drive.friction[motion.touched[i] - 1] > 0.0:
             continue
         o = motion.touched[i] - 1
-        push = drive.dt * lam * network.inverse_mass[i]
         n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
-        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
-        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
         g0, g1, g2 = motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2]
         pressed = drive.friction[o] * ((g0 - u0) * n0 + (g1 - u1) * n1 + (g2 - u2) * n2)
         w0, w1, w2 = drive.velocity[step, o, 0], drive.velocity[step, o, 1], drive.velocity[step, o, 2]
@@ -63,22 +61,6 @@ def release_slipping(network, motion, drive, lam):
     return changes
 
 
-@inlined
-def gap_and_normal(drive, step, o, y0, y1, y2):
-    """Distance [m] of y to obstacle o, negative inside, and its normal there; a round one's axis has none."""
-    m0, m1, m2 = y0 - drive.position[step, o, 0], y1 - drive.position[step, o, 1], y2 - drive.position[step, o, 2]
-    if drive.is_plane[o]:
-        n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
-        return n0 * m0 + n1 * m1 + n2 * m2, n0, n1, n2
-    a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-    share = axis_share(m0, m1, m2, a0, a1, a2)
-    m0, m1, m2 = m0 - share * a0, m1 - share * a1, m2 - share * a2
-    distance = math.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
-    if not distance > 0.0:
-        return math.inf, 0.0, 0.0, 0.0
-    return distance - drive.radius[o], m0 / distance, m1 / distance, m2 / distance
-
-
 @lean
 def wedge(network, motion, drive, step, lam):
     """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 37); how many.
@@ -91,11 +73,8 @@ def wedge(network, motion, drive, step, lam):
         i = motion.touching[k]
         if motion.locked[i] != 1:
             continue
-        push = dt * lam * network.inverse_mass[i]
         n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
-        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
-        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
         u0, u1, u2 = allowed_part(1, n0, n1, n2, u0, u1, u2)
         u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
         y0, y1, y2 = motion.x[i, 0] + dt * u0, motion.x[i, 1] + dt * u1, motion.x[i, 2] + dt * u2
@@ -103,7 +82,8 @@ def wedge(network, motion, drive, step, lam):
         for o in range(drive.radius.shape[0]):
             if o + 1 == motion.touched[i]:
                 continue
-            gap, m0, m1, m2 = gap_and_normal(drive, step, o, y0, y1, y2)
+            p0, p1, p2 = drive.position[step, o, 0], drive.position[step, o, 1], drive.position[step, o, 2]
+            gap, m0, m1, m2 = gap_and_normal(drive, o, y0 - p0, y1 - p1, y2 - p2)
             e0, e1, e2 = n1 * m2 - n2 * m1, n2 * m0 - n0 * m2, n0 * m1 - n1 * m0
             square = e0 * e0 + e1 * e1 + e2 * e2
             if gap < deepest and square > PARALLEL:
@@ -141,10 +121,7 @@ def release_wedged(network, motion, drive, lam):
         i = motion.touching[k]
         if motion.locked[i] != 2:
             continue
-        push = drive.dt * lam * network.inverse_mass[i]
-        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
-        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
-        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
         # What the edge leaves free is at right angles to both normals and takes no share.
         alpha, beta = shares(
             motion.goal[i, 0] - u0,

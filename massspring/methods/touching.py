@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
+from massspring.kernels.contact import let_go
 from massspring.kernels.implicit_contact import seat_entering
 from massspring.kernels.layout import Drive, Motion, Network
 from massspring.kernels.rubbing import wedge
@@ -65,8 +66,7 @@ class Contact:
         self.network, self.motion, self.drive, self.step = network, motion, drive, step
         self.rubbed = np.zeros_like(motion.x)
         """Friction of the nodes that slip, times dt² [kg m], (n, 3)."""
-        motion.locked[network.surface_nodes] = 0
-        motion.touched[network.surface_nodes] = 0
+        let_go(motion)
         self._seat(np.empty(0, dtype=np.int64), motion.v)
 
     def revise(self, end: np.ndarray, touching: Touching, impulses: np.ndarray) -> bool:
@@ -140,8 +140,6 @@ class Contact:
             rough = drive.friction[obstacle] > 0.0
             self._stick(new[rough], drive.velocity[self.step][obstacle[rough]])
         if len(drive.radius) > 1:
-            touched = np.flatnonzero(motion.locked)
-            motion.touching[: len(touched)], motion.touching_count[0] = touched, len(touched)
             count += wedge(self.network, motion, drive, self.step, 0.0)
             self.rubbed[motion.locked == WEDGED] = 0.0
         return count
