@@ -21,6 +21,16 @@ def allowed_part(locked, d0, d1, d2, g0, g1, g2):
 
 
 @lean
+def taken_share(locked, d0, d1, d2, g0, g1, g2, v0, v1, v2):
+    """g·(I − P) v, what obstacles take of a product (eq. 9)."""
+    along = (g0 * d0 + g1 * d1 + g2 * d2) * (v0 * d0 + v1 * d1 + v2 * d2)
+    if locked == 1:
+        return along
+    whole = g0 * v0 + g1 * v1 + g2 * v2
+    return whole - along if locked == 2 else whole
+
+
+@lean
 def axis_share(r0, r1, r2, s0, s1, s2):
     """Where on a segment 0 … s the point nearest to r lies, 0 … 1; 0 where s has no length.
 

@@ -3,7 +3,7 @@
 import math
 
 from massspring.kernels.compiled import inlined, lean
-from massspring.kernels.distances import allowed_part
+from massspring.kernels.distances import allowed_part, taken_share
 from massspring.kernels.flat import flat
 from massspring.kernels.rubbing import shares
 from massspring.kernels.team import MOVE, call, join
@@ -68,10 +68,9 @@ def multiplier_of_sums(motion, inverse_mass, volume_error, dt, flow, mobility):
             g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
             v0, v1, v2 = v_star[i, 0], v_star[i, 1], v_star[i, 2]
             d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
-            p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, g0, g1, g2)
-            mobility -= inverse_mass[i] * (g0 * (g0 - p0) + g1 * (g1 - p1) + g2 * (g2 - p2))
-            p0, p1, p2 = allowed_part(locked[i], d0, d1, d2, v0, v1, v2)
-            flow += g0 * (p0 + goal[i, 0] - v0) + g1 * (p1 + goal[i, 1] - v1) + g2 * (p2 + goal[i, 2] - v2)
+            mobility -= inverse_mass[i] * taken_share(locked[i], d0, d1, d2, g0, g1, g2, g0, g1, g2)
+            flow -= taken_share(locked[i], d0, d1, d2, g0, g1, g2, v0, v1, v2)
+            flow += g0 * goal[i, 0] + g1 * goal[i, 1] + g2 * goal[i, 2]
     if mobility <= NEGLIGIBLE * free:
         return 0.0, 0.0
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility

@@ -3,8 +3,6 @@
 Each spring is computed at both of its ends: nothing is scattered, and all lanes of a vector register do the same.
 """
 
-import math
-
 from massspring.kernels.compiled import inlined, lean
 from massspring.kernels.motion import places_into
 from massspring.kernels.pieces import add_walls, join_pieces
@@ -12,24 +10,25 @@ from massspring.kernels.springs import SHORTEST
 from massspring.kernels.team import SPRINGS, SPRINGS_AND_VOLUME, call, join
 from massspring.kernels.tiles import (
     AREA,
-    BEFORE,
+    EVEN,
     FIRST,
     FORCE,
     HERE,
     LANES,
+    ODD,
     RESULT,
+    SHARE,
     SPEED,
     SUMS,
-    VECTOR,
     begin,
     close_rings,
     fetch,
-    pull,
     put,
-    sweep,
+    store,
+    stretch,
+    sweep_pair,
     take,
     total,
-    way,
 )
 
 
@@ -45,30 +44,45 @@ def gather(places, slices, s, keeps, shortest, o0, o1, o2, tile):
     begin(places, slices, s, tile)
     first, last = slices.start[s], slices.start[s + 1]
     ring_end = first + (slices.rings[s] if keeps else 0)
-    for row in range(first, ring_end):
-        fetch(places, neighbour, row, tile)
-        k = stiffness_row[row]
-        for lane in range(LANES):
-            d0, d1, d2, square = way(tile, lane)
-            length = max(math.sqrt(square), shortest)
-            pull(tile, lane, stiffness[k, lane], rest_length[row, lane], length, d0, d1, d2)
-            sweep(tile, lane, d0, d1, d2)
-            tile[BEFORE + lane], tile[BEFORE + LANES + lane], tile[BEFORE + 2 * LANES + lane] = d0, d1, d2
-        if row == first:
-            for entry in range(VECTOR):
-                tile[FIRST + entry] = tile[BEFORE + entry]
     share = 0.0
     if ring_end > first:
-        close_rings(tile, o0, o1, o2)
-        share = total(tile, BEFORE)
+        walk_rings(places, slices, first, ring_end, shortest, tile)
+        close_rings(tile, (ring_end - first) % 2, o0, o1, o2)
+        share = total(tile, SHARE)
     for row in range(ring_end, last):
         fetch(places, neighbour, row, tile)
         k = stiffness_row[row]
         for lane in range(LANES):
-            d0, d1, d2, square = way(tile, lane)
-            length = max(math.sqrt(square), shortest)
-            pull(tile, lane, stiffness[k, lane], rest_length[row, lane], length, d0, d1, d2)
+            stretch(tile, lane, stiffness[k, lane], rest_length[row, lane], shortest)
     return share
+
+
+@inlined
+def walk_rings(places, slices, first, last, shortest, tile):
+    """The springs to the rings of a slice and, of 6 G, what lies between the first and the last entry.
+
+    Entries 1 and 2, 3 and 4, … give theirs together; of an even number the last is left for `close_rings`.
+    """
+    neighbour, rest_length = slices.neighbour, slices.rest_length
+    stiffness, stiffness_row = slices.stiffness, slices.stiffness_row
+    fetch(places, neighbour, first, tile)
+    k = stiffness_row[first]
+    for lane in range(LANES):
+        d0, d1, d2 = stretch(tile, lane, stiffness[k, lane], rest_length[first, lane], shortest)
+        store(tile, EVEN, lane, d0, d1, d2)
+        store(tile, FIRST, lane, d0, d1, d2)
+    for row in range(first + 1, last):
+        fetch(places, neighbour, row, tile)
+        k = stiffness_row[row]
+        if (row - first) % 2:
+            for lane in range(LANES):
+                d0, d1, d2 = stretch(tile, lane, stiffness[k, lane], rest_length[row, lane], shortest)
+                store(tile, ODD, lane, d0, d1, d2)
+        else:
+            for lane in range(LANES):
+                d0, d1, d2 = stretch(tile, lane, stiffness[k, lane], rest_length[row, lane], shortest)
+                sweep_pair(tile, lane, d0, d1, d2)
+                store(tile, EVEN, lane, d0, d1, d2)
 
 
 @inlined
@@ -115,8 +129,7 @@ def pass_slices(motion, drive, slices, first, last, keeps, tile):
     shortest = real(SHORTEST)
     o0, o1, o2 = places[slices.origin, 0], places[slices.origin, 1], places[slices.origin, 2]
     for s in range(first, last):
-        share = gather(places, slices, s, keeps, shortest, o0, o1, o2, tile)
-        sums[s, 0] = share
+        sums[s, 0] = gather(places, slices, s, keeps, shortest, o0, o1, o2, tile)
         if s < slices.pieces:
             for entry in range(RESULT):
                 pulled[s, entry] = tile[entry]

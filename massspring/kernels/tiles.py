@@ -4,18 +4,21 @@ A loop copies 64 neighbours into a flat tile and the next computes on the tile, 
 instructions: the blocks of one array cannot overlap, and 64 nodes later a copy has left the store buffer.
 """
 
+import math
+
 from massspring.kernels.compiled import inlined
 from massspring.kernels.flat import flat
 
 LANES = 64
 """Nodes side by side; with 8 or 16 the tile waits for its own stores, 32 to 128 are equally fast."""
 VECTOR = 3 * LANES
-FORCE, AREA, HERE, BEFORE, FIRST, THERE = (VECTOR * block for block in range(6))
-"""Where blocks of a tile begin: x, y, z of all f_i, 6 G_i, x_i, d_k−1, d_0; and x_k, four numbers a lane."""
+FORCE, AREA, HERE, EVEN, ODD, FIRST, THERE = (VECTOR * block for block in range(7))
+"""Where blocks of a tile begin: x, y, z of all f_i, 6 G_i, x_i, the last d_k of even and of odd k in a ring, d_0; and
+x_k, four numbers a lane."""
 RESULT = 2 * VECTOR
-SUMS, SPEED = BEFORE, THERE
-"""While v* is found: the lanes' shares of G·v* and G·W·G; v, then v*, three numbers a lane."""
-TILE = 5 * VECTOR + 4 * LANES
+SUMS, SHARE, SPEED = EVEN, THERE, THERE
+"""Shares of the lanes in G·v* and G·W·G; of 18 V; v, then v*, three numbers a lane."""
+TILE = 6 * VECTOR + 4 * LANES
 
 
 @inlined
@@ -46,12 +49,33 @@ def pull(tile, lane, stiffness, rest_length, length, d0, d1, d2):
 
 
 @inlined
-def sweep(tile, lane, d0, d1, d2):
-    """6 G_i += d_k−1 × d_k [m²] (eq. 108)."""
-    p0, p1, p2 = tile[BEFORE + lane], tile[BEFORE + LANES + lane], tile[BEFORE + 2 * LANES + lane]
+def stretch(tile, lane, stiffness, rest_length, shortest):
+    """The pull of the spring to x_k; d_k = x_k − x_i [m]."""
+    d0, d1, d2, square = way(tile, lane)
+    pull(tile, lane, stiffness, rest_length, max(math.sqrt(square), shortest), d0, d1, d2)
+    return d0, d1, d2
+
+
+@inlined
+def store(tile, block, lane, d0, d1, d2):
+    """A vector of a lane into a block of the tile."""
+    tile[block + lane], tile[block + LANES + lane], tile[block + 2 * LANES + lane] = d0, d1, d2
+
+
+@inlined
+def sweep(tile, block, lane, d0, d1, d2):
+    """6 G_i += p × d [m²], p in a block of the tile."""
+    p0, p1, p2 = tile[block + lane], tile[block + LANES + lane], tile[block + 2 * LANES + lane]
     tile[AREA + lane] += p1 * d2 - p2 * d1
     tile[AREA + LANES + lane] += p2 * d0 - p0 * d2
     tile[AREA + 2 * LANES + lane] += p0 * d1 - p1 * d0
+
+
+@inlined
+def sweep_pair(tile, lane, d0, d1, d2):
+    """6 G_i += d_k−1 × (d_k − d_k−2) (eq. 108): two products of a ring for the price of one."""
+    e0, e1, e2 = tile[EVEN + lane], tile[EVEN + LANES + lane], tile[EVEN + 2 * LANES + lane]
+    sweep(tile, ODD, lane, d0 - e0, d1 - e1, d2 - e2)
 
 
 @inlined
@@ -76,18 +100,28 @@ def begin(places, slices, s, tile):
     for entry in range(VECTOR):
         tile[FORCE + entry] = 0
         tile[AREA + entry] = 0
-        tile[BEFORE + entry] = 0
 
 
 @inlined
-def close_rings(tile, o0, o1, o2):
-    """d_last × d_0 ends the rings; the shares 6 G·(x − o) of 18 V into `BEFORE`."""
-    for lane in range(LANES):
-        sweep(tile, lane, tile[FIRST + lane], tile[FIRST + LANES + lane], tile[FIRST + 2 * LANES + lane])
-        volume = tile[AREA + lane] * (tile[HERE + lane] - o0)
-        volume += tile[AREA + LANES + lane] * (tile[HERE + LANES + lane] - o1)
-        volume += tile[AREA + 2 * LANES + lane] * (tile[HERE + 2 * LANES + lane] - o2)
-        tile[BEFORE + lane] = volume
+def close_rings(tile, odd, o0, o1, o2):
+    """What d_last and d_0 add ends the rings; the shares 6 G·(x − o) of 18 V into `SHARE`."""
+    if odd:
+        for lane in range(LANES):
+            sweep(tile, EVEN, lane, tile[FIRST + lane], tile[FIRST + LANES + lane], tile[FIRST + 2 * LANES + lane])
+            weigh(tile, lane, o0, o1, o2)
+    else:
+        for lane in range(LANES):
+            sweep_pair(tile, lane, tile[FIRST + lane], tile[FIRST + LANES + lane], tile[FIRST + 2 * LANES + lane])
+            weigh(tile, lane, o0, o1, o2)
+
+
+@inlined
+def weigh(tile, lane, o0, o1, o2):
+    """6 G·(x − o) [m³] into `SHARE`."""
+    volume = tile[AREA + lane] * (tile[HERE + lane] - o0)
+    volume += tile[AREA + LANES + lane] * (tile[HERE + LANES + lane] - o1)
+    volume += tile[AREA + 2 * LANES + lane] * (tile[HERE + 2 * LANES + lane] - o2)
+    tile[SHARE + lane] = volume
 
 
 @inlined
