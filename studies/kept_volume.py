@@ -46,7 +46,7 @@ def kept_volumes(root: Path, studies: Sequence[Study]) -> pd.DataFrame:
                 "scene": case.scene.name,
                 "body": case.body.series,
                 "nodes": case.body.nodes,
-                "method": case.method.name,
+                "method": case.method_words,
                 "volumes": record.attributes["volumes"],
                 "dt/dt_c": record.attributes["dt"] / record.attributes["dt_limit"],
                 "worst |V/V0 - 1| [1]": worst,

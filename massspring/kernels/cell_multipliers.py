@@ -1,6 +1,6 @@
 """The volumes of all tetrahedra solved for at the end of a step: together, or one after the other (eq. 166, 167)."""
 
-from massspring.kernels.cells import add_four, cell_slopes
+from massspring.kernels.cells import add_four, cell_slopes, mean_pressure
 from massspring.kernels.compiled import compiled, inlined
 from massspring.kernels.distances import allowed_part
 from massspring.kernels.prediction import pushed_by_into, unpushed_into
@@ -190,7 +190,7 @@ def relax_whole(network, motion, cells, target, scale, compliance, lam, force):
     y, gradient, inverse_mass = cells.y, cells.gradient, network.inverse_mass
     locked, direction = motion.locked, motion.direction
     volume = volume_gradient_into(y, network.triangles, gradient)
-    soft = compliance * target
+    soft = compliance * cells.rest_whole
     stiff = soft
     for i in range(y.shape[0]):
         g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
@@ -208,3 +208,15 @@ def relax_whole(network, motion, cells, target, scale, compliance, lam, force):
         force[i, 0], force[i, 1] = force[i, 0] + change * g0, force[i, 1] + change * g1
         force[i, 2] += change * g2
     return lam + change, idle
+
+
+@compiled
+def relax_sum(network, motion, cells, target, scale, compliance, force):
+    """All pressures of cells by as much as mends the sum of their volumes (eq. 169).
+
+    Returns whether a wrong sum had nothing to push on."""
+    mean = mean_pressure(cells)
+    lam, idle = relax_whole(network, motion, cells, target, scale, compliance, mean, force)
+    for t in range(cells.pressure.shape[0]):
+        cells.pressure[t] += lam - mean
+    return idle

@@ -6,6 +6,10 @@ iteration: Δp = (V0 − V(y) − C V0 p)/(dt² ∇V·W̃∇V + C V0), in the un
 eq. 167). p is kept over the iterations of a step: without it the answer is hard whatever the compliance C, a mistake in
 public implementations. As iterations go on, it is the compliant volume solved for at the end of the step.
 
+Ours: a sweep over tetrahedra ends with one constraint more, the sum of their volumes, as the same pressure on all
+(eq. 169). What the cells end up with stays the same, but cells that mend themselves after each other take hundreds of
+sweeps to see what all of them lack: five leave 2e-4 of the whole without it and 2e-8 with it (ball of 200 nodes).
+
 Limits: what the iterations have not reached depends on their number and on dt. The gradients are those of positions
 under way, so that spin is not kept. Per tetrahedron it locks as `element` does.
 """
@@ -17,7 +21,7 @@ import numpy as np
 
 from massspring.body import Body
 from massspring.errors import MassSpringError
-from massspring.kernels.cell_multipliers import relax_cells, relax_whole
+from massspring.kernels.cell_multipliers import relax_cells, relax_sum, relax_whole
 from massspring.kernels.cells import fill, mean_pressure
 from massspring.kernels.compiled import compiled
 from massspring.kernels.contact import find_contacts, revise_contacts
@@ -56,6 +60,7 @@ def xpbd_frame(network, cells, motion, drive, tally, compliance, iterations, who
                     lam, idle = relax_whole(network, motion, cells, target, dt * dt, compliance, lam, motion.gradient)
                 else:
                     idle = relax_cells(motion, network.inverse_mass, cells, dt * dt, compliance, motion.gradient)
+                    idle |= relax_sum(network, motion, cells, target, dt * dt, compliance, motion.gradient)
             mark(tally.ticks, MULTIPLIER)
             if sweep + 1 == passes:
                 break
@@ -80,14 +85,14 @@ class Xpbd(Method):
     volumes: Literal["element", "whole"] = "element"
     """Each tetrahedron's, or the one of the whole."""
     iterations: int = 5
-    """Sweeps over the volumes in a step. Five leave less than 1e-3 of the whole of a pressed ball of 1,500 tetrahedra
-    at half the limit of its springs; its force still grows with every further sweep, towards the locked one."""
+    """Sweeps over the volumes in a step. What five leave of single tetrahedra shows in the force on a pressed ball: it
+    still grows with every further sweep, towards the locked one. The whole is kept from two on."""
     compliance: float = 0.0
     """C = 1/K [1/Pa]; 0 is hard."""
 
     name: ClassVar[str] = "xpbd"
     order: ClassVar[int] = 1
-    volume_tol: ClassVar[float | None] = 1e-3
+    volume_tol: ClassVar[float | None] = 1e-4
     remedy: ClassVar[Remedy | None] = "whole"
     misses_probes: ClassVar[str | None] = "what a contact does to the volumes that it has mended is not made up for"
     keeps_spin: ClassVar[bool] = False
