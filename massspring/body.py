@@ -7,7 +7,7 @@ import numpy as np
 
 from massspring.errors import MassSpringError
 from massspring.kernels.deformation import tetrahedron_volumes_into
-from massspring.kernels.layout import Membrane
+from massspring.kernels.spring_layout import Membrane
 from massspring.kernels.springs import spring_energy, spring_forces_into
 from massspring.kernels.volume import enclosed_volume, volume_gradient_into
 from massspring.springs import Springs, lengths

@@ -4,7 +4,7 @@ import numpy as np
 
 from massspring.body import Body, Material
 from massspring.errors import MassSpringError
-from massspring.kernels.layout import Membrane
+from massspring.kernels.spring_layout import Membrane
 from massspring.springs import EDGES_OF_TRIANGLE, SpringKind, Springs, lengths, unique_edges
 from massspring.surface import check_surface
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from massspring.curve import along_curve
-from massspring.kernels.layout import Slices
+from massspring.kernels.spring_layout import Slices
 from massspring.kernels.tiles import LANES
 from massspring.springs import Springs
 
@@ -157,6 +157,28 @@ def places_in_slices(springs: Springs, triangles: np.ndarray, rest: np.ndarray) 
     return place
 
 
+def _springs_by_lane(
+    slots: _Slots, springs: Springs, start: np.ndarray, ring_rows: np.ndarray, real: np.dtype
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Neighbours, their rest lengths [m] and stiffnesses [N/m], (r, LANES) each: rings first, `ring_rows` (S,) of them.
+
+    What fills a short ring is its first neighbour again, and a short list the node itself.
+    """
+    begins = slots.node.copy()
+    first = slots.ring.at == 0
+    begins.reshape(-1)[slots.ring.of[first]] = slots.ring.node[first]
+    of_row = np.repeat(np.arange(len(slots.node)), np.diff(start))
+    in_ring = np.arange(start[-1]) < (start[:-1] + ring_rows)[of_row]
+    neighbour = np.where(in_ring[:, None], begins[of_row], slots.node[of_row]).astype(np.uint32)
+    rest_length, stiffness = aligned(neighbour.shape, real), aligned(neighbour.shape, real)
+    for lists, begin in ((slots.ring, start[:-1]), (slots.rest, start[:-1] + ring_rows)):
+        row, lane = begin[lists.of // LANES] + lists.at, lists.of % LANES
+        neighbour[row, lane] = lists.node
+        row, lane, spring = (part[lists.spring >= 0] for part in (row, lane, lists.spring))
+        rest_length[row, lane], stiffness[row, lane] = springs.rest_length[spring], springs.stiffness[spring]
+    return neighbour, rest_length, stiffness
+
+
 def slices_of(springs: Springs, triangles: np.ndarray, inverse_mass: np.ndarray, rest: np.ndarray) -> Slices:
     """The layout for `springs` and the kept surface `triangles` (f, 3) on nodes of `inverse_mass` (n,) [1/kg].
 
@@ -168,19 +190,7 @@ def slices_of(springs: Springs, triangles: np.ndarray, inverse_mass: np.ndarray,
     ring_rows, rest_rows = _rows(slots.ring, slices), _rows(slots.rest, slices)
     rows = np.cumsum(ring_rows + rest_rows)
     start = np.r_[0, rows]
-    # What fills a short ring is its first neighbour again, and a short list the node itself.
-    begins = node.copy()
-    first = slots.ring.at == 0
-    begins.reshape(-1)[slots.ring.of[first]] = slots.ring.node[first]
-    of_row = np.repeat(np.arange(slices), np.diff(start))
-    in_ring = np.arange(start[-1]) < (start[:-1] + ring_rows)[of_row]
-    neighbour = np.where(in_ring[:, None], begins[of_row], node[of_row]).astype(np.uint32)
-    rest_length, stiffness = aligned(neighbour.shape, real), aligned(neighbour.shape, real)
-    for lists, begin in ((slots.ring, start[:-1]), (slots.rest, start[:-1] + ring_rows)):
-        row, lane = begin[lists.of // LANES] + lists.at, lists.of % LANES
-        neighbour[row, lane] = lists.node
-        row, lane, spring = (part[lists.spring >= 0] for part in (row, lane, lists.spring))
-        rest_length[row, lane], stiffness[row, lane] = springs.rest_length[spring], springs.stiffness[spring]
+    neighbour, rest_length, stiffness = _springs_by_lane(slots, springs, start, ring_rows, real)
     used = np.arange(LANES) < slots.lanes[:, None]
     in_a_row = used.all(axis=1) & (np.diff(node, axis=1) == 1).all(axis=1)
     pieces = np.flatnonzero(used[: slots.pieces])

@@ -9,8 +9,12 @@ from massspring.collision import is_inside, mean_edge, tip_depth
 from massspring.crew import cores
 from massspring.errors import MassSpringError
 from massspring.methods.base import Method
-from massspring.obstacles import Probe
+from massspring.obstacles import Capsule, Plane, Probe, Sphere
+from massspring.surface import winding_number
 from massspring.volumes import Ramp
+
+INSIDE = 1e-6
+"""Of the body's size: what an obstacle may reach into it at the start, round-off of positions that touch."""
 
 
 def check_surroundings(gravity: tuple[float, float, float], damping: float, dt: float) -> None:
@@ -89,10 +93,33 @@ def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.nda
         )
     inside = is_inside(probe.anchor + probe.path(0.0), x, body.triangles)
     depth = tip_depth(probe, x, body.triangles, 0.0)
-    if inside or depth > 1e-6 * body.size:
-        raise MassSpringError(
-            f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
-        )
+    if inside or depth > INSIDE * body.size:
+        raise _starts_inside(number, depth)
+
+
+def check_solid(number: int, obstacle: Plane | Sphere | Capsule, body: Body, x: np.ndarray) -> None:
+    """Raises MassSpringError for an obstacle that starts inside the body at `x` (n, 3)."""
+    depth = starting_depth(obstacle, body, x)
+    if depth > INSIDE * body.size:
+        raise _starts_inside(number, depth)
+
+
+def _starts_inside(number: int, depth: float) -> MassSpringError:
+    return MassSpringError(
+        f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
+    )
+
+
+def starting_depth(obstacle: Plane | Sphere | Capsule, body: Body, x: np.ndarray) -> float:
+    """How deep the body at `x` (n, 3) reaches into an obstacle at the start [m]; one between all nodes counts too."""
+    depth = -float(obstacle.gap(x[body.surface_nodes], 0.0).min())
+    if isinstance(obstacle, Plane):
+        return depth
+    ends = [obstacle.anchor + obstacle.path(0.0)]
+    if isinstance(obstacle, Capsule):
+        ends.append(ends[0] + obstacle.span)
+    inside = any(abs(winding_number(end, x, body.triangles)) > 0.5 for end in ends)
+    return max(depth, obstacle.radius) if inside else depth
 
 
 def check_threads(threads: int, method: Method) -> None:

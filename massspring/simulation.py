@@ -24,11 +24,11 @@ from massspring.setup_checks import (
     check_held_apart,
     check_nodal,
     check_probe,
+    check_solid,
     check_surroundings,
     check_targets,
     check_threads,
 )
-from massspring.surface import winding_number
 from massspring.targets import fastest_filling, followed
 from massspring.volumes import Ramp
 
@@ -74,12 +74,8 @@ class Setup:
         for number, obstacle in enumerate(self.obstacles):
             if isinstance(obstacle, Probe):
                 check_probe(number, obstacle, self.method, self.body, x)
-                continue
-            depth = starting_depth(obstacle, self.body, x)
-            if depth > 1e-6 * self.body.size:
-                raise MassSpringError(
-                    f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
-                )
+            else:
+                check_solid(number, obstacle, self.body, x)
         check_held_apart(self.body, self.method)
         check_targets(self.targets, self.body, self.method)
         rate = fastest_filling(self.body)
@@ -155,18 +151,6 @@ class Setup:
         """What each kept volume should be at times `t` (q,) [s], (q, m) [m³]."""
         factors = [self.followed[name](t) if name in self.targets else np.ones(len(t)) for name in self.body.kept.names]
         return np.column_stack(factors) * self.body.rest_volumes
-
-
-def starting_depth(obstacle: Plane | Sphere | Capsule, body: Body, x: np.ndarray) -> float:
-    """How deep the body at `x` (n, 3) reaches into an obstacle at the start [m]; one between all nodes counts too."""
-    depth = -float(obstacle.gap(x[body.surface_nodes], 0.0).min())
-    if isinstance(obstacle, Plane):
-        return depth
-    ends = [obstacle.anchor + obstacle.path(0.0)]
-    if isinstance(obstacle, Capsule):
-        ends.append(ends[0] + obstacle.span)
-    inside = any(abs(winding_number(end, x, body.triangles)) > 0.5 for end in ends)
-    return max(depth, obstacle.radius) if inside else depth
 
 
 def _rows(vectors: list[np.ndarray]) -> np.ndarray:

@@ -34,8 +34,8 @@ def seat(network, motion, drive, step, lam, count):
             if depth < deepest:
                 deepest, lift = depth, -depth
                 if not drive.is_plane[o]:
-                    a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-                    n0, n1, n2, lift = round_contact(s0, s1, s2, r0, r1, r2, a0, a1, a2, drive.radius[o])
+                    axis = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
+                    n0, n1, n2, lift = round_contact((s0, s1, s2), (r0, r1, r2), axis, drive.radius[o])
                 a = n0 * u0 + n1 * u1 + n2 * u2 + lift / dt
                 motion.touched[i], motion.locked[i] = o + 1, 1
                 motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2] = n0, n1, n2

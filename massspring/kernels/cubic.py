@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.compiled import compiled
+from massspring.kernels.compiled import compiled, inlined
 from massspring.kernels.prediction import pushed_by_into, unpushed_into
 
 POLISHES = 4
@@ -30,10 +30,10 @@ def line_into(motion, inverse_mass, dt, line):
     pushed_by_into(motion, inverse_mass, dt * dt, motion.gradient, line.d)
 
 
-@compiled
-def triple(a0, a1, a2, b0, b1, b2, c0, c1, c2):
-    """a · (b × c)."""
-    return a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0)
+@inlined
+def triple(a, b, c):
+    """a · (b × c) of three vectors, each a tuple of three numbers."""
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 
 
 @compiled
@@ -46,20 +46,20 @@ def volume_cubic(y, d, triangles):
     k0, k1, k2, k3 = 0.0, 0.0, 0.0, 0.0
     for f in range(triangles.shape[0]):
         i, j, k = triangles[f, 0], triangles[f, 1], triangles[f, 2]
-        a0, a1, a2 = y[i, 0] - o0, y[i, 1] - o1, y[i, 2] - o2
-        b0, b1, b2 = y[j, 0] - o0, y[j, 1] - o1, y[j, 2] - o2
-        c0, c1, c2 = y[k, 0] - o0, y[k, 1] - o1, y[k, 2] - o2
-        p0, p1, p2 = d[i, 0], d[i, 1], d[i, 2]
-        q0, q1, q2 = d[j, 0], d[j, 1], d[j, 2]
-        r0, r1, r2 = d[k, 0], d[k, 1], d[k, 2]
-        k0 += triple(a0, a1, a2, b0, b1, b2, c0, c1, c2)
-        k1 += triple(p0, p1, p2, b0, b1, b2, c0, c1, c2)
-        k1 += triple(a0, a1, a2, q0, q1, q2, c0, c1, c2)
-        k1 += triple(a0, a1, a2, b0, b1, b2, r0, r1, r2)
-        k2 += triple(a0, a1, a2, q0, q1, q2, r0, r1, r2)
-        k2 += triple(p0, p1, p2, b0, b1, b2, r0, r1, r2)
-        k2 += triple(p0, p1, p2, q0, q1, q2, c0, c1, c2)
-        k3 += triple(p0, p1, p2, q0, q1, q2, r0, r1, r2)
+        a = y[i, 0] - o0, y[i, 1] - o1, y[i, 2] - o2
+        b = y[j, 0] - o0, y[j, 1] - o1, y[j, 2] - o2
+        c = y[k, 0] - o0, y[k, 1] - o1, y[k, 2] - o2
+        p = d[i, 0], d[i, 1], d[i, 2]
+        q = d[j, 0], d[j, 1], d[j, 2]
+        r = d[k, 0], d[k, 1], d[k, 2]
+        k0 += triple(a, b, c)
+        k1 += triple(p, b, c)
+        k1 += triple(a, q, c)
+        k1 += triple(a, b, r)
+        k2 += triple(a, q, r)
+        k2 += triple(p, b, r)
+        k2 += triple(p, q, c)
+        k3 += triple(p, q, r)
     return k0 / 6.0, k1 / 6.0, k2 / 6.0, k3 / 6.0
 
 

@@ -51,13 +51,15 @@ def round_gap(r0, r1, r2, a0, a1, a2, radius):
 
 
 @lean
-def sphere_contact(s0, s1, s2, r0, r1, r2, radius):
+def sphere_contact(s, r, radius):
     """(normal, lift) of a node at s now and at r after the predicted step, seen from the centre [m] (eq. 12).
 
     n = s/|s|; the node ends the step at n·r⁺ = n·r + lift = √(R² − |r − n (n·r)|²), on the sphere, moved along n alone.
     A node that slides farther than R within a step has no such point: it ends on the tangent plane at r/|r|. Inverse
     lengths are infinite at the very centre, and the run has diverged.
     """
+    s0, s1, s2 = s
+    r0, r1, r2 = r
     distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
     now = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
     along = (r0 * s0 + r1 * s1 + r2 * s2) / now if now > 0.0 else 0.0
@@ -68,13 +70,14 @@ def sphere_contact(s0, s1, s2, r0, r1, r2, radius):
 
 
 @lean
-def round_contact(s0, s1, s2, r0, r1, r2, a0, a1, a2, radius):
+def round_contact(s, r, a, radius):
     """`sphere_contact` with the sphere around the nearest point of an axis 0 … a, a capsule's; a = 0: a sphere's.
 
     Along the side both points are seen from the axis. A node that passes from side to end ends on the tangent plane.
     """
-    now, then = axis_share(s0, s1, s2, a0, a1, a2), axis_share(r0, r1, r2, a0, a1, a2)
-    r0, r1, r2 = r0 - then * a0, r1 - then * a1, r2 - then * a2
+    now = axis_share(s[0], s[1], s[2], a[0], a[1], a[2])
+    then = axis_share(r[0], r[1], r[2], a[0], a[1], a[2])
+    r = r[0] - then * a[0], r[1] - then * a[1], r[2] - then * a[2]
     if now == then or (0.0 < now < 1.0 and 0.0 < then < 1.0):
-        return sphere_contact(s0 - now * a0, s1 - now * a1, s2 - now * a2, r0, r1, r2, radius)
-    return sphere_contact(r0, r1, r2, r0, r1, r2, radius)
+        return sphere_contact((s[0] - now * a[0], s[1] - now * a[1], s[2] - now * a[2]), r, radius)
+    return sphere_contact(r, r, radius)

@@ -158,7 +158,7 @@ def book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse):
         if locked[i] == 2:
             m0, m1, m2 = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
             n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-            _, beta = shares(k0, k1, k2, n0, n1, n2, m0, m1, m2)
+            _, beta = shares((k0, k1, k2), (n0, n1, n2), (m0, m1, m2))
             book(contact_impulse, o, motion.second[i] - 1, beta * m0, beta * m1, beta * m2)
 
 

@@ -3,7 +3,7 @@
 import math
 
 from massspring.kernels.clearance import gap_and_normal, pushed_velocity
-from massspring.kernels.compiled import lean
+from massspring.kernels.compiled import inlined, lean
 from massspring.kernels.distances import allowed_part
 
 SLIPS = 1.0 + 1e-9
@@ -104,11 +104,16 @@ def wedge(network, motion, drive, step, lam):
     return changes
 
 
+@inlined
+def dot(a, b):
+    """a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 @lean
-def shares(k0, k1, k2, n0, n1, n2, m0, m1, m2):
-    """The parts of k = α n + β n' + rest along two normals that are not parallel: (α, β)."""
-    along, other = k0 * n0 + k1 * n1 + k2 * n2, k0 * m0 + k1 * m1 + k2 * m2
-    cosine = n0 * m0 + n1 * m1 + n2 * m2
+def shares(k, n, m):
+    """The parts of k = α n + β n' + rest along two normals that are not parallel, tuples of three numbers: (α, β)."""
+    along, other, cosine = dot(k, n), dot(k, m), dot(n, m)
     square = 1.0 - cosine * cosine
     return (along - cosine * other) / square, (other - cosine * along) / square
 
@@ -123,17 +128,9 @@ def release_wedged(network, motion, drive, lam):
             continue
         u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
         # What the edge leaves free is at right angles to both normals and takes no share.
-        alpha, beta = shares(
-            motion.goal[i, 0] - u0,
-            motion.goal[i, 1] - u1,
-            motion.goal[i, 2] - u2,
-            motion.normal[i, 0],
-            motion.normal[i, 1],
-            motion.normal[i, 2],
-            motion.second_normal[i, 0],
-            motion.second_normal[i, 1],
-            motion.second_normal[i, 2],
-        )
+        n = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+        m = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
+        alpha, beta = shares((motion.goal[i, 0] - u0, motion.goal[i, 1] - u1, motion.goal[i, 2] - u2), n, m)
         if alpha < 0.0 or beta < 0.0:
             motion.touched[i], motion.locked[i], motion.clearance[i] = 0, 0, 0.0
             changes += 1

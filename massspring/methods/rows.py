@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse import csr_array
 
-from massspring.kernels.lanes import LANES
+from massspring.kernels.four_numbers import LANES
 from massspring.kernels.layout import VolumeRows
 from massspring.methods.quadrangles import edge_chains, quadrangles
 from massspring.neighbours import aligned

@@ -17,8 +17,8 @@ from massspring import (
     simulate,
     step_limit,
 )
-from massspring.kernels.layout import Membrane
 from massspring.kernels.membrane import add_membrane_forces, membrane_energy
+from massspring.kernels.spring_layout import Membrane
 from massspring.membranes import lloyd_springs, triangle_springs
 from massspring.stability import scaled_stiffness
 from massspring.stiffness import membrane_stiffness

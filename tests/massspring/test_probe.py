@@ -95,8 +95,25 @@ def test_an_attachment_bears_what_presses_on_its_nodes(method):
     assert np.abs(contact + reaction).max() < 1e-2 * np.abs(contact).max()
 
 
-def test_contacts_and_volume_equal_the_full_saddle_point_solve():
-    """Outside truth: [M, −Cᵀ, −Gᵀ; C, 0; G, 0] solved densely for the rows that press."""
+def rates_of(rows, count, shape):
+    """What rows ask of the velocities of all nodes: Σ b n, (count, n, 3)."""
+    rates = np.zeros((count, *shape))
+    for k in range(count):
+        for q in range(3):
+            rates[k, rows.node[k, q]] += rows.weight[k, q] * rows.direction[k]
+    return rates
+
+
+def asked_of(stage, rates):
+    """How fast (count,) the corners of each row must leave its tip in the step [m/s]."""
+    rows, probes = stage.probes.rows, stage.probes
+    probe, direction = rows.probe[: len(rates)], rows.direction[: len(rates)]
+    tip = np.einsum("ki,ki->k", direction, stage.tips.end[stage.step, probe])
+    return (probes.radius[probe] - np.einsum("kij,ij->k", rates, stage.motion.x) + tip) / stage.dt
+
+
+def disturbed_contact():
+    """A step in which a tip presses on some triangles, with other velocities and directions than it found."""
     setup = pressed(ImplicitVolume(), frames=60, slide=0.01)
     state = None
     for _, state in frames_of(setup):
@@ -104,38 +121,34 @@ def test_contacts_and_volume_equal_the_full_saddle_point_solve():
             break
     drive = setup.drive(59)
     after = begin_frame(state, drive)
-    probing, motion, net, dt = after.probing, after.motion, after.network, drive.dt
-    rng = np.random.default_rng(4)
+    motion, net, rows, rng = after.motion, after.network, after.probing.rows, np.random.default_rng(4)
     motion.v_star[:] = 0.02 * rng.normal(size=motion.v_star.shape)
     motion.v_star[net.held_nodes] = 0.0
     motion.locked[:] = 0
     motion.touching_count[0] = 0
-    rows = probing.rows
     count = int(rows.count[0])
     rows.direction[:count] += 0.3 * rng.normal(size=(count, 3))
     rows.direction[:count] /= np.linalg.norm(rows.direction[:count], axis=1)[:, None]
-    g = motion.gradient
-    mobility = float((net.inverse_mass[:, None] * g * g).sum())
-    lam = 50.0
+    mobility = float((net.inverse_mass[:, None] * motion.gradient**2).sum())
+    after.probing.near[0], after.probing.near_count[0] = np.arange(len(net.triangles)), len(net.triangles)
+    return Stage(net, motion, drive.tips, after.probing, None, mobility, 0, drive.dt)
+
+
+def test_contacts_and_volume_equal_the_full_saddle_point_solve():
+    """Outside truth: [M, −Cᵀ, −Gᵀ; C, 0; G, 0] solved densely for the rows that press."""
+    stage, lam = disturbed_contact(), 50.0
+    probing, motion, net, dt = stage.probes, stage.motion, stage.network, stage.dt
+    g, rows, count = motion.gradient, probing.rows, int(probing.rows.count[0])
     u = motion.v_star + dt * lam * net.inverse_mass[:, None] * g
-    stage = Stage(net, motion, drive.tips, probing, None, mobility, 0, dt)
-    probing.near[0], probing.near_count[0] = np.arange(len(net.triangles)), len(net.triangles)
     gather(stage, lam)
     solve_rows(stage, None)
     beside = lam + probing.change[0]
     impulse = rows.impulse[:count]
     assert (impulse >= 0).all() and (impulse > 0).sum() > 0
     found = motion.v_star + net.inverse_mass[:, None] * dt * beside * g + probing.push
-
-    c = np.zeros((count, *u.shape))
-    for k in range(count):
-        for q in range(3):
-            c[k, probing.surface[rows.triangle[k], q]] += rows.weight[k, q] * rows.direction[k]
-    tip = drive.tips.end[0, rows.probe[:count]]
-    ask = (
-        probing.radius[rows.probe[:count]]
-        - (np.einsum("kij,ij->k", c, motion.x) - (rows.direction[:count] * tip).sum(1))
-    ) / dt
+    assert np.array_equal(rows.node[:count], probing.surface[rows.triangle[:count]])
+    c = rates_of(rows, count, u.shape)
+    ask = asked_of(stage, c)
     pressing = impulse > 0
     free = np.repeat(net.inverse_mass > 0, 3)
     constraints = np.vstack([c[pressing].reshape(pressing.sum(), -1), dt * g.ravel()])[:, free]

@@ -13,7 +13,7 @@ from massspring.kernels.probe_motion import gather, move
 from massspring.kernels.probe_pressure import change_of_rows, swelling
 from massspring.methods.base import begin_frame
 from tests.massspring.test_methods import clock_for
-from tests.massspring.test_probe import BALL, pressed
+from tests.massspring.test_probe import BALL, asked_of, pressed, rates_of
 from tests.massspring.test_probe_volumes import gradients
 
 METHOD = ImplicitVolume()
@@ -95,40 +95,40 @@ def taken_from(motion):
     return np.choose(motion.locked[:, None, None], [0 * outer, outer, np.eye(3) - outer, 0 * outer + np.eye(3)])
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_contacts_beside_obstacles_equal_the_full_saddle_point(seed):
-    """Outside truth: Newton's law for all nodes with every constraint in one dense system: least squares of numpy."""
+def random_step(seed, lam):
+    """A step with contacts beside obstacles and attachments, velocities at random; what is left to each node."""
     setup, rng = pressed(METHOD), np.random.default_rng(seed)
     after, drive = begin_frame(setup.start(), setup.drive(0)), setup.drive(0)
-    probing, motion, net, lam, dt = after.probing, after.motion, after.network, 40.0, drive.dt
+    probing, motion, net = after.probing, after.motion, after.network
     motion.v_star[:], motion.gradient[:] = 0.02 * rng.normal(size=(2, *motion.x.shape))
     motion.v_star[net.held_nodes] = 0.0
     motion.gradient[:] *= 0.01
-    stage = Stage(net, motion, drive.tips, probing, None, 0.0, 0, dt)
+    stage = Stage(net, motion, drive.tips, probing, None, 0.0, 0, drive.dt)
     some_rows(stage, rng)
     motion.locked[net.held_nodes] = 0
-    taken = taken_from(motion)
-    kept, g, w = np.eye(3) - taken, motion.gradient, net.inverse_mass
-    mobility = float(np.einsum("n,ni,nij,nj->", w, g, kept, g))
-    stage = stage._replace(mobility=mobility)
+    kept, g = np.eye(3) - taken_from(motion), motion.gradient
+    stage = stage._replace(mobility=float(np.einsum("n,ni,nij,nj->", net.inverse_mass, g, kept, g)))
     probing.near[0], probing.near_count[0] = np.arange(len(probing.surface)), len(probing.surface)
     gather(stage, lam)
+    return stage, kept
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_contacts_beside_obstacles_equal_the_full_saddle_point(seed):
+    """Outside truth: Newton's law for all nodes with every constraint in one dense system: least squares of numpy."""
+    lam = 40.0
+    stage, kept = random_step(seed, lam)
+    probing, motion, dt = stage.probes, stage.motion, stage.dt
+    g, w = motion.gradient, stage.network.inverse_mass
     bound = solve_rows(stage, None)
     move(stage, None)
-    u = (
-        np.einsum("nij,nj->ni", kept, motion.v_star + dt * lam * w[:, None] * g)
-        + motion.goal * (motion.locked > 0)[:, None]
-    )
+    u = np.einsum("nij,nj->ni", kept, motion.v_star + dt * lam * w[:, None] * g)
+    u += motion.goal * (motion.locked > 0)[:, None]
     on = np.unique(BALL.triangles)
     assert np.allclose(probing.base[on], u[on], atol=1e-14)
-    found, rows = np.where(np.isin(np.arange(len(u)), on)[:, None], probing.velocity, u), probing.rows
-    impulse = rows.impulse[:5]
-    c = np.zeros((5, *u.shape))
-    for k in range(5):
-        for q in range(3):
-            c[k, rows.node[k, q]] += rows.weight[k, q] * rows.direction[k]
-    ask = (probing.radius[0] - np.einsum("kij,ij->k", c, motion.x) + rows.direction[:5] @ drive.tips.end[0, 0]) / dt
-    pressing = impulse > 0
+    found = np.where(np.isin(np.arange(len(u)), on)[:, None], probing.velocity, u)
+    impulse, c = probing.rows.impulse[:5], rates_of(probing.rows, 5, u.shape)
+    ask, pressing = asked_of(stage, c), impulse > 0
     assert pressing.any()
     # W̃ M̃ = I on what is left to each node: the multipliers of obstacles and attachments drop out.
     mobile = np.einsum("n,nij->nij", w, kept)

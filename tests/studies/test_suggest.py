@@ -16,14 +16,13 @@ def test_a_typo_is_answered_with_the_nearest_name(typo):
     with pytest.raises(StudyError) as problem:
         choose(typo, SCENES, "scene")
     known = "ball_clamped, ball_squeeze, liver_press"
-    assert str(problem.value) == f"unknown scene {typo!r}; did you mean 'ball_squeeze'? Known: {known}"
+    assert str(problem.value) == f"unknown scene {typo!r}; did you mean 'ball_squeeze' (known are {known})?"
 
 
 def test_nothing_near_suggests_nothing():
     with pytest.raises(StudyError) as problem:
         choose("zzz", SCENES, "scene")
-    assert "did you mean" not in str(problem.value)
-    assert "liver_press" in str(problem.value)
+    assert str(problem.value) == "unknown scene 'zzz'; known are ball_clamped, ball_squeeze, liver_press"
 
 
 def test_many_names_are_cut_and_none_are_said():

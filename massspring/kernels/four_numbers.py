@@ -1,0 +1,102 @@
+"""The code of sums over entries of four numbers: loads, arithmetic and stores of one vector register."""
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+
+LANES = 4
+NEXT, FIRST = (1, 2, 0, 3), (0, 0, 0, 0)
+"""Lanes in another order: (y, z, x, 0) of (x, y, z, 0), and the first one in all."""
+
+
+def _address(builder: Any, kind: Any, array: Any, row: Any) -> Any:
+    """Of the first number in `row`, rows of one or of four numbers."""
+    width = LANES if kind.ndim == 2 else 1
+    return builder.gep(array.data, [builder.mul(row, ir.Constant(row.type, width))])
+
+
+class Row:
+    """Writes the code of one sum: loads by row of the arrays among the arguments, arithmetic on four numbers."""
+
+    def __init__(self, context: Any, builder: Any, signature: Any, args: Any, real: Any) -> None:
+        self.context, self.builder, self.kinds, self.args = context, builder, signature.args, args
+        self.arrays = {
+            at: context.make_array(kind)(context, builder, arg)
+            for at, (kind, arg) in enumerate(zip(signature.args, args, strict=True))
+            if isinstance(kind, types.Array)
+        }
+        self.real = real
+        self.vector = ir.VectorType(context.get_value_type(real), LANES)
+
+    def _where(self, at: int, row: Any) -> Any:
+        return _address(self.builder, self.kinds[at], self.arrays[at], row)
+
+    def _pointer(self, at: int, row: Any) -> tuple[Any, int]:
+        """To four numbers of the array, and what they are aligned to: one number."""
+        address = self._where(at, row)
+        four = ir.VectorType(address.type.pointee, LANES).as_pointer()
+        return self.builder.bitcast(address, four), self.kinds[at].dtype.bitwidth // 8
+
+    def number(self, at: int, row: Any) -> Any:
+        """One number, as real as the sum."""
+        number = self.builder.load(self._where(at, row))
+        return self.context.cast(self.builder, number, self.kinds[at].dtype, self.real)
+
+    def given(self, at: int) -> Any:
+        """A number among the arguments, as real as the sum."""
+        return self.context.cast(self.builder, self.args[at], self.kinds[at], self.real)
+
+    def index(self, at: int, row: Any, column: int = 0) -> Any:
+        """A row number out of an array of uint32."""
+        address = self.builder.gep(self._where(at, row), [ir.Constant(row.type, column)])
+        return self.builder.zext(self.builder.load(address), row.type)
+
+    def four(self, at: int, row: Any) -> Any:
+        """Four numbers, as real as the array."""
+        pointer, align = self._pointer(at, row)
+        return self.builder.load(pointer, align=align)
+
+    def widened(self, four: Any) -> Any:
+        """Four numbers as real as the sum."""
+        return four if four.type == self.vector else self.builder.fpext(four, self.vector)
+
+    def put(self, four: Any, at: int, row: Any) -> None:
+        """Stores four numbers."""
+        pointer, align = self._pointer(at, row)
+        self.builder.store(four, pointer, align=align)
+
+    def turned(self, four: Any, order: tuple[int, ...]) -> Any:
+        """The lanes in another order."""
+        chosen = ir.Constant(ir.VectorType(ir.IntType(32), LANES), list(order))
+        return self.builder.shuffle_vector(four, ir.Constant(four.type, ir.Undefined), chosen)
+
+    def spread(self, number: Any) -> Any:
+        """One number in all lanes."""
+        single = self.builder.insert_element(
+            ir.Constant(self.vector, ir.Undefined), number, ir.Constant(ir.IntType(32), 0)
+        )
+        return self.turned(single, FIRST)
+
+    def plus(self, total: Any, a: Any, b: Any) -> Any:
+        """total + a b, rounded once where the machine can."""
+        kind = ir.FunctionType(self.vector, [self.vector] * 3)
+        name = f"llvm.fmuladd.v{LANES}{self.vector.element.intrinsic_name}"
+        return self.builder.call(cgutils.get_or_insert_function(self.builder.module, kind, name), [a, b, total])
+
+    def sums(self, count: int, step: Callable[[Any, list[Any]], list[Any]]) -> list[Any]:
+        """`count` totals over the entries start ≤ e < stop, the first two arguments: `step` adds one entry to them."""
+        builder, (start, stop) = self.builder, self.args[:2]
+        zero = ir.Constant(self.vector, [0.0] * LANES)
+        totals = [cgutils.alloca_once_value(builder, zero) for _ in range(count)]
+        with cgutils.for_range_slice(builder, start, stop, ir.Constant(start.type, 1)) as (e, _):
+            for total, after in zip(totals, step(e, [builder.load(total) for total in totals]), strict=True):
+                builder.store(after, total)
+        return [builder.load(total) for total in totals]
+
+    def across(self, four: Any) -> Any:
+        """The sum of four lanes."""
+        a, b, c, d = (self.builder.extract_element(four, ir.Constant(ir.IntType(32), lane)) for lane in range(LANES))
+        return self.builder.fadd(self.builder.fadd(a, b), self.builder.fadd(c, d))

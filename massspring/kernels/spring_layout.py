@@ -1,0 +1,61 @@
+"""What compiled loops are given of springs: triangle springs, and the others side by side in slices."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Membrane(NamedTuple):
+    """t triangle springs; edge a of a triangle lies opposite its node a."""
+
+    triangles: np.ndarray
+    """(t, 3) uint32."""
+    rest_square: np.ndarray
+    """L_a² [m²], (t, 3)."""
+    stiffness: np.ndarray
+    """k_a of each edge [N/m³], (t, 3)."""
+    coupling: np.ndarray
+    """c_a of the two edges that meet at node a [N/m³], (t, 3)."""
+
+
+class Slices(NamedTuple):
+    """Who pulls at whom, 64 nodes side by side in S slices; r rows of 64 neighbours.
+
+    The first rows of a slice walk the rings of its nodes: the neighbours on the kept surface in order, first to last.
+    The others are all remaining springs. Shorter lists are filled up with springs of no stiffness. The first `pieces`
+    slices hold pieces of nodes that have too many neighbours for a lane, or several rings.
+    """
+
+    node: np.ndarray
+    """(S, 64) uint32; empty lanes repeat a node of the slice."""
+    lanes: np.ndarray
+    """Lanes in use, (S,) int64."""
+    first: np.ndarray
+    """Of a full slice whose nodes follow each other in memory the first, else -1, (S,) int64."""
+    start: np.ndarray
+    """First row of each slice, (S + 1,) int64."""
+    rings: np.ndarray
+    """How many of its rows are rings, (S,) int64."""
+    neighbour: np.ndarray
+    """(r, 64) uint32."""
+    rest_length: np.ndarray
+    """[m], (r, 64)."""
+    stiffness: np.ndarray
+    """[N/m], (u, 64), each different row once: few where all springs of a kind have the same; 0 for no spring."""
+    stiffness_row: np.ndarray
+    """Which of them each row has, (r,) uint32."""
+    inverse_mass: np.ndarray
+    """[1/kg], (S, 64)."""
+    pieces: int
+    split_node: np.ndarray
+    """Nodes in pieces, (q,) uint32."""
+    split_start: np.ndarray
+    """Where the pieces of each begin, (q + 1,) int64."""
+    split_piece: np.ndarray
+    """Slice × 64 + lane of each piece, int64."""
+    held_start: np.ndarray
+    """Where in `held_lane` each slice begins, (S + 1,) int64."""
+    held_lane: np.ndarray
+    """Lanes of the nodes whose motion is prescribed, but for those in pieces, int64."""
+    origin: int
+    """The node from which the volume is seen."""
