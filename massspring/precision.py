@@ -11,7 +11,7 @@ from massspring.methods.rows import OF_EACH_VOLUME
 from massspring.neighbours import aligned
 
 Precision = Literal["float64", "float32"]
-KEPT_DOUBLE = frozenset({"sums", "matrix", *OF_EACH_VOLUME})
+KEPT_DOUBLE = frozenset({"sums", "matrix", "scale", *OF_EACH_VOLUME})
 """Sums over many nodes and what is solved with them: as long as there are slices or volumes, so they cost nothing."""
 
 

@@ -8,14 +8,30 @@ from numba import types
 from numba.core import cgutils
 
 LANES = 4
-NEXT, FIRST = (1, 2, 0, 3), (0, 0, 0, 0)
-"""Lanes in another order: (y, z, x, 0) of (x, y, z, 0), and the first one in all."""
+NEXT = (1, 2, 0, 3)
+"""Lanes in another order: (y, z, x, 0) of (x, y, z, 0)."""
 
 
 def _address(builder: Any, kind: Any, array: Any, row: Any) -> Any:
     """Of the first number in `row`, rows of one or of four numbers."""
     width = LANES if kind.ndim == 2 else 1
     return builder.gep(array.data, [builder.mul(row, ir.Constant(row.type, width))])
+
+
+def spread_over(builder: Any, number: Any, vector: Any) -> Any:
+    """One number in all lanes of a vector type."""
+    none = ir.Constant(vector, ir.Undefined)
+    single = builder.insert_element(none, number, ir.Constant(ir.IntType(32), 0))
+    first = ir.Constant(ir.VectorType(ir.IntType(32), vector.count), [0] * vector.count)
+    return builder.shuffle_vector(single, none, first)
+
+
+def plus(builder: Any, total: Any, a: Any, b: Any) -> Any:
+    """total + a b lane by lane, rounded once where the machine can."""
+    vector = total.type
+    name = f"llvm.fmuladd.v{vector.count}{vector.element.intrinsic_name}"
+    kind = ir.FunctionType(vector, [vector] * 3)
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [a, b, total])
 
 
 class Row:
@@ -75,16 +91,11 @@ class Row:
 
     def spread(self, number: Any) -> Any:
         """One number in all lanes."""
-        single = self.builder.insert_element(
-            ir.Constant(self.vector, ir.Undefined), number, ir.Constant(ir.IntType(32), 0)
-        )
-        return self.turned(single, FIRST)
+        return spread_over(self.builder, number, self.vector)
 
     def plus(self, total: Any, a: Any, b: Any) -> Any:
         """total + a b, rounded once where the machine can."""
-        kind = ir.FunctionType(self.vector, [self.vector] * 3)
-        name = f"llvm.fmuladd.v{LANES}{self.vector.element.intrinsic_name}"
-        return self.builder.call(cgutils.get_or_insert_function(self.builder.module, kind, name), [a, b, total])
+        return plus(self.builder, total, a, b)
 
     def sums(self, count: int, step: Callable[[Any, list[Any]], list[Any]]) -> list[Any]:
         """`count` totals over the entries start ≤ e < stop, the first two arguments: `step` adds one entry to them."""
@@ -95,6 +106,24 @@ class Row:
             for total, after in zip(totals, step(e, [builder.load(total) for total in totals]), strict=True):
                 builder.store(after, total)
         return [builder.load(total) for total in totals]
+
+    def sums_by_twos(self, count: int, step: Callable[[Any, list[Any]], list[Any]]) -> list[Any]:
+        """`sums` for rows of many entries, two entries at a time: half as many turns, none waits for the last sum."""
+        builder, (start, stop) = self.builder, self.args[:2]
+        zero, one = ir.Constant(self.vector, [0.0] * LANES), ir.Constant(start.type, 1)
+        even = [cgutils.alloca_once_value(builder, zero) for _ in range(count)]
+        odd = [cgutils.alloca_once_value(builder, zero) for _ in range(count)]
+        left = builder.and_(builder.sub(stop, start), one)
+        with builder.if_then(builder.icmp_signed("<", start, stop)):
+            # The one beyond the pairs is taken as if it were always there: a branch would be guessed wrong.
+            alone = builder.icmp_signed("==", left, one)
+            for total, first in zip(even, step(start, [zero] * count), strict=True):
+                builder.store(builder.select(alone, first, zero), total)
+        with cgutils.for_range_slice(builder, builder.add(start, left), stop, ir.Constant(start.type, 2)) as (e, _):
+            for totals, at in ((even, e), (odd, builder.add(e, one))):
+                for total, after in zip(totals, step(at, [builder.load(total) for total in totals]), strict=True):
+                    builder.store(after, total)
+        return [builder.fadd(builder.load(a), builder.load(b)) for a, b in zip(even, odd, strict=True)]
 
     def across(self, four: Any) -> Any:
         """The sum of four lanes."""

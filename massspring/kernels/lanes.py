@@ -65,7 +65,7 @@ def _scaled(
         def step(e: Any, totals: list[Any]) -> list[Any]:
             return [row.plus(totals[0], row.spread(row.number(4, row.index(2, e))), row.four(3, e))]
 
-        row.put(builder.fmul(row.spread(row.given(5)), row.sums(1, step)[0]), 6, args[7])
+        row.put(builder.fmul(row.spread(row.given(5)), row.sums_by_twos(1, step)[0]), 6, args[7])
         return context.get_dummy_value()
 
     return types.void(types.intp, types.intp, index, value, factor, times, out, types.intp), generate
@@ -79,7 +79,7 @@ def _products(typingctx: Any, start: Any, stop: Any, index: Any, value: Any, fie
         def step(e: Any, totals: list[Any]) -> list[Any]:
             return [row.plus(totals[0], row.four(3, e), row.four(4, row.index(2, e)))]
 
-        return row.across(row.sums(1, step)[0])
+        return row.across(row.sums_by_twos(1, step)[0])
 
     return value.dtype(types.intp, types.intp, index, value, field), generate
 
@@ -96,7 +96,9 @@ def _from_origin(typingctx: Any, start: Any, stop: Any, index: Any, value: Any, 
             weighed = builder.fmul(row.spread(row.number(5, j)), entry)
             return [row.plus(totals[0], away, entry), row.plus(totals[1], weighed, entry)]
 
-        return context.make_tuple(builder, signature.return_type, [row.across(total) for total in row.sums(2, step)])
+        return context.make_tuple(
+            builder, signature.return_type, [row.across(total) for total in row.sums_by_twos(2, step)]
+        )
 
     pair = types.UniTuple(types.float64, 2)
     return pair(types.intp, types.intp, index, value, places, weight), generate

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring.kernels.clusters import Clusters
 from massspring.kernels.spring_layout import Membrane, Slices
 from massspring.kernels.team import Team
 from massspring.kernels.ticks import Ticks
@@ -80,8 +81,8 @@ class VolumeRows(NamedTuple):
     """S_rr without contact [m⁴/kg], (m,)."""
     diagonal: np.ndarray
     """S_rr [m⁴/kg], (m,)."""
-    per_diagonal: np.ndarray
-    """1/S_rr, 0 for what nothing can push [kg/m⁴], (m,)."""
+    clusters: Clusters
+    """Of no volume where S is solved densely."""
     matrix: np.ndarray
     """S [m⁴/kg], (m, m); (0, 0) where it is solved iteratively."""
     search: np.ndarray

@@ -2,6 +2,7 @@
 
 import math
 
+from massspring.kernels.clusters import precondition_into, scale_into
 from massspring.kernels.compiled import compiled, inlined, lean, summing
 from massspring.kernels.distances import allowed_part
 from massspring.kernels.rows import NEGLIGIBLE, mobilised_into, padded_rows_times_into
@@ -94,13 +95,12 @@ def dot(a, b):
 
 
 @summing
-def judged(residual, allowed, per_diagonal):
-    """residual · D⁻¹ residual, and how many volumes are farther off than allowed."""
-    rho, beyond = 0.0, 0
+def beyond(residual, allowed):
+    """How many volumes are farther off than allowed; one that is no number is not."""
+    count = 0
     for r in range(residual.shape[0]):
-        rho += residual[r] * residual[r] * per_diagonal[r]
-        beyond += abs(residual[r]) > allowed[r]
-    return rho, beyond
+        count += abs(residual[r]) > allowed[r]
+    return count
 
 
 @inlined
@@ -113,31 +113,29 @@ def along(search, image, alpha, lam, residual):
 
 @lean
 def solve_iteratively(rows, motion, inverse_mass, lam, allowed, most):
-    """lam += S⁻¹ rhs by conjugate gradients with the diagonal as preconditioner (eq. 34).
+    """lam += S⁻¹ rhs by conjugate gradients with clusters of S at rest as preconditioner (eq. 34, 169).
 
     Ends when |rhs − S Δlam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number. A volume
     without a diagonal has nothing to push on and is left out.
     """
-    residual, search, image, per_diagonal = rows.right, rows.search, rows.image, rows.per_diagonal
+    residual, search, image = rows.right, rows.search, rows.image
     for r in range(search.shape[0]):
         search[r] = 0.0
-        if rows.diagonal[r] > 0.0:
-            per_diagonal[r] = 1.0 / rows.diagonal[r]
-        else:
-            residual[r], per_diagonal[r], allowed[r] = 0.0, 0.0, math.inf
-    rho, beyond = judged(residual, allowed, per_diagonal)
-    keep = 0.0
+        if not rows.diagonal[r] > 0.0:
+            residual[r], allowed[r] = 0.0, math.inf
+    scale_into(rows.clusters, rows.diagonal)
+    before = math.inf
     iteration = 0
-    while beyond > 0 and iteration < most:
+    while iteration < most and beyond(residual, allowed) > 0:
+        rho = precondition_into(rows.clusters, residual, image)
+        keep = rho / before
         for r in range(search.shape[0]):
-            search[r] = per_diagonal[r] * residual[r] + keep * search[r]
+            search[r] = image[r] + keep * search[r]
         apply_schur(rows, motion, inverse_mass, search, image)
         curvature = dot(search, image)
         if not curvature > 0.0:
             break
         along(search, image, rho / curvature, lam, residual)
         before = rho
-        rho, beyond = judged(residual, allowed, per_diagonal)
-        keep = rho / before
         iteration += 1
     return iteration

@@ -17,6 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from massspring.body import Body
 from massspring.kernels.compiled import compiled, lean
 from massspring.kernels.contact import find_contacts, pressure_reach, revise_contacts
 from massspring.kernels.layout import Accuracy, Drive
@@ -55,7 +56,9 @@ from massspring.kernels.ticks import (
     VOLUME,
     mark,
 )
-from massspring.methods.base import Method, Remedy, State, crewed_frame
+from massspring.methods.base import Method, Remedy, State, crewed_frame, start
+from massspring.methods.clusters import clusters_at_rest
+from massspring.obstacles import Attachment
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
@@ -210,6 +213,15 @@ class ImplicitVolume(Method):
     holds_apart: ClassVar[bool] = True
     misses_probes: ClassVar[str | None] = None
     threaded: ClassVar[bool] = True
+
+    def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
+        """The body at rest, or with velocities `v` (n, 3) [m/s], and clusters of its volumes where they are many."""
+        state = start(body, attachments, v)
+        rows = state.rows
+        if rows is None or len(rows.matrix):
+            return state
+        clusters = clusters_at_rest(rows, state.motion.x, state.network.inverse_mass)
+        return replace(state, rows=rows._replace(clusters=clusters))
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""

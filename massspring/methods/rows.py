@@ -5,6 +5,7 @@ from scipy.sparse import csr_array
 
 from massspring.kernels.four_numbers import LANES
 from massspring.kernels.layout import VolumeRows
+from massspring.methods.clusters import each_alone
 from massspring.methods.quadrangles import edge_chains, quadrangles
 from massspring.neighbours import aligned
 from massspring.volumes import Volumes
@@ -12,7 +13,7 @@ from massspring.volumes import Volumes
 DENSE_UP_TO = 64
 """Volumes up to which S is factored densely; beyond it conjugate gradients from the last multipliers are cheaper."""
 
-OF_EACH_VOLUME = ("volume", "lam", "right", "free_diagonal", "diagonal", "per_diagonal", "search", "image", "allowed")
+OF_EACH_VOLUME = ("volume", "lam", "right", "free_diagonal", "diagonal", "search", "image", "allowed")
 """Arrays with one number for each volume, double in either precision."""
 
 
@@ -33,7 +34,8 @@ def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
         shape=(len(entries), len(volumes.triangles)),
     )
     chains, edges = edge_chains(sums, volumes.triangles)
-    summed, twin = _twins(row, column, chains, nodes)
+    chains.sort_indices()
+    summed, twin = _twins(chains)
     ring, corner, share = quadrangles(chains[summed], edges)
     sizes = np.bincount(ring, minlength=len(summed))
     # Alike ones one after the other: the processor then knows what comes.
@@ -57,24 +59,30 @@ def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
         node_value=aligned((len(entries), LANES), np.dtype(np.float64)),
         matrix=np.zeros((dense, dense)),
         node_vector=aligned((nodes, LANES), np.dtype(np.float64)),
+        clusters=each_alone(0 if dense else m),
         **{name: np.zeros(m) for name in OF_EACH_VOLUME},
     )
 
 
-def _twins(row: np.ndarray, column: np.ndarray, chains: csr_array, nodes: int) -> tuple[np.ndarray, np.ndarray]:
+def _twins(chains: csr_array) -> tuple[np.ndarray, np.ndarray]:
     """Entries to sum, and the entry that is the negative of each (itself where none is), (c,) and (c,).
 
-    The volumes of two nodes inside a body push each other's node with opposite areas: the ring of tetrahedra around
-    their edge closes, and is passed the other way round.
+    Where just two volumes meet in a node they share its ring, passed in opposite senses; and the volumes of two nodes
+    inside a body push each other's node with the ring of tetrahedra around their edge.
     """
-    key, mirrored = row * nodes + column, column * nodes + row
-    partner = np.minimum(np.searchsorted(key, mirrored), len(key) - 1)
-    both = csr_array(chains + chains[partner])
+    # Opposite chains have the same sum but for its sign, whatever is added up, as it is in the same order.
+    names = np.random.default_rng(0).normal(size=chains.shape[1])  # pyright: ignore[reportOptionalSubscript]
+    sums = np.asarray(chains @ names)
+    alike = np.lexsort((sums, np.abs(sums)))
+    first, second = np.sort([alike[:-1], alike[1:]], axis=0)
+    both = csr_array(chains[first] + chains[second])
     both.eliminate_zeros()
-    found = (key[partner] == mirrored) & (np.diff(both.indptr) == 0)
-    entry = np.arange(len(key))
-    summed = np.flatnonzero(~found | (row < column))
-    return summed, np.where(found, partner, entry)[summed]
+    # Of those alike the negative ones come first: one pair at most of each kind.
+    opposite = (np.diff(both.indptr) == 0) & (np.diff(sums[alike]) > 0.0)
+    twin = np.arange(len(sums))
+    twin[first[opposite]] = second[opposite]
+    summed = np.delete(np.arange(len(sums)), second[opposite])
+    return summed, twin[summed]
 
 
 def _starts(sorted_or_not: np.ndarray, size: int) -> np.ndarray:
