@@ -7,6 +7,7 @@ import pytest
 
 from massspring import Clock, ImplicitVolume, Path, Probe, Setup, Volumes
 from massspring.collision import mean_edge
+from massspring.kernels.carrying import lead
 from massspring.kernels.point_contacts import solve_rows
 from massspring.kernels.probe_layout import CARRIED, CARRYING, LEFT_BEHIND, Stage
 from massspring.kernels.probe_motion import gather, move
@@ -147,3 +148,36 @@ def test_contacts_beside_obstacles_equal_the_full_saddle_point(seed):
     assert np.linalg.norm(found - u, axis=1).max() <= bound
     swollen = np.array([swelling(stage, None, i) for i in range(len(u))])
     assert 0 < np.linalg.norm(swollen, axis=1).max() <= change_of_rows(stage)
+
+
+def led(weight, held, radius=0.0):
+    """A triangle of which all but the corner `held` are carried and sent ahead of a tip: (stage, corners, answer)."""
+    setup, rng = pressed(METHOD), np.random.default_rng(3)
+    after, drive = begin_frame(setup.start(), setup.drive(0)), setup.drive(0)
+    probing = after.probing
+    corners = probing.surface[0].astype(int)
+    probing.near[0, 0], probing.found[0, :3], probing.radius[0] = 0, weight, radius
+    probing.velocity[corners] = 0.1 * rng.normal(size=(3, 3))
+    probing.pair.tip[:] = 1e-3 * rng.normal(size=(2, 3))
+    probing.carried[np.delete(corners, held)] = 1
+    stage = Stage(after.network, after.motion, drive.tips, probing, None, 0.0, 0, drive.dt)
+    return stage, corners, lead(stage, 0, 0)
+
+
+@pytest.mark.parametrize("radius", [0.0, 2e-3])
+def test_carried_corners_go_ahead_until_the_point_that_is_passed_rests(radius):
+    """Seen from the tip, or a radius farther; by their weights, as a contact would push them; the held one not."""
+    weight = np.array([0.5, 0.2, 0.3])
+    stage, corners, moved = led(weight, 0, radius)
+    push, pair = stage.probes.push[corners], stage.probes.pair
+    missing = (pair.tip[1] - pair.tip[0]) / stage.dt - weight @ stage.probes.velocity[corners]
+    farther = radius / stage.dt * missing / np.linalg.norm(missing)
+    assert moved and np.allclose(weight @ push, missing + farther, rtol=1e-12)
+    assert not push[0].any() and np.allclose(push[1] / 0.2, push[2] / 0.3, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("weight", "moved"), [((0.97, 0.02, 0.01), True), ((0.985, 0.01, 0.005), False)])
+def test_a_tip_that_hits_almost_the_held_corner_is_stopped_by_it(weight, moved):
+    """A free corner would have to go more than fifty times as far as the tip."""
+    stage, _, answer = led(np.array(weight), 0)
+    assert answer == moved == stage.probes.push.any()
