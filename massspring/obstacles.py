@@ -1,6 +1,7 @@
 """Rigid obstacles and attachments that move along prescribed paths."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -29,8 +30,16 @@ class Path:
 
     def __call__(self, t: float | np.ndarray) -> np.ndarray:
         """Displacement [m] at time(s) `t` [s], (3,) or (q, 3)."""
-        keys = np.asarray(self.displacements)
-        return np.stack([np.interp(t, self.times, keys[:, axis]) for axis in range(3)], axis=-1)
+        times, columns = self._keys
+        found = np.empty((*np.shape(t), 3))
+        for axis in range(3):
+            found[..., axis] = np.interp(t, times, columns[axis])
+        return found
+
+    @cached_property
+    def _keys(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times (k,) and displacements by axis (3, k) as arrays: a run asks for a place at every frame."""
+        return np.array(self.times), np.array(self.displacements).T.copy()
 
 
 STILL = Path()

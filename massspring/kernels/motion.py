@@ -10,6 +10,8 @@ from massspring.kernels.team import MOVE, call, join
 
 NEGLIGIBLE = 1e-12
 """A mobility this much smaller than what it was taken from is round-off."""
+NEAR = 4096
+"""Nodes of which a step's end fits the second cache."""
 
 
 @lean
@@ -202,13 +204,20 @@ def advance_to_places(motion, mass, inverse_mass, lam, dt, contact_impulse):
 def move_all(motion, inverse_mass, lam, dt, team):
     """`advance_nodes` and `places_into` of all nodes, by as many threads as there are."""
     if team is None:
-        advance_nodes(motion, inverse_mass, lam, dt, 0, motion.x.shape[0])
-        places_into(motion, 0, motion.x.shape[0])
+        move(motion, inverse_mass, lam, dt, 0, motion.x.shape[0])
     else:
         call(team, MOVE, 0, lam)
-        advance_nodes(motion, inverse_mass, lam, dt, team.nodes[0], team.nodes[1])
-        places_into(motion, team.nodes[0], team.nodes[1])
+        move(motion, inverse_mass, lam, dt, team.nodes[0], team.nodes[1])
         join(team)
+
+
+@inlined
+def move(motion, inverse_mass, lam, dt, first, last):
+    """`advance_nodes` and `places_into` of some nodes; `NEAR` at a time, so that new positions are still at hand."""
+    for begin in range(first, last, NEAR):
+        end = min(begin + NEAR, last)
+        advance_nodes(motion, inverse_mass, lam, dt, begin, end)
+        places_into(motion, begin, end)
 
 
 @inlined
