@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter_ns
+from typing import Any
 
 import numpy as np
 
@@ -125,26 +126,34 @@ class Setup:
             return state
         return replace(state, motion=shared(state.motion, state.network, self.threads))
 
+    @cached_property
+    def _unmoved(self) -> dict[str, Any]:
+        """What is the same in the drives of all frames."""
+        solids = self.solids
+        return {
+            "dt": self.clock.dt,
+            "damping": float(self.damping),
+            "gravity": np.asarray(self.gravity, dtype=np.float64),
+            "is_plane": np.array([isinstance(o, Plane) for o in solids], dtype=np.bool_),
+            "plane_normal": _rows([o.unit_normal if isinstance(o, Plane) else np.zeros(3) for o in solids]),
+            "radius": np.array([0.0 if isinstance(o, Plane) else o.radius for o in solids]),
+            "span": _rows([o.span if isinstance(o, Capsule) else np.zeros(3) for o in solids]),
+            "friction": np.array([np.inf if o.friction == "no_slip" else float(o.friction) for o in solids]),
+            "rough": any(o.friction != 0 for o in solids),
+        }
+
     def drive(self, frame: int) -> Drive:
         """The outside world during frame number `frame` (0, 1, …): positions at the end of each of its steps."""
         dt = self.clock.dt
         t = frame * self.clock.frame + dt * np.arange(1, self.clock.steps + 1)
-        solids = self.solids
+        solids, probes = self.solids, self.probes
         return Drive(
-            dt=dt,
-            damping=float(self.damping),
-            gravity=np.asarray(self.gravity, dtype=np.float64),
-            is_plane=np.array([isinstance(o, Plane) for o in solids], dtype=np.bool_),
-            plane_normal=_rows([o.unit_normal if isinstance(o, Plane) else np.zeros(3) for o in solids]),
-            radius=np.array([0.0 if isinstance(o, Plane) else o.radius for o in solids]),
-            span=_rows([o.span if isinstance(o, Capsule) else np.zeros(3) for o in solids]),
-            friction=np.array([np.inf if o.friction == "no_slip" else float(o.friction) for o in solids]),
-            rough=any(o.friction != 0 for o in solids),
+            **self._unmoved,
             position=_tracks([o.anchor + o.path(t) for o in solids], len(t)),
             velocity=_tracks([(o.path(t) - o.path(t - dt)) / dt for o in solids], len(t)),
             held_displacement=_tracks([a.path(t) for a in self.attachments], len(t)),
             volume_target=self.volume_targets(t),
-            tips=Tips(*(_tracks([p.anchor + p.path(u) for p in self.probes], len(t)) for u in (t - dt, t))),
+            tips=Tips(*(_tracks([p.anchor + p.path(u) for p in probes], len(t)) for u in (t - dt, t))),
         )
 
     def volume_targets(self, t: np.ndarray) -> np.ndarray:

@@ -128,8 +128,8 @@ def main() -> None:
             "what": [line.what for line in lines],
             "measured": [line.measured for line in lines],
             "unit": [line.unit for line in lines],
-            "target": [f"{'<=' if line.at_most else '>='} {line.target:g}" for line in lines],
-            "met": ["yes" if line.met else "NO" for line in lines],
+            "target": [line.promise for line in lines],
+            "met": [line.verdict for line in lines],
             "note": [line.note for line in lines],
         }
     )

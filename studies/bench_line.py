@@ -1,20 +1,28 @@
-"""A line of `make bench`: a promised number beside the measured one."""
+"""A line of `make bench`: a promised number beside the measured one, or what the machine itself gives."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Line:
-    """A promised number beside the measured one."""
+    """A promised number beside the measured one; without a target it says what the machine gives, whatever the code."""
 
     what: str
     measured: float
     unit: str
-    target: float
+    target: float | None = None
     at_most: bool = True
     note: str = ""
 
     @property
-    def met(self) -> bool:
+    def promise(self) -> str:
+        """The target in words."""
+        return "" if self.target is None else f"{'<=' if self.at_most else '>='} {self.target:g}"
+
+    @property
+    def verdict(self) -> str:
         """Whether the target is reached."""
-        return self.measured <= self.target if self.at_most else self.measured >= self.target
+        if self.target is None:
+            return ""
+        reached = self.measured <= self.target if self.at_most else self.measured >= self.target
+        return "yes" if reached else "NO"

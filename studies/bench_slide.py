@@ -21,6 +21,8 @@ from studies.timing import interleave, pinned
 UPDATE = 2e-3
 """Simulated and wall time between two forces on the hand [s]."""
 REPEATS = 5
+COUNTED = 25_000
+"""Numbers that plain Python counts in half a millisecond or so."""
 SAME = 1e-9
 """Of a step: an update that ends with a step does not wait for the next."""
 
@@ -69,14 +71,25 @@ def updates_ns(step_ns: np.ndarray, dt: float, span: float) -> np.ndarray:
     return np.concatenate(found, axis=1)
 
 
+def counted_ns(frames: int) -> np.ndarray:
+    """Times of a loop that has nothing to do with us, about as long as a step [ns], (F,)."""
+    times = np.zeros(frames)
+    for frame in range(frames):
+        begin, total = perf_counter_ns(), 0
+        for number in range(COUNTED):
+            total += number & 1
+        times[frame] = perf_counter_ns() - begin
+    return times
+
+
 def slide_lines() -> list[Line]:
     """A step in contact, and p99 of updates and frames in the wall time that their simulated time leaves."""
     video = slide_setup()
     haptic, dt = stepwise(video), video.clock.dt
     with pinned(threads=1):
         runs = {"haptic": lambda: waited_ns(haptic), "video": lambda: waited_ns(video)}
-        measured = interleave(runs, REPEATS)
-    step_ns, frame_ns = (ns[:, ns.shape[1] // 4 :] for ns in (measured["haptic"], measured["video"]))
+        measured = interleave({**runs, "counting": lambda: counted_ns(haptic.clock.frames)}, REPEATS)
+    step_ns, frame_ns, counting = (ns[:, ns.shape[1] // 4 :] for ns in measured.values())
     served = updates_ns(step_ns, dt, UPDATE)
     note = f"{video.body.springs.count} springs, {len(video.body.triangles)} triangles, dt = {1e3 * dt:.3g} ms"
     most = steps_of_updates(step_ns.shape[1], dt, UPDATE).max()
@@ -90,8 +103,11 @@ def slide_lines() -> list[Line]:
         Line(f"{name}: a step", 1e-6 * kernel_ns(frame_ns) / video.clock.steps, "ms", 1e3 * dt, note=note),
         Line(f"{name}: a step with its call", 1e-6 * kernel_ns(step_ns), "ms", 1e3 * dt, note="as a device waits"),
     ]
+    restless = percentiles(counting)["p99"] / kernel_ns(counting)
     for what, ns, span, needs in late:
         found = percentiles(ns)
         note = f"{needs}; median {1e-6 * found['p50']:.3g}"
         lines.append(Line(f"stomach_slide: {what}", 1e-6 * found["p99"], "ms", 1e3 * span, note=note))
-    return lines
+    what = "a loop of plain Python, at its fastest as long as that step with its call: the limit of the machine"
+    note = f"p99; {restless:.3g} times the fastest"
+    return [*lines, Line(what, 1e-6 * restless * kernel_ns(step_ns), "ms", note=note)]

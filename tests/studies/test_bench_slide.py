@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from massspring import Clock, Free, MassSpringError, Setup, simulate
-from studies.bench_slide import steps_of_updates, stepwise, updates_ns, waited_ns
+from studies.bench_line import Line
+from studies.bench_slide import counted_ns, steps_of_updates, stepwise, updates_ns, waited_ns
 from tests.massspring.test_probe import BALL, pressed
 
 DT = 1.5e-3
@@ -42,3 +43,16 @@ def test_every_frame_is_timed_and_a_run_that_breaks_off_is_none():
     thrown = np.random.default_rng(0).normal(size=BALL.rest.shape)
     with pytest.raises(MassSpringError, match="broke off while it was timed"):
         waited_ns(Setup(BALL, Free(), Clock(0.5, 200, 1), velocity=thrown))
+
+
+def test_a_line_is_judged_by_its_target_or_not_at_all():
+    assert Line("p99", 1.0, "ms", 2.0).verdict == "yes" and Line("p99", 3.0, "ms", 2.0).verdict == "NO"
+    faster = Line("times faster", 1.5, "1", 1.6, at_most=False)
+    assert faster.verdict == "NO" and faster.promise == ">= 1.6"
+    limit = Line("the machine", 1e9, "ms")
+    assert limit.verdict == limit.promise == ""
+
+
+def test_the_loop_beside_the_steps_does_the_same_each_time():
+    times = counted_ns(20)
+    assert times.shape == (20,) and times.min() > 1e5  # 25,000 turns take more than 0.1 ms
