@@ -126,7 +126,9 @@ def test_readme_names_only_charts_that_are_made():
 
 
 def test_every_equation_the_code_cites_is_in_the_theory():
-    known = set(re.findall(r"\*\*\((\d+)\)\*\*", (ROOT / "docs/theory.md").read_text(encoding="utf-8")))
+    numbers = re.findall(r"\*\*\((\d+)\)\*\*", (ROOT / "docs/theory.md").read_text(encoding="utf-8"))
+    known = set(numbers)
+    assert len(known) == len(numbers), "a number stands for two equations"
     for source in [*ROOT.glob("massspring/**/*.py"), *ROOT.glob("studies/**/*.py")]:
         for group in re.findall(r"eq\. ([\d, –]+)", source.read_text(encoding="utf-8")):
             for number in re.findall(r"\d+", group):

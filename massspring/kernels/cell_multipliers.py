@@ -212,7 +212,7 @@ def relax_whole(network, motion, cells, target, scale, compliance, lam, force):
 
 @compiled
 def relax_sum(network, motion, cells, target, scale, compliance, force):
-    """All pressures of cells by as much as mends the sum of their volumes (eq. 169).
+    """All pressures of cells by as much as mends the sum of their volumes (eq. 170).
 
     Returns whether a wrong sum had nothing to push on."""
     mean = mean_pressure(cells)

@@ -7,7 +7,7 @@ eq. 167). p is kept over the iterations of a step: without it the answer is hard
 public implementations. As iterations go on, it is the compliant volume solved for at the end of the step.
 
 Ours: a sweep over tetrahedra ends with one constraint more, the sum of their volumes, as the same pressure on all
-(eq. 169). What the cells end up with stays the same, but cells that mend themselves after each other take hundreds of
+(eq. 170). What the cells end up with stays the same, but cells that mend themselves after each other take hundreds of
 sweeps to see what all of them lack: five leave 2e-4 of the whole without it and 2e-8 with it (ball of 200 nodes).
 
 Limits: what the iterations have not reached depends on their number and on dt. The gradients are those of positions
