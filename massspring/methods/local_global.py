@@ -15,8 +15,9 @@ from massspring.methods.factor import Factor
 from massspring.methods.rows import DENSE_UP_TO
 from massspring.methods.touching import Contact, Touching
 
-CONTACT_REVISIONS = 3
-"""Of the touched set in one pass; the last solution always belongs to the set that is applied."""
+CONTACT_REVISIONS, LAST_REVISIONS = 3, 12
+"""Of the touched set in one pass, and in the last one, after which no other pass finds a node that enters or is pulled.
+The last solution always belongs to the set that is applied."""
 NEGLIGIBLE = 1e-12
 """Contact and held nodes that leave a volume this little of its response leave nothing but round-off."""
 
@@ -84,10 +85,11 @@ class Step:
                 self.answer()
             if number == 0:
                 self.cap(begun)
-            for revision in range(CONTACT_REVISIONS):
+            most = CONTACT_REVISIONS if number + 1 < passes else LAST_REVISIONS
+            for revision in range(most):
                 change, impulses = self.solve(free, touching)
                 self.mark(MULTIPLIER)
-                if not obstacles or revision + 1 == CONTACT_REVISIONS:
+                if not obstacles or revision + 1 == most:
                     break
                 revised = self.contact.revise(self.p + change, touching, impulses)
                 touching = self.touch() if revised else touching
