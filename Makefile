@@ -44,7 +44,7 @@ figures: setup-run ## draw the charts again from the stored results
 	$(BIN)/organbench report --figures
 
 bench: setup-run ## measure the numbers that the README promises (quiet machine, please)
-	OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m studies.bench
+	OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m studies.bench.main
 
 # A chart or table by its file name: results/STUDY/NAME.png, results/STUDY/NAME.csv
 results/%.png: setup-run FORCE ## one chart by its file name: make results/volume_loss/volume.png

@@ -1,11 +1,11 @@
 """Mass-spring bodies that keep their volume: Jung, Hong, Choi (2005). Knows no file, no plot, no scene."""
 
-from massspring.bodies import surface_body, tetrahedral_body
-from massspring.body import Body, Material
-from massspring.clock import Clock, make_clock
+from massspring.analysis.stability import StepLimit, step_limit
+from massspring.body.body import Body, Material
+from massspring.body.build import surface_body, tetrahedral_body
+from massspring.body.membranes import membrane_body
+from massspring.body.volumes import Ramp, Volumes
 from massspring.errors import MassSpringError
-from massspring.history import History
-from massspring.membranes import membrane_body
 from massspring.methods import (
     METHODS,
     Barycentre,
@@ -24,10 +24,10 @@ from massspring.methods import (
     State,
     Xpbd,
 )
-from massspring.obstacles import Attachment, Capsule, Obstacle, Path, Plane, Probe, Sphere
-from massspring.simulation import Setup, simulate
-from massspring.stability import StepLimit, step_limit
-from massspring.volumes import Ramp, Volumes
+from massspring.run.history import History
+from massspring.run.simulation import Setup, simulate
+from massspring.world.clock import Clock, make_clock
+from massspring.world.obstacles import Attachment, Capsule, Obstacle, Path, Plane, Probe, Sphere
 
 __all__ = [
     "METHODS",

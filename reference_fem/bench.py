@@ -6,12 +6,12 @@ import time
 import numpy as np
 from skfem import MeshTet
 
-from reference_fem.equilibrium import equilibrium_path
-from reference_fem.material import NeoHookean
-from reference_fem.obstacles import RigidPlane
-from reference_fem.problem import Held, Problem
-from reference_fem.state import Loads, NewtonSettings
-from reference_fem.system import System
+from reference_fem.model.material import NeoHookean
+from reference_fem.model.obstacles import RigidPlane
+from reference_fem.model.problem import Held, Problem
+from reference_fem.statics.equilibrium import equilibrium_path
+from reference_fem.system.saddle_point import System
+from reference_fem.system.state import Loads, NewtonSettings
 
 
 def slab(cells, obstacles=()):

@@ -2,14 +2,14 @@
 
 import sys
 
-from studies import interrupts
+from studies.base import interrupts
 
 
 def main() -> None:
-    """Loads the command line and runs it; exit codes as studies.cli.main."""
+    """Loads the command line and runs it; exit codes as studies.cli.app.main."""
     with interrupts.listening():
         try:
-            from studies import cli
+            from studies.cli import app as cli
 
             interrupts.stop_if_pressed()
         except BaseException:  # a library may have made something else of it

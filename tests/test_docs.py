@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from massspring import Body, Clock, Material, Setup, simulate, surface_body
-from studies.case import BodyRecipe, Case
 from studies.catalog import STUDIES
-from studies.report import BEGIN, END
-from studies.run import measure
-from studies.store import Status
-from studies.sweep import load_runs, run_studies
+from studies.report.results import BEGIN, END
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.run import measure
+from studies.store.record import Status
+from studies.sweep.run_studies import load_runs, run_studies
 
 ROOT = Path(__file__).parent.parent
 FENCE = re.compile(r"```python\n(.*?)```", re.DOTALL)
@@ -59,7 +59,7 @@ def test_an_added_metric_reads_a_run(tmp_path):
         BodyRecipe(nodes=100),
         frames=5,
     )
-    from studies.metrics import Run
+    from studies.metrics.metrics import Run
 
     assert 0 <= added(Run(plain, measure(plain))) < 1e-3
     assert added.description.startswith("100 mean")
@@ -101,7 +101,7 @@ def test_an_added_study_runs_and_goes_on_where_it_was(tmp_path):
 
 
 def test_an_added_organ_has_the_volume_of_its_formula():
-    from studies.geometry.levelset import Shape
+    from studies.geometry.shape.levelset import Shape
 
     shape = executed("CONTRIBUTING.md", "Add an organ")["egg"]()
     assert isinstance(shape, Shape)

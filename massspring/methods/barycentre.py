@@ -17,12 +17,12 @@ from typing import ClassVar
 import numpy as np
 from scipy.sparse import csr_array
 
-from massspring.body import Body
-from massspring.kernels.layout import Drive
-from massspring.methods.base import Method, State, start
-from massspring.methods.cells import cell_stiffness, cells_of, one_filled, push_cells
-from massspring.methods.known_pressure import check_modulus
-from massspring.obstacles import Attachment
+from massspring.body.body import Body
+from massspring.kernels.arrays.layout import Drive
+from massspring.methods.families.known_pressure import check_modulus
+from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, one_filled, push_cells
+from massspring.methods.method import Method, State, start
+from massspring.world.obstacles import Attachment
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ root of eq. 106 is what a step leaves of it. 2 alpha = beta = 1/dt is HCJ05 with
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.body import Body
+from massspring.body.body import Body
 from massspring.errors import MassSpringError
-from massspring.kernels.layout import Drive
-from massspring.methods.base import Method, Remedy, State, one_whole
-from massspring.methods.constraint import Rule, advance_by
+from massspring.kernels.arrays.layout import Drive
+from massspring.methods.families.one_volume import Rule, advance_by
+from massspring.methods.method import Method, Remedy, State, one_whole
 
 
 @dataclass(frozen=True)

@@ -16,20 +16,30 @@ from typing import ClassVar
 import numpy as np
 from scipy.sparse import csr_array
 
-from massspring.body import Body
-from massspring.kernels.cell_multipliers import any_idle, cell_forces_into, cell_rows_into, solve_cells
-from massspring.kernels.cells import fill, mean_pressure
-from massspring.kernels.compiled import compiled
-from massspring.kernels.contact import find_contacts, revise_contacts
-from massspring.kernels.layout import Accuracy, Drive
-from massspring.kernels.motion import add_held_impulse, advance
-from massspring.kernels.prediction import predict
-from massspring.kernels.ticks import HELD, INTEGRATION, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, VOLUME, mark
-from massspring.methods.base import Method, Remedy, State, begin_frame, start
-from massspring.methods.cells import cell_stiffness, cells_of, one_filled, own_cells, push_cells
+from massspring.body.body import Body
+from massspring.kernels.arrays.layout import Accuracy, Drive
+from massspring.kernels.constraint.tetrahedra import any_idle, cell_forces_into, cell_rows_into, solve_cells
+from massspring.kernels.contact.active_set import find_contacts, revise_contacts
+from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
+from massspring.kernels.jit.decorators import compiled
+from massspring.kernels.jit.stage_clock import (
+    HELD,
+    INTEGRATION,
+    MULTIPLIER,
+    OUTSIDE,
+    REVISION,
+    SEARCH,
+    SPRINGS,
+    VOLUME,
+    mark,
+)
+from massspring.kernels.step.advance import add_held_impulse, advance
+from massspring.kernels.step.predict import predict
+from massspring.methods.families.known_pressure import check_modulus
+from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, one_filled, own_cells, push_cells
 from massspring.methods.implicit_volume import CONTACT_PASSES
-from massspring.methods.known_pressure import check_modulus
-from massspring.obstacles import Attachment
+from massspring.methods.method import Method, Remedy, State, begin_frame, start
+from massspring.world.obstacles import Attachment
 
 
 @compiled

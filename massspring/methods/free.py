@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.kernels.compiled import lean
-from massspring.kernels.contact import find_contacts
-from massspring.kernels.layout import Drive
-from massspring.kernels.motion import add_held_impulse, advance_to_places, places_into, prescribe_velocity_into
-from massspring.kernels.probing import meet_probes
-from massspring.kernels.slices import predict_from_places
-from massspring.kernels.ticks import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, mark
-from massspring.methods.base import Method, State, crewed_frame
+from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.contact.active_set import find_contacts
+from massspring.kernels.fused.sweep import predict_from_places
+from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, mark
+from massspring.kernels.probe.stage import meet_probes
+from massspring.kernels.step.advance import add_held_impulse, advance_to_places, places_into, prescribe_velocity_into
+from massspring.methods.method import Method, State, crewed_frame
 
 
 @lean

@@ -17,14 +17,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from massspring.body import Body
-from massspring.kernels.layout import Accuracy, Drive
-from massspring.kernels.ticks import OUTSIDE, mark
-from massspring.methods.base import Method, Remedy, State, begin_frame, start
-from massspring.methods.factor import Factors
-from massspring.methods.local_global import Step
-from massspring.methods.rows import volume_rows
-from massspring.obstacles import Attachment
+from massspring.body.body import Body
+from massspring.kernels.arrays.layout import Accuracy, Drive
+from massspring.kernels.jit.stage_clock import OUTSIDE, mark
+from massspring.layout.jacobian_pattern import volume_rows
+from massspring.methods.implicit.factor import Factors
+from massspring.methods.implicit.passes import Step
+from massspring.methods.method import Method, Remedy, State, begin_frame, start
+from massspring.world.obstacles import Attachment
 
 
 @dataclass(frozen=True)

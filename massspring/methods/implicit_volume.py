@@ -17,25 +17,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from massspring.body import Body
-from massspring.kernels.compiled import compiled, lean
-from massspring.kernels.contact import find_contacts, pressure_reach, revise_contacts
-from massspring.kernels.layout import Accuracy, Drive
-from massspring.kernels.motion import (
-    add_held_impulse,
-    advance,
-    advance_to_places,
-    capped_error,
-    multiplier_of_sums,
-    places_into,
-    prescribe,
-    prescribe_velocity_into,
-    steepest,
-    surely_short,
-)
-from massspring.kernels.multipliers import dense_into, solve_dense, solve_iteratively
-from massspring.kernels.probing import meet_probes
-from massspring.kernels.rows import (
+from massspring.body.body import Body
+from massspring.kernels.arrays.layout import Accuracy, Drive
+from massspring.kernels.constraint.jacobian import (
     diagonal_into,
     padded_rows_times_into,
     pushed_velocity_into,
@@ -43,8 +27,11 @@ from massspring.kernels.rows import (
     steepest_of_row,
     transposed_rows_times_into,
 )
-from massspring.kernels.slices import gather_and_predict, predict_from_places
-from massspring.kernels.ticks import (
+from massspring.kernels.constraint.schur import dense_into, solve_dense, solve_iteratively
+from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
+from massspring.kernels.fused.sweep import gather_and_predict, predict_from_places
+from massspring.kernels.jit.decorators import compiled, lean
+from massspring.kernels.jit.stage_clock import (
     HELD,
     INTEGRATION,
     MULTIPLIER,
@@ -56,9 +43,22 @@ from massspring.kernels.ticks import (
     VOLUME,
     mark,
 )
-from massspring.methods.base import Method, Remedy, State, crewed_frame, start
-from massspring.methods.clusters import clusters_at_rest
-from massspring.obstacles import Attachment
+from massspring.kernels.probe.stage import meet_probes
+from massspring.kernels.step.advance import (
+    add_held_impulse,
+    advance,
+    advance_to_places,
+    capped_error,
+    multiplier_of_sums,
+    places_into,
+    prescribe,
+    prescribe_velocity_into,
+    steepest,
+    surely_short,
+)
+from massspring.layout.block_jacobi import clusters_at_rest
+from massspring.methods.method import Method, Remedy, State, crewed_frame, start
+from massspring.world.obstacles import Attachment
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""

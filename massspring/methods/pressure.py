@@ -12,10 +12,10 @@ from typing import ClassVar
 
 from scipy.sparse import csr_array
 
-from massspring.body import Body
-from massspring.kernels.layout import Drive
-from massspring.methods.base import Method, Remedy, State, one_whole
-from massspring.methods.known_pressure import GAS, check_modulus, push, volume_stiffness
+from massspring.body.body import Body
+from massspring.kernels.arrays.layout import Drive
+from massspring.methods.families.known_pressure import GAS, check_modulus, push, volume_stiffness
+from massspring.methods.method import Method, Remedy, State, one_whole
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ without damping the body gains energy at the rate of eq. 107, and spin where it 
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.body import Body
-from massspring.kernels.layout import Drive
-from massspring.methods.base import Method, Remedy, State, one_whole
-from massspring.methods.constraint import Rule, advance_by
+from massspring.body.body import Body
+from massspring.kernels.arrays.layout import Drive
+from massspring.methods.families.one_volume import Rule, advance_by
+from massspring.methods.method import Method, Remedy, State, one_whole
 
 
 @dataclass(frozen=True)

@@ -19,20 +19,20 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from massspring.body import Body
+from massspring.body.body import Body
 from massspring.errors import MassSpringError
-from massspring.kernels.cell_multipliers import relax_cells, relax_sum, relax_whole
-from massspring.kernels.cells import fill, mean_pressure
-from massspring.kernels.compiled import compiled
-from massspring.kernels.contact import find_contacts, revise_contacts
-from massspring.kernels.layout import Drive
-from massspring.kernels.motion import add_held_impulse, advance
-from massspring.kernels.prediction import predict, unpushed_into
-from massspring.kernels.ticks import HELD, INTEGRATION, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, mark
-from massspring.methods.base import Method, Remedy, State, begin_frame, one_whole, start
-from massspring.methods.cells import cells_of, one_filled, own_cells
+from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.constraint.tetrahedra import relax_cells, relax_sum, relax_whole
+from massspring.kernels.contact.active_set import find_contacts, revise_contacts
+from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
+from massspring.kernels.jit.decorators import compiled
+from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, mark
+from massspring.kernels.step.advance import add_held_impulse, advance
+from massspring.kernels.step.predict import predict, unpushed_into
+from massspring.methods.families.tetrahedra import cells_of, one_filled, own_cells
 from massspring.methods.implicit_volume import CONTACT_PASSES
-from massspring.obstacles import Attachment
+from massspring.methods.method import Method, Remedy, State, begin_frame, one_whole, start
+from massspring.world.obstacles import Attachment
 
 
 @compiled

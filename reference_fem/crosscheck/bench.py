@@ -7,11 +7,11 @@ import numpy as np
 
 from reference_fem.crosscheck.cases import clamped_ball
 from reference_fem.crosscheck.ngsolve_code import Model
+from reference_fem.model.problem import Problem
 from reference_fem.oracles.base import unknowns
-from reference_fem.problem import Problem
-from reference_fem.state import NewtonSettings
-from reference_fem.system import System
-from reference_fem.tangent import Tangent
+from reference_fem.statics.tangent import Tangent
+from reference_fem.system.saddle_point import System
+from reference_fem.system.state import NewtonSettings
 
 INVERSES = ("sparsecholesky", "umfpack")
 """NGSolve's own direct solvers; with MKL's, where it has that, it took no less time."""

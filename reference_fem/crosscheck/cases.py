@@ -6,11 +6,11 @@ import numpy as np
 from scipy.spatial import KDTree
 from skfem import MeshTet
 
-from reference_fem.elements import facet_nodes, nodes
+from reference_fem.elements.shapes import facet_nodes, nodes
 from reference_fem.errors import ReferenceProblem
-from reference_fem.material import NeoHookean
+from reference_fem.model.material import NeoHookean
+from reference_fem.model.problem import Held, Problem
 from reference_fem.oracles.bodies import shell_octant, symmetry, whole_ball
-from reference_fem.problem import Held, Problem
 
 STEPS = (0.25, 0.5, 0.75, 1.0)
 """Times of the loading path; all motions end at 1."""

@@ -16,10 +16,10 @@ from skfem import MeshTet
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
 
-from reference_fem.elements import edge_index, nodes
+from reference_fem.elements.shapes import edge_index, nodes
 from reference_fem.errors import ReferenceProblem
-from reference_fem.material import NeoHookean
-from reference_fem.problem import HeldNodes, Problem, find_held
+from reference_fem.model.material import NeoHookean
+from reference_fem.model.problem import HeldNodes, Problem, find_held
 
 EDGE = -0.125
 """Value of NGSolve's edge function half-way: u there is the mean of the ends plus this times the coefficient."""

@@ -7,10 +7,10 @@ import numpy as np
 
 from reference_fem.crosscheck.cases import STEPS, clamped_ball, thick_sphere
 from reference_fem.crosscheck.ngsolve_code import solve
-from reference_fem.equilibrium import equilibrium_path
+from reference_fem.model.problem import Problem
 from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
-from reference_fem.problem import Problem
-from reference_fem.state import NewtonSettings
+from reference_fem.statics.equilibrium import equilibrium_path
+from reference_fem.system.state import NewtonSettings
 
 CLOSE = NewtonSettings(force_tol=1e-10, volume_tol=1e-12)
 """So that what differs is the codes, not where their iterations stop."""

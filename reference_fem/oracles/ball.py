@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from reference_fem import exact
-from reference_fem.elements import nodes
-from reference_fem.equilibrium import Equilibrium, equilibrium_path
-from reference_fem.material import NeoHookean
-from reference_fem.obstacles import RigidPlane
+from reference_fem.elements.shapes import nodes
+from reference_fem.model.material import NeoHookean
+from reference_fem.model.obstacles import RigidPlane
+from reference_fem.model.problem import Problem
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import ball_octant, symmetry
-from reference_fem.problem import Problem
+from reference_fem.statics.equilibrium import Equilibrium, equilibrium_path
 
 KAPPA = 5000.0
 """Over mu."""

@@ -6,9 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from reference_fem.element_table import find_element
-from reference_fem.elements import displacement_points
-from reference_fem.problem import Problem
+from reference_fem.elements.shapes import displacement_points
+from reference_fem.elements.table import find_element
+from reference_fem.model.problem import Problem
 
 
 @dataclass(frozen=True)

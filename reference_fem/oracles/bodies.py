@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from skfem import MeshTet, MeshTet2
 
-from reference_fem.elements import nodes
-from reference_fem.mesh import curve
-from reference_fem.problem import Held
+from reference_fem.elements.curve import curve
+from reference_fem.elements.shapes import nodes
+from reference_fem.model.problem import Held
 
 
 def block(cells=(2, 2, 2), skew=0.0):

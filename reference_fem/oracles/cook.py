@@ -3,13 +3,13 @@
 import numpy as np
 
 from reference_fem import exact
-from reference_fem.elements import nodes
-from reference_fem.equilibrium import equilibrium_path
-from reference_fem.loads import Traction
-from reference_fem.material import NeoHookean
+from reference_fem.elements.shapes import nodes
+from reference_fem.model.loads import Traction
+from reference_fem.model.material import NeoHookean
+from reference_fem.model.problem import Held, Problem
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import between, mapped
-from reference_fem.problem import Held, Problem
+from reference_fem.statics.equilibrium import equilibrium_path
 
 LEFT, LOWER, UPPER, RIGHT = 44.0, 44.0, 60.0, 48.0
 """Height of the held edge, the loaded edge from LOWER to UPPER at x = RIGHT [mm]."""

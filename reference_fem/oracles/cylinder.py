@@ -3,14 +3,14 @@
 import numpy as np
 
 from reference_fem import exact
-from reference_fem.element_table import DEFAULT, ELEMENTS
-from reference_fem.elements import nodes
-from reference_fem.equilibrium import equilibrium_path
-from reference_fem.loads import Traction
-from reference_fem.material import NeoHookean
+from reference_fem.elements.shapes import nodes
+from reference_fem.elements.table import DEFAULT, ELEMENTS
+from reference_fem.model.loads import Traction
+from reference_fem.model.material import NeoHookean
+from reference_fem.model.problem import Problem
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import between, mapped, straight, symmetry
-from reference_fem.problem import Problem
+from reference_fem.statics.equilibrium import equilibrium_path
 
 INNER, OUTER, YOUNG = 3.0, 9.0, 1000.0
 THICKNESS = 0.3

@@ -3,14 +3,14 @@
 import numpy as np
 
 from reference_fem import exact
-from reference_fem.cavity import Cavity
-from reference_fem.equilibrium import equilibrium_path
-from reference_fem.material import NeoHookean
+from reference_fem.model.cavity import Cavity
+from reference_fem.model.material import NeoHookean
+from reference_fem.model.problem import Problem
 from reference_fem.oracles.ball import squeeze, whole_force
 from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import ball_octant, shell_octant, symmetry
-from reference_fem.problem import Problem
-from reference_fem.system import NewtonSettings
+from reference_fem.statics.equilibrium import equilibrium_path
+from reference_fem.system.saddle_point import NewtonSettings
 
 RATIOS = (10.0, 1e2, 1e3, 1e4, 1e5)
 STRETCH, SHARE = 1.5, 0.20

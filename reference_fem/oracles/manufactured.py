@@ -11,17 +11,17 @@ from skfem import ElementTetP2
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
 
-from reference_fem import assembly
-from reference_fem.element_table import DEFAULT, ELEMENTS
-from reference_fem.elements import basis_table, element_nodes, nodes
-from reference_fem.equilibrium import advance
-from reference_fem.loads import BodyForce
-from reference_fem.material import Material, MooneyRivlin
+from reference_fem.elements.shapes import basis_table, element_nodes, nodes
+from reference_fem.elements.table import DEFAULT, ELEMENTS
+from reference_fem.model.loads import BodyForce
+from reference_fem.model.material import Material, MooneyRivlin
+from reference_fem.model.problem import Held, Problem
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import block
-from reference_fem.problem import Held, Problem
-from reference_fem.state import NewtonSettings
-from reference_fem.system import System
+from reference_fem.statics.equilibrium import advance
+from reference_fem.system import assembly
+from reference_fem.system.saddle_point import System
+from reference_fem.system.state import NewtonSettings
 
 SHEARS, PRESSURE = (0.15, 0.10, 0.12), 2.0
 """a, b, c [m] and the largest pressure over the shear modulus."""

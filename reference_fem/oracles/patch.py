@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from reference_fem.element_table import ELEMENTS
-from reference_fem.elements import nodes
-from reference_fem.equilibrium import equilibrium_path
-from reference_fem.material import MooneyRivlin
+from reference_fem.elements.shapes import nodes
+from reference_fem.elements.table import ELEMENTS
+from reference_fem.model.material import MooneyRivlin
+from reference_fem.model.problem import Held, Problem
 from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import block
 from reference_fem.oracles.uniaxial import TIGHT
-from reference_fem.problem import Held, Problem
+from reference_fem.statics.equilibrium import equilibrium_path
 
 STRAIN = 5e-4
 """Volume change, so that the pressure is not zero."""

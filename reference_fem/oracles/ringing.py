@@ -3,11 +3,11 @@
 import numpy as np
 
 from reference_fem import exact
-from reference_fem.material import NeoHookean
-from reference_fem.modes import natural_frequencies
+from reference_fem.dynamics.modes import natural_frequencies
+from reference_fem.model.material import NeoHookean
+from reference_fem.model.problem import Problem
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import whole_ball
-from reference_fem.problem import Problem
 
 RATIOS = {5000.0: 0.5, 5.0 / 3.0: 0.25}
 """kappa/mu -> Poisson's ratio; 5000 is 0.4999, and moves the frequency by less than 1e-4."""

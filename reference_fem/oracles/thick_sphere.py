@@ -3,13 +3,13 @@
 import numpy as np
 
 from reference_fem import exact
-from reference_fem.cavity import Cavity
-from reference_fem.equilibrium import equilibrium_path
-from reference_fem.material import NeoHookean
+from reference_fem.model.cavity import Cavity
+from reference_fem.model.material import NeoHookean
+from reference_fem.model.problem import Problem
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import shell_octant, symmetry
-from reference_fem.problem import Problem
-from reference_fem.state import NewtonSettings
+from reference_fem.statics.equilibrium import equilibrium_path
+from reference_fem.system.state import NewtonSettings
 
 STRETCHES = (1.1, 1.25, 1.5)
 MESHES = {0.5: ((4, 3), (6, 4), (8, 5)), 0.8: ((8, 3),)}

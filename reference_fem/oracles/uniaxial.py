@@ -1,12 +1,12 @@
 """A block pulled and squeezed along one axis, its sides free: the state is homogeneous, so any mesh is exact."""
 
 from reference_fem import exact
-from reference_fem.equilibrium import equilibrium_path
-from reference_fem.material import MooneyRivlin, NeoHookean
+from reference_fem.model.material import MooneyRivlin, NeoHookean
+from reference_fem.model.problem import Held, Problem
 from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import block, symmetry
-from reference_fem.problem import Held, Problem
-from reference_fem.state import NewtonSettings
+from reference_fem.statics.equilibrium import equilibrium_path
+from reference_fem.system.state import NewtonSettings
 
 STRETCHES = (0.7, 0.8, 0.9, 1.5)
 LAWS = {"neo-Hookean": NeoHookean(1.0, 1000.0), "Mooney-Rivlin": MooneyRivlin(0.3, 0.2, 1000.0)}

@@ -1,12 +1,12 @@
 """The studies, one file each. Adding one: a file and a line in STUDIES."""
 
-from studies.catalog.base import Chart, Study
 from studies.catalog.frame_rate import FRAME_RATE
 from studies.catalog.laws import LAWS_STUDY
 from studies.catalog.methods import METHODS_STUDY
 from studies.catalog.organs import ORGANS
 from studies.catalog.stability_map import STABILITY_MAP
 from studies.catalog.stress import STRESS
+from studies.catalog.study import Chart, Study
 from studies.catalog.volume_loss import VOLUME_LOSS
 from studies.catalog.work_precision import WORK_PRECISION
 

@@ -1,9 +1,9 @@
 """What does a frame cost, with and without the constraint, and which deadlines does it meet?"""
 
 from massspring import Free, ImplicitVolume
-from studies.case import BodyRecipe, Case
-from studies.catalog.base import Chart, Study
+from studies.catalog.study import Chart, Study
 from studies.plots import cost_ratio, frame_time
+from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.scenes.liver_probe import LIVER_PROBE
 

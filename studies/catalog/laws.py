@@ -1,9 +1,9 @@
 """What does the stiffness law do to the force and to the time step, with one volume and with one per node?"""
 
 from massspring import ImplicitVolume
-from studies.case import BodyRecipe, Case
-from studies.catalog.base import Chart, Study
+from studies.catalog.study import Chart, Study
 from studies.plots import laws
+from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 
 NODES = (150, 300, 550)

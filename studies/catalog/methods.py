@@ -16,9 +16,9 @@ from massspring import (
     Shake,
     Xpbd,
 )
-from studies.case import BodyRecipe, Case
-from studies.catalog.base import Chart, Study
+from studies.catalog.study import Chart, Study
 from studies.plots import methods
+from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.scenes.liver_press import LIVER_PRESS
 

@@ -1,9 +1,9 @@
 """Does what holds for ball and liver hold for kidney, spleen, stomach and bladder, solid and hollow?"""
 
 from massspring import Free, ImplicitVolume
-from studies.case import BodyRecipe, Case
-from studies.catalog.base import Chart, Study
+from studies.catalog.study import Chart, Study
 from studies.plots import accuracy, force_path, volume_history
+from studies.runs.case import BodyRecipe, Case
 from studies.scenes import BLADDER_FILL, KIDNEY_PROBE, SPLEEN_SAG, STOMACH_PRESS, STOMACH_PROBE, Scene
 
 SOLID, HOLLOW = (KIDNEY_PROBE, SPLEEN_SAG), (STOMACH_PRESS, STOMACH_PROBE, BLADDER_FILL)

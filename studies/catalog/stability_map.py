@@ -1,9 +1,9 @@
 """When does it break: over time step, stiffness and method?"""
 
 from massspring import Free, ImplicitVolume
-from studies.case import BodyRecipe, Case
-from studies.catalog.base import Chart, Study
+from studies.catalog.study import Chart, Study
 from studies.plots import stability
+from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 
 FRAMES = 100

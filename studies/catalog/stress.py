@@ -1,9 +1,9 @@
 """From which starts does a body find its rest shape again, and what does it need for that?"""
 
 from massspring import Free, ImplicitVolume, Shake
-from studies.case import BodyRecipe, Case
-from studies.catalog.base import Chart, Study
+from studies.catalog.study import Chart, Study
 from studies.plots import recovery
+from studies.runs.case import BodyRecipe, Case
 from studies.scenes.stress import STRESS_SCENES
 
 NODES = 230

@@ -1,9 +1,9 @@
 """How much volume does each model lose, and how far is it from the reference? (The paper's Figure 3.)"""
 
 from massspring import Free, ImplicitVolume
-from studies.case import BodyRecipe, Case
-from studies.catalog.base import Chart, Study
+from studies.catalog.study import Chart, Study
 from studies.plots import accuracy, force_path, squeeze, volume_history
+from studies.runs.case import BodyRecipe, Case
 from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE
 
 TETRAHEDRAL, SURFACE = BodyRecipe("tetrahedral"), BodyRecipe("surface")

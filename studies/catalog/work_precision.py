@@ -1,9 +1,9 @@
 """How much accuracy does run time buy: over mesh size, time step and method?"""
 
 from massspring import Free, ImplicitVolume
-from studies.case import BodyRecipe, Case
-from studies.catalog.base import Chart, Study
+from studies.catalog.study import Chart, Study
 from studies.plots import work_precision
+from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.liver_press import LIVER_PRESS
 

@@ -1,9 +1,11 @@
 """Meshes of organs: gmsh and meshio live here only. Lengths in metres, surface nodes numbered first."""
 
-from studies.geometry.api import attach, ball, ball_octant, curved, fill, liver, organ, organ_family
-from studies.geometry.checks import check_surface, check_tetrahedra
-from studies.geometry.curved import CurvedMesh
-from studies.geometry.mesh import OrganMesh
+from studies.geometry.api.organs import attach, ball, ball_octant, curved, fill, liver, organ, organ_family
+from studies.geometry.api.scans import scan
+from studies.geometry.files.reading import read_mesh
+from studies.geometry.mesh.checks import check_surface, check_tetrahedra
+from studies.geometry.mesh.organ_mesh import OrganMesh
+from studies.geometry.mesh.second_order import CurvedMesh
 from studies.geometry.organs import SHAPES
 from studies.geometry.organs.ball import project_ball
 from studies.geometry.organs.bladder import BLADDER_REGIONS
@@ -18,9 +20,7 @@ from studies.geometry.organs.liver import (
 from studies.geometry.organs.spleen import SPLEEN_REGIONS
 from studies.geometry.organs.stomach import STOMACH_REGIONS
 from studies.geometry.organs.variation import vary
-from studies.geometry.reading import read_mesh
-from studies.geometry.regions import BallRegion, EllipsoidRegion, HalfSpace, Region
-from studies.geometry.scan import scan
+from studies.geometry.shape.regions import BallRegion, EllipsoidRegion, HalfSpace, Region
 
 __all__ = [
     "BLADDER_REGIONS",

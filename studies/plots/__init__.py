@@ -1,1 +1,1 @@
-"""One chart per file, one style; matplotlib lives here only."""
+"""One chart per file; matplotlib lives here only."""

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.metrics import DOUBT, METRICS, Metric, Run
-from studies.plots.page import (
+from studies.metrics.metrics import DOUBT, METRICS, Metric, Run
+from studies.plots.style.page import (
     band_handle,
     blank,
     body_method_handles,
@@ -24,7 +24,7 @@ from studies.plots.page import (
     panels,
     remarks,
 )
-from studies.plots.style import BLACK, BODY_MARKERS, GREY, SMALL, heading, method_colour, remark, save, styled
+from studies.plots.style.style import BLACK, BODY_MARKERS, GREY, SMALL, heading, method_colour, remark, save, styled
 
 TITLE = "Error against the reference"
 QUANTITIES = {

@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from massspring import Free
-from studies.metrics import Run
-from studies.plots.page import blank, finish, grouped, page
-from studies.plots.style import BLACK, GREY, NORMAL, heading, method_colour, readable, save, styled
-from studies.spread import Ratio, ratio_with_spread
+from studies.metrics.metrics import Run
+from studies.plots.style.page import blank, finish, grouped, page
+from studies.plots.style.style import BLACK, GREY, NORMAL, heading, method_colour, readable, save, styled
+from studies.timing.statistics import Ratio, ratio_with_spread
 
 TITLE = "Cost of keeping the volume"
 Row = tuple[str, str, Ratio]

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from massspring import Path as Motion
-from studies.metrics import COMPARABLE, METRICS, Run, force_end
-from studies.plots.page import (
+from studies.metrics.metrics import COMPARABLE, METRICS, Run, force_end
+from studies.plots.style.page import (
     band_handle,
     blank,
     body_method_handles,
@@ -27,7 +27,7 @@ from studies.plots.page import (
     remarks,
     spread_out,
 )
-from studies.plots.style import BLACK, BODY_LINES, GREY, SMALL, heading, method_colour, save, styled
+from studies.plots.style.style import BLACK, BODY_LINES, GREY, SMALL, heading, method_colour, save, styled
 from studies.scenes import Scene
 
 TITLE = "Force of the press against the reference"

@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from studies.metrics import Run
-from studies.plots.page import band_handle, blank, finish, grouped, log_axis, page, panels, remarks
-from studies.plots.style import BLACK, GREY, SMALL, heading, method_colour, readable, save, styled
-from studies.spread import percentiles
-from studies.timing import FrameTiming
+from studies.metrics.metrics import Run
+from studies.plots.style.page import band_handle, blank, finish, grouped, log_axis, page, panels, remarks
+from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, save, styled
+from studies.timing.protocol import FrameTiming
+from studies.timing.statistics import percentiles
 
 TITLE = "Time of a frame"
 DEADLINES_MS = {33.0: "33 ms", 2.0: "2 ms", 1.0: "1 ms"}

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.metrics import COMPARABLE, METRICS, Metric, Run
-from studies.plots.page import (
+from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run
+from studies.plots.style.page import (
     band_handle,
     blank,
     by_scene,
@@ -22,7 +22,7 @@ from studies.plots.page import (
     panels,
     remarks,
 )
-from studies.plots.style import (
+from studies.plots.style.style import (
     BLACK,
     BLUE,
     GREEN,

@@ -9,11 +9,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from massspring import Method
-from studies.case import chosen_settings
-from studies.metrics import COMPARABLE, METRICS, Metric, Run
-from studies.plots.page import blank, by_scene, doubt_mark, doubts, finish, log_axis, page, panels, remarks
-from studies.plots.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, heading, readable, save, styled
+from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run
+from studies.plots.style.page import blank, by_scene, doubt_mark, doubts, finish, log_axis, page, panels, remarks
+from studies.plots.style.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, heading, readable, save, styled
 from studies.plots.work_precision import cost
+from studies.runs.case import chosen_settings
 
 TITLE = "Ways to keep a volume, on the same bodies, at one share of their step limits unless a step is named"
 QUANTITIES = {

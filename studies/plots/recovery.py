@@ -7,8 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from studies.metrics import Run
-from studies.plots.page import (
+from studies.metrics.metrics import Run
+from studies.metrics.table import metric
+from studies.plots.style.page import (
     blank,
     body_method_handles,
     by_scene,
@@ -19,8 +20,7 @@ from studies.plots.page import (
     page,
     panels,
 )
-from studies.plots.style import BLACK, BODY_LINES, GREY, SMALL, heading, method_colour, readable, save, styled
-from studies.table import metric
+from studies.plots.style.style import BLACK, BODY_LINES, GREY, SMALL, heading, method_colour, readable, save, styled
 
 TITLE = "From which starts a body finds its rest shape again"
 LOWEST, HIGHEST = -1.6, 1.15

@@ -10,10 +10,10 @@ from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull
 
 from massspring import Plane
-from studies.metrics import COMPARABLE, Run, force_end, volume_end, volume_worst
-from studies.plots.page import blank, finish, page, panels
-from studies.plots.render import Camera, draw_surface, frame, scale_bar, uniform
-from studies.plots.style import BLACK, GREY, NORMAL, SMALL, method_colour, readable, save, styled
+from studies.metrics.metrics import COMPARABLE, Run, force_end, volume_end, volume_worst
+from studies.plots.style.page import blank, finish, page, panels
+from studies.plots.style.render import Camera, draw_surface, frame, scale_bar, uniform
+from studies.plots.style.style import BLACK, GREY, NORMAL, SMALL, method_colour, readable, save, styled
 
 TITLE = "A soft ball between two planes"
 SCENE, BODY = "ball_squeeze", "tetrahedral"

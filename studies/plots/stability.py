@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from studies.metrics import Run
-from studies.plots.page import blank, finish, grouped, log_axis, page, panels
-from studies.plots.style import BLACK, STATUS_LOOKS, heading, readable, save, styled
-from studies.store import Status
+from studies.metrics.metrics import Run
+from studies.plots.style.page import blank, finish, grouped, log_axis, page, panels
+from studies.plots.style.style import BLACK, STATUS_LOOKS, heading, readable, save, styled
+from studies.store.record import Status
 
 TITLE = "Stability: time step × stiffness"
 MS = 1e3

@@ -8,20 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.floors import Uncertainty
-from studies.plots.page import blank, finish, log_axis, page, panels
-from studies.plots.style import (
-    BLUE,
-    GREEN,
-    LIGHT,
-    ORANGE,
-    SMALL,
-    VERMILLION,
-    heading,
-    readable,
-    save,
-    styled,
-)
+from studies.plots.style.page import blank, finish, log_axis, page, panels
+from studies.plots.style.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, heading, readable, save, styled
+from studies.reference.uncertainty import Uncertainty
 
 TITLE = "What the references leave open"
 LOOKS = {"mesh": (BLUE, "o"), "contact": (VERMILLION, "s"), "kappa": (GREEN, "^"), "steps": (ORANGE, "D")}

@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from reference_fem.oracles import Curve
-from studies.plots.page import blank, finish, page, panels
-from studies.plots.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, save, styled
+from studies.plots.style.page import blank, finish, page, panels
+from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, save, styled
 
 TITLE = "The reference against known answers: error over mesh size"
 COLOURS, MARKERS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY), "osD^vP"

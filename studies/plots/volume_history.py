@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.metrics import COMPARABLE, Run
-from studies.plots.page import (
+from studies.metrics.metrics import COMPARABLE, Run
+from studies.plots.style.page import (
     blank,
     body_method_handles,
     by_scene,
@@ -22,7 +22,7 @@ from studies.plots.page import (
     reference_handle,
     remarks,
 )
-from studies.plots.style import BLACK, BODY_LINES, GREY, heading, method_colour, save, styled
+from studies.plots.style.style import BLACK, BODY_LINES, GREY, heading, method_colour, save, styled
 
 TITLE = "How much volume each model loses"
 PERCENT = 100.0

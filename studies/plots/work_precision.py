@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.metrics import COMPARABLE, METRICS, Metric, Run, real_time
-from studies.plots.page import (
+from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run, real_time
+from studies.plots.style.page import (
     band_handle,
     blank,
     by_scene,
@@ -22,8 +22,8 @@ from studies.plots.page import (
     panels,
     remarks,
 )
-from studies.plots.style import BLACK, GREY, SMALL, heading, method_colour, readable, remark, save, styled
-from studies.store import Status
+from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, remark, save, styled
+from studies.store.record import Status
 
 TITLE = "Accuracy for computing time"
 ROWS = {"force_error": "force error [%]", "interior_error": "displacement error [%]"}

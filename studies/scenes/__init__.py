@@ -1,9 +1,9 @@
 """The scenes, one file each. Adding one: a file and a line in SCENES, where tests, commands and charts find it."""
 
+from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene, Start, Tissue
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_ringing import BALL_RINGING
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.base import Held, Lumen, Organ, Probed, ReferencePlan, Scene, Start, Tissue
 from studies.scenes.bladder_fill import BLADDER_FILL
 from studies.scenes.kidney_probe import KIDNEY_PROBE
 from studies.scenes.liver_press import LIVER_PRESS

@@ -2,7 +2,7 @@
 
 from massspring import Path
 from studies.geometry import HalfSpace
-from studies.scenes.base import LIVER, Held, Organ, Probed, ReferencePlan, Scene, press_times
+from studies.scene.scene import LIVER, Held, Organ, Probed, ReferencePlan, Scene, press_times
 
 RADIUS = 0.05  # m
 CAP = 0.8  # the caps are |z| > CAP · RADIUS

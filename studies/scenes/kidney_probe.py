@@ -2,7 +2,7 @@
 
 from massspring import Path, Sphere
 from studies.geometry.organs.kidney import KIDNEY_REGIONS, kidney_shape
-from studies.scenes.base import KIDNEY, Held, Organ, Probed, ReferencePlan, Scene, along, press_times, probe_of, scaled
+from studies.scene.scene import KIDNEY, Held, Organ, Probed, ReferencePlan, Scene, along, press_times, probe_of, scaled
 
 RADIUS = 0.015  # m, a fingertip; twice the edge of the coarsest reference mesh
 DEPTH = 0.006  # m, a seventh of the kidney's thickness

@@ -2,7 +2,7 @@
 
 from massspring import Path, Plane
 from studies.geometry import LIVER_PRESS_DIRECTION, LIVER_REGIONS
-from studies.scenes.base import LIVER, Held, Organ, Probed, ReferencePlan, Scene, press_times, scaled
+from studies.scene.scene import LIVER, Held, Organ, Probed, ReferencePlan, Scene, press_times, scaled
 
 FRONT = -0.0686  # m: where the liver begins along the press direction
 GAP = 0.0014  # m between plane and liver at the start: curved facets of a coarse mesh bulge that far

@@ -2,7 +2,7 @@
 
 from massspring import Path, Plane, Sphere
 from studies.geometry.organs.stomach import STOMACH_REGIONS, stomach_shape
-from studies.scenes.base import (
+from studies.scene.scene import (
     STOMACH,
     Held,
     Lumen,

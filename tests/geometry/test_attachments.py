@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace, attach, ball, check_surface, liver
-from studies.geometry.mesh import triangle_areas, unique_edges
+from studies.geometry.mesh.organ_mesh import triangle_areas, unique_edges
+from studies.geometry.mesh.quality import triangle_radius_ratio
 from studies.geometry.organs import SHAPES
-from studies.geometry.quality import triangle_radius_ratio
-from studies.geometry.regions import region_from_dict, region_to_dict
-from studies.geometry.snap import crossing_edges, snap_region
+from studies.geometry.shape.regions import region_from_dict, region_to_dict
+from studies.geometry.surface.snap import crossing_edges, snap_region
 
 RADIUS, CAP = 0.05, 0.035
 CAPS = {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.geometry.blends import canal, closed, local_min, smooth_min
+from studies.geometry.shape.blends import canal, closed, local_min, smooth_min
 
 
 def test_canal_of_two_spheres_is_the_round_cone():

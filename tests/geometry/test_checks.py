@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
+from studies.base.errors import StudyError
 from studies.geometry import check_surface, check_tetrahedra
-from studies.geometry.checks import check_one_part
-from studies.geometry.mesh import boundary_triangles, signed_volume, surface_first, tetrahedron_volumes
-from studies.geometry.quality import dihedral_angles, tetrahedron_radius_ratio, triangle_radius_ratio
+from studies.geometry.mesh.checks import check_one_part
+from studies.geometry.mesh.organ_mesh import boundary_triangles, signed_volume, surface_first, tetrahedron_volumes
+from studies.geometry.mesh.quality import dihedral_angles, tetrahedron_radius_ratio, triangle_radius_ratio
 
 REGULAR = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * 0.01
 TET = np.array([[0, 2, 1, 3]])

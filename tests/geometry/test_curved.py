@@ -7,14 +7,15 @@ import pytest
 import skfem
 from skfem.models.poisson import laplace
 
-from studies.errors import StudyError
-from studies.geometry import HalfSpace, api, ball, ball_octant, check_surface, curved, organ, organ_family
-from studies.geometry.curved import GOOD, make_curved, middle_stiffness, true_outlines, unfold
-from studies.geometry.family import true_volume
-from studies.geometry.jacobian import PAIRS, curved_volume, jacobian_coefficients, smallest_jacobian
-from studies.geometry.levelset import Shape, at_depth
-from studies.geometry.mesh import unique_edges
+from studies.base.errors import StudyError
+from studies.geometry import HalfSpace, ball, ball_octant, check_surface, curved, organ, organ_family
+from studies.geometry.api import organs as api
+from studies.geometry.mesh.jacobian import PAIRS, curved_volume, jacobian_coefficients, smallest_jacobian
+from studies.geometry.mesh.organ_mesh import unique_edges
+from studies.geometry.mesh.second_order import GOOD, make_curved, middle_stiffness, true_outlines, unfold
 from studies.geometry.organs import SHAPES
+from studies.geometry.shape.levelset import Shape, at_depth
+from studies.geometry.surface.family import true_volume
 
 RADIUS = 0.05
 BALL_VOLUME = 4 / 3 * np.pi * RADIUS**3

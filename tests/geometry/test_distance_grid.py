@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.geometry.distance_grid import BAND, distance_grid, winding_number
+from studies.geometry.scanned.distance_grid import BAND, distance_grid, winding_number
 from tests.geometry.boxes import box, box_distance, split, together
 
 CELL = 0.1

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from massspring import Material, step_limit, tetrahedral_body
-from studies.errors import StudyError
-from studies.geometry.doctor import examine
-from studies.geometry.doctor_words import RULES
+from studies.base.errors import StudyError
+from studies.geometry.doctor.examine import examine
+from studies.geometry.doctor.findings import RULES
 from tests.geometry.boxes import box, split, together
 from tests.geometry.real import NAMES, real_surface
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
+from studies.base.errors import StudyError
 from studies.geometry import read_mesh, scan
-from studies.geometry.doctor import examine
-from studies.geometry.estimate import check_whole, size_warning, triangle_count
-from studies.geometry.writing import write_mesh
+from studies.geometry.doctor.examine import examine
+from studies.geometry.files.estimate import check_whole, size_warning, triangle_count
+from studies.geometry.files.writing import write_mesh
 
 
 def sparse_stl(path, count, size):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from studies.distance import distance_to_surface
-from studies.geometry.count import MOST
-from studies.geometry.fit import ALLOWED, evenly_spread, folded_pairs, refined, unspoilt
-from studies.geometry.intersections import crossing_triangles
-from studies.geometry.quality import triangle_radius_ratio
+from studies.geometry.mesh.quality import triangle_radius_ratio
+from studies.geometry.surface.distance import distance_to_surface
+from studies.geometry.surface.fit import ALLOWED, evenly_spread, folded_pairs, refined, unspoilt
+from studies.geometry.surface.intersections import crossing_triangles
+from studies.geometry.surface.node_count import MOST
 from tests.geometry.boxes import box, split
 
 

@@ -6,9 +6,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from studies.geometry.boxes import overlapping_boxes
-from studies.geometry.intersections import crossing_triangles
-from studies.geometry.predicates import orientation, orientation_2
+from studies.geometry.surface.boxes import overlapping_boxes
+from studies.geometry.surface.intersections import crossing_triangles
+from studies.geometry.surface.predicates import orientation, orientation_2
 from tests.geometry.boxes import box, split, together
 
 ROT = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
-from studies.geometry import HalfSpace, ball, fill, jobs
-from studies.geometry.jobs import mesh_from, recipe_hash
+from studies.base.errors import StudyError
+from studies.geometry import HalfSpace, ball, fill
+from studies.geometry.mesher import jobs
+from studies.geometry.mesher.jobs import mesh_from, recipe_hash
 
 RECIPE = {"kind": "organ", "name": "ball", "organ": "ball", "nodes": 150, "parameters": {}, "regions": {}, "fill": True}
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from studies.geometry import SHAPES, organ
-from studies.geometry.checks import check_one_part, check_surface
-from studies.geometry.mesh import triangle_areas, unique_edges
-from studies.geometry.surface import first_surface
+from studies.geometry.mesh.checks import check_one_part, check_surface
+from studies.geometry.mesh.organ_mesh import triangle_areas, unique_edges
+from studies.geometry.surface.first_surface import first_surface
 
 ORGANS = tuple(name for name, make in SHAPES.items() if make().literature is not None)
 pytestmark = pytest.mark.slow

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
+from studies.base.errors import StudyError
 from studies.geometry import (
     LIVER_PRESS_DIRECTION,
     LIVER_PROBE_NORMAL,
@@ -17,11 +17,11 @@ from studies.geometry import (
     project_ball,
     project_liver,
 )
-from studies.geometry.levelset import normals
-from studies.geometry.mesh import boundary_triangles, tetrahedron_volumes, triangle_normals, unique_edges
+from studies.geometry.mesh.organ_mesh import boundary_triangles, tetrahedron_volumes, triangle_normals, unique_edges
+from studies.geometry.mesh.quality import MIN_DIHEDRAL, MIN_RATIO, dihedral_angles, tetrahedron_radius_ratio
 from studies.geometry.organs.liver import LIVER
-from studies.geometry.quality import MIN_DIHEDRAL, MIN_RATIO, dihedral_angles, tetrahedron_radius_ratio
-from studies.geometry.surface import first_surface
+from studies.geometry.shape.levelset import normals
+from studies.geometry.surface.first_surface import first_surface
 
 RADIUS = 0.05
 COUNTS = (150, 300, 550, 1100)

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
+from studies.base.errors import StudyError
 from studies.geometry import ball, check_surface
-from studies.geometry.blends import ellipsoid, groove, smooth_max, smooth_min
-from studies.geometry.count import surface_with
-from studies.geometry.edit import collapse_edge, flip_edges, split_edge, with_node_count
-from studies.geometry.levelset import Shape, gradient, normals, project
-from studies.geometry.mesh import triangle_areas, unique_edges
+from studies.geometry.mesh.organ_mesh import triangle_areas, unique_edges
 from studies.geometry.organs import SHAPES
-from studies.geometry.surface import first_surface
+from studies.geometry.shape.blends import ellipsoid, groove, smooth_max, smooth_min
+from studies.geometry.shape.levelset import Shape, gradient, normals, project
+from studies.geometry.surface.edit import collapse_edge, flip_edges, split_edge, with_node_count
+from studies.geometry.surface.first_surface import first_surface
+from studies.geometry.surface.node_count import surface_with
 
 BALL = SHAPES["ball"](0.05)
 

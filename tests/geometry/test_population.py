@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
-from studies.geometry import bench, organ
-from studies.geometry.bench import check_topology, faults, specimen, summary
+from studies.base.errors import StudyError
+from studies.bench import meshes as bench
+from studies.bench.meshes import check_topology, faults, specimen, summary
+from studies.geometry import organ
 
 
 @pytest.fixture(scope="module")

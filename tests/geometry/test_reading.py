@@ -7,10 +7,10 @@ import meshio
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
+from studies.base.errors import StudyError
 from studies.geometry import attach, check_tetrahedra, fill, read_mesh
-from studies.geometry.quality import dihedral_angles
-from studies.geometry.regions import BallRegion
+from studies.geometry.mesh.quality import dihedral_angles
+from studies.geometry.shape.regions import BallRegion
 
 REAL = Path(__file__).parents[2].parent / "shared" / "meshes"
 

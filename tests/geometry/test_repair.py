@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
+from studies.base.errors import StudyError
 from studies.geometry import check_surface
-from studies.geometry.mesh import signed_volume
-from studies.geometry.repair import border, mend, oriented, part_of, without_holes
+from studies.geometry.mesh.organ_mesh import signed_volume
+from studies.geometry.surface.repair import border, mend, oriented, part_of, without_holes
 from tests.geometry.boxes import box, split, together
 
 

@@ -7,12 +7,12 @@ import meshio
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
+from studies.base.errors import StudyError
+from studies.bench.scans import hausdorff_share, main
 from studies.geometry import check_surface, check_tetrahedra, scan
-from studies.geometry.mesh import signed_volume
-from studies.geometry.quality import dihedral_angles, tetrahedron_radius_ratio
-from studies.geometry.scan import raw_surface
-from studies.geometry.scan_bench import hausdorff_share, main
+from studies.geometry.api.scans import raw_surface
+from studies.geometry.mesh.organ_mesh import signed_volume
+from studies.geometry.mesh.quality import dihedral_angles, tetrahedron_radius_ratio
 from tests.geometry.boxes import box, split, together
 from tests.geometry.real import COARSE, NAMES, real_surface
 

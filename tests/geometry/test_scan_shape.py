@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
-from studies.geometry.mesh import signed_volume
-from studies.geometry.scan_shape import scan_shape, smoothed
-from studies.geometry.surface import first_surface
+from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import signed_volume
+from studies.geometry.scanned.scan_shape import scan_shape, smoothed
+from studies.geometry.surface.first_surface import first_surface
 from tests.geometry.boxes import box, box_distance, split
 
 MM = 1e-3

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from skimage.measure import euler_number, label
 
-from studies.errors import StudyError
-from studies.geometry.levelset import at_depth, gradient, normals
-from studies.geometry.mesh import signed_volume, triangle_areas
+from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas
 from studies.geometry.organs import SHAPES
 from studies.geometry.organs.variation import vary
-from studies.geometry.surface import first_surface
+from studies.geometry.shape.levelset import at_depth, gradient, normals
+from studies.geometry.surface.first_surface import first_surface
 
 ORGANS = tuple(name for name, make in SHAPES.items() if make().literature is not None)
 HOLLOW = tuple(name for name in ORGANS if SHAPES[name]().wall is not None)

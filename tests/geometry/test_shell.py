@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
+from studies.base.errors import StudyError
 from studies.geometry import HalfSpace, ball, check_surface, check_tetrahedra, fill, organ
-from studies.geometry.levelset import at_depth, project
-from studies.geometry.mesh import boundary_triangles, signed_volume, tetrahedron_volumes
+from studies.geometry.mesh.organ_mesh import boundary_triangles, signed_volume, tetrahedron_volumes
+from studies.geometry.mesh.quality import MIN_WALL_RATIO, tetrahedron_radius_ratio
+from studies.geometry.mesh.wall_layers import fill_wall, mend_wall, split_prisms, suggested_layers
 from studies.geometry.organs import SHAPES
-from studies.geometry.quality import MIN_WALL_RATIO, tetrahedron_radius_ratio
-from studies.geometry.shell import fill_wall, mend_wall, split_prisms, suggested_layers
+from studies.geometry.shape.levelset import at_depth, project
 
 RADIUS, WALL = 0.05, 0.01
 CAP = {"top": HalfSpace((0.0, 0.0, 0.035), (0.0, 0.0, -1.0))}

@@ -6,9 +6,9 @@ import meshio
 import numpy as np
 import pytest
 
-from studies.errors import StudyError
+from studies.base.errors import StudyError
 from studies.geometry import curved, organ, read_mesh
-from studies.geometry.writing import SURFACES, TAGS, VOLUMES, check_target, write_mesh
+from studies.geometry.files.writing import SURFACES, TAGS, VOLUMES, check_target, write_mesh
 
 
 @pytest.mark.parametrize("suffix", [*VOLUMES, *SURFACES])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from massspring import MassSpringError, surface_body
-from massspring.axis import AXES, closest_virtual_node, virtual_nodes
-from massspring.springs import SpringKind
+from massspring.body.axis import AXES, closest_virtual_node, virtual_nodes
+from massspring.body.springs import SpringKind
 from tests.massspring.conftest import SOFT, icosphere
 
 RADIUS, TUBE, SPACING = 0.10, 0.03, 0.015

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from massspring import Body, MassSpringError, Material, surface_body, tetrahedral_body
-from massspring.axis import principal_axis
-from massspring.springs import SpringKind
+from massspring.body.axis import principal_axis
+from massspring.body.springs import SpringKind
 from tests.massspring.conftest import SOFT, block, icosphere
 
 EXACT = 1e-12

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from massspring import Clock, Free, ImplicitVolume, Path, Probe, Setup
-from massspring.kernels.broad_phase import TRIANGLE_BLOCK, fastest_node
-from massspring.kernels.collision import NEVER, crossing, nearest_into, passes_by, stays_off
-from massspring.kernels.probe_layout import IN_CONTACT
+from massspring.kernels.probe.arrays import IN_CONTACT
+from massspring.kernels.probe.broad_phase import TRIANGLE_BLOCK, fastest_node
+from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, stays_off
 from tests.massspring.test_collision import pair_of
 from tests.massspring.test_probe import BALL, EDGE, R, pressed
 from tests.massspring.touched import list_touched

@@ -15,19 +15,19 @@ from massspring import (
     simulate,
     tetrahedral_body,
 )
-from massspring.kernels.cell_multipliers import (
+from massspring.body.volumes import Volumes
+from massspring.kernels.arrays.layout import Accuracy
+from massspring.kernels.constraint.tetrahedra import (
     cell_changes_into,
     cell_forces_into,
     cell_rows_into,
     relax_cells,
     solve_cells,
 )
-from massspring.kernels.layout import Accuracy
-from massspring.kernels.prediction import predict, unpushed_into
-from massspring.kernels.volume import enclosed_volume
-from massspring.methods.base import start
-from massspring.methods.cells import cells_of
-from massspring.volumes import Volumes
+from massspring.kernels.forces.volume import enclosed_volume
+from massspring.kernels.step.predict import predict, unpushed_into
+from massspring.methods.families.tetrahedra import cells_of
+from massspring.methods.method import start
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.test_cells import cell_volumes, deformed, pressed
 from tests.massspring.test_methods import clock_for, thrown

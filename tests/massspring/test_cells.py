@@ -19,10 +19,15 @@ from massspring import (
     Xpbd,
     simulate,
 )
-from massspring.kernels.cells import add_barycentre_forces, add_volume_forces, cell_slopes, mean_pressure
-from massspring.kernels.deformation import tetrahedron_volumes_into
-from massspring.kernels.volume import enclosed_volume, pyramid_volume
-from massspring.methods.cells import cells_of
+from massspring.kernels.forces.tetrahedra import tetrahedron_volumes_into
+from massspring.kernels.forces.tetrahedron_volumes import (
+    add_barycentre_forces,
+    add_volume_forces,
+    cell_slopes,
+    mean_pressure,
+)
+from massspring.kernels.forces.volume import enclosed_volume, pyramid_volume
+from massspring.methods.families.tetrahedra import cells_of
 from tests.massspring.test_methods import clock_for, squeeze
 
 BULK = 30_000.0  # Pa

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from massspring import Attachment, Body, ImplicitVolume, Volumes
-from massspring.kernels.clusters import SIZE, answer, precondition_into, scale_into
-from massspring.kernels.multipliers import solve_iteratively
-from massspring.kernels.rows import diagonal_into, rows_into
-from massspring.methods.base import State, start
-from massspring.methods.clusters import SHIFT, clusters_at_rest, each_alone
+from massspring.kernels.constraint.block_jacobi import SIZE, answer, precondition_into, scale_into
+from massspring.kernels.constraint.jacobian import diagonal_into, rows_into
+from massspring.kernels.constraint.schur import solve_iteratively
+from massspring.layout.block_jacobi import SHIFT, clusters_at_rest, each_alone
+from massspring.methods.method import State, start
 from tests.massspring.test_kernels import moved
 from tests.massspring.test_rows import dense
 

@@ -16,9 +16,9 @@ from massspring import (
     Shake,
     simulate,
 )
-from massspring.kernels.volume import enclosed_volume
-from massspring.methods.base import begin_frame
-from massspring.methods.constraint import Rule, advance_by, correct_positions
+from massspring.kernels.forces.volume import enclosed_volume
+from massspring.methods.families.one_volume import Rule, advance_by, correct_positions
+from massspring.methods.method import begin_frame
 from tests.massspring.test_cubic import gradient
 from tests.massspring.test_methods import clock_for, squeeze, thrown
 

@@ -18,7 +18,7 @@ from massspring import (
     step_limit,
     tetrahedral_body,
 )
-from massspring.kernels.contact import find_contacts, pressure_reach, revise_contacts
+from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.test_methods import clock_for, squeeze
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from massspring import Capsule, Clock, ImplicitVolume, Path, Plane, Setup, Sphere, surface_body
-from massspring.kernels.contact import find_contacts, pressure_reach, revise_contacts
+from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
 from tests.massspring.conftest import SOFT, icosphere
 
 DT = 1e-3

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from massspring.kernels.cubic import nearest_root, volume_cubic
-from massspring.kernels.volume import enclosed_volume, volume_gradient_into
+from massspring.kernels.constraint.exact_volume import nearest_root, volume_cubic
+from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
 
 
 def gradient(x, triangles):

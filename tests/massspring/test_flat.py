@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from massspring.curve import along_curve
-from massspring.kernels.blocks import BLOCK, any_within
-from massspring.kernels.compiled import lean
-from massspring.kernels.flat import flat
+from massspring.kernels.jit.blocks import BLOCK, any_within
+from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.flat import flat
+from massspring.layout.morton import along_curve
 
 
 @lean

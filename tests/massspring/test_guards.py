@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from massspring import METHODS, Attachment, Body, Clock, Free, Method, Path, Plane, Ramp, Setup, simulate
-from massspring.methods.base import begin_frame
-from massspring.targets import fastest_filling
+from massspring.methods.method import begin_frame
+from massspring.world.targets import fastest_filling
 from tests.massspring.test_methods import clock_for, squeeze
 from tests.massspring.test_stress import start_of
 

@@ -19,8 +19,8 @@ from massspring import (
     step_limit,
     tetrahedral_body,
 )
-from massspring.methods.factor import Factor
-from massspring.methods.touching import Touching
+from massspring.methods.implicit.contact import Touching
+from massspring.methods.implicit.factor import Factor
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.test_methods import squeeze, thrown
 

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from massspring import Body
-from massspring.kernels.deformation import smallest_ratio, tetrahedron_volumes_into
-from massspring.kernels.springs import spring_energy, spring_forces_into
-from massspring.kernels.volume import enclosed_volume, volume_gradient_into
+from massspring.kernels.forces.springs import spring_energy, spring_forces_into
+from massspring.kernels.forces.tetrahedra import smallest_ratio, tetrahedron_volumes_into
+from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
 
 ROUND_OFF = 1e-13  # relative; sums of a few thousand doubles
 STEP = 1e-6  # relative central differences: error ~ 1e-12 truncation + 1e-10 round-off

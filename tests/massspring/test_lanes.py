@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from massspring.kernels.compiled import compiled
-from massspring.kernels.lanes import copy_scaled, sum_of_areas, sum_of_products, sum_of_scaled, sums_from_origin
+from massspring.kernels.jit.decorators import compiled
+from massspring.kernels.jit.row_sums import copy_scaled, sum_of_areas, sum_of_products, sum_of_scaled, sums_from_origin
 
 MANY = 1e-14
 """Round-off of a sum of some ten terms, over their size."""

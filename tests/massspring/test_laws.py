@@ -20,11 +20,11 @@ from massspring import (
     surface_body,
     tetrahedral_body,
 )
-from massspring.bodies import SURFACE_WEIGHTS
-from massspring.kernels.volume import volume_gradient_into
-from massspring.laws import TETRAHEDRAL_LAWS, WITHOUT_LENGTH
-from massspring.springs import SpringKind
-from massspring.stiffness import spring_stiffness, stiffness_at_rest, volume_hessian
+from massspring.analysis.stiffness import spring_stiffness, stiffness_at_rest, volume_hessian
+from massspring.body.build import SURFACE_WEIGHTS
+from massspring.body.laws import TETRAHEDRAL_LAWS, WITHOUT_LENGTH
+from massspring.body.springs import SpringKind
+from massspring.kernels.forces.volume import volume_gradient_into
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.test_kernels import energy, forces, gradient, moved
 from tests.massspring.test_methods import squeeze, thrown

@@ -17,11 +17,11 @@ from massspring import (
     simulate,
     step_limit,
 )
-from massspring.kernels.membrane import add_membrane_forces, membrane_energy
-from massspring.kernels.spring_layout import Membrane
-from massspring.membranes import lloyd_springs, triangle_springs
-from massspring.stability import scaled_stiffness
-from massspring.stiffness import membrane_stiffness
+from massspring.analysis.stability import scaled_stiffness
+from massspring.analysis.stiffness import membrane_stiffness
+from massspring.body.membranes import lloyd_springs, triangle_springs
+from massspring.kernels.arrays.spring_layout import Membrane
+from massspring.kernels.forces.membrane import add_membrane_forces, membrane_energy
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.test_kernels import directional
 from tests.massspring.test_methods import thrown

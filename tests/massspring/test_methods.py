@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import massspring.kernels.motion as motion_kernels
+import massspring.kernels.step.advance as motion_kernels
 from massspring import (
     METHODS,
     Body,
@@ -22,9 +22,9 @@ from massspring import (
     simulate,
     step_limit,
 )
-from massspring.kernels.contact import find_contacts
-from massspring.kernels.prediction import predict
-from massspring.methods.base import State, begin_frame
+from massspring.kernels.contact.active_set import find_contacts
+from massspring.kernels.step.predict import predict
+from massspring.methods.method import State, begin_frame
 
 MOMENTUM_TOL = 1e-12  # relative: round-off of some thousand additions per step, over 40 steps
 

@@ -5,9 +5,9 @@ import pytest
 from scipy.linalg import eigh, null_space
 
 from massspring import Clock, ImplicitVolume, MassSpringError, Setup, step_limit
-from massspring.modes import natural_frequencies, volume_gradients
-from massspring.stability import largest_frequency
-from massspring.stiffness import stiffness_at_rest
+from massspring.analysis.modes import natural_frequencies, volume_gradients
+from massspring.analysis.stability import largest_frequency
+from massspring.analysis.stiffness import stiffness_at_rest
 
 
 def test_they_are_those_of_a_dense_solver(kept_body):

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import massspring.kernels.motion as motion_kernels
-import massspring.methods.rows as rows_module
+import massspring.kernels.step.advance as motion_kernels
+import massspring.layout.jacobian_pattern as rows_module
 from massspring import (
     Attachment,
     Body,
@@ -15,12 +15,12 @@ from massspring import (
     Volumes,
     simulate,
 )
-from massspring.kernels.layout import Accuracy
-from massspring.kernels.multipliers import solve_iteratively
-from massspring.kernels.rows import diagonal_into, rows_into, transposed_rows_times_into
-from massspring.methods.base import new_tally, start
+from massspring.kernels.arrays.layout import Accuracy
+from massspring.kernels.constraint.jacobian import diagonal_into, rows_into, transposed_rows_times_into
+from massspring.kernels.constraint.schur import solve_iteratively
+from massspring.layout.jacobian_pattern import volume_rows
 from massspring.methods.implicit_volume import set_right_side, solve_multipliers
-from massspring.methods.rows import volume_rows
+from massspring.methods.method import new_tally, start
 from tests.massspring.test_kernels import ROUND_OFF, directional, moved
 from tests.massspring.test_methods import clock_for, squeeze
 from tests.massspring.touched import list_touched, seat

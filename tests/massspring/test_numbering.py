@@ -16,10 +16,10 @@ from massspring import (
     surface_body,
     tetrahedral_body,
 )
-from massspring.kernels.tiles import LANES
-from massspring.membranes import membrane_body
-from massspring.methods.base import start
-from massspring.numbering import MANY, Numbered, numbered, renumbered
+from massspring.body.membranes import membrane_body
+from massspring.kernels.fused.chunk import LANES
+from massspring.methods.method import start
+from massspring.run.renumber import MANY, Numbered, numbered, renumbered
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.test_methods import clock_for, squeeze, thrown
 

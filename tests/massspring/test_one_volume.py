@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-import massspring.kernels.motion as motion_kernels
+import massspring.kernels.step.advance as motion_kernels
 from massspring import (
     Attachment,
     Free,
@@ -12,8 +12,8 @@ from massspring import (
     Sphere,
     simulate,
 )
-from massspring.kernels.volume import enclosed_volume, volume_gradient_into
-from massspring.methods.base import start
+from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
+from massspring.methods.method import start
 from tests.massspring.test_methods import clock_for, squeeze, thrown
 from tests.massspring.touched import seat
 

@@ -8,10 +8,10 @@ from numba.core.runtime import _nrt_python as _nrt
 from numba.core.runtime import rtsys
 
 from massspring import Attachment, Free, ImplicitVolume, MassSpringError, Setup, simulate
-from massspring.kernels.distances import round_gap
-from massspring.kernels.slices import gather_and_predict
-from massspring.methods.base import start
-from massspring.precision import KEPT_DOUBLE, in_precision
+from massspring.kernels.contact.node_contact import round_gap
+from massspring.kernels.fused.sweep import gather_and_predict
+from massspring.methods.method import start
+from massspring.run.precision import KEPT_DOUBLE, in_precision
 from tests.massspring.test_methods import clock_for, squeeze
 
 SINGLE = float(np.finfo(np.float32).eps)

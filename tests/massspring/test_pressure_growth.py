@@ -14,7 +14,7 @@ from massspring import (
     Shake,
     step_limit,
 )
-from massspring.stiffness import spring_stiffness, volume_hessian
+from massspring.analysis.stiffness import spring_stiffness, volume_hessian
 from tests.massspring.test_cubic import gradient
 
 CALM_FRAMES = 120

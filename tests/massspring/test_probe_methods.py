@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from massspring import METHODS, Clock, ImplicitVolume, MassSpringError, Probe, Setup, simulate
-from massspring.kernels.probe_layout import COMPARED, IN_CONTACT
+from massspring.kernels.probe.arrays import COMPARED, IN_CONTACT
 from tests.massspring.conftest import SOFT
 from tests.massspring.test_methods import clock_for, thrown
 from tests.massspring.test_probe import BALL, R, pressed

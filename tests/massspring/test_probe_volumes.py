@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from massspring import Attachment, ImplicitVolume, Path, Probe, Setup, Volumes, simulate
-from massspring.kernels.probe_layout import CARRYING, IN_CONTACT, LEFT_BEHIND
-from massspring.simulation import pierced
+from massspring.kernels.probe.arrays import CARRYING, IN_CONTACT, LEFT_BEHIND
+from massspring.run.simulation import pierced
 from tests.massspring.test_methods import clock_for
 
 EDGE = 0.02

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from massspring import Attachment, Clock, ImplicitVolume, Path, Plane, Setup, surface_body
-from massspring.kernels.rubbing import release_wedged
-from massspring.stability import step_limit
+from massspring.analysis.stability import step_limit
+from massspring.kernels.contact.friction import release_wedged
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.test_rubbing import wedge_of
 from tests.massspring.touched import list_touched

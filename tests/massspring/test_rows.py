@@ -5,13 +5,13 @@ import pytest
 from scipy.sparse import csr_array
 
 from massspring import Body, Volumes
-from massspring.kernels.layout import VolumeRows
-from massspring.kernels.multipliers import apply_schur
-from massspring.kernels.rows import diagonal_into, rows_into
-from massspring.methods.base import start
-from massspring.methods.quadrangles import quadrangles
-from massspring.methods.rows import volume_rows
-from massspring.precision import in_precision
+from massspring.kernels.arrays.layout import VolumeRows
+from massspring.kernels.constraint.jacobian import diagonal_into, rows_into
+from massspring.kernels.constraint.schur import apply_schur
+from massspring.layout.jacobian_pattern import volume_rows
+from massspring.layout.ring_areas import quadrangles
+from massspring.methods.method import start
+from massspring.run.precision import in_precision
 from tests.massspring.conftest import icosphere
 from tests.massspring.test_kernels import moved
 

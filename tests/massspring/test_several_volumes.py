@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import massspring.methods.rows as rows_module
+import massspring.layout.jacobian_pattern as rows_module
 from massspring import (
     Attachment,
     ImplicitVolume,
@@ -14,7 +14,7 @@ from massspring import (
     Volumes,
     simulate,
 )
-from massspring.kernels.deformation import tetrahedron_volumes_into
+from massspring.kernels.forces.tetrahedra import tetrahedron_volumes_into
 from tests.massspring.test_methods import clock_for, squeeze
 
 

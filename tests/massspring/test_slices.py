@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from massspring import Attachment, Body, Clock, Free, ImplicitVolume, Setup, Volumes, tetrahedral_body
-from massspring.kernels.membrane import add_membrane_forces
-from massspring.kernels.motion import multiplier_of_sums, prescribe, volume_multiplier
-from massspring.kernels.slices import gather_and_predict
-from massspring.kernels.springs import spring_forces_into
-from massspring.kernels.tiles import LANES
-from massspring.kernels.volume import enclosed_volume, volume_gradient_into
-from massspring.methods.base import start
-from massspring.neighbours import LONGEST, rings, slices_of
-from massspring.springs import Springs
+from massspring.body.springs import Springs
+from massspring.kernels.forces.membrane import add_membrane_forces
+from massspring.kernels.forces.springs import spring_forces_into
+from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
+from massspring.kernels.fused.chunk import LANES
+from massspring.kernels.fused.sweep import gather_and_predict
+from massspring.kernels.step.advance import multiplier_of_sums, prescribe, volume_multiplier
+from massspring.layout.sell_chunks import LONGEST, rings, slices_of
+from massspring.methods.method import start
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.test_kernels import DIFFERENCE, STEP, moved
 from tests.massspring.touched import list_touched

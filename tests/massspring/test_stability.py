@@ -14,8 +14,8 @@ from massspring import (
     simulate,
     step_limit,
 )
-from massspring.springs import Springs
-from massspring.stability import largest_frequency, scaled_stiffness
+from massspring.analysis.stability import largest_frequency, scaled_stiffness
+from massspring.body.springs import Springs
 from tests.massspring.test_kernels import forces
 from tests.massspring.test_methods import CONTESTANTS, thrown
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from massspring import Free, ImplicitVolume, Plane, Setup, Shake, simulate
-from massspring.kernels.deformation import tetrahedron_volumes_into
-from massspring.kernels.volume import enclosed_volume
+from massspring.kernels.forces.tetrahedra import tetrahedron_volumes_into
+from massspring.kernels.forces.volume import enclosed_volume
 from tests.massspring.test_methods import clock_for, momentum, thrown
 
 

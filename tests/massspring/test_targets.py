@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from massspring import Clock, ImplicitVolume, Ramp, Setup, Volumes, simulate, step_limit
-from massspring.kernels.springs import spring_energy
-from massspring.kernels.volume import volume_gradient_into
-from massspring.targets import fastest_filling, followed
+from massspring.kernels.forces.springs import spring_energy
+from massspring.kernels.forces.volume import volume_gradient_into
+from massspring.world.targets import fastest_filling, followed
 
 JUMP = 1.3
 

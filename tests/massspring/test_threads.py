@@ -19,10 +19,10 @@ from massspring import (
     surface_body,
 )
 from massspring import Path as Motion
-from massspring.crew import crew, shared
-from massspring.kernels.blocks import BLOCK
-from massspring.kernels.team import JOB, REST, SPRINGS, call, join, team_of
-from massspring.stability import step_limit
+from massspring.analysis.stability import step_limit
+from massspring.kernels.jit.blocks import BLOCK
+from massspring.kernels.jit.thread_team import JOB, REST, SPRINGS, call, join, team_of
+from massspring.layout.threads import crew, shared
 from tests.massspring.conftest import SOFT, icosphere
 
 RADIUS = 0.05
@@ -37,7 +37,7 @@ def ball():
 @pytest.fixture(autouse=True)
 def many_cores(monkeypatch):
     """The number of cores decides what pays, not what is right: threads on one core take turns."""
-    monkeypatch.setattr("massspring.setup_checks.cores", lambda: 4)
+    monkeypatch.setattr("massspring.run.checks.cores", lambda: 4)
 
 
 def slid(body, method, **options) -> Setup:

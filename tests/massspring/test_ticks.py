@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from massspring import METHODS, ImplicitSprings, Setup, Sphere
-from massspring.kernels.ticks import (
+from massspring.kernels.jit.stage_clock import (
     HELD,
     INTEGRATION,
     OUTSIDE,
@@ -94,7 +94,7 @@ def test_stages_have_names_and_outside_is_none_of_them():
 @pytest.mark.slow
 def test_marks_run_without_the_compiler():
     program = """
-from massspring.kernels.ticks import mark, new_ticks, SPRINGS
+from massspring.kernels.jit.stage_clock import mark, new_ticks, SPRINGS
 ticks = new_ticks()
 mark(None, SPRINGS)
 mark(ticks, SPRINGS)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from massspring import Clock, ImplicitSprings, Path, Plane, Setup
-from massspring.methods.touching import SLIDES, STICKS, STILL, Contact, Touching
+from massspring.methods.implicit.contact import SLIDES, STICKS, STILL, Contact, Touching
 
 DT, MU = 5e-3, 0.5
 BELOW = 1e-3

@@ -24,7 +24,7 @@ from massspring import (
     surface_body,
     tetrahedral_body,
 )
-from massspring.kernels.probe_layout import CARRIED
+from massspring.kernels.probe.arrays import CARRIED
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.test_methods import clock_for, squeeze
 

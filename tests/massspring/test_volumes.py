@@ -16,7 +16,7 @@ from massspring import (
     Volumes,
     tetrahedral_body,
 )
-from massspring.partition import cell_graph, partition
+from massspring.body.partition import cell_graph, partition
 from tests.massspring.conftest import SOFT, block, hollow_block
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from massspring.kernels.layout import Motion
+from massspring.kernels.arrays.layout import Motion
 
 
 def list_touched(motion: Motion) -> None:

@@ -6,14 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 
 from massspring import Free, ImplicitVolume
-from studies.case import BodyRecipe, Case
-from studies.metrics import Run
-from studies.records import new_record
+from studies.metrics.metrics import Run
+from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.scenes.liver_press import LIVER_PRESS
-from studies.store import Field, Status
-from studies.timing import FrameTiming
+from studies.store.new_record import new_record
+from studies.store.record import Field, Status
+from studies.timing.protocol import FrameTiming
 
 FRAMES = 40
 """So many that every scene has a frame at each of its checkpoints."""

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from massspring import Free
-from studies.floors import Uncertainty
 from studies.plots import accuracy, force_path, uncertainty, volume_history
 from studies.plots import work_precision as work
-from studies.plots.page import DOUBT_MARK
-from studies.plots.style import BLACK, BLUE, ORANGE, VERMILLION
+from studies.plots.style.page import DOUBT_MARK
+from studies.plots.style.style import BLACK, BLUE, ORANGE, VERMILLION
+from studies.reference.uncertainty import Uncertainty
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.store import Status
+from studies.store.record import Status
 from tests.plots.made_up import FLOOR, FRAMES, run, timed_grid
 from tests.plots.reading import lines, points, words
 

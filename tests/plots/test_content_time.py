@@ -6,8 +6,8 @@ from matplotlib.colors import to_hex
 
 from massspring import Free, ImplicitVolume
 from studies.plots import cost_ratio, frame_time, squeeze, stability
-from studies.plots.style import BLACK, BLUE, GREY, STATUS_LOOKS, VERMILLION
-from studies.store import Status
+from studies.plots.style.style import BLACK, BLUE, GREY, STATUS_LOOKS, VERMILLION
+from studies.store.record import Status
 from tests.plots.made_up import FRAMES, frame_ns, run, stability_grid
 from tests.plots.reading import lines, points, words
 

@@ -9,8 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 from massspring import Free
+from studies.base.errors import StudyError
 from studies.catalog import STUDIES
-from studies.errors import StudyError
 from studies.plots import (
     accuracy,
     cost_ratio,
@@ -24,8 +24,8 @@ from studies.plots import (
     volume_history,
 )
 from studies.plots import work_precision as work
-from studies.plots.style import DPI, SMALL, styled
-from studies.store import Status
+from studies.plots.style.style import DPI, SMALL, styled
+from studies.store.record import Status
 from tests.plots.made_up import grid, laws_grid, run, stability_grid, timed_grid, without_reference
 
 GOOD = {

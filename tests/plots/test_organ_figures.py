@@ -5,9 +5,9 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from studies.geometry import HalfSpace, OrganMesh, organ
-from studies.geometry.regions import region_to_dict
-from studies.plots import organ_springs, organs
-from studies.plots.cut import cut_face, cut_surface
+from studies.geometry.shape.regions import region_to_dict
+from studies.plots.figures import organ_springs, organs
+from studies.plots.style.cut import cut_face, cut_surface
 from tests.plots.made_up import CELLS, POINTS, RADIUS, TRIANGLES, VOLUME
 
 CAP = {"top_cap": region_to_dict(HalfSpace((0.0, 0.0, 0.02), (0.0, 0.0, -1.0)))}

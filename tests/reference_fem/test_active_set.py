@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from reference_fem import Cavity, Held, NeoHookean, NewtonSettings, Problem, RigidPlane, RigidSphere, active_set, newton
+from reference_fem import Cavity, Held, NeoHookean, NewtonSettings, Problem, RigidPlane, RigidSphere
 from reference_fem.bench import contact_path
-from reference_fem.equilibrium import equilibrium_path
-from reference_fem.state import Loads
-from reference_fem.surface import point_positions
-from reference_fem.system import System
-from reference_fem.tangent import Tangent
+from reference_fem.elements.surface import point_positions
+from reference_fem.statics import active_set, newton
+from reference_fem.statics.equilibrium import equilibrium_path
+from reference_fem.statics.tangent import Tangent
+from reference_fem.system.saddle_point import System
+from reference_fem.system.state import Loads
 from tests.reference_fem.bodies import block
 from tests.reference_fem.test_cavity import hollow_cube, in_the_middle
 

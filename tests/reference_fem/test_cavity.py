@@ -7,9 +7,9 @@ import pytest
 from skfem import MeshTet
 
 from reference_fem import Cavity, Held, NeoHookean, NewtonSettings, Problem, ReferenceProblem, equilibrium_path, exact
-from reference_fem.state import Loads
-from reference_fem.system import System
-from reference_fem.tangent import Tangent
+from reference_fem.statics.tangent import Tangent
+from reference_fem.system.saddle_point import System
+from reference_fem.system.state import Loads
 from tests.reference_fem.bodies import shell_octant, symmetry
 
 TISSUE = NeoHookean(1.0, 5000.0)

@@ -15,7 +15,7 @@ from reference_fem import (
     natural_frequencies,
     nodes,
 )
-from reference_fem.inertia import Motion, MovingSystem, TimeStep, scheme
+from reference_fem.dynamics.inertia import Motion, MovingSystem, TimeStep, scheme
 from tests.reference_fem.bodies import ball_octant, block, symmetry, whole_ball
 
 MU, RHO = 1800.0, 1060.0

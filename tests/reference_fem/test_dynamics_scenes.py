@@ -20,8 +20,8 @@ from reference_fem import (
     natural_frequencies,
     nodes,
 )
-from reference_fem.contact import misplacement, penetration, touch
-from reference_fem.inertia import MovingSystem
+from reference_fem.contact.augmented import misplacement, penetration, touch
+from reference_fem.dynamics.inertia import MovingSystem
 from tests.reference_fem.bodies import ball_octant, block, shell_octant, symmetry, whole_ball
 
 MATERIAL = NeoHookean(1.0, 5000.0)

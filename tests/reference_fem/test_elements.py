@@ -15,11 +15,11 @@ from reference_fem import (
     nodes,
 )
 from reference_fem import equilibrium_path as solve
-from reference_fem.assembly import deformation
-from reference_fem.element_table import DEFAULT
-from reference_fem.elements import build_elements
+from reference_fem.elements.shapes import build_elements
+from reference_fem.elements.table import DEFAULT
 from reference_fem.oracles import cylinder
-from reference_fem.system import System
+from reference_fem.system.assembly import deformation
+from reference_fem.system.saddle_point import System
 from tests.reference_fem.bodies import block
 
 SOFT = NeoHookean(1.0, 1000.0)

@@ -12,12 +12,12 @@ from reference_fem import (
     Problem,
     RigidPlane,
     RigidSphere,
-    assembly,
-    contact,
     curve,
 )
-from reference_fem.state import Loads
-from reference_fem.system import System
+from reference_fem.contact import augmented as contact
+from reference_fem.system import assembly
+from reference_fem.system.saddle_point import System
+from reference_fem.system.state import Loads
 from tests.reference_fem.bodies import block
 
 STEP = 1e-6

@@ -16,8 +16,8 @@ from reference_fem import (
     ReferenceProblem,
     SlowSolverWarning,
     equilibrium_path,
-    linear,
 )
+from reference_fem.system import linear
 from tests.reference_fem.bodies import block, symmetry
 
 BACKENDS = ["scipy"] + (["pardiso"] if importlib.util.find_spec("pypardiso") else [])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference_fem import MooneyRivlin, NeoHookean, ReferenceProblem
-from reference_fem.material import response_into
+from reference_fem.model.material import response_into
 
 LAWS = [NeoHookean(2.0, 50.0), MooneyRivlin(0.4, 0.6, 50.0), MooneyRivlin(0.0, 1.0, 2e5)]
 STEP, AGREES = 1e-5, 1e-8

@@ -5,8 +5,8 @@ import pytest
 from skfem import ElementTetP2
 
 from reference_fem import Evaluator, ReferenceProblem, nodes, surface_triangles
-from reference_fem.elements import basis_table, build_elements, build_facets, element_nodes, facet_nodes
-from reference_fem.pattern import build_pattern
+from reference_fem.elements.shapes import basis_table, build_elements, build_facets, element_nodes, facet_nodes
+from reference_fem.system.pattern import build_pattern
 from tests.reference_fem.bodies import ball_octant, block, shell_octant
 
 

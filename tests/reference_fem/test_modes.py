@@ -5,7 +5,7 @@ import pytest
 from skfem import Basis, BilinearForm, ElementTetP2
 
 from reference_fem import Held, NeoHookean, NewtonSettings, Problem, ReferenceProblem, exact, natural_frequencies, nodes
-from reference_fem.inertia import MovingSystem
+from reference_fem.dynamics.inertia import MovingSystem
 from tests.reference_fem.bodies import ball_octant, block, symmetry, whole_ball
 
 MU, RHO = 1800.0, 1060.0

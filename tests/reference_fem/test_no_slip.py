@@ -12,13 +12,13 @@ from reference_fem import (
     RigidCapsule,
     RigidPlane,
     RigidSphere,
-    contact,
     equilibrium_path,
 )
-from reference_fem.obstacles import gap_into, gaps
-from reference_fem.state import Loads
-from reference_fem.surface import point_positions
-from reference_fem.system import System
+from reference_fem.contact import augmented as contact
+from reference_fem.elements.surface import point_positions
+from reference_fem.model.obstacles import gap_into, gaps
+from reference_fem.system.saddle_point import System
+from reference_fem.system.state import Loads
 from tests.reference_fem.bodies import ball_octant, block, symmetry
 
 TISSUE = NeoHookean(1.0, 1000.0)

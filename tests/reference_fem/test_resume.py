@@ -14,7 +14,7 @@ from reference_fem import (
     RigidSphere,
     equilibrium_path,
 )
-from reference_fem.state import State
+from reference_fem.system.state import State
 from tests.reference_fem.bodies import block
 from tests.reference_fem.test_cavity import hollow_cube, in_the_middle
 

@@ -6,10 +6,10 @@ import warnings
 
 import pytest
 
-from studies import cli
-from studies.reference import load_reference
-from studies.reference_solve import pieces, solve
-from studies.sweep import run_studies
+from studies.cli import app as cli
+from studies.reference.load import load_reference
+from studies.reference.solve import pieces, solve
+from studies.sweep.run_studies import run_studies
 from tests.studies.octant import SCENE
 from tests.studies.tiny import TINY, Silent, tiny_study
 

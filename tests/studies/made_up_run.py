@@ -5,12 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from studies.case import BodyRecipe, Case
-from studies.metrics import Run
-from studies.records import new_record
+from studies.metrics.metrics import Run
+from studies.metrics.table import metric
+from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.store import Field, Status
-from studies.table import metric
+from studies.store.new_record import new_record
+from studies.store.record import Field, Status
 from tests.studies.tiny import cube
 
 EDGE = 0.1

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from massspring import MassSpringError, Path
-from studies.adapt import attachments_for, body_for, mesh_for, patch_nodes, prepare
-from studies.case import BodyRecipe
-from studies.errors import StudyError
+from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
+from studies.runs.case import BodyRecipe
+from studies.runs.prepare import attachments_for, body_for, mesh_for, patch_nodes, prepare
 from studies.scenes import Held
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from tests.geometry.boxes import box, split

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-import studies.atomic
-from studies.atomic import sweep_parts, write_whole
-from studies.errors import StudyError
+import studies.base.atomic
+from studies.base.atomic import sweep_parts, write_whole
+from studies.base.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
 
@@ -29,7 +29,7 @@ def test_a_full_disk_keeps_what_was_stored(tmp_path, monkeypatch, call):
     def full(*args):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(studies.atomic.os, call, full)
+    monkeypatch.setattr(studies.base.atomic.os, call, full)
     with pytest.raises(StudyError, match=r"a\.h5 \(0\.0 MB\) was not written, the disk is full: free some space"):
         write_whole(path, b"new")
     assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == [("a.h5", b"old")]
@@ -53,7 +53,7 @@ def test_a_folder_that_cannot_be_written(tmp_path):
 WRITER = """
 import sys
 from pathlib import Path
-from studies.atomic import write_whole
+from studies.base.atomic import write_whole
 path, n = Path(sys.argv[1]), 0
 while True:
     n += 1

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from massspring import Clock, Free, ImplicitVolume, Path, simulate
-from studies.bench_massspring import squeezed_setup, without_ns
+from studies.bench.solver import squeezed_setup, without_ns
 from studies.scenes.ball_squeeze import RADIUS
 
 seen: dict[str, list[np.ndarray]] = {}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from massspring import Clock, Free, MassSpringError, Setup, simulate
-from studies.bench_line import Line
-from studies.bench_slide import counted_ns, steps_of_updates, stepwise, updates_ns, waited_ns
+from studies.bench.line import Line
+from studies.bench.slide import counted_ns, steps_of_updates, stepwise, updates_ns, waited_ns
 from tests.massspring.test_probe import BALL, pressed
 
 DT = 1.5e-3

@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 
 from massspring import METHODS, Element, Free, ImplicitVolume, Xpbd
-from studies.case import BodyRecipe, Case, case_from_json, case_to_dict
+from studies.base.errors import StudyError
 from studies.catalog import STUDIES
-from studies.errors import StudyError
+from studies.runs.case import BodyRecipe, Case, case_from_json, case_to_dict
 from studies.scenes import SCENES
 from tests.studies.tiny import tiny_case
 

@@ -2,11 +2,11 @@
 
 import pytest
 
-from studies.adapt import prepare
 from studies.catalog import STUDIES
-from studies.catalog.base import SMOKE_FRAMES, SMOKE_NODES, SMOKE_NODES_HOLLOW
-from studies.paths import readable
-from studies.table import metric
+from studies.catalog.study import SMOKE_FRAMES, SMOKE_NODES, SMOKE_NODES_HOLLOW
+from studies.metrics.table import metric
+from studies.runs.prepare import prepare
+from studies.store.paths import readable
 from tests.studies.tiny import tiny_case, tiny_study
 
 TIMES = {"step_time", "frame_time", "frame_time_p99", "real_time"}

@@ -10,15 +10,15 @@ import pytest
 from typer.testing import CliRunner
 
 from massspring import METHODS
-from studies import cli
 from studies.catalog import STUDIES
+from studies.cli import app as cli
 from studies.geometry.organs import SHAPES
-from studies.metrics import METRICS
-from studies.paths import index_path
-from studies.reference_solve import pieces
-from studies.run import case_path
+from studies.metrics.metrics import METRICS
+from studies.reference.solve import pieces
+from studies.runs.run import case_path
 from studies.scenes import SCENES
-from studies.store import Field, read_record, write_record
+from studies.store.paths import index_path
+from studies.store.record import Field, read_record, write_record
 from tests.studies.tiny import content, diverging_case, tiny_case
 
 

@@ -10,10 +10,10 @@ import h5py
 import numpy as np
 import pytest
 
-from studies import cli
-from studies.paths import record_files
-from studies.run import case_path
-from studies.store import Status, read_record, write_record
+from studies.cli import app as cli
+from studies.runs.run import case_path
+from studies.store.paths import record_files
+from studies.store.record import Status, read_record, write_record
 from tests.studies.tiny import TINY, content, cube, tiny_case, write_obj
 
 REPOSITORY = Path(__file__).parents[2]
@@ -24,7 +24,7 @@ BROKEN = {
     "import": ("\nimport massspringg\n", "ModuleNotFoundError in line 2: No module named 'massspringg'"),
     "name": ("def f():\n    return nothing\nf()\n", "NameError in line 2: name 'nothing' is not defined"),
     "misspelt setting": (
-        "from studies.case import Case\nfrom studies.scenes import SCENES\nSTUDY = Case(SCENES[0], dtt=1)\n",
+        "from studies.runs.case import Case\nfrom studies.scenes import SCENES\nSTUDY = Case(SCENES[0], dtt=1)\n",
         "TypeError in line 3",
     ),
     "dt zero": (
@@ -165,7 +165,7 @@ def test_bad_meshes_fail_and_the_study_goes_on(organbench, tmp_path):
     file = tmp_path / "meshes.py"
     names = [str(tmp_path / f"{name}.obj") for name in ("good", "open", "large", "missing")]
     file.write_text(
-        "from dataclasses import replace\nfrom studies.case import BodyRecipe\nfrom tests.studies.tiny import *\n"
+        "from dataclasses import replace\nfrom studies.runs.case import BodyRecipe\nfrom tests.studies.tiny import *\n"
         f"NAMES = {names!r}\n"
         "SCENES = [replace(file_scene(name), name=f'file_{k}') for k, name in enumerate(NAMES)]\n"
         "STUDY = tiny_study(cases=tuple(tiny_case(scene=s, body=BodyRecipe('surface')) for s in SCENES))\n"

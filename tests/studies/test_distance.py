@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import KDTree
 
-from studies.distance import distance_to_surface, hausdorff
 from studies.geometry import ball
+from studies.geometry.surface.distance import distance_to_surface, hausdorff
 from tests.studies.tiny import cube
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]])

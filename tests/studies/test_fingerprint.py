@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from studies.errors import StudyError
-from studies.fingerprint import source_fingerprint
+from studies.base.errors import StudyError
+from studies.store.fingerprint import source_fingerprint
 
 
 def package(root: Path, text: str = "x = 1\n", name: str = "a.py") -> Path:
@@ -85,12 +85,12 @@ def test_content_cannot_move_between_files_unseen(tmp_path):
 
 
 def test_packages_and_modules_are_found_by_name():
-    import studies.errors
-    import studies.suggest
+    import studies.base.errors
+    import studies.base.lookup
 
-    assert source_fingerprint("studies.errors") == source_fingerprint(Path(studies.errors.__file__))
-    assert source_fingerprint("studies") == source_fingerprint(Path(studies.errors.__file__).parent)
-    assert source_fingerprint("studies.errors") != source_fingerprint("studies.errors", "studies.suggest")
+    assert source_fingerprint("studies.base.errors") == source_fingerprint(Path(studies.base.errors.__file__))
+    assert source_fingerprint("studies") == source_fingerprint(Path(studies.base.errors.__file__).parent)
+    assert source_fingerprint("studies.base.errors") != source_fingerprint("studies.base.errors", "studies.base.lookup")
 
 
 @pytest.mark.parametrize("name", ["studies.nowhere", "no_such_package.inside", "sys"])

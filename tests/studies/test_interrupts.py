@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from studies import cli, interrupts
-from studies.errors import StudyError
-from studies.paths import record_files
-from studies.store import Status, peek
-from studies.sweep import perform, run_studies, standings
+from studies.base import interrupts
+from studies.base.errors import StudyError
+from studies.cli import app as cli
+from studies.store.paths import record_files
+from studies.store.record import Status, peek
+from studies.sweep.run_studies import perform, run_studies, standings
 from tests.studies.tiny import Silent, tiny_case, tiny_study
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and process groups")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from massspring import Capsule, Free, ImplicitVolume, Path, Plane, Sphere
-from studies.case import BodyRecipe, Case
-from studies.kept_volume import PROMISED, kept_volumes, promised, worst_volume
-from studies.run import case_path, measure
+from studies.report.kept_volume import PROMISED, kept_volumes, promised, worst_volume
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.run import case_path, measure
 from studies.scenes import BALL_CLAMPED, SCENES
-from studies.store import Status, read_record, write_record
+from studies.store.record import Status, read_record, write_record
 from tests.studies.tiny import NODES, SQUEEZE, diverging_case, tiny_case, tiny_study
 
 FRAMES = 40

@@ -7,13 +7,13 @@ import pytest
 
 from massspring import Volumes
 from reference_fem import exact
-from studies.adapt import body_for, mesh_for, prepare
-from studies.case import BodyRecipe, Case
-from studies.errors import StudyError
-from studies.run import measure
+from studies.base.errors import StudyError
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.prepare import body_for, mesh_for, prepare
+from studies.runs.run import measure
 from studies.scenes import BALL_SQUEEZE, BLADDER_FILL
 from studies.scenes.ball_squeeze import DEPTH, PRESS_END, RADIUS
-from studies.store import Status
+from studies.store.record import Status
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import socket
 
 import pytest
 
-import studies.machine
-from studies.errors import StudyError
-from studies.machine import machine_id, this_machine, write_machine
+import studies.store.machine
+from studies.base.errors import StudyError
+from studies.store.machine import machine_id, this_machine, write_machine
 
 
 @pytest.fixture(autouse=True)
@@ -27,10 +27,10 @@ def test_the_id_is_short_and_stays():
 
 def test_other_hardware_has_another_id_and_other_packages_have_not(monkeypatch):
     first = machine_id()
-    monkeypatch.setattr(studies.machine, "_version", lambda name: "0.0.0")
+    monkeypatch.setattr(studies.store.machine, "_version", lambda name: "0.0.0")
     this_machine.cache_clear()
     assert machine_id() == first
-    monkeypatch.setattr(studies.machine, "_cpu", lambda: ("Abacus", None))
+    monkeypatch.setattr(studies.store.machine, "_cpu", lambda: ("Abacus", None))
     this_machine.cache_clear()
     assert machine_id() != first
 
@@ -64,7 +64,7 @@ def test_what_is_written_does_not_change_between_runs(tmp_path):
 
 def test_a_system_that_tells_nothing(monkeypatch, tmp_path):
     for name in ("CPUINFO", "CPUFREQ"):
-        monkeypatch.setattr(studies.machine, name, tmp_path / "absent")
+        monkeypatch.setattr(studies.store.machine, name, tmp_path / "absent")
     machine = this_machine()
     assert machine.virtual is None
     assert machine.clock["max_mhz"] is None
@@ -77,8 +77,8 @@ def test_the_facts_of_the_first_processor(monkeypatch, tmp_path):
     frequency.mkdir()
     (frequency / "cpuinfo_max_freq").write_text("3700000\n")
     (frequency / "scaling_governor").write_text("performance\n")
-    monkeypatch.setattr(studies.machine, "CPUINFO", info)
-    monkeypatch.setattr(studies.machine, "CPUFREQ", frequency)
+    monkeypatch.setattr(studies.store.machine, "CPUINFO", info)
+    monkeypatch.setattr(studies.store.machine, "CPUFREQ", frequency)
     machine = this_machine()
     assert machine.cpu == "Fast CPU @ 3 GHz (family 26, model 2)"
     assert machine.virtual is True

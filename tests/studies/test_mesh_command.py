@@ -7,9 +7,9 @@ import meshio
 import numpy as np
 import pytest
 
-from studies.commands import mesh as commands
+from studies.cli import mesh as commands
 from studies.geometry import read_mesh
-from studies.geometry.mesh import signed_volume
+from studies.geometry.mesh.organ_mesh import signed_volume
 from tests.geometry.boxes import box, split, together
 from tests.geometry.real import real_surface
 

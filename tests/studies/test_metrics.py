@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from studies.catalog import STUDIES
-from studies.metrics import METRICS, Metric
+from studies.metrics.metrics import METRICS, Metric
+from studies.metrics.table import DOUBTFUL, metric, study_table
 from studies.scenes import SCENES
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.store import Status
-from studies.table import DOUBTFUL, metric, study_table
-from studies.timing import FrameTiming
+from studies.store.record import Status
+from studies.timing.protocol import FrameTiming
 from tests.studies.made_up_run import SCENE, of, run
 
 

@@ -6,24 +6,25 @@ import numpy as np
 import pytest
 
 from massspring import Capsule, Path, Plane, Probe, Sphere
-from reference_fem import RigidCapsule, RigidPlane, RigidSphere, inertia
+from reference_fem import RigidCapsule, RigidPlane, RigidSphere
+from reference_fem.dynamics import inertia
 from reference_fem.uncertainty import combined
-from studies.adapt import prepare
-from studies.adapt_reference import rigid
-from studies.case import BodyRecipe, Case
-from studies.errors import StudyError
-from studies.floors import Places, View
-from studies.measured import Run
-from studies.metrics import METRICS, frequency_error
-from studies.reference import load_reference
-from studies.reference_solve import Piece, pieces, solve
-from studies.ringing import fitted_frequency
-from studies.run import measure
+from studies.base.errors import StudyError
+from studies.metrics.metrics import METRICS, frequency_error
+from studies.metrics.run import Run
+from studies.reference.load import load_reference
+from studies.reference.problem import rigid
+from studies.reference.ringing import fitted_frequency
+from studies.reference.solve import Piece, pieces, solve
+from studies.reference.uncertainty import Places, View
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.prepare import prepare
+from studies.runs.run import measure
+from studies.scene.scene import Start, allowed
 from studies.scenes import Lumen, ReferencePlan
 from studies.scenes.ball_ringing import BALL_RINGING, RADIUS
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.base import Start, allowed
-from studies.store import Status
+from studies.store.record import Status
 
 LAMB = 2.6656
 """Angular frequency over √(mu/rho)/R of the spheroidal mode n = 2 of an incompressible ball (Lamb 1882)."""

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.adapt_reference import whole_forces
-from studies.distance import hausdorff
-from studies.errors import StudyError
-from studies.floors import QUANTITIES
-from studies.geometry.mesh import signed_volume
-from studies.reference import load_reference
-from studies.reference_solve import pieces, solve
+from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import signed_volume
+from studies.geometry.surface.distance import hausdorff
+from studies.reference.load import load_reference
+from studies.reference.problem import whole_forces
+from studies.reference.solve import pieces, solve
+from studies.reference.uncertainty import QUANTITIES
 from studies.scenes import ReferencePlan
 from tests.studies.octant import SCENE
 

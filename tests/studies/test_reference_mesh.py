@@ -7,10 +7,10 @@ import pytest
 from skfem import MeshTet, MeshTet2
 
 from reference_fem import NewtonSettings, facet_nodes, nodes
-from reference_fem.problem import find_held
-from reference_fem.system import System
-from studies.adapt_reference import reference_problem
-from studies.reference_mesh import coarse_body, reference_mesh, rim_sides
+from reference_fem.model.problem import find_held
+from reference_fem.system.saddle_point import System
+from studies.reference.mesh import coarse_body, reference_mesh, rim_sides
+from studies.reference.problem import reference_problem
 from studies.scenes.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scenes.liver_probe import LIVER_PROBE
 from tests.studies.tiny import cube

@@ -8,16 +8,16 @@ import pandas as pd
 import pytest
 
 from reference_fem import Checkpoint, ReferenceProblem
-from studies import checkpoints
-from studies import reference_solve as module
-from studies.errors import StudyError
-from studies.reference import load_reference
-from studies.reference_report import reference_listing, refresh_uncertainty
-from studies.reference_solve import Piece, pieces, solve
+from studies.base.errors import StudyError
+from studies.reference import checkpoints
+from studies.reference import solve as module
+from studies.reference.load import load_reference
+from studies.reference.solve import Piece, pieces, solve
+from studies.report.references import reference_listing, refresh_uncertainty
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.store import Status, read_record
-from studies.sweep import load_runs
+from studies.store.record import Status, read_record
+from studies.sweep.run_studies import load_runs
 from tests.studies.octant import LEVELS, SCENE
 from tests.studies.tiny import tiny_case, tiny_study
 
@@ -155,7 +155,7 @@ def test_a_path_that_breaks_off_is_stored_and_not_believed(solved, tmp_path, mon
 
 
 def test_runs_are_loaded_without_a_reference_that_failed(solved, tmp_path, monkeypatch, mesh_cache):
-    from studies.run import run_case
+    from studies.runs.run import run_case
 
     root = shutil.copytree(solved, tmp_path / "results")
     study = tiny_study(cases=(tiny_case(scene=SCENE),))

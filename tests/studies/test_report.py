@@ -11,13 +11,23 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from studies.base.errors import StudyError
 from studies.catalog import Chart
-from studies.errors import StudyError
-from studies.machine import machine_id
-from studies.report import BEGIN, DOUBT_MARK, END, draw_charts, refresh, report, summary_of, write_readme, write_table
-from studies.run import case_path
-from studies.store import Status
-from studies.sweep import load_runs
+from studies.report.results import (
+    BEGIN,
+    DOUBT_MARK,
+    END,
+    draw_charts,
+    refresh,
+    report,
+    summary_of,
+    write_readme,
+    write_table,
+)
+from studies.runs.run import case_path
+from studies.store.machine import machine_id
+from studies.store.record import Status
+from studies.sweep.run_studies import load_runs
 from tests.studies.tiny import tiny_case, tiny_study
 
 REPOSITORY = Path(__file__).parents[2]

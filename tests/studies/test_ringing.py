@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from massspring import Body, Clock, ImplicitVolume, Setup, step_limit
-from massspring.modes import natural_frequencies
+from massspring.analysis.modes import natural_frequencies
 from reference_fem import exact
-from studies.adapt import body_for, mesh_for
-from studies.case import BodyRecipe
+from studies.runs.case import BodyRecipe
+from studies.runs.prepare import body_for, mesh_for
 from studies.scenes.ball_squeeze import BALL_SQUEEZE, RADIUS
 
 TISSUE = BALL_SQUEEZE.tissue

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from massspring import Element, Free, Xpbd, simulate
-from massspring.history import EXTRA
-from studies import run as module
-from studies.adapt import prepare
-from studies.case import BodyRecipe, Case
-from studies.errors import StudyError
-from studies.run import case_is_current, case_path, checkpoint_frames, judge, measure, replay, run_case
+from massspring.run.history import EXTRA
+from studies.base.errors import StudyError
+from studies.runs import run as module
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.prepare import prepare
+from studies.runs.run import case_is_current, case_path, checkpoint_frames, judge, measure, replay, run_case
 from studies.scenes.stress import STRESS_SCENES
-from studies.store import Field, Status, read_record, write_record
+from studies.store.record import Field, Status, read_record, write_record
 from tests.studies.tiny import FRAMES, NODES, diverging_case, tiny_case
 
 SERIES = ("volume", "pressure", "contact_force", "penetration", "min_j")

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from massspring import Capsule, Path, Sphere
-from studies.adapt import mesh_for
-from studies.case import BodyRecipe
 from studies.geometry import HalfSpace
-from studies.run import case_is_current, measure, run_case
+from studies.runs.case import BodyRecipe
+from studies.runs.prepare import mesh_for
+from studies.runs.run import case_is_current, measure, run_case
 from studies.scenes import Held
-from studies.store import Status, read_record
+from studies.store.record import Status, read_record
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
 
 

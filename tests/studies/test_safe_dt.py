@@ -5,13 +5,13 @@ from dataclasses import replace
 import pytest
 
 from massspring import METHODS, StepLimit, Xpbd
-from studies import safe_dt as module
-from studies.adapt import prepare
-from studies.case import BodyRecipe, Case
-from studies.errors import StudyError
-from studies.safe_dt import ABOVE, BELOW, SafeStep, safe_step
+from studies.base.errors import StudyError
+from studies.runs import safe_dt as module
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.prepare import prepare
+from studies.runs.safe_dt import ABOVE, BELOW, SafeStep, safe_step
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.store import Status
+from studies.store.record import Status
 from tests.studies.tiny import tiny_case
 
 SHORT = replace(BALL_SQUEEZE, reference=None, duration=1.0, checkpoints=(1.0,))

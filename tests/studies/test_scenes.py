@@ -8,13 +8,13 @@ import pytest
 
 from massspring import METHODS, Capsule, Path, Plane, Ramp, simulate
 from reference_fem import NewtonSettings
-from reference_fem.problem import find_held
-from reference_fem.system import System
-from studies.adapt import mesh_for, patch_nodes, prepare
-from studies.adapt_reference import anchor, kept_obstacles, reference_problem
-from studies.case import BodyRecipe, Case, scene_from_dict, scene_to_json
-from studies.errors import StudyError
-from studies.run import checkpoint_frames
+from reference_fem.model.problem import find_held
+from reference_fem.system.saddle_point import System
+from studies.base.errors import StudyError
+from studies.reference.problem import anchor, kept_obstacles, reference_problem
+from studies.runs.case import BodyRecipe, Case, scene_from_dict, scene_to_json
+from studies.runs.prepare import mesh_for, patch_nodes, prepare
+from studies.runs.run import checkpoint_frames
 from studies.scenes import SCENES, Start
 from studies.scenes.stress import STRESS_SCENES
 

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studies.errors import StudyError
-from studies.spread import _sign_test_rank, kernel_ns, missed, percentiles, ratio_with_spread
+from studies.base.errors import StudyError
+from studies.timing.statistics import _sign_test_rank, kernel_ns, missed, percentiles, ratio_with_spread
 
 
 def test_percentiles_are_times_that_frames_took():

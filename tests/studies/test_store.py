@@ -7,8 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from studies.errors import StudyError
-from studies.store import (
+from studies.base.errors import StudyError
+from studies.store.record import (
     SCHEMA,
     Field,
     Record,

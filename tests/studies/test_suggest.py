@@ -1,7 +1,7 @@
 import pytest
 
-from studies.errors import StudyError
-from studies.suggest import choose
+from studies.base.errors import StudyError
+from studies.base.lookup import choose
 
 SCENES = {"ball_squeeze": 1, "ball_clamped": 2, "liver_press": 3}
 

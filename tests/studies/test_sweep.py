@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from studies import sweep as module
-from studies import timed
-from studies.errors import StudyError
-from studies.run import case_path
+from studies.base.errors import StudyError
+from studies.runs.run import case_path
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.store import Status, read_record, write_record
-from studies.sweep import Task, failed, load_runs, perform, run_studies, standings, tasks_of
+from studies.store.record import Status, read_record, write_record
+from studies.sweep import run_studies as module
+from studies.sweep.run_studies import Task, failed, load_runs, perform, run_studies, standings, tasks_of
+from studies.timing import cases as timed
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
 
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from massspring import Free, simulate
-from studies import timed as module
-from studies.adapt import prepare
-from studies.errors import StudyError
-from studies.machine import machine_id
-from studies.metrics import Run
-from studies.run import case_path
-from studies.store import Status, read_record, write_record
-from studies.table import metric
-from studies.timed import can_be_timed, read_timing, time_cases, timing_file, timing_is_current, write_timing
-from studies.timing import FrameTiming
+from studies.base.errors import StudyError
+from studies.metrics.metrics import Run
+from studies.metrics.table import metric
+from studies.runs.prepare import prepare
+from studies.runs.run import case_path
+from studies.store.machine import machine_id
+from studies.store.record import Status, read_record, write_record
+from studies.timing import cases as module
+from studies.timing.cases import can_be_timed, read_timing, time_cases, timing_file, timing_is_current, write_timing
+from studies.timing.protocol import FrameTiming
 from tests.studies.tiny import FRAMES, diverging_case, tiny_case
 
 KEPT, LOOSE = tiny_case(timed=True), tiny_case(method=Free(), timed=True)

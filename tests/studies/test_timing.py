@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from studies.errors import StudyError
-from studies.store import SCHEMA, Record, Status, read_record, write_record
-from studies.timing import FrameTiming, interleave, pinned
+from studies.base.errors import StudyError
+from studies.store.record import SCHEMA, Record, Status, read_record, write_record
+from studies.timing.protocol import FrameTiming, interleave, pinned
 
 
 def test_pinned_to_one_core_and_one_thread_and_back():

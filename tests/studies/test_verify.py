@@ -9,7 +9,8 @@ from typer.testing import CliRunner
 
 from reference_fem import ReferenceProblem
 from reference_fem.oracles import Check, Curve, Oracle, Outcome, kappa
-from studies import cli, verification
+from studies.cli import app as cli
+from studies.verify import verification
 
 
 def oracle(name, got, fast=True, **options):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from massspring import Free, ImplicitVolume
-from studies.case import BodyRecipe, Case
 from studies.catalog import Study
-from studies.geometry.mesh import boundary_triangles
+from studies.geometry.mesh.organ_mesh import boundary_triangles
+from studies.runs.case import BodyRecipe, Case
 from studies.scenes import Organ, Scene
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from studies.errors import StudyError
-from studies.geometry.levelset import Shape
+from studies.base.errors import StudyError
+from studies.geometry.shape.levelset import Shape
 
 
 def ball_shape(radius: float = 0.05, wall: float | None = None) -> Shape:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from studies.geometry.blends import canal, closed, ellipsoid, local_min, smooth_max
-from studies.geometry.levelset import Literature, Shape
 from studies.geometry.organs.millimetres import MARGIN, MM, check_lengths, check_wall, metres, si, touch
-from studies.geometry.regions import BallRegion
+from studies.geometry.shape.blends import canal, closed, ellipsoid, local_min, smooth_max
+from studies.geometry.shape.levelset import Literature, Shape
+from studies.geometry.shape.regions import BallRegion
 
 CAPACITY = Literature(
     400.0, "Lukacz et al., Int. J. Clin. Pract. 65 (2011) 1026: capacity of healthy adults 300-400 mL"

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from studies.geometry.blends import canal, closed, ellipsoid, smooth_max
-from studies.geometry.levelset import Literature, Shape
 from studies.geometry.organs.millimetres import MARGIN, MM, check_lengths, metres, si, touch
-from studies.geometry.regions import EllipsoidRegion
+from studies.geometry.shape.blends import canal, closed, ellipsoid, smooth_max
+from studies.geometry.shape.levelset import Literature, Shape
+from studies.geometry.shape.regions import EllipsoidRegion
 
 VOLUME = Literature(
     150.0, "137 ± 30 mL by ultrasound (Lee, J. Korean Soc. Med. Ultrasound 15 (1996) 63), 150 g in textbooks"

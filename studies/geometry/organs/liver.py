@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from studies.geometry.blends import ellipsoid, groove, smooth_max, smooth_min
-from studies.geometry.levelset import Literature, Shape, project
 from studies.geometry.organs.millimetres import MM, check_lengths, metres, probe_near, si
-from studies.geometry.regions import EllipsoidRegion, Vector
+from studies.geometry.shape.blends import ellipsoid, groove, smooth_max, smooth_min
+from studies.geometry.shape.levelset import Literature, Shape, project
+from studies.geometry.shape.regions import EllipsoidRegion, Vector
 
 VOLUME = Literature(1500.0, "Henderson et al., Radiology 141 (1981) 525: 1,493 ± 230 mL by CT")
 LIVER_PRESS_DIRECTION: Vector = (0.0, 0.9, 0.19**0.5)

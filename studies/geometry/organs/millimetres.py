@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from studies.errors import StudyError
-from studies.geometry.blends import Sphere
-from studies.geometry.levelset import Level, Probe, Shape, gradient, normals, project
-from studies.geometry.regions import Vector
+from studies.base.errors import StudyError
+from studies.geometry.shape.blends import Sphere
+from studies.geometry.shape.levelset import Level, Probe, Shape, gradient, normals, project
+from studies.geometry.shape.regions import Vector
 
 MM = 1e-3
 """Metres in a millimetre."""

@@ -3,10 +3,10 @@ along the tenth rib, z to the superior border."""
 
 import numpy as np
 
-from studies.geometry.blends import ellipsoid, groove, smooth_max, smooth_min
-from studies.geometry.levelset import Literature, Shape
 from studies.geometry.organs.millimetres import MARGIN, MM, check_lengths, metres, si, touch
-from studies.geometry.regions import EllipsoidRegion
+from studies.geometry.shape.blends import ellipsoid, groove, smooth_max, smooth_min
+from studies.geometry.shape.levelset import Literature, Shape
+from studies.geometry.shape.regions import EllipsoidRegion
 
 VOLUME = Literature(200.0, "Prassopoulos et al., Eur. Radiol. 7 (1997) 246: 215 mL, 107 to 315, by CT")
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from studies.geometry.blends import canal, closed, local_min
-from studies.geometry.levelset import Literature, Shape
 from studies.geometry.organs.millimetres import MM, box_of, check_lengths, check_wall, metres, si, touch
-from studies.geometry.regions import BallRegion
+from studies.geometry.shape.blends import canal, closed, local_min
+from studies.geometry.shape.levelset import Literature, Shape
+from studies.geometry.shape.regions import BallRegion
 
 CAPACITY = Literature(1000.0, "Ferrua and Singh, J. Food Sci. 75 (2010) R151: about 1 L after a meal")
 

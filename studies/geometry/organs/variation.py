@@ -5,9 +5,9 @@ import zlib
 
 import numpy as np
 
-from studies.errors import StudyError
+from studies.base.errors import StudyError
+from studies.base.lookup import choose
 from studies.geometry.organs import SHAPES
-from studies.suggest import choose
 
 COMMON = 0.7
 """Share of the spread that all lengths of one organ have in common: a long kidney is a wide one."""

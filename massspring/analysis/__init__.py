@@ -1,0 +1,1 @@
+"""What a body will do before it runs: stiffness, step limit, modes."""

@@ -1,0 +1,84 @@
+"""The largest frequency of a spring network and the time step it allows (docs/theory.md, section 3)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
+from massspring.analysis.stiffness import stiffness_at_rest
+from massspring.body.body import Body
+from massspring.errors import MassSpringError
+
+LANCZOS_TOLERANCE = 1e-4
+"""Relative accuracy of ω²; far below the 1 % to which a nonlinear run knows its limit."""
+
+
+def scaled_stiffness(body: Body, held_nodes: np.ndarray) -> csr_array:
+    """M^-½ K M^-½ [1/s²] of the free nodes at rest, (3n, 3n); rows of held nodes are zero (eq. 16)."""
+    root = 1.0 / np.sqrt(body.mass)
+    root[held_nodes] = 0.0
+    scale = diags_array(np.repeat(root, 3))
+    return csr_array(scale @ stiffness_at_rest(body) @ scale)
+
+
+def largest_frequency(body: Body, held_nodes: np.ndarray | None = None, added: csr_array | None = None) -> float:
+    """ω_max [1/s] of small oscillations about rest, by Lanczos iteration from a fixed start. Raises MassSpringError.
+
+    `added` B (3n, r) [√(N/m)] is what a method adds to the springs: K + B Bᵀ (eq. 16).
+    """
+    held = np.empty(0, dtype=np.int64) if held_nodes is None else held_nodes
+    matrix = scaled_stiffness(body, held)
+    if added is not None:
+        matrix = _with_added(matrix, body, held, added)
+    start = np.random.default_rng(0).standard_normal(3 * body.node_count)
+    try:
+        largest = eigsh(matrix, 1, which="LA", v0=start, tol=LANCZOS_TOLERANCE, return_eigenvectors=False)[0]  # pyright: ignore[reportArgumentType]
+    except ArpackError as error:
+        raise MassSpringError(f"the largest frequency of the network did not converge: {error}") from error
+    return math.sqrt(max(float(largest), 0.0))
+
+
+def _with_added(matrix: csr_array, body: Body, held: np.ndarray, added: csr_array) -> LinearOperator:
+    """M^-½ (K + B Bᵀ) M^-½ without forming B Bᵀ, which is full for a volume of the whole."""
+    root = np.repeat(1.0 / np.sqrt(body.mass), 3)
+    root.reshape(-1, 3)[held] = 0.0
+    factor = csr_array(added.multiply(root[:, None]))
+    return LinearOperator(matrix.shape, matvec=lambda q: matrix @ q + factor @ (factor.T @ q), dtype=np.float64)  # pyright: ignore[reportCallIssue]
+
+
+@dataclass(frozen=True)
+class StepLimit:
+    """The stability limit of symplectic Euler with viscous damping at the old velocity."""
+
+    frequency: float
+    """ω_max [1/s]."""
+    damping: float
+    """c [1/s]."""
+
+    @property
+    def undamped(self) -> float:
+        """dt_c = 2/ω_max [s]; the volume constraint does not lower it (Cauchy interlacing)."""
+        return 2.0 / self.frequency
+
+    @property
+    def damped(self) -> float:
+        """(2/ω)(√(1 + ζ²) − ζ) [s] with ζ = c/(2ω) (eq. 17)."""
+        zeta = self.damping / (2.0 * self.frequency)
+        return self.undamped * (math.sqrt(1.0 + zeta * zeta) - zeta)
+
+
+def step_limit(
+    body: Body, damping: float = 0.0, held_nodes: np.ndarray | None = None, added: csr_array | None = None
+) -> StepLimit:
+    """Limit of a body with mass-proportional `damping` [1/s], with what a method adds to its springs.
+
+    `added`: the method's `added_stiffness(body)`. Raises MassSpringError for a body without springs.
+    """
+    frequency = (
+        largest_frequency(body, held_nodes, added) if body.springs.count or len(body.membrane.triangles) else 0.0
+    )
+    if not frequency > 0:
+        raise MassSpringError("the body has no stiffness, so no largest frequency; give it springs or a dt in seconds")
+    return StepLimit(frequency, damping)

@@ -1,0 +1,79 @@
+"""The stiffness matrix of a body: what its forces change by when its nodes move a little."""
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from massspring.body.body import Body
+
+AXIS = np.arange(3)
+
+
+def blocks(rows: np.ndarray, columns: np.ndarray, values: np.ndarray, nodes: int) -> csr_array:
+    """Σ of 3 × 3 blocks `values` (b, 3, 3) at node pairs `rows`, `columns` (b,), as a matrix (3n, 3n)."""
+    row = 3 * rows.astype(np.int64)[:, None, None] + AXIS[:, None]
+    column = 3 * columns.astype(np.int64)[:, None, None] + AXIS
+    indices = (np.broadcast_to(row, values.shape).ravel(), np.broadcast_to(column, values.shape).ravel())
+    return coo_array((values.ravel(), indices), shape=(3 * nodes, 3 * nodes)).tocsr()
+
+
+def edge_blocks(ends: np.ndarray, block: np.ndarray, nodes: int) -> csr_array:
+    """Σ_e of `block` (s, 3, 3) between the ends (s, 2) of springs: + on both nodes, − across, (3n, 3n)."""
+    i, j = ends.T
+    rows, columns = np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i])
+    return blocks(rows, columns, np.concatenate([block, block, -block, -block]), nodes)
+
+
+def spring_stiffness(body: Body, x: np.ndarray) -> csr_array:
+    """−∂f/∂x = Σ_e k [(1 − L/|d|) I + (L/|d|) d̂ d̂ᵀ] [N/m] at positions `x` (n, 3), (3n, 3n) (eq. 76)."""
+    ends, springs = body.springs.ends, body.springs
+    d = x[ends[:, 1]] - x[ends[:, 0]]
+    square = np.einsum("ei,ei->e", d, d)
+    share = springs.rest_length / np.sqrt(square)
+    along = d[:, :, None] * d[:, None, :] / square[:, None, None]
+    block = (1.0 - share)[:, None, None] * np.eye(3) + share[:, None, None] * along
+    return edge_blocks(ends, springs.stiffness[:, None, None] * block, body.node_count)
+
+
+def volume_hessian(triangles: np.ndarray, x: np.ndarray) -> csr_array:
+    """∂²V/∂x² [m] of the volume inside closed `triangles` (f, 3) at `x` (n, 3) [m], symmetric, (3n, 3n).
+
+    V = Σ x_i · (x_j × x_k)/6 is linear in each node: the block of i and j is −[x_k]×/6, from a node close by.
+    """
+    x = x - x.mean(axis=0)
+    rows, columns, values = [], [], []
+    for a in range(3):
+        i, j, k = (triangles[:, (a + b) % 3] for b in range(3))
+        block = np.zeros((len(triangles), 3, 3))
+        block[:, [2, 0, 1], [1, 2, 0]] = -x[k] / 6.0
+        block -= block.transpose(0, 2, 1)
+        rows += [i, j]
+        columns += [j, i]
+        values += [block, -block]
+    return blocks(np.concatenate(rows), np.concatenate(columns), np.concatenate(values), len(x))
+
+
+def membrane_stiffness(body: Body) -> csr_array:
+    """Σ_t Σ_ab q_ab ∂Δ_a/∂x ∂Δ_b/∂x [N/m] of triangle springs at rest, (3n, 3n) (eq. 77)."""
+    membrane, n = body.membrane, body.node_count
+    corners = body.rest[membrane.triangles]
+    edge = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    slope = np.zeros((len(edge), 3, 3, 3))  # of Δ_a by the position of corner b
+    for a in range(3):
+        slope[:, a, (a + 1) % 3], slope[:, a, (a + 2) % 3] = -2.0 * edge[:, a], 2.0 * edge[:, a]
+    form = np.zeros((len(edge), 3, 3))
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        form[:, a, a] = membrane.stiffness[:, a]
+        form[:, b, c] = form[:, c, b] = membrane.coupling[:, a]
+    block = np.einsum("tapi,tab,tbqj->tpqij", slope, form, slope)
+    rows = np.repeat(membrane.triangles, 3, axis=1).ravel()
+    columns = np.tile(membrane.triangles, (1, 3)).ravel()
+    return blocks(rows, columns, block.reshape(-1, 3, 3), n)
+
+
+def stiffness_at_rest(body: Body) -> csr_array:
+    """−∂f/∂x [N/m] of springs, triangle springs and rest pressure together at rest, (3n, 3n) (eq. 16, 76)."""
+    springs = csr_array(spring_stiffness(body, body.rest) + membrane_stiffness(body))
+    if not body.rest_pressure:
+        return springs
+    return csr_array(springs - body.rest_pressure * volume_hessian(body.triangles, body.rest))

@@ -1,0 +1,1 @@
+"""Particles, springs and kept volumes."""

@@ -1,0 +1,193 @@
+"""A body: particles, springs, its closed surface and the volumes that can be kept."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from massspring.body.springs import Springs, lengths
+from massspring.body.surface import check_finite, check_surface
+from massspring.body.volumes import Volumes
+from massspring.errors import MassSpringError
+from massspring.kernels.arrays.spring_layout import Membrane
+from massspring.kernels.forces.springs import spring_energy, spring_forces_into
+from massspring.kernels.forces.tetrahedra import tetrahedron_volumes_into
+from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
+
+SAME_VOLUME = 1e-9
+"""Relative: both are sums of the same determinants, up to round-off of some million additions."""
+BALANCED = 1e-8
+"""Of the largest force at a node: far above round-off, far below one spring too many."""
+NO_MEMBRANE = Membrane(np.empty((0, 3), dtype=np.uint32), *(np.empty((0, 3)) for _ in range(3)))
+NO_TETRAHEDRA = np.empty((0, 4), dtype=np.uint32)
+
+
+def check_positive(volumes: np.ndarray) -> None:
+    """Raises MassSpringError naming the worst of tetrahedra that are flat or inside-out; `volumes` (k,) [m³]."""
+    if len(volumes) and not (volumes > 0).all():
+        worst = int(np.argmin(volumes))
+        raise MassSpringError(
+            f"tetrahedron {worst} has volume {volumes[worst]:.3g} m³; swap two of its nodes or remove it"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """Isotropic tissue."""
+
+    shear_modulus: float
+    """mu [Pa]."""
+    density: float
+    """rho [kg/m³]."""
+
+    def __post_init__(self) -> None:
+        for name, unit in (("shear_modulus", "Pa"), ("density", "kg/m³")):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise MassSpringError(f"{name} is {value} {unit}; it must be a positive finite number")
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """n nodes at rest; the solver never changes it."""
+
+    rest: np.ndarray
+    """Rest positions [m], (n, 3)."""
+    mass: np.ndarray
+    """[kg], (n,)."""
+    springs: Springs
+    triangles: np.ndarray
+    """Closed surface, outward, (f, 3) uint32; of several sheets for a hollow body (inner sheets face the lumen)."""
+    tetrahedra: np.ndarray = field(default_factory=lambda: NO_TETRAHEDRA)
+    """(k, 4) uint32, positive; empty for a surface body."""
+    law: str = "given"
+    """Stiffness law, recorded with every result: it alone moves a force by 12–16 %."""
+    volumes: Volumes | None = None
+    """What methods keep; None: the whole."""
+    rest_pressure: float = 0.0
+    """Pressure that balances springs without length at rest [Pa]; 0 for springs that rest at their own length."""
+    membrane: Membrane = NO_MEMBRANE
+    """Triangle springs of a wall."""
+
+    def __post_init__(self) -> None:
+        check_finite("rest positions", self.rest)
+        check_finite("masses", self.mass)
+        check_surface(self.rest, self.triangles)
+        if len(self.mass) != len(self.rest):
+            raise MassSpringError(f"{len(self.mass)} masses for {len(self.rest)} nodes; give one mass per node")
+        if not (self.mass > 0).all():
+            node = int(np.argmin(self.mass))
+            raise MassSpringError(f"node {node} has mass {self.mass[node]:g} kg; every node needs a positive mass")
+        self._check_springs()
+        check_positive(self.tetrahedron_volumes)
+        self._check_volumes()
+
+    def _check_volumes(self) -> None:
+        filled = float(self.tetrahedron_volumes.sum())
+        if len(self.tetrahedra) and abs(filled - self.volume) > SAME_VOLUME * filled:
+            raise MassSpringError(
+                f"the surface encloses {self.volume:.6g} m³ but the tetrahedra fill {filled:.6g} m³; "
+                "give all sheets of their boundary, each turned outward of the tissue"
+            )
+        if int(self.kept.triangles.max()) >= len(self.rest):
+            raise MassSpringError(
+                f"a kept volume names a node beyond the {len(self.rest)} there are; build it on this body"
+            )
+        if not (self.rest_volumes > 0).all():
+            worst = int(np.argmin(self.rest_volumes))
+            name, volume = self.kept.names[worst], self.rest_volumes[worst]
+            raise MassSpringError(f"volume '{name}' is {volume:.3g} m³ at rest; turn its triangles round")
+
+    def _check_springs(self) -> None:
+        springs = self.springs
+        if springs.count and int(springs.ends.max()) >= len(self.rest):
+            raise MassSpringError(
+                f"a spring ends at node {int(springs.ends.max())}, but there are {len(self.rest)} nodes"
+            )
+        check_finite("spring stiffnesses", springs.stiffness)
+        for values in self.membrane[1:]:
+            check_finite("triangle springs", values)
+        if len(self.membrane.triangles) and int(self.membrane.triangles.max()) >= len(self.rest):
+            raise MassSpringError(
+                f"a triangle spring names node {int(self.membrane.triangles.max())}, "
+                f"but there are {len(self.rest)} nodes"
+            )
+        length = lengths(self.rest, springs.ends) if self.rest_pressure else springs.rest_length
+        if not (length > 0).all():
+            worst = int(np.argmin(length))
+            raise MassSpringError(f"spring {worst} has rest length {length[worst]:g} m; weld its two nodes")
+        if self.rest_pressure:
+            self._check_balance()
+
+    def _check_balance(self) -> None:
+        """Springs that are taut at rest are held apart by the rest pressure, at every node."""
+        springs, pull, gradient = self.springs, np.empty_like(self.rest), np.empty_like(self.rest)
+        spring_forces_into(self.rest, springs.ends, springs.rest_length, springs.stiffness, pull)
+        volume_gradient_into(self.rest, self.triangles, gradient)
+        if np.abs(pull + self.rest_pressure * gradient).max() > BALANCED * np.abs(pull).max():
+            raise MassSpringError(
+                f"a rest pressure of {self.rest_pressure:g} Pa does not balance the springs at rest; "
+                "give springs without length the stiffnesses of the cotangent law, and its mu as the pressure"
+            )
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes, virtual ones included."""
+        return len(self.rest)
+
+    @property
+    def surface_nodes(self) -> np.ndarray:
+        """Nodes of the closed surface, ascending, (c,) uint32."""
+        return np.unique(self.triangles).astype(np.uint32)
+
+    @property
+    def volume(self) -> float:
+        """Rest volume V0 [m³]."""
+        return float(enclosed_volume(self.rest, self.triangles))
+
+    @cached_property
+    def kept(self) -> Volumes:
+        """The volumes that methods keep: `volumes`, or the whole."""
+        return Volumes.whole(self) if self.volumes is None else self.volumes
+
+    @cached_property
+    def rest_volumes(self) -> np.ndarray:
+        """V0_r [m³] of the kept volumes, (m,)."""
+        return self.kept.measure(self.rest)
+
+    @cached_property
+    def rest_lam(self) -> np.ndarray:
+        """What each kept volume takes of the rest pressure [Pa], (m,): Jᵀ rest_lam = rest_pressure · dV/dx."""
+        if not self.rest_pressure:
+            return np.zeros(self.kept.count)
+        return self.rest_pressure * self.kept.parts_of(self.triangles)
+
+    @property
+    def rest_energy(self) -> float:
+        """Energy of springs that are taut at rest [J]; energies are reported above it."""
+        springs = self.springs
+        return float(spring_energy(self.rest, springs.ends, springs.rest_length, springs.stiffness))
+
+    @property
+    def tetrahedron_volumes(self) -> np.ndarray:
+        """Rest volumes [m³], (k,)."""
+        volumes = np.empty(len(self.tetrahedra))
+        tetrahedron_volumes_into(self.rest, self.tetrahedra, volumes)
+        return volumes
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the bounding box at rest [m]."""
+        return float(np.linalg.norm(np.ptp(self.rest, axis=0)))
+
+    def keeping(self, volumes: Volumes) -> "Body":
+        """The same body with other volumes to keep. Raises MassSpringError for one that is not positive at rest."""
+        return replace(self, volumes=volumes)
+
+    def stiffened(self, factor: float) -> "Body":
+        """The same body with every spring `factor` times as stiff."""
+        stiffer = replace(self.springs, stiffness=self.springs.stiffness * factor)
+        membrane = self.membrane._replace(
+            stiffness=self.membrane.stiffness * factor, coupling=self.membrane.coupling * factor
+        )
+        return replace(self, springs=stiffer, rest_pressure=self.rest_pressure * factor, membrane=membrane)

@@ -1,0 +1,48 @@
+"""What makes a list of triangles a closed surface."""
+
+import numpy as np
+
+from massspring.body.springs import EDGES_OF_TRIANGLE
+from massspring.errors import MassSpringError
+from massspring.kernels.forces.volume import enclosed_volume
+from massspring.kernels.probe.point_query import turns_round
+
+
+def winding_number(point: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> float:
+    """How often a closed surface goes round `point` (3,): 1 inside, 0 outside, its solid angle over 4 pi.
+
+    `points` (n, 3) [m], `triangles` (f, 3).
+    """
+    return float(turns_round(np.asarray(point, dtype=np.float64), points, triangles))
+
+
+def check_finite(what: str, values: np.ndarray) -> None:
+    """Raises MassSpringError naming `what` when a value is not finite."""
+    if not np.isfinite(values).all():
+        raise MassSpringError(
+            f"{what} hold {int((~np.isfinite(values)).sum())} values that are not finite; repair the input"
+        )
+
+
+def check_surface(points: np.ndarray, triangles: np.ndarray) -> None:
+    """Closed and consistently oriented: every directed edge once, its reverse once; outward: positive volume.
+
+    `points` (n, 3) [m], `triangles` (f, 3), one sheet or several. Raises MassSpringError.
+    """
+    if len(triangles) < 4:
+        raise MassSpringError(f"the surface has {len(triangles)} triangles; a closed one has at least 4")
+    if int(triangles.max()) >= len(points):
+        raise MassSpringError(f"a triangle names node {int(triangles.max())}, but there are {len(points)} nodes")
+    edges = triangles[:, EDGES_OF_TRIANGLE].reshape(-1, 2).astype(np.int64)
+    forward = edges[:, 0] * len(points) + edges[:, 1]
+    backward = edges[:, 1] * len(points) + edges[:, 0]
+    if len(np.unique(forward)) != len(forward):
+        raise MassSpringError(
+            "an edge is walked twice in the same sense; the surface is not manifold, or not consistently oriented"
+        )
+    lonely = np.setdiff1d(forward, backward)
+    if len(lonely):
+        raise MassSpringError(f"the surface is open at {len(lonely)} edges; close it, its volume is not defined")
+    volume = enclosed_volume(points, triangles)
+    if not volume > 0:
+        raise MassSpringError(f"the surface encloses {volume:.3g} m³; it is flat or inside-out, flip its triangles")

@@ -1,0 +1,197 @@
+"""Which volumes a body keeps: the whole, wall and lumen, m regions, or one per node.
+
+Each is a signed sum of oriented triangles, V_r = Σ_f s_rf (1/6) x_i · (x_j × x_k) (docs/theory.md, eq. 31), so that
+one sweep over triangles serves all kinds. A region is bounded by its own faces; the volume of a node, a quarter of
+every tetrahedron around it, is a quarter of what their outer faces enclose.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array, vstack
+from scipy.sparse.linalg import lsqr
+
+from massspring.body.partition import partition, tetrahedron_faces
+from massspring.body.surface import check_surface
+from massspring.errors import MassSpringError
+
+if TYPE_CHECKING:
+    from massspring.body.body import Body
+
+DEPENDENT = 1e-8
+"""Relative residual below which a volume is a sum of others; independent ones of a mesh leave more than 1e-4."""
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """A number over time, straight between key values and still outside them."""
+
+    times: tuple[float, ...] = (0.0,)
+    """[s], ascending."""
+    values: tuple[float, ...] = (1.0,)
+    """One per time."""
+
+    def __post_init__(self) -> None:
+        if len(self.times) != len(self.values) or not self.times:
+            raise MassSpringError(f"a ramp has {len(self.times)} times for {len(self.values)} values; give one each")
+        if not (np.isfinite(self.times).all() and np.isfinite(self.values).all()):
+            raise MassSpringError("a ramp holds values that are not finite; give numbers")
+        if (np.diff(self.times) <= 0).any():
+            raise MassSpringError(f"the times of a ramp are {self.times} s; they must ascend")
+
+    def __call__(self, t: float | np.ndarray) -> np.ndarray:
+        """Value at time(s) `t` [s], () or (q,)."""
+        return np.asarray(np.interp(t, self.times, self.values))
+
+
+@dataclass(frozen=True, eq=False)
+class Volumes:
+    """m volumes over f triangles; independent of each other."""
+
+    names: tuple[str, ...]
+    """m different names."""
+    triangles: np.ndarray
+    """Oriented, (f, 3) uint32."""
+    share: csr_array
+    """s_rf, the part of triangle f in volume r, (m, f)."""
+
+    def __post_init__(self) -> None:
+        if len(set(self.names)) != len(self.names) or len(self.names) != self.count:
+            raise MassSpringError(f"{self.count} volumes are named {self.names}; give each a name of its own")
+
+    @property
+    def count(self) -> int:
+        """m."""
+        return self.share.shape[0]  # pyright: ignore[reportOptionalSubscript]
+
+    def measure(self, x: np.ndarray) -> np.ndarray:
+        """V_r [m³] at positions `x` (n, 3) [m], seen from their mean (eq. 31), (m,)."""
+        corners = x[self.triangles] - x.mean(axis=0)
+        return self.share @ np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+
+    def parts_of(self, triangles: np.ndarray) -> np.ndarray:
+        """p with Σ_r p_r V_r = the volume inside the closed surface `triangles` (f, 3), (m,).
+
+        Raises MassSpringError where the volumes do not add up to it.
+        """
+        united, place = _united(self.triangles, triangles)
+        rows = _moved(self.share, place[0], len(united))
+        wanted = np.zeros(len(united))
+        wanted[place[1][0]] = place[1][1]
+        start = np.ones(self.count)  # exact for regions and nodes
+        found = lsqr(rows.T, wanted, atol=1e-15, btol=1e-15, iter_lim=10 * self.count + 100, x0=start)[0]
+        if np.abs(rows.T @ found - wanted).max() > DEPENDENT:
+            raise MassSpringError("the kept volumes do not add up to the whole body; keep one volume per node")
+        return found
+
+    def joined(self, other: "Volumes") -> "Volumes":
+        """Both kinds together. Raises MassSpringError when a volume of `other` is a sum of the rest."""
+        triangles, place = _united(self.triangles, other.triangles)
+        mine = _moved(self.share, place[0], len(triangles))
+        rows = _moved(other.share, place[1], len(triangles))
+        for r in range(other.count):
+            row = rows[[r]]
+            _refuse_dependent(mine, self.names + other.names[:r], row, other.names[r])
+            mine = csr_array(vstack([mine, row]))
+        return Volumes(self.names + other.names, triangles, mine)
+
+    @staticmethod
+    def whole(body: "Body") -> "Volumes":
+        """The tissue inside the body's surface."""
+        return Volumes(("whole",), body.triangles, csr_array(np.ones((1, len(body.triangles)))))
+
+    @staticmethod
+    def closed_surfaces(body: "Body", surfaces: Mapping[str, np.ndarray]) -> "Volumes":
+        """One volume per closed surface: name -> triangles (f, 3) that enclose it with a positive volume.
+
+        {"wall": all boundary triangles, "lumen": the inner ones turned round} for a hollow organ. Raises
+        MassSpringError for an open or inside-out surface, or one whose volume follows from the others.
+        """
+        kept: Volumes | None = None
+        for name, given in surfaces.items():
+            triangles = np.ascontiguousarray(given, dtype=np.uint32)
+            try:
+                check_surface(body.rest, triangles)
+            except MassSpringError as error:
+                raise MassSpringError(f"volume '{name}': {error}") from error
+            one = Volumes((name,), triangles, csr_array(np.ones((1, len(triangles)))))
+            kept = one if kept is None else kept.joined(one)
+        if kept is None:
+            raise MassSpringError("no surface is given; name at least one")
+        return kept
+
+    @staticmethod
+    def regions(body: "Body", count: int) -> "Volumes":
+        """`count` connected regions of tetrahedra of about equal volume. Raises MassSpringError for too many.
+
+        More volumes than nodes would leave less than two of three motions of a node free: the body locks.
+        """
+        _need_tetrahedra(body, "regions")
+        if count > body.node_count:
+            raise MassSpringError(
+                f"{count} regions asked of a mesh of {body.node_count} nodes; more volumes than nodes lock it, "
+                f"give up to {body.node_count} or refine the mesh"
+            )
+        region = partition(body.rest, body.tetrahedra.astype(np.int64), body.tetrahedron_volumes, count)
+        triangles, first, second = tetrahedron_faces(body.tetrahedra)
+        a, b = region[first // 4], np.where(second >= 0, region[second // 4], -1)
+        between = np.flatnonzero(a != b)
+        inner = between[b[between] >= 0]
+        rows, columns = np.r_[a[between], b[inner]], np.r_[between, inner]
+        share = coo_array((np.r_[np.ones(len(between)), -np.ones(len(inner))], (rows, columns)), shape=(count, len(a)))
+        return Volumes(tuple(f"region {r}" for r in range(count)), triangles[between], share.tocsr()[:, between])
+
+    @staticmethod
+    def nodal(body: "Body") -> "Volumes":
+        """One volume per node: a quarter of every tetrahedron around it."""
+        _need_tetrahedra(body, "nodal volumes")
+        cells = body.tetrahedra.astype(np.int64)
+        triangles, first, second = tetrahedron_faces(cells)
+        face, inner, outer = np.arange(len(triangles)), np.flatnonzero(second >= 0), np.flatnonzero(second < 0)
+        around = triangles[outer].astype(np.int64)
+        rows = np.r_[cells.ravel()[first], cells.ravel()[second[inner]], around.ravel()]
+        columns = np.r_[face, inner, np.repeat(outer, 3)]
+        values = np.r_[np.full(len(face), 0.25), np.full(len(inner), -0.25), np.full(around.size, 0.25)]
+        share = coo_array((values, (rows, columns)), shape=(body.node_count, len(triangles))).tocsr()
+        return Volumes(tuple(f"node {i}" for i in range(body.node_count)), triangles, share)
+
+
+def _need_tetrahedra(body: "Body", what: str) -> None:
+    if not len(body.tetrahedra):
+        raise MassSpringError(f"{what} are made of tetrahedra, the body has none; fill its mesh or keep the whole")
+
+
+def _united(mine: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]]:
+    """Triangles of both lists, each once whatever its sense; for each list (place in the union, ±1 for the sense)."""
+    both = np.vstack([mine, others]).astype(np.int64)
+    _, first, inverse = np.unique(np.sort(both, axis=1), axis=0, return_index=True, return_inverse=True)
+    inverse = inverse.reshape(-1)
+    # Even permutations keep the sense of a triangle.
+    sense = np.sign(_parity(both) * _parity(both[first])[inverse])
+    united = np.ascontiguousarray(both[first], dtype=np.uint32)
+    cut = len(mine)
+    return united, [(inverse[:cut], sense[:cut]), (inverse[cut:], sense[cut:])]
+
+
+def _parity(triangles: np.ndarray) -> np.ndarray:
+    """+1 where the three numbers ascend cyclically, −1 where they descend."""
+    a, b, c = triangles.T
+    return np.sign((b - a) * (c - b) * (c - a))
+
+
+def _moved(share: csr_array, place: tuple[np.ndarray, np.ndarray], size: int) -> csr_array:
+    index, sense = place
+    old = share.tocoo()
+    return coo_array((old.data * sense[old.col], (old.row, index[old.col])), shape=(share.shape[0], size)).tocsr()  # pyright: ignore[reportOptionalSubscript]
+
+
+def _refuse_dependent(rows: csr_array, names: tuple[str, ...], row: csr_array, name: str) -> None:
+    """Volumes are independent functions of the positions exactly when their rows of shares are."""
+    wanted = row.toarray().ravel()
+    found = lsqr(rows.T, wanted, atol=1e-13, btol=1e-13, iter_lim=10 * rows.shape[0] + 100)[0]  # pyright: ignore[reportOptionalSubscript]
+    if np.linalg.norm(rows.T @ found - wanted) < DEPENDENT * np.linalg.norm(wanted):
+        used = [names[r] for r in np.flatnonzero(np.abs(found) > 0.5 * np.abs(found).max())]
+        parts = ", ".join(used[:4]) + (f" and {len(used) - 4} more" if len(used) > 4 else "")
+        raise MassSpringError(f"volume '{name}' is redundant: it follows from {parts}; leave one of them out")

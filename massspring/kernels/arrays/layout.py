@@ -1,0 +1,209 @@
+"""What a compiled frame loop is given: plain tuples of arrays, so that a frame costs one call from Python."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from massspring.kernels.arrays.spring_layout import Membrane, Slices
+from massspring.kernels.constraint.block_jacobi import Clusters
+from massspring.kernels.jit.stage_clock import Ticks
+from massspring.kernels.jit.thread_team import Team
+
+
+class Network(NamedTuple):
+    """What does not change during a run; s springs, f triangles, n nodes, h held nodes, c surface nodes."""
+
+    ends: np.ndarray
+    """Spring ends, (s, 2) uint32. Unsigned: signed indices cost up to 1.9 times in gather loops."""
+    rest_length: np.ndarray
+    """[m], (s,)."""
+    stiffness: np.ndarray
+    """[N/m], (s,)."""
+    membrane: Membrane
+    """Triangle springs, none in most bodies."""
+    triangles: np.ndarray
+    """Closed surface of the one volume that is kept, outward, (f, 3) uint32; of the whole where there are several."""
+    mass: np.ndarray
+    """[kg], (n,)."""
+    inverse_mass: np.ndarray
+    """[1/kg], (n,); 0 marks a node whose motion is prescribed."""
+    largest_inverse_mass: float
+    surface_nodes: np.ndarray
+    """Nodes on the surface, (c,) uint32."""
+    touchable: np.ndarray
+    """1 for nodes that obstacles can touch: on the surface and not held, (n,) uint8."""
+    held_nodes: np.ndarray
+    """(h,) uint32."""
+    held_group: np.ndarray
+    """Attachment each held node belongs to, (h,) uint32."""
+    held_rest: np.ndarray
+    """Rest positions of the held nodes [m], (h, 3)."""
+    rest_lam: np.ndarray
+    """What each kept volume takes of the pressure that holds springs without length apart at rest [Pa], (m,)."""
+    longest_correction: float
+    """How far a step may move a node to make up for a wrong volume [m]; what is left is made up later."""
+    slices: Slices
+
+
+class VolumeRows(NamedTuple):
+    """m volumes: J = dV/dx as sparse rows with e entries, its transpose, and scratch."""
+
+    target: np.ndarray
+    """Of each entry of J that is summed from areas its place among all, its place node by node, and the same two of the
+    entry that is its negative (again its own where none is), (c, 4) uint32."""
+    ring_start: np.ndarray
+    """First quadrangle in the ring of each summed entry, (c + 1,) uint32."""
+    corner: np.ndarray
+    """Nodes round a quadrangle, the last one the first again where it is a triangle, (q, 4) uint32."""
+    corner_share: np.ndarray
+    """s_rf / 6 [1], (q,)."""
+    row_start: np.ndarray
+    """First entry of each volume, (m + 1,) uint32."""
+    column: np.ndarray
+    """Node of each entry, (e,) uint32."""
+    node_start: np.ndarray
+    """Where the entries of each node begin in the next two, (n + 1,) uint32."""
+    node_entry: np.ndarray
+    """Entries node by node, volumes ascending, (e,) uint32."""
+    node_row: np.ndarray
+    """Their volumes, (e,) uint32."""
+    value: np.ndarray
+    """J_rj [m²], (e, 4); the fourth number is 0 and fills a vector register."""
+    node_value: np.ndarray
+    """The same node by node, (e, 4)."""
+    volume: np.ndarray
+    """V_r [m³], (m,)."""
+    lam: np.ndarray
+    """Multipliers, on the way in those of the last step [Pa], (m,)."""
+    right: np.ndarray
+    """What the multipliers of the moment leave of the right-hand side [m³/s²], (m,)."""
+    free_diagonal: np.ndarray
+    """S_rr without contact [m⁴/kg], (m,)."""
+    diagonal: np.ndarray
+    """S_rr [m⁴/kg], (m,)."""
+    clusters: Clusters
+    """Of no volume where S is solved densely."""
+    matrix: np.ndarray
+    """S [m⁴/kg], (m, m); (0, 0) where it is solved iteratively."""
+    search: np.ndarray
+    """(m,)."""
+    image: np.ndarray
+    """(m,)."""
+    allowed: np.ndarray
+    """Residual at which the iteration ends, (m,)."""
+    node_vector: np.ndarray
+    """(n, 4); the fourth number is 0."""
+
+
+class Motion(NamedTuple):
+    """What changes at every step, with the scratch arrays of the loop: nothing is allocated inside it."""
+
+    x: np.ndarray
+    """Positions [m], (n, 3)."""
+    v: np.ndarray
+    """Velocities [m/s], (n, 3)."""
+    v_star: np.ndarray
+    """Velocities after all known forces [m/s], (n, 3)."""
+    force: np.ndarray
+    """Spring forces [N], (n, 3)."""
+    gradient: np.ndarray
+    """G = dV/dx [m²], (n, 3)."""
+    touched: np.ndarray
+    """0 for a free node, else 1 + the obstacle it lies on, (n,) uint32."""
+    second: np.ndarray
+    """1 + the other obstacle of a node in a wedge, (n,) uint32."""
+    locked: np.ndarray
+    """Directions that obstacles take from a node: 0, 1 (slides on one), 2 (in a wedge) or 3 (sticks), (n,) uint8."""
+    normal: np.ndarray
+    """Unit normal of the touched obstacle, towards the body, (n, 3)."""
+    second_normal: np.ndarray
+    """Of the second obstacle, (n, 3)."""
+    direction: np.ndarray
+    """The normal of a node that slides, the edge of one in a wedge, (n, 3)."""
+    goal: np.ndarray
+    """Velocity that ends the step on the obstacles, in the directions taken, less what friction takes [m/s], (n, 3)."""
+    touching: np.ndarray
+    """The touched nodes, in the order in which they were found, (n,) uint32; released ones among them."""
+    touching_count: np.ndarray
+    """(1,) int64."""
+    entering: np.ndarray
+    """Scratch: nodes that would enter an obstacle, (n,) uint32."""
+    clearance: np.ndarray
+    """Distance to the nearest obstacle at the end of the predicted step [m], inf for touched nodes, (n,)."""
+    places: np.ndarray
+    """Scratch: positions [m] and a zero, (n, 4)."""
+    tile: np.ndarray
+    """Scratch of `kernels.slices`, one row a thread."""
+    pulled: np.ndarray
+    """Scratch: forces and 6 G of the slices of pieces, (pieces, 384)."""
+    sums: np.ndarray
+    """Scratch: shares of the slices in 18 V, G·v* and G·W·G, (S + 1, 3) float64; last those of nodes in pieces."""
+    team: Team | None = None
+    """Threads that share the longest loops; None for one thread: nothing is compiled for them then."""
+
+
+class Tips(NamedTuple):
+    """Where the tips of p thin probes are during a frame of q steps."""
+
+    start: np.ndarray
+    """At the start of each step [m], (q, p, 3)."""
+    end: np.ndarray
+    """At the end of each step [m], (q, p, 3)."""
+
+
+class Drive(NamedTuple):
+    """One frame's outside world, q steps, o obstacles, g attachments."""
+
+    dt: float
+    """[s]."""
+    damping: float
+    """Mass-proportional damping c [1/s]."""
+    gravity: np.ndarray
+    """[m/s²], (3,)."""
+    is_plane: np.ndarray
+    """(o,) bool; what is no plane is a capsule, a sphere where it has no length."""
+    plane_normal: np.ndarray
+    """Unit normals, towards the body, (o, 3)."""
+    radius: np.ndarray
+    """Of spheres and capsules [m], (o,)."""
+    span: np.ndarray
+    """From the start of a capsule's axis to its end [m], (o, 3)."""
+    friction: np.ndarray
+    """Coulomb's coefficient [1], (o,); inf where nothing slips."""
+    rough: bool
+    """Whether any obstacle has friction."""
+    position: np.ndarray
+    """Plane points, sphere centres and starts of capsules at the end of each step [m], (q, o, 3)."""
+    velocity: np.ndarray
+    """Of the obstacles, mean over each step [m/s], (q, o, 3)."""
+    held_displacement: np.ndarray
+    """Of the attachments at the end of each step [m], (q, g, 3)."""
+    volume_target: np.ndarray
+    """What each kept volume should be at the end of each step [m³], (q, m)."""
+    tips: Tips
+    """Of thin probes, which are not among the obstacles above."""
+
+
+class Accuracy(NamedTuple):
+    """When an iteration for the multipliers ends."""
+
+    tolerance: float
+    """Volume error left by the linear solve, over the volume [1]."""
+    most_iterations: int
+
+
+class Tally(NamedTuple):
+    """What a frame measures of itself; the loop adds, the caller starts it at zero."""
+
+    contact_impulse: np.ndarray
+    """Impulse of each obstacle on the body [N s], those of thin probes last, (o + p, 3)."""
+    held_impulse: np.ndarray
+    """Impulse of each attachment on the body [N s], (g, 3)."""
+    skipped: np.ndarray
+    """Steps in which a wrong volume had no gradient to push on, so that no pressure could act, (1,) int64."""
+    capped: np.ndarray
+    """Steps that made up for a part only of a wrong volume, (1,) int64."""
+    iterations: np.ndarray
+    """Iterations for the multipliers: their sum, and the most in one step, (2,) int64; 0 where they are direct."""
+    ticks: Ticks | None = None
+    """Where the time goes; None where nobody asks."""

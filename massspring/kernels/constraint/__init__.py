@@ -1,0 +1,1 @@
+"""Pressures that keep volumes."""

@@ -1,0 +1,105 @@
+"""The volume along a straight line: an exact cubic in the length of the step (docs/theory.md, section 10)."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from massspring.kernels.jit.decorators import compiled, inlined
+from massspring.kernels.step.predict import pushed_by_into, unpushed_into
+
+POLISHES = 4
+"""Newton steps after the closed form: each doubles the digits that cancellation has left of it."""
+BEYOND = 1e-12
+"""A root this many times farther away than the linear step is round-off of one at infinity."""
+
+
+class Line(NamedTuple):
+    """Where a step would end without pressure, and where a pressure moves it."""
+
+    y: np.ndarray
+    """y = x + dt ṽ [m], (n, 3)."""
+    d: np.ndarray
+    """d = dt² W̃ G, per unit of pressure [m/Pa], (n, 3)."""
+
+
+@compiled
+def line_into(motion, inverse_mass, dt, line):
+    """y = x + dt ṽ [m], d = dt² W̃ G [m/Pa], (n, 3) each: the step ends at y + lam d (eq. 9, 10, 101)."""
+    unpushed_into(motion, dt, line.y)
+    pushed_by_into(motion, inverse_mass, dt * dt, motion.gradient, line.d)
+
+
+@inlined
+def triple(a, b, c):
+    """a · (b × c) of three vectors, each a tuple of three numbers."""
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+
+
+@compiled
+def volume_cubic(y, d, triangles):
+    """V(y + a d) = V + a G(y)·d + a² Σ y·g(d) + a³ V[d]: the four coefficients, on a closed surface (eq. 101).
+
+    y is seen from a node of the surface, so that no digits are lost far from the origin.
+    """
+    o0, o1, o2 = y[triangles[0, 0], 0], y[triangles[0, 0], 1], y[triangles[0, 0], 2]
+    k0, k1, k2, k3 = 0.0, 0.0, 0.0, 0.0
+    for f in range(triangles.shape[0]):
+        i, j, k = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+        a = y[i, 0] - o0, y[i, 1] - o1, y[i, 2] - o2
+        b = y[j, 0] - o0, y[j, 1] - o1, y[j, 2] - o2
+        c = y[k, 0] - o0, y[k, 1] - o1, y[k, 2] - o2
+        p = d[i, 0], d[i, 1], d[i, 2]
+        q = d[j, 0], d[j, 1], d[j, 2]
+        r = d[k, 0], d[k, 1], d[k, 2]
+        k0 += triple(a, b, c)
+        k1 += triple(p, b, c)
+        k1 += triple(a, q, c)
+        k1 += triple(a, b, r)
+        k2 += triple(a, q, r)
+        k2 += triple(p, b, r)
+        k2 += triple(p, q, c)
+        k3 += triple(p, q, r)
+    return k0 / 6.0, k1 / 6.0, k2 / 6.0, k3 / 6.0
+
+
+@compiled
+def largest_root(b, c, e):
+    """The real root of t³ + b t² + c t + e of largest modulus (Cardano; three real ones by Viète's cosines)."""
+    q = (b * b - 3.0 * c) / 9.0
+    r = (2.0 * b * b * b - 9.0 * b * c + 27.0 * e) / 54.0
+    if r * r < q * q * q:
+        root = math.sqrt(q)
+        angle = math.acos(min(max(r / (root * root * root), -1.0), 1.0))
+        largest = 0.0
+        for turn in range(3):
+            t = -2.0 * root * math.cos((angle + 2.0 * math.pi * turn) / 3.0) - b / 3.0
+            if abs(t) > abs(largest):
+                largest = t
+        return largest
+    u = -math.copysign(np.cbrt(abs(r) + math.sqrt(max(r * r - q * q * q, 0.0))), r)
+    return u + (q / u if u != 0.0 else 0.0) - b / 3.0
+
+
+@compiled
+def nearest_root(k0, k1, k2, k3):
+    """The real a nearest to 0 with k0 + k1 a + k2 a² + k3 a³ = 0; NaN where there is none (eq. 102).
+
+    In t = s/a with s = −k0/k1, the linear step, it is the largest root of t³ − t² + …: never of lower degree.
+    """
+    if k0 == 0.0:
+        return 0.0
+    scale = -k0 / k1 if k1 != 0.0 else 1.0
+    b, c, e = k1 * scale / k0, k2 * scale * scale / k0, k3 * scale * scale * scale / k0
+    t = largest_root(b, c, e)
+    left = abs(e + t * (c + t * (b + t)))
+    for _ in range(POLISHES):
+        slope = c + t * (2.0 * b + 3.0 * t)
+        if slope == 0.0:
+            break
+        better = t - (e + t * (c + t * (b + t))) / slope
+        now = abs(e + better * (c + better * (b + better)))
+        if not now < left:
+            break
+        t, left = better, now
+    return scale / t if abs(t) > BEYOND and math.isfinite(t) else math.nan

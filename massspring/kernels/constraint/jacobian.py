@@ -1,0 +1,134 @@
+"""Several volumes at once: the sparse rows J_r = dV_r/dx and what multiplies them (docs/theory.md, section 8)."""
+
+import math
+
+from massspring.kernels.contact.node_contact import allowed_part
+from massspring.kernels.jit.decorators import compiled, lean
+from massspring.kernels.jit.row_sums import copy_scaled, sum_of_areas, sum_of_products, sum_of_scaled, sums_from_origin
+
+NEGLIGIBLE = 1e-12
+"""A diagonal or pivot this much smaller than what it was summed from is round-off."""
+
+
+@compiled
+def rows_into(x, inverse_mass, rows):
+    """J_rj [m²], the non-zero entries (e, 4), padded with 0, V_r [m³] (eq. 32, 39) and S_rr without contact [m⁴/kg]."""
+    places = rows.node_vector
+    for i in range(x.shape[0]):
+        places[i, 0], places[i, 1], places[i, 2] = x[i, 0], x[i, 1], x[i, 2]
+    areas_into(rows, places)
+    for r in range(rows.volume.shape[0]):
+        first, last = rows.row_start[r], rows.row_start[r + 1]
+        three, square = 0.0, 0.0
+        if last > first:
+            three, square = sums_from_origin(first, last, rows.column, rows.value, places, inverse_mass)
+        rows.volume[r], rows.free_diagonal[r] = three / 3.0, square
+
+
+@lean
+def areas_into(rows, places):
+    """J_rj = Σ_q c_q (x_2 − x_0) × (x_3 − x_1) [m²], the area of the ring of node j in volume r (eq. 39).
+
+    Σ_j J_rj = 0. Where J_jr = −J_rj always, one of the two is summed.
+    """
+    value, node_value, target = rows.value, rows.node_value, rows.target
+    for k in range(target.shape[0]):
+        e, twin = target[k, 0], target[k, 2]
+        sum_of_areas(rows.ring_start[k], rows.ring_start[k + 1], rows.corner, rows.corner_share, places, value, e)
+        copy_scaled(1.0, value, e, node_value, target[k, 1])
+        if twin != e:
+            copy_scaled(-1.0, value, e, value, twin)
+            copy_scaled(-1.0, value, e, node_value, target[k, 3])
+
+
+@compiled
+def rows_times_into(rows, u, product):
+    """(J u)_r = Σ_j J_rj · u_j, (m,)."""
+    for r in range(product.shape[0]):
+        total = 0.0
+        for e in range(rows.row_start[r], rows.row_start[r + 1]):
+            j = rows.column[e]
+            total += rows.value[e, 0] * u[j, 0] + rows.value[e, 1] * u[j, 1] + rows.value[e, 2] * u[j, 2]
+        product[r] = total
+
+
+@lean
+def padded_rows_times_into(rows, u, product):
+    """(J u)_r as above for `u` (n, 4) with 0 as fourth number, twice as fast."""
+    value, column, start = rows.value, rows.column, rows.row_start
+    for r in range(product.shape[0]):
+        product[r] = sum_of_products(start[r], start[r + 1], column, value, u)
+
+
+@lean
+def transposed_rows_times_into(rows, p, out):
+    """(Jᵀ p)_j = Σ_r J_rj p_r, (n, 3): with pressures p [Pa] the force of all volumes on each node [N]."""
+    u, start, row, value = rows.node_vector, rows.node_start, rows.node_row, rows.node_value
+    for j in range(out.shape[0]):
+        sum_of_scaled(start[j], start[j + 1], row, value, p, 1.0, u, j)
+    for j in range(out.shape[0]):
+        out[j, 0], out[j, 1], out[j, 2] = u[j, 0], u[j, 1], u[j, 2]
+
+
+@compiled
+def pushed_velocity_into(motion, inverse_mass, dt, u):
+    """u = ṽ + dt W̃ F [m/s], (n, 3), with F = Jᵀ lam in `motion.gradient` [N] (eq. 9, 10)."""
+    for i in range(u.shape[0]):
+        push = dt * inverse_mass[i]
+        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
+        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
+        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+        if motion.locked[i] > 0:
+            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+            u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
+            u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
+        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+
+
+@lean
+def mobilised_into(rows, motion, inverse_mass, p, u):
+    """u = W̃ Jᵀ p, (n, 4): no motion of a held node, none into an obstacle (eq. 9)."""
+    start, row, value, locked, direction = (
+        rows.node_start,
+        rows.node_row,
+        rows.node_value,
+        motion.locked,
+        motion.direction,
+    )
+    for i in range(u.shape[0]):
+        sum_of_scaled(start[i], start[i + 1], row, value, p, inverse_mass[i], u, i)
+    for i in range(u.shape[0]):
+        if locked[i] > 0:
+            d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
+            u[i, 0], u[i, 1], u[i, 2] = allowed_part(locked[i], d0, d1, d2, u[i, 0], u[i, 1], u[i, 2])
+
+
+@compiled
+def diagonal_into(rows, motion, inverse_mass, diagonal):
+    """S_rr = Σ_j J_rj · W̃_j J_rj [m⁴/kg], (m,), from what it is without contact (eq. 9).
+
+    0 where contact and held nodes leave nothing but round-off.
+    """
+    for r in range(diagonal.shape[0]):
+        diagonal[r] = rows.free_diagonal[r]
+    for j in range(inverse_mass.shape[0]):
+        if motion.locked[j] > 0:
+            d0, d1, d2 = motion.direction[j, 0], motion.direction[j, 1], motion.direction[j, 2]
+            for k in range(rows.node_start[j], rows.node_start[j + 1]):
+                g0, g1, g2 = rows.node_value[k, 0], rows.node_value[k, 1], rows.node_value[k, 2]
+                p0, p1, p2 = allowed_part(motion.locked[j], d0, d1, d2, g0, g1, g2)
+                taken = g0 * (g0 - p0) + g1 * (g1 - p1) + g2 * (g2 - p2)
+                diagonal[rows.node_row[k]] -= inverse_mass[j] * taken
+    for r in range(diagonal.shape[0]):
+        if not diagonal[r] > NEGLIGIBLE * rows.free_diagonal[r]:
+            diagonal[r] = 0.0
+
+
+@compiled
+def steepest_of_row(rows, inverse_mass, r):
+    """max_j w_j |J_rj| [m²/kg]: how far the node that moves most goes per unit of pressure and dt²."""
+    steepest = 0.0
+    for e in range(rows.row_start[r], rows.row_start[r + 1]):
+        g0, g1, g2 = rows.value[e, 0], rows.value[e, 1], rows.value[e, 2]
+        steepest = max(steepest, inverse_mass[rows.column[e]] * math.sqrt(g0 * g0 + g1 * g1 + g2 * g2))
+    return steepest

@@ -1,0 +1,1 @@
+"""Which nodes touch, and what that takes from their motion."""

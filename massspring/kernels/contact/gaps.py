@@ -1,0 +1,97 @@
+"""How far nodes end the predicted step from obstacles: all of them side by side, or one.
+
+In the loops over all nodes literals such as 0.0 are avoided: they turn one over single numbers into one over double
+ones.
+"""
+
+import math
+
+from massspring.kernels.contact.node_contact import axis_share, round_gap
+from massspring.kernels.jit.decorators import inlined
+from massspring.kernels.jit.flat import flat
+
+
+@inlined
+def clearances_into(network, motion, drive, step, lam, first, last):
+    """clearance_i = min over obstacles of the distance of y = x + dt (v* + dt lam W G) [m] (eq. 12).
+
+    Of the nodes from `first` to `last`, those that nothing can touch among them.
+    """
+    real = motion.x.dtype.type
+    x, v_star = flat(motion.x, first, last), flat(motion.v_star, first, last)
+    gradient, inverse_mass = flat(motion.gradient, first, last), flat(network.inverse_mass, first, last)
+    course = x, v_star, gradient, inverse_mass, real(drive.dt), real(drive.dt * lam)
+    clearance = flat(motion.clearance, first, last)
+    for i in range(clearance.shape[0]):
+        clearance[i] = math.inf
+    for o in range(drive.radius.shape[0]):
+        place, span, radius = drive.position[step, o], drive.span[o], real(drive.radius[o])
+        p0, p1, p2 = real(place[0]), real(place[1]), real(place[2])
+        if drive.is_plane[o]:
+            normal = drive.plane_normal[o]
+            plane_clearance(course, clearance, p0, p1, p2, real(normal[0]), real(normal[1]), real(normal[2]))
+        elif span[0] == 0.0 and span[1] == 0.0 and span[2] == 0.0:
+            sphere_clearance(course, clearance, p0, p1, p2, radius)
+        else:
+            capsule_clearance(course, clearance, p0, p1, p2, real(span[0]), real(span[1]), real(span[2]), radius)
+
+
+@inlined
+def way_from(p0, p1, p2, course, i):
+    """y − p [m] of a node, y = x + dt (v* + dt lam W G)."""
+    x, v_star, gradient, inverse_mass, dt, push = course
+    w = push * inverse_mass[i]
+    r0 = x[3 * i] + dt * (v_star[3 * i] + w * gradient[3 * i]) - p0
+    r1 = x[3 * i + 1] + dt * (v_star[3 * i + 1] + w * gradient[3 * i + 1]) - p1
+    r2 = x[3 * i + 2] + dt * (v_star[3 * i + 2] + w * gradient[3 * i + 2]) - p2
+    return r0, r1, r2
+
+
+@inlined
+def plane_clearance(course, clearance, p0, p1, p2, n0, n1, n2):
+    """n·(y − p) [m]."""
+    for i in range(clearance.shape[0]):
+        r0, r1, r2 = way_from(p0, p1, p2, course, i)
+        clearance[i] = min(clearance[i], n0 * r0 + n1 * r1 + n2 * r2)
+
+
+@inlined
+def sphere_clearance(course, clearance, c0, c1, c2, radius):
+    """|y − c| − R [m]."""
+    for i in range(clearance.shape[0]):
+        r0, r1, r2 = way_from(c0, c1, c2, course, i)
+        clearance[i] = min(clearance[i], math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius)
+
+
+@inlined
+def capsule_clearance(course, clearance, p0, p1, p2, a0, a1, a2, radius):
+    """Distance of y to the axis p … p + a less R [m]."""
+    for i in range(clearance.shape[0]):
+        r0, r1, r2 = way_from(p0, p1, p2, course, i)
+        clearance[i] = min(clearance[i], round_gap(r0, r1, r2, a0, a1, a2, radius))
+
+
+@inlined
+def pushed_velocity(network, motion, drive, lam, i):
+    """u = v* + dt lam W G of node i when the pressure acts as a force [m/s] (eq. 12)."""
+    push = drive.dt * lam * network.inverse_mass[i]
+    u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
+    u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
+    u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+    return u0, u1, u2
+
+
+@inlined
+def gap_and_normal(drive, o, r0, r1, r2):
+    """Distance [m] of r to obstacle o, negative inside, and its normal there; r is seen from the obstacle's position.
+
+    On the axis of a round one the normal is not a number.
+    """
+    if drive.is_plane[o]:
+        n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
+        return n0 * r0 + n1 * r1 + n2 * r2, n0, n1, n2
+    a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
+    share = axis_share(r0, r1, r2, a0, a1, a2)
+    r0, r1, r2 = r0 - share * a0, r1 - share * a1, r2 - share * a2
+    distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+    return distance - drive.radius[o], r0 / distance, r1 / distance, r2 / distance

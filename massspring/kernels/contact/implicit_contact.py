@@ -1,0 +1,25 @@
+"""Contact for methods whose steps are long and solved as a whole."""
+
+from massspring.kernels.contact.active_set import admit, enters, forget_released, seat
+from massspring.kernels.jit.decorators import compiled
+
+
+@compiled
+def seat_entering(network, motion, drive, step):
+    """Puts free surface nodes that `v_star` carries into an obstacle onto it (eq. 12) and lists them; how many.
+
+    Those that have been released since the last search leave the list.
+    """
+    forget_released(motion)
+    count = 0
+    for c in range(network.surface_nodes.shape[0]):
+        i = network.surface_nodes[c]
+        if network.inverse_mass[i] == 0.0 or motion.locked[i] > 0:
+            continue
+        if enters(network, motion, drive, step, 0.0, i):
+            motion.entering[count] = i
+            count += 1
+    if count > 0:
+        seat(network, motion, drive, step, 0.0, count)
+        admit(motion, count)
+    return count

@@ -1,0 +1,83 @@
+"""Where a node is beside an obstacle, and what motion an obstacle leaves it.
+
+These functions know numbers alone, no arrays: the same ones serve a node, a point of a probe, and loops over all nodes,
+in either precision.
+"""
+
+import math
+
+from massspring.kernels.jit.decorators import lean
+
+
+@lean
+def allowed_part(locked, d0, d1, d2, g0, g1, g2):
+    """P g, what obstacles leave of a vector: P = I − n nᵀ on one, e eᵀ on two, 0 where a node sticks (eq. 9)."""
+    along = g0 * d0 + g1 * d1 + g2 * d2
+    if locked == 1:
+        return g0 - along * d0, g1 - along * d1, g2 - along * d2
+    if locked == 2:
+        return along * d0, along * d1, along * d2
+    return 0.0, 0.0, 0.0
+
+
+@lean
+def taken_share(locked, d0, d1, d2, g0, g1, g2, v0, v1, v2):
+    """g·(I − P) v, what obstacles take of a product (eq. 9)."""
+    along = (g0 * d0 + g1 * d1 + g2 * d2) * (v0 * d0 + v1 * d1 + v2 * d2)
+    if locked == 1:
+        return along
+    whole = g0 * v0 + g1 * v1 + g2 * v2
+    return whole - along if locked == 2 else whole
+
+
+@lean
+def axis_share(r0, r1, r2, s0, s1, s2):
+    """Where on a segment 0 … s the point nearest to r lies, 0 … 1; 0 where s has no length.
+
+    Constants of the type of its numbers: a double among floats makes the loop over all nodes three times slower.
+    """
+    square = s0 * s0 + s1 * s1 + s2 * s2
+    real = type(square)
+    zero, one = real(0.0), real(1.0)
+    return min(max((r0 * s0 + r1 * s1 + r2 * s2) / square, zero), one) if square > zero else zero
+
+
+@lean
+def round_gap(r0, r1, r2, a0, a1, a2, radius):
+    """Distance [m] of r to the axis 0 … a less a radius, negative inside (eq. 12)."""
+    share = axis_share(r0, r1, r2, a0, a1, a2)
+    r0, r1, r2 = r0 - share * a0, r1 - share * a1, r2 - share * a2
+    return math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius
+
+
+@lean
+def sphere_contact(s, r, radius):
+    """(normal, lift) of a node at s now and at r after the predicted step, seen from the centre [m] (eq. 12).
+
+    n = s/|s|; the node ends the step at n·r⁺ = n·r + lift = √(R² − |r − n (n·r)|²), on the sphere, moved along n alone.
+    A node that slides farther than R within a step has no such point: it ends on the tangent plane at r/|r|. Inverse
+    lengths are infinite at the very centre, and the run has diverged.
+    """
+    s0, s1, s2 = s
+    r0, r1, r2 = r
+    distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+    now = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
+    along = (r0 * s0 + r1 * s1 + r2 * s2) / now if now > 0.0 else 0.0
+    below = radius * radius - (distance * distance - along * along)
+    if along > 0.0 and below > 0.0:
+        return s0 / now, s1 / now, s2 / now, math.sqrt(below) - along
+    return r0 / distance, r1 / distance, r2 / distance, radius - distance
+
+
+@lean
+def round_contact(s, r, a, radius):
+    """`sphere_contact` with the sphere around the nearest point of an axis 0 … a, a capsule's; a = 0: a sphere's.
+
+    Along the side both points are seen from the axis. A node that passes from side to end ends on the tangent plane.
+    """
+    now = axis_share(s[0], s[1], s[2], a[0], a[1], a[2])
+    then = axis_share(r[0], r[1], r[2], a[0], a[1], a[2])
+    r = r[0] - then * a[0], r[1] - then * a[1], r[2] - then * a[2]
+    if now == then or (0.0 < now < 1.0 and 0.0 < then < 1.0):
+        return sphere_contact((s[0] - now * a[0], s[1] - now * a[1], s[2] - now * a[2]), r, radius)
+    return sphere_contact(r, r, radius)

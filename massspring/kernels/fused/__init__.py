@@ -1,0 +1,1 @@
+"""Springs, volume gradient and prediction in one pass over the nodes."""

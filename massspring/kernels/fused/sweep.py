@@ -1,0 +1,191 @@
+"""Springs, volume gradient and prediction of all nodes: one pass over their neighbours, 64 nodes at a time.
+
+Each spring is computed at both of its ends: nothing is scattered, and all lanes of a vector register do the same.
+"""
+
+from massspring.kernels.forces.springs import SHORTEST
+from massspring.kernels.fused.chunk import (
+    AREA,
+    EVEN,
+    FIRST,
+    FORCE,
+    HERE,
+    LANES,
+    ODD,
+    RESULT,
+    SHARE,
+    SPEED,
+    SUMS,
+    begin,
+    close_rings,
+    fetch,
+    put,
+    store,
+    stretch,
+    sweep_pair,
+    take,
+    total,
+)
+from massspring.kernels.fused.long_rows import add_walls, join_pieces
+from massspring.kernels.jit.decorators import inlined, lean
+from massspring.kernels.jit.thread_team import SPRINGS, SPRINGS_AND_VOLUME, call, join
+from massspring.kernels.step.advance import places_into
+
+
+@inlined
+def gather(places, slices, s, keeps, shortest, o0, o1, o2, tile):
+    """f_i [N] (eq. 1) and, where a volume is kept, 6 G_i = Σ_k d_k × d_k+1 [m²] (eq. 108) of a slice; its share of V.
+
+    d_k = x_k − x_i goes round the ring of neighbours of node i, then on to its other springs. The share is the slice's
+    in 18 V = Σ 6 G·(x − o); o is a node of the surface, so that no digits are lost far from the origin.
+    """
+    neighbour, rest_length = slices.neighbour, slices.rest_length
+    stiffness, stiffness_row = slices.stiffness, slices.stiffness_row
+    begin(places, slices, s, tile)
+    first, last = slices.start[s], slices.start[s + 1]
+    ring_end = first + (slices.rings[s] if keeps else 0)
+    share = 0.0
+    if ring_end > first:
+        walk_rings(places, slices, first, ring_end, shortest, tile)
+        close_rings(tile, (ring_end - first) % 2, o0, o1, o2)
+        share = total(tile, SHARE)
+    for row in range(ring_end, last):
+        fetch(places, neighbour, row, tile)
+        k = stiffness_row[row]
+        for lane in range(LANES):
+            stretch(tile, lane, stiffness[k, lane], rest_length[row, lane], shortest)
+    return share
+
+
+@inlined
+def walk_rings(places, slices, first, last, shortest, tile):
+    """The springs to the rings of a slice and, of 6 G, what lies between the first and the last entry.
+
+    Entries 1 and 2, 3 and 4, … give theirs together; of an even number the last is left for `close_rings`.
+    """
+    neighbour, rest_length = slices.neighbour, slices.rest_length
+    stiffness, stiffness_row = slices.stiffness, slices.stiffness_row
+    fetch(places, neighbour, first, tile)
+    k = stiffness_row[first]
+    for lane in range(LANES):
+        d0, d1, d2 = stretch(tile, lane, stiffness[k, lane], rest_length[first, lane], shortest)
+        store(tile, EVEN, lane, d0, d1, d2)
+        store(tile, FIRST, lane, d0, d1, d2)
+    for row in range(first + 1, last):
+        fetch(places, neighbour, row, tile)
+        k = stiffness_row[row]
+        if (row - first) % 2:
+            for lane in range(LANES):
+                d0, d1, d2 = stretch(tile, lane, stiffness[k, lane], rest_length[row, lane], shortest)
+                store(tile, ODD, lane, d0, d1, d2)
+        else:
+            for lane in range(LANES):
+                d0, d1, d2 = stretch(tile, lane, stiffness[k, lane], rest_length[row, lane], shortest)
+                sweep_pair(tile, lane, d0, d1, d2)
+                store(tile, EVEN, lane, d0, d1, d2)
+
+
+@inlined
+def predict_slice(motion, slices, s, dt, keep, a0, a1, a2, tile):
+    """v* (eq. 6) and G of the nodes of a slice in place of x and 6 G, and their shares of G·v* and G·W·G."""
+    v, node, inverse_mass = motion.v, slices.node, slices.inverse_mass
+    sixth = motion.x.dtype.type(1.0 / 6.0)
+    if slices.first[s] >= 0:
+        take(v, slices.first[s], 3, tile)
+    else:
+        for lane in range(LANES):
+            i, at = node[s, lane], SPEED + 3 * lane
+            tile[at], tile[at + 1], tile[at + 2] = v[i, 0], v[i, 1], v[i, 2]
+    for lane in range(LANES):
+        at, w = SPEED + 3 * lane, inverse_mass[s, lane]
+        v0 = keep * tile[at] + dt * w * tile[FORCE + lane] + a0
+        v1 = keep * tile[at + 1] + dt * w * tile[FORCE + LANES + lane] + a1
+        v2 = keep * tile[at + 2] + dt * w * tile[FORCE + 2 * LANES + lane] + a2
+        g0, g1 = sixth * tile[AREA + lane], sixth * tile[AREA + LANES + lane]
+        g2 = sixth * tile[AREA + 2 * LANES + lane]
+        tile[SUMS + lane] = g0 * v0 + g1 * v1 + g2 * v2
+        tile[SUMS + LANES + lane] = w * (g0 * g0 + g1 * g1 + g2 * g2)
+        tile[HERE + lane], tile[HERE + LANES + lane], tile[HERE + 2 * LANES + lane] = v0, v1, v2
+        tile[AREA + lane], tile[AREA + LANES + lane], tile[AREA + 2 * LANES + lane] = g0, g1, g2
+
+
+@inlined
+def keep_held(slices, s, force, tile):
+    """The spring forces of the held nodes of a slice [N]: what their attachments take."""
+    for h in range(slices.held_start[s], slices.held_start[s + 1]):
+        lane = slices.held_lane[h]
+        i = slices.node[s, lane]
+        for axis in range(3):
+            force[i, axis] = tile[FORCE + axis * LANES + lane]
+
+
+@inlined
+def pass_slices(motion, drive, slices, first, last, keeps, tile):
+    """v* and G of some slices, with their shares of 18 V, G·v* and G·W·G in `sums`; of pieces f and 6 G alone."""
+    real = motion.x.dtype.type
+    dt, keep = real(drive.dt), real(1.0 - drive.damping * drive.dt)
+    a0, a1, a2 = real(drive.dt * drive.gravity[0]), real(drive.dt * drive.gravity[1]), real(drive.dt * drive.gravity[2])
+    places, pulled, sums, v_star, gradient = motion.places, motion.pulled, motion.sums, motion.v_star, motion.gradient
+    shortest = real(SHORTEST)
+    o0, o1, o2 = places[slices.origin, 0], places[slices.origin, 1], places[slices.origin, 2]
+    for s in range(first, last):
+        sums[s, 0] = gather(places, slices, s, keeps, shortest, o0, o1, o2, tile)
+        if s < slices.pieces:
+            for entry in range(RESULT):
+                pulled[s, entry] = tile[entry]
+            continue
+        keep_held(slices, s, motion.force, tile)
+        predict_slice(motion, slices, s, dt, keep, a0, a1, a2, tile)
+        put(tile, HERE, slices, s, v_star)
+        # Empty lanes have springs of no stiffness and no ring: they add zeros.
+        if keeps:
+            put(tile, AREA, slices, s, gradient)
+            sums[s, 1], sums[s, 2] = total(tile, SUMS), total(tile, SUMS + LANES)
+
+
+@inlined
+def pass_all(motion, drive, slices, keeps, team):
+    """`pass_slices` of all slices, by as many threads as there are."""
+    if team is None:
+        pass_slices(motion, drive, slices, 0, slices.lanes.shape[0], keeps, motion.tile[0])
+    else:
+        call(team, SPRINGS_AND_VOLUME if keeps else SPRINGS, 0, 0.0)
+        pass_slices(motion, drive, slices, team.slices[0], team.slices[1], keeps, motion.tile[0])
+        join(team)
+
+
+@inlined
+def predict_from_places(network, motion, drive, keeps):
+    """v* of eq. 6 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
+
+    `places` holds the positions. Of the forces only those of held nodes are written out.
+    """
+    slices = network.slices
+    walls = network.membrane.triangles.shape[0] > 0
+    if walls:
+        motion.force[:] = 0
+    pass_all(motion, drive, slices, keeps, motion.team)
+    join_pieces(network, motion, drive, keeps)
+    volume, flow, mobility = add_up(motion.sums, slices.pieces)
+    if walls:
+        flow += add_walls(network, motion, drive.dt)
+    return volume, flow, mobility
+
+
+@lean
+def gather_and_predict(network, motion, drive, keeps):
+    """The same from `x`; leaves the positions in `places`, where `advance` looks for them."""
+    places_into(motion, 0, motion.x.shape[0])
+    return predict_from_places(network, motion, drive, keeps)
+
+
+@inlined
+def add_up(sums, pieces):
+    """(V, G·v*, G·W·G) from the shares of the slices, in double precision and always in the same order."""
+    volume, flow, mobility = 0.0, 0.0, 0.0
+    for s in range(sums.shape[0]):
+        volume += sums[s, 0]
+        if s >= pieces:
+            flow += sums[s, 1]
+            mobility += sums[s, 2]
+    return volume / 18.0, flow, mobility

@@ -1,0 +1,21 @@
+"""Looking for the few among many: 64 nodes are passed over at once where none of them is meant."""
+
+from massspring.kernels.jit.decorators import inlined
+from massspring.kernels.jit.flat import flat
+
+BLOCK = 64
+"""Nodes."""
+
+
+@inlined
+def any_within(clearance, begin, reach):
+    """Whether any node of the block is no farther than `reach` [m]; a block that is not full is always looked through.
+
+    What is not a number counts as near.
+    """
+    if begin + BLOCK > clearance.shape[0]:
+        return True
+    block, found = flat(clearance, begin, begin + BLOCK), 0
+    for i in range(BLOCK):
+        found += not block[i] > reach
+    return found > 0

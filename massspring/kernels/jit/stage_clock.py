@@ -1,0 +1,81 @@
+"""A clock inside the frame loop: what each stage of a step costs. Without ticks a mark compiles to nothing."""
+
+from time import perf_counter_ns
+from typing import NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+
+from massspring.kernels.jit.decorators import inlined
+
+STAGES = (
+    "springs and prediction",
+    "attachments",
+    "volume",
+    "contact search",
+    "multiplier",
+    "contact revision",
+    "thin probes",
+    "integration",
+)
+"""Where one volume is kept by implicit_volume, its gradient is found in the same pass as the springs."""
+SPRINGS, HELD, VOLUME, SEARCH, MULTIPLIER, REVISION, PROBES, INTEGRATION, OUTSIDE = range(len(STAGES) + 1)
+"""OUTSIDE: between two frames."""
+MONOTONIC = 1
+"""The clock's number in POSIX systems (Linux)."""
+
+
+class Ticks(NamedTuple):
+    """Where marks write."""
+
+    spent: np.ndarray
+    """Time in each stage and outside [ns], (stages + 1,) int64."""
+    last: np.ndarray
+    """Time of the last mark [ns], (1,) int64."""
+    marks: np.ndarray
+    """How many there were, each stage apart, (stages + 1,) int64."""
+
+
+def new_ticks() -> Ticks:
+    """Ticks at zero."""
+    return Ticks(*(np.zeros(size, dtype=np.int64) for size in (len(STAGES) + 1, 1, len(STAGES) + 1)))
+
+
+@intrinsic
+def _clock(typingctx):
+    """`clock_gettime`, by its name in the process, so that compiled code can be kept on disk; [ns]."""
+
+    def generate(context, builder, signature, arguments):
+        i32, i64 = ir.IntType(32), ir.IntType(64)
+        time = cgutils.alloca_once(builder, ir.ArrayType(i64, 2))
+        kind = ir.FunctionType(i32, [i32, time.type])
+        function = cgutils.get_or_insert_function(builder.module, kind, "clock_gettime")
+        builder.call(function, [i32(MONOTONIC), time])
+        whole = builder.load(cgutils.gep_inbounds(builder, time, 0, 0))
+        rest = builder.load(cgutils.gep_inbounds(builder, time, 0, 1))
+        return builder.add(builder.mul(whole, i64(1_000_000_000)), rest)
+
+    return types.int64(), generate
+
+
+def now() -> int:
+    """Time of a clock that never goes back [ns]."""
+    return perf_counter_ns()
+
+
+@overload(now)
+def _compiled_now():
+    return lambda: _clock()  # pyright: ignore[reportCallIssue]
+
+
+@inlined
+def mark(ticks, stage):
+    """Books the time since the last mark on `stage`; nothing where ticks is None."""
+    if ticks is not None:
+        time = now()
+        ticks.spent[stage] += time - ticks.last[0]
+        ticks.marks[stage] += 1
+        ticks.last[0] = time

@@ -1,0 +1,145 @@
+"""Several threads at one frame: the caller's runs it all, the others wait for parts of its longest loops.
+
+Every number is computed by the same instructions from the same numbers as by one thread, and sums are kept apart by
+slice: results are equal to the last bit. Waiting is by spinning, a step has no time to sleep.
+"""
+
+import os
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+
+from massspring.kernels.jit.decorators import inlined
+
+LINE = 8
+"""Numbers of a line of the cache: counters in one line would slow each other down."""
+ROUND, DONE, JOB, STEP, READY = (LINE * line for line in range(5))
+REST, SPRINGS, SPRINGS_AND_VOLUME, SEARCH, MOVE = range(5)
+"""Jobs; REST ends the frame."""
+PATIENCE = 20_000
+"""Looks at a counter before the thread offers its core to others: 5 to 10 µs."""
+
+
+class Team(NamedTuple):
+    """How T threads share the work: each has the slices and the nodes between two borders of its own.
+
+    Borders depend on T, sums do not: a slice is always summed by itself, and slices in their order."""
+
+    signal: np.ndarray
+    """Round number, parts done, job, step, whether all is compiled; one line of the cache each, int64."""
+    pressure: np.ndarray
+    """lam of the job [Pa], (1,) float64."""
+    slices: np.ndarray
+    """First slice of each thread, (T + 1,) int64."""
+    nodes: np.ndarray
+    """First node of each thread, (T + 1,) int64."""
+
+
+def look(signal: np.ndarray, at: int) -> int:
+    """signal[at], and all that its writer wrote before it."""
+    return int(signal[at])
+
+
+def raise_by_one(signal: np.ndarray, at: int) -> None:
+    """signal[at] += 1, seen by others after all that was written before."""
+    signal[at] += 1
+
+
+def offer_core() -> None:
+    """Lets another thread of this core run."""
+    if hasattr(os, "sched_yield"):
+        os.sched_yield()
+
+
+def _pointer(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    array = context.make_array(signature.args[0])(context, builder, args[0])
+    return builder.gep(array.data, [args[1]])
+
+
+@intrinsic
+def _look(typingctx: Any, signal: Any, at: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.load_atomic(_pointer(context, builder, signature, args), "acquire", 8)
+
+    return types.int64(signal, types.intp), generate
+
+
+@intrinsic
+def _raise_by_one(typingctx: Any, signal: Any, at: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        builder.atomic_rmw(
+            "add", _pointer(context, builder, signature, args), ir.Constant(ir.IntType(64), 1), "acq_rel"
+        )
+        return context.get_dummy_value()
+
+    return types.void(signal, types.intp), generate
+
+
+@intrinsic
+def _offer_core(typingctx: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.FunctionType(ir.IntType(32), [])
+        builder.call(cgutils.get_or_insert_function(builder.module, kind, "sched_yield"), [])
+        return context.get_dummy_value()
+
+    return types.void(), generate
+
+
+@overload(look)
+def _compiled_look(signal, at):
+    return lambda signal, at: _look(signal, at)  # pyright: ignore[reportCallIssue]
+
+
+@overload(raise_by_one)
+def _compiled_raise(signal, at):
+    return lambda signal, at: _raise_by_one(signal, at)  # pyright: ignore[reportCallIssue]
+
+
+@overload(offer_core)
+def _compiled_offer():
+    return lambda: _offer_core()  # pyright: ignore[reportCallIssue]
+
+
+@inlined
+def wait_until_other_than(signal, at, value):
+    """Waits until signal[at] is not `value`; returns what it is."""
+    looks = 0
+    now = look(signal, at)
+    while now == value:
+        looks += 1
+        if looks > PATIENCE:
+            offer_core()
+        now = look(signal, at)
+    return now
+
+
+@inlined
+def call(team, job, step, lam):
+    """Gives every other thread its part of a job."""
+    team.signal[JOB], team.signal[STEP], team.signal[DONE] = job, step, 0
+    team.pressure[0] = lam
+    raise_by_one(team.signal, ROUND)
+
+
+@inlined
+def join(team):
+    """Waits until all parts of the job are done."""
+    others = team.nodes.shape[0] - 2
+    while True:
+        done = look(team.signal, DONE)
+        if done == others:
+            return
+        wait_until_other_than(team.signal, DONE, done)
+
+
+def team_of(threads: int, rows: np.ndarray, nodes: int, block: int) -> Team:
+    """T threads for slices that begin at `rows` (S + 1,) and for n nodes, as even as whole slices and blocks allow."""
+    share = np.arange(threads + 1) / threads
+    slices = np.searchsorted(rows, share * rows[-1])
+    borders = np.round(share * nodes / block).astype(np.int64) * block
+    borders[-1] = nodes
+    return Team(np.zeros(5 * LINE, dtype=np.int64), np.zeros(1), slices.astype(np.int64), np.minimum(borders, nodes))

@@ -1,0 +1,1 @@
+"""Thin tools against triangles (docs/theory.md, eq. 141 to 147)."""

@@ -1,0 +1,183 @@
+"""Contacts of points with triangles beside a volume: few rows, one small dense solve (docs/theory.md, section 11).
+
+A contact at the weights b of a triangle couples its three nodes. With u the motion of the step without any,
+
+    v⁺_i = u_i + W̃_i (Σ_k b_ki n_k c_k + dt δ G_i),  n_k·(Σ_i b_ki x⁺_i − tip⁺) ≥ radius,  c_k ≥ 0,
+    Σ G_i·(v⁺_i − u_i) = 0.
+
+Eliminating the change of pressure δ leaves A c ≥ right with A_kl = Σ_i b_ki b_li n_k·W̃_i n_l − g_k·S⁻¹ g_l.
+"""
+
+from massspring.kernels.constraint.schur import solve_dense
+from massspring.kernels.contact.node_contact import allowed_part
+from massspring.kernels.jit.decorators import lean
+from massspring.kernels.probe.pressure import answer_into, change_of_rows, flow_into
+
+RIGID = 1e-10
+"""Added share of A's diagonal: two contacts on one edge are one, and the weaker of them goes."""
+IDLE = 1e-9
+"""Share of the diagonal without the volume below which a contact has nothing to move."""
+SWAPS = 8
+"""Changes of the set that presses, times the number of rows; two are the rule."""
+SLACK = 1e-9
+"""Share of the largest right side by which a contact that does not press may be missed: round-off."""
+
+
+@lean
+def row_of(rows, p, f):
+    """The row of a probe and a triangle, or the number of rows."""
+    count = rows.count[0]
+    for k in range(count):
+        if rows.probe[k] == p and rows.triangle[k] == f:
+            return k
+    return count
+
+
+@lean
+def set_row(rows, p, f, triangles, pair):
+    """Makes what `pair` has found of probe p and triangle f their row; whether there is room for it."""
+    k = row_of(rows, p, f)
+    if k == rows.triangle.shape[0]:
+        return False
+    rows.count[0] = max(rows.count[0], k + 1)
+    rows.probe[k], rows.triangle[k] = p, f
+    for q in range(3):
+        rows.node[k, q] = triangles[f, q]
+        rows.weight[k, q] = pair.weight[q]
+        rows.direction[k, q] = pair.direction[q]
+    return True
+
+
+@lean
+def aim_rows(stage):
+    """W̃ n and the right side of every row (eq. 146).
+
+    right_k = [radius − n·(Σ b x − tip⁺)]/dt − n·Σ b u [m/s].
+    """
+    rows, motion, probes = stage.probes.rows, stage.motion, stage.probes
+    for k in range(rows.count[0]):
+        p = rows.probe[k]
+        d0, d1, d2 = rows.direction[k, 0], rows.direction[k, 1], rows.direction[k, 2]
+        end = stage.tips.end
+        gap = -(d0 * end[stage.step, p, 0] + d1 * end[stage.step, p, 1] + d2 * end[stage.step, p, 2])
+        approach = 0.0
+        for q in range(3):
+            i, b = rows.node[k, q], rows.weight[k, q]
+            approach += b * (d0 * probes.base[i, 0] + d1 * probes.base[i, 1] + d2 * probes.base[i, 2])
+            gap += b * (d0 * motion.x[i, 0] + d1 * motion.x[i, 1] + d2 * motion.x[i, 2])
+            w, m0, m1, m2 = stage.network.inverse_mass[i], d0, d1, d2
+            if motion.locked[i] > 0:
+                e0, e1, e2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+                m0, m1, m2 = allowed_part(motion.locked[i], e0, e1, e2, m0, m1, m2)
+            rows.moves[k, q, 0], rows.moves[k, q, 1], rows.moves[k, q, 2] = w * m0, w * m1, w * m2
+        rows.right[k] = (probes.radius[p] - gap) / stage.dt - approach
+
+
+@lean
+def matrix_into(rows):
+    """A_kj = Σ_i b_ki b_ji n_k·W̃_i n_j − g_k·S⁻¹ g_j [1/kg], both halves (eq. 146)."""
+    for k in range(rows.count[0]):
+        for j in range(k + 1):
+            shared = 0.0
+            for q in range(3):
+                for r in range(3):
+                    if rows.node[k, q] == rows.node[j, r]:
+                        along = 0.0
+                        for axis in range(3):
+                            along += rows.moves[k, q, axis] * rows.direction[j, axis]
+                        shared += rows.weight[k, q] * rows.weight[j, r] * along
+            value = shared
+            for r in range(rows.flow.shape[1]):
+                value -= rows.flow[k, r] * rows.answer[j, r]
+            if k == j:
+                # Where all else is held the volume may leave a triangle nowhere to go.
+                value = max(value, IDLE * shared) * (1.0 + RIGID)
+            rows.matrix[k, j], rows.matrix[j, k] = value, value
+
+
+@lean
+def press(rows):
+    """A_aa c_a = right_a for the rows that press, the others 0 [N s] (eq. 146)."""
+    count, active = 0, rows.active
+    for k in range(rows.count[0]):
+        rows.impulse[k] = 0.0
+        if active[k]:
+            rows.part[0, count] = rows.right[k]
+            other = 0
+            for j in range(k + 1):
+                if active[j]:
+                    rows.small[count, other] = rows.matrix[k, j]
+                    other += 1
+            count += 1
+    solve_dense(rows.small[:count, :count], rows.part[0, :count], rows.part[1, :count])
+    count = 0
+    for k in range(rows.count[0]):
+        if active[k]:
+            rows.impulse[k] = rows.part[1, count]
+            count += 1
+
+
+@lean
+def choose_rows(rows):
+    """c ≥ 0, A c ≥ right, and one of them equal in every row: a contact that would pull is left (eq. 146)."""
+    n = rows.count[0]
+    largest = 0.0
+    for k in range(n):
+        rows.active[k] = rows.right[k] > 0.0 and rows.matrix[k, k] > 0.0
+        largest = max(largest, abs(rows.right[k]))
+    for _ in range(SWAPS * n):
+        press(rows)
+        worst, swapped = 0.0, -1
+        for k in range(n):
+            if rows.active[k] and rows.impulse[k] < worst:
+                worst, swapped = rows.impulse[k], k
+        if swapped < 0:
+            worst = SLACK * largest
+            for k in range(n):
+                missed = rows.right[k]
+                for j in range(n):
+                    missed -= rows.matrix[k, j] * rows.impulse[j]
+                if not rows.active[k] and missed > worst and rows.matrix[k, k] > 0.0:
+                    worst, swapped = missed, k
+        if swapped < 0:
+            break
+        rows.active[swapped] = not rows.active[swapped]
+    for k in range(n):
+        rows.impulse[k] = max(rows.impulse[k], 0.0)
+
+
+@lean
+def spread_push(rows, push, inverse_mass):
+    """push_i = Σ_k b_ki c_k W̃_i n_k [m/s] of the corners of all rows; the largest bound w Σ b c on it [m/s]."""
+    clear_push(rows, push)
+    fastest = 0.0
+    for k in range(rows.count[0]):
+        for q in range(3):
+            i, share = rows.node[k, q], rows.weight[k, q] * rows.impulse[k]
+            for axis in range(3):
+                push[i, axis] += share * rows.moves[k, q, axis]
+            fastest += inverse_mass[i] * share
+    return fastest
+
+
+@lean
+def clear_push(rows, push):
+    """Takes the pushes of all rows away."""
+    for k in range(rows.count[0]):
+        for q in range(3):
+            for axis in range(3):
+                push[rows.node[k, q], axis] = 0.0
+
+
+@lean
+def solve_rows(stage, volumes):
+    """Impulses of all rows and the change of pressures beside them; how much faster they make a node at most [m/s]
+    (eq. 146)."""
+    rows = stage.probes.rows
+    aim_rows(stage)
+    for k in range(rows.count[0]):
+        flow_into(stage, volumes, k)
+        answer_into(stage, volumes, rows.flow[k], rows.answer[k])
+    matrix_into(rows)
+    choose_rows(rows)
+    return spread_push(rows, stage.probes.push, stage.network.inverse_mass) + change_of_rows(stage)

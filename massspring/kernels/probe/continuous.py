@@ -1,0 +1,245 @@
+"""A moving point and a moving triangle: when they meet, and where (docs/theory.md, section 11).
+
+All corners are given as seen from the point, so the point rests at the origin and a pair is two arrays (3, 3).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from massspring.kernels.contact.node_contact import axis_share
+from massspring.kernels.jit.decorators import lean
+
+NEVER = 2.0
+"""Time of a meeting that does not happen within the step, whose times run from 0 to 1."""
+ROUND_OFF = 1e-14
+"""Share of size³ below which a triple product of corners is round-off: some thirty operations."""
+ON = 1e-8
+"""Share of the size within which a point counts as on a triangle: a double root of (142) is good to the square root of
+round-off."""
+HALVINGS = 60
+"""Of an interval that holds one root: down to the last bit."""
+CREEPS = 200
+"""Steps of an advance that cannot overshoot; a pair that is not through after them has met for all purposes."""
+
+
+class Pair(NamedTuple):
+    """One point and one triangle during a step, and where they meet."""
+
+    tip: np.ndarray
+    """The point at the start of the step and at its end [m], (2, 3)."""
+    begin: np.ndarray
+    """Corners seen from the point at the start of the step [m], (3, 3)."""
+    end: np.ndarray
+    """The same at its end [m], (3, 3)."""
+    corner: np.ndarray
+    """The same in between: scratch, (3, 3)."""
+    weight: np.ndarray
+    """Barycentric weights of the meeting point, (3,)."""
+    direction: np.ndarray
+    """Unit vector from the point into the triangle, (3,)."""
+
+
+@lean
+def nearest_into(corner, weight):
+    """Weights (3,) of the point of a triangle (3, 3) nearest to the origin; returns its distance [m] (eq. 141).
+
+    The best of the foot on the plane, where it lies inside, and of the three edges: right for slivers and points too.
+    """
+    a0, a1, a2 = corner[0, 0], corner[0, 1], corner[0, 2]
+    b0, b1, b2 = corner[1, 0] - a0, corner[1, 1] - a1, corner[1, 2] - a2
+    c0, c1, c2 = corner[2, 0] - a0, corner[2, 1] - a1, corner[2, 2] - a2
+    n0, n1, n2 = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
+    area = n0 * n0 + n1 * n1 + n2 * n2
+    best = math.inf
+    if area > 0.0:
+        v = -((a1 * c2 - a2 * c1) * n0 + (a2 * c0 - a0 * c2) * n1 + (a0 * c1 - a1 * c0) * n2) / area
+        w = -((b1 * a2 - b2 * a1) * n0 + (b2 * a0 - b0 * a2) * n1 + (b0 * a1 - b1 * a0) * n2) / area
+        if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
+            q0, q1, q2 = a0 + v * b0 + w * c0, a1 + v * b1 + w * c1, a2 + v * b2 + w * c2
+            best = q0 * q0 + q1 * q1 + q2 * q2
+            weight[0], weight[1], weight[2] = 1.0 - v - w, v, w
+    for k in range(3):
+        j = (k + 1) % 3
+        p0, p1, p2 = corner[k, 0], corner[k, 1], corner[k, 2]
+        s0, s1, s2 = corner[j, 0] - p0, corner[j, 1] - p1, corner[j, 2] - p2
+        share = axis_share(-p0, -p1, -p2, s0, s1, s2)
+        q0, q1, q2 = p0 + share * s0, p1 + share * s1, p2 + share * s2
+        square = q0 * q0 + q1 * q1 + q2 * q2
+        if square < best:
+            best = square
+            weight[k], weight[j], weight[3 - k - j] = 1.0 - share, share, 0.0
+    return math.sqrt(best)
+
+
+@lean
+def triple(p, i, q, j, r, k):
+    """p_i · (q_j × r_k) of rows of three arrays (3, 3) [m³]."""
+    return (
+        p[i, 0] * (q[j, 1] * r[k, 2] - q[j, 2] * r[k, 1])
+        + p[i, 1] * (q[j, 2] * r[k, 0] - q[j, 0] * r[k, 2])
+        + p[i, 2] * (q[j, 0] * r[k, 1] - q[j, 1] * r[k, 0])
+    )
+
+
+@lean
+def coplanarity(begin, move):
+    """Coefficients of (a + t a') · ((b + t b') × (c + t c')) = f0 + f1 t + f2 t² + f3 t³ [m³] (eq. 142).
+
+    f is six times the volume between the point and the triangle: it changes sign where the point passes the plane.
+    """
+    f0 = triple(begin, 0, begin, 1, begin, 2)
+    f1 = triple(move, 0, begin, 1, begin, 2) + triple(begin, 0, move, 1, begin, 2) + triple(begin, 0, begin, 1, move, 2)
+    f2 = triple(begin, 0, move, 1, move, 2) + triple(move, 0, begin, 1, move, 2) + triple(move, 0, move, 1, begin, 2)
+    return f0, f1, f2, triple(move, 0, move, 1, move, 2)
+
+
+@lean
+def turning_points(f1, f2, f3):
+    """Times in (0, 1) at which f0 + f1 t + f2 t² + f3 t³ turns, ascending; NEVER for one that is not there."""
+    root = f2 * f2 - 3.0 * f1 * f3
+    if not root > 0.0:
+        return NEVER, NEVER
+    # The two quotients of one sum of like signs: neither loses digits, and a straight line divides by nothing.
+    q = -(f2 + math.copysign(math.sqrt(root), f2))
+    first = f1 / q if q != 0.0 else NEVER
+    second = q / (3.0 * f3) if f3 != 0.0 else NEVER
+    first = first if 0.0 < first < 1.0 else NEVER
+    second = second if 0.0 < second < 1.0 else NEVER
+    return min(first, second), max(first, second)
+
+
+@lean
+def single_root(low, high, f0, f1, f2, f3):
+    """The root of f0 + f1 t + f2 t² + f3 t³ between `low` and `high`, where its sign differs: halving (eq. 142)."""
+    rising = f0 + low * (f1 + low * (f2 + low * f3)) < 0.0
+    for _ in range(HALVINGS):
+        t = 0.5 * (low + high)
+        if (f0 + t * (f1 + t * (f2 + t * f3)) < 0.0) == rising:
+            low = t
+        else:
+            high = t
+    return high
+
+
+@lean
+def at_time(pair, t):
+    """Corners at time t of the step, in `pair.corner`."""
+    for k in range(3):
+        for axis in range(3):
+            pair.corner[k, axis] = (1.0 - t) * pair.begin[k, axis] + t * pair.end[k, axis]
+
+
+@lean
+def point_along(pair, sign):
+    """Makes `direction` the triangle's unit normal times `sign`; without area or sign, against its motion (eq. 143)."""
+    y, d = pair.corner, pair.direction
+    b0, b1, b2 = y[1, 0] - y[0, 0], y[1, 1] - y[0, 1], y[1, 2] - y[0, 2]
+    c0, c1, c2 = y[2, 0] - y[0, 0], y[2, 1] - y[0, 1], y[2, 2] - y[0, 2]
+    d[0], d[1], d[2] = sign * (b1 * c2 - b2 * c1), sign * (b2 * c0 - b0 * c2), sign * (b0 * c1 - b1 * c0)
+    length = math.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
+    longest = max(b0 * b0 + b1 * b1 + b2 * b2, c0 * c0 + c1 * c1 + c2 * c2)
+    if not length > ROUND_OFF * longest:
+        for axis in range(3):
+            d[axis] = 0.0
+            for k in range(3):
+                d[axis] -= pair.weight[k] * (pair.end[k, axis] - pair.begin[k, axis])
+        length = math.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
+    if length > 0.0:
+        d[0], d[1], d[2] = d[0] / length, d[1] / length, d[2] / length
+
+
+@lean
+def touching(pair, radius):
+    """First time at which the triangle is within `radius` [m] of the point, by steps that cannot overshoot (eq. 144).
+
+    The distance shrinks no faster than the fastest corner moves. `direction` points from the point to the nearest one.
+    """
+    fastest, size = 0.0, 0.0
+    for k in range(3):
+        s0, s1, s2 = (
+            pair.end[k, 0] - pair.begin[k, 0],
+            pair.end[k, 1] - pair.begin[k, 1],
+            pair.end[k, 2] - pair.begin[k, 2],
+        )
+        fastest = max(fastest, math.sqrt(s0 * s0 + s1 * s1 + s2 * s2))
+        for axis in range(3):
+            size = max(size, abs(pair.begin[k, axis]), abs(pair.end[k, axis]))
+    t, distance = 0.0, math.inf
+    for _ in range(CREEPS):
+        at_time(pair, t)
+        distance = nearest_into(pair.corner, pair.weight)
+        if distance <= radius + ON * size:
+            break
+        if t == 1.0:
+            return NEVER
+        t = min(1.0, t + (distance - radius) / fastest) if fastest > 0.0 else 1.0
+    for axis in range(3):
+        pair.direction[axis] = 0.0
+        for k in range(3):
+            pair.direction[axis] += pair.weight[k] * pair.corner[k, axis] / distance
+    if not distance > ON * size:
+        point_along(pair, 0.0)
+    return t
+
+
+@lean
+def passes_by(pair):
+    """Whether one coordinate of all corners keeps its sign through the step: nothing crosses then (eq. 142)."""
+    apart, size = 0.0, 0.0
+    for axis in range(3):
+        low = min(pair.begin[0, axis], pair.begin[1, axis], pair.begin[2, axis])
+        low = min(low, pair.end[0, axis], pair.end[1, axis], pair.end[2, axis])
+        high = max(pair.begin[0, axis], pair.begin[1, axis], pair.begin[2, axis])
+        high = max(high, pair.end[0, axis], pair.end[1, axis], pair.end[2, axis])
+        apart, size = max(apart, low, -high), max(size, -low, high)
+    return apart > 2.0 * ON * size
+
+
+@lean
+def stays_off(corner, distance):
+    """Whether a coordinate of all corners (3, 3) alone keeps them more than `distance` [m] from the origin."""
+    apart = 0.0
+    for axis in range(3):
+        low = min(corner[0, axis], corner[1, axis], corner[2, axis])
+        high = max(corner[0, axis], corner[1, axis], corner[2, axis])
+        apart = max(apart, low, -high)
+    return apart * (1.0 - ON) > distance
+
+
+@lean
+def crossing(pair):
+    """First time at which the point passes through the triangle, or NEVER: roots of (142) at which it lies inside.
+
+    Edges and corners belong to the triangle, so that no path slips between two of them. A point that moves in the
+    plane of its triangle has no root: it meets the rim (`touching`).
+    """
+    size = 0.0
+    for k in range(3):
+        for axis in range(3):
+            size = max(size, abs(pair.begin[k, axis]), abs(pair.end[k, axis]))
+            pair.corner[k, axis] = pair.end[k, axis] - pair.begin[k, axis]
+    f0, f1, f2, f3 = coplanarity(pair.begin, pair.corner)
+    noise = ROUND_OFF * size * size * size
+    if max(abs(f0), abs(f1), abs(f2), abs(f3)) <= noise:
+        return touching(pair, 0.0)
+    first, second = turning_points(f1, f2, f3)
+    low, before = 0.0, f0
+    for part in range(3):
+        high = min(first, 1.0) if part == 0 else (min(second, 1.0) if part == 1 else 1.0)
+        after = f0 + high * (f1 + high * (f2 + high * f3))
+        t = NEVER
+        if (before < 0.0 < after) or (after < 0.0 < before):
+            t = single_root(low, high, f0, f1, f2, f3)
+        elif abs(after) <= noise:
+            t = high
+        if t <= 1.0:
+            at_time(pair, t)
+            if nearest_into(pair.corner, pair.weight) <= ON * size:
+                point_along(pair, math.copysign(1.0, before) if abs(before) > noise else 0.0)
+                return t
+        if high == 1.0:
+            break
+        low, before = high, after
+    return NEVER

@@ -1,0 +1,201 @@
+"""The last resort where contacts alone cannot clear a step: nodes move with a tip (docs/theory.md, eq. 147).
+
+Seen from the tip a triangle of carried nodes rests, so it is not passed. One that is held at a corner still turns:
+its carried corners then go ahead of the tip, until the point that was passed rests too. With all three corners held
+there is nothing to move: the tip goes through, and the run says so.
+"""
+
+import math
+
+from massspring.kernels.jit.decorators import lean
+from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND
+from massspring.kernels.probe.broad_phase import ROOM, find_near
+from massspring.kernels.probe.contacts import clear_push
+from massspring.kernels.probe.motion import carried_speed, gather, move
+from massspring.kernels.probe.pressure import answer_into, faster_by, prepare, pressed_on
+from massspring.kernels.probe.search import look
+
+ROUNDS = 400
+"""Of taking more nodes along, or of sending them farther ahead."""
+LEFT = 1e-9
+"""Share of G·W̃·G that nodes that are not carried must have for the volume to be left to them."""
+FREE_SHARE = 0.02
+"""Weight of the carried corners where a tip hits a triangle, below which its held ones stop it: to stay ahead, a free
+corner would have to go fifty times as far as the tip."""
+STUCK = 3
+"""Of `Motion.locked`: moves in no direction of its own."""
+
+
+@lean
+def take(stage, p, i):
+    """Carries node i with the tip of probe p: it takes no share in any volume from then on."""
+    probes, motion = stage.probes, stage.motion
+    probes.carried[i] = p + 1
+    probes.taken[probes.taken_count[0]] = i
+    probes.taken_count[0] += 1
+    probes.counts[CARRIED] += 1
+    motion.locked[i] = STUCK
+    for axis in range(3):
+        # What the node would do; `gather` has no more use for it.
+        motion.goal[i, axis] = probes.base[i, axis]
+
+
+@lean
+def lead(stage, p, n):
+    """Sends the carried corners of the near triangle n ahead, until its point that is passed rests seen from the tip.
+
+    They share Σ b_i Δ_i = −(what the point moves towards the tip) by their weights; whether there are any.
+    """
+    probes, pair, radius = stage.probes, stage.probes.pair, stage.probes.radius[p]
+    f = probes.near[p, n]
+    square, free, length, shift = 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)
+    for k in range(3):
+        i, b = probes.surface[f, k], probes.found[n, k]
+        if probes.carried[i] > 0:
+            square += b * b
+            free += b
+        v = probes.velocity
+        shift = (shift[0] - b * v[i, 0], shift[1] - b * v[i, 1], shift[2] - b * v[i, 2])
+    if free < FREE_SHARE:
+        return False
+    shift = (
+        shift[0] + (pair.tip[1, 0] - pair.tip[0, 0]) / stage.dt,
+        shift[1] + (pair.tip[1, 1] - pair.tip[0, 1]) / stage.dt,
+        shift[2] + (pair.tip[1, 2] - pair.tip[0, 2]) / stage.dt,
+    )
+    length = math.sqrt(shift[0] ** 2 + shift[1] ** 2 + shift[2] ** 2)
+    if not length > 0.0:
+        return False
+    # And a radius more, so that it does not end on the tip.
+    farther = (1.0 + radius / (stage.dt * length)) / square
+    for k in range(3):
+        i = probes.surface[f, k]
+        if probes.carried[i] > 0:
+            b = farther * probes.found[n, k]
+            probes.push[i, 0] += b * shift[0]
+            probes.push[i, 1] += b * shift[1]
+            probes.push[i, 2] += b * shift[2]
+    return True
+
+
+@lean
+def take_along(stage, p):
+    """Carries the free corners of all triangles that the tip of probe p passes, or sends those ahead; whether any."""
+    probes, network, motion = stage.probes, stage.network, stage.motion
+    more = False
+    look(stage, p)
+    for n in range(probes.near_count[p]):
+        if not probes.time[n] <= 1.0:
+            continue
+        fresh = False
+        for k in range(3):
+            i = probes.surface[probes.near[p, n], k]
+            if network.inverse_mass[i] > 0.0 and motion.locked[i] == 0:
+                take(stage, p, i)
+                fresh = True
+        more |= fresh or lead(stage, p, n)
+    return more
+
+
+@lean
+def give_way(stage, volumes):
+    """δ with dt S δ = −J (v − u) of the carried nodes: the volumes are left to the others (eq. 147).
+
+    Returns how much faster it makes a node at most [m/s].
+    """
+    probes, motion, network = stage.probes, stage.motion, stage.network
+    flow, answer, change = probes.rows.flow[0], probes.rows.answer[0], probes.change
+    for r in range(change.shape[0]):
+        flow[r], answer[r], change[r] = 0.0, 0.0, 0.0
+    taken = 0.0
+    for k in range(probes.taken_count[0]):
+        i = probes.taken[k]
+        s0, s1, s2 = carried_speed(stage, i)
+        s0, s1, s2 = s0 - motion.goal[i, 0], s1 - motion.goal[i, 1], s2 - motion.goal[i, 2]
+        if volumes is None:
+            g = motion.gradient
+            flow[0] -= g[i, 0] * s0 + g[i, 1] * s1 + g[i, 2] * s2
+            taken += network.inverse_mass[i] * (g[i, 0] ** 2 + g[i, 1] ** 2 + g[i, 2] ** 2)
+        else:
+            for t in range(volumes.node_start[i], volumes.node_start[i + 1]):
+                e, j = volumes.node_entry[t], volumes.value
+                flow[volumes.node_row[t]] -= j[e, 0] * s0 + j[e, 1] * s1 + j[e, 2] * s2
+    if volumes is None:
+        left = stage.mobility - taken
+        answer[0] = flow[0] / left if left > LEFT * stage.mobility else 0.0
+    else:
+        prepare(stage, volumes)
+        answer_into(stage, volumes, flow, answer)
+    felt = 0.0
+    for r in range(change.shape[0]):
+        change[r] = answer[r] / stage.dt
+        felt += flow[r] * answer[r]
+    return faster_by(stage, felt)
+
+
+@lean
+def carry(stage, volumes, lam, plain, horizon):
+    """Nodes of triangles that a tip would pass move with the tip or ahead of it, so that nothing passes it (eq. 147).
+
+    Returns the pressure of the one volume [Pa] and what any node moves at most [m].
+    """
+    probes = stage.probes
+    clear_push(probes.rows, probes.push)
+    probes.rows.count[0] = 0
+    probes.change[:] = 0.0
+    reach = plain
+    for _ in range(ROUNDS):
+        move(stage, volumes)
+        more = False
+        for p in range(probes.radius.shape[0]):
+            more |= take_along(stage, p)
+        if not more:
+            break
+        fastest = 0.0
+        for k in range(probes.taken_count[0]):
+            s0, s1, s2 = carried_speed(stage, probes.taken[k])
+            fastest = max(fastest, math.sqrt(s0 * s0 + s1 * s1 + s2 * s2))
+        reach = plain + stage.dt * (fastest + give_way(stage, volumes))
+        if reach > horizon:
+            horizon = ROOM * reach
+            find_near(stage.motion, stage.tips, stage.step, probes, horizon)
+            gather(stage, lam)
+    probes.counts[CARRYING] += 1
+    note_passed(stage)
+    lam = pressed_on(stage, volumes, lam)
+    settle_carried(stage, lam)
+    return lam, reach
+
+
+@lean
+def note_passed(stage):
+    """Counts the step if a tip still goes through a triangle, and keeps the first triangle of each tip."""
+    probes = stage.probes
+    passed = False
+    for p in range(probes.radius.shape[0]):
+        first = look(stage, p)
+        if first <= 1.0:
+            passed = True
+            for n in range(probes.near_count[p]):
+                if probes.time[n] == first and probes.passed[p] == 0:
+                    probes.passed[p] = 1 + probes.number[probes.near[p, n]]
+    probes.counts[LEFT_BEHIND] += passed
+
+
+@lean
+def settle_carried(stage, lam):
+    """Carried nodes end the step where they were carried: v* takes the difference, the tip's impulse [N s]."""
+    probes, network, motion, tally = stage.probes, stage.network, stage.motion, stage.probes.tally
+    first = tally.contact_impulse.shape[0] - probes.radius.shape[0]
+    for k in range(probes.taken_count[0]):
+        i = probes.taken[k]
+        p = probes.carried[i] - 1
+        speed = carried_speed(stage, i)
+        push = stage.dt * lam * network.inverse_mass[i]
+        for axis in range(3):
+            gain = speed[axis] - push * motion.gradient[i, axis] - motion.v_star[i, axis]
+            motion.v_star[i, axis] += gain
+            tally.contact_impulse[first + p, axis] += network.mass[i] * gain
+            probes.push[i, axis] = 0.0
+        probes.carried[i], motion.locked[i] = 0, 0
+    probes.taken_count[0] = 0

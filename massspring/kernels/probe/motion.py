@@ -1,0 +1,91 @@
+"""Where the nodes near a thin tip go in the step as it stands, and how its contacts are handed on to the step."""
+
+import math
+
+from massspring.kernels.contact.node_contact import allowed_part
+from massspring.kernels.jit.decorators import lean
+from massspring.kernels.probe.pressure import swelling
+
+
+@lean
+def gather(stage, lam):
+    """u_i of the corners of all near triangles (eq. 9, 10), and v⁺ = u."""
+    motion, probes, triangles, weight = stage.motion, stage.probes, stage.probes.surface, stage.network.inverse_mass
+    v, g, base, velocity = motion.v_star, motion.gradient, probes.base, probes.velocity
+    for p in range(probes.radius.shape[0]):
+        for n in range(probes.near_count[p]):
+            for k in range(3):
+                i = triangles[probes.near[p, n], k]
+                push = stage.dt * lam * weight[i]
+                u0, u1, u2 = v[i, 0] + push * g[i, 0], v[i, 1] + push * g[i, 1], v[i, 2] + push * g[i, 2]
+                if motion.locked[i] > 0:
+                    d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+                    u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
+                    u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
+                base[i, 0], base[i, 1], base[i, 2] = u0, u1, u2
+                velocity[i, 0], velocity[i, 1], velocity[i, 2] = u0, u1, u2
+
+
+@lean
+def carried_speed(stage, i):
+    """Of a carried node [m/s]: its tip's, and what it goes faster (eq. 147)."""
+    tips, push, dt, step = stage.tips, stage.probes.push, stage.dt, stage.step
+    p = stage.probes.carried[i] - 1
+    return (
+        push[i, 0] + (tips.end[step, p, 0] - tips.start[step, p, 0]) / dt,
+        push[i, 1] + (tips.end[step, p, 1] - tips.start[step, p, 1]) / dt,
+        push[i, 2] + (tips.end[step, p, 2] - tips.start[step, p, 2]) / dt,
+    )
+
+
+@lean
+def move(stage, volumes):
+    """v⁺_i = u_i + push_i + dt W̃_i (Jᵀ δ)_i of the near corners, or as they are carried [m/s] (eq. 146, 147)."""
+    probes, triangles, base, push = stage.probes, stage.probes.surface, stage.probes.base, stage.probes.push
+    for p in range(probes.radius.shape[0]):
+        for n in range(probes.near_count[p]):
+            for k in range(3):
+                i = triangles[probes.near[p, n], k]
+                if probes.carried[i] > 0:
+                    u0, u1, u2 = carried_speed(stage, i)
+                else:
+                    s0, s1, s2 = swelling(stage, volumes, i)
+                    u0, u1, u2 = (
+                        base[i, 0] + push[i, 0] + s0,
+                        base[i, 1] + push[i, 1] + s1,
+                        base[i, 2] + push[i, 2] + s2,
+                    )
+                probes.velocity[i, 0], probes.velocity[i, 1], probes.velocity[i, 2] = u0, u1, u2
+
+
+@lean
+def settle(stage):
+    """Hands the contacts on to the step: v* takes their pushes; books them for probes and attachments [N s]."""
+    probes, network, rows, tally = stage.probes, stage.network, stage.probes.rows, stage.probes.tally
+    first = tally.contact_impulse.shape[0] - probes.radius.shape[0]
+    for k in range(rows.count[0]):
+        for axis in range(3):
+            tally.contact_impulse[first + rows.probe[k], axis] += rows.impulse[k] * rows.direction[k, axis]
+        for q in range(3):
+            i = rows.node[k, q]
+            for axis in range(3):
+                stage.motion.v_star[i, axis] += probes.push[i, axis]
+                probes.push[i, axis] = 0.0
+            if network.inverse_mass[i] == 0.0:
+                for h in range(network.held_nodes.shape[0]):
+                    if network.held_nodes[h] == i:
+                        for axis in range(3):
+                            share = rows.weight[k, q] * rows.impulse[k] * rows.direction[k, axis]
+                            tally.held_impulse[network.held_group[h], axis] -= share
+
+
+@lean
+def longest_way(tips, step):
+    """Of any tip in the step [m]."""
+    longest = 0.0
+    for p in range(tips.end.shape[1]):
+        square = 0.0
+        for axis in range(3):
+            square += (tips.end[step, p, axis] - tips.start[step, p, axis]) ** 2
+        longest = max(longest, math.sqrt(square))
+    return longest

@@ -1,0 +1,115 @@
+"""The pressures beside point contacts, for one volume, several, or none (docs/theory.md, section 11).
+
+An impulse c of contact k changes the volumes at the rate g_k c; pressures −S⁻¹ g_k c/dt undo that, S = J W̃ Jᵀ.
+"""
+
+import math
+
+from massspring.kernels.constraint.jacobian import diagonal_into, transposed_rows_times_into
+from massspring.kernels.constraint.schur import dense_into, factor_dense, solve_iteratively, substitute
+from massspring.kernels.contact.node_contact import allowed_part
+from massspring.kernels.jit.decorators import lean
+
+ACCURATE = 1e-7
+"""Of the largest flow: what an iterative solve may leave. The next step makes up for it, as for every volume error."""
+MOST_ITERATIONS = 400
+
+
+@lean
+def prepare(stage, volumes):
+    """S for what can move now; factored where it is dense (eq. 33)."""
+    if volumes is not None:
+        diagonal_into(volumes, stage.motion, stage.network.inverse_mass, volumes.diagonal)
+        if volumes.matrix.shape[0] > 0:
+            dense_into(volumes, stage.motion, stage.network.inverse_mass, volumes.matrix)
+            factor_dense(volumes.matrix)
+
+
+@lean
+def flow_into(stage, volumes, k):
+    """g_k = Σ_i b_i J_i W̃_i n [m²/kg] of row k (eq. 146)."""
+    rows = stage.probes.rows
+    for r in range(rows.flow.shape[1]):
+        rows.flow[k, r] = 0.0
+    for q in range(3):
+        i, b, m = rows.node[k, q], rows.weight[k, q], rows.moves
+        if volumes is None:
+            g = stage.motion.gradient
+            if stage.mobility > 0.0:
+                rows.flow[k, 0] += b * (g[i, 0] * m[k, q, 0] + g[i, 1] * m[k, q, 1] + g[i, 2] * m[k, q, 2])
+        else:
+            for t in range(volumes.node_start[i], volumes.node_start[i + 1]):
+                e, r = volumes.node_entry[t], volumes.node_row[t]
+                j = volumes.value
+                rows.flow[k, r] += b * (j[e, 0] * m[k, q, 0] + j[e, 1] * m[k, q, 1] + j[e, 2] * m[k, q, 2])
+
+
+@lean
+def answer_into(stage, volumes, flow, answer):
+    """S⁻¹ g [1/m²], (m,): the division of one volume, a back-solve of few, an iteration for many (eq. 33, 34)."""
+    if volumes is None:
+        for r in range(flow.shape[0]):
+            answer[r] = flow[r] / stage.mobility if stage.mobility > 0.0 else 0.0
+    elif volumes.matrix.shape[0] > 0:
+        substitute(volumes.matrix, flow, answer)
+    else:
+        largest = 0.0
+        for r in range(flow.shape[0]):
+            largest = max(largest, abs(flow[r]))
+        for r in range(flow.shape[0]):
+            volumes.right[r], volumes.allowed[r], answer[r] = flow[r], ACCURATE * largest, 0.0
+        solve_iteratively(volumes, stage.motion, stage.network.inverse_mass, answer, volumes.allowed, MOST_ITERATIONS)
+
+
+@lean
+def change_of_rows(stage):
+    """δ = −Σ_k S⁻¹ g_k c_k/dt [Pa]; how much faster it makes a node at most, √(max w · δ·S δ) dt [m/s] (eq. 146)."""
+    rows, change = stage.probes.rows, stage.probes.change
+    felt = 0.0
+    for r in range(change.shape[0]):
+        flow, answer = 0.0, 0.0
+        for k in range(rows.count[0]):
+            flow += rows.flow[k, r] * rows.impulse[k]
+            answer += rows.answer[k, r] * rows.impulse[k]
+        change[r] = -answer / stage.dt
+        felt += flow * answer
+    return faster_by(stage, felt)
+
+
+@lean
+def faster_by(stage, felt):
+    """√(max w · dt² δ·S δ) ≥ dt w_i |(Jᵀ δ)_i| [m/s]: how much faster pressures can make any free node."""
+    return 1.0001 * math.sqrt(max(stage.network.largest_inverse_mass * felt, 0.0))
+
+
+@lean
+def swelling(stage, volumes, i):
+    """dt W̃_i (Jᵀ δ)_i [m/s], what the change of pressures does to a node (eq. 146)."""
+    motion, change = stage.motion, stage.probes.change
+    s0, s1, s2 = 0.0, 0.0, 0.0
+    if volumes is None:
+        g, p = motion.gradient, change[0]
+        s0, s1, s2 = p * g[i, 0], p * g[i, 1], p * g[i, 2]
+    else:
+        for t in range(volumes.node_start[i], volumes.node_start[i + 1]):
+            e, p = volumes.node_entry[t], change[volumes.node_row[t]]
+            s0 += p * volumes.value[e, 0]
+            s1 += p * volumes.value[e, 1]
+            s2 += p * volumes.value[e, 2]
+    push = stage.dt * stage.network.inverse_mass[i]
+    s0, s1, s2 = push * s0, push * s1, push * s2
+    if motion.locked[i] > 0:
+        d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+        s0, s1, s2 = allowed_part(motion.locked[i], d0, d1, d2, s0, s1, s2)
+    return s0, s1, s2
+
+
+@lean
+def pressed_on(stage, volumes, lam):
+    """The pressure of one volume with its change [Pa]; several have theirs in `lam`, and their force in `gradient`."""
+    if volumes is None:
+        return lam + stage.probes.change[0]
+    for r in range(volumes.lam.shape[0]):
+        volumes.lam[r] += stage.probes.change[r]
+    transposed_rows_times_into(volumes, volumes.lam, stage.motion.gradient)
+    return lam

@@ -1,0 +1,99 @@
+"""What a thin tip runs into in the step as it stands: triangles passed or too near (docs/theory.md, section 11)."""
+
+from massspring.kernels.jit.decorators import lean
+from massspring.kernels.probe.arrays import TESTED
+from massspring.kernels.probe.contacts import row_of, set_row
+from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, stays_off, touching
+
+SAME_TIME = 1e-6
+"""Of a step: triangles that share the edge or corner that is met are met together."""
+ENOUGH = 0.95
+"""Share of the radius left at which a contact is not turned once more: what is missing is second order in the step."""
+
+
+@lean
+def pair_into(pair, x, velocity, triangles, f, dt):
+    """Corners of a triangle seen from the tip of `pair`, at the start of the step and at its end [m]."""
+    for k in range(3):
+        i = triangles[f, k]
+        for axis in range(3):
+            pair.begin[k, axis] = x[i, axis] - pair.tip[0, axis]
+            way = dt * velocity[i, axis] - (pair.tip[1, axis] - pair.tip[0, axis])
+            pair.end[k, axis] = pair.begin[k, axis] + way
+
+
+@lean
+def look(stage, p):
+    """When and where the tip passes through each near triangle in the step as it stands; the first time, or NEVER."""
+    probes, x, triangles, pair = stage.probes, stage.motion.x, stage.probes.surface, stage.probes.pair
+    for axis in range(3):
+        pair.tip[0, axis] = stage.tips.start[stage.step, p, axis]
+        pair.tip[1, axis] = stage.tips.end[stage.step, p, axis]
+    first = NEVER
+    for n in range(probes.near_count[p]):
+        pair_into(pair, x, probes.velocity, triangles, probes.near[p, n], stage.dt)
+        t = NEVER if passes_by(pair) else crossing(pair)
+        probes.time[n] = t
+        if t <= 1.0:
+            first = min(first, t)
+            for k in range(3):
+                probes.found[n, k], probes.found[n, 3 + k] = pair.weight[k], pair.direction[k]
+    probes.counts[TESTED] += probes.near_count[p]
+    return first
+
+
+@lean
+def add_crossings(probes, p, first):
+    """A contact for every triangle that the tip passes through at the first time; how many found room.
+
+    What lies beyond it would be met only by a tip that nothing had stopped.
+    """
+    room = 0
+    for n in range(probes.near_count[p]):
+        if probes.time[n] <= first + SAME_TIME:
+            for k in range(3):
+                probes.pair.weight[k], probes.pair.direction[k] = probes.found[n, k], probes.found[n, 3 + k]
+            room += set_row(probes.rows, p, probes.near[p, n], probes.surface, probes.pair)
+    return room
+
+
+@lean
+def add_touches(stage, p):
+    """A contact for every triangle that ends the step within the radius, where it first touches; how many found room.
+
+    A triangle that has its contact and turned away under it gets the direction of the end of the step.
+    """
+    room, probes, pair, triangles = 0, stage.probes, stage.probes.pair, stage.probes.surface
+    for n in range(probes.near_count[p]):
+        f = probes.near[p, n]
+        pair_into(pair, stage.motion.x, probes.velocity, triangles, f, stage.dt)
+        if stays_off(pair.end, probes.radius[p]):
+            continue
+        distance = nearest_into(pair.end, pair.weight)
+        if distance >= probes.radius[p]:
+            continue
+        if row_of(probes.rows, p, f) == probes.rows.count[0]:
+            touching(pair, probes.radius[p])
+        elif distance < ENOUGH * probes.radius[p]:
+            for axis in range(3):
+                pair.direction[axis] = 0.0
+                for k in range(3):
+                    pair.direction[axis] += pair.weight[k] * pair.end[k, axis] / distance
+        else:
+            continue
+        room += set_row(probes.rows, p, f, triangles, pair)
+    return room
+
+
+@lean
+def search(stage):
+    """Adds what the step as it stands runs into; (contacts that found room, whether a tip crosses)."""
+    found, crosses = 0, False
+    for p in range(stage.probes.radius.shape[0]):
+        first = look(stage, p)
+        if first <= 1.0:
+            crosses = True
+            found += add_crossings(stage.probes, p, first)
+        else:
+            found += add_touches(stage, p)
+    return found, crosses

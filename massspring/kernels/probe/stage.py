@@ -1,0 +1,58 @@
+"""The stage of thin probes in a step: what a tip runs into, the contacts that stop it, and a last resort.
+
+Nothing is left to the size of a step: the motion that the step will make is searched for crossings, each becomes a
+contact, and the search begins again until nothing crosses (docs/theory.md, section 11).
+"""
+
+import math
+
+from massspring.kernels.jit.decorators import lean
+from massspring.kernels.probe.arrays import IN_CONTACT, ROUNDS, Stage
+from massspring.kernels.probe.broad_phase import ROOM, SAFE, fastest_node, find_near
+from massspring.kernels.probe.contacts import solve_rows
+from massspring.kernels.probe.fallback import carry
+from massspring.kernels.probe.motion import gather, longest_way, move, settle
+from massspring.kernels.probe.pressure import prepare, pressed_on
+from massspring.kernels.probe.search import search
+
+PASSES = 24
+"""Searches for what the last solution runs into; each adds contacts or turns one."""
+
+
+@lean
+def meet_probes(network, motion, drive, step, probes, lam, mobility, volumes):
+    """Contact with thin probes, once pressures and the other contacts of the step are known (eq. 141–147).
+
+    One volume: its pressure `lam` [Pa] and `mobility` G·W̃·G [m⁴/kg]; returns the pressure beside the contacts. Several:
+    `volumes`, with their force in `motion.gradient` and lam 1; changed in place. None: lam and mobility 0.
+    """
+    dt = drive.dt
+    stage = Stage(network, motion, drive.tips, probes, volumes, mobility, step, dt)
+    plain = dt * fastest_node(network, motion, lam, dt) + longest_way(drive.tips, step)
+    if not plain < math.inf:
+        return lam
+    reach, horizon, crosses = plain, ROOM * plain, False
+    find_near(motion, drive.tips, step, probes, horizon)
+    gather(stage, lam)
+    probes.rows.count[0] = 0
+    for sweep in range(PASSES):
+        found, crosses = search(stage)
+        if found == 0 or sweep + 1 == PASSES:
+            break
+        if sweep == 0:
+            prepare(stage, volumes)
+        reach = plain + dt * solve_rows(stage, volumes)
+        probes.counts[ROUNDS] += 1
+        if reach > horizon:
+            horizon = ROOM * reach
+            find_near(motion, drive.tips, step, probes, horizon)
+            gather(stage, lam)
+        move(stage, volumes)
+    probes.counts[IN_CONTACT] += probes.rows.count[0] > 0
+    if crosses:
+        lam, reach = carry(stage, volumes, lam, plain, horizon)
+    elif probes.rows.count[0] > 0:
+        settle(stage)
+        lam = pressed_on(stage, volumes, lam)
+    probes.travel[0] += SAFE * reach
+    return lam

@@ -1,0 +1,20 @@
+"""What a pass of the implicit springs starts from."""
+
+from massspring.kernels.constraint.jacobian import rows_into, transposed_rows_times_into
+from massspring.kernels.forces.springs import spring_forces_into
+from massspring.kernels.jit.decorators import compiled
+
+
+@compiled
+def imbalance_into(network, motion, rows, p, drive, out):
+    """dt M v + dt² (f(p) + Jᵀ lam + m g) − (1 + c dt) M (p − x) [kg m], (n, 3) (eq. 92); J, V at p go to `rows`."""
+    dt = drive.dt
+    spring_forces_into(p, network.ends, network.rest_length, network.stiffness, motion.force)
+    rows_into(p, network.inverse_mass, rows)
+    transposed_rows_times_into(rows, rows.lam, out)
+    for i in range(p.shape[0]):
+        m = network.mass[i]
+        for axis in range(3):
+            known = dt * dt * (motion.force[i, axis] + out[i, axis] + m * drive.gravity[axis])
+            moved = (1.0 + drive.damping * dt) * (p[i, axis] - motion.x[i, axis])
+            out[i, axis] = m * (dt * motion.v[i, axis] - moved) + known

@@ -1,0 +1,49 @@
+"""What the other threads of a team do during a frame (kernels.team)."""
+
+from massspring.kernels.contact.gaps import clearances_into
+from massspring.kernels.fused.sweep import pass_slices
+from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.thread_team import (
+    DONE,
+    JOB,
+    REST,
+    ROUND,
+    SEARCH,
+    SPRINGS,
+    SPRINGS_AND_VOLUME,
+    STEP,
+    call,
+    raise_by_one,
+    wait_until_other_than,
+)
+from massspring.kernels.step.advance import advance_nodes, places_into
+
+
+@lean
+def serve(network, motion, drive, rank):
+    """Does part number `rank` of every job of a frame, until it is told to rest."""
+    team = motion.team
+    first, last = team.slices[rank], team.slices[rank + 1]
+    begin, end = team.nodes[rank], team.nodes[rank + 1]
+    known = 0
+    while True:
+        known = wait_until_other_than(team.signal, ROUND, known)
+        job, step, lam = team.signal[JOB], team.signal[STEP], team.pressure[0]
+        if job == REST:
+            return
+        if job == SPRINGS:
+            pass_slices(motion, drive, network.slices, first, last, False, motion.tile[rank])
+        elif job == SPRINGS_AND_VOLUME:
+            pass_slices(motion, drive, network.slices, first, last, True, motion.tile[rank])
+        elif job == SEARCH:
+            clearances_into(network, motion, drive, step, lam, begin, end)
+        else:
+            advance_nodes(motion, network.inverse_mass, lam, drive.dt, begin, end)
+            places_into(motion, begin, end)
+        raise_by_one(team.signal, DONE)
+
+
+@lean
+def dismiss(team):
+    """Ends the frame for the other threads."""
+    call(team, REST, 0, 0.0)

@@ -1,0 +1,101 @@
+"""Thin probes and a closed surface: what the stage of a run needs, and where a tip is (docs/theory.md, section 11)."""
+
+import numpy as np
+
+from massspring.body.body import Body
+from massspring.body.springs import EDGES_OF_TRIANGLE, lengths, unique_edges
+from massspring.body.surface import winding_number
+from massspring.kernels.arrays.layout import Tally
+from massspring.kernels.probe.arrays import COUNTS, Probing, Rows
+from massspring.kernels.probe.broad_phase import TRIANGLE_BLOCK
+from massspring.kernels.probe.continuous import Pair
+from massspring.kernels.probe.point_query import distance_to
+from massspring.layout.morton import along_curve
+from massspring.world.obstacles import Probe
+
+SKIN = 0.01
+"""Of the mean edge: how far a surface stays off a tip that has no thickness, so that it always lies on a side."""
+MOST_ROWS = 24
+"""Point contacts of a step. A thin tip in a dimple touches one to eight triangles; what finds no row is carried."""
+
+
+def mean_edge(body: Body) -> float:
+    """Of the surface at rest [m]."""
+    return float(lengths(body.rest, unique_edges(body.triangles, EDGES_OF_TRIANGLE)).mean())
+
+
+def kept_radius(probe: Probe, body: Body) -> float:
+    """How far the surface stays from the tip [m]: the probe's radius, or the skin of one without thickness."""
+    return max(probe.radius, SKIN * mean_edge(body))
+
+
+def new_pair() -> Pair:
+    """One for everything: it is filled anew for each point and triangle."""
+    return Pair(np.zeros((2, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3))
+
+
+def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tally: Tally) -> Probing:
+    """Everything awake, nothing in contact, for probes on the triangles `surface` (f, 3)."""
+    count, triangles, nodes = len(probes), len(surface), body.node_count
+    number = np.argsort(along_curve(body.rest[surface].mean(axis=1)))
+    many, kept = MOST_ROWS, body.kept.count
+    rows = Rows(
+        count=np.zeros(1, dtype=np.int64),
+        **{name: np.zeros(many, dtype=np.uint32) for name in ("triangle", "probe")},
+        node=np.zeros((many, 3), dtype=np.uint32),
+        weight=np.zeros((many, 3)),
+        direction=np.zeros((many, 3)),
+        moves=np.zeros((many, 3, 3)),
+        **{name: np.zeros((many, kept)) for name in ("flow", "answer")},
+        **{name: np.zeros(many) for name in ("right", "impulse")},
+        active=np.zeros(many, dtype=np.bool_),
+        **{name: np.zeros((many, many)) for name in ("matrix", "small")},
+        part=np.zeros((2, many)),
+    )
+    return Probing(
+        radius=np.array([kept_radius(probe, body) for probe in probes]),
+        skipping=True,
+        travel=np.zeros(1),
+        surface=np.ascontiguousarray(surface[number]),
+        number=number.astype(np.uint32),
+        wake=np.full((count, -(-triangles // TRIANGLE_BLOCK)), -np.inf),
+        near=np.zeros((count, triangles), dtype=np.uint32),
+        near_count=np.zeros(count, dtype=np.int64),
+        time=np.zeros(triangles),
+        found=np.zeros((triangles, 6)),
+        rows=rows,
+        **{name: np.zeros((nodes, 3)) for name in ("base", "push", "velocity")},
+        change=np.zeros(kept),
+        **{name: np.zeros(nodes, dtype=np.uint32) for name in ("carried", "taken")},
+        taken_count=np.zeros(1, dtype=np.int64),
+        passed=np.zeros(count, dtype=np.int64),
+        pair=new_pair(),
+        tally=tally,
+        counts=np.zeros(len(COUNTS), dtype=np.int64),
+    )
+
+
+def fresh(probing: Probing, tally: Tally) -> Probing:
+    """What a frame may change without changing the state it starts from."""
+    kept = {name: getattr(probing, name).copy() for name in ("travel", "wake", "passed", "counts")}
+    return probing._replace(tally=tally, **kept)
+
+
+def tip_depth(probe: Probe, x: np.ndarray, triangles: np.ndarray, t: float) -> float:
+    """How deep the surface lies in a probe at time `t` [m]: its radius less the distance of the tip, behind it more.
+
+    `x` (n, 3) [m]. Negative while they are apart.
+    """
+    tip = probe.anchor + probe.path(t)
+    distance = surface_distance(tip, x, triangles)
+    return probe.radius + distance if is_inside(tip, x, triangles) else probe.radius - distance
+
+
+def surface_distance(point: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> float:
+    """Of a point (3,) to a surface [m]."""
+    return float(distance_to(point, x, triangles, np.zeros((3, 3)), np.zeros(3)))
+
+
+def is_inside(point: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether the surface goes round the point."""
+    return abs(winding_number(point, x, triangles)) > 0.5

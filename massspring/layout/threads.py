@@ -1,0 +1,54 @@
+"""The other threads of a frame: called when it begins, dismissed when it ends (kernels.team)."""
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import cache
+
+from massspring.kernels.arrays.layout import Drive, Motion, Network
+from massspring.kernels.fused.chunk import TILE
+from massspring.kernels.jit.blocks import BLOCK
+from massspring.kernels.jit.thread_team import READY, ROUND, team_of
+from massspring.kernels.step.thread_jobs import dismiss, serve
+from massspring.layout.sell_chunks import aligned
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def shared(motion: Motion, network: Network, threads: int) -> Motion:
+    """`motion` to be advanced by so many threads, two or more; each has scratch of its own."""
+    team = team_of(threads, network.slices.start, len(motion.x), BLOCK)
+    return motion._replace(team=team, tile=aligned((threads, TILE), motion.tile.dtype))
+
+
+@contextmanager
+def crew(network: Network, motion: Motion, drive: Drive) -> Iterator[None]:
+    """Inside, the other threads of `motion.team` wait for their parts; without a team nothing happens."""
+    team = motion.team
+    if team is None:
+        yield
+        return
+    others = range(1, len(team.nodes) - 1)
+    if not team.signal[READY]:
+        # A thread that had to compile, or could not, would keep the frame waiting.
+        dismiss(team)
+        serve(network, motion, drive, 1)
+        team.signal[READY] = 1
+    team.signal[ROUND] = 0
+    parts = [_pool(os.getpid(), len(others)).submit(serve, network, motion, drive, rank) for rank in others]
+    try:
+        yield
+    finally:
+        dismiss(team)
+        for part in parts:
+            part.result()
+
+
+@cache
+def _pool(process: int, others: int) -> ThreadPoolExecutor:
+    """Threads live as long as the process; one that was forked has none of its parent's."""
+    return ThreadPoolExecutor(others, thread_name_prefix="massspring")

@@ -1,0 +1,1 @@
+"""Frame loops that several methods share."""

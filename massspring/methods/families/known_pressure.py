@@ -1,0 +1,86 @@
+"""One loop for methods whose pressure is a function of the volume now, and acts as one more force.
+
+A penalty is bounded by its modulus, a gas without room is not: it bursts, and the run has diverged. Cut off like a
+correction of constraints it would come back, but steps beyond the limit would rattle under the cut and seem stable. A
+surface without gradient is not pushed at all.
+Contact and held nodes see it as `free` sees its springs: nothing is solved (docs/theory.md, eq. 161, 162).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from massspring.body.body import Body
+from massspring.errors import MassSpringError
+from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.contact.active_set import find_contacts
+from massspring.kernels.forces.volume import pyramid_volume, volume_gradient_into
+from massspring.kernels.jit.decorators import compiled
+from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, VOLUME, mark
+from massspring.kernels.probe.stage import meet_probes
+from massspring.kernels.step.advance import add_held_impulse, advance
+from massspring.kernels.step.predict import predict
+from massspring.methods.method import State, begin_frame
+
+PENALTY, GAS, PYRAMIDS = 0, 1, 2
+
+
+@compiled
+def known_pressure(network, motion, bulk_modulus, law, volume, target):
+    """lam [Pa] of the volume now (eq. 161, 163)."""
+    if law == GAS:
+        return bulk_modulus * (target / volume - 1.0) if volume > 0.0 else np.inf
+    if law == PYRAMIDS:
+        volume = pyramid_volume(motion.x, network.mass, network.triangles)
+    return bulk_modulus * (target - volume) / target
+
+
+@compiled
+def pressure_frame(network, motion, drive, tally, bulk_modulus, law, probing):
+    """One frame of symplectic Euler with a known pressure (eq. 6, 7, 10, 12, 161); returns the last one [Pa]."""
+    lam, dt = 0.0, drive.dt
+    mark(tally.ticks, OUTSIDE)
+    for step in range(drive.position.shape[0]):
+        volume, mobility = predict(network, motion, drive, step, True)
+        mark(tally.ticks, SPRINGS)
+        lam = known_pressure(network, motion, bulk_modulus, law, volume, drive.volume_target[step, 0])
+        if not mobility > 0.0:
+            lam = 0.0
+            tally.skipped[0] += 1
+        mark(tally.ticks, VOLUME)
+        if drive.radius.shape[0] > 0:
+            find_contacts(network, motion, drive, step, lam)
+            mark(tally.ticks, SEARCH)
+        if probing is not None:  # the pressure is a force that no contact changes: no mobility
+            meet_probes(network, motion, drive, step, probing, lam, 0.0, None)
+            mark(tally.ticks, PROBES)
+        add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
+        mark(tally.ticks, HELD)
+        advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
+        mark(tally.ticks, INTEGRATION)
+    return lam
+
+
+def push(state: State, drive: Drive, bulk_modulus: float, law: int) -> State:
+    """One frame by the pressure `law`."""
+    after = begin_frame(state, drive)
+    lam = pressure_frame(after.network, after.motion, drive, after.tally, bulk_modulus, law, after.probing)
+    return replace(after, lam=np.array([lam]))
+
+
+def volume_stiffness(body: Body, bulk_modulus: float) -> csr_array:
+    """B = √(K/V0) G at rest [√(N/m)], (3n, 1): dlam/dV = −K/V0, so that K_added = (K/V0) G Gᵀ (eq. 162)."""
+    volumes = body.kept
+    gradient = np.zeros_like(body.rest)
+    share = volumes.share.tocoo()
+    triangles = volumes.triangles[share.col]
+    triangles = np.ascontiguousarray(np.where(share.data[:, None] > 0, triangles, triangles[:, ::-1]))
+    volume = volume_gradient_into(body.rest, triangles, gradient)
+    return csr_array(np.sqrt(bulk_modulus / volume) * gradient.reshape(-1, 1))
+
+
+def check_modulus(method: str, name: str, value: float) -> None:
+    """Raises MassSpringError for a modulus that is not positive and finite."""
+    if not 0.0 < value < float("inf"):
+        raise MassSpringError(f"{method}'s {name} is {value} Pa; it must be positive and finite")

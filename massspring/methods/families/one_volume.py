@@ -1,0 +1,190 @@
+"""One loop for the relatives of implicit constraint enforcement that keep one volume (docs/theory.md, section 10).
+
+With ṽ, W̃ of eq. 9 every one of them ends a step at v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺. They differ in where G is
+taken, in how long the step along it is, and in whether a correction of the positions is felt by the velocities.
+
+A thin probe's contacts come after the multiplier and leave G·v⁺ as it is (eq. 146): what a rule asks of the rate of V
+stays true. An exact root is then true to first order in what the contacts move; the next step starts from the true V,
+so that nothing adds up. Nothing may move after that stage: a correction of the positions would not be looked at.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.constraint.exact_volume import Line, line_into, nearest_root, volume_cubic
+from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
+from massspring.kernels.contact.node_contact import allowed_part
+from massspring.kernels.forces.volume import volume_gradient_into
+from massspring.kernels.jit.decorators import compiled
+from massspring.kernels.jit.stage_clock import (
+    HELD,
+    INTEGRATION,
+    MULTIPLIER,
+    OUTSIDE,
+    PROBES,
+    REVISION,
+    SEARCH,
+    SPRINGS,
+    VOLUME,
+    mark,
+)
+from massspring.kernels.probe.stage import meet_probes
+from massspring.kernels.step.advance import (
+    add_held_impulse,
+    advance,
+    capped_error,
+    steepest,
+    surely_short,
+    volume_multiplier,
+)
+from massspring.kernels.step.predict import predict
+from massspring.methods.implicit_volume import CONTACT_PASSES
+from massspring.methods.method import State, begin_frame
+
+
+class Rule(NamedTuple):
+    """The switches. As they stand: HCJ05."""
+
+    pull: float = 1.0
+    """Share of V0 − V that a step makes up for, (beta dt)² [1]."""
+    brake: float = 1.0
+    """Share of dV/dt that a step stops, 2 alpha dt [1]."""
+    convective: bool = False
+    """Whether the change of G along the motion, vᵀ H v, enters."""
+    exact: bool = False
+    """Whether the step ends at V0 exactly, at the nearest root of the cubic, instead of at the linearised V0."""
+    at_prediction: bool = False
+    """Whether G is taken at x + dt v* instead of x; only with `exact`."""
+    stabilised: bool = False
+    """Whether positions, but not velocities, are corrected once more after the step."""
+
+
+@compiled
+def inertial_change(network, motion, rule, dt):
+    """dt (1 − 2 alpha dt) G·v − dt² vᵀHv [m³], what a step leaves of the old change of volume (eq. 104)."""
+    change = 0.0
+    if rule.brake != 1.0:
+        for i in range(motion.v.shape[0]):
+            change += motion.gradient[i, 0] * motion.v[i, 0]
+            change += motion.gradient[i, 1] * motion.v[i, 1]
+            change += motion.gradient[i, 2] * motion.v[i, 2]
+        change *= dt * (1.0 - rule.brake)
+    if rule.convective:
+        _, _, half, _ = volume_cubic(motion.x, motion.v, network.triangles)
+        change -= 2.0 * dt * dt * half
+    return change
+
+
+@compiled
+def linear_multiplier(network, motion, error, kept, dt, whole):
+    """lam [Pa] and G·W̃·G of a step that makes up for `error` [m³] and stops `kept` [m³]; whether the error was cut.
+
+    It is not where the `whole` of it is wanted (eq. 8, 35, 104).
+    """
+    lam, mobility = volume_multiplier(motion, network.inverse_mass, error + kept, dt)
+    lightest, longest = network.largest_inverse_mass, network.longest_correction
+    if whole or not mobility > 0.0 or surely_short(error, mobility, lightest, longest):
+        return lam, mobility, False
+    part = capped_error(error, mobility, steepest(motion.gradient, network.inverse_mass), longest)
+    if part != error:
+        lam, mobility = volume_multiplier(motion, network.inverse_mass, part + kept, dt)
+    return lam, mobility, part != error
+
+
+@compiled
+def exact_multiplier(network, motion, line, target, mobility, dt):
+    """lam [Pa] with V(y + lam d) = V0, the root of smallest modulus (eq. 101, 102), and G·W̃·G; (0, 0) without one."""
+    line_into(motion, network.inverse_mass, dt, line)
+    volume, k1, k2, k3 = volume_cubic(line.y, line.d, network.triangles)
+    lam = nearest_root(volume - target, k1, k2, k3)
+    return (lam, mobility) if lam == lam else (0.0, 0.0)
+
+
+@compiled
+def predicted_gradient_into(network, motion, line, dt):
+    """G at x + dt v* [m²], (n, 3), before contact (eq. 4, 6)."""
+    for i in range(motion.x.shape[0]):
+        for axis in range(3):
+            line.y[i, axis] = motion.x[i, axis] + dt * motion.v_star[i, axis]
+    volume_gradient_into(line.y, network.triangles, motion.gradient)
+
+
+@compiled
+def correct_positions(network, motion, target, dt):
+    """x += W̃ G (V0 − V)/(G·W̃·G), G at x, velocities untouched (eq. 105); whether the correction was cut (eq. 35)."""
+    error = target - volume_gradient_into(motion.x, network.triangles, motion.gradient)
+    _, mobility = volume_multiplier(motion, network.inverse_mass, error, dt)
+    if not mobility > 0.0:
+        return False
+    part = capped_error(error, mobility, steepest(motion.gradient, network.inverse_mass), network.longest_correction)
+    for i in range(motion.x.shape[0]):
+        push = network.inverse_mass[i] * part / mobility
+        p0, p1, p2 = push * motion.gradient[i, 0], push * motion.gradient[i, 1], push * motion.gradient[i, 2]
+        if motion.locked[i] > 0:
+            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+            p0, p1, p2 = allowed_part(motion.locked[i], d0, d1, d2, p0, p1, p2)
+        motion.x[i, 0] += p0
+        motion.x[i, 1] += p1
+        motion.x[i, 2] += p2
+    return part != error
+
+
+@compiled
+def constraint_frame(network, motion, line, drive, tally, lam, rule, probing):
+    """One frame with contact inside the multiplier (eq. 6–13, 101–105); returns the last lam [Pa]."""
+    dt = drive.dt
+    lightest = network.largest_inverse_mass
+    mark(tally.ticks, OUTSIDE)
+    for step in range(drive.position.shape[0]):
+        target = drive.volume_target[step, 0]
+        volume, _ = predict(network, motion, drive, step, True)
+        error = rule.pull * (target - volume)
+        mark(tally.ticks, SPRINGS)
+        kept = inertial_change(network, motion, rule, dt)
+        if rule.at_prediction:
+            predicted_gradient_into(network, motion, line, dt)
+        mark(tally.ticks, VOLUME)
+        predicted = lam
+        passes = 1
+        if drive.radius.shape[0] > 0:
+            find_contacts(network, motion, drive, step, predicted)
+            mark(tally.ticks, SEARCH)
+            passes = CONTACT_PASSES
+        for sweep in range(passes):
+            lam, mobility, capped = linear_multiplier(network, motion, error, kept, dt, rule.exact)
+            if rule.exact and mobility > 0.0:
+                lam, mobility = exact_multiplier(network, motion, line, target, mobility, dt)
+            tally.capped[0] += capped and sweep == 0
+            mark(tally.ticks, MULTIPLIER)
+            if sweep + 1 == passes:
+                break
+            reach = pressure_reach(lam - predicted, mobility, lightest, dt)
+            changes = revise_contacts(network, motion, drive, step, lam, reach)
+            mark(tally.ticks, REVISION)
+            if changes == 0:
+                break
+        if not mobility > 0.0:
+            tally.skipped[0] += 1
+        if probing is not None:
+            lam = meet_probes(network, motion, drive, step, probing, lam, mobility, None)
+            mark(tally.ticks, PROBES)
+        add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
+        mark(tally.ticks, HELD)
+        advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
+        mark(tally.ticks, INTEGRATION)
+        if rule.stabilised:
+            tally.capped[0] += correct_positions(network, motion, target, dt)
+            mark(tally.ticks, MULTIPLIER)
+    return lam
+
+
+def advance_by(rule: Rule, state: State, drive: Drive) -> State:
+    """One frame by `rule`."""
+    after = begin_frame(state, drive)
+    line = Line(np.empty_like(after.x), np.empty_like(after.x))
+    start = float(after.lam[0])
+    lam = constraint_frame(after.network, after.motion, line, drive, after.tally, start, rule, after.probing)
+    return replace(after, lam=np.array([lam]))

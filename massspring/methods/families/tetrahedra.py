@@ -1,0 +1,97 @@
+"""What methods on tetrahedra share: their arrays, which bodies they apply to, and the loop of known pressures."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from massspring.body.body import SAME_VOLUME, Body
+from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.contact.active_set import find_contacts
+from massspring.kernels.forces.tetrahedron_volumes import (
+    Cells,
+    add_barycentre_forces,
+    add_volume_forces,
+    fill,
+    mean_pressure,
+)
+from massspring.kernels.jit.decorators import compiled
+from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, OUTSIDE, SEARCH, SPRINGS, VOLUME, mark
+from massspring.kernels.step.advance import add_held_impulse, advance
+from massspring.kernels.step.predict import add_to_prediction, predict
+from massspring.methods.method import State, begin_frame, one_whole
+
+
+def cells_of(body: Body) -> Cells:
+    """The tetrahedra of a body at rest, with scratch arrays."""
+    corners = body.rest[body.tetrahedra]
+    reach = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).sum(axis=1)
+    k, n = len(body.tetrahedra), body.node_count
+    return Cells(
+        tetrahedra=body.tetrahedra,
+        rest_volume=body.tetrahedron_volumes,
+        rest_whole=float(body.rest_volumes[0]),
+        filling=np.ones(1),
+        rest_reach=reach,
+        slope=np.zeros((k, 3, 3)),
+        **{name: np.zeros(k) for name in ("pressure", "right", "diagonal", "search", "image")},
+        **{name: np.zeros((n, 3)) for name in ("y", "gradient")},
+    )
+
+
+def one_filled(body: Body) -> str | None:
+    """Why a method that keeps every tetrahedron does not apply; None when it does."""
+    if not len(body.tetrahedra):
+        return "it keeps the volume of every tetrahedron, the body has none; fill its mesh"
+    reason = one_whole(body)
+    if reason is None and abs(body.rest_volumes[0] / body.tetrahedron_volumes.sum() - 1.0) > SAME_VOLUME:
+        return "it keeps the volume of every tetrahedron, the body keeps a lumen too; take implicit_volume"
+    return reason
+
+
+def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_array:
+    """B = √weight_t dC_t/dx [√(N/m)], (3n, k), of energies ½ weight_t C_t², `slopes` dC_t/dx (k, 4, 3) (eq. 162)."""
+    k = len(body.tetrahedra)
+    rows = 3 * body.tetrahedra.astype(np.int64)[:, :, None] + np.arange(3)
+    columns = np.broadcast_to(np.arange(k)[:, None, None], rows.shape)
+    values = np.sqrt(weight)[:, None, None] * slopes
+    return coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * body.node_count, k)).tocsr()
+
+
+@compiled
+def cells_frame(network, cells, motion, drive, tally, bulk_modulus, barycentric):
+    """One frame of symplectic Euler with a known pressure in every cell (eq. 6, 7, 10, 12, 164, 165)."""
+    dt = drive.dt
+    mark(tally.ticks, OUTSIDE)
+    for step in range(drive.position.shape[0]):
+        fill(cells, drive, step)
+        predict(network, motion, drive, step, False)
+        mark(tally.ticks, SPRINGS)
+        cells.gradient[:] = 0.0
+        if barycentric:
+            add_barycentre_forces(motion.x, cells, bulk_modulus, cells.gradient)
+        else:
+            tally.skipped[0] += add_volume_forces(motion.x, cells, bulk_modulus, cells.gradient)
+        add_to_prediction(network, motion, cells.gradient, dt)
+        mark(tally.ticks, VOLUME)
+        if drive.radius.shape[0] > 0:
+            find_contacts(network, motion, drive, step, 0.0)
+            mark(tally.ticks, SEARCH)
+        add_held_impulse(network, motion, 0.0, dt, drive.gravity, tally.held_impulse)
+        mark(tally.ticks, HELD)
+        advance(motion, network.mass, network.inverse_mass, 0.0, dt, tally.contact_impulse)
+        mark(tally.ticks, INTEGRATION)
+    return mean_pressure(cells)
+
+
+def own_cells(state: State) -> Cells:
+    """The state's cells, what they remember copied, so that a frame leaves the old state as it was."""
+    return state.memory._replace(pressure=state.memory.pressure.copy(), filling=state.memory.filling.copy())
+
+
+def push_cells(state: State, drive: Drive, bulk_modulus: float, barycentric: bool) -> State:
+    """One frame of `cells_frame`."""
+    after = begin_frame(state, drive)
+    cells = own_cells(state)
+    lam = cells_frame(after.network, cells, after.motion, drive, after.tally, bulk_modulus, barycentric)
+    return replace(after, lam=np.array([lam]), memory=cells)

@@ -1,0 +1,93 @@
+"""A constant matrix, factored once: A = (1 + c dt) M + dt² Σ_e k_e (e_i − e_j)(e_i − e_j)ᵀ, n × n (eq. 91).
+
+Every spring takes its full stiffness in every direction, so the three components do not couple: three right-hand
+sides. A is positive definite also where single weights of a cotangent network are negative.
+"""
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array, diags_array, tril
+from scipy.sparse.linalg import splu
+
+from massspring.kernels.arrays.layout import Network, VolumeRows
+from massspring.kernels.constraint.ldl_solve import Triangular, respond_into
+
+
+class Factor:
+    """A⁻¹ of one step length and damping; held nodes do not respond."""
+
+    def __init__(self, network: Network, dt: float, damping: float) -> None:
+        i, j = network.ends.astype(np.int64).T
+        n = len(network.mass)
+        rows, columns = np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i])
+        weights = np.concatenate([network.stiffness, network.stiffness, -network.stiffness, -network.stiffness])
+        springs = coo_array((weights, (rows, columns)), shape=(n, n)).tocsr()
+        matrix = diags_array((1.0 + damping * dt) * network.mass) + dt * dt * springs
+        free = np.flatnonzero(network.inverse_mass > 0.0)
+        self.diagonal = np.where(network.inverse_mass > 0.0, matrix.diagonal(), np.inf)
+        """Of A [kg], (n,); inf where held."""
+        self._triangular = triangular(matrix.tocsr()[free][:, free].tocsc(), free)
+        self._place = np.full(n, -1)
+        self._columns = np.empty((0, n))
+        self._known = 0
+
+    def respond(self, forces: np.ndarray) -> np.ndarray:
+        """A⁻¹ `forces`, (n, 3) each."""
+        moved = np.empty_like(forces)
+        respond_into(self._triangular, forces, moved)
+        return moved
+
+    def alone(self, rows: VolumeRows) -> tuple[np.ndarray, np.ndarray]:
+        """Σ_j |J_rj|²/A_jj [m⁴/kg] and max_j |J_rj|/A_jj [m²/kg], (m,): how a volume answers its pressure, and how far
+        the node that moves most does, where each node is alone."""
+        begin, square = rows.row_start[:-1].astype(np.int64), (rows.value**2).sum(axis=1)
+        stiff = self.diagonal[rows.column]
+        return np.add.reduceat(square / stiff, begin), np.maximum.reduceat(np.sqrt(square) / stiff, begin)
+
+    def columns(self, nodes: np.ndarray) -> np.ndarray:
+        """A⁻¹ e_i of each of `nodes` (c,), as rows, (c, n); a node's is solved for when it is first touched."""
+        new = np.unique(nodes[self._place[nodes] < 0])
+        self._make_room(len(new))
+        for three in (new[k : k + 3] for k in range(0, len(new), 3)):
+            units = np.zeros((len(self._place), 3))
+            units[three, np.arange(len(three))] = 1.0
+            last = self._known + len(three)
+            self._columns[self._known : last] = self.respond(units).T[: len(three)]
+            self._place[three] = np.arange(self._known, last)
+            self._known = last
+        return self._columns[self._place[nodes]]
+
+    def _make_room(self, count: int) -> None:
+        """Doubles the store of columns until `count` more fit."""
+        while self._known + count > len(self._columns):
+            more = np.empty((max(64, len(self._columns)), len(self._place)))
+            self._columns = np.concatenate([self._columns, more])
+
+
+def triangular(matrix: csc_array, nodes: np.ndarray) -> Triangular:
+    """L D Lᵀ of a positive definite matrix whose columns belong to `nodes`, ordered by least degree."""
+    options = {"SymmetricMode": True}
+    found = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    assert np.array_equal(found.perm_r, found.perm_c)  # without a threshold no row leaves the diagonal
+    below = csc_array(tril(found.L, -1))
+    below.sort_indices()
+    return Triangular(
+        start=below.indptr.astype(np.uint32),
+        row=below.indices.astype(np.uint32),
+        value=below.data,
+        inverse_pivot=1.0 / found.U.diagonal(),
+        node=nodes[np.argsort(found.perm_c)].astype(np.uint32),
+        scratch=np.zeros((len(nodes), 4)),
+    )
+
+
+class Factors:
+    """The factors of a run: one for each step length and damping it has seen."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[float, float], Factor] = {}
+
+    def at(self, network: Network, dt: float, damping: float) -> Factor:
+        """The factor for steps of `dt` [s] with `damping` [1/s]."""
+        if (dt, damping) not in self._known:
+            self._known[dt, damping] = Factor(network, dt, damping)
+        return self._known[dt, damping]

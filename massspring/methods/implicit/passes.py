@@ -1,0 +1,211 @@
+"""One step of implicit springs: passes from the prediction to where springs, volumes, obstacles agree (eq. 92–94)."""
+
+import math
+
+import numpy as np
+
+from massspring.kernels.arrays.layout import Accuracy, Drive
+from massspring.kernels.constraint.jacobian import rows_into, rows_times_into, transposed_rows_times_into
+from massspring.kernels.forces.springs import spring_forces_into
+from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, REVISION, SEARCH, SPRINGS, VOLUME, mark
+from massspring.kernels.step.advance import add_held_impulse
+from massspring.kernels.step.implicit_step import imbalance_into
+from massspring.layout.jacobian_pattern import DENSE_UP_TO
+from massspring.methods.implicit.contact import Contact, Touching
+from massspring.methods.implicit.factor import Factor
+from massspring.methods.method import State
+
+CONTACT_REVISIONS, LAST_REVISIONS = 3, 12
+"""Of the touched set in one pass, and in the last one, after which no other pass finds a node that enters or is pulled.
+The last solution always belongs to the set that is applied."""
+NEGLIGIBLE = 1e-12
+"""Contact and held nodes that leave a volume this little of its response leave nothing but round-off."""
+
+SOFTNESS = 1e-10
+"""Relative compliance of volumes that are solved for densely: where some depend on others S stays regular; the next
+pass sees what it leaves."""
+
+
+class Step:
+    """One step in the making; arrays of the state are its scratch."""
+
+    def __init__(self, state: State, drive: Drive, step: int, factor: Factor, accuracy: Accuracy) -> None:
+        assert state.rows is not None  # start() made them
+        self.drive, self.step, self.factor, self.accuracy = drive, step, factor, accuracy
+        self.network, self.motion, self.rows, self.tally = state.network, state.motion, state.rows, state.tally
+        # Without gravity: passes that start from balance must stay there, or a sum of few would be biased.
+        self.p = self.motion.x + drive.dt * self.motion.v
+        held = self.network.held_nodes
+        self.p[held] = self.network.held_rest + drive.held_displacement[step][self.network.held_group]
+        self.few = len(self.rows.lam) <= DENSE_UP_TO
+        self.target = drive.volume_target[step]
+        """What the volumes are to be at the end of the step [m³], (m,); nearer to what they are where that is far."""
+        self.far_off = False
+        """Whether a volume is so far off that only a part of it is made up for."""
+        self.idle = False
+        """Whether a volume has had nothing to push on."""
+        self.contact = Contact(self.network, self.motion, drive, step)
+        self.answers: np.ndarray | None = None
+
+    def times(self, field: np.ndarray) -> np.ndarray:
+        """J u [m³], (m,)."""
+        product = np.empty(len(self.rows.lam))
+        rows_times_into(self.rows, field, product)
+        return product
+
+    def pushed(self, pressure: np.ndarray) -> np.ndarray:
+        """Jᵀ p [N], (n, 3)."""
+        force = np.empty_like(self.p)
+        transposed_rows_times_into(self.rows, pressure, force)
+        return force
+
+    def mark(self, stage: int) -> None:
+        """Books the time since the last mark, where somebody asks."""
+        if self.tally.ticks is not None:
+            mark(self.tally.ticks, stage)
+
+    def take(self, passes: int) -> None:
+        """So many passes; then v⁺ = (x⁺ − x)/dt."""
+        rows_into(self.motion.x, self.network.inverse_mass, self.rows)
+        begun = self.rows.volume.copy()
+        touching, impulses = self.touch(), np.zeros(0)
+        obstacles = len(self.drive.radius) > 0
+        if obstacles:
+            self.mark(SEARCH)
+        for number in range(passes):
+            if number > 0 and self.contact.rub(self.p, touching, impulses):
+                touching = self.touch()
+            free = self.factor.respond(self.imbalance())
+            self.mark(SPRINGS)
+            if number == 0 and self.few:
+                self.answers = self.answers_of_all()
+                self.reach(touching)
+                self.mark(VOLUME)
+            if self.few:
+                self.answer()
+            if number == 0:
+                self.cap(begun)
+            most = CONTACT_REVISIONS if number + 1 < passes else LAST_REVISIONS
+            for revision in range(most):
+                change, impulses = self.solve(free, touching)
+                self.mark(MULTIPLIER)
+                if not obstacles or revision + 1 == most:
+                    break
+                revised = self.contact.revise(self.p + change, touching, impulses)
+                touching = self.touch() if revised else touching
+                self.mark(REVISION)
+                if not revised:
+                    break
+            self.p += change
+            self.rows.lam[:] += self.rows.search
+            if self.far_off:
+                break  # the pressure of one linear step along J where it began says nothing about J where it ended
+        self.tally.skipped[0] += self.idle
+        self.book(touching, impulses)
+        self.mark(HELD)
+        self.motion.v[:] = (self.p - self.motion.x) / self.drive.dt
+        self.motion.x[:] = self.p
+        self.mark(INTEGRATION)
+
+    def touch(self) -> Touching:
+        """The touched nodes of the moment, and how volumes answer their pressures past them."""
+        touching = Touching(self.factor, self.motion, self.network.surface_nodes, self.drive.dt)
+        if self.answers is not None:
+            self.reach(touching)
+            self.answer()
+        return touching
+
+    def reach(self, touching: Touching) -> None:
+        """dt² W̃ J_rᵀ [m/Pa], (m, n, 3)."""
+        assert self.answers is not None
+        self.reached = np.stack([touching.without(answer) for answer in self.answers])
+
+    def answer(self) -> None:
+        """dt² J W̃ Jᵀ [m³/Pa] with J at p, (m, m)."""
+        self.schur = np.column_stack([self.times(field) for field in self.reached])
+
+    def cap(self, begun: np.ndarray) -> None:
+        """Cuts what the step makes up for of volumes that are `begun` (m,) [m³] at its start: each alone moves no node
+        farther than 0.3 L by it (eq. 35)."""
+        if self.few:
+            gained, moved = np.diag(self.schur), np.linalg.norm(self.reached, axis=2).max(axis=1)
+        else:
+            gained, moved = self.factor.alone(self.rows)
+        longest = self.network.longest_correction
+        most = np.divide(longest * gained, moved, out=np.zeros_like(moved), where=moved > 0.0)
+        error = self.target - begun
+        cut = (np.abs(error) > most) & (most > 0.0)
+        self.far_off = bool(cut.any())
+        self.tally.capped[0] += self.far_off
+        self.target = np.where(cut, begun + np.clip(error, -most, most), self.target)
+
+    def imbalance(self) -> np.ndarray:
+        """J, V at p, and the right-hand side for the pressures of the moment [kg m], (n, 3) (eq. 92)."""
+        out = np.empty_like(self.p)
+        imbalance_into(self.network, self.motion, self.rows, self.p, self.drive, out)
+        return out
+
+    def solve(self, free: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
+        """(δ [m], contact impulses γ [kg m]) that end the pass at V0 and on the obstacles; `rows.search` is Δlam."""
+        if self.drive.rough:
+            free = free + self.factor.respond(self.contact.rubbed)
+        missing = touching.place - touching.along(self.p + free)
+        change = free + touching.moved_by(touching.impulses(missing)) if len(missing) else free
+        error = self.target - self.rows.volume - self.times(change)
+        self.rows.search[:], answer = self.directly(error) if self.few else self.iteratively(error, touching)
+        reached = np.tensordot(self.rows.search, self.reached, 1) if self.few else touching.without(answer)
+        return change + reached, touching.impulses(missing - touching.along(answer))
+
+    def directly(self, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(Δlam, dt² A⁻¹ Jᵀ Δlam) of few volumes by a dense solve (eq. 93)."""
+        assert self.answers is not None
+        able = np.diag(self.schur) > NEGLIGIBLE * self.drive.dt**2 * self.factor.alone(self.rows)[0]
+        pressure = np.zeros(len(error))
+        if able.any():
+            inner = self.schur[np.ix_(able, able)]
+            inner = inner + SOFTNESS * inner.diagonal().max() * np.eye(len(inner))
+            pressure[able] = np.linalg.solve(inner, error[able])
+        self.idle |= not able.all()
+        return pressure, np.tensordot(pressure, self.answers, 1)
+
+    def answers_of_all(self) -> np.ndarray:
+        """dt² A⁻¹ J_rᵀ [m/Pa] before contact, a back-solve each, (m, n, 3).
+
+        Once a step, with J where the passes start: what Jᵀ turns by after that, the next pass makes up for.
+        """
+        units = np.eye(len(self.rows.lam))
+        return self.drive.dt**2 * np.stack([self.factor.respond(self.pushed(unit)) for unit in units])
+
+    def iteratively(self, error: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
+        """(Δlam, dt² A⁻¹ Jᵀ Δlam) of many volumes by conjugate gradients, one back-solve an iteration (eq. 34)."""
+        diagonal = self.drive.dt**2 * self.factor.alone(self.rows)[0]
+        able = diagonal > 0.0
+        self.idle |= not able.all()
+        diagonal = np.where(able, diagonal, np.inf)
+        allowed = np.where(able, self.accuracy.tolerance * self.drive.volume_target[self.step], np.inf)
+        pressure, answer, residual = np.zeros_like(error), np.zeros_like(self.p), error.copy()
+        search, before, count = np.zeros_like(error), math.inf, 0
+        while (np.abs(residual) > allowed).any() and count < self.accuracy.most_iterations:
+            scaled = residual / diagonal
+            rho = float(residual @ scaled)
+            search = scaled + (rho / before if count else 0.0) * search
+            response = self.drive.dt**2 * self.factor.respond(self.pushed(search))
+            image = self.times(touching.without(response))
+            step = rho / float(search @ image)
+            pressure, answer, residual = pressure + step * search, answer + step * response, residual - step * image
+            before, count = rho, count + 1
+        self.tally.iterations[0] += count
+        self.tally.iterations[1] = max(int(self.tally.iterations[1]), count)
+        return pressure, answer
+
+    def book(self, touching: Touching, impulses: np.ndarray) -> None:
+        """Impulses of obstacles and attachments [N s] (eq. 11)."""
+        motion, net, dt = self.motion, self.network, self.drive.dt
+        given = self.tally.contact_impulse
+        np.add.at(given, touching.obstacle, impulses[:, None] / dt * touching.direction)
+        if self.drive.rough:
+            rubbed = np.flatnonzero(self.contact.rubbed.any(axis=1))
+            np.add.at(given, motion.touched[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
+        spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, motion.force)
+        motion.gradient[:] = self.pushed(self.rows.lam)
+        add_held_impulse(net, motion, 1.0, dt, self.drive.gravity, self.tally.held_impulse)

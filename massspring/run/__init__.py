@@ -1,0 +1,1 @@
+"""A run, frame by frame: set-up, checks, histories."""

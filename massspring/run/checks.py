@@ -1,0 +1,132 @@
+"""What a set-up is checked for before it runs; each complaint is one sentence."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from massspring.body.body import Body
+from massspring.body.surface import winding_number
+from massspring.body.volumes import Ramp
+from massspring.errors import MassSpringError
+from massspring.layout.probe_arrays import is_inside, mean_edge, tip_depth
+from massspring.layout.threads import cores
+from massspring.methods.method import Method
+from massspring.world.obstacles import Capsule, Plane, Probe, Sphere
+
+INSIDE = 1e-6
+"""Of the body's size: what an obstacle may reach into it at the start, round-off of positions that touch."""
+
+
+def check_surroundings(gravity: tuple[float, float, float], damping: float, dt: float) -> None:
+    """Raises MassSpringError for gravity [m/s²] or damping [1/s] that no step `dt` [s] could use."""
+    if len(gravity) != 3 or not np.isfinite(gravity).all():
+        raise MassSpringError(f"gravity is {gravity} m/s²; give three finite numbers")
+    if not (np.isfinite(damping) and damping >= 0):
+        raise MassSpringError(f"damping is {damping} 1/s; it must be zero or positive")
+    if damping * dt >= 1:
+        raise MassSpringError(
+            f"damping {damping:g} 1/s turns velocities round within dt = {dt:.3g} s; keep dt below {1 / damping:.3g} s"
+        )
+
+
+def check_nodal(what: str, values: np.ndarray | None, body: Body) -> None:
+    """Raises MassSpringError unless there are none, or three finite numbers for every node."""
+    if values is None:
+        return
+    if np.shape(values) != (body.node_count, 3):
+        raise MassSpringError(
+            f"{what} have shape {np.shape(values)}; the body has {body.node_count} nodes, give ({body.node_count}, 3)"
+        )
+    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if len(bad):
+        raise MassSpringError(f"{what} are not finite at node {bad[0]} and {len(bad) - 1} more; give numbers")
+
+
+def check_targets(targets: Mapping[str, Ramp], body: Body, method: Method) -> None:
+    """Raises MassSpringError for a target that the method would not read, of a volume that is not kept, or one that
+    falls to nothing."""
+    if targets and not method.follows_targets:
+        raise MassSpringError(
+            f"a target is given for volume '{next(iter(targets))}', which method '{method.name}' does not follow; "
+            "leave it out, or take implicit_volume"
+        )
+    for name, ramp in targets.items():
+        if name not in body.kept.names:
+            known = ", ".join(body.kept.names[:6])
+            raise MassSpringError(f"target '{name}' names no kept volume; the body keeps {known}")
+        if min(ramp.values) <= 0:
+            raise MassSpringError(f"target '{name}' falls to {min(ramp.values):g} of its rest volume; keep it positive")
+
+
+def check_held_apart(body: Body, method: Method) -> None:
+    """Springs without length need a volume at every node and a method that starts with their rest pressure.
+
+    One volume for many nodes would let some shrink as others grow. Raises MassSpringError.
+    """
+    if not body.rest_pressure:
+        return
+    if body.kept.count < body.node_count:
+        raise MassSpringError(
+            f"springs of law '{body.law}' pull every part of the body together, and it keeps {body.kept.count} "
+            f"volumes for {body.node_count} nodes; keep one volume per node"
+        )
+    if not method.holds_apart:
+        raise MassSpringError(
+            f"method '{method.name}' has no pressure at rest to hold springs of law '{body.law}' apart; "
+            "use implicit_volume, or another law"
+        )
+
+
+def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.ndarray) -> None:
+    """Raises MassSpringError for a thin probe that the method does not meet, that starts inside the body at `x` (n, 3)
+    or is too thick for contact with single triangles."""
+    if method.misses_probes is not None:
+        raise MassSpringError(
+            f"obstacle {number} is a thin probe, which method '{method.name}' does not meet: {method.misses_probes}; "
+            "use a Sphere, or implicit_volume"
+        )
+    edge = mean_edge(body)
+    if probe.radius > edge:
+        raise MassSpringError(
+            f"obstacle {number} is a probe of radius {probe.radius:.3g} m on a surface with edges of {edge:.3g} m; "
+            "use a Sphere, or a finer surface"
+        )
+    inside = is_inside(probe.anchor + probe.path(0.0), x, body.triangles)
+    depth = tip_depth(probe, x, body.triangles, 0.0)
+    if inside or depth > INSIDE * body.size:
+        raise _starts_inside(number, depth)
+
+
+def check_solid(number: int, obstacle: Plane | Sphere | Capsule, body: Body, x: np.ndarray) -> None:
+    """Raises MassSpringError for an obstacle that starts inside the body at `x` (n, 3)."""
+    depth = starting_depth(obstacle, body, x)
+    if depth > INSIDE * body.size:
+        raise _starts_inside(number, depth)
+
+
+def _starts_inside(number: int, depth: float) -> MassSpringError:
+    return MassSpringError(
+        f"obstacle {number} starts {depth:.3g} m inside the body; start its path outside the surface"
+    )
+
+
+def starting_depth(obstacle: Plane | Sphere | Capsule, body: Body, x: np.ndarray) -> float:
+    """How deep the body at `x` (n, 3) reaches into an obstacle at the start [m]; one between all nodes counts too."""
+    depth = -float(obstacle.gap(x[body.surface_nodes], 0.0).min())
+    if isinstance(obstacle, Plane):
+        return depth
+    ends = [obstacle.anchor + obstacle.path(0.0)]
+    if isinstance(obstacle, Capsule):
+        ends.append(ends[0] + obstacle.span)
+    inside = any(abs(winding_number(end, x, body.triangles)) > 0.5 for end in ends)
+    return max(depth, obstacle.radius) if inside else depth
+
+
+def check_threads(threads: int, method: Method) -> None:
+    """Raises MassSpringError for what is no number of threads, for more than cores, and where `method` has no use."""
+    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise MassSpringError(f"{threads!r} is no number of threads; give 1 or more")
+    if threads > cores():
+        raise MassSpringError(f"{threads} threads need as many cores, this process may use {cores()}; give fewer")
+    if threads > 1 and not method.threaded:
+        raise MassSpringError(f"method '{method.name}' runs on one thread; leave threads at 1")

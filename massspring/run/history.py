@@ -1,0 +1,185 @@
+"""What a run leaves behind, frame by frame."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from massspring.body.body import Body
+from massspring.errors import MassSpringError
+from massspring.kernels.forces.membrane import membrane_energy
+from massspring.kernels.forces.springs import spring_energy
+from massspring.kernels.forces.tetrahedra import smallest_ratio, tetrahedron_volumes_into
+from massspring.kernels.probe.arrays import COUNTS
+from massspring.layout.probe_arrays import tip_depth
+from massspring.methods.method import State
+from massspring.world.clock import Clock
+from massspring.world.obstacles import Obstacle, Probe
+
+EXTRA = ("kinetic", "elastic")
+"""Fields that can be left out: a sweep over all nodes and springs after every frame, which only an energy balance
+reads."""
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """F frames; entries after an early end are NaN, and so are extra fields that were not asked for."""
+
+    t: np.ndarray
+    """End of each frame [s], (F,)."""
+    volume: np.ndarray
+    """Of each kept volume [m³], (F, m)."""
+    volume_target: np.ndarray
+    """What each kept volume should be at the end of each frame [m³], (F, m)."""
+    pressure: np.ndarray
+    """lam of the last step of the frame [Pa], (F, m)."""
+    kinetic: np.ndarray
+    """[J], (F,)."""
+    elastic: np.ndarray
+    """Above the rest state [J], (F,)."""
+    contact_force: np.ndarray
+    """Mean force of each obstacle on the body during the frame [N], (F, o, 3)."""
+    penetration: np.ndarray
+    """How deep the deepest surface node, for a thin probe the surface, lies in each obstacle at the end of the frame
+    [m], (F, o)."""
+    held_force: np.ndarray
+    """Mean force of each attachment on the body during the frame [N], (F, g, 3)."""
+    min_j: np.ndarray
+    """Smallest tetrahedron volume ratio [1], (F,); NaN for a surface body."""
+    snapshot_frames: np.ndarray
+    """Frame numbers, 1 … F, (s,)."""
+    snapshots: np.ndarray
+    """Positions after those frames [m], (s, n, 3)."""
+    final: np.ndarray
+    """Positions after the last good frame [m], (n, 3)."""
+    frame_ns: np.ndarray
+    """Wall time of each frame's steps [ns], (F,); 0 after an early end."""
+    outcome: str
+    """"finished", "diverged", "blocked" (a thin probe met tissue that had nowhere to go) or "timed-out"."""
+    good_frames: int
+    """Frames before the early end, F when there was none."""
+    message: str
+    """Why it stopped; empty when it did not."""
+    skipped_steps: int
+    """Steps in which a volume had no gradient to push on."""
+    capped_steps: int
+    """Steps that made up for a part only of a wrong volume."""
+    iterations: np.ndarray
+    """For the multipliers of each frame: their sum over its steps, and the most in one step, (F, 2) int64."""
+    probe_counts: np.ndarray
+    """What thin probes did in each frame, one column for each of kernels.probe_layout.COUNTS, (F, 7) int64."""
+
+
+class Recorder:
+    """Fills the arrays of a History; a minimum J is only looked for where there are tetrahedra, and of `EXTRA` only
+    what is asked for is computed. Raises MassSpringError for an unknown extra field."""
+
+    def __init__(
+        self,
+        body: Body,
+        clock: Clock,
+        obstacles: tuple[Obstacle, ...],
+        attachments: int,
+        keep: frozenset[int],
+        extra: Collection[str] = EXTRA,
+    ) -> None:
+        frames = clock.frames
+        unknown = sorted(set(extra) - set(EXTRA))
+        if unknown:
+            raise MassSpringError(f"no extra field is called '{unknown[0]}'; there are {', '.join(EXTRA)}")
+        self.extra = frozenset(extra)
+        self.body = body
+        self.clock = clock
+        self.rest_volumes = body.tetrahedron_volumes
+        self.rest_energy = body.rest_energy
+        self.cell_volumes = np.empty_like(self.rest_volumes)
+        self.t = clock.frame * np.arange(1, frames + 1)
+        self.scalars = {name: np.full(frames, np.nan) for name in ("kinetic", "elastic", "min_j")}
+        self.volumes = body.kept
+        self.volume, self.pressure, self.volume_target = (
+            np.full((frames, self.volumes.count), np.nan) for _ in range(3)
+        )
+        self.iterations = np.zeros((frames, 2), dtype=np.int64)
+        self.probe_counts = np.zeros((frames, len(COUNTS)), dtype=np.int64)
+        self.obstacles = obstacles
+        # The impulses of thin probes come last.
+        self.rank = sorted(range(len(obstacles)), key=lambda o: isinstance(obstacles[o], Probe))
+        self.surface_nodes = body.surface_nodes
+        self.contact_force = np.full((frames, len(obstacles), 3), np.nan)
+        self.penetration = np.full((frames, len(obstacles)), np.nan)
+        self.held_force = np.full((frames, attachments, 3), np.nan)
+        self.frame_ns = np.zeros(frames, dtype=np.int64)
+        self.keep = keep
+        self.kept: dict[int, np.ndarray] = {}
+        self.final = body.rest
+        self.skipped = 0
+        self.capped = 0
+
+    def record(self, frame: int, state: State, elapsed_ns: int) -> None:
+        """Reads the state after frame number `frame` (0, 1, …)."""
+        net, x = state.network, state.x.astype(np.float64, copy=False)
+        inside_x, v = (part.astype(np.float64, copy=False) for part in (state.motion.x, state.motion.v))
+        self.volume[frame] = self.volumes.measure(x)
+        self.pressure[frame] = state.lam
+        if "kinetic" in self.extra:
+            # Not by `@`: a pool of threads that has computed a product waits for the next at the expense of frames.
+            self.scalars["kinetic"][frame] = 0.5 * float(np.einsum("i,ij,ij->", net.mass, v, v))
+        if "elastic" in self.extra:
+            taut = spring_energy(inside_x, net.ends, net.rest_length, net.stiffness) - self.rest_energy
+            self.scalars["elastic"][frame] = taut + membrane_energy(inside_x, net.membrane)
+        if len(self.rest_volumes):
+            tetrahedron_volumes_into(x, self.body.tetrahedra, self.cell_volumes)
+            self.scalars["min_j"][frame] = smallest_ratio(self.cell_volumes, self.rest_volumes)
+        self.contact_force[frame, self.rank] = state.tally.contact_impulse / self.clock.frame
+        for o, obstacle in enumerate(self.obstacles):
+            t = float(self.t[frame])
+            if isinstance(obstacle, Probe):
+                depth = tip_depth(obstacle, x, self.body.triangles, t)
+            else:
+                depth = -obstacle.gap(x[self.surface_nodes], t).min()
+            self.penetration[frame, o] = max(0.0, depth)
+        self.held_force[frame] = state.tally.held_impulse / self.clock.frame
+        self.frame_ns[frame] = elapsed_ns
+        self.skipped += int(state.tally.skipped[0])
+        self.capped += int(state.tally.capped[0])
+        self.iterations[frame] = state.tally.iterations
+        if state.probing is not None:
+            self.probe_counts[frame] = state.probing.counts - self.probe_counts[:frame].sum(axis=0)
+        self.final = x
+        if frame + 1 in self.keep:
+            self.kept[frame + 1] = x
+
+    def finished(self) -> History:
+        """All frames ran."""
+        return self._history("finished", self.clock.frames, "")
+
+    def stopped(self, frame: int, outcome: str, reason: str) -> History:
+        """The run ends before frame number `frame` (0, 1, …)."""
+        return self._history(outcome, frame, f"{outcome} in frame {frame + 1} at {self.t[frame]:.4g} s: {reason}")
+
+    def _history(self, outcome: str, good_frames: int, message: str) -> History:
+        frames = sorted(self.kept)
+        shape = (len(frames), self.body.node_count, 3)
+        return History(
+            t=self.t,
+            volume=self.volume,
+            volume_target=self.volume_target,
+            pressure=self.pressure,
+            kinetic=self.scalars["kinetic"],
+            elastic=self.scalars["elastic"],
+            contact_force=self.contact_force,
+            penetration=self.penetration,
+            held_force=self.held_force,
+            min_j=self.scalars["min_j"],
+            snapshot_frames=np.array(frames, dtype=np.int64),
+            snapshots=np.array([self.kept[f] for f in frames]).reshape(shape),
+            final=self.final,
+            frame_ns=self.frame_ns,
+            outcome=outcome,
+            good_frames=good_frames,
+            message=message,
+            skipped_steps=self.skipped,
+            capped_steps=self.capped,
+            iterations=self.iterations,
+            probe_counts=self.probe_counts,
+        )

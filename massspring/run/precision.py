@@ -1,0 +1,45 @@
+"""A state in single precision: half the memory to move, twice the numbers in a vector register."""
+
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from massspring.errors import MassSpringError
+from massspring.layout.jacobian_pattern import OF_EACH_VOLUME
+from massspring.layout.sell_chunks import aligned
+from massspring.methods.method import State
+
+Precision = Literal["float64", "float32"]
+KEPT_DOUBLE = frozenset({"sums", "matrix", "scale", *OF_EACH_VOLUME})
+"""Sums over many nodes and what is solved with them: as long as there are slices or volumes, so they cost nothing."""
+
+
+def check_precision(precision: str) -> None:
+    """Raises MassSpringError for what is neither float64 nor float32."""
+    if precision not in ("float64", "float32"):
+        raise MassSpringError(f"unknown precision '{precision}'; choose float64 or float32")
+
+
+def in_precision(state: State, precision: Precision) -> State:
+    """`state` with the arrays of its nodes, springs and volumes as `precision`; float64 leaves it as it is.
+
+    What a method or a thin probe remembers of its own stays in double precision.
+    """
+    if precision == "float64":
+        return state
+    rows = None if state.rows is None else _cast(state.rows, np.dtype(np.float32))
+    network, motion = (_cast(part, np.dtype(np.float32)) for part in (state.network, state.motion))
+    return replace(state, network=network, motion=motion, rows=rows)
+
+
+def _cast(part: Any, real: np.dtype) -> Any:
+    """A tuple of arrays, with tuples inside, whose arrays of float64 are `real`."""
+    changed = {}
+    for name, value in part._asdict().items():
+        if isinstance(value, tuple):
+            changed[name] = _cast(value, real)
+        elif isinstance(value, np.ndarray) and value.dtype == np.float64 and name not in KEPT_DOUBLE:
+            changed[name] = aligned(value.shape, real)
+            changed[name][...] = value
+    return part._replace(**changed)

@@ -1,0 +1,64 @@
+"""The numbers nodes have during a run: those of a slice follow each other, and neighbours are near in memory.
+
+Whoever makes a body or reads a run keeps the numbers of the mesh: `State.x` and `State.v` are in them.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from massspring.body.body import Body
+from massspring.layout.sell_chunks import places_in_slices
+from massspring.methods.method import Method, State, nodes_of, swept_surface
+from massspring.world.obstacles import Attachment
+
+MANY = 512
+"""Nodes from which on it pays: what a step reads and writes of fewer lies in the nearest cache in any order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Numbered:
+    """A body with the numbers of a run."""
+
+    body: Body
+    place: np.ndarray | None
+    """Number in `body` of each node of the mesh, (n,); None where it has the mesh's."""
+
+    def start(self, method: Method, attachments: tuple[Attachment, ...], velocity: np.ndarray | None) -> State:
+        """The body at rest, or with velocities (n, 3) [m/s]; all that is given has the numbers of the mesh.
+
+        Raises MassSpringError for bad attachments.
+        """
+        if self.place is None:
+            return method.start(self.body, attachments, velocity)
+        held = tuple(
+            replace(attachment, nodes=np.sort(self.place[nodes]))
+            for attachment, nodes in zip(attachments, nodes_of(attachments, self.body), strict=True)
+        )
+        order = np.argsort(self.place)
+        state = method.start(self.body, held, None if velocity is None else np.asarray(velocity)[order])
+        return replace(state, place=self.place)
+
+
+def numbered(body: Body) -> Numbered:
+    """The nodes of a large body in the order in which `kernels.slices` passes over them."""
+    if body.node_count < MANY:
+        return Numbered(body, None)
+    place = places_in_slices(body.springs, swept_surface(body), body.rest)
+    return Numbered(renumbered(body, place), place)
+
+
+def renumbered(body: Body, place: np.ndarray) -> Body:
+    """The same body, whose node i has number `place[i]` (n,); springs, triangles and volumes keep theirs."""
+    order, number = np.argsort(place), place.astype(np.uint32)
+    volumes = body.volumes
+    return replace(
+        body,
+        rest=body.rest[order],
+        mass=body.mass[order],
+        springs=replace(body.springs, ends=number[body.springs.ends]),
+        triangles=number[body.triangles],
+        tetrahedra=number[body.tetrahedra],
+        volumes=None if volumes is None else replace(volumes, triangles=number[volumes.triangles]),
+        membrane=body.membrane._replace(triangles=number[body.membrane.triangles]),
+    )

@@ -1,0 +1,249 @@
+"""Frame by frame: moves the obstacles, advances the method, records. The only Python in the loop is once per frame."""
+
+import math
+import warnings
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from time import perf_counter_ns
+from typing import Any
+
+import numpy as np
+
+from massspring.body.body import Body
+from massspring.body.volumes import Ramp
+from massspring.errors import MassSpringError
+from massspring.kernels.arrays.layout import Drive, Tips
+from massspring.layout.probe_arrays import new_probing
+from massspring.layout.threads import shared
+from massspring.methods.method import Method, State
+from massspring.run.checks import (
+    check_held_apart,
+    check_nodal,
+    check_probe,
+    check_solid,
+    check_surroundings,
+    check_targets,
+    check_threads,
+)
+from massspring.run.history import EXTRA, History, Recorder
+from massspring.run.precision import Precision, check_precision, in_precision
+from massspring.run.renumber import Numbered, numbered
+from massspring.world.clock import Clock
+from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
+from massspring.world.targets import fastest_filling, followed
+
+ESCAPED = 20.0
+"""A node this many body sizes from rest, beyond any obstacle's push, has left: the run has diverged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """A body in its surroundings."""
+
+    body: Body
+    method: Method
+    clock: Clock
+    obstacles: tuple[Obstacle, ...] = ()
+    attachments: tuple[Attachment, ...] = ()
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """[m/s²]."""
+    damping: float = 0.0
+    """Mass-proportional damping [1/s]."""
+    velocity: np.ndarray | None = None
+    """Initial velocities [m/s], (n, 3); None: at rest."""
+    targets: Mapping[str, Ramp] = field(default_factory=dict)
+    """Name of a kept volume -> its target over time as a factor of its rest volume; unnamed ones stay at 1.
+    What is faster than the body can follow without being thrown apart is ramped, with a warning."""
+    positions: np.ndarray | None = None
+    """Initial positions [m], (n, 3); None: those at rest."""
+    precision: Precision = "float64"
+    """Of the state; "float32" is faster and meets volumes to 1e-5."""
+    threads: int = 1
+    """That share a step; the result is the same to the last bit. Pays for bodies of some thousand nodes."""
+
+    def __post_init__(self) -> None:
+        reason = self.method.applies(self.body)
+        if reason is not None:
+            raise MassSpringError(f"method '{self.method.name}' does not apply to this body: {reason}")
+        check_precision(self.precision)
+        check_threads(self.threads, self.method)
+        check_surroundings(self.gravity, self.damping, self.clock.dt if self.method.limited else 0.0)
+        check_nodal("initial velocities", self.velocity, self.body)
+        check_nodal("initial positions", self.positions, self.body)
+        x = self.body.rest if self.positions is None else self.positions
+        for number, obstacle in enumerate(self.obstacles):
+            if isinstance(obstacle, Probe):
+                check_probe(number, obstacle, self.method, self.body, x)
+            else:
+                check_solid(number, obstacle, self.body, x)
+        check_held_apart(self.body, self.method)
+        check_targets(self.targets, self.body, self.method)
+        rate = fastest_filling(self.body)
+        for name in self.ramped:
+            warnings.warn(
+                f"the target of volume '{name}' moves faster than {rate:.3g} of its rest volume a second, which would"
+                " throw the body apart; it is followed at that rate",
+                stacklevel=3,
+            )
+
+    @property
+    def probes(self) -> tuple[Probe, ...]:
+        """The thin ones among the obstacles; they have a stage of their own."""
+        return tuple(o for o in self.obstacles if isinstance(o, Probe))
+
+    @property
+    def solids(self) -> tuple[Plane | Sphere | Capsule, ...]:
+        """The obstacles that nodes touch."""
+        return tuple(o for o in self.obstacles if not isinstance(o, Probe))
+
+    @cached_property
+    def followed(self) -> dict[str, Ramp]:
+        """The targets as they are followed (massspring.world.targets)."""
+        rate = fastest_filling(self.body) if self.targets else 0.0
+        return {name: followed(ramp, rate) for name, ramp in self.targets.items()}
+
+    @property
+    def ramped(self) -> list[str]:
+        """Names of the volumes whose target is too fast to be followed as it is."""
+        return [name for name, ramp in self.followed.items() if ramp is not self.targets[name]]
+
+    @cached_property
+    def inside(self) -> Numbered:
+        """The body with the numbers its nodes have during a run."""
+        return numbered(self.body)
+
+    def start(self) -> State:
+        """The state at t = 0."""
+        state = self.inside.start(self.method, self.attachments, self.velocity)
+        if self.probes:
+            probing = new_probing(self.inside.body, state.network.triangles, self.probes, state.tally)
+            state = replace(state, probing=probing)
+        if self.positions is not None:
+            state = state.moved_to(self.positions)
+        state = in_precision(state, self.precision)
+        if self.threads == 1:
+            return state
+        return replace(state, motion=shared(state.motion, state.network, self.threads))
+
+    @cached_property
+    def _unmoved(self) -> dict[str, Any]:
+        """What is the same in the drives of all frames."""
+        solids = self.solids
+        return {
+            "dt": self.clock.dt,
+            "damping": float(self.damping),
+            "gravity": np.asarray(self.gravity, dtype=np.float64),
+            "is_plane": np.array([isinstance(o, Plane) for o in solids], dtype=np.bool_),
+            "plane_normal": _rows([o.unit_normal if isinstance(o, Plane) else np.zeros(3) for o in solids]),
+            "radius": np.array([0.0 if isinstance(o, Plane) else o.radius for o in solids]),
+            "span": _rows([o.span if isinstance(o, Capsule) else np.zeros(3) for o in solids]),
+            "friction": np.array([np.inf if o.friction == "no_slip" else float(o.friction) for o in solids]),
+            "rough": any(o.friction != 0 for o in solids),
+        }
+
+    def drive(self, frame: int) -> Drive:
+        """The outside world during frame number `frame` (0, 1, …): positions at the end of each of its steps."""
+        dt = self.clock.dt
+        t = frame * self.clock.frame + dt * np.arange(1, self.clock.steps + 1)
+        solids, probes = self.solids, self.probes
+        return Drive(
+            **self._unmoved,
+            position=_tracks([o.anchor + o.path(t) for o in solids], len(t)),
+            velocity=_tracks([(o.path(t) - o.path(t - dt)) / dt for o in solids], len(t)),
+            held_displacement=_tracks([a.path(t) for a in self.attachments], len(t)),
+            volume_target=self.volume_targets(t),
+            tips=Tips(*(_tracks([p.anchor + p.path(u) for p in probes], len(t)) for u in (t - dt, t))),
+        )
+
+    def volume_targets(self, t: np.ndarray) -> np.ndarray:
+        """What each kept volume should be at times `t` (q,) [s], (q, m) [m³]."""
+        factors = [self.followed[name](t) if name in self.targets else np.ones(len(t)) for name in self.body.kept.names]
+        return np.column_stack(factors) * self.body.rest_volumes
+
+
+def _rows(vectors: list[np.ndarray]) -> np.ndarray:
+    return np.array(vectors, dtype=np.float64).reshape(-1, 3)
+
+
+def _tracks(tracks: list[np.ndarray], steps: int) -> np.ndarray:
+    """(q, o, 3), contiguous, also when there is nothing to track."""
+    return np.ascontiguousarray(np.array(tracks, dtype=np.float64).reshape(-1, steps, 3).transpose(1, 0, 2))
+
+
+def lost(drive: Drive) -> str | None:
+    """Which part of the outside world has no place or no size any more, or None."""
+    for what, values in (
+        ("obstacle", drive.position),
+        ("attachment", drive.held_displacement),
+        ("target of kept volume", drive.volume_target[:, :, None]),
+    ):
+        bad = np.flatnonzero(~np.isfinite(values).all(axis=(0, 2)))
+        if len(bad):
+            return f"{what} {bad[0]} is no longer finite; correct its path"
+    return None
+
+
+def trouble(state: State, body: Body) -> str | None:
+    """Why the run cannot go on, or None: values that are not finite, or nodes that have left."""
+    far = float(np.abs(state.x - body.rest).max())
+    if not np.isfinite(far):
+        return "positions are no longer finite"
+    if not np.isfinite(state.lam).all():
+        return "pressures are no longer finite"
+    return None if far < ESCAPED * body.size else f"a node has moved {far:.3g} m from rest"
+
+
+def pierced(state: State, obstacles: tuple[Obstacle, ...]) -> str | None:
+    """Which thin probe was driven through tissue that had nowhere to go, or None."""
+    if state.probing is None or not state.probing.passed.any():
+        return None
+    thin = [number for number, obstacle in enumerate(obstacles) if isinstance(obstacle, Probe)]
+    p = int(np.flatnonzero(state.probing.passed)[0])
+    triangle = int(state.probing.passed[p]) - 1
+    held = int((state.network.inverse_mass[state.network.triangles[triangle]] == 0.0).sum())
+    return (
+        f"the thin probe that is obstacle {thin[p]} was driven through triangle {triangle}, {held} of whose corners "
+        "are attached; lead its path past attached tissue, or attach fewer nodes"
+    )
+
+
+def simulate(
+    setup: Setup,
+    snapshots: Iterable[int] = (),
+    on_frame: Callable[[int], object] | None = None,
+    time_limit: float = math.inf,
+    extra: Collection[str] = EXTRA,
+) -> History:
+    """Runs all frames, or up to the first that diverges, and returns what happened.
+
+    `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is told after each.
+    A run longer than `time_limit` [s] of wall time ends early. `extra`: which of `history.EXTRA` are recorded; raises
+    MassSpringError for another name. Frame times are those of `advance` alone.
+    """
+    keep = frozenset(snapshots)
+    recorder = Recorder(setup.body, setup.clock, setup.obstacles, len(setup.attachments), keep, extra)
+    recorder.volume_target[:] = setup.volume_targets(recorder.t)
+    state = setup.start()
+    advance = setup.method.advance
+    begun = perf_counter_ns()
+    for frame in range(setup.clock.frames):
+        drive = setup.drive(frame)
+        reason = lost(drive)
+        if reason is not None:
+            return recorder.stopped(frame, "diverged", reason)
+        begin = perf_counter_ns()
+        state = advance(state, drive)
+        elapsed = perf_counter_ns() - begin
+        reason = trouble(state, setup.body)
+        if reason is not None:
+            return recorder.stopped(frame, "diverged", reason)
+        reason = pierced(state, setup.obstacles)
+        if reason is not None:
+            return recorder.stopped(frame, "blocked", reason)
+        recorder.record(frame, state, elapsed)
+        if on_frame is not None:
+            on_frame(frame + 1)
+        if perf_counter_ns() - begun > 1e9 * time_limit and frame + 1 < setup.clock.frames:
+            return recorder.stopped(frame + 1, "timed-out", f"the time limit of {time_limit:g} s was reached")
+    return recorder.finished()

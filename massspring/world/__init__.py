@@ -1,0 +1,1 @@
+"""What surrounds a body: obstacles, attachments, the clock, targets of volumes."""

@@ -1,0 +1,58 @@
+"""Frames and steps: a frame is what a user sees, a step what the method takes."""
+
+import math
+from dataclasses import dataclass
+
+from massspring.analysis.stability import StepLimit
+from massspring.errors import MassSpringError
+
+AUTO_FRACTION = 0.5
+"""dt = "auto" is this fraction of the stability limit."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """F frames of equal length, each of `steps` equal steps."""
+
+    frame: float
+    """Length of a frame [s]."""
+    frames: int
+    steps: int
+    """Steps per frame."""
+
+    @property
+    def dt(self) -> float:
+        """Time step [s]; never longer than the one asked for."""
+        return self.frame / self.steps
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.frame * self.frames
+
+
+def make_clock(duration: float, frames: int, dt: float | str, limit: StepLimit, beyond_limit: bool = False) -> Clock:
+    """Frames that fill `duration` [s] exactly, with steps no longer than `dt` [s]; "auto": half the stability limit.
+
+    Raises MassSpringError for dt ≤ 0, and for a dt above the limit unless that is wanted (`beyond_limit`).
+    """
+    if isinstance(dt, str):
+        if dt != "auto":
+            raise MassSpringError(f"dt is '{dt}'; give seconds or 'auto'")
+        wanted = AUTO_FRACTION * limit.damped
+    else:
+        wanted = float(dt)
+    if not (math.isfinite(wanted) and wanted > 0):
+        raise MassSpringError(f"dt is {dt} s; it must be positive, the stability limit is {limit.damped:.3g} s")
+    if frames < 1 or not duration > 0:
+        raise MassSpringError(
+            f"{frames} frames in {duration} s; a run needs at least one frame and a positive duration"
+        )
+    frame = duration / frames
+    clock = Clock(frame, frames, max(1, math.ceil(frame / wanted - 1e-9)))
+    if clock.dt > limit.damped and not beyond_limit:
+        raise MassSpringError(
+            f"dt = {clock.dt:.3g} s lies above the stability limit of {limit.damped:.3g} s; "
+            "take a smaller dt or 'auto', or set beyond_limit to see the run diverge"
+        )
+    return clock

@@ -1,0 +1,1 @@
+"""Motions and small oscillations: inertia, time integration, modes."""

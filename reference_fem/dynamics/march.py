@@ -1,0 +1,132 @@
+"""Step by step through time: steps that fail are halved and grow again; the energy is accounted for.
+
+docs/theory.md, eq. 55.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from reference_fem.dynamics.inertia import Instant, Motion, MovingSystem, Scheme, TimeStep
+from reference_fem.dynamics.release import held_motion, released
+from reference_fem.errors import ReferenceProblem
+from reference_fem.statics.equilibrium import EASY
+from reference_fem.statics.newton import StepFailed, solve_step
+from reference_fem.system import assembly
+from reference_fem.system.state import State
+
+
+class Powers(NamedTuple):
+    """What enters the energy account at one instant."""
+
+    force: np.ndarray
+    """Dead loads and weight, (field_count,) [N]."""
+    obstacles: np.ndarray
+    """Their positions, (no, 3) [m]."""
+    push: np.ndarray
+    """Their forces on the body, (no, 3) [N]."""
+    reaction: np.ndarray
+    """Forces of the holders, one for each held unknown [N]."""
+    pressures: np.ndarray
+    """In the cavities, (nc,) [Pa]."""
+    volumes: np.ndarray
+    """Of the cavities, (nc,) [m³]."""
+    dissipation: float
+    """c v·M v [W]."""
+
+
+class Account:
+    """Work and damping since the start, by the trapezoidal rule between the ends of the steps."""
+
+    def __init__(self, system: MovingSystem, motion: Motion):
+        self.system, self.damped, self.work = system, 0.0, 0.0
+        self.now = self.powers(motion)
+
+    def powers(self, motion: Motion) -> Powers:
+        system, state = self.system, motion.state
+        loads = system.loads_of(state)
+        found = system.evaluate(state.x, loads, tangent=False)
+        dissipation = 2.0 * system.damping * kinetic(system, motion)
+        rows = loads.rows[:, 1:4]
+        reaction, pressures = found.residual[system.pattern.held], state.x[system.field_count :]
+        push = found.touch.force
+        return Powers(np.asarray(loads.force), rows, push, reaction, pressures, found.volumes, dissipation)
+
+    def book(self, old: Motion, new: Motion):
+        """The step from old to new."""
+        system, before, now = self.system, self.now, self.powers(new)
+        moved = new.state.x - old.state.x
+        n, held = system.displacement_count, system.pattern.held
+        self.work += 0.5 * (before.force + now.force)[:n] @ moved[:n]
+        self.work += 0.5 * np.sum((before.push + now.push) * (now.obstacles - before.obstacles))
+        self.work += 0.5 * (before.reaction + now.reaction) @ moved[held]
+        self.work += 0.5 * (before.pressures + now.pressures) @ (now.volumes - before.volumes)
+        self.damped += 0.5 * (before.dissipation + now.dissipation) * (new.state.t - old.state.t)
+        self.now = now
+
+
+def kinetic(system: MovingSystem, motion: Motion):
+    """v·M v / 2 [J]."""
+    return 0.5 * float(motion.v @ system.inertia(motion.v))
+
+
+def strain(system: MovingSystem, state: State):
+    """Strain energy [J]."""
+    return assembly.energy(state.x, system.elements, system.problem.material)
+
+
+class March:
+    """A motion under way."""
+
+    def __init__(self, system: MovingSystem, scheme: Scheme, dt=None):
+        self.system, self.scheme, self.dt = system, scheme, dt
+        self.iterations = self.substeps = 0
+
+    def begin(self, state: State, v, interval):
+        """Let go of a body in `state` with velocities v; interval [s]: to the first wanted time."""
+        system = self.system
+        self.motion = released(system, state, v, interval / self.count(interval))
+        system.clock = Instant(self.motion)
+        self.account = Account(system, self.motion)
+        # with the pressure as given: the multiplier that starts the motion stores no energy
+        self.energy0 = kinetic(system, self.motion) + strain(system, state)
+
+    def count(self, interval):
+        """Equal steps that an interval takes; 1e-9 is round-off in an interval that is a multiple of dt."""
+        return 1 if self.dt is None else max(1, int(np.ceil(interval / self.dt * (1.0 - 1e-9))))
+
+    def advance(self, t, path):
+        """To time t, in as many steps as it takes; `path` goes into the exception when they fail."""
+        t0, reached = self.motion.state.t, 0.0
+        share = full = 1.0 / self.count(t - t0)
+        while reached < 1.0:
+            # no step of its own for a remainder that is round-off
+            goal = 1.0 if reached + 1.001 * share > 1.0 else reached + share
+            try:
+                self.step(t if goal == 1.0 else t0 + goal * (t - t0))
+            except StepFailed as failure:
+                share = 0.5 * (goal - reached)
+                if share < self.system.settings.smallest_step * full:
+                    raise self.stuck(t, failure, path) from failure
+                continue
+            reached = goal
+            if self.motion.state.iterations <= EASY:
+                share = min(full, 2.0 * share)
+
+    def step(self, t):
+        """One step, to time t; a StepFailed leaves the motion as it was."""
+        system, old = self.system, self.motion
+        dt = t - old.state.t
+        system.clock = TimeStep(old, dt, self.scheme, system.pattern.held, *held_motion(system, t, dt))
+        state = solve_step(system, old.state, t, 1.0)
+        self.motion = Motion(state, *system.clock.at(state.x[: system.displacement_count]))
+        system.clock = Instant(self.motion)
+        self.account.book(old, self.motion)
+        self.iterations, self.substeps = self.iterations + state.iterations, self.substeps + 1
+
+    def stuck(self, t, failure, path):
+        return ReferenceProblem(
+            f"no motion found between t = {self.motion.state.t:g} s (the last that converged) and t = {t:g} s: "
+            f"{failure}; refine the mesh where it folds, or ask for less",
+            converged=path,
+        )

@@ -1,0 +1,1 @@
+"""Shape functions, quadrature, curved meshes, evaluation at points."""

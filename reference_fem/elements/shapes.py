@@ -1,0 +1,217 @@
+"""Elements on one mesh: their unknowns, reference tables and geometry, from scikit-fem.
+
+Whatever the element, the mesh gives ten nodes to a tetrahedron and results are reported at them (`nodes`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from skfem import ElementTetMini, ElementTetP2, ElementTriP2, MeshTet
+from skfem.assembly import Dofs
+from skfem.quadrature import get_quadrature
+from skfem.refdom import RefTet, RefTri
+
+from reference_fem.elements.table import DEFAULT, ELEMENTS, Element
+from reference_fem.errors import ReferenceProblem
+
+FACET_EDGES = ((0, 1), (1, 2), (0, 2))
+"""Vertex pairs of the mid-side nodes 3, 4, 5 of a six-node triangle."""
+
+
+class Sizes(NamedTuple):
+    """Lengths as tuples of zeros: the compiler knows a tuple's length, not an array's, and unrolls its loops by it.
+
+    Handed to inner functions one by one: all three together cost a fifth of the assembly's speed.
+    """
+
+    functions: tuple
+    """nu displacement functions."""
+    pressures: tuple
+    """np pressure functions."""
+    unknowns: tuple
+    """Unknowns of an element, as many as columns of `dofs`."""
+
+
+class Elements(NamedTuple):
+    """Everything the element kernel reads, for `ne` elements and `nq` quadrature points each.
+
+    A local vector has u_x at the `nu` functions, then u_y, u_z, then p at the `np` functions.
+    """
+
+    dofs: np.ndarray
+    """Global unknown of each local one, (ne, 3 nu + np) uint32; (ne, 3 nu) when the pressure is eliminated."""
+    gradients: np.ndarray
+    """Rest gradients of the displacement functions, (ne, nq, 3, nu) [1/m]."""
+    pressures: np.ndarray
+    """Values of the pressure functions, (nq, np)."""
+    weights: np.ndarray
+    """Rest volume of each quadrature point, (ne, nq) [m³]."""
+    sizes: Sizes
+
+
+class Facets(NamedTuple):
+    """Boundary facets, turned outward, for `nf` facets and `nq` points each."""
+
+    nodes: np.ndarray
+    """Three vertices, then the mid-side nodes of FACET_EDGES, (nf, 6); without those for linear facets, (nf, 3)."""
+    values: np.ndarray
+    """Values of the six (or three) functions, (nq, 6)."""
+    weights: np.ndarray
+    """Rest area of each quadrature point, (nf, nq) [m²]."""
+
+
+def basis_table(element, points):
+    """Values (nq, nb) and gradients (nq, dim, nb) of a scikit-fem element at points (dim, nq)."""
+    count = element.doflocs.shape[0]
+    pairs = [element.lbasis(points, i) for i in range(count)]
+    values = np.stack([np.broadcast_to(v, points.shape[1:]) for v, _ in pairs], axis=1)
+    gradients = np.stack([np.asarray(g, dtype=float).T for _, g in pairs], axis=2)
+    return values, gradients
+
+
+def element_nodes(mesh):
+    """P2 nodes of every tetrahedron, (ne, 10): four vertices, then six mid-side nodes."""
+    return Dofs(mesh, ElementTetP2()).element_dofs.T
+
+
+def nodes(mesh: MeshTet) -> np.ndarray:
+    """Rest positions of the P2 nodes, (N2, 3) [m]: the vertices, then the edges' mid-side nodes."""
+    if mesh.doflocs.shape[1] > mesh.nvertices:
+        return np.ascontiguousarray(mesh.doflocs.T)
+    middles = mesh.p[:, mesh.edges].mean(axis=1)
+    return np.ascontiguousarray(np.hstack((mesh.p, middles)).T)
+
+
+def displacement_table(mesh: MeshTet, element: Element) -> np.ndarray:
+    """Numbers of each element's displacement functions, (ne, nu): vertices first, then mid-side nodes or bubbles."""
+    return np.asarray(Dofs(mesh, element.displacement).element_dofs).T
+
+
+def displacement_points(mesh: MeshTet, element: Element) -> np.ndarray:
+    """Rest positions that belong to the displacement functions, (n, 3) [m]: nodes, or the centre for a bubble."""
+    if isinstance(element.displacement, ElementTetP2):
+        return nodes(mesh)
+    points = nodes(mesh)[: mesh.nvertices]
+    if isinstance(element.displacement, ElementTetMini):
+        points = np.vstack((points, points[mesh.t[:4]].mean(axis=0)))
+    return points
+
+
+def at_nodes(mesh: MeshTet, element: Element, values) -> np.ndarray:
+    """A displacement field (n, 3) at the P2 nodes, (N2, 3); mid-side nodes of a linear field lie between two vertices,
+    and a bubble is zero there."""
+    if isinstance(element.displacement, ElementTetP2):
+        return values
+    corners = values[: mesh.nvertices]
+    return np.vstack((corners, corners[mesh.edges].mean(axis=0)))
+
+
+def forces_at_nodes(mesh: MeshTet, element: Element, forces):
+    """Forces on the displacement functions (n, 3) as forces on the P2 nodes, (N2, 3) [N]; bubbles carry none."""
+    if isinstance(element.displacement, ElementTetP2):
+        return forces
+    return np.vstack((forces[: mesh.nvertices], np.zeros((len(nodes(mesh)) - mesh.nvertices, 3))))
+
+
+def build_elements(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAULT]) -> Elements:
+    """Tables of every element; raises ReferenceProblem for folded or flat elements.
+
+    order: degree that the quadrature integrates exactly; P2 displacements enter J as a cubic and p J as a quartic.
+    """
+    points, w = get_quadrature(RefTet, order)
+    _, shape = basis_table(ElementTetP2(), points)
+    _, local = basis_table(element.displacement, points)
+    x = nodes(mesh)
+    jacobian = np.einsum("eni,qJn->eqiJ", x[element_nodes(mesh)], shape)
+    det = np.linalg.det(jacobian)
+    check_shapes(det)
+    gradients = np.einsum("eqJi,qJn->eqin", np.linalg.inv(jacobian), local)
+    table = displacement_table(mesh, element)
+    dofs, pressures = [3 * table + c for c in range(3)], np.ones((len(w), 1))
+    if element.pressure is not None:
+        dofs.append(3 * (table.max() + 1) + mesh.t[:4].T)
+        pressures, _ = basis_table(element.pressure, points)
+    unknowns = np.hstack(dofs).astype(np.uint32)
+    sizes = Sizes(*((0,) * n for n in (table.shape[1], pressures.shape[1], unknowns.shape[1])))
+    return Elements(
+        dofs=unknowns,
+        gradients=np.ascontiguousarray(gradients),
+        pressures=pressures,
+        weights=np.abs(det) * w,
+        sizes=sizes,
+    )
+
+
+def check_shapes(det):
+    """Refuse elements whose map folds: the sign of det (ne, nq) must not change inside one element."""
+    largest = np.abs(det).max(axis=1)
+    folded = det.min(axis=1) * det.max(axis=1) <= 0.0
+    # 1e-10 of the typical size is far below what a meshing tool leaves and far above round-off
+    bad = np.flatnonzero(folded | (largest < 1e-10 * np.median(largest)))
+    if bad.size:
+        raise ReferenceProblem(
+            f"element {bad[0]} is inverted or flat at rest ({bad.size} such elements; smallest volume ratio "
+            f"{(det.min(axis=1) * np.sign(det.mean(axis=1)) / largest)[bad[0]]:.1e}, limit > 0): mend the mesh, "
+            f"or leave its mid-side nodes straight"
+        )
+
+
+def check_neighbours(mesh):
+    """Refuse an inside-out element: the two tetrahedra at a face must lie on opposite sides of it."""
+    inner = np.flatnonzero(mesh.f2t[1] >= 0)
+    a, b, c = mesh.p[:, mesh.facets[:, inner]].transpose(1, 2, 0)
+    normal = np.cross(b - a, c - a)
+    sides = []
+    for k in (0, 1):
+        element = mesh.t[:4, mesh.f2t[k, inner]]
+        other = element.sum(axis=0) - mesh.facets[:, inner].sum(axis=0)
+        sides.append(np.einsum("ni,ni->n", mesh.p[:, other].T - a, normal))
+    bad = np.flatnonzero(sides[0] * sides[1] >= 0.0)
+    if bad.size:
+        pair = mesh.f2t[:, inner[bad[0]]]
+        raise ReferenceProblem(
+            f"elements {pair[0]} and {pair[1]} overlap across their common face ({bad.size} such faces, limit 0): "
+            f"one of them is inverted, mend the mesh"
+        )
+
+
+def facet_nodes(mesh: MeshTet) -> np.ndarray:
+    """Six nodes of every boundary facet, outward, (nf, 6)."""
+    index = mesh.boundary_facets()
+    corners = np.asarray(mesh.facets)[:, index].T.copy()
+    owner = mesh.t[:4, np.asarray(mesh.f2t)[0, index]].T
+    opposite = owner.sum(axis=1) - corners.sum(axis=1)
+    a, b, c, d = (mesh.p[:, i].T for i in (*corners.T, opposite))
+    inward = np.einsum("fi,fi->f", np.cross(b - a, c - a), d - a) > 0.0
+    corners[inward] = corners[inward][:, [0, 2, 1]]
+    middles = [mesh.nvertices + edge_index(mesh, corners[:, pair]) for pair in FACET_EDGES]
+    return np.column_stack((corners, *middles))
+
+
+def edge_index(mesh, pairs):
+    """Rows of mesh.edges that join the vertex pairs (n, 2)."""
+    count = mesh.nvertices
+    keys = np.min(mesh.edges, axis=0) * np.int64(count) + np.max(mesh.edges, axis=0)
+    order = np.argsort(keys)
+    wanted = np.min(pairs, axis=1) * np.int64(count) + np.max(pairs, axis=1)
+    return order[np.searchsorted(keys, wanted, sorter=order)]
+
+
+def build_facets(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAULT]) -> Facets:
+    """Quadrature on the boundary. Raises ReferenceProblem when the order has a rule with negative weights."""
+    points, w = get_quadrature(RefTri, order)
+    if w.min() <= 0.0:
+        raise ReferenceProblem(f"the contact order {order} has a rule with negative weights: use 4, 5, 6 or 8")
+    _, local = basis_table(ElementTriP2(), points)
+    table = facet_nodes(mesh)
+    tangents = np.einsum("fni,qJn->fqJi", nodes(mesh)[table], local)
+    area = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2)
+    values, _ = basis_table(element.facet, points)
+    return Facets(table[:, : values.shape[1]], values, area * w)
+
+
+def surface_triangles(mesh: MeshTet) -> np.ndarray:
+    """Boundary as linear triangles, outward, four to a facet, (4 nf, 3) indices into nodes(mesh)."""
+    table = facet_nodes(mesh)
+    quarters = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
+    return np.vstack([table[:, q] for q in quarters])

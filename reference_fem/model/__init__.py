@@ -1,0 +1,1 @@
+"""What is solved: material, loads, obstacles, cavities, the problem as a whole."""

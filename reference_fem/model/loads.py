@@ -1,0 +1,93 @@
+"""Dead loads: forces given per rest area or rest volume, whatever the body does."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from skfem import ElementTetP2, ElementTriP2, MeshTet
+from skfem.quadrature import get_quadrature
+from skfem.refdom import RefTet, RefTri
+
+from reference_fem.elements.shapes import (
+    Element,
+    basis_table,
+    build_elements,
+    build_facets,
+    displacement_points,
+    displacement_table,
+    element_nodes,
+    facet_nodes,
+    nodes,
+)
+from reference_fem.errors import ReferenceProblem
+
+
+@dataclass(frozen=True, eq=False)
+class Traction:
+    """Force per rest area on part of the boundary; it does not turn with the body.
+
+    where: (3, N) rest positions of facet centres -> bool (N,). value: t [s], (3, M) rest positions -> (3, M) [Pa].
+    """
+
+    where: Callable
+    value: Callable
+
+
+@dataclass(frozen=True, eq=False)
+class BodyForce:
+    """Force per rest volume. value: t [s], (3, M) rest positions -> (3, M) [N/m³]."""
+
+    value: Callable
+
+
+class LoadedPoints(NamedTuple):
+    """Quadrature points that a load acts at: k elements or facets, q points each."""
+
+    value: Callable
+    positions: np.ndarray
+    """Rest positions, (3, k q) [m]."""
+    weights: np.ndarray
+    """Rest volumes [m³] or areas [m²], (k, q)."""
+    functions: np.ndarray
+    """Displacement functions at the points, (q, nu)."""
+    table: np.ndarray
+    """Their numbers, (k, nu)."""
+    count: int
+    """Number of all displacement functions."""
+
+
+def find_points(load: Traction | BodyForce, mesh: MeshTet, element: Element, order: int) -> LoadedPoints:
+    """Where a load acts on one mesh; raises ReferenceProblem for a traction that finds no facet."""
+    x, count = nodes(mesh), len(displacement_points(mesh, element))
+    if isinstance(load, BodyForce):
+        points, _ = get_quadrature(RefTet, order)
+        shape, _ = basis_table(ElementTetP2(), points)
+        functions, _ = basis_table(element.displacement, points)
+        positions, weights = x[element_nodes(mesh)], build_elements(mesh, order, element).weights
+        table = displacement_table(mesh, element)
+    else:
+        facets, corners = build_facets(mesh, order, element), facet_nodes(mesh)
+        chosen = np.asarray(load.where(x[corners[:, :3]].mean(axis=1).T), dtype=bool)
+        if not chosen.any():
+            raise ReferenceProblem("a traction acts on no facet of the boundary: choose a region that touches it")
+        shape, _ = basis_table(ElementTriP2(), get_quadrature(RefTri, order)[0])
+        positions, weights, functions = x[corners[chosen]], facets.weights[chosen], facets.values
+        table = facets.nodes[chosen]
+    where = np.einsum("qn,kni->kqi", shape, positions).reshape(-1, 3).T
+    return LoadedPoints(load.value, where, weights, functions, table, count)
+
+
+def nodal_force(points: LoadedPoints, t):
+    """Force on every displacement unknown at time t, (3 count,) [N]; refuses values that are not finite."""
+    value = np.asarray(points.value(t, points.positions), dtype=float)
+    if value.shape != points.positions.shape or not np.isfinite(value).all():
+        raise ReferenceProblem(
+            f"a load gives values of shape {value.shape} at t = {t:g} s for {points.positions.shape[1]} points: "
+            f"finite values of shape {points.positions.shape} are needed"
+        )
+    local = value.reshape(3, *points.weights.shape) * points.weights
+    shares = np.einsum("ikq,qa->kai", local, points.functions).reshape(-1, 3)
+    force = np.zeros((points.count, 3))
+    np.add.at(force, points.table.ravel(), shares)
+    return force.ravel()

@@ -1,0 +1,101 @@
+"""What is solved: a body, its material, what holds it and what presses it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from skfem import MeshTet
+
+from reference_fem.elements.shapes import build_facets, displacement_points
+from reference_fem.elements.table import DEFAULT, find_element
+from reference_fem.errors import ReferenceProblem
+from reference_fem.model.cavity import Cavity
+from reference_fem.model.loads import BodyForce, Traction
+from reference_fem.model.material import Material
+from reference_fem.model.obstacles import Obstacle, finite_vector
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Displacement components prescribed at boundary nodes.
+
+    where: (3, N) rest positions -> bool (N,), asked at the nodes of the boundary.
+    motion: t [s] -> (3,) displacement [m], None = stays. shape: (3, N) rest positions -> (3, N) factors that the
+    displacement is multiplied with, component by component, None = 1 (for radial or affine motions).
+    """
+
+    where: Callable
+    components: Sequence[int] = (0, 1, 2)
+    motion: Callable | None = None
+    shape: Callable | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A quasi-static problem in SI units; the body is stress-free on its mesh.
+
+    mesh: MeshTet (straight) or MeshTet2 (curved, see curve). gravity [m/s²], density [kg/m³].
+    cavities: lumens that keep a volume or a pressure; a lumen not named is open. element: a name in ELEMENTS.
+    order: degree integrated exactly, None = the element's own (for P2/P1 that is 5, the lowest with positive weights at
+    or above what p J needs, 4). loads: dead forces, switched on with gravity at the start, then as their time says.
+    """
+
+    mesh: MeshTet
+    material: Material
+    held: Sequence[Held]
+    obstacles: Sequence[Obstacle] = ()
+    gravity: Sequence[float] = (0.0, 0.0, 0.0)
+    density: float = 0.0
+    order: int | None = None
+    contact_order: int = 4
+    cavities: Sequence[Cavity] = ()
+    element: str = DEFAULT
+    loads: Sequence[Traction | BodyForce] = ()
+
+    @property
+    def degree(self) -> int:
+        """The quadrature order in use."""
+        return find_element(self.element).order if self.order is None else self.order
+
+
+@dataclass(frozen=True, eq=False)
+class HeldNodes:
+    """One Held on one mesh: its nodes, its unknowns, and the displacement factors."""
+
+    nodes: np.ndarray
+    dofs: np.ndarray
+    """Unknowns, component by component, (k, len(nodes))."""
+    components: tuple
+    factors: np.ndarray
+    """(k, len(nodes))."""
+    motion: Callable | None = field(default=None)
+
+    def displacement(self, t):
+        """Prescribed displacement of `dofs` at time t [m]."""
+        if self.motion is None:
+            return np.zeros_like(self.factors)
+        moved = finite_vector(self.motion(t), f"the motion of a held region at t = {t:g} s")
+        return moved[list(self.components), None] * self.factors
+
+
+def find_held(problem: Problem) -> list[HeldNodes]:
+    """Held regions as unknowns; raises ReferenceProblem when a region finds no node or names a wrong component."""
+    element = find_element(problem.element)
+    x = displacement_points(problem.mesh, element)
+    boundary = np.unique(build_facets(problem.mesh, problem.contact_order, element).nodes)
+    found = []
+    for k, held in enumerate(problem.held):
+        components = tuple(held.components)
+        if not components or not set(components) <= {0, 1, 2}:
+            raise ReferenceProblem(f"held region {k} names components {components}: give some of 0, 1, 2")
+        chosen = boundary[np.asarray(held.where(x[boundary].T), dtype=bool)]
+        if chosen.size == 0:
+            low, high = x.min(axis=0), x.max(axis=0)
+            raise ReferenceProblem(
+                f"held region {k} contains no boundary node: the body fills {np.array2string(low, precision=4)} to "
+                f"{np.array2string(high, precision=4)} m, choose a region that touches its surface"
+            )
+        factors = np.ones((3, chosen.size)) if held.shape is None else np.asarray(held.shape(x[chosen].T), dtype=float)
+        dofs = np.stack([3 * chosen + c for c in components])
+        found.append(HeldNodes(chosen, dofs, components, factors[list(components)], held.motion))
+    return found

@@ -1,0 +1,1 @@
+"""Equilibrium along a load path: Newton, contact status, tangents."""

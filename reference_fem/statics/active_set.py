@@ -1,0 +1,176 @@
+"""Which points are in contact at the end of a Newton step: its linearised contact problem, solved to the end.
+
+With the body and the obstacles' surfaces linearised, the pressures are still t = max(0, m - eps (g + n·d)). Newton's
+tangent takes the points that touch as known; where others touch, its step ends out of balance and points flicker from
+step to step. Each point that changes is a rank-one change eps w b bᵀ of the tangent, b = n N, so that the factors serve
+for any set of points (Sherman, Morrison and Woodbury; Hager, SIAM Review 31, 1989; docs/theory.md, eq. 148), and a
+semismooth Newton iteration finds the set (Hintermüller, Ito and Kunisch, SIAM J. Optim. 13, 2003).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+
+from reference_fem.contact.augmented import Touch
+from reference_fem.elements.surface import point_positions
+from reference_fem.model.obstacles import gap_into
+from reference_fem.statics.tangent import Tangent
+from reference_fem.system.saddle_point import System
+
+ROUNDS = 20
+"""Sets of points that are tried: it takes 2 to 7; the set of the last round is as good a direction as any."""
+
+BATCH = 64
+"""Right-hand sides solved at once: a column then costs a quarter of a solve of its own, and little memory."""
+
+MOST = 512
+"""Points that may change: more would cost more than the factorisation that they save."""
+
+
+class Points(NamedTuple):
+    """Contact points that may begin or cease to touch, np of them."""
+
+    directions: sp.csr_matrix
+    """b = n N of each, so that b·d is how far it moves off its obstacle, (np, total)."""
+    gap: np.ndarray
+    """Where the obstacle will be [m]."""
+    multiplier: np.ndarray
+    """m [Pa]."""
+    penalty: np.ndarray
+    """eps [Pa/m]."""
+    area: np.ndarray
+    """Rest area w [m²]."""
+    touching: np.ndarray
+    """Whether the tangent counts it as in contact, bool."""
+    excess: np.ndarray
+    """Pressure that the tangent counts with and the residual lacks [Pa]."""
+    place: tuple
+    """Obstacle, facet and point of each."""
+
+
+@njit(cache=True)
+def look_at(rows, y, gap, normal):
+    """Gaps (no, nf, nq) [m] and normals (no, nf, nq, 3) of the points y (nf, nq, 3) [m]."""
+    along = np.empty(3)
+    for o in range(gap.shape[0]):
+        for f in range(gap.shape[1]):
+            for q in range(gap.shape[2]):
+                gap[o, f, q] = gap_into(rows[o], y[f, q], normal[o, f, q], along)[0]
+
+
+def points_near(system: System, touch: Touch, x, change) -> Points:
+    """The points on facets that are, or after the change will be, no farther from an obstacle than their size.
+
+    Of a stuck point only the normal part takes part: its traction stays as the tangent has it.
+    """
+    surface, counted = system.surface, touch.guess if len(touch.guess) else touch.pressure
+    y = point_positions(x, surface)
+    moved = point_positions(change[: len(surface.rest)] - surface.rest, surface)
+    gap, normal = np.empty_like(touch.multiplier), np.empty((*touch.multiplier.shape, 3))
+    look_at(touch.rows, y, gap, normal)
+    after = gap + np.einsum("ofqi,fqi->ofq", normal, moved) - np.einsum("ofqi,oi->ofq", normal, touch.shift)
+    reach = np.sqrt(surface.weights.sum(axis=1))[:, None]
+    close = (np.minimum(gap, after) < reach) | (counted > 0.0)
+    near = np.repeat(close.any(axis=2)[..., None], gap.shape[2], axis=2)
+    place = o, f, q = np.nonzero(near)
+    n, shapes = normal[place], surface.values[q]
+    values = (n[:, :, None] * shapes[:, None, :]).ravel()
+    start = surface.dofs.shape[1] * np.arange(len(o) + 1)
+    directions = sp.csr_matrix((values, surface.dofs[f].ravel(), start), shape=(len(o), system.total))
+    m, eps, touching = touch.multiplier[place], touch.penalty[f], counted[place] > 0.0
+    excess = np.where(touching, m - eps * gap[place], 0.0) - touch.pressure[place]
+    ahead = gap[place] - np.sum(n * touch.shift[o], axis=1)
+    return Points(directions, ahead, m, eps, surface.weights[f, q], touching, excess, place)
+
+
+class Influence:
+    """How all points move when one of them is pushed; found when first asked for."""
+
+    def __init__(self, system: System, tangent: Tangent, points: Points):
+        self.tangent, self.points = tangent, points
+        self.pushes = points.directions[:, system.pattern.free]
+        self.known: dict[int, np.ndarray] = {}
+
+    def of(self, chosen):
+        """Movement of all points off their obstacles per force [m/N], (np, len(chosen))."""
+        new = [k for k in chosen if k not in self.known]
+        for first in range(0, len(new), BATCH):
+            batch = new[first : first + BATCH]
+            moves = self.points.directions @ self.tangent.respond(self.pushes[batch].T.toarray(order="F"))
+            self.known |= dict(zip(batch, moves.T, strict=True))
+        return np.array([self.known[k] for k in chosen]).reshape(len(chosen), len(self.points.gap)).T
+
+    def forces(self, push):
+        """Forces on the free unknowns of pushes (np,) [N] at the points."""
+        return self.pushes.T @ push
+
+
+def settled(system: System, tangent: Tangent, x, change):
+    """Newton's change (total,) of x with the contact of the linearised problem settled, and its pressures (no, nf, nq).
+
+    The next tangent counts with those: they tell better than the gaps which points are going to touch.
+    """
+    touch = tangent.found.touch
+    points = points_near(system, touch, x, change)
+    influence = Influence(system, tangent, points)
+    change = change + tangent.respond(influence.forces(points.area * points.excess))
+    plain = gap = points.gap + points.directions @ change
+    push = np.zeros(len(gap))
+    for _ in range(ROUNDS):
+        wanted = changed(points, gap)
+        if len(set(wanted) | influence.known.keys()) > MOST:
+            break
+        goal, moves = np.zeros(len(gap)), influence.of(wanted)
+        goal[wanted] = pushes(points, wanted, moves[wanted], plain)
+        there = plain + moves @ goal[wanted]
+        if np.array_equal(wanted, changed(points, there)):
+            push, gap = goal, there
+            break
+        share = share_of(points, push, goal - push, gap, there - gap)
+        push, gap = push + share * (goal - push), gap + share * (there - gap)
+    guess = np.zeros_like(touch.multiplier)
+    guess[points.place] = pressures(points, gap)
+    return (change + tangent.respond(influence.forces(push)) if push.any() else change), guess
+
+
+def pressures(points: Points, gap):
+    """t = max(0, m - eps g) [Pa]."""
+    return np.maximum(0.0, points.multiplier - points.penalty * gap)
+
+
+def changed(points: Points, gap):
+    """Numbers of the points that touch although the tangent does not count them, or the other way round."""
+    return np.flatnonzero((pressures(points, gap) > 0.0) != points.touching)
+
+
+def pushes(points: Points, chosen, moves, gap):
+    """Forces [N] at the points that change, (k,): +w t of those that touch, -w t of those that the tangent holds.
+
+    From t = m - eps (gap + moves·push) (eq. 148); moves (k, k): among themselves.
+    """
+    sign = np.where(points.touching[chosen], -1.0, 1.0)
+    eps = points.penalty[chosen]
+    matrix = np.diag(sign / points.area[chosen]) + eps[:, None] * moves
+    return np.linalg.solve(matrix, points.multiplier[chosen] - eps * gap[chosen])
+
+
+def share_of(points: Points, push, more, gap, moved):
+    """The share of a change of pushes and gaps, up to 1, that lowers the potential most: without it sets may cycle.
+
+    Its slope, sum moved (push - w (t - t the tangent counts)), grows with the share: bisected to a thousandth.
+    """
+
+    def slope(share):
+        there = gap + share * moved
+        counted = np.where(points.touching, points.multiplier - points.penalty * there, 0.0)
+        return moved @ (push + share * more - points.area * (pressures(points, there) - counted))
+
+    low, high = 0.0, 1.0
+    if slope(high) <= 0.0:
+        return high
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if slope(middle) <= 0.0 else (low, middle)
+    return high

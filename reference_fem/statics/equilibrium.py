@@ -1,0 +1,183 @@
+"""Loading paths: equilibria at wanted times, with sub-steps that shrink on failure and grow again."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from reference_fem.contact import augmented as contact
+from reference_fem.elements.shapes import at_nodes, forces_at_nodes
+from reference_fem.errors import ReferenceProblem
+from reference_fem.model.problem import Problem
+from reference_fem.statics.newton import StepFailed, solve_step
+from reference_fem.system import assembly
+from reference_fem.system.checks import check_resumed, check_times
+from reference_fem.system.saddle_point import System
+from reference_fem.system.state import NewtonSettings, State
+
+EASY = 8
+"""Newton iterations below which the next sub-step may be twice as long."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """One state of rest under load; SI units, N2 P2 nodes, N1 vertices."""
+
+    t: float
+    u: np.ndarray
+    """Displacement of the P2 nodes, (N2, 3) [m]."""
+    p: np.ndarray
+    """Pressure at the vertices, positive in tension, (N1,) [Pa]."""
+    obstacle_force: np.ndarray
+    """Force of each obstacle on the body, (no, 3) [N], from the contact pressures."""
+    held_force: np.ndarray
+    """Force of each held region on the body, (nh, 3) [N]; a shared unknown counts for the first region."""
+    reaction: np.ndarray
+    """Force of the holders on each node, (N2, 3) [N]."""
+    volume: float
+    volume0: float
+    J: np.ndarray
+    """Volume ratio at the quadrature points, (ne, nq)."""
+    weights: np.ndarray
+    """Rest volume of the quadrature points, (ne, nq) [m³]."""
+    penetration: float
+    """Deepest quadrature point inside an obstacle [m]."""
+    slippage: float
+    """Farthest that a point stuck to a no-slip obstacle has slipped [m]."""
+    newton_iterations: int
+    """Linear solves since the previous wanted time, failed sub-steps not counted."""
+    substeps: int
+    energy: float
+    """Strain energy [J]."""
+    cavity_pressure: np.ndarray
+    """Gauge pressure in each lumen, positive when it pushes the wall out, (nc,) [Pa]."""
+    cavity_volume: np.ndarray
+    """Volume of each lumen, (nc,) [m³]."""
+
+    @property
+    def min_J(self):
+        return float(self.J.min())
+
+    @property
+    def max_J(self):
+        return float(self.J.max())
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """A path half-way: what was found at its first times, and all that the next load step starts from.
+
+    state.to_arrays() and State.from_arrays store it without this package's classes.
+    """
+
+    path: list[Equilibrium]
+    state: State
+
+
+def equilibrium_path(
+    problem: Problem,
+    times,
+    settings: NewtonSettings | None = None,
+    on_step: Callable[[Equilibrium], None] | None = None,
+    on_checkpoint: Callable[[Checkpoint], None] | None = None,
+    resume: Checkpoint | None = None,
+) -> list[Equilibrium]:
+    """Equilibria at the given times [s], reached from rest at settings.start; on_step sees each as it is found.
+
+    on_checkpoint gets what `resume` needs to go on from there with the same problem, times and settings: the answers
+    are then those of the uninterrupted path.
+    Dead loads and cavities that start filled are switched on first, at the start. Raises ReferenceProblem for a problem
+    that cannot be set up, and when a sub-step below settings.smallest_step still fails: then its `converged` holds
+    what was reached.
+    """
+    settings = settings or NewtonSettings()
+    times = check_times(times, settings.start)
+    system = System(problem, settings)
+    path: list[Equilibrium] = [] if resume is None else list(resume.path)
+    try:
+        state, pending = system.rest(), (0, 0)
+        if resume is not None:
+            check_resumed(state, resume.state)
+            state = resume.state
+        elif system.starts_loaded():
+            state, *pending = advance(system, state, settings.start, 1.0, path)
+        for t in times[len(path) :]:
+            state, iterations, substeps = advance(system, state, t, 1.0, path)
+            path.append(describe(system, state, iterations + pending[0], substeps + pending[1]))
+            pending = (0, 0)
+            if on_step is not None:
+                on_step(path[-1])
+            if on_checkpoint is not None:
+                on_checkpoint(Checkpoint(list(path), state))
+    finally:
+        system.solver.release()
+    return path
+
+
+def advance(system: System, state: State, t, load, path):
+    """(state at time t and gravity share load, iterations, sub-steps), in as many sub-steps as it takes."""
+    t0, load0, reached, share = state.t, state.load, 0.0, 1.0
+    iterations = substeps = 0
+    while reached < 1.0:
+        goal = min(1.0, reached + share)
+        there = t if goal == 1.0 else t0 + goal * (t - t0)
+        try:
+            state = solve_step(system, state, there, load0 + goal * (load - load0))
+        except StepFailed as failure:
+            share = 0.5 * (goal - reached)
+            if share < system.settings.smallest_step:
+                raise stuck(state, t, failure, path) from failure
+            continue
+        iterations, substeps, reached = iterations + state.iterations, substeps + 1, goal
+        if state.iterations <= EASY:
+            share *= 2.0
+    return state, iterations, substeps
+
+
+def stuck(state: State, t, failure, path):
+    """The exception for a path that cannot go on."""
+    gravity = f" under {100 * state.load:.3g} % of what acts at the start" if state.load < 1.0 else ""
+    return ReferenceProblem(
+        f"no equilibrium found between t = {state.t:g} s{gravity} (the last that converged) and t = {t:g} s: "
+        f"{failure}; refine the mesh where it folds, or ask for less",
+        converged=path,
+    )
+
+
+def describe(system: System, state: State, iterations, substeps) -> Equilibrium:
+    """Everything worth knowing about a converged state."""
+    n, elements = system.displacement_count, system.elements
+    found = system.evaluate(state.x, system.loads_of(state), tangent=False)
+    mesh, material = system.problem.mesh, system.problem.material
+    J = np.linalg.det(assembly.deformation(state.x, elements, material.kappa)[0])
+    reaction = np.zeros(n)
+    reaction[system.pattern.held] = found.residual[system.pattern.held]
+    return Equilibrium(
+        t=float(state.t),
+        u=at_nodes(mesh, system.element, state.x[:n].reshape(-1, 3).copy()),
+        p=assembly.vertex_pressure(state.x[: system.field_count], elements, mesh, material.kappa),
+        obstacle_force=found.touch.force,
+        held_force=held_forces(system, reaction),
+        reaction=forces_at_nodes(mesh, system.element, reaction.reshape(-1, 3)),
+        volume=float(np.sum(elements.weights * J)),
+        volume0=system.volume,
+        J=J,
+        weights=elements.weights,
+        penetration=contact.penetration(found.touch),
+        slippage=contact.slippage(found.touch),
+        newton_iterations=iterations,
+        substeps=substeps,
+        energy=assembly.energy(state.x, elements, material),
+        cavity_pressure=state.x[system.field_count :].copy(),
+        cavity_volume=found.volumes,
+    )
+
+
+def held_forces(system: System, reaction):
+    """Sum of the reactions of each held region, (nh, 3) [N]."""
+    left, forces = reaction.copy(), np.zeros((len(system.held), 3))
+    for k, held in enumerate(system.held):
+        for component, dofs in zip(held.components, held.dofs, strict=True):
+            forces[k, component] = left[dofs].sum()
+            left[dofs] = 0.0
+    return forces

@@ -1,0 +1,107 @@
+"""Newton's method on one load step."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from reference_fem.contact import augmented as contact
+from reference_fem.contact.augmented import NO_GUESS
+from reference_fem.statics import active_set
+from reference_fem.statics.tangent import Tangent
+from reference_fem.system.saddle_point import System
+from reference_fem.system.state import Loads, State
+
+PENALTY_GROWTH = 2.0
+"""Factor on the contact penalty at each multiplier update inside a step: plain updates gain little where a facet is
+partly in contact, for its points then ask for more than six nodes can give."""
+
+MERIT_GROWTH = 5.0
+"""Largest rise of the error in one accepted iteration: points that come into contact raise it before it falls."""
+
+LOOSE = 1e4
+"""Factor on both tolerances before a multiplier update: solving closer first saves no iteration afterwards."""
+
+
+HESITATION = 8
+"""Iterations in which a stuck point may be let go and held again; then what is let go stays so to the end of the load
+step. Held, some points are not pressed, and let go, they are: without this they would come and go for ever."""
+
+
+class StepFailed(Exception):
+    """A load step did not converge; the path tries a smaller one."""
+
+
+def solve_step(system: System, state: State, t, load) -> State:
+    """The equilibrium at time t from the one in `state`; raises StepFailed.
+
+    Multipliers are updated, and the penalty raised, only while some point is deeper than allowed, or is pushed from as
+    far outside; the next step starts low again.
+    """
+    target, stiffness = system.held_at(t), 1.0
+    force, filling = system.force_at(t, load), system.filling_at(t, load)
+    loads = Loads(force, system.obstacles_at(t), state.pressure, filling, grip=state.hold)
+    x, found, before = state.x, first_guess(system, state, loads), None
+    for iteration in range(1, system.settings.max_iterations + 1):
+        change, guess = direction(system, found, x, target)
+        loads = loads._replace(guess=guess, grip=let_go(loads.grip, guess) if iteration > HESITATION else loads.grip)
+        x, found = search(system, x, change, loads, before)
+        arrived = np.array_equal(x[system.pattern.held], target)
+        off = misplaced(system, x, found)
+        if arrived and settled(found, system.settings, LOOSE if off else 1.0):
+            if not off:
+                hold = contact.renewed_grip(found.touch, system.sticks, system.surface, x)
+                settled_in = State(t, load, x, loads.multiplier, found.touch.pressure, iteration)
+                return replace(settled_in, stiffness=stiffness, grip=loads.grip, hold=hold)
+            stiffness *= PENALTY_GROWTH
+            grip = loads.grip._replace(traction=found.touch.traction)
+            loads = loads._replace(multiplier=found.touch.pressure, stiffness=stiffness, grip=grip)
+            found = system.evaluate(x, loads)
+        before = found
+    raise StepFailed(
+        f"{system.settings.max_iterations} Newton iterations left a relative force error of {found.errors[0]:.1e}"
+    )
+
+
+def first_guess(system, state, loads: Loads):
+    """The evaluation that the first direction is taken from: where the body is, with the move of the obstacles
+    linearised."""
+    old = system.obstacles_at(state.t)
+    return system.evaluate(state.x, loads._replace(rows=old, shift=loads.rows[:, 1:4] - old[:, 1:4]))
+
+
+def let_go(grip: contact.Grip, guess):
+    """The grip without the points that nothing will press."""
+    return grip._replace(stuck=grip.stuck & (guess > 0.0)) if grip.stuck.size else grip
+
+
+def direction(system: System, found, x, target):
+    """Newton's change at x, which also takes the held unknowns to their target; and the contact pressures to expect."""
+    tangent = Tangent(system, found)
+    change = tangent.newton(target - x[system.pattern.held])
+    return active_set.settled(system, tangent, x, change) if len(system.rows) else (change, NO_GUESS)
+
+
+def settled(found, settings, slack):
+    """Whether both relative errors are below their tolerances times slack, and what holds a point also presses it."""
+    if contact.mistaken(found.touch):
+        return False
+    return found.errors[0] <= slack * settings.force_tol and found.errors[1] <= slack * settings.volume_tol
+
+
+def misplaced(system, x, found):
+    """Whether contact acts farther from an obstacle's surface, or from where it stuck, than its share of the largest
+    displacement."""
+    allowed = system.settings.penetration_tol * np.abs(x[: system.displacement_count]).max()
+    return max(contact.misplacement(found.touch), contact.slippage(found.touch)) > allowed
+
+
+def search(system, x, direction, loads, before):
+    """First of a few halved trial steps that keeps every element upright and does not throw the error far up."""
+    share = 1.0
+    while share > 1e-2:
+        trial = x + share * direction
+        found = system.evaluate(trial, loads)
+        if found.usable and (before is None or found.errors.max() <= MERIT_GROWTH * before.errors.max()):
+            return trial, found
+        share *= 0.5
+    raise StepFailed("no share of Newton's step keeps the elements upright and the error in bounds")

@@ -1,0 +1,47 @@
+"""The factored tangent of one evaluation, and what displacement answers a force."""
+
+import numpy as np
+
+from reference_fem.system.saddle_point import Evaluation, System
+
+
+class Tangent:
+    """Factors of a tangent, with its cavities as a border. Raises ReferenceProblem when it is singular.
+
+    With K b = dV/dx, the fields move by d + b dp, and dV/dx·(d + b dp) = -misfit gives dp: one more solve for each
+    cavity, no dense row in the pattern (docs/theory.md, eq. 42).
+    """
+
+    def __init__(self, system: System, found: Evaluation):
+        self.system, self.found = system, found
+        system.solver.factor(system.pattern.upper(found.values))
+        if system.lumens:
+            self.columns = system.solver.solve(np.asfortranarray(found.gradients[:, system.pattern.free].T))
+            self.matrix = found.gradients[:, system.pattern.free] @ self.columns
+            for k, lumen in enumerate(system.lumens):
+                if lumen.by_pressure:
+                    self.matrix[k] = np.eye(len(system.lumens))[k]
+
+    def respond(self, forces, misfits: np.ndarray | float = 0.0, lifted: np.ndarray | float = 0.0):
+        """Change of all unknowns (total, ...) that balances forces on the free ones (n, ...) and closes the misfits.
+
+        misfits (nc, ...): of the cavities. lifted (m, ...): change of the held unknowns, its forces among `forces`.
+        """
+        system, m = self.system, self.system.field_count
+        change = np.zeros((system.total, *forces.shape[1:]))
+        change[system.pattern.held] = lifted
+        change[system.pattern.free] = system.solver.solve(forces)
+        if system.lumens:
+            right = misfits - self.found.gradients @ change[:m]
+            for k, lumen in enumerate(system.lumens):
+                if lumen.by_pressure:
+                    right[k] = np.broadcast_to(misfits, right.shape)[k]
+            change[m:] = np.linalg.solve(self.matrix, right)
+            change[system.pattern.free] += self.columns @ change[m:]
+        return change
+
+    def newton(self, lift):
+        """Newton's change of all unknowns (total,), by `lift` (m,) at the held ones."""
+        system, found = self.system, self.found
+        forces = -found.residual[system.pattern.free] - system.pattern.lifting(found.values) @ lift
+        return self.respond(forces, -found.residual[system.field_count :], lift)

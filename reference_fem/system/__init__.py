@@ -1,0 +1,1 @@
+"""The discrete equations: assembly, saddle-point system, linear solvers, state."""

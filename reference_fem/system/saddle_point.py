@@ -1,0 +1,172 @@
+"""The discrete system of one problem: residual, tangent and Newton's direction under given loads."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from reference_fem.contact import augmented as contact
+from reference_fem.elements.shapes import build_elements, build_facets, displacement_points
+from reference_fem.elements.surface import Surface
+from reference_fem.elements.table import find_element
+from reference_fem.errors import ReferenceProblem
+from reference_fem.model import cavity, obstacles
+from reference_fem.model.loads import BodyForce, find_points, nodal_force
+from reference_fem.model.problem import Problem, find_held
+from reference_fem.system import assembly, checks
+from reference_fem.system.linear import SymmetricSolver
+from reference_fem.system.pattern import build_pattern
+from reference_fem.system.state import Loads, NewtonSettings, State
+
+TOUCHING = 1e-6
+"""Gap over the size of the body below which a point sticks to a no-slip obstacle from the start: round-off, no more."""
+
+
+@dataclass
+class Evaluation:
+    """Residual (full), tangent values, least J, contact state, and the two relative errors that Newton drives down."""
+
+    residual: np.ndarray
+    """One entry for each unknown; those of the cavities are volume misfits [m³], or pressure misfits [Pa]."""
+    values: np.ndarray
+    smallest_J: float
+    touch: contact.Touch
+    errors: np.ndarray
+    volumes: np.ndarray
+    """Of the cavities, (nc,) [m³]."""
+    gradients: np.ndarray
+    """dV/dx of the cavities, (nc, field_count) [m²]."""
+
+    @property
+    def usable(self):
+        return self.smallest_J > 0.0 and np.isfinite(self.errors).all()
+
+
+class System:
+    """Tables, pattern and solver of a problem. Raises ReferenceProblem for what cannot be solved."""
+
+    def __init__(self, problem: Problem, settings: NewtonSettings):
+        mesh, self.problem, self.settings = problem.mesh, problem, settings
+        checks.check_mesh(mesh)
+        checks.check_loads(problem)
+        self.element = find_element(problem.element)
+        self.nodes = displacement_points(mesh, self.element)
+        self.displacement_count = 3 * len(self.nodes)
+        self.field_count = self.displacement_count + (mesh.nvertices if self.element.pressure else 0)
+        self.total = self.field_count + len(problem.cavities)
+        self.elements = build_elements(mesh, problem.degree, self.element)
+        self.volume = float(self.elements.weights.sum())
+        self.held = find_held(problem)
+        mask = np.zeros(self.field_count, dtype=bool)
+        for held in self.held:
+            mask[held.dofs] = True
+        self.check_freedom(np.flatnonzero(mask))
+        self.pattern = build_pattern(self.elements.dofs, mask)
+        self.positions = self.pattern.positions(self.elements.dofs)
+        facets = build_facets(mesh, problem.contact_order, self.element)
+        self.surface = self.build_surface(facets)
+        self.lumens = cavity.find_lumens(problem, self.pattern, self.element.facet, facets.nodes, self.held)
+        self.rows = np.array([obstacle.row() for obstacle in problem.obstacles]).reshape(-1, 8)
+        self.sticks = obstacles.sticky(problem.obstacles)
+        self.loaded = self.find_loads()
+        start = self.obstacles_at(settings.start)
+        checks.check_start(self.surface, start, checks.boundary_size(mesh))
+        self.solver = SymmetricSolver(settings.solver)
+
+    def check_freedom(self, held_dofs):
+        """At rest nothing else balances a load than the holders: every rigid motion must be held."""
+        checks.check_held(self.nodes, held_dofs)
+
+    def build_surface(self, facets):
+        dofs = np.hstack([3 * facets.nodes + c for c in range(3)])
+        penalty = self.settings.penalty * self.problem.material.mu / np.sqrt(facets.weights.sum(axis=1))
+        positions = self.pattern.positions(dofs)
+        rest = self.nodes.ravel()
+        return Surface(dofs.astype(np.uint32), positions, rest, facets.values, facets.weights, penalty)
+
+    def find_loads(self):
+        """The dead loads at their quadrature points, weight among them."""
+        loads, pull = list(self.problem.loads), self.problem.density * np.asarray(self.problem.gravity, dtype=float)
+        if pull.any():
+            loads.append(BodyForce(lambda t, x: np.repeat(pull[:, None], x.shape[1], axis=1)))
+        return [find_points(load, self.problem.mesh, self.element, self.problem.degree) for load in loads]
+
+    def force_at(self, t, share=1.0):
+        """Share of all dead forces at time t, (field_count,) [N]."""
+        force = np.zeros(self.field_count)
+        for points in self.loaded:
+            force[: self.displacement_count] += share * nodal_force(points, t)
+        return force
+
+    def rest(self) -> State:
+        shape = (len(self.rows), *self.surface.weights.shape)
+        x, start = np.zeros(self.total), self.settings.start
+        grip = contact.first_grip(self.obstacles_at(start), self.sticks, self.surface, x, TOUCHING * np.ptp(self.nodes))
+        return State(start, 0.0, x, np.zeros(shape), np.zeros(shape), grip=grip, hold=grip)
+
+    def obstacles_at(self, t):
+        return obstacles.place(self.rows, self.problem.obstacles, t)
+
+    def filling_at(self, t, load):
+        """What the cavities are wanted to hold at time t, see Loads."""
+        return np.array([lumen.target(t, load) for lumen in self.lumens])
+
+    def starts_loaded(self):
+        """Whether something is to be switched on at the start, before time runs: a force, or a cavity's content."""
+        start = self.settings.start
+        return bool(np.any(self.force_at(start)) or np.any(self.filling_at(start, 1.0) != self.filling_at(start, 0.0)))
+
+    def loads_of(self, state: State) -> Loads:
+        """What acts in a converged state."""
+        rows, filling = self.obstacles_at(state.t), self.filling_at(state.t, state.load)
+        force = self.force_at(state.t, state.load)
+        return Loads(force, rows, state.multiplier, filling, state.stiffness, grip=state.grip)
+
+    def held_at(self, t):
+        """Prescribed values of the held unknowns at time t; refuses regions that contradict each other."""
+        wanted = np.full(self.field_count, np.nan)
+        for k, held in enumerate(self.held):
+            value, there = held.displacement(t), wanted[held.dofs]
+            clash = np.abs(value - there) > 1e-9 * (np.abs(value) + np.abs(there))
+            if clash.any():
+                raise ReferenceProblem(
+                    f"held region {k} prescribes {value[clash][0]:g} m where an earlier one prescribes "
+                    f"{there[clash][0]:g} m at t = {t:g} s: let them not overlap, or agree"
+                )
+            wanted[held.dofs] = value
+        return wanted[self.pattern.held]
+
+    def evaluate(self, x, loads: Loads, tangent=True) -> Evaluation:
+        """Residual and, if wanted, tangent at x under the loads."""
+        residual = np.zeros(self.total)
+        residual[: self.field_count] -= loads.force
+        values = np.zeros(self.pattern.size if tangent else 1)
+        shift = np.zeros((len(loads.rows), 3)) if loads.shift is None else loads.shift
+        penalty = loads.stiffness * self.surface.penalty
+        touch = contact.touch(loads.rows, shift, loads.multiplier, penalty, loads.grip, loads.guess)
+        parameters = self.problem.material.parameters
+        J = assembly.add_elements(x, self.elements, parameters, self.positions, values, residual, tangent)
+        volumes, gradients = np.zeros(len(self.lumens)), np.zeros((len(self.lumens), self.field_count))
+        if J > 0.0:
+            if len(loads.rows):
+                contact.add_contact(x, self.surface, touch, values, residual, tangent)
+            for k, (lumen, wanted) in enumerate(zip(self.lumens, loads.filling, strict=True)):
+                pressure = x[self.field_count + k]
+                volumes[k] = lumen.add(x, pressure, gradients[k], values, tangent)
+                residual[: self.field_count] -= pressure * gradients[k]
+                residual[self.field_count + k] = (pressure if lumen.by_pressure else volumes[k]) - wanted
+        errors = self.relative_errors(x, residual, touch, loads.force, gradients)
+        return Evaluation(residual, values, J, touch, errors, volumes, gradients)
+
+    def relative_errors(self, x, residual, touch, force, gradients):
+        """(unbalanced force over the forces at work, misfit of tissue volume or filling over the whole)."""
+        n, m, mu = self.displacement_count, self.field_count, self.problem.material.mu
+        free = np.zeros(m)
+        free[self.pattern.free] = residual[self.pattern.free]
+        held = residual[self.pattern.held]
+        inside = np.linalg.norm(x[m:] @ gradients)
+        floor = 1e-9 * mu * self.volume ** (2.0 / 3.0)
+        sizes = (np.linalg.norm(held), np.abs(touch.force).sum(), np.linalg.norm(force), inside, floor)
+        misfits = [np.abs(free[n:]).sum() / self.volume]
+        for lumen, misfit in zip(self.lumens, residual[m:], strict=True):
+            misfits.append(abs(misfit) / (mu if lumen.by_pressure else lumen.volume0))
+        return np.array([np.linalg.norm(free[:n]) / max(sizes), max(misfits)])

@@ -1,0 +1,79 @@
+"""A file is there whole or not at all, whatever interrupts: full disk, Ctrl-C, kill -9, power cut."""
+
+import errno
+import os
+import time
+from pathlib import Path
+
+from studies.base.errors import StudyError
+
+STALE_SECONDS = 3600.0  # a write takes seconds: a .part this old belongs to a process that was killed
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Writes `content` to `path` through a `.part` file beside it: written, flushed to disk, renamed.
+
+    Each process has its own .part, so two that write the same file do not mix; the last one wins.
+    What stood at `path` stays untouched until the rename. Raises StudyError when it cannot be written.
+    """
+    path = Path(path)
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(part, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+        _flush_folder(path.parent)
+    except OSError as problem:
+        raise StudyError(_sentence(path, len(content), problem)) from problem
+    finally:
+        _remove(part)
+
+
+def sweep_parts(folder: Path) -> int:
+    """Removes the .part files that killed processes left in `folder`; returns how many."""
+    limit = time.time() - STALE_SECONDS
+    old = [part for part in Path(folder).glob("*.part") if _modified(part) < limit]
+    for part in old:
+        _remove(part)
+    return len(old)
+
+
+def _modified(part: Path) -> float:
+    try:
+        return part.stat().st_mtime
+    except FileNotFoundError:  # renamed by its owner between the listing and now
+        return float("inf")
+
+
+def _remove(part: Path) -> None:
+    # Gone already after the rename; and in a folder that refuses, the first error is the one to report.
+    try:
+        part.unlink()
+    except OSError:
+        return
+
+
+def _flush_folder(folder: Path) -> None:
+    if os.name != "posix":  # elsewhere a folder cannot be opened
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _sentence(path: Path, size: int, problem: OSError) -> str:
+    if problem.errno in (errno.ENOSPC, errno.EDQUOT):
+        return (
+            f"{path} ({size / 1e6:.1f} MB) was not written, the disk is full: free some space and run again; "
+            "everything stored before is kept"
+        )
+    reason = problem.strerror or str(problem)
+    return (
+        f"{path} was not written ({reason}): choose a results folder that can be written to; "
+        "everything stored before is kept"
+    )

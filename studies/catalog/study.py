@@ -1,0 +1,54 @@
+"""A study: a question, the cases that answer it, the charts that show the answer."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from studies.metrics.metrics import Run
+from studies.runs.case import Case
+from studies.scenes import Scene
+
+SMOKE_NODES, SMOKE_NODES_HOLLOW = 150, 400
+"""A wall folds on a coarser surface."""
+SMOKE_FRAMES = 20
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A picture of a study's runs."""
+
+    file: str
+    draw: Callable[[Sequence[Run], Path], None]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A question over many cases."""
+
+    name: str
+    question: str
+    cases: tuple[Case, ...]
+    charts: tuple[Chart, ...]
+    columns: tuple[str, ...]
+    """Metrics shown in its table."""
+
+    def smoke(self) -> "Study":
+        """The same study on small meshes, few frames and the two coarsest reference meshes: does it work at all?"""
+        small = {case.key: case for case in map(smoke_case, self.cases)}
+        return replace(self, cases=tuple(small.values()))
+
+    @property
+    def scenes(self) -> tuple[Scene, ...]:
+        """The scenes of the cases, each once."""
+        return tuple({case.scene.name: case.scene for case in self.cases}.values())
+
+
+def smoke_case(case: Case) -> Case:
+    """A case small enough for a smoke run."""
+    plan = case.scene.reference
+    coarse = replace(plan, levels=plan.levels[:2], variants=()) if plan is not None else None
+    return case.replaced(
+        scene=replace(case.scene, reference=coarse),
+        body=replace(case.body, nodes=min(case.body.nodes, SMOKE_NODES_HOLLOW if case.scene.lumen else SMOKE_NODES)),
+        frames=min(case.frames or case.scene.frames, SMOKE_FRAMES),
+    )

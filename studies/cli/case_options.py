@@ -1,0 +1,24 @@
+"""The case that words on the command line name."""
+
+from typing import Annotated
+
+import typer
+
+from massspring import METHODS
+from studies.base.lookup import choose
+from studies.runs.case import BodyRecipe, Case
+from studies.scenes import SCENES, UNJUDGED
+
+MethodName = Annotated[str, typer.Option(help="see `organbench list`")]
+BodyKind = Annotated[str, typer.Option(help="tetrahedral or surface")]
+SurfaceNodes = Annotated[int, typer.Option(help="surface nodes")]
+
+
+def chosen_case(scene: str, method: str, body: str, nodes: int) -> Case:
+    """`method` on a body of so many surface nodes in a scene. Raises StudyError for a word that names none."""
+    kind = choose(body, ("tetrahedral", "surface"), "body")
+    return Case(
+        scene=choose(scene, {s.name: s for s in (*SCENES, *UNJUDGED)}, "scene"),
+        body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
+        method=choose(method, {m.name: m for m in METHODS}, "method")(),
+    )

@@ -1,0 +1,51 @@
+"""`organbench cost`: where the time of a step goes, what the scene leaves out, and what that saves."""
+
+from pathlib import Path
+from typing import Annotated
+
+import pandas as pd
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from studies.cli.case_options import BodyKind, MethodName, SurfaceNodes, chosen_case
+from studies.metrics.table import write_table
+from studies.timing.stage_cost import FRAME, SKIPPED, STAGE, cost_table
+
+console = Console(soft_wrap=True)
+HEADINGS = {STAGE: "stages of a step", SKIPPED: "left out here; what it would cost", FRAME: "Python between two frames"}
+
+
+def cost(
+    scene: str,
+    method: MethodName = "implicit_volume",
+    body: BodyKind = "tetrahedral",
+    nodes: SurfaceNodes = 550,
+    csv: Annotated[Path | None, typer.Option(help="also write the table there")] = None,
+    json: Annotated[bool, typer.Option("--json", help="print JSON instead of a table")] = False,
+) -> None:
+    """Microseconds per stage of a step, their share, what was skipped and what that saved; on one pinned core."""
+    case = chosen_case(scene, method, body, nodes)
+    with Console(stderr=True).status("measuring (the first time most goes into compiling) ..."):
+        found = cost_table(case)
+    if csv is not None:
+        write_table(csv, found)
+    if json:
+        console.print(found.to_json(orient="records", force_ascii=False), markup=False, highlight=False)
+        return
+    console.print(f"{case.name}, over the whole scene", markup=False, highlight=False)
+    console.print(_drawn(found))
+    for what, told in found[["what", "how much"]].itertuples(index=False):
+        if told:
+            console.print(f"{what}: {told}", markup=False, highlight=False)
+
+
+def _drawn(found: pd.DataFrame) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading, side in (("", "left"), ("µs per step", "right"), ("share", "right")):
+        table.add_column(heading, justify=side)  # type: ignore[arg-type]
+    for kind, rows in found.groupby("kind", sort=False):
+        table.add_row(HEADINGS[str(kind)], "", "", style="bold")
+        for what, cost, share in rows[["what", "µs per step", "share of the step"]].itertuples(index=False):
+            table.add_row(f"  {what}", f"{cost:.2f}", f"{100 * share:.1f} %")
+    return table

@@ -1,0 +1,1 @@
+"""Meshes by name: organs, balls, and files of users."""

@@ -1,0 +1,111 @@
+"""Real organs: from a surface in a file to a mesh of a wanted number of nodes."""
+
+import hashlib
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.geometry.api.organs import fill as fill_mesh
+from studies.geometry.files.reading import cells_of, parse, weld
+from studies.geometry.files.units import UNITS, settled_unit
+from studies.geometry.mesh.checks import check_finite, check_one_part, check_surface, check_volume
+from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
+from studies.geometry.mesher.jobs import mesh_from
+from studies.geometry.surface.repair import Mended, border, mend
+
+
+def scan(
+    path: str | Path,
+    nodes: int | None = None,
+    *,
+    unit: str | None = None,
+    smooth: float = 0.0,
+    holes: bool = False,
+    wall: float | None = None,
+    layers: int | None = None,
+    fill: bool = True,
+) -> OrganMesh:
+    """A body from the surface in a file: welded, its largest part kept, oriented, and remeshed to `nodes` nodes.
+
+    nodes: None keeps the file's own triangles. unit: of the file, "m", "cm" or "mm"; None where only metres make an
+    organ of it. smooth: see scan_shape [m]; needs `nodes`. holes: close borders first. wall: thickness [m] of the wall
+    of a hollow organ, in `layers` of elements; needs `nodes`. fill: with tetrahedra. Warns of every change to the
+    surface. Raises StudyError for what cannot be read, mended or meshed.
+    """
+    path = Path(path)
+    points, triangles = raw_surface(path)
+    unit = settled_unit(path.name, float(np.ptp(points, axis=0).max()), unit)
+    points = points * UNITS[unit]
+    mended = mend(*weld(points, triangles), path.name, holes)
+    for sentence in mended.said:
+        warnings.warn(f"{path.name}: {sentence}", stacklevel=2)
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    recipe: dict[str, Any] = {
+        "kind": "file",
+        "name": path.stem,
+        "file": path.name,
+        "sha256": digest,
+        "unit": unit,
+        "holes": bool(holes),
+    }
+    if nodes is None:
+        if smooth or wall is not None:
+            raise StudyError(
+                f"{path.name}: smoothing and a wall need a new surface; say how many nodes it shall have (--nodes)"
+            )
+        return as_it_is(mended, recipe, fill)
+    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
+        raise StudyError(f"{path.name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
+    check_watertight(mended, path.name)
+    check_lengths(path.name, smooth, wall)
+    if wall is not None:
+        recipe |= {"wall": float(wall)} | ({} if layers is None else {"layers": int(layers)})
+    recipe |= {"kind": "scan", "nodes": int(nodes), "smooth": float(smooth), "fill": bool(fill), "regions": {}}
+    return mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles})
+
+
+def check_lengths(name: str, smooth: float, wall: float | None) -> None:
+    """Raise StudyError unless the lengths [m] are such."""
+    if not 0 <= smooth < np.inf:
+        raise StudyError(f"{name}: smoothing over {1e3 * smooth:g} mm asked for; give 0 or a few millimetres")
+    if wall is not None and not 0 < wall < np.inf:
+        raise StudyError(f"{name}: a wall of {1e3 * wall:g} mm asked for; give a thickness above 0")
+
+
+def raw_surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) in the file's unit and triangles (t, 3): of the surface, or the boundary of the tetrahedra.
+
+    Raises StudyError for a file without them or with coordinates that are not finite.
+    """
+    raw = parse(path)
+    points = np.asarray(raw.points, float)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise StudyError(f"{path.name}: points have shape {points.shape}; a body needs three coordinates per point")
+    check_finite(points, path.name)
+    tetrahedra, triangles = cells_of(raw, path.name)
+    return points, boundary_triangles(tetrahedra) if len(tetrahedra) else triangles
+
+
+def longest_side(path: Path) -> float:
+    """Longest side of the bounding box of a surface in a file, in the file's unit."""
+    return float(np.ptp(raw_surface(path)[0], axis=0).max())
+
+
+def as_it_is(mended: Mended, recipe: dict[str, Any], fill: bool) -> OrganMesh:
+    """The mended surface with the file's own triangles, filled when asked."""
+    check_surface(mended.points, mended.triangles, recipe["file"])
+    check_one_part(mended.triangles, recipe["file"])
+    none = np.empty((0, 4), np.int64)
+    surface = OrganMesh(recipe["name"], mended.points, mended.triangles, none, len(mended.points), {}, recipe)
+    return fill_mesh(surface) if fill else surface
+
+
+def check_watertight(mended: Mended, name: str) -> None:
+    """Raise StudyError unless the surface has an inside: no border, and a volume."""
+    left = len(border(mended.triangles))
+    if left:
+        raise StudyError(f"{name}: the surface is open at {left} edges; close the holes (--close-holes)")
+    check_volume(mended.points, mended.triangles, name)

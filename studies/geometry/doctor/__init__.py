@@ -1,0 +1,1 @@
+"""What is wrong with a mesh, and which option mends it."""

@@ -1,0 +1,203 @@
+"""What the mesh doctor says: for each finding a sentence a student understands and the option that mends it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from studies.geometry.files.units import UNITS, likely_units
+from studies.geometry.mesh.quality import MIN_DIHEDRAL
+
+POOR_TRIANGLE = 0.1
+"""Radius ratio of a triangle under which springs on it are stiff and the fill gets slivers."""
+
+REMESH = "organbench mesh --from FILE --nodes N makes a new, even surface"
+EXPORT = "export the file again from the program that made it"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong."""
+
+    code: str
+    """Stable name, for machines."""
+    count: int
+    """How many of it."""
+    sentence: str
+    mend: str
+
+
+Rule = tuple[str, Callable[[dict[str, Any]], int], Callable[[dict[str, Any]], str], str]
+
+
+def _number(name: str) -> Callable[[dict[str, Any]], int]:
+    return lambda m: int(m.get(name) or 0)
+
+
+def _poor(name: str, key: str, limit: float) -> Callable[[dict[str, Any]], int]:
+    """1 when the worst of a spread is under the limit."""
+    return lambda m: int(bool(m.get(name)) and m[name][key] < limit)
+
+
+def _unit_sentence(m: dict[str, Any]) -> str:
+    side = max(m["size"]) / UNITS[m["unit"]]
+    likely = " or ".join(likely_units(side)) or "no unit we know"
+    return (
+        f"the file does not say its unit, and its longest side of {side:.4g} is an organ's in {likely}; "
+        f"the numbers here take it as {m['unit']}"
+    )
+
+
+def _size_sentence(m: dict[str, Any]) -> str:
+    return f"the longest side is {max(m['size']):.4g} m, which is no organ's: the unit is probably not {m['unit']}"
+
+
+def _wrong_size(m: dict[str, Any]) -> int:
+    return int(m["unit_said"] and bool(m.get("size")) and not likely_units(max(m["size"])).count("m"))
+
+
+def _sliver_sentence(m: dict[str, Any]) -> str:
+    ratio = m["triangle_radius_ratio"]
+    return (
+        f"triangle {m['worst_triangle']} is a sliver (radius ratio {ratio['min']:.2g}, 1 is equilateral; one in a "
+        f"hundred is under {ratio['p1']:.2g}): springs on it are stiff and force a small time step"
+    )
+
+
+def _tet_sliver_sentence(m: dict[str, Any]) -> str:
+    return (
+        f"the flattest tetrahedron has an angle of {m['dihedral_angle']['min']:.2g} degrees between two faces (under "
+        f"{MIN_DIHEDRAL:g}; radius ratio {m['tetrahedron_radius_ratio']['min']:.2g}): it stiffens the body and forces "
+        "a small time step"
+    )
+
+
+RULES: tuple[Rule, ...] = (
+    (
+        "bad_points",
+        _number("bad_points"),
+        lambda m: f"{m['bad_points']} points are not numbers (NaN or infinite)",
+        EXPORT,
+    ),
+    ("unit", lambda m: int(not m["unit_said"]), _unit_sentence, "say --unit mm, --unit cm or --unit m"),
+    ("size", _wrong_size, _size_sentence, "say another --unit"),
+    (
+        "duplicate_points",
+        _number("duplicate_points"),
+        lambda m: f"{m['duplicate_points']} points lie on others: triangles that look joined are not",
+        "organbench mesh --from FILE joins (welds) them",
+    ),
+    (
+        "unused_points",
+        _number("unused_points"),
+        lambda m: f"{m['unused_points']} points belong to nothing and would be masses without springs",
+        "organbench mesh --from FILE leaves them out",
+    ),
+    (
+        "collapsed",
+        _number("collapsed_triangles"),
+        lambda m: f"{m['collapsed_triangles']} triangles use a point twice and are only a line",
+        "organbench mesh --from FILE leaves them out",
+    ),
+    (
+        "duplicate_triangles",
+        _number("duplicate_triangles"),
+        lambda m: f"{m['duplicate_triangles']} triangles are there twice, so the surface is double there",
+        "organbench mesh --from FILE leaves the second ones out",
+    ),
+    (
+        "open",
+        _number("open_edges"),
+        lambda m: (
+            f"the surface has {m['holes']} holes ({m['open_edges']} edges with one triangle only), so it has no "
+            "inside and no volume"
+        ),
+        "organbench mesh --from FILE --close-holes puts flat lids on them",
+    ),
+    (
+        "crowded",
+        _number("crowded_edges"),
+        lambda m: f"{m['crowded_edges']} edges have more than two triangles: inside and outside are not defined there",
+        REMESH,
+    ),
+    (
+        "one_sided",
+        lambda m: int("two_sided" in m and not m["two_sided"]),
+        lambda m: "the surface has one side only, like a Moebius band: it cannot enclose anything",
+        EXPORT,
+    ),
+    (
+        "disagreeing",
+        lambda m: m["disagreeing_edges"] if m.get("two_sided") else 0,
+        lambda m: (
+            f"at {m['disagreeing_edges']} edges neighbouring triangles look to opposite sides, so the volume comes "
+            "out wrong"
+        ),
+        "organbench mesh --from FILE turns them round",
+    ),
+    (
+        "inside_out",
+        _number("inside_out_parts"),
+        lambda m: f"the surface is inside out (volume {1e6 * m['volume']:.4g} mL): its triangles look inwards",
+        "organbench mesh --from FILE turns it round",
+    ),
+    (
+        "pinched",
+        _number("pinched_nodes"),
+        lambda m: f"at {m['pinched_nodes']} points two sheets of the surface touch in one point only",
+        REMESH,
+    ),
+    (
+        "parts",
+        lambda m: max(0, m.get("parts", 1) - m.get("lumens", 0) - 1),
+        lambda m: f"there are {m['parts']} separate parts; a body is one",
+        "organbench mesh --from FILE keeps the largest",
+    ),
+    (
+        "handles",
+        lambda m: max(0, m.get("genus") or 0),
+        lambda m: f"the surface has {m['genus']} handles or tunnels, as a ring has one; organs have none",
+        "organbench mesh --from FILE --nodes N --smooth 3 closes narrow ones",
+    ),
+    (
+        "self_intersections",
+        _number("self_intersections"),
+        lambda m: f"{m['self_intersections']} pairs of triangles cut through each other: it cannot be filled",
+        REMESH,
+    ),
+    (
+        "flat",
+        _number("flat_triangles"),
+        lambda m: f"{m['flat_triangles']} triangles have no area to speak of, and no normal",
+        REMESH,
+    ),
+    (
+        "slivers",
+        lambda m: _poor("triangle_radius_ratio", "min", POOR_TRIANGLE)(m) if not m.get("flat_triangles") else 0,
+        _sliver_sentence,
+        REMESH,
+    ),
+    (
+        "duplicate_tetrahedra",
+        _number("duplicate_tetrahedra"),
+        lambda m: f"{m['duplicate_tetrahedra']} tetrahedra are there twice",
+        EXPORT,
+    ),
+    (
+        "inverted",
+        _number("inverted_tetrahedra"),
+        lambda m: f"{m['inverted_tetrahedra']} tetrahedra have a negative or no volume: they are turned inside out",
+        "organbench mesh --from FILE fills the surface anew",
+    ),
+    (
+        "tetrahedron_slivers",
+        _poor("dihedral_angle", "min", MIN_DIHEDRAL),
+        _tet_sliver_sentence,
+        "organbench mesh --from FILE --nodes N makes a new body",
+    ),
+)
+
+
+def findings_of(measures: dict[str, Any]) -> tuple[Finding, ...]:
+    """Everything that is wrong, the gravest first as far as mending goes."""
+    rows = [(code, count(measures), sentence, mend) for code, count, sentence, mend in RULES]
+    return tuple(Finding(code, int(n), sentence(measures), mend) for code, n, sentence, mend in rows if n)

@@ -1,0 +1,172 @@
+"""The numbers of the mesh doctor."""
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from massspring import MassSpringError, Material, step_limit, surface_body, tetrahedral_body
+from studies.base.errors import StudyError
+from studies.geometry.files.reading import weld
+from studies.geometry.mesh.checks import SLIVER, pinched_nodes
+from studies.geometry.mesh.organ_mesh import signed_volume, tetrahedron_volumes, triangle_areas, unique_edges
+from studies.geometry.mesh.quality import dihedral_angles, tetrahedron_radius_ratio, triangle_radius_ratio
+from studies.geometry.surface.intersections import crossing_triangles
+from studies.geometry.surface.repair import border, edge_pairs, oriented, part_of, without_repeats
+
+MEASURED_BODY = 6000
+"""Nodes up to which the largest frequency of the springs is computed (seconds); above it is estimated."""
+
+
+def describe_welding(points: np.ndarray, cells: np.ndarray, repeats: bool) -> dict[str, Any]:
+    """Points of a file, before they are welded: how many are not finite, double or unused."""
+    bad = int((~np.isfinite(points).all(axis=1)).sum())
+    found: dict[str, Any] = {"bad_points": bad, "points_in_file": len(points)}
+    used = len(np.unique(cells))
+    found["unused_points"] = len(points) - used
+    found["duplicate_points"] = 0 if bad or repeats else used - len(weld(points, cells)[0])
+    return found
+
+
+def describe_surface(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
+    """Topology, orientation, size and quality of welded triangles (t, 3) on points (n, 3) [m]."""
+    sound = without_repeats(triangles)
+    rows = np.sort(triangles, axis=1)
+    collapsed = int((rows[:, 1:] == rows[:, :-1]).any(axis=1).sum())
+    found: dict[str, Any] = {"nodes": len(points), "triangles": len(triangles), "collapsed_triangles": collapsed}
+    found["duplicate_triangles"] = len(triangles) - len(sound) - collapsed
+    found |= describe_edges(sound)
+    found |= describe_parts(points, sound, found)
+    found |= describe_size(points, sound)
+    found["self_intersections"] = len(crossing_triangles(points, sound))
+    return found
+
+
+def describe_edges(triangles: np.ndarray) -> dict[str, Any]:
+    """How the triangles hang together: open, crowded and disagreeing edges, holes, pinched nodes."""
+    half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    _, counts = np.unique(np.sort(half, axis=1), axis=0, return_counts=True)
+    _, agree = edge_pairs(triangles)
+    open_edges, crowded = int((counts == 1).sum()), int((counts > 2).sum())
+    try:
+        turned, two_sided = oriented(triangles, "")[0], True
+    except StudyError:
+        turned, two_sided = triangles, False
+    found: dict[str, Any] = {
+        "open_edges": open_edges,
+        "holes": hole_count(turned) if open_edges else 0,
+        "crowded_edges": crowded,
+        "two_sided": two_sided,
+        "disagreeing_edges": int((~agree).sum()),
+        "closed": open_edges == 0 and len(triangles) > 0,
+    }
+    whole = found["closed"] and two_sided and not crowded
+    found["pinched_nodes"] = len(pinched_nodes(turned)) if whole else 0
+    found["manifold"] = not crowded and not found["pinched_nodes"]
+    found["oriented"] = two_sided and found["disagreeing_edges"] == 0
+    return found
+
+
+def hole_count(triangles: np.ndarray) -> int:
+    """Borders that hang together."""
+    edges = border(triangles)
+    nodes, local = np.unique(edges, return_inverse=True)
+    i, j = local.reshape(-1, 2).T
+    graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(nodes), len(nodes)))
+    return int(connected_components(graph, directed=False)[0])
+
+
+def describe_parts(points: np.ndarray, triangles: np.ndarray, known: dict[str, Any]) -> dict[str, Any]:
+    """Separate parts, lumens among them, inside-out ones, and handles.
+
+    A part that looks inwards inside the box of the largest one bounds a lumen.
+    """
+    parts = part_of(triangles)
+    pieces = [triangles[parts == k] for k in range(int(parts.max()) + 1)] if len(parts) else []
+    boxes = [(points[p.ravel()].min(axis=0), points[p.ravel()].max(axis=0)) for p in pieces]
+    found: dict[str, Any] = {"parts": len(pieces), "lumens": 0, "inside_out_parts": 0, "genus": None}
+    if not pieces or not (known["closed"] and known["oriented"]):
+        return found
+    main = int(np.argmax([np.linalg.norm(high - low) for low, high in boxes]))
+    for k, piece in enumerate(pieces):
+        if signed_volume(points, piece) < 0:
+            inside = (boxes[k][0] > boxes[main][0]).all() and (boxes[k][1] < boxes[main][1]).all()
+            found["lumens" if k != main and inside else "inside_out_parts"] += 1
+    if known["manifold"]:
+        euler = len(np.unique(triangles)) - len(unique_edges(triangles)) + len(triangles)
+        found["genus"] = len(pieces) - euler // 2
+    return found
+
+
+def describe_size(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
+    """Box, area, volume [m, m^2, m^3], edges and the shape of the triangles."""
+    used = points[np.unique(triangles)]
+    size = np.ptp(used, axis=0) if len(used) else np.zeros(3)
+    edges = unique_edges(triangles)
+    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    ratio = triangle_radius_ratio(points, triangles)
+    areas = triangle_areas(points, triangles)
+    return {
+        "size": [float(side) for side in size],
+        "diagonal": float(np.linalg.norm(size)),
+        "area": float(areas.sum()),
+        "volume": signed_volume(points, triangles) if len(triangles) else 0.0,
+        "edge": spread(lengths),
+        "triangle_radius_ratio": spread(ratio),
+        "worst_triangle": int(ratio.argmin()) if len(ratio) else None,
+        "flat_triangles": int((ratio < SLIVER).sum()),
+    }
+
+
+def describe_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray) -> dict[str, Any]:
+    """Number, volume and shape of the tetrahedra (k, 4)."""
+    ratio = tetrahedron_radius_ratio(points, tetrahedra)
+    distinct = np.unique(np.sort(tetrahedra, axis=1), axis=0)
+    return {
+        "nodes": len(points),
+        "tetrahedra": len(tetrahedra),
+        "duplicate_tetrahedra": len(tetrahedra) - len(distinct),
+        "inverted_tetrahedra": int((tetrahedron_volumes(points, tetrahedra) <= 0).sum()),
+        "volume": float(tetrahedron_volumes(points, tetrahedra).sum()),
+        "tetrahedron_radius_ratio": spread(ratio),
+        "dihedral_angle": spread(dihedral_angles(points, tetrahedra).min(axis=1)),
+        "worst_tetrahedron": int(ratio.argmin()),
+    }
+
+
+def spread(values: np.ndarray) -> dict[str, float] | None:
+    """Worst, first and fifth percentile, median and largest; None of nothing."""
+    if not len(values):
+        return None
+    least, first, fifth, half, most = np.percentile(values, [0, 1, 5, 50, 100])
+    return {"min": float(least), "p1": float(first), "p5": float(fifth), "p50": float(half), "max": float(most)}
+
+
+def springs_see(
+    points: np.ndarray,
+    triangles: np.ndarray,
+    tetrahedra: np.ndarray | None,
+    known: dict[str, Any],
+    tissue: tuple[float, float],
+) -> dict[str, Any]:
+    """Shortest edge [m] and the largest stable time step [s] of springs on this mesh (docs/theory.md, eq. 17).
+
+    From the largest frequency of a body where one can be made and is not too large ("measured"), else as the time in
+    which a wave in a Cauchy solid, E = 2.5 mu, crosses the shortest edge ("estimated").
+    """
+    modulus, density = tissue
+    material = Material(modulus, density)
+    shortest = known["edge"]["min"] if known["edge"] else 0.0
+    answer = {"shortest_edge": shortest, "shear_modulus": modulus, "density": density}
+    sound = known["closed"] and known["manifold"] and known["oriented"] and not known["collapsed_triangles"]
+    try:
+        if len(points) > MEASURED_BODY or not sound or known["duplicate_triangles"]:
+            raise MassSpringError("no body, or one too large for its frequencies in a moment")
+        if tetrahedra is not None:
+            body = tetrahedral_body(points, triangles, tetrahedra, material)
+        else:
+            body = surface_body(points, triangles, material)
+        return answer | {"dt_limit": step_limit(body).undamped, "how": "measured"}
+    except MassSpringError:
+        return answer | {"dt_limit": shortest / float(np.sqrt(2.5 * modulus / density)), "how": "estimated"}

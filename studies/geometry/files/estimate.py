@@ -1,0 +1,63 @@
+"""How large a mesh file is, before anything is read of it."""
+
+import re
+from pathlib import Path
+
+from studies.base.errors import StudyError
+
+LARGE = 2_000_000
+"""Triangles from which a person is asked first: minutes of work and gigabytes of memory."""
+BYTES = {".stl": 270.0, ".obj": 50.0, ".off": 45.0, ".ply": 45.0, ".vtk": 45.0, ".vtu": 35.0, ".msh": 55.0}
+"""Bytes a triangle takes in a text file, its share of the points included."""
+SECONDS, GIGABYTES = 30.0, 2.3
+"""For a million triangles: to weld, check and measure them on one core, and the memory that takes (from 200,000)."""
+HEADER = 84
+PER_TRIANGLE = 50
+HEAD = 4096
+
+
+def triangle_count(path: Path) -> int:
+    """Triangles in a file, by its header where that says it, else by its size."""
+    size = path.stat().st_size
+    with open(path, "rb") as file:
+        head = file.read(HEAD)
+    if path.suffix.lower() == ".stl" and not is_ascii_stl(head):
+        return int.from_bytes(head[80:84], "little") if size >= HEADER else 0
+    said = re.search(rb"element face (\d+)", head) if path.suffix.lower() == ".ply" else None
+    return int(said[1]) if said else int(size / BYTES.get(path.suffix.lower(), 50.0))
+
+
+def is_ascii_stl(head: bytes) -> bool:
+    """Whether a file that begins like this is a text STL; binary ones may begin with "solid" too."""
+    return head.lstrip().startswith(b"solid") and (b"facet" in head or b"endsolid" in head)
+
+
+def check_whole(path: Path) -> None:
+    """Raise StudyError for a binary STL file that is shorter than its header says."""
+    if path.suffix.lower() != ".stl":
+        return
+    size = path.stat().st_size
+    with open(path, "rb") as file:
+        head = file.read(HEAD)
+    if is_ascii_stl(head) or size < HEADER or not head.strip():
+        return
+    count = int.from_bytes(head[80:84], "little")
+    promised = HEADER + PER_TRIANGLE * count
+    # Text that is no STL at all has letters where the count is: its last byte says over 150 million triangles.
+    if size < promised and head[83] < ord("\t"):
+        raise StudyError(
+            f"{path.name} is cut short: its header promises {count:,} triangles in {promised:,} bytes, "
+            f"but it has {size:,}; copy or export it again"
+        )
+
+
+def size_warning(path: Path) -> str | None:
+    """What a person should know before a file is read; None for one that takes no time to speak of."""
+    count = triangle_count(path)
+    if count < LARGE:
+        return None
+    millions = count / 1e6
+    return (
+        f"{path.name} holds about {count:,} triangles ({path.stat().st_size / 1e6:,.0f} MB); to read and check it "
+        f"takes about {max(1, round(SECONDS * millions / 60))} minutes and {GIGABYTES * millions:.0f} GB of memory"
+    )

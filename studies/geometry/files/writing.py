@@ -1,0 +1,101 @@
+"""Writing a mesh to a file, whole or not at all."""
+
+import contextlib
+import io
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+
+from studies.base.atomic import write_whole
+from studies.base.errors import StudyError
+from studies.geometry.files.reading import PATCH
+from studies.geometry.files.units import UNITS, check_unit
+from studies.geometry.mesh.organ_mesh import OrganMesh
+from studies.geometry.mesh.second_order import CurvedMesh
+
+VOLUMES, SURFACES = (".vtu", ".vtk", ".msh"), (".stl", ".ply", ".obj", ".off")
+"""Formats that hold tetrahedra, and those that hold triangles only."""
+TAGS = {"outer": 1, "lumen": 2, "tissue": 3}
+"""Cell data `part` (VTU, VTK), physical groups (MSH)."""
+
+
+def check_target(path: Path, source: Path | None = None) -> None:
+    """Raise StudyError unless `path` has a suffix that can be written and is not the file that is read."""
+    known = (*VOLUMES, *SURFACES)
+    if path.suffix.lower() not in known:
+        raise StudyError(f"{path.name}: meshes are written as {', '.join(known)}; choose one of these suffixes")
+    if path.is_dir():
+        raise StudyError(f"{path} is a folder; give the name of a file")
+    if source is not None and path.exists() and source.exists() and path.samefile(source):
+        raise StudyError(f"{path.name} is the file that is read, and it stays as it is; give another name to -o")
+
+
+def holds_tetrahedra(path: Path) -> bool:
+    """Whether the format of `path` can hold a filled body."""
+    return path.suffix.lower() in VOLUMES
+
+
+def write_mesh(mesh: OrganMesh, path: Path, unit: str = "m", curved: CurvedMesh | None = None) -> None:
+    """The mesh in a file, its format by the suffix, lengths in `unit`; `curved`: its second-order form instead.
+
+    Formats without tetrahedra get the boundary. Raises StudyError for a suffix or unit that is not known, a curved mesh
+    in a format without tetrahedra, or a place that cannot be written.
+    """
+    check_target(path)
+    check_unit(unit)
+    if curved is not None and not holds_tetrahedra(path):
+        raise StudyError(f"{path.name}: {path.suffix} holds flat triangles only; write a curved mesh as .vtu")
+    written = curved_cells(mesh, curved) if curved is not None else straight_cells(mesh, holds_tetrahedra(path))
+    written.points = written.points / UNITS[unit]
+    if path.suffix.lower() in (".stl", ".obj", ".off"):
+        written.point_data, written.cell_data = {}, {}
+    if path.suffix.lower() == ".ply":
+        written.cell_data = {}
+    if path.suffix.lower() == ".msh":
+        parts = written.cell_data.pop("part")
+        written.cell_data = {"gmsh:physical": parts, "gmsh:geometrical": parts}
+        # meshio does not read whole numbers back, and writes text that it cannot read: hence binary, and real numbers.
+        patches: dict[str, Any] = {name: np.asarray(values, float) for name, values in written.point_data.items()}
+        written.point_data = patches
+    write_whole(path, content(written, path.suffix.lower()))
+
+
+def straight_cells(mesh: OrganMesh, tetrahedra: bool) -> meshio.Mesh:
+    """Boundary triangles and, when there are and they are wanted, tetrahedra, with patches and parts."""
+    with_cells = tetrahedra and len(mesh.tetrahedra) > 0
+    points = mesh.points if with_cells else mesh.points[: mesh.surface_count]
+    cells: list[Any] = [("triangle", mesh.triangles.astype(np.int32))]
+    outer = np.where((mesh.triangles < mesh.outer_count).all(axis=1), TAGS["outer"], TAGS["lumen"])
+    parts: list[Any] = [outer.astype(np.int32)]
+    if with_cells:
+        cells.append(("tetra", mesh.tetrahedra.astype(np.int32)))
+        parts.append(np.full(len(mesh.tetrahedra), TAGS["tissue"], np.int32))
+    return meshio.Mesh(points, cells, patch_data(mesh, len(points)), {"part": parts})
+
+
+def curved_cells(mesh: OrganMesh, curved: CurvedMesh) -> meshio.Mesh:
+    """Second-order tetrahedra; the patches are those of the vertices."""
+    cells: list[Any] = [("tetra10", curved.cells.astype(np.int32))]
+    part = np.full(len(curved.cells), TAGS["tissue"], np.int32)
+    return meshio.Mesh(curved.points, cells, patch_data(mesh, len(curved.points)), {"part": [part]})
+
+
+def patch_data(mesh: OrganMesh, count: int) -> dict[str, Any]:
+    """1 at the nodes of each patch, 0 elsewhere, shape (count,)."""
+    data: dict[str, Any] = {}
+    for name, nodes in mesh.patches.items():
+        data[PATCH + name] = np.zeros(count, np.int32)
+        data[PATCH + name][nodes] = 1
+    return data
+
+
+def content(mesh: meshio.Mesh, suffix: str) -> bytes:
+    """The bytes of the file: meshio writes to a folder that is thrown away."""
+    options = {".stl": {"binary": True}, ".msh": {"file_format": "gmsh22", "binary": True}}.get(suffix, {})
+    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
+        path = Path(folder, "mesh" + suffix)
+        meshio.write(path, mesh, **options)
+        return path.read_bytes()

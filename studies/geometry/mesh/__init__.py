@@ -1,0 +1,1 @@
+"""Tetrahedra: the mesh of an organ, its quality, curved sides, walls."""

@@ -1,0 +1,194 @@
+"""Second-order meshes that follow the true shape."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse.linalg import cg
+
+from studies.base.errors import StudyError
+from studies.geometry.mesh.jacobian import PAIRS, curved_volume, scaled_coefficients, smallest_jacobian
+from studies.geometry.mesh.organ_mesh import OrganMesh, tetrahedron_volumes, unique_edges
+from studies.geometry.mesh.smooth_nodes import trial_moves
+from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.shape.levelset import Shape, at_depth, project
+from studies.geometry.shape.regions import Region, region_from_dict
+
+GOOD = 0.1
+"""Elements whose Jacobian may fall below this fraction of the straight one get their inner mid-side nodes moved."""
+ROUNDS = 30
+REACH = (0.2, 0.1, 0.04, 0.01, 0.003)
+"""Trial moves in lengths of the edge."""
+MOST_BAD = 0.05
+"""Share of such elements beyond which single nodes cannot mend the mesh."""
+
+
+@dataclass(frozen=True, eq=False)
+class CurvedMesh:
+    """Quadratic tetrahedra whose boundary nodes lie on the true surface.
+
+    The surface is met to O(h^3), the volume to O(h^4); no element is folded anywhere.
+
+    points: [m], shape (n2, 3); the vertices, numbered as in the straight mesh, come first
+    cells: shape (k, 10), vertices and mid-side nodes in VTK's order of a quadratic tetrahedron
+    vertex_count: number of vertices
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    vertex_count: int
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3] of the curved body."""
+        return curved_volume(self.points, self.cells)
+
+    @property
+    def smallest_jacobian(self) -> float:
+        """Lower bound of the Jacobian over that of the straight element; positive: no element is folded anywhere."""
+        return float(smallest_jacobian(self.points, self.cells).min())
+
+
+def true_surfaces(mesh: OrganMesh) -> list[tuple[np.ndarray, Shape]]:
+    """Triangles (t, 3) of each curved part of the boundary and the shape on whose f = 0 they lie.
+
+    Raises StudyError for a mesh whose true shape is not known.
+    """
+    kind = mesh.recipe.get("kind")
+    if kind == "organ":
+        shape = make_shape(mesh.recipe["organ"], mesh.recipe["parameters"])
+        outer = [(mesh.outer_triangles, shape)]
+        return [*outer, (mesh.lumen_triangles, at_depth(shape, shape.wall or 0.0))] if mesh.hollow else outer
+    if kind == "ball_octant":
+        round_node = np.isin(np.arange(len(mesh.points)), mesh.patches["sphere"])
+        sphere = mesh.triangles[round_node[mesh.triangles].all(axis=1)]
+        return [(sphere, make_shape("ball", {"radius": mesh.recipe["radius"]}))]
+    raise StudyError(f"{mesh.name}: its true shape is not known, so it cannot be curved; mesh it from an organ")
+
+
+def true_outlines(mesh: OrganMesh) -> list[tuple[np.ndarray, Region]]:
+    """Of each attachment the edges (e, 2) of its outline, and the region on whose level = 0 they lie."""
+    outlines = []
+    for name, data in mesh.recipe.get("regions", {}).items():
+        half = mesh.patch_triangles(name)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+        edges, count = np.unique(np.sort(half, axis=1), axis=0, return_counts=True)
+        outlines.append((edges[count == 1], region_from_dict(data)))
+    return outlines
+
+
+def make_curved(mesh: OrganMesh) -> CurvedMesh:
+    """The second-order mesh of a filled organ, its boundary on the true surfaces and outlines, the rest moved along.
+
+    Raises StudyError for a mesh without tetrahedra or true shape, or too coarse to be curved unfolded.
+    """
+    if not len(mesh.tetrahedra):
+        raise StudyError(f"{mesh.name}: only a filled mesh can be curved; ask for fill=True")
+    count = len(mesh.points)
+    ends = np.sort(mesh.tetrahedra[:, np.array(PAIRS)].reshape(-1, 2), axis=1)
+    edges, middle = np.unique(ends, axis=0, return_inverse=True)
+    middle = middle.reshape(-1, 6)
+    cells = np.concatenate([mesh.tetrahedra, count + middle], axis=1)
+    moved = np.zeros((len(edges), 3))
+    key = edges @ [count, 1]
+    for triangles, shape in true_surfaces(mesh):
+        here = np.searchsorted(key, unique_edges(triangles) @ [count, 1])
+        straight = mesh.points[edges[here]].mean(axis=1)
+        moved[here] = project(shape, straight) - straight
+    for rim, region in true_outlines(mesh):
+        here = np.searchsorted(key, rim @ [count, 1])
+        straight = mesh.points[rim].mean(axis=1)
+        moved[here] = project(true_surfaces(mesh)[0][1], straight, (region.level,)) - straight
+    fixed = np.isin(key, unique_edges(mesh.triangles) @ [count, 1])
+    moved = spread(mesh, middle, moved, fixed)
+    points = np.concatenate([mesh.points, mesh.points[edges].mean(axis=1) + moved])
+    points = unfold(points, cells, np.concatenate([np.zeros(count, bool), ~fixed]))
+    worst = smallest_jacobian(points, cells)
+    if worst.min() <= 0:
+        raise StudyError(
+            f"{mesh.name}: {int((worst <= 0).sum())} of {len(cells)} elements fold when they follow the true shape at "
+            f"{mesh.outer_count} surface nodes; use more nodes"
+        )
+    return CurvedMesh(points, cells, count)
+
+
+def spread(mesh: OrganMesh, middle: np.ndarray, moved: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """Displacements [m], shape (e, 3), of all mid-side nodes from those of the fixed ones: the harmonic extension.
+
+    middle (k, 6): the mid-side nodes of each tetrahedron. Minimises the integral of |grad u|^2 with the vertices at
+    rest, which is as well conditioned on a fine mesh as on a coarse one.
+    """
+    count = len(moved)
+    rows, columns = np.repeat(middle, 6, axis=1).ravel(), np.tile(middle, (1, 6)).ravel()
+    values = middle_stiffness(mesh.points, mesh.tetrahedra).ravel()
+    stiffness = csr_array(coo_array((values, (rows, columns)), shape=(count, count)))
+    free = np.flatnonzero(~fixed)
+    matrix, load = stiffness[free][:, free], -(stiffness[free] @ moved)
+    moved = moved.copy()
+    for axis in range(3):
+        solution, failed = cg(matrix, load[:, axis], rtol=1e-8, M=diags_array(1.0 / matrix.diagonal()))
+        if failed:
+            raise StudyError(f"{mesh.name}: its second-order nodes cannot be placed, the fill is too flat; mesh again")
+        moved[free, axis] = solution
+    return moved
+
+
+def middle_stiffness(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    """Integrals of grad N_a . grad N_b [m], shape (k, 6, 6), of the quadratic functions N = 4 L_i L_j of the edges.
+
+    Closed form from the constant gradients of the barycentric L and from int L_i L_j = V (1 + delta_ij) / 20.
+    """
+    x = points[tetrahedra]
+    slopes = np.linalg.inv(x[:, 1:] - x[:, :1]).transpose(0, 2, 1)
+    slopes = np.concatenate([-slopes.sum(axis=1, keepdims=True), slopes], axis=1)
+    gram = np.einsum("kid,kjd->kij", slopes, slopes)
+    mass = 16.0 / 20.0 * (1.0 + np.eye(4))
+    stiffness = np.empty((len(tetrahedra), 6, 6))
+    for a, (i, j) in enumerate(PAIRS):
+        for b, (m, n) in enumerate(PAIRS):
+            stiffness[:, a, b] = (
+                mass[i, m] * gram[:, j, n]
+                + mass[i, n] * gram[:, j, m]
+                + mass[j, m] * gram[:, i, n]
+                + mass[j, n] * gram[:, i, m]
+            )
+    return stiffness * tetrahedron_volumes(points, tetrahedra)[:, None, None]
+
+
+def unfold(points: np.ndarray, cells: np.ndarray, movable: np.ndarray) -> np.ndarray:
+    """Points with the movable mid-side nodes of nearly folded elements moved to where the elements around fold less."""
+    points = points.copy()
+    trials = trial_moves(REACH)
+    for _ in range(ROUNDS):
+        jacobian = smallest_jacobian(points, cells)
+        bad = np.flatnonzero(jacobian < GOOD)
+        if len(bad) > MOST_BAD * len(cells) + 1:
+            break
+        nodes = np.unique(cells[bad, 4:])
+        gained = [move_middle(points, cells, int(node), trials) for node in nodes[movable[nodes]]]
+        if not any(gained):
+            break
+    return points
+
+
+def move_middle(points: np.ndarray, cells: np.ndarray, node: int, trials: np.ndarray) -> bool:
+    """Move one mid-side node, in place, to the best of the trial moves (m, 3), in edge lengths; whether one helps."""
+    around = cells[(cells[:, 4:] == node).any(axis=1)]
+    slot = int(np.flatnonzero(around[0] == node)[0]) - 4
+    i, j = PAIRS[slot]
+    places = points[node] + trials * np.linalg.norm(points[around[0, i]] - points[around[0, j]])
+    corners = np.where((around == node)[None, :, :, None], places[:, None, None, :], points[around][None])
+    stars = np.arange(10 * len(trials) * len(around)).reshape(-1, 10)
+    costs = fold_cost(corners.reshape(-1, 3), stars).reshape(len(trials), -1).sum(axis=1)
+    best = int(costs.argmin())
+    if costs[best] >= 0.999 * fold_cost(points, around).sum():
+        return False
+    points[node] = places[best]
+    return True
+
+
+def fold_cost(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Sum of exp(-c / GOOD) over the scaled coefficients c of the Jacobian, shape (k,).
+
+    Smooth, unlike the smallest coefficient, at which moves of single nodes get stuck where several are equal.
+    """
+    return np.exp(-scaled_coefficients(points, cells) / GOOD).sum(axis=1)

@@ -1,0 +1,62 @@
+"""Single nodes moved to where their worst tetrahedron is better."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from studies.geometry.mesh.quality import tetrahedron_radius_ratio
+
+ROUNDS = 12
+REACH = (0.3, 0.1, 0.03)
+"""Trial moves in fractions of the mean distance to the neighbours."""
+
+Bring = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""(nodes (k,), points (k, 3)) -> points (k, 3): back onto the surface that these nodes have to stay on."""
+
+
+def mend_nodes(
+    points: np.ndarray, tetrahedra: np.ndarray, movable: np.ndarray, bring: Bring, wanted: float
+) -> np.ndarray:
+    """Points (n, 3) [m] with movable nodes of tetrahedra below the `wanted` radius ratio moved, worst first.
+
+    movable (n,) bool. Each node tries 26 directions at three lengths, is brought back onto its surface, and stays
+    where the worst of its tetrahedra is best. No tetrahedron that was better than the worst around it becomes worse
+    than that worst one.
+    """
+    points = points.copy()
+    trials = trial_moves(REACH)
+    for _ in range(ROUNDS):
+        ratio = tetrahedron_radius_ratio(points, tetrahedra)
+        bad = np.flatnonzero(ratio < wanted)
+        nodes = tetrahedra[bad[np.argsort(ratio[bad], kind="stable")]].ravel()
+        nodes = nodes[movable[nodes]]
+        nodes = nodes[np.sort(np.unique(nodes, return_index=True)[1])]
+        moves = [move_node(points, tetrahedra, int(node), trials, bring) for node in nodes]
+        if not any(moves):
+            return points
+    return points
+
+
+def trial_moves(reaches: tuple[float, ...]) -> np.ndarray:
+    """Moves, shape (26 r, 3), of each of the given lengths towards the faces, edges and corners of a cube."""
+    directions = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
+    directions = directions[np.abs(directions).sum(axis=1) > 0]
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    return np.concatenate([reach * directions for reach in reaches])
+
+
+def move_node(points: np.ndarray, tetrahedra: np.ndarray, node: int, trials: np.ndarray, bring: Bring) -> bool:
+    """Move one node, in place, to the best of the trial moves (m, 3); whether one is better than staying."""
+    around = tetrahedra[(tetrahedra == node).any(axis=1)]
+    neighbours = np.setdiff1d(around, node)
+    scale = np.linalg.norm(points[neighbours] - points[node], axis=1).mean()
+    places = bring(np.full(len(trials), node), points[node] + scale * trials)
+    # One copy of the star per trial, all judged in one call.
+    corners = np.where((around == node)[None, :, :, None], places[:, None, None, :], points[around][None])
+    stars = np.arange(4 * len(trials) * len(around)).reshape(-1, 4)
+    worst = tetrahedron_radius_ratio(corners.reshape(-1, 3), stars).reshape(len(trials), -1).min(axis=1)
+    best = int(worst.argmax())
+    if worst[best] <= tetrahedron_radius_ratio(points, around).min() + 1e-3:
+        return False
+    points[node] = places[best]
+    return True

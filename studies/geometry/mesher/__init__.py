@@ -1,0 +1,1 @@
+"""The worker process that meshes a recipe; gmsh is called here only."""

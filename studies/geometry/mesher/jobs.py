@@ -1,0 +1,162 @@
+"""Meshes by recipe: from the cache, or made by the worker process under a time limit."""
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import warnings
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import OrganMesh
+from studies.geometry.shape.regions import ON_CURVE, region_from_dict
+
+TIME_LIMIT = 300.0
+"""Seconds after which a meshing job is given up: 20 times what the largest one takes; gmsh hangs without a word."""
+
+PARTS = ("points", "triangles", "tetrahedra", "surface_count", "outer_count")
+"""What the worker makes and the cache keeps."""
+
+HERE = Path(__file__).parents[1]
+
+
+def mesh_from(
+    recipe: dict[str, Any], arrays: dict[str, np.ndarray] | None = None, limit: float = TIME_LIMIT
+) -> OrganMesh:
+    """The mesh of a JSON-able recipe (and the arrays it refers to), cached.
+
+    limit: seconds the worker may take. Raises StudyError when the mesh cannot be made.
+    """
+    given = arrays or {}
+    return to_mesh(recipe, cached(recipe, given, PARTS, lambda: run_worker(recipe, given, limit)))
+
+
+def cached(
+    recipe: dict[str, Any],
+    arrays: dict[str, np.ndarray],
+    parts: tuple[str, ...],
+    make: Callable[[], dict[str, np.ndarray]],
+) -> dict[str, np.ndarray]:
+    """The arrays called `parts` for a recipe: from the cache, or made and stored there."""
+    path = cache_folder() / f"{recipe['name']}-{recipe_hash(recipe, arrays)}.npz"
+    result = read_cached(path, parts)
+    if result is None:
+        result = make()
+        write_cached(path, result)
+    return result
+
+
+def to_mesh(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> OrganMesh:
+    """The mesh with its patches."""
+    count, outer = int(arrays["surface_count"]), int(arrays["outer_count"])
+    cells = arrays["triangles"], arrays["tetrahedra"]
+    mesh = OrganMesh(recipe["name"], arrays["points"], *cells, count, recipe=recipe, outer_count=outer)
+    return replace(mesh, patches=patches_of(mesh, recipe.get("regions", {})))
+
+
+def patches_of(mesh: OrganMesh, regions: dict[str, dict[str, Any]]) -> dict[str, np.ndarray]:
+    """Outer nodes inside or on the outline of each region; raises StudyError for a region without nodes."""
+    surface = mesh.points[: mesh.outer_count]
+    # Outlines are met to ON_CURVE of the size of the box of the shape, which is somewhat larger than the mesh.
+    tolerance = 10 * ON_CURVE * float(np.linalg.norm(np.ptp(surface, axis=0)))
+    patches = {}
+    for name, data in regions.items():
+        patches[name] = np.flatnonzero(region_from_dict(data).level(surface) <= tolerance)
+        if not len(patches[name]):
+            raise StudyError(
+                f"{mesh.name}: region {name!r} holds no surface node; move or enlarge it, or use more nodes"
+            )
+    return patches
+
+
+def cache_folder() -> Path:
+    """ORGANBENCH_CACHE when set, else results/cache/meshes under the current folder."""
+    return Path(os.environ.get("ORGANBENCH_CACHE") or Path.cwd() / "results" / "cache" / "meshes")
+
+
+def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:
+    """Hash of all that decides the mesh: recipe, given arrays, our code, the mesher's version."""
+    digest = hashlib.sha256(code_hash().encode())
+    digest.update(json.dumps(recipe, sort_keys=True).encode())
+    for key in sorted(arrays):
+        digest.update(
+            f"{key} {arrays[key].dtype} {arrays[key].shape}".encode() + np.ascontiguousarray(arrays[key]).tobytes()
+        )
+    return digest.hexdigest()[:16]
+
+
+@lru_cache(maxsize=1)
+def code_hash() -> str:
+    """Hash of the sources of this package and of the libraries that decide a mesh."""
+    digest = hashlib.sha256()
+    for path in sorted(HERE.rglob("*.py")):
+        digest.update(path.relative_to(HERE).as_posix().encode() + path.read_bytes())
+    digest.update(" ".join(version(name) for name in ("gmsh", "scikit-image", "numpy", "scipy")).encode())
+    return digest.hexdigest()
+
+
+def read_cached(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | None:
+    """The stored arrays, or None when there are none or the file is damaged (said in a warning)."""
+    if not path.exists():
+        return None
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return {key: data[key] for key in parts}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        warnings.warn(f"the cached mesh {path} is damaged ({error}); it is made again", stacklevel=3)
+        return None
+
+
+def write_cached(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    """Store under a name of its own, then rename: another process sees the whole file or none."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as part:
+            np.savez(part, allow_pickle=False, **arrays)
+        os.replace(part.name, path)
+    except OSError as error:
+        raise StudyError(
+            f"the mesh cannot be stored in {path.parent} ({error.strerror}); "
+            "set ORGANBENCH_CACHE to a folder that can be written"
+        ) from error
+
+
+def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: float) -> dict[str, np.ndarray]:
+    """Run the worker on a job and read what it made; raises StudyError for its sentence, a crash or a time-out."""
+    with tempfile.TemporaryDirectory() as folder:
+        job, out = Path(folder, "job.npz"), Path(folder, "out.npz")
+        np.savez(job, allow_pickle=False, recipe=np.array(json.dumps(recipe)), **arrays)
+        root = str(HERE.parents[1])
+        paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
+        environment = os.environ | {
+            "PYTHONPATH": os.pathsep.join(paths),
+            "OMP_NUM_THREADS": "1",
+            "OPENBLAS_NUM_THREADS": "1",
+        }
+        command = [sys.executable, "-m", "studies.geometry.mesher.worker", str(job), str(out)]
+        try:
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit, check=False)
+        except subprocess.TimeoutExpired as error:
+            raise StudyError(
+                f"{recipe['name']}: the mesher did not finish within {limit:g} s and was stopped; "
+                "try another node count"
+            ) from error
+        if not out.exists():
+            last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+            raise StudyError(
+                f"{recipe['name']}: the mesher ended with code {done.returncode} ({last}); try another node count"
+            )
+        with np.load(out, allow_pickle=False) as data:
+            if "error" in data.files:
+                raise StudyError(str(data["error"]))
+            return {key: data[key] for key in data.files}

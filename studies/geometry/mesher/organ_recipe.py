@@ -1,0 +1,123 @@
+"""Making a mesh from its recipe, inside the worker process. The same recipe gives the same mesh bit for bit."""
+
+from typing import Any
+
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.geometry.mesh.checks import check_surface
+from studies.geometry.mesh.organ_mesh import triangle_areas
+from studies.geometry.mesh.wall_layers import fill_wall
+from studies.geometry.mesher.fill import fill_surface
+from studies.geometry.mesher.gmsh_calls import Remesher, fresh_model
+from studies.geometry.mesher.octant import build_octant
+from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.shape.levelset import Shape
+from studies.geometry.shape.regions import ON_CURVE, Region, region_from_dict
+from studies.geometry.surface.first_surface import first_surface
+from studies.geometry.surface.node_count import Surface, surface_with
+from studies.geometry.surface.snap import relax, snap_region
+
+Arrays = dict[str, np.ndarray]
+
+
+def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
+    """The arrays of jobs.PARTS for a recipe; `arrays` holds a given surface for kind "fill".
+
+    Raises StudyError when the recipe cannot be made.
+    """
+    if recipe["kind"] == "scan":
+        # Its compiled distances take half a second to import, which other meshes need not wait for.
+        from studies.geometry.mesher.scan_recipe import build_scan
+
+        return build_scan(recipe, arrays)
+    return {"organ": build_organ, "fill": build_fill, "ball_octant": build_octant}[recipe["kind"]](recipe, arrays)
+
+
+def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
+    """An organ of SHAPES with `nodes` surface nodes, its outlines of regions snapped, filled when asked."""
+    return mesh_shape(make_shape(recipe["organ"], recipe["parameters"]), recipe)
+
+
+def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:
+    """Any shape by the `nodes`, `regions`, `fill` and `layers` of a recipe; hollow when the shape has a wall."""
+    regions = [region_from_dict(data) for data in recipe["regions"].values()]
+    points, triangles = mesh_surface(shape, recipe["nodes"], regions)
+    return finish(shape, points, triangles, recipe)
+
+
+def even_surface(shape: Shape, start: Surface, nodes: int) -> Surface:
+    """A surface of `nodes` nodes with edges of one length, from a fine first triangulation."""
+    area = float(triangle_areas(*start).sum())
+    with fresh_model():
+        return surface_with(nodes, area, Remesher(*start).mesh, shape)
+
+
+def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict[str, Any]) -> Arrays:
+    """A surface on f = 0, filled as its recipe says; elements of a scan are as good as its folds allow."""
+    check_surface(points, triangles, shape.name)
+    if not recipe["fill"]:
+        return arrays_of(points, triangles, np.empty((0, 4), np.int64), len(points), len(points))
+    if shape.wall is not None:
+        return arrays_of(*fill_wall(shape, points, triangles, recipe.get("layers")), 2 * len(points), len(points))
+    all_points, tetrahedra = fill_surface(points, triangles, strict=recipe["kind"] != "scan")
+    return arrays_of(all_points, triangles, tetrahedra, len(points), len(points))
+
+
+def mesh_surface(shape: Shape, nodes: int, regions: list[Region]) -> Surface:
+    """An even surface with `nodes` nodes and every region's outline on its edges.
+
+    Where edges are too long for a region, the surface is meshed again with edges half as long in the regions.
+    """
+    start_points, start_triangles = first_surface(shape)
+    area = float(triangle_areas(start_points, start_triangles).sum())
+    for region in regions:
+        region.level(start_points[:1])  # a region that is none is refused here, not inside the mesher
+    with fresh_model():
+        remesher = Remesher(start_points, start_triangles)
+        surface = snap_if_it_fits(shape, *surface_with(nodes, area, remesher.mesh, shape), regions)
+        if surface is None:
+            remesher.finer_in(regions)
+            surface = snap_all(shape, *surface_with(nodes, area, remesher.mesh, shape), regions)
+    return surface
+
+
+def snap_if_it_fits(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region]) -> Surface | None:
+    """The surface with its outlines, or None when its edges are too long for one of the regions."""
+    try:
+        surface = snap_all(shape, points, triangles, regions)
+    except StudyError:
+        # Not lost: the finer surface that follows either fits or says the same.
+        return None
+    return surface if all(is_met(region, *surface) for region in regions) else None
+
+
+def is_met(region: Region, points: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether some triangle lies inside the region, outline included."""
+    inside = region.level(points) <= ON_CURVE * np.linalg.norm(np.ptp(points, axis=0))
+    return bool(inside[triangles].all(axis=1).any())
+
+
+def snap_all(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region]) -> Surface:
+    """Even out the surface, then give every region its outline; earlier outlines stay where they are."""
+    fixed = np.zeros(len(points), bool)
+    points = relax(shape, points, triangles, None, fixed, fixed)
+    for region in regions:
+        points, triangles, on_curve = snap_region(shape, points, triangles, region, fixed)
+        fixed |= on_curve
+    return points, triangles
+
+
+def build_fill(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
+    """A given surface, filled as well as its triangles allow."""
+    points, triangles = arrays["points"], arrays["triangles"]
+    all_points, tetrahedra = fill_surface(points, triangles, strict=False)
+    return arrays_of(all_points, triangles, tetrahedra, len(points), len(points))
+
+
+def arrays_of(
+    points: np.ndarray, triangles: np.ndarray, tetrahedra: np.ndarray, surface_count: int, outer_count: int
+) -> Arrays:
+    """What the worker hands over, by the names of jobs.PARTS."""
+    counts = {"surface_count": np.array(surface_count), "outer_count": np.array(outer_count)}
+    return {"points": points, "triangles": triangles, "tetrahedra": tetrahedra, **counts}

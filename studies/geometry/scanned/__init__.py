@@ -1,0 +1,1 @@
+"""A surface from a file as a level function."""

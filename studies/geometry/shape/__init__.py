@@ -1,0 +1,1 @@
+"""Organs as level functions, and regions on them."""

@@ -1,0 +1,129 @@
+"""An organ as a function: f(x) < 0 inside, f(x) = 0 its surface; and the way onto that surface."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.geometry.shape.regions import KnownRegion, Vector
+
+Level = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Literature:
+    """What textbooks or series of patients say: the volume [mL] of an adult's organ, of a hollow one its content."""
+
+    volume_ml: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A smooth, freely reachable surface point [m] and the outward unit normal there; a probe moves against it."""
+
+    point: Vector
+    normal: Vector
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """An organ's true shape.
+
+    level: f(points (n, 3) [m]) -> (n,) [m], negative inside, smooth near its zero set, |grad f| of order 1
+    low, high: corners of a box that holds the organ with at least two cells to spare [m]
+    cell: edge of the grid on which f is first sampled [m]; finer than the thinnest part
+    regions: the attachments it has by default
+    wall: thickness of the wall of a hollow organ, whose lumen is f = -wall [m]; None for a solid one
+    literature: the volume that the default parameters are held to
+    probe, press: where an instrument palpates, and the unit vector along which a plane presses; None when not said
+    """
+
+    name: str
+    level: Level
+    low: Vector
+    high: Vector
+    cell: float
+    regions: Mapping[str, KnownRegion] = field(default_factory=dict)
+    wall: float | None = None
+    literature: Literature | None = None
+    probe: Probe | None = None
+    press: Vector | None = None
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the box [m]."""
+        return float(np.linalg.norm(np.subtract(self.high, self.low)))
+
+
+def at_depth(shape: Shape, depth: float) -> Shape:
+    """The body inside f = -depth [m]: the lumen of a hollow organ when depth is its wall."""
+    return replace(shape, level=lambda points: shape.level(points) + depth)
+
+
+def gradient(level: Level, points: np.ndarray, step: float) -> np.ndarray:
+    """Central difference of f, shape (n, 3), with the given step [m]."""
+    count = len(points)
+    shifts = step * np.vstack([np.eye(3), -np.eye(3)])
+    values = level((points[None, :, :] + shifts[:, None, :]).reshape(-1, 3)).reshape(6, count)
+    return (values[:3] - values[3:]).T / (2.0 * step)
+
+
+def normals(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """Outward unit normals, shape (n, 3), of the level surfaces at points (n, 3) [m]."""
+    rows = gradient(shape.level, points, 1e-6 * shape.size)
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+
+
+STALE = 0.05
+"""A step that leaves more than this share of the residual takes new gradients before the next one."""
+STEPS = 60
+
+
+def project(
+    shape: Shape, points: np.ndarray, constraints: tuple[Level, ...] = (), within: float | None = None
+) -> np.ndarray:
+    """Move points (n, 3) [m] onto f = 0, and onto g = 0 for every further constraint g.
+
+    Newton's method with the smallest correction, d = -A^T (A A^T)^-1 r with the gradients as rows of A, which are kept
+    while they serve (chord method). within: residual [m] at which a point stays; rounding when None. Raises StudyError
+    where it does not converge, which happens only far from the surface or where the constraints do not meet.
+    """
+    x = np.array(points, float)
+    levels = (shape.level, *constraints)
+    tolerance = 1e-13 * shape.size if within is None else within
+    residual = np.stack([level(x) for level in levels], axis=1)
+    rows = np.zeros((len(x), len(levels), 3))
+    stale = np.ones(len(x), bool)
+    moving = np.flatnonzero(np.abs(residual).max(axis=1, initial=0.0) > tolerance)
+    for _ in range(STEPS):
+        if not len(moving):
+            return x
+        new = moving[stale[moving]]
+        if len(new):
+            rows[new] = forward_gradients(levels, x[new], residual[new], 1e-6 * shape.size)
+        a, r = rows[moving], residual[moving]
+        gram = a @ a.transpose(0, 2, 1) + 1e-12 * np.eye(len(levels))
+        d = -(a.transpose(0, 2, 1) @ np.linalg.solve(gram, r[:, :, None]))[:, :, 0]
+        # A step longer than a cell leaves the neighbourhood in which the gradient means anything.
+        d *= np.minimum(1.0, shape.cell / np.maximum(np.linalg.norm(d, axis=1), 1e-300))[:, None]
+        x[moving] += d
+        residual[moving] = np.stack([level(x[moving]) for level in levels], axis=1)
+        left = np.abs(residual[moving]).max(axis=1)
+        stale[moving] = left > STALE * np.abs(r).max(axis=1)
+        moving = moving[left > tolerance]
+    worst = np.abs(residual).max()
+    raise StudyError(
+        f"{shape.name}: points could not be brought onto the surface (still {worst:.2g} m away); start nearer to it"
+    )
+
+
+def forward_gradients(levels: tuple[Level, ...], x: np.ndarray, values: np.ndarray, step: float) -> np.ndarray:
+    """Gradients, shape (n, l, 3), of l levels at x (n, 3) [m] where they have `values` (n, l), by forward differences.
+
+    Good enough for Newton's method, whose residual and not its gradient decides where the points end.
+    """
+    shifted = (x[None, :, :] + step * np.eye(3)[:, None, :]).reshape(-1, 3)
+    ahead = np.stack([level(shifted).reshape(3, len(x)) for level in levels], axis=2)
+    return (ahead - values[None]).transpose(1, 2, 0) / step

@@ -1,0 +1,92 @@
+"""Where an organ is attached, said by geometry: the same place on a mesh of any size.
+
+A region is a part of space with a signed level, negative inside. The patch of a surface that lies in it is bounded
+by the curve level = 0, onto which the mesher moves nodes (snap.py), so the patch does not depend on the mesh.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from studies.base.errors import StudyError
+
+Vector = tuple[float, float, float]
+
+ON_CURVE = 1e-10
+"""A node counts as on the outline within this fraction of the size of the box: far above rounding, far below edges."""
+
+
+class Region(Protocol):
+    """Part of space; `level` is a length [m], negative inside."""
+
+    def level(self, points: np.ndarray) -> np.ndarray:
+        """Signed level [m], shape (n,), of points [m], shape (n, 3)."""
+        ...
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """Points with normal . (x - point) <= 0: `normal` points out of the region, as on a body."""
+
+    point: Vector
+    normal: Vector
+
+    def level(self, points: np.ndarray) -> np.ndarray:
+        """Signed distance [m], shape (n,)."""
+        normal = np.asarray(self.normal, float)
+        length = np.linalg.norm(normal)
+        if not length > 0:
+            raise StudyError(f"the normal {self.normal} of a half space has no length; give a direction")
+        return (np.asarray(points, float) - self.point) @ (normal / length)
+
+
+@dataclass(frozen=True)
+class BallRegion:
+    """Points within `radius` [m] of `center` [m]."""
+
+    center: Vector
+    radius: float
+
+    def level(self, points: np.ndarray) -> np.ndarray:
+        """Signed distance [m], shape (n,)."""
+        if not self.radius > 0:
+            raise StudyError(f"a ball region of radius {self.radius} m is empty; give a radius above 0")
+        return np.linalg.norm(np.asarray(points, float) - self.center, axis=1) - self.radius
+
+
+@dataclass(frozen=True)
+class EllipsoidRegion:
+    """Points inside an ellipsoid with semi-axes [m] along x, y, z."""
+
+    center: Vector
+    semi_axes: Vector
+
+    def level(self, points: np.ndarray) -> np.ndarray:
+        """Scaled level [m], shape (n,): zero on the ellipsoid, not a distance away from it."""
+        axes = np.asarray(self.semi_axes, float)
+        if not (axes > 0).all():
+            raise StudyError(f"an ellipsoid region with semi-axes {self.semi_axes} m is empty; give lengths above 0")
+        scaled = (np.asarray(points, float) - self.center) / axes
+        return (np.linalg.norm(scaled, axis=1) - 1.0) * axes.min()
+
+
+KnownRegion = HalfSpace | BallRegion | EllipsoidRegion
+"""Those that can be stored as JSON."""
+
+KINDS: dict[str, type] = {cls.__name__: cls for cls in (HalfSpace, BallRegion, EllipsoidRegion)}
+
+
+def region_to_dict(region: Any) -> dict[str, Any]:
+    """JSON-able form of a region; raises StudyError for anything that is not one of KINDS."""
+    kind = type(region).__name__
+    if KINDS.get(kind) is not type(region):
+        raise StudyError(f"{region!r} is no region; use one of {', '.join(KINDS)}")
+    fields = {key: np.asarray(value, float).tolist() for key, value in asdict(region).items()}
+    return {"kind": kind, **fields}
+
+
+def region_from_dict(data: dict[str, Any]) -> Region:
+    """The region of which `data` is the JSON-able form."""
+    fields = {key: tuple(value) if isinstance(value, list) else value for key, value in data.items() if key != "kind"}
+    return KINDS[data["kind"]](**fields)

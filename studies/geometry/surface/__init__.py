@@ -1,0 +1,1 @@
+"""Triangles: made, moved onto a level function, edited, repaired, compared."""

@@ -1,0 +1,99 @@
+"""Small edits of a closed triangulation: nodes added, removed, edges turned."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from studies.geometry.mesh.organ_mesh import triangle_normals, unique_edges
+from studies.geometry.mesh.quality import triangle_radius_ratio
+
+
+def with_node_count(points: np.ndarray, triangles: np.ndarray, nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """The triangulation with exactly `nodes` nodes where it allows: longest edges split or shortest ones collapsed.
+
+    Edits keep to themselves: the neighbourhood of one is not edited again. Returns as near as that permits.
+    """
+    split = len(points) < nodes
+    edges = pick_edges(points, triangles, abs(len(points) - nodes), split)
+    for k in range(len(edges)):
+        if split:
+            points, triangles = split_edge(points, triangles, edges[k])
+        else:
+            points, triangles = collapse_edge(points, triangles, edges[k])
+            # The node that vanished leaves no gap in the numbering.
+            edges = edges - (edges > edges[k, 1])
+    return points, triangles
+
+
+def pick_edges(points: np.ndarray, triangles: np.ndarray, wanted: int, split: bool) -> np.ndarray:
+    """Up to `wanted` edges, shape (e, 2), the longest to split or the shortest to collapse, far from each other, that
+    leave 4 to 7 edges at every node around."""
+    edges = unique_edges(triangles)
+    valence = np.bincount(edges.ravel(), minlength=len(points))
+    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    around = np.argsort(triangles.ravel(), kind="stable") // 3
+    start = np.concatenate([[0], np.cumsum(np.bincount(triangles.ravel(), minlength=len(points)))])
+    touched = np.zeros(len(points), bool)
+    picked = []
+    for edge in edges[np.argsort(-length if split else length, kind="stable")]:
+        if len(picked) == wanted:
+            break
+        one, other = (np.unique(triangles[around[start[node] : start[node + 1]]]) for node in edge)
+        near = np.union1d(one, other)
+        if touched[near].any():
+            continue
+        shared = np.intersect1d(one, other)
+        opposite = shared[(shared != edge[0]) & (shared != edge[1])]
+        # A collapse keeps the surface a manifold only where the ends share exactly the two opposite nodes.
+        collapsible = len(shared) == 4 and valence[edge].sum() - 4 <= 7 and (valence[opposite] >= 5).all()
+        if (valence[opposite] <= 6).all() if split else collapsible:
+            picked.append(edge)
+            touched[near] = True
+    return np.array(picked, dtype=np.int64).reshape(-1, 2)
+
+
+def split_edge(points: np.ndarray, triangles: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A node in the middle of the edge; its two triangles become four."""
+    middle = len(points)
+    both = np.isin(triangles, edge).sum(axis=1) == 2
+    halves = [np.where(triangles[both] == node, middle, triangles[both]) for node in edge]
+    return np.vstack([points, points[edge].mean(axis=0)]), np.vstack([triangles[~both], *halves])
+
+
+def collapse_edge(points: np.ndarray, triangles: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The edge's ends become one node in its middle; its two triangles vanish."""
+    keep, drop = edge
+    points = points.copy()
+    points[keep] = points[edge].mean(axis=0)
+    left = triangles[np.isin(triangles, edge).sum(axis=1) < 2]
+    left = np.where(left == drop, keep, left)
+    return np.delete(points, drop, axis=0), left - (left > drop)
+
+
+def flip_edges(
+    points: np.ndarray, triangles: np.ndarray, edges: np.ndarray, allowed: Callable[[int, int], bool], floor: float
+) -> np.ndarray:
+    """The triangles with each of the edges (e, 2) turned in its quadrilateral, where that helps.
+
+    It helps when the new edge is new and `allowed(k, l)`, when the two new triangles are better than the worse old one
+    or than `floor`, and when they look the same way (within 60 degrees of the old ones together).
+    """
+    triangles = triangles.copy()
+    for i, j in edges:
+        rows = np.flatnonzero(np.isin(triangles, (i, j)).sum(axis=1) == 2)
+        if len(rows) != 2:
+            continue
+        old = triangles[rows]
+        # The triangle that runs along i -> j comes first.
+        forward = [(np.roll(row, -1) == j)[row == i].any() for row in old]
+        k, m = (np.setdiff1d(row, (i, j))[0] for row in (old if forward[0] else old[::-1]))
+        if not allowed(k, m) or (np.isin(triangles, (k, m)).sum(axis=1) == 2).any():
+            continue
+        new = np.array([[i, m, k], [m, j, k]])
+        outward = triangle_normals(points, old).sum(axis=0)
+        normals = triangle_normals(points, new)
+        same_way = normals @ outward > 0.5 * np.linalg.norm(normals, axis=1) * np.linalg.norm(outward)
+        target = min(floor, triangle_radius_ratio(points, old).min() + 0.01)
+        if same_way.all() and triangle_radius_ratio(points, new).min() >= target:
+            triangles[rows] = new
+    return triangles

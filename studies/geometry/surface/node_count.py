@@ -1,0 +1,59 @@
+"""Meshing a surface with a wanted number of nodes."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import signed_volume, unique_edges
+from studies.geometry.mesh.quality import triangle_radius_ratio
+from studies.geometry.shape.levelset import Shape, project
+from studies.geometry.surface.edit import with_node_count
+
+Surface = tuple[np.ndarray, np.ndarray]
+
+TOLERANCE = 0.02
+"""Relative deviation from the wanted node count that single-node edits may have to make up (or 5 nodes)."""
+CLOSE = 0.005
+"""Deviation at which the search stops; so few edits leave no trace in the quality."""
+FEWEST, MOST = 60, 20_000
+TRIES = 12
+QUALITY = 0.2
+"""Smallest radius ratio of a triangle that is accepted; below it the fill has slivers whatever the optimiser does."""
+
+
+def surface_with(nodes: int, area: float, mesh_at: Callable[[float], Surface], shape: Shape) -> Surface:
+    """A good closed surface on f = 0 with exactly `nodes` nodes, or within TOLERANCE where single edits cannot do it.
+
+    nodes: wanted number; area: of the true surface [m^2]; mesh_at(size [m]) -> points, triangles of edges of that size.
+    Raises StudyError when no try within TOLERANCE is closed, unfolded and well shaped.
+    """
+    if not FEWEST <= nodes <= MOST:
+        raise StudyError(f"{shape.name}: {nodes} surface nodes asked for, but the mesher offers {FEWEST} to {MOST}")
+    size = 1.06 * np.sqrt(2.0 * area / (np.sqrt(3.0) * nodes))
+    found: list[tuple[float, Surface]] = []
+    for attempt in range(TRIES):
+        points, triangles = mesh_at(size)
+        miss = abs(len(points) / nodes - 1.0)
+        if miss <= max(TOLERANCE, 5.0 / nodes):
+            edited, triangles = with_node_count(points, triangles, nodes)
+            surface = project(shape, edited), triangles
+            if is_good(*surface):
+                found.append((miss, surface))
+                if miss <= CLOSE and len(edited) == nodes:
+                    break
+        # N ~ size^-2; the slight overshoot that alternates keeps the search from standing still on one bad mesh.
+        size *= (len(points) / nodes) ** 0.5 * (1.0 + 0.005 * (-1) ** attempt * (attempt // 2))
+    if not found:
+        raise StudyError(
+            f"{shape.name}: no well-shaped surface with {nodes} nodes in {TRIES} tries; "
+            "ask for more nodes, or for a smoother shape"
+        )
+    return min(found, key=lambda item: (len(item[1][0]) != nodes, item[0]))[1]
+
+
+def is_good(points: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether a surface is one closed sphere-like sheet, outward, and without slivers."""
+    if len(points) - len(unique_edges(triangles)) + len(triangles) != 2 or signed_volume(points, triangles) <= 0:
+        return False
+    return bool(triangle_radius_ratio(points, triangles).min() > QUALITY)

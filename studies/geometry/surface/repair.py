@@ -1,0 +1,153 @@
+"""What can be mended without guessing: doubled and flat triangles, parts, orientation, small holes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from studies.base.errors import StudyError
+from studies.geometry.mesh.checks import SLIVER
+from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas
+from studies.geometry.mesh.quality import triangle_radius_ratio
+
+Surface = tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Mended:
+    """A mended surface and what was done to it."""
+
+    points: np.ndarray
+    triangles: np.ndarray
+    said: tuple[str, ...]
+    """One sentence for each kind of change, for the person who gave the file."""
+
+
+def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = False) -> Mended:
+    """The largest part of a welded surface, points (n, 3) [m], triangles (t, 3), oriented outward.
+
+    Triangles given twice or without three different corners go; parts other than the largest go; triangles are turned
+    to agree with their neighbours and to look outward; `holes`: borders are closed by a fan over their middle.
+    Raises StudyError when nothing is left, or for a surface with one side only.
+    """
+    said: list[str] = []
+    whole = len(triangles)
+    triangles = without_repeats(triangles)
+    if len(triangles) < whole:
+        said.append(f"{whole - len(triangles)} triangles that were doubled or had no three corners are left out")
+    if not len(triangles):
+        raise StudyError(f"{name}: no usable triangle is left; export the surface again")
+    parts = part_of(triangles)
+    count = int(parts.max()) + 1
+    if count > 1:
+        keep = largest(points, triangles, parts)
+        lost = triangle_areas(points, triangles[parts != keep]).sum() / triangle_areas(points, triangles).sum()
+        triangles = triangles[parts == keep]
+        said.append(f"{count - 1} of {count} separate parts are left out ({100 * lost:.2g} % of the area)")
+    triangles, turned = oriented(triangles, name)
+    if turned:
+        said.append(f"{turned} triangles are turned to agree with their neighbours")
+    if holes:
+        points, triangles, closed = without_holes(points, triangles)
+        if closed:
+            said.append(f"{closed} holes are closed by flat fans")
+    if signed_volume(points, triangles) < 0:
+        triangles = triangles[:, ::-1].copy()
+        said.append("the surface was inside out and is turned round")
+    used, renumbered = np.unique(triangles, return_inverse=True)
+    return Mended(points[used], renumbered.reshape(triangles.shape), tuple(said))
+
+
+def without_repeats(triangles: np.ndarray) -> np.ndarray:
+    """The triangles with three different corners, each set of corners once, in their order."""
+    rows = np.sort(triangles, axis=1)
+    sound = np.flatnonzero((rows[:, 1:] != rows[:, :-1]).all(axis=1))
+    _, first = np.unique(rows[sound], axis=0, return_index=True)
+    return triangles[sound[np.sort(first)]]
+
+
+def edge_pairs(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles that share an edge, as pairs (e, 2), and whether they run along it in opposite directions (e,).
+
+    At an edge with more than two triangles each is paired with the next.
+    """
+    half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    low, high = half.min(axis=1), half.max(axis=1)
+    order = np.lexsort((high, low))
+    same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
+    one, other = order[:-1][same], order[1:][same]
+    return np.stack([one // 3, other // 3], axis=1), half[one, 0] != half[other, 0]
+
+
+def part_of(triangles: np.ndarray) -> np.ndarray:
+    """Number of the part of each triangle (t,); parts hang together by edges."""
+    pairs, _ = edge_pairs(triangles)
+    count = len(triangles)
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return connected_components(graph, directed=False)[1]
+
+
+def largest(points: np.ndarray, triangles: np.ndarray, parts: np.ndarray) -> int:
+    """Number of the part with the largest bounding box: an outer surface, never its lumen."""
+    sizes = [
+        float(np.linalg.norm(np.ptp(points[triangles[parts == k]].reshape(-1, 3), axis=0))) for k in np.unique(parts)
+    ]
+    return int(np.argmax(sizes))
+
+
+def largest_part(points: np.ndarray, triangles: np.ndarray) -> Surface:
+    """The part with the largest bounding box alone, without the points of the others."""
+    parts = part_of(triangles)
+    kept = triangles[parts == largest(points, triangles, parts)]
+    used, renumbered = np.unique(kept, return_inverse=True)
+    return points[used], renumbered.reshape(kept.shape)
+
+
+def oriented(triangles: np.ndarray, name: str) -> tuple[np.ndarray, int]:
+    """Triangles (t, 3) of one part turned to agree with the majority, and how many were turned.
+
+    Every triangle stands twice in a graph, as it is and turned; neighbours are joined where they agree. The surface has
+    two sides when that graph falls in two; raises StudyError when it does not (a Moebius band).
+    """
+    pairs, opposite = edge_pairs(triangles)
+    count = len(triangles)
+    a, b = pairs.T
+    other = np.where(opposite, b, b + count)
+    mirrored = np.where(opposite, b + count, b)
+    ends = np.concatenate([a, a + count]), np.concatenate([other, mirrored])
+    graph = coo_array((np.ones(len(ends[0])), ends), shape=(2 * count, 2 * count))
+    label = connected_components(graph, directed=False)[1]
+    if (label[:count] == label[count:]).any():
+        raise StudyError(f"{name}: the surface has only one side, like a Moebius band; export it again")
+    turn = label[:count] != label[0]
+    if 2 * turn.sum() > count:
+        turn = ~turn
+    return np.where(turn[:, None], triangles[:, ::-1], triangles), int(turn.sum())
+
+
+def border(triangles: np.ndarray) -> np.ndarray:
+    """Half edges (b, 2) that no triangle runs along the other way."""
+    half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    size = int(triangles.max()) + 1
+    forward, backward = half[:, 0] * size + half[:, 1], half[:, 1] * size + half[:, 0]
+    return half[~np.isin(forward, backward)]
+
+
+def without_holes(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Every border closed by a fan over the mean of its nodes: points, triangles, number of holes."""
+    open_edges = border(triangles)
+    if not len(open_edges):
+        return points, triangles, 0
+    nodes, local = np.unique(open_edges, return_inverse=True)
+    i, j = local.reshape(-1, 2).T
+    graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(nodes), len(nodes)))
+    count, loop = connected_components(graph, directed=False)
+    middles = np.stack([points[nodes[loop == k]].mean(axis=0) for k in range(count)])
+    fans = np.column_stack([open_edges[:, ::-1], len(points) + loop[i]])
+    return np.vstack([points, middles]), np.vstack([triangles, fans]), count
+
+
+def flat_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Numbers of the triangles without a usable normal."""
+    return np.flatnonzero(triangle_radius_ratio(points, triangles) < SLIVER)

@@ -1,0 +1,242 @@
+"""Numbers read off a run: functions Run -> float, each with its unit, direction and the floor of its reference."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+from studies.geometry.surface.distance import hausdorff
+from studies.metrics.run import Run
+from studies.reference.ringing import ringing_frequency
+from studies.scene.scene import ALWAYS, allowed
+from studies.store.record import Status
+
+PERCENT = 100.0
+DOUBT = 0.1
+"""An error with more than this share of uncertainty in it is doubtful (docs/theory.md, the reference)."""
+COMPARABLE = (Status.OK, Status.INVERTED, Status.DRIFTED)
+"""A run that ended early has no last checkpoint."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """How a number is called, what it means, and what it may be compared with."""
+
+    name: str
+    unit: str
+    better: str
+    """"lower", "higher", or "-" where the sign says which way it is off."""
+    of: Callable[[Run], float]
+    quantity: str | None = None
+    """Of the reference: the name of its floor, and what the scene must allow to be compared."""
+
+    @property
+    def description(self) -> str:
+        """First line of the function's docstring."""
+        return (self.of.__doc__ or "").strip().split("\n")[0]
+
+    def __call__(self, run: Run) -> float:
+        """The number; NaN where the run ended early, or its reference or timing is missing."""
+        if run.record.status not in COMPARABLE or not self._allowed(run):
+            return float("nan")
+        return float(self.of(run))
+
+    def floor(self, run: Run) -> float:
+        """Uncertainty of the reference in the metric's unit; NaN without one or where nothing may be compared."""
+        if self.quantity is None or run.reference is None or not self._allowed(run):
+            return float("nan")
+        return PERCENT * run.reference.floor[self.quantity]
+
+    def doubtful(self, run: Run) -> bool:
+        """Whether the reference is not ten times better than what it judges here."""
+        floor = self.floor(run)
+        return floor == floor and self.quantity not in ALWAYS and floor > DOUBT * abs(self(run))
+
+    def _allowed(self, run: Run) -> bool:
+        """Whether there is something to compare with, and the scene says that it may be."""
+        if self.quantity is None or self.quantity in ALWAYS:
+            return True
+        return run.reference is not None and allowed(run.case.scene, self.quantity)
+
+
+def volume_worst(run: Run) -> float:
+    """100 max |V/V0 − 1| over all frames [%]."""
+    return PERCENT * float(np.max(np.abs(run.volume_ratio - 1)))
+
+
+def volume_end(run: Run) -> float:
+    """100 (V/V0 − 1) after the last frame [%]."""
+    return PERCENT * float(run.volume_ratio[-1] - 1)
+
+
+def force_error(run: Run) -> float:
+    """100 ‖F − F_ref‖/‖F_ref‖ over the checkpoints [%]."""
+    assert run.reference is not None
+    truth = run.reference.force
+    return PERCENT * float(np.linalg.norm(run.force[run.checkpoint_frames] - truth) / np.linalg.norm(truth))
+
+
+def force_end(run: Run) -> float:
+    """100 (F/F_ref − 1) at the last checkpoint [%]."""
+    assert run.reference is not None
+    return PERCENT * float(run.force[run.checkpoint_frames[-1]] / run.reference.force[-1] - 1)
+
+
+def _relative(run: Run, weights: np.ndarray) -> float:
+    truth, error = run.displacement_error
+    return PERCENT * float(np.sqrt((weights @ (error**2).sum(axis=1)) / (weights @ (truth**2).sum(axis=1))))
+
+
+def surface_error(run: Run) -> float:
+    """Area-weighted relative L2 error of the displacement of the surface at the last checkpoint [%]."""
+    return _relative(run, run.surface_weights)
+
+
+def interior_error(run: Run) -> float:
+    """Volume-weighted relative L2 error of the displacement at the last checkpoint [%]; NaN without an interior."""
+    if not len(run.field("tetrahedra")):
+        return float("nan")
+    return _relative(run, run.field("mass"))
+
+
+def mean_error(run: Run) -> float:
+    """Area-weighted mean error over the largest displacement [%], the measure of Duan et al. 2016."""
+    truth, error = run.displacement_error
+    weights = run.surface_weights
+    mean = float(weights @ np.linalg.norm(error, axis=1) / weights.sum())
+    return PERCENT * mean / float(np.linalg.norm(truth, axis=1).max())
+
+
+def silhouette_error(run: Run) -> float:
+    """Hausdorff distance of the deformed surface to its deformation by the reference, over the body's size [%]."""
+    assert run.reference is not None
+    rest, triangles = run.field("rest"), run.field("triangles")
+    surface = np.unique(triangles)
+    # The same polyhedron, moved by the reference: what the facets cut off the true organ is no error of the model.
+    truth = rest.copy()
+    truth[surface] += run.reference.displacement(rest[surface])
+    return PERCENT * hausdorff(run.field("snapshots")[-1], triangles, truth, triangles) / run.size
+
+
+def min_j(run: Run) -> float:
+    """Smallest tetrahedron volume ratio over all frames [1]; NaN for a surface body."""
+    return float(np.min(run.field("min_j")))
+
+
+def inverted_share(run: Run) -> float:
+    """Share of tetrahedra turned inside out at the last checkpoint [%]; NaN for a surface body."""
+    cells = run.field("tetrahedra")
+    if not len(cells):
+        return float("nan")
+    return PERCENT * float((tetrahedron_volumes(run.field("snapshots")[-1], cells) <= 0).mean())
+
+
+def j_spread(run: Run) -> float:
+    """100 × (95th − 5th percentile of J over the rest volume) at the last checkpoint [%]; NaN for a surface body."""
+    cells = run.field("tetrahedra")
+    if not len(cells):
+        return float("nan")
+    rest = tetrahedron_volumes(run.field("rest"), cells)
+    ratio = tetrahedron_volumes(run.field("snapshots")[-1], cells) / rest
+    order = np.argsort(ratio)
+    below = np.cumsum(rest[order]) / rest.sum()
+    low, high = ratio[order][np.searchsorted(below, (0.05, 0.95))]
+    return PERCENT * float(high - low)
+
+
+def rest_distance(run: Run) -> float:
+    """100 × RMS distance of the nodes from their rest shape, moved and turned to fit, over the body's size [%]."""
+    rest, last = run.field("rest"), run.field("snapshots")[-1]
+    mass = run.field("mass") / run.field("mass").sum()
+    wanted, found = rest - mass @ rest, last - mass @ last
+    left, _, right = np.linalg.svd((mass[:, None] * wanted).T @ found)
+    # A turn, never a mirror image (Kabsch 1976).
+    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    return PERCENT * float(np.sqrt(mass @ ((found - wanted @ turn) ** 2).sum(axis=1)) / run.size)
+
+
+def penetration(run: Run) -> float:
+    """100 × the deepest any node lies inside an obstacle after a frame, over the body's size [%]; NaN without one."""
+    depth = run.field("penetration")
+    return (
+        PERCENT * float(depth.max()) / float(np.linalg.norm(np.ptp(run.field("rest"), axis=0)))
+        if depth.size
+        else np.nan
+    )
+
+
+def pressure_error(run: Run) -> float:
+    """100 (lam/p_ref − 1) at the last checkpoint [%]; NaN for a method without a pressure."""
+    assert run.reference is not None
+    lam = float(run.tissue_pressure[run.checkpoint_frames[-1]])
+    return PERCENT * (lam / float(run.reference.field("pressure")[-1]) - 1) if lam else float("nan")
+
+
+def frequency_error(run: Run) -> float:
+    """100 (f/f_ref − 1) of the ringing, both read off the displacement of the same points [%]."""
+    assert run.reference is not None
+    rest, weights, scene = run.field("rest")[run.material_nodes], run.surface_weights, run.case.scene
+    t = run.field("t")[run.checkpoint_frames]
+    own = run.field("snapshots")[:, run.material_nodes] - rest
+    truth = np.array([run.reference.displacement(rest, k) for k in range(len(t))])
+    times = np.array(scene.checkpoints)
+    found, wanted = (ringing_frequency(scene, at, rest, u, weights) for at, u in ((t, own), (times, truth)))
+    return PERCENT * (found / wanted - 1)
+
+
+def lumen_pressure_error(run: Run) -> float:
+    """100 (lam/p_ref − 1) of the lumen at the last checkpoint [%]; NaN where the lumen is no volume of its own."""
+    assert run.reference is not None
+    if run.lumen is None:
+        return float("nan")
+    lam = float(run.field("pressure")[run.checkpoint_frames[-1], run.lumen])
+    return PERCENT * (lam / float(run.reference.field("lumen_pressure")[-1]) - 1) if lam else float("nan")
+
+
+def _timing(run: Run, quantile: float) -> float:
+    return float("nan") if run.timing is None else float(np.quantile(run.timing.frame_ns, quantile))
+
+
+def step_time(run: Run) -> float:
+    """Median frame time over the steps in a frame [µs]."""
+    return 1e-3 * _timing(run, 0.5) / run.record.attributes["steps"]
+
+
+def frame_time(run: Run) -> float:
+    """Median frame time [ms]."""
+    return 1e-6 * _timing(run, 0.5)
+
+
+def frame_time_p99(run: Run) -> float:
+    """99th percentile of the frame time [ms]."""
+    return 1e-6 * _timing(run, 0.99)
+
+
+def real_time(run: Run) -> float:
+    """Simulated seconds per second of computing [1]: what explicit steps of different size are compared by."""
+    return float(run.record.attributes["frame"]) / (1e-9 * _timing(run, 0.5))
+
+
+METRICS: tuple[Metric, ...] = (
+    Metric("volume_worst", "%", "lower", volume_worst, "volume"),
+    Metric("volume_end", "%", "-", volume_end, "volume"),
+    Metric("force_error", "%", "lower", force_error, "force"),
+    Metric("force_end", "%", "-", force_end, "force_end"),
+    Metric("surface_error", "%", "lower", surface_error, "surface"),
+    Metric("interior_error", "%", "lower", interior_error, "interior"),
+    Metric("mean_error", "%", "lower", mean_error, "surface_mean"),
+    Metric("silhouette_error", "%", "lower", silhouette_error, "silhouette"),
+    Metric("pressure_error", "%", "-", pressure_error, "pressure"),
+    Metric("frequency_error", "%", "-", frequency_error, "frequency"),
+    Metric("lumen_pressure_error", "%", "-", lumen_pressure_error, "lumen"),
+    Metric("min_j", "1", "higher", min_j),
+    Metric("j_spread", "%", "lower", j_spread),
+    Metric("inverted_share", "%", "lower", inverted_share),
+    Metric("rest_distance", "%", "lower", rest_distance),
+    Metric("penetration", "%", "lower", penetration),
+    Metric("step_time", "µs", "lower", step_time),
+    Metric("frame_time", "ms", "lower", frame_time),
+    Metric("frame_time_p99", "ms", "lower", frame_time_p99),
+    Metric("real_time", "s/s", "higher", real_time),
+)

@@ -1,0 +1,52 @@
+"""One row per case: what it was, how it ended, and the study's metrics beside the floor of their reference."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from studies.base.atomic import write_whole
+from studies.base.lookup import choose
+from studies.metrics.metrics import METRICS, Metric, Run
+
+DOUBTFUL = "doubtful"
+"""Column with the metrics of which the reference knows the truth less than ten times better than the model."""
+
+
+def metric(name: str) -> Metric:
+    """The metric called `name`. Raises StudyError with the nearest match."""
+    return choose(name, {m.name: m for m in METRICS}, "metric")
+
+
+def study_table(runs: Sequence[Run], columns: Sequence[str]) -> pd.DataFrame:
+    """Metrics `columns` of `runs`; a column "… floor" follows where the reference has an uncertainty of its own."""
+    metrics = [metric(name) for name in columns]
+    rows = [_row(run, metrics) for run in runs]
+    known = {name for row in rows for name, value in row.items() if " floor [" not in name or value == value}
+    return pd.DataFrame([{name: value for name, value in row.items() if name in known} for row in rows])
+
+
+def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
+    case, attributes = run.case, run.record.attributes
+    row: dict[str, object] = {
+        "scene": case.scene.name,
+        "body": case.body.series,
+        "law": attributes.get("law", ""),
+        "nodes": case.body.nodes,
+        "stiffness": case.body.stiffness,
+        "method": case.method_words,
+        "dt [ms]": 1e3 * attributes["dt"] if "dt" in attributes else float("nan"),
+        "dt/dt_c": attributes["dt"] / attributes["dt_limit"] if "dt" in attributes else float("nan"),
+        "status": str(run.record.status),
+    }
+    for entry in metrics:
+        row[f"{entry.name} [{entry.unit}]"] = entry(run)
+        row[f"{entry.name} floor [{entry.unit}]"] = entry.floor(run)
+    row[DOUBTFUL] = " ".join(entry.name for entry in metrics if entry.doubtful(run))
+    return row
+
+
+def write_table(path: Path, table: pd.DataFrame) -> Path:
+    """A table as CSV with six significant digits; whole or not at all."""
+    write_whole(path, table.to_csv(index=False, float_format="%.6g").encode())
+    return path

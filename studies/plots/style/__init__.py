@@ -1,0 +1,1 @@
+"""What all charts share: page, colours, three-dimensional pictures."""

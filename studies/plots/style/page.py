@@ -1,0 +1,217 @@
+"""A chart's page: title above, panels, and below them, outside all data, the legend and the notes."""
+
+import textwrap
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axis import Axis, XAxis
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter
+
+from studies.metrics.metrics import Metric, Run
+from studies.plots.style.style import (
+    BLACK,
+    BODY_LINES,
+    BODY_MARKERS,
+    GREY,
+    SMALL,
+    heading,
+    method_colour,
+    readable,
+    remark,
+    styled,
+)
+
+ROW, LINE, MARGIN = 0.25, 0.19, 0.12
+"""Heights of a legend row, of a line of notes, and of the space around them [inch]."""
+LETTERS = 12.8
+"""Letters of a note to the inch: a wide line of them still fits."""
+NARROWEST = 8.0
+"""Width of a page with one panel [inch]."""
+HANDLE = 0.62
+"""Width of a legend entry besides its words [inch]."""
+MOST_NOTES = 6
+DOUBT_MARK = "†"
+SHORT = 200.0
+"""A logarithmic axis from one end to the other of which values grow less than this has numbers between the decades."""
+
+
+def page(width: float, height: float) -> Figure:
+    """An empty page [inch], wide enough for words; `finish` adds the room for what stands below the panels."""
+    figure = Figure(figsize=(max(width, NARROWEST), height), layout="constrained")
+    engine = figure.get_layout_engine()
+    assert engine is not None  # asked for in the line above
+    engine.set(w_pad=0.06, h_pad=0.07, wspace=0.03, hspace=0.04)  # pyright: ignore[reportCallIssue]
+    return figure
+
+
+def panels(figure: Figure | SubFigure, rows: int, columns: int, **options: object) -> np.ndarray:
+    """Axes of shape (rows, columns), whatever their number."""
+    return figure.subplots(rows, columns, squeeze=False, **options)  # pyright: ignore[reportCallIssue, reportArgumentType]
+
+
+def finish(
+    figure: Figure, title: str, handles: Sequence[Artist], notes: Sequence[str] = (), columns: int = 4
+) -> Figure:
+    """Title, legend in rows of `columns`, and notes; the page grows by what they need."""
+    figure.suptitle(title)
+    width, height = (float(size) for size in figure.get_size_inches())
+    shown = [*notes[:MOST_NOTES], f"… and {len(notes) - MOST_NOTES} more remarks"] if len(notes) > MOST_NOTES else notes
+    lines = [line for note in shown for line in textwrap.wrap(note, int(LETTERS * width))]
+    columns = _fitting(columns, [str(handle.get_label()) for handle in handles], width)
+    rows = -(-len(handles) // columns)
+    foot = rows * ROW + len(lines) * LINE + 2 * MARGIN * bool(rows or lines)
+    total = height + foot
+    figure.set_figheight(total)
+    engine = figure.get_layout_engine()
+    assert engine is not None  # page() set one
+    engine.set(rect=(0, foot / total, 1, height / total))  # pyright: ignore[reportCallIssue]
+    if handles:
+        top = (len(lines) * LINE + rows * ROW + MARGIN) / total
+        place = {"loc": "upper center", "bbox_to_anchor": (0.5, top), "borderaxespad": 0.0, "borderpad": 0.0}
+        figure.legend(handles=handles, ncols=columns, columnspacing=1.6, handlelength=2.4, **place)
+    if lines:
+        low = 0.6 * MARGIN / total
+        figure.text(0.012, low, "\n".join(lines), color=GREY, size=SMALL, va="bottom", ha="left", linespacing=1.25)
+    return figure
+
+
+def _fitting(columns: int, labels: Sequence[str], width: float) -> int:
+    """The largest number of legend columns up to `columns` that the page is wide enough for [inch]."""
+    columns = max(1, min(columns, len(labels)))
+    while columns > 1:
+        longest = [max(map(len, part)) for part in np.array_split(np.array(labels, dtype=object), columns)]
+        if sum(longest) / LETTERS + columns * HANDLE <= width:
+            break
+        columns -= 1
+    return columns
+
+
+@styled
+def blank(title: str, reason: str) -> Figure:
+    """A page that says why there is no chart."""
+    figure = page(8, 2.5)
+    axes = figure.subplots()
+    axes.set_axis_off()
+    remark(axes, reason)
+    return finish(figure, title, [])
+
+
+def by_scene(runs: Sequence[Run]) -> dict[str, list[Run]]:
+    """Runs of each scene, in the order in which they come."""
+    groups: dict[str, list[Run]] = {}
+    for run in runs:
+        groups.setdefault(run.case.scene.name, []).append(run)
+    return groups
+
+
+def grouped(runs: Sequence[Run], key: Callable[[Run], object]) -> list[list[Run]]:
+    """Runs with the same key together, in the order in which they come."""
+    groups: dict[object, list[Run]] = {}
+    for run in runs:
+        groups.setdefault(key(run), []).append(run)
+    return list(groups.values())
+
+
+def remarks(runs: Sequence[Run]) -> list[str]:
+    """What a chart cannot show, a sentence each: runs that broke off, scenes without a reference."""
+    ended = [f"{run.case.name}: {run.record.message or run.record.status}." for run in runs if not has_frames(run)]
+    ended += [
+        f"{run.case.name} {readable(run.record.status)}; shown up to there."
+        for run in runs
+        if has_frames(run) and good_frames(run) < len(run.field("t"))
+    ]
+    bare = [name for name, group in by_scene(runs).items() if all(run.reference is None for run in group)]
+    missing = [f"No reference for {', '.join(map(readable, bare))}: no error can be given there."] if bare else []
+    return [*missing, *ended]
+
+
+def doubts(runs: Sequence[Run], metrics: Sequence[Metric]) -> list[str]:
+    """A note for each scene whose reference is not ten times better than every error it judges, and in what."""
+    notes = []
+    for name, group in by_scene(runs).items():
+        weak = [metric for metric in metrics if any(metric.doubtful(run) for run in group)]
+        if weak:
+            worst = max(_share(metric, run) for metric in weak for run in group if metric.doubtful(run))
+            what = ", ".join(readable(metric.name) for metric in weak)
+            percent = f"up to {100 * worst:.0f} % of" if worst < 1 else "as large as"
+            notes.append(f"{DOUBT_MARK} {heading(name)}: the reference's uncertainty is {percent} some {what} drawn.")
+    return notes
+
+
+def _share(metric: Metric, run: Run) -> float:
+    error = abs(metric(run))
+    return metric.floor(run) / error if error else np.inf
+
+
+def doubt_mark(group: Sequence[Run], metrics: Sequence[Metric]) -> str:
+    """Behind the name of a scene that `doubts` has a note on."""
+    return f" {DOUBT_MARK}" if any(metric.doubtful(run) for metric in metrics for run in group) else ""
+
+
+def has_frames(run: Run) -> bool:
+    """Whether the run recorded any frame: one that could not start has none."""
+    return "t" in run.record.fields and good_frames(run) > 0
+
+
+def good_frames(run: Run) -> int:
+    """Number of frames before the run broke off."""
+    return int(run.record.attributes.get("good_frames", len(run.field("t"))))
+
+
+def body_method_handles(runs: Sequence[Run], markers: bool = False) -> list[Artist]:
+    """Legend entries for every method and body that occurs, and for both together: colour is method, line is body."""
+    series = dict.fromkeys((run.case.body.series, run.case.method.name) for run in runs)
+    return [series_handle(kind, method, markers) for kind, method in series]
+
+
+def series_handle(kind: str, method: str, markers: bool = False) -> Line2D:
+    """The legend entry of one body with one method."""
+    look = (
+        {"marker": BODY_MARKERS[kind], "linestyle": "", "markersize": 7} if markers else {"linestyle": BODY_LINES[kind]}
+    )
+    return Line2D([], [], color=method_colour(method), label=f"{kind}, {readable(method)}", **look)
+
+
+def reference_handle(label: str = "reference (finite elements)", **look: object) -> Line2D:
+    """The legend entry of the reference: black."""
+    plain = {"marker": "o", "linestyle": "", "markersize": 5.5, "markeredgecolor": "white"} | look
+    return Line2D([], [], color=BLACK, label=label, **plain)  # pyright: ignore[reportArgumentType]
+
+
+def band_handle(label: str) -> Patch:
+    """The legend entry of a grey area."""
+    return Patch(facecolor=GREY, alpha=0.3, linewidth=0, label=label)
+
+
+def log_axis(axis: Axis) -> None:
+    """Plain numbers, not powers: 0.1, 1, 10, and 2 and 5 between them where the axis is short."""
+
+    def between(value: float, _: int) -> str:
+        low, high = axis.get_view_interval()
+        first = round(value / 10 ** np.floor(np.log10(value)))
+        return f"{value:g}" if first in (2, 5) and high < SHORT * low else ""
+
+    (axis.axes.set_xscale if isinstance(axis, XAxis) else axis.axes.set_yscale)("log")
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(FuncFormatter(between))
+    axis.set_tick_params(which="minor", labelsize=SMALL)
+
+
+def spread_out(heights: np.ndarray, gap: float) -> np.ndarray:
+    """The heights nearest to `heights` (n,), in the same order, at least `gap` apart (as isotonic regression)."""
+    order = np.argsort(heights, kind="stable")
+    ladder = gap * np.arange(len(heights))
+    blocks: list[tuple[float, int]] = []
+    for height in heights[order] - ladder:
+        mean, count = float(height), 1
+        while blocks and blocks[-1][0] > mean:
+            before, size = blocks.pop()
+            mean, count = (before * size + mean * count) / (size + count), size + count
+        blocks.append((mean, count))
+    placed = np.empty(len(heights))
+    placed[order] = np.repeat([mean for mean, _ in blocks], [count for _, count in blocks]) + ladder
+    return placed

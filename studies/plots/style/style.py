@@ -1,0 +1,133 @@
+"""One look for all charts: colours that everybody can tell apart, type that survives half size, one way to save."""
+
+import functools
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+import matplotlib.style
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from massspring import METHODS
+from studies.base.atomic import write_whole
+from studies.store.record import Status
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+DPI = 110
+"""Of every picture: with it 10 inches are 1,100 pixels, and the smallest type is still read at half of that."""
+SMALL, NORMAL, LARGE = 10.0, 11.5, 14.0
+"""Type sizes [pt]: notes and tick labels, axes and legends, titles."""
+
+# Okabe and Ito, "Color universal design", 2008.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+GREY, LIGHT, PALE = "#5A5A5A", "#B5B5B5", "#E4E4E4"
+
+METHOD_COLOURS = {"free": VERMILLION, "implicit_volume": BLUE}
+# Then the muted scheme of P. Tol, "Colour schemes", 2021.
+MUTED = ("#332288", "#999933", "#882255", "#44AA99", "#DDCC77", "#AA4499", "#117733", "#661100", "#88CCEE", "#CC6677")
+OTHER_METHODS = (GREEN, PURPLE, ORANGE, SKY, *MUTED)
+BODY_LINES = {
+    "tetrahedral": "-",
+    "surface": (0, (4, 1.6)),
+    "tetrahedral, one volume": (0, (1, 1.2)),
+    "tetrahedral, nodal volumes": (0, (6, 1.5, 1, 1.5)),
+    "membrane": (0, (2.5, 1)),
+}
+BODY_MARKERS = {
+    "tetrahedral": "o",
+    "surface": "s",
+    "tetrahedral, one volume": "D",
+    "tetrahedral, nodal volumes": "^",
+    "membrane": "v",
+}
+"""Of the bodies that charts tell apart, by BodyRecipe.series."""
+STATUS_LOOKS: dict[Status, tuple[str, str]] = {
+    Status.OK: (GREEN, "o"),
+    Status.INVERTED: (PURPLE, "v"),
+    Status.DRIFTED: (YELLOW, "D"),
+    Status.DIVERGED: (BLACK, "X"),
+    Status.NOT_CONVERGED: (ORANGE, "P"),
+    Status.BLOCKED: (MUTED[2], "^"),
+    Status.TIMED_OUT: (SKY, "s"),
+    Status.FAILED: (LIGHT, "*"),
+    Status.SKIPPED: (GREY, "_"),
+}
+"""Colour and marker; none is the colour of one of the first two methods."""
+
+SHEET = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib: the same letters on every machine
+    "font.size": NORMAL,
+    "axes.titlesize": NORMAL + 0.5,
+    "axes.titleweight": "bold",
+    "axes.labelsize": NORMAL,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": GREY,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "axes.formatter.use_mathtext": True,
+    "grid.color": PALE,
+    "grid.linewidth": 0.8,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": BLACK,
+    "ytick.labelcolor": BLACK,
+    "legend.fontsize": SMALL,
+    "legend.frameon": False,
+    "figure.titlesize": LARGE,
+    "figure.titleweight": "bold",
+    "lines.linewidth": 1.9,
+    "hatch.linewidth": 0.7,
+}
+
+
+def styled(build: Callable[P, R]) -> Callable[P, R]:
+    """Runs `build` under matplotlib's defaults and SHEET, whatever the user's own settings are."""
+
+    @functools.wraps(build)
+    def under_sheet(*args: P.args, **kwargs: P.kwargs) -> R:
+        with matplotlib.style.context(["default", SHEET]):
+            return build(*args, **kwargs)
+
+    return under_sheet
+
+
+@styled
+def save(figure: Figure, path: Path, dpi: int = DPI) -> None:
+    """Writes a PNG, whole or not at all; the same figure gives the same bytes. Raises StudyError when it cannot."""
+    image = io.BytesIO()
+    FigureCanvasAgg(figure)
+    figure.savefig(image, format="png", dpi=dpi, metadata={"Software": None}, facecolor="white")
+    write_whole(path, image.getvalue())
+
+
+def method_colour(name: str) -> str:
+    """The colour a method has in every chart."""
+    if name in METHOD_COLOURS:
+        return METHOD_COLOURS[name]
+    others = [method.name for method in METHODS if method.name not in METHOD_COLOURS]
+    return OTHER_METHODS[others.index(name) % len(OTHER_METHODS)]
+
+
+def readable(name: str) -> str:
+    """A name of the code as words: "implicit_volume" -> "implicit volume"."""
+    return name.replace("_", " ").replace("-", " ")
+
+
+def heading(name: str) -> str:
+    """The same with a capital letter."""
+    words = readable(name)
+    return words[:1].upper() + words[1:]
+
+
+def remark(axes: Axes, text: str) -> None:
+    """Small grey words in the middle of a panel that has nothing to show."""
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color=GREY, size=SMALL)

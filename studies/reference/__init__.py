@@ -1,0 +1,1 @@
+"""A scene solved by finite elements, with its error bar."""

@@ -1,0 +1,104 @@
+"""From a scene to the finite-element reference problem on one mesh of its family."""
+
+import numpy as np
+from scipy.spatial import KDTree
+from skfem import MeshTet2
+
+from massspring import Capsule, Obstacle, Plane, Probe
+from reference_fem import Cavity, NeoHookean, Problem, RigidCapsule, RigidPlane, RigidSphere, nodes
+from reference_fem import Held as HeldPatch
+from studies.base.errors import StudyError
+from studies.reference.mesh import reference_mesh
+from studies.scene.scene import Scene
+
+SAME_POINT = 1e-9
+"""Two nodes closer than this fraction of the body are one: far above rounding, far below an edge."""
+
+
+def reference_problem(scene: Scene, level: float) -> Problem:
+    """The scene on mesh `level` of its reference plan, curved second order where the true surface is known.
+
+    Raises StudyError for a mesh that cannot be made, ReferenceProblem for one that cannot be used.
+    """
+    tissue = scene.tissue
+    mesh, patches, lumen = reference_mesh(scene, level)
+    return Problem(
+        mesh=mesh,
+        material=NeoHookean(tissue.shear_modulus, tissue.shear_modulus * tissue.bulk_over_shear),
+        held=_symmetry_planes() if scene.symmetric else _held(scene, mesh, patches),
+        obstacles=tuple(rigid(o) for o in kept_obstacles(scene)),
+        gravity=scene.gravity,
+        density=tissue.density,
+        cavities=(_cavity(scene, lumen),) if scene.filled else (),
+    )
+
+
+def _cavity(scene: Scene, middles: np.ndarray) -> Cavity:
+    """The lumen, walled by the facets with these middles (f, 3) [m]; its volume follows the scene."""
+    if not len(middles):
+        raise StudyError(f"scene '{scene.name}' fills a lumen, but its {scene.organ.shape} has none; leave it out")
+    assert scene.lumen is not None  # it is filled
+    tree, reach = KDTree(middles), SAME_POINT * float(np.ptp(middles))
+    return Cavity(where=lambda x: tree.query(x.T)[0] < reach, volume=scene.lumen.filling)
+
+
+def anchor(obstacle: Obstacle) -> np.ndarray:
+    """Point of a plane, centre of a sphere or start of a capsule [m], (3,)."""
+    return obstacle.anchor
+
+
+def kept_obstacles(scene: Scene) -> tuple[Obstacle, ...]:
+    """The obstacles the reference sees: of an octant only those on its side of the symmetry planes."""
+    if not scene.symmetric:
+        return scene.obstacles
+    return tuple(o for o in scene.obstacles if (anchor(o) >= 0).all())
+
+
+def whole_forces(scene: Scene, forces: np.ndarray) -> np.ndarray:
+    """Forces of all scene obstacles (K, o, 3) [N] from those of the kept ones (K, kept, 3).
+
+    An obstacle centred on an axis presses four octants; what they feel across the axis cancels.
+    """
+    if not scene.symmetric:
+        return forces
+    kept = np.array([anchor(o) for o in kept_obstacles(scene)])
+    whole = np.zeros((len(forces), len(scene.obstacles), 3))
+    for number, obstacle in enumerate(scene.obstacles):
+        at = anchor(obstacle)
+        twin = int(np.argmin(np.linalg.norm(kept - np.abs(at), axis=1)))
+        whole[:, number] = np.sign(at) * forces[:, twin] * 2.0 ** np.count_nonzero(at == 0)
+    return whole
+
+
+def _symmetry_planes() -> tuple[HeldPatch, ...]:
+    return tuple(HeldPatch(where=lambda x, axis=axis: np.abs(x[axis]) < 1e-12, components=(axis,)) for axis in range(3))
+
+
+def _held(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray]) -> tuple[HeldPatch, ...]:
+    points = nodes(mesh)
+    reach = SAME_POINT * float(np.ptp(points))
+    trees = [KDTree(points[patch]) for patch in patches]
+    return tuple(
+        HeldPatch(where=lambda x, tree=tree: tree.query(x.T)[0] < reach, motion=held.path)
+        for held, tree in zip(scene.held, trees, strict=True)
+    )
+
+
+def rigid(obstacle: Obstacle) -> RigidPlane | RigidSphere | RigidCapsule:
+    """The obstacle as the reference knows it. Raises StudyError for one it does not."""
+    if isinstance(obstacle, Probe):
+        raise StudyError(
+            f"the reference knows planes, spheres and capsules, not the thin probe at {obstacle.tip}; "
+            f"use a sphere wider than its elements, or a scene without reference"
+        )
+    if obstacle.friction not in (0, "no_slip"):
+        raise StudyError(
+            f"an obstacle has friction {obstacle.friction}, and the reference knows contact without friction (0) or "
+            f"without slip ('no_slip'); choose one of the two, or a scene without reference"
+        )
+    slip = "no_slip" if obstacle.friction == "no_slip" else "frictionless"
+    if isinstance(obstacle, Plane):
+        return RigidPlane(obstacle.point, tuple(obstacle.unit_normal), obstacle.path, slip)
+    if isinstance(obstacle, Capsule):
+        return RigidCapsule(obstacle.start, obstacle.end, obstacle.radius, obstacle.path, slip)
+    return RigidSphere(obstacle.centre, obstacle.radius, obstacle.path, slip)

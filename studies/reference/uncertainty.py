@@ -1,0 +1,216 @@
+"""How far each quantity of a reference may be from the truth: shares of the mesh, load steps, contact and kappa.
+
+Differences of solutions are taken at the vertices of the coarsest mesh, weighted with their rest volume or area, so
+that a mesh refined somewhere does not count more there.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reference_fem.uncertainty import MeshError, cell_size, combined, field_error, mesh_error, setting_error
+from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import boundary_triangles, tetrahedron_volumes, triangle_areas
+from studies.geometry.surface.distance import hausdorff
+from studies.reference.ringing import ringing_frequency
+from studies.reference.solve import VARIANTS
+from studies.scene.scene import allowed
+
+if TYPE_CHECKING:
+    from studies.reference.load import Solution
+
+FAMILY = 3
+"""Meshes that make an error bar, the finest ones; two make a large one."""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Of one quantity, relative to its size [1]."""
+
+    shares: dict[str, float]
+    """"mesh" and the names of VARIANTS."""
+    order: float
+    """Observed order of convergence in the element size; NaN where it is not monotone: the spread then counts."""
+    shift: float
+    """How far the extrapolated value is from that of the finest mesh, which is the one compared with."""
+
+    @property
+    def total(self) -> float:
+        """The one number: root of the sum of the squares of the shares (docs, eq. 20)."""
+        return combined(self.shares)
+
+
+class Places:
+    """Where solutions are compared: the vertices of a mesh, with their share of its rest volume and of its surface."""
+
+    def __init__(self, solution: "Solution") -> None:
+        cells = solution.field("tetrahedra")
+        self.points = solution.field("nodes")[: int(cells.max()) + 1]
+        self.triangles = solution.outside(boundary_triangles(cells))
+        self.size = solution.size
+        self.volumes = _shares(cells, tetrahedron_volumes(self.points, cells), len(self.points))
+        self.areas = _shares(self.triangles, triangle_areas(self.points, self.triangles), len(self.points))
+
+
+def _shares(corners: np.ndarray, sizes: np.ndarray, count: int) -> np.ndarray:
+    """What each vertex has of the sizes (k,) of elements with `corners` (k, c), (count,)."""
+    width = corners.shape[1]
+    return np.bincount(corners.ravel(), np.repeat(sizes / width, width), count)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One solution, seen at the places."""
+
+    solution: "Solution"
+    places: Places
+
+    @cached_property
+    def u(self) -> np.ndarray:
+        """Displacement at the last checkpoint [m], (m, 3)."""
+        return self.solution.displacement(self.places.points)
+
+    @cached_property
+    def frequency(self) -> float:
+        """Of the ringing [Hz]; NaN for a scene that does not start with a speed."""
+        scene, points = self.solution.scene, self.places.points
+        moved = np.array([self.solution.displacement(points, k) for k in range(len(scene.checkpoints))])
+        return ringing_frequency(scene, np.array(scene.checkpoints), points, moved, self.places.areas)
+
+    @property
+    def force(self) -> np.ndarray:
+        """The probed force at the checkpoints [N], (K,)."""
+        return self.solution.force
+
+    @property
+    def cell_size(self) -> float:
+        """Representative size of an element [m]."""
+        return cell_size(float(self.places.volumes.sum()), len(self.solution.field("tetrahedra")))
+
+    def series(self, name: str) -> np.ndarray:
+        """A stored series of numbers, (K,)."""
+        return self.solution.field(name)
+
+
+Measure = Callable[[View, View], float]
+"""Change from the first view to the second, relative to the size of the quantity in the second."""
+
+
+def force(a: View, b: View) -> float:
+    """‖F_a − F_b‖/‖F_b‖ over the checkpoints."""
+    return float(np.linalg.norm(a.force - b.force) / np.linalg.norm(b.force))
+
+
+def force_end(a: View, b: View) -> float:
+    """|F_a/F_b − 1| at the last checkpoint."""
+    return float(abs(a.force[-1] / b.force[-1] - 1))
+
+
+def _relative(a: View, b: View, weights: np.ndarray) -> float:
+    change, size = ((a.u - b.u) ** 2).sum(axis=1), (b.u**2).sum(axis=1)
+    return float(np.sqrt((weights @ change) / (weights @ size)))
+
+
+def surface(a: View, b: View) -> float:
+    """Area-weighted relative L2 of the displacement of the surface."""
+    return _relative(a, b, b.places.areas)
+
+
+def interior(a: View, b: View) -> float:
+    """Volume-weighted relative L2 of the displacement."""
+    return _relative(a, b, b.places.volumes)
+
+
+def surface_mean(a: View, b: View) -> float:
+    """Area-weighted mean of |u_a − u_b| over the largest |u_b|."""
+    weights = b.places.areas
+    mean = weights @ np.linalg.norm(a.u - b.u, axis=1) / weights.sum()
+    return float(mean / np.linalg.norm(b.u[weights > 0], axis=1).max())
+
+
+def silhouette(a: View, b: View) -> float:
+    """Hausdorff distance of the surface moved by one and by the other, over the body's size."""
+    points, triangles = b.places.points, b.places.triangles
+    return hausdorff(points + a.u, triangles, points + b.u, triangles) / b.places.size
+
+
+def volume(a: View, b: View) -> float:
+    """Largest change of V/V0 over the checkpoints."""
+    return float(np.abs(a.series("volume") - b.series("volume")).max())
+
+
+def pressure(a: View, b: View) -> float:
+    """|p_a/p_b − 1| at the last checkpoint."""
+    return float(abs(a.series("pressure")[-1] / b.series("pressure")[-1] - 1))
+
+
+def frequency(a: View, b: View) -> float:
+    """|f_a/f_b − 1| of the ringing."""
+    return abs(a.frequency / b.frequency - 1)
+
+
+def lumen(a: View, b: View) -> float:
+    """|p_a/p_b − 1| of the lumen at the last checkpoint."""
+    return float(abs(a.series("lumen_pressure")[-1] / b.series("lumen_pressure")[-1] - 1))
+
+
+NUMBERS: dict[str, tuple[Measure, Callable[[View], np.ndarray]]] = {
+    "force": (force, lambda view: view.force),
+    "force_end": (force_end, lambda view: view.force[-1:]),
+    "volume": (volume, lambda view: view.series("volume")),
+    "pressure": (pressure, lambda view: view.series("pressure")[-1:]),
+    "frequency": (frequency, lambda view: np.array([view.frequency])),
+    "lumen": (lumen, lambda view: view.series("lumen_pressure")[-1:]),
+}
+"""Numbers and series of them: how a change is measured, and the values."""
+FIELDS: dict[str, tuple[Measure, Callable[[Places], np.ndarray]]] = {
+    "surface": (surface, lambda places: places.areas),
+    "interior": (interior, lambda places: places.volumes),
+}
+"""The displacement, with the weights of its points."""
+ABOUT_SURFACE: dict[str, Measure] = {"surface_mean": surface_mean, "silhouette": silhouette}
+"""What is read off the displaced surface: it has the bar of its change from one mesh to the next, times how many times
+the change of the surface its own bar is."""
+QUANTITIES: dict[str, Measure] = {name: m for name, (m, _) in (NUMBERS | FIELDS).items()} | ABOUT_SURFACE
+"""By the name that metrics use."""
+
+
+def uncertainties(
+    finest: "Solution", coarser: Sequence["Solution"], variants: Sequence["Solution"]
+) -> dict[str, Uncertainty]:
+    """Uncertainty of every quantity of `finest` from the next coarser meshes (fine to coarse) and the variants.
+
+    Raises StudyError without a coarser mesh.
+    """
+    if not coarser:
+        raise StudyError(f"the reference of '{finest.scene.name}' has one mesh only, so no error bar; solve three")
+    places = Places(coarser[-1])
+    views = [View(solution, places) for solution in (finest, *coarser)]
+    better = {str(s.record.attributes["variant"]): View(s, places) for s in variants}
+    family = views[:FAMILY]
+    found = {}
+    for name, measure in QUANTITIES.items():
+        if not allowed(finest.scene, name):
+            continue
+        mesh = _of_mesh(name, family)
+        shares = {key: setting_error(measure(views[-1], view), VARIANTS[key][1]) for key, view in better.items()}
+        found[name] = Uncertainty({"mesh": mesh.uncertainty, **shares}, mesh.order, mesh.shift)
+    return found
+
+
+def _of_mesh(name: str, family: Sequence[View]) -> MeshError:
+    """What the meshes leave, relative to the size of the quantity."""
+    sizes = [view.cell_size for view in family]
+    if name in NUMBERS:
+        values = [NUMBERS[name][1](view) for view in family]
+        size = 1.0 if name == "volume" else float(np.linalg.norm(values[0]))
+        error, sign = mesh_error(sizes, values), float(np.sign(values[0][0]))
+        return MeshError(error.uncertainty / size, sign * error.shift / size, error.order)
+    weights = FIELDS[name if name in FIELDS else "surface"][1](family[0].places)
+    field = field_error(sizes, [view.u for view in family], weights)
+    change = np.sqrt(weights @ ((family[1].u - family[0].u) ** 2).sum(axis=1))
+    scale = QUANTITIES[name](family[1], family[0]) / change if change else 0.0
+    return MeshError(scale * field.uncertainty, scale * field.shift, field.order)

@@ -1,0 +1,118 @@
+"""What is known of the references themselves: a table and a chart of their error bars."""
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import pandas as pd
+
+from studies.base.atomic import write_whole
+from studies.base.errors import StudyError
+from studies.metrics.table import write_table
+from studies.plots.uncertainty import draw
+from studies.reference.checkpoints import kept
+from studies.reference.load import Reference, load_reference
+from studies.reference.solve import STUDY, VARIANTS, pieces
+from studies.scene.scene import Scene
+from studies.store.fingerprint import source_fingerprint
+from studies.store.paths import study_folder
+from studies.store.record import peek
+
+TABLE, CHART = "uncertainty.csv", "uncertainty.png"
+
+
+def known_references(root: Path, scenes: Iterable[Scene]) -> dict[str, Reference]:
+    """Those that are solved on all their meshes, by the name of their scene; the others are told of by their study."""
+    found = {}
+    for scene in scenes:
+        try:
+            reference = load_reference(root, scene)
+        except StudyError:
+            continue  # load_runs says which piece is missing, and why
+        if reference is not None:
+            found[scene.name] = reference
+    return found
+
+
+def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
+    """A row per scene and quantity: its shares, their sum, order, shift; relative [%]."""
+    rows = []
+    for scene, reference in references.items():
+        levels = [s.record.attributes["level"] for s in (*reversed(reference.coarser), reference)]
+        for quantity, known in reference.uncertainty.items():
+            shares = {f"{name} [%]": 100 * known.shares.get(name, float("nan")) for name in ("mesh", *VARIANTS)}
+            rows.append(
+                {
+                    "scene": scene,
+                    "quantity": quantity,
+                    **shares,
+                    "uncertainty [%]": 100 * known.total,
+                    "order [1]": known.order,
+                    "extrapolated shift [%]": 100 * known.shift,
+                    "levels": " ".join(f"{level:g}" for level in levels),
+                    "unknowns": reference.record.attributes["unknowns"],
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def reference_listing(root: Path, scenes: Iterable[Scene]) -> pd.DataFrame:
+    """A row per piece of the references: mesh, unknowns, load steps done, seconds and state.
+
+    The uncertainty of the probed force stands in the row of the finest mesh.
+    """
+    references = known_references(root, scenes)
+    rows = []
+    for scene in scenes:
+        plan = scene.reference
+        for piece in pieces(scene):
+            path, state = piece.path(root), piece.state(root)
+            known = peek(path).attributes if state not in ("missing", "half-way", "unreadable") else {}
+            if state == "half-way":
+                begun = kept(path, piece.stamp)
+                known = {"steps_done": len([e for e in begun.path if e.t in scene.checkpoints]) if begun else 0}
+            finest = plan is not None and not piece.variant and piece.level == plan.levels[-1]
+            floor = (
+                references[scene.name].floor.get("force", float("nan"))
+                if finest and scene.name in references
+                else float("nan")
+            )
+            rows.append(
+                {
+                    "scene": scene.name,
+                    "level": f"{piece.level:g}",
+                    "variant": piece.variant,
+                    "unknowns": known.get("unknowns", ""),
+                    "steps": f"{known.get('steps_done', 0)}/{len(scene.checkpoints)}",
+                    "seconds": round(float(known.get("seconds", float("nan"))), 1),
+                    "force uncertainty [%]": 100 * floor,
+                    "state": state,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def state_of(files: Iterable[Path]) -> str:
+    """Hash of all that charts and tables are made from: result files with their sizes and times, and the code."""
+    digest = hashlib.sha256(source_fingerprint("studies", "massspring", "reference_fem").encode())
+    for file in files:
+        state = file.stat() if file.exists() else None
+        digest.update(f"{file.name} {state and (state.st_mtime_ns, state.st_size)}\n".encode())
+    return digest.hexdigest()
+
+
+def refresh_uncertainty(root: Path, scenes: Iterable[Scene]) -> list[Path]:
+    """Writes table and chart of the error bars, unless they show what is stored; none where no reference is known."""
+    each = list({scene.name: scene for scene in scenes}.values())
+    folder = study_folder(root, STUDY)
+    paths = [folder / TABLE, folder / CHART]
+    stamp, state = root / "cache" / f"{STUDY}.drawn", state_of(p.path(root) for scene in each for p in pieces(scene))
+    if all(path.exists() for path in (*paths, stamp)) and stamp.read_text(encoding="utf-8") == state:
+        return paths
+    references = known_references(root, each)
+    if not references:
+        return []
+    write_table(paths[0], uncertainty_table(references))
+    draw({name: reference.uncertainty for name, reference in references.items()}, paths[1])
+    write_whole(stamp, state.encode())
+    return paths

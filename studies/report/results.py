@@ -1,0 +1,196 @@
+"""What people look at: charts, tables as CSV, the summary of results that README shows."""
+
+import json
+import math
+from collections.abc import Hashable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from studies.base.atomic import write_whole
+from studies.base.errors import StudyError
+from studies.catalog import Study
+from studies.geometry import SHAPES, organ
+from studies.metrics.metrics import Run
+from studies.metrics.table import DOUBTFUL, study_table, write_table
+from studies.plots.figures import paper_ball, paper_slide
+from studies.plots.figures.organ_springs import draw_organ_springs
+from studies.plots.figures.organs import draw_organs
+from studies.reference.solve import pieces
+from studies.report.kept_volume import kept_volumes
+from studies.report.references import refresh_uncertainty, state_of
+from studies.runs.paper import play, slide_case, squeezed_balls
+from studies.runs.run import case_path
+from studies.store.machine import write_machine
+from studies.store.paths import study_folder
+from studies.sweep.run_studies import load_runs
+from studies.timing.cases import timing_file
+
+BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
+"""Between these lines of README.md stands the summary; `organbench report --readme` writes it."""
+
+FIGURE_NODES = 550
+PAPER_NODES = {"liver": 544, "stomach": 550}
+"""Surface nodes of the organs in Figure 1 of Jung, Hong and Choi (2005)."""
+HEADLINE = "volume_loss"
+"""The study that the summary is read off."""
+
+
+def draw_charts(root: Path, study: Study, runs: Sequence[Run]) -> list[Path]:
+    """Draws all charts of a study; their paths."""
+    folder = study_folder(root, study.name)
+    make_folder(folder)
+    drawn = []
+    for chart in study.charts:
+        chart.draw(runs, folder / chart.file)
+        drawn.append(folder / chart.file)
+    return drawn
+
+
+def make_folder(folder: Path) -> None:
+    """The folder, when it is not there yet. Raises StudyError when it cannot be made."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StudyError(
+            f"{folder} cannot be made ({error.strerror}); choose a folder that can be written to"
+        ) from error
+
+
+def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
+    """Charts and tables of all studies, the summary and machine.json; paths, and what is missing in sentences.
+
+    A study of which nothing is stored keeps the charts that are there.
+    """
+    written, remarks, absent = [], [], []
+    for study in studies:
+        if not any(case_path(root, study.name, case).exists() for case in study.cases):
+            absent.append(study.name)
+            continue
+        paths, missing = refresh(root, study)
+        written += paths
+        remarks += [f"{study.name}: {sentence}" for sentence in missing]
+    written += refresh_uncertainty(root, [scene for study in studies for scene in study.scenes])
+    kept = kept_volumes(root, studies)
+    if len(kept):
+        written.append(write_table(root / "kept_volume.csv", kept))
+    write_machine(root / "machine.json")
+    if absent:
+        remarks.append(f"not run here, what is drawn of them stays: {', '.join(absent)}; make study-NAME runs one")
+    return written, remarks
+
+
+def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
+    """Draws the charts and writes the tables of a study, unless they show what is stored already.
+
+    Their paths, and what is missing in sentences.
+    """
+    folder = study_folder(root, study.name)
+    table = folder / f"{study.name}.csv"
+    paths = [*(folder / chart.file for chart in study.charts), table]
+    if study.name == HEADLINE:
+        paths.append(root / "summary.md")
+    stamp = root / "cache" / f"{study.name}.drawn.json"
+    shown = {"inputs": inputs_of(root, study), "remarks": []}
+    if all(path.exists() for path in paths) and stamp.exists():
+        before = json.loads(stamp.read_text(encoding="utf-8"))
+        if before["inputs"] == shown["inputs"]:
+            return paths, before["remarks"]
+    runs, shown["remarks"] = load_runs(root, study)
+    draw_charts(root, study, runs)
+    write_table(table, study_table(runs, study.columns))
+    if study.name == HEADLINE:
+        write_whole(root / "summary.md", (summary_of({HEADLINE: runs}) + "\n").encode())
+    write_whole(stamp, json.dumps(shown).encode())
+    return paths, shown["remarks"]
+
+
+def inputs_of(root: Path, study: Study) -> str:
+    """Hash of all that charts and tables are made from: result files with their sizes and times, and the code."""
+    files = [case_path(root, study.name, case) for case in study.cases]
+    files += [timing_file(root, study.name, case) for case in study.cases if case.timed]
+    return state_of([*files, *(piece.path(root) for scene in study.scenes for piece in pieces(scene))])
+
+
+def draw_figures(root: Path) -> list[Path]:
+    """The gallery of all organs, and Figures 1 to 4 of Jung, Hong and Choi (2005) from our runs; their paths."""
+    gallery, springs = root / "figures" / "organs.png", root / "figures" / "organ_springs.png"
+    make_folder(gallery.parent)
+    draw_organs({name: organ(name, FIGURE_NODES) for name in SHAPES}, gallery)
+    draw_organ_springs({name: organ(name, nodes, fill=False) for name, nodes in PAPER_NODES.items()}, springs)
+    return [gallery, springs, *draw_paper(gallery.parent)]
+
+
+def draw_paper(folder: Path) -> list[Path]:
+    """The paper's Figures 2 to 4, run now: two balls in seconds, the refined stomach in about a minute."""
+    squeezed, volume, slide = (folder / f"paper_{name}.png" for name in ("squeezed", "volume", "slide"))
+    paper_ball.draw(squeezed_balls(), squeezed, volume)
+    paper_slide.draw(play(slide_case()), slide)
+    return [squeezed, volume, slide]
+
+
+def summary_of(runs_of: dict[str, list[Run]]) -> str:
+    """The headline table in Markdown: accuracy of each scene, body and method, beside the floor of the reference."""
+    rows = study_table(runs_of.get("volume_loss", []), SUMMARY_METRICS)
+    if rows.empty:
+        return "No results yet: run `make study`."
+    rows = rows.loc[~(rows["dt/dt_c"] <= 0.25)]  # a case that failed has no step, and stays
+    lines = [
+        "| scene | body | method | " + " | ".join(SUMMARY_HEADS) + " |",
+        "|---|---|---|" + "---|" * len(SUMMARY_HEADS),
+    ]
+    for row in rows.to_dict("records"):
+        cells = [_cell(row, name) for name in SUMMARY_COLUMNS]
+        lines.append(f"| {row['scene']} | {row['body']} | {row['method']} | " + " | ".join(cells) + " |")
+    if any(DOUBT_MARK in line for line in lines):
+        lines += ["", f"{DOUBT_MARK} the reference is not ten times better than this error"]
+    return "\n".join(lines)
+
+
+DOUBT_MARK = "†"
+SUMMARY_METRICS = ("volume_worst", "force_end", "interior_error", "mean_error", "silhouette_error", "min_j")
+SUMMARY_COLUMNS = (
+    "volume_worst [%]",
+    "force_end [%]",
+    "interior_error [%]",
+    "mean_error [%]",
+    "silhouette_error [%]",
+    "min_j [1]",
+)
+SUMMARY_HEADS = (
+    "worst \\|V/V0 − 1\\| [%]",
+    "force [%]",
+    "interior rel. L2 [%]",
+    "surface mean / max u [%]",
+    "silhouette / size [%]",
+    "min J",
+)
+
+
+def _cell(row: Mapping[Hashable, Any], column: str) -> str:
+    """A value with the uncertainty of its reference, or a dash."""
+    value = float(row[column])
+    if value != value:
+        return "–"
+    if column.startswith("min_j"):
+        return f"{value:.2f}"
+    if column.startswith("volume"):
+        return f"{value:.2g}"
+    floor = float(row.get(column.replace(" [", " floor ["), float("nan")))
+    sign = "+" if column.startswith("force") else ""
+    if not floor > 0:
+        return f"{value:{sign}.3g}"
+    digits = max(0, -math.floor(math.log10(floor)))  # as many as the uncertainty has
+    mark = f" {DOUBT_MARK}" if column.split(" [")[0] in str(row.get(DOUBTFUL, "")).split() else ""
+    return f"{value:{sign}.{digits}f} ± {floor:.{digits}f}{mark}".replace("-", "−")
+
+
+def write_readme(readme: Path, summary: str) -> None:
+    """Replaces what stands between the marks in README.md. Raises StudyError when the marks are missing."""
+    if not readme.is_file():
+        raise StudyError(f"there is no file {readme} to put the table into; run the command where it lies")
+    text = readme.read_text(encoding="utf-8")
+    if BEGIN not in text or END not in text:
+        raise StudyError(f"{readme} has no lines '{BEGIN}' and '{END}' to put the table between")
+    head, rest = text.split(BEGIN, 1)
+    tail = rest.split(END, 1)[1]
+    write_whole(readme, f"{head}{BEGIN}\n{summary.strip()}\n{END}{tail}".encode())

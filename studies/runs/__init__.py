@@ -1,0 +1,1 @@
+"""A case: described, prepared, run and judged."""

@@ -1,0 +1,241 @@
+"""A case: scene × body recipe × method × time step, and its form as JSON, under which it is stored and found again."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
+from typing import Any, Literal
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
+
+from massspring import METHODS, ImplicitVolume, Method
+from massspring.run.history import EXTRA
+from studies.base.errors import StudyError
+from studies.base.lookup import choose
+from studies.scene.scene import Scene
+
+Seconds = float | Literal["auto"]
+
+
+@dataclass(frozen=True)
+class BodyRecipe:
+    """How the mass-spring body is made from the scene's organ."""
+
+    kind: Literal["tetrahedral", "surface", "membrane"] = "tetrahedral"
+    """"surface": the paper's (JHC05); "tetrahedral": springs on the edges of the filled mesh; "membrane": the outer
+    surface of a hollow organ as a thin wall round its content."""
+    nodes: int = 550
+    """Surface nodes."""
+    law: Literal["van_gelder", "uniform", "lloyd", "lloyd_matched", "cotangent", "delingette"] = "van_gelder"
+    """Stiffness law of a tetrahedral body or a membrane; "lloyd" as published, the others match the tissue's shear
+    modulus. "cotangent", springs without length, needs nodal volumes; a membrane takes "delingette" or "lloyd"."""
+    stiffness: float = 1.0
+    """Factor on every spring; 1 matches the tissue's shear modulus."""
+    volumes: Literal["scene", "whole", "regions", "nodal"] = "scene"
+    """Which volumes are kept. "scene": those that physics keeps apart, the wall and a closed lumen of a hollow organ;
+    "whole": one, enclosed by the outer surface, as in the paper; "regions": `regions` parts; "nodal": one per node."""
+    regions: int = 32
+    """How many, where volumes is "regions"."""
+    axis: Literal["straight", "centre_line"] = "straight"
+    """Of a surface body: "centre_line" follows a bent organ."""
+    weights: tuple[float, float, float, float] | None = None
+    """Of a surface body: relative stiffness of structural, bending, inner and axial springs; None for 1, ½, ½, 1."""
+
+    @property
+    def series(self) -> str:
+        """What sets it apart in charts and tables: its kind, and the volumes it keeps where that was chosen."""
+        chosen = {
+            "scene": "",
+            "whole": ", one volume",
+            "regions": f", {self.regions} volumes",
+            "nodal": ", nodal volumes",
+        }
+        return self.kind + chosen[self.volumes]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One point of a study."""
+
+    scene: Scene
+    body: BodyRecipe = field(default_factory=BodyRecipe)
+    method: Method = field(default_factory=ImplicitVolume)
+    dt: Seconds = "auto"
+    """Time step [s], or "auto": `dt_fraction` of the stability limit."""
+    dt_fraction: float = 0.5
+    frames: int | None = None
+    """Instead of the scene's number of frames; the duration stays."""
+    beyond_limit: bool = False
+    """Whether a step above the stability limit is wanted; it is refused otherwise."""
+    precision: Literal["float64", "float32"] = "float64"
+    """Of the mass-spring state."""
+    recorded: tuple[str, ...] = ()
+    """Fields beside those that metrics read: of `massspring.run.history.EXTRA`, the energies."""
+    timed: bool = False
+    """Whether frame times are measured by the timing protocol."""
+
+    def __post_init__(self) -> None:
+        if self.dt != "auto" and not _positive(self.dt):
+            raise StudyError(
+                f"dt is {self.dt!r} s; it must be positive, or 'auto' for a fraction of the stability limit"
+            )
+        if not _positive(self.dt_fraction):
+            raise StudyError(
+                f"dt_fraction is {self.dt_fraction!r}; it must be positive, 1 is the stability limit itself"
+            )
+        if self.frames is not None and (type(self.frames) is not int or self.frames < 1):
+            raise StudyError(f"frames is {self.frames!r}; give a whole number from 1 on, or None for the scene's own")
+        if self.precision not in ("float64", "float32"):
+            raise StudyError(f"the precision is '{self.precision}'; choose float64 or float32")
+        unknown = sorted(set(self.recorded) - set(EXTRA))
+        if unknown:
+            raise StudyError(f"no extra field is called '{unknown[0]}'; there are {', '.join(EXTRA)}")
+
+    @property
+    def name(self) -> str:
+        """Readable; unique within a study together with the hash of the whole case."""
+        step = f"dt{self.dt_fraction:g}" if self.dt == "auto" else f"dt{1e3 * float(self.dt):.4g}ms"
+        parts = [self.scene.name, self.body.kind, str(self.body.nodes), self.method.name, step]
+        if self.body.kind != "surface" and self.body.law != "van_gelder":
+            parts.append(self.body.law)
+        if self.body.volumes != "scene":
+            parts.append(f"{self.body.regions}regions" if self.body.volumes == "regions" else self.body.volumes)
+        if self.body.axis != "straight":
+            parts.append(self.body.axis)
+        if self.body.stiffness != 1.0:
+            parts.append(f"k{self.body.stiffness:g}")
+        if self.precision != "float64":
+            parts.append(self.precision)
+        if self.body.weights is not None:
+            parts.append("w" + "_".join(f"{weight:g}" for weight in self.body.weights))
+        parts += _settings(self.method)
+        return "-".join(parts)
+
+    @property
+    def method_words(self) -> str:
+        """The method and its chosen settings: "element bulk_modulus1e+06 hard"."""
+        return " ".join([self.method.name, *_settings(self.method)])
+
+    @property
+    def key(self) -> str:
+        """Canonical JSON; equal text means equal case."""
+        return json.dumps(case_to_dict(self), sort_keys=True, ensure_ascii=False)
+
+    def replaced(self, **changes: Any) -> "Case":
+        """A copy with some fields changed."""
+        return replace(self, **changes)
+
+
+def chosen_settings(method: Method) -> dict[str, Any]:
+    """The settings of a method that are not its defaults, by name."""
+    usual = asdict(type(method)())  # pyright: ignore[reportArgumentType]
+    return {name: value for name, value in asdict(method).items() if value != usual[name]}  # pyright: ignore[reportArgumentType]
+
+
+def _settings(method: Method) -> list[str]:
+    """The chosen settings as words of a name: "hard", "iterations2", "whole"."""
+    words = []
+    for name, value in chosen_settings(method).items():
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        words.append(f"{name}{value:g}" if number else name if value is True else str(value))
+    return words
+
+
+def case_to_dict(case: Case) -> dict[str, Any]:
+    """JSON-able form, without `timed`: measuring time changes no physics; `precision` and `recorded` where chosen."""
+    chosen: dict[str, Any] = {} if case.precision == "float64" else {"precision": case.precision}
+    if case.recorded:
+        chosen["recorded"] = list(case.recorded)
+    return {
+        "scene": _scene_adapter().dump_python(case.scene, mode="json"),
+        "body": _recipe_to_dict(case.body),
+        "method": {"name": case.method.name, "settings": asdict(case.method)},  # pyright: ignore[reportArgumentType]
+        "dt": case.dt,
+        "dt_fraction": case.dt_fraction,
+        "frames": case.frames,
+        "beyond_limit": case.beyond_limit,
+        **chosen,
+    }
+
+
+def _recipe_to_dict(recipe: BodyRecipe) -> dict[str, Any]:
+    """JSON-able form; without weights where none are chosen, so that records from before they could be stay current."""
+    fields = asdict(recipe)
+    if recipe.weights is None:
+        del fields["weights"]
+    return fields
+
+
+def case_from_json(text: str) -> Case:
+    """The case of which `text` is the key. Raises StudyError when it is none."""
+    try:
+        data = json.loads(text)
+        case = Case(
+            scene=scene_from_dict(data["scene"]),
+            body=_strict(BodyRecipe).validate_python(data["body"]),
+            method=method_from_dict(data["method"]),
+            dt=data["dt"],
+            dt_fraction=data["dt_fraction"],
+            frames=data["frames"],
+            beyond_limit=data["beyond_limit"],
+            precision=data.get("precision", "float64"),
+            recorded=tuple(data.get("recorded", ())),
+        )
+    except (json.JSONDecodeError, KeyError, TypeError, ValidationError) as error:
+        raise StudyError(f"the text is no stored case: {_first_line(error)}") from error
+    unread = _unread(data, case_to_dict(case))
+    if unread:
+        raise StudyError(f"the text is no stored case: nothing reads {', '.join(unread)}; correct or remove it")
+    return case
+
+
+def method_from_dict(data: Mapping[str, Any]) -> Method:
+    """The method of {"name": …, "settings": {…}}; a setting that no one reads is an error. Raises StudyError."""
+    kind = choose(data["name"], {method.name: method for method in METHODS}, "method")
+    unknown = set(data["settings"]) - set(kind.__dataclass_fields__)  # pyright: ignore[reportAttributeAccessIssue]
+    if unknown:
+        raise StudyError(f"method '{kind.name}' has no setting {', '.join(sorted(unknown))}")
+    return _strict(kind).validate_python(dict(data["settings"]))
+
+
+def scene_to_json(scene: Scene) -> str:
+    """Canonical JSON of a scene."""
+    return json.dumps(_scene_adapter().dump_python(scene, mode="json"), sort_keys=True, ensure_ascii=False)
+
+
+def scene_from_dict(data: Mapping[str, Any]) -> Scene:
+    """The scene of a JSON-able form; pydantic checks every type."""
+    return _scene_adapter().validate_python(data)
+
+
+@cache
+def _scene_adapter() -> TypeAdapter[Scene]:
+    return TypeAdapter(Scene)
+
+
+@cache
+def _strict(kind: type) -> TypeAdapter[Any]:
+    return TypeAdapter(with_config(ConfigDict(extra="forbid"))(kind))
+
+
+def _unread(given: Any, understood: Any, where: str = "") -> list[str]:
+    """Names of the settings in `given` that did not arrive in `understood`."""
+    if isinstance(given, dict) and isinstance(understood, dict):
+        names = [(f"{where}.{name}" if where else name, name) for name in given]
+        lost = [path for path, name in names if name not in understood]
+        return lost + [
+            u for path, name in names if name in understood for u in _unread(given[name], understood[name], path)
+        ]
+    if isinstance(given, list) and isinstance(understood, list):
+        pairs = enumerate(zip(given, understood, strict=False))
+        return [u for number, (g, known) in pairs for u in _unread(g, known, f"{where}[{number}]")]
+    return []
+
+
+def _positive(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0 < value < math.inf
+
+
+def _first_line(error: Exception) -> str:
+    return " ".join(str(error).split("\n")[:3])

@@ -1,0 +1,172 @@
+"""From a scene to the mass-spring solver: the mesh, the body, the set-up of a run."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from massspring import (
+    Attachment,
+    Body,
+    Material,
+    Ramp,
+    Setup,
+    StepLimit,
+    make_clock,
+    membrane_body,
+    step_limit,
+    surface_body,
+    tetrahedral_body,
+)
+from massspring.body.membranes import MEMBRANE_LAWS
+from massspring.body.volumes import Volumes
+from studies.base.errors import DoesNotApply, StudyError
+from studies.base.lookup import choose
+from studies.geometry import OrganMesh, fill, organ, read_mesh, scan
+from studies.geometry.mesh.organ_mesh import triangle_areas
+from studies.geometry.organs import SHAPES
+from studies.runs.case import BodyRecipe, Case
+from studies.scene.scene import Scene
+
+LUMEN, WHOLE = "lumen", "whole"
+
+FILE_PARAMETERS = ("path", "unit", "remesh", "smooth", "wall")
+"""Of the organ "file"."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """All that a run needs, and what a report says about it."""
+
+    mesh: OrganMesh
+    setup: Setup
+    limit: StepLimit
+
+
+def mesh_for(scene: Scene, nodes: int, filled: bool = True) -> OrganMesh:
+    """The scene's organ with `nodes` surface nodes. Raises StudyError.
+
+    A mesh file comes as it is, unless its parameters ask for a new surface: "remesh": true, or "smooth" or "wall" [m].
+    """
+    if choose(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
+        return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters)
+    parameters = scene.organ.parameters
+    if "path" not in parameters or "unit" not in parameters:
+        raise StudyError(
+            f"scene '{scene.name}': an organ from a file needs a path and a unit, it has {dict(parameters)}"
+        )
+    for key in parameters:
+        choose(key, FILE_PARAMETERS, "parameter of an organ from a file")
+    asked = {key: parameters[key] for key in ("smooth", "wall") if key in parameters}
+    if asked or parameters.get("remesh"):
+        return scan(parameters["path"], nodes, unit=parameters["unit"], fill=filled, **asked)
+    mesh = read_mesh(parameters["path"], unit=parameters["unit"])
+    return fill(mesh) if filled and not len(mesh.tetrahedra) else mesh
+
+
+def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh) -> Body:
+    """The mass-spring body of the scene's tissue on a mesh. Raises StudyError or MassSpringError."""
+    if not recipe.stiffness > 0:
+        raise StudyError(f"the stiffness factor is {recipe.stiffness}; it must be positive")
+    material = Material(scene.tissue.shear_modulus, scene.tissue.density)
+    outside = mesh.outer() if mesh.hollow else mesh
+    if recipe.kind == "membrane":
+        body = wall_for(scene, recipe, mesh, material)
+    elif recipe.kind == "surface":
+        body = surface_body(
+            outside.points[: outside.outer_count], outside.triangles, material, recipe.axis, recipe.weights
+        )
+    else:
+        body = tetrahedral_body(mesh.points, mesh.triangles, mesh.tetrahedra, material, recipe.law)
+    if recipe.stiffness != 1.0:
+        body = body.stiffened(recipe.stiffness)
+    volumes = volumes_for(scene, recipe, mesh, body)
+    return body if volumes is None else body.keeping(volumes)
+
+
+def wall_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, material: Material) -> Body:
+    """A hollow organ as a membrane on its outer surface, as thick as its wall is in the mean. Raises StudyError."""
+    if not mesh.hollow:
+        raise StudyError(f"scene '{scene.name}' has a solid organ; a membrane is for the wall of a hollow one")
+    if recipe.law not in MEMBRANE_LAWS:
+        raise StudyError(f"law '{recipe.law}' is not for membranes; choose {' or '.join(MEMBRANE_LAWS)}")
+    outside = mesh.outer()
+    thickness = mesh.volume / triangle_areas(outside.points, outside.triangles).sum()
+    # What fills the organ weighs as much as tissue, as in a surface body.
+    content = material.density * (1.0 - mesh.volume / mesh.outer_volume)
+    return membrane_body(outside.points, outside.triangles, float(thickness), material, recipe.law, content)
+
+
+def volumes_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, body: Body) -> Volumes | None:
+    """The volumes a recipe asks for; None for the tissue as a whole. Raises MassSpringError for what a body has not."""
+    surfaces = {}
+    if recipe.kind == "tetrahedral" and mesh.hollow and scene.filled:
+        if recipe.volumes == "whole":
+            return Volumes.closed_surfaces(body, {WHOLE: mesh.outer_triangles})
+        if recipe.volumes == "scene":
+            return Volumes.closed_surfaces(body, {"wall": mesh.triangles, LUMEN: mesh.lumen_triangles})
+        surfaces = {LUMEN: mesh.lumen_triangles}
+    if recipe.volumes in ("scene", "whole"):
+        return None
+    tissue = Volumes.nodal(body) if recipe.volumes == "nodal" else Volumes.regions(body, recipe.regions)
+    return tissue.joined(Volumes.closed_surfaces(body, surfaces)) if surfaces else tissue
+
+
+def targets_for(scene: Scene, mesh: OrganMesh, body: Body) -> dict[str, Ramp]:
+    """How the kept volumes change when the lumen is filled."""
+    if scene.lumen is None or set(scene.lumen.filling.values) == {1.0}:
+        return {}
+    filling = scene.lumen.filling
+    if LUMEN in body.kept.names:
+        return {LUMEN: filling}
+    # One volume for wall and content grows by what the content grows.
+    share = mesh.lumen_volume / (mesh.lumen_volume + mesh.volume)
+    return {body.kept.names[0]: Ramp(filling.times, tuple(1.0 + share * (f - 1.0) for f in filling.values))}
+
+
+def attachments_for(scene: Scene, mesh: OrganMesh) -> tuple[Attachment, ...]:
+    """The nodes of each held region, found by geometry."""
+    return tuple(Attachment(patch_nodes(mesh, held.name, held.region), held.path) for held in scene.held)
+
+
+def patch_nodes(mesh: OrganMesh, name: str, region: object) -> np.ndarray:
+    """Surface nodes of a patch: as the mesher outlined it, or for a mesh from a file those inside the region."""
+    if name in mesh.patches:
+        return mesh.patches[name]
+    return np.flatnonzero(region.level(mesh.points[: mesh.surface_count]) <= 0)  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def prepare(case: Case) -> Prepared:
+    """Mesh, body, clock, surroundings of a case. Raises StudyError, MassSpringError."""
+    scene = case.scene
+    reason = scene.skip(case.method)
+    if reason is not None:
+        raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
+    # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.
+    mesh = mesh_for(scene, case.body.nodes, filled=case.body.kind == "tetrahedral" or scene.lumen is not None)
+    body = body_for(scene, case.body, mesh)
+    reason = case.method.applies(body)
+    if reason is not None:
+        raise DoesNotApply(f"method '{case.method.name}' does not apply to the {case.body.kind} body: {reason}")
+    targets = targets_for(scene, mesh, body)
+    if case.body.kind != "tetrahedral" and mesh.hollow:
+        mesh = mesh.outer()
+    attachments = attachments_for(scene, mesh)
+    held = np.concatenate([a.nodes for a in attachments]) if attachments else None
+    limit = step_limit(body, scene.damping, held, case.method.added_stiffness(body))
+    dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
+    beyond = case.beyond_limit or not case.method.limited
+    clock = make_clock(scene.duration, case.frames or scene.frames, dt, limit, beyond)
+    setup = Setup(
+        body,
+        case.method,
+        clock,
+        scene.obstacles,
+        attachments,
+        scene.gravity,
+        scene.damping,
+        targets=targets,
+        velocity=scene.start and scene.start.velocities(body.rest),
+        positions=scene.start.positions(body.rest) if scene.start and scene.start.shaped else None,
+        precision=case.precision,
+    )
+    return Prepared(mesh, setup, limit)

@@ -1,0 +1,175 @@
+"""One case: prepared, simulated, judged, stored. Whatever happens is a result; only a full disk is not."""
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from massspring import History, MassSpringError, simulate
+from studies.base.errors import DoesNotApply, StudyError
+from studies.runs.case import Case, case_from_json
+from studies.runs.prepare import LUMEN, Prepared, prepare
+from studies.store.fingerprint import source_fingerprint
+from studies.store.new_record import new_record
+from studies.store.paths import record_path
+from studies.store.record import Field, Record, Status, is_current, read_record, write_record
+
+DRIFT = 0.01
+"""A method that keeps the volume and is this far from it has drifted: thirty times what the worst claims allow."""
+TIME_LIMIT = 600.0
+"""Wall time after which a run is given up [s]: ten times the longest case of the catalogue."""
+
+
+def run_fingerprint() -> str:
+    """Hash of all code that a run depends on; the scene itself is part of the case."""
+    return source_fingerprint("massspring", "studies.geometry", "studies.runs.prepare", "studies.runs.run")
+
+
+def case_path(root: Path, study: str, case: Case) -> Path:
+    """Where the record of a case lies."""
+    return record_path(root, study, case.name, case.key)
+
+
+def case_is_current(root: Path, study: str, case: Case) -> bool:
+    """Whether it is there, from this code."""
+    return is_current(case_path(root, study, case), case.key, run_fingerprint())
+
+
+def run_case(root: Path, study: str, case: Case, on_frame: Callable[[int], object] | None = None) -> Path:
+    """Runs a case and stores what came of it, a failure too. Raises StudyError only when it cannot be stored."""
+    path = case_path(root, study, case)
+    write_record(path, measure(case, on_frame))
+    return path
+
+
+def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Record:
+    """The record of a case; what preparing it warned of is its attribute `warnings`."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        try:
+            prepared = prepare(case)
+            # Attachments that overlap, or hold no node, show only when the run starts.
+            history = simulate(prepared.setup, checkpoint_frames(case, prepared), on_frame, TIME_LIMIT, case.recorded)
+        except DoesNotApply as reason:
+            return _record(case, Status.SKIPPED, str(reason), {"warnings": _said(caught)}, {})
+        except (StudyError, MassSpringError) as error:
+            return _record(case, Status.FAILED, str(error), {"warnings": _said(caught)}, {})
+    status, message = judge(case, prepared, history)
+    attributes = {**_attributes(prepared, history), "warnings": _said(caught)}
+    return _record(case, status, message, attributes, _fields(case, prepared, history))
+
+
+def _said(caught: list[warnings.WarningMessage]) -> str:
+    return "; ".join(dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, UserWarning)))
+
+
+def checkpoint_frames(case: Case, prepared: Prepared) -> list[int]:
+    """Numbers (1 … F) of the frames that end at the scene's checkpoints."""
+    clock = prepared.setup.clock
+    return [min(clock.frames, max(1, round(t / clock.frame))) for t in case.scene.checkpoints]
+
+
+def judge(case: Case, prepared: Prepared, history: History) -> tuple[Status, str]:
+    """How the run ended, and in a sentence why."""
+    if history.outcome != "finished":
+        return Status(history.outcome), history.message
+    smallest = float(history.min_j[-1])
+    if smallest <= 0:
+        return Status.INVERTED, f"a tetrahedron ends inside out (smallest volume ratio {smallest:.3g})"
+    # A body that starts with a wrong volume is judged by the one it ends with.
+    since = 0 if case.scene.start is None else -1
+    drift = float(np.max(np.abs(history.volume[since:] / history.volume_target[since:] - 1)))
+    if case.method.volume_tol is not None and drift > DRIFT:
+        return (
+            Status.DRIFTED,
+            f"the volume was off by {100 * drift:.3g} %, a kept volume may be off by {100 * DRIFT:g} %",
+        )
+    return Status.OK, ""
+
+
+def _record(case: Case, status: Status, message: str, attributes: dict, fields: dict[str, Field]) -> Record:
+    return new_record(
+        kind="run",
+        key=case.key,
+        name=case.name,
+        status=status,
+        message=message,
+        fingerprint=run_fingerprint(),
+        attributes=attributes,
+        fields=fields,
+    )
+
+
+def _attributes(prepared: Prepared, history: History) -> dict[str, float | int | str]:
+    setup, clock = prepared.setup, prepared.setup.clock
+    return {
+        "rest_volume": setup.body.volume,
+        "dt": clock.dt,
+        "dt_limit": prepared.limit.damped,
+        "steps": clock.steps,
+        "frame": clock.frame,
+        "frames": clock.frames,
+        "good_frames": history.good_frames,
+        "nodes": setup.body.node_count,
+        "springs": setup.body.springs.count,
+        "triangles": len(setup.body.triangles),
+        "law": setup.body.law,
+        "skipped_steps": history.skipped_steps,
+        "capped_steps": history.capped_steps,
+        "volumes": setup.body.kept.count,
+        "lumen_column": setup.body.kept.names.index(LUMEN) if LUMEN in setup.body.kept.names else -1,
+    }
+
+
+def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field]:
+    body = prepared.setup.body
+    energies = {
+        "kinetic": Field(history.kinetic, "J", "kinetic energy"),
+        "elastic": Field(history.elastic, "J", "energy of the springs"),
+    }
+    return {
+        **{name: energies[name] for name in case.recorded},
+        "t": Field(history.t, "s", "end of each frame"),
+        "volume": Field(history.volume, "m^3", "enclosed volume, one column per kept volume"),
+        "volume_target": Field(history.volume_target, "m^3", "what each kept volume should be"),
+        "pressure": Field(history.pressure, "Pa", "multiplier of each kept volume in the last step of the frame"),
+        "contact_force": Field(history.contact_force, "N", "force of each obstacle on the body, mean of the frame"),
+        "penetration": Field(history.penetration, "m", "depth of the deepest surface node in each obstacle"),
+        "held_force": Field(history.held_force, "N", "force of each held region on the body, mean of the frame"),
+        "iterations": Field(history.iterations, "1", "for the multipliers: sum of the frame, most in a step"),
+        "min_j": Field(history.min_j, "1", "smallest tetrahedron volume ratio; NaN without tetrahedra"),
+        "snapshot_frame": Field(
+            history.snapshot_frames, "1", "number of the frame after which each snapshot was taken"
+        ),
+        "snapshots": Field(history.snapshots, "m", "positions at the scene's checkpoints"),
+        "rest": Field(body.rest, "m", "rest positions"),
+        "mass": Field(body.mass, "kg", "mass of each node"),
+        "triangles": Field(body.triangles, "1", "nodes of each surface triangle, outward"),
+        "tetrahedra": Field(body.tetrahedra, "1", "nodes of each tetrahedron"),
+    }
+
+
+def replay(path: Path) -> tuple[Record, Record, str | None]:
+    """Runs the case stored in `path` again: (stored, new, how they differ or None when every value is equal)."""
+    stored = read_record(path)
+    if stored.kind != "run":
+        raise StudyError(f"{path} holds a {stored.kind}, only a run can be replayed")
+    new = measure(case_from_json(stored.key))
+    return stored, new, _difference(stored, new)
+
+
+def _difference(stored: Record, new: Record) -> str | None:
+    if stored.status != new.status:
+        return f"it was {stored.status}, now it is {new.status}: {new.message}"
+    odd = set(stored.fields) ^ set(new.fields)
+    if odd:
+        return f"'{min(odd)}' is {'not stored' if min(odd) in new.fields else 'no longer computed'}"
+    for name, field in stored.fields.items():
+        if new.fields[name].values.shape != field.values.shape:
+            return f"'{name}' has another shape"
+        if not np.array_equal(field.values, new.fields[name].values, equal_nan=field.values.dtype.kind == "f"):
+            # As numbers with a sign: indices are stored without one.
+            gap = float(np.nanmax(np.abs(field.values - new.fields[name].values.astype(float))))
+            return f"'{name}' differs by up to {gap:.3g} {field.unit}"
+    return None

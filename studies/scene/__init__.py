@@ -1,0 +1,1 @@
+"""What a scene is made of: organ, tissue, loads, clock, quantities."""

@@ -1,0 +1,240 @@
+"""A scene: what happens to which organ. Both solvers read the same one: load, contact and clock agree."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from massspring import Method, Obstacle, Path, Ramp
+from studies.base.errors import StudyError
+from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace
+from studies.geometry.shape.levelset import Probe, Shape
+
+Region = HalfSpace | BallRegion | EllipsoidRegion
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Tissue:
+    """Nearly incompressible soft tissue; the mass-spring body matches mu, its volume constraint stands for kappa."""
+
+    shear_modulus: float
+    """mu [Pa]."""
+    density: float
+    """rho [kg/m³]."""
+    source: str
+    """Where the numbers come from."""
+    bulk_over_shear: float = 5000.0
+    """kappa/mu of the reference [1]."""
+
+
+@dataclass(frozen=True)
+class Organ:
+    """A shape the mesher knows, or a mesh file."""
+
+    shape: str
+    """A name of `studies.geometry`, or "file"."""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    """Of the shape; for "file": {"path": …, "unit": "m" or "mm"}, and "remesh": true, "smooth" or "wall" [m] for a new
+    surface with the nodes that are asked for."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """A region whose surface nodes follow a path."""
+
+    name: str
+    region: Region
+    path: Path = field(default_factory=Path)
+
+
+@dataclass(frozen=True)
+class Lumen:
+    """What fills a hollow organ."""
+
+    content: str = "closed"
+    """"closed": an incompressible content, its volume prescribed; "open": drained, without pressure."""
+    filling: Ramp = field(default_factory=Ramp)
+    """Volume of a closed lumen over time, as a factor of its volume at rest."""
+
+    def __post_init__(self) -> None:
+        if self.content not in ("closed", "open"):
+            raise StudyError(f"a lumen's content is 'closed' or 'open', not '{self.content}'")
+        if self.content == "open" and set(self.filling.values) != {1.0}:
+            raise StudyError("an open lumen cannot be filled; close it, or leave its filling out")
+
+
+@dataclass(frozen=True)
+class Probed:
+    """The force a scene is about: what an obstacle, or an attachment, feels of the body."""
+
+    what: str
+    """"obstacle" or "held"."""
+    number: int
+    direction: Vector
+    """Unit vector of the force on the body, so that a press counts as positive."""
+
+    def __post_init__(self) -> None:
+        if self.what not in ("obstacle", "held"):
+            raise StudyError(f"a force is probed at an 'obstacle' or a 'held' region, not at '{self.what}'")
+
+
+@dataclass(frozen=True)
+class Start:
+    """How a body starts that is not at rest. A shape is for the mass-spring solver alone, a speed for both."""
+
+    matrix: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    """Linear map of the rest positions about the middle of their box [1], row by row."""
+    scatter: float = 0.0
+    """How far every node is thrown from there, evenly in a cube: over half the longest side of the box [1]."""
+
+    speed: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    """Linear map from rest positions about the origin to velocities [1/s], row by row; without trace, or it asks an
+    incompressible body to swell."""
+
+    def velocities(self, rest: np.ndarray) -> np.ndarray | None:
+        """(n, 3) [m/s]; None where all is still."""
+        return rest @ np.asarray(self.speed).T if np.any(self.speed) else None
+
+    @property
+    def shaped(self) -> bool:
+        """Whether it begins in another shape than that at rest."""
+        return self.scatter != 0.0 or not np.array_equal(self.matrix, np.eye(3))
+
+    def positions(self, rest: np.ndarray) -> np.ndarray:
+        """(n, 3) [m]; the same nodes are always thrown to the same places."""
+        low, high = rest.min(axis=0), rest.max(axis=0)
+        thrown = np.random.default_rng(0).uniform(-1.0, 1.0, rest.shape) * 0.5 * (high - low).max()
+        middle = 0.5 * (low + high)
+        return middle + (rest - middle) @ np.asarray(self.matrix).T + self.scatter * thrown
+
+
+@dataclass(frozen=True)
+class ReferencePlan:
+    """The family of meshes the reference is computed on, coarse to fine; the last one is the reference."""
+
+    mesh: str
+    """"solid": the scene's organ with so many surface nodes; "octant": an eighth of a ball (three symmetry planes)."""
+    levels: tuple[float, ...]
+    """Surface nodes ("solid"), or element size over radius away from the contact ("octant"); three are the rule."""
+    variants: tuple[str, ...] = ("steps", "contact", "kappa")
+    """Settings that are made better on the coarsest mesh, for their share of the error bar."""
+    at_outlines: int = 0
+    """Times the elements at the outlines of held regions are halved; three halve their size."""
+    at_contact: int = 0
+    """Times the elements at the surface that an obstacle will reach are halved."""
+
+    dt: float | None = None
+    """Largest time step of a motion [s]; None: a load path without inertia, as slow as it takes."""
+
+    def __post_init__(self) -> None:
+        if self.mesh not in ("solid", "octant") or len(self.levels) < 2:
+            raise StudyError(
+                "a reference needs a 'solid' or 'octant' mesh and at least two levels, or it has no error bar"
+            )
+        if self.dt is not None and not 0.0 < self.dt < np.inf:
+            raise StudyError(f"a reference plan has dt = {self.dt} s; give a positive time step, or None for no motion")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Load, clock and material; immutable and JSON-able."""
+
+    name: str
+    title: str
+    organ: Organ
+    tissue: Tissue
+    duration: float
+    """[s]."""
+    frames: int
+    checkpoints: tuple[float, ...]
+    """Times at which the reference is known [s], ascending; the last one is the scene at its deepest, come to rest."""
+    probed: Probed
+    reference: ReferencePlan | None
+    obstacles: tuple[Obstacle, ...] = ()
+    held: tuple[Held, ...] = ()
+    lumen: Lumen | None = None
+    """Of a hollow organ; None for a solid one."""
+    gravity: Vector = (0.0, 0.0, 0.0)
+    """[m/s²]."""
+    damping: float = 0.0
+    """Mass-proportional [1/s]; both models have the same."""
+    quantities: tuple[str, ...] = ("force", "surface", "interior", "silhouette", "volume")
+    """What may be compared; a scene that leaves a rigid turn free drops "surface" and "interior" (gauge freedom)."""
+    start: Start | None = None
+    """None: at rest."""
+    not_for: tuple[tuple[str, str], ...] = ()
+    """(method, reason): combinations that make no sense."""
+
+    def skip(self, method: Method) -> str | None:
+        """Why `method` does not apply here; None when it does."""
+        return dict(self.not_for).get(method.name)
+
+    @property
+    def regions(self) -> dict[str, Region]:
+        """Attachment regions by name, as the mesher wants them."""
+        return {held.name: held.region for held in self.held}
+
+    @property
+    def filled(self) -> bool:
+        """Whether a lumen's content pushes back."""
+        return self.lumen is not None and self.lumen.content == "closed"
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the reference is an octant, mirrored at the three coordinate planes."""
+        return self.reference is not None and self.reference.mesh == "octant"
+
+    def probe(self, contact_force: np.ndarray, held_force: np.ndarray) -> np.ndarray:
+        """The probed force [N], (…,), of forces on the body (…, o, 3) and (…, g, 3): positive for a press."""
+        force = contact_force if self.probed.what == "obstacle" else held_force
+        return force[..., self.probed.number, :] @ np.asarray(self.probed.direction)
+
+
+ALWAYS = ("volume",)
+"""Quantities with a truth of their own: a volume is compared with the body's own rest volume."""
+GAUGE_FREE = ("pressure", "lumen")
+"""Quantities that every scene at rest allows: a rigid turn does not change them."""
+
+
+def allowed(scene: Scene, quantity: str) -> bool:
+    """Whether the scene says that a quantity of its reference may be compared."""
+    word = quantity.split("_")[0]
+    if word == "lumen" and not scene.filled:
+        return False
+    moves = scene.reference is not None and scene.reference.dt is not None
+    return word in ALWAYS or word in scene.quantities or (word in GAUGE_FREE and not moves)
+
+
+KIDNEY = Tissue(4900.0, 1050.0, "kidney, MR elastography at 45 Hz: 4.9 ± 0.5 kPa; density about 1,050 kg/m³")
+SPLEEN = Tissue(
+    3600.0, 1060.0, "spleen, MR elastography at 60 Hz: 3.6 ± 0.3 kPa (Talwalkar et al. 2009); density as liver"
+)
+STOMACH = Tissue(640.0, 1058.0, "stomach wall, MR elastography: 0.64 kPa; wall tests at large stretch are far stiffer")
+BLADDER = Tissue(10_000.0, 1040.0, "bladder wall, assumed: published moduli span a decade; the pressure scales with mu")
+LIVER = Tissue(1800.0, 1060.0, "liver, MR elastography: 1.8 ± 0.4 kPa; density 1,060 kg/m³")
+
+
+def press_times(start: float, end: float, steps: int, rest: float) -> tuple[float, ...]:
+    """`steps` evenly spaced times up to the end of a press [s], the last moved to `rest`, when all is still."""
+    times = np.linspace(start, end, steps + 1)[1:]
+    return (*times[:-1].tolist(), rest)
+
+
+def probe_of(shape: Shape) -> Probe:
+    """Where the shape is palpated. Raises StudyError for a shape that does not say."""
+    if shape.probe is None:
+        raise StudyError(f"the shape '{shape.name}' names no probe point; give it one, or choose another organ")
+    return shape.probe
+
+
+def scaled(direction: Vector, length: float) -> Vector:
+    """length · direction."""
+    return (length * direction[0], length * direction[1], length * direction[2])
+
+
+def along(point: Vector, direction: Vector, length: float) -> Vector:
+    """point + length · direction."""
+    step = scaled(direction, length)
+    return (point[0] + step[0], point[1] + step[1], point[2] + step[2])

@@ -1,0 +1,1 @@
+"""One file per result, whole or not at all."""

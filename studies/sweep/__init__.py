@@ -1,0 +1,1 @@
+"""Runs what is missing or stale, and reads what is stored."""

@@ -1,0 +1,1 @@
+"""Frame times that can be trusted."""

@@ -1,0 +1,82 @@
+"""Frame times of stored cases in files of their own: re-timing never touches physics (studies.timing.protocol)."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from massspring import Free, simulate
+from studies.base.errors import StudyError
+from studies.runs.case import Case
+from studies.runs.prepare import prepare
+from studies.runs.run import case_path, run_fingerprint
+from studies.store.machine import machine_id
+from studies.store.new_record import new_record
+from studies.store.paths import timing_path
+from studies.store.record import Status, is_current, peek, read_record, write_record
+from studies.timing.protocol import FrameTiming, interleave, pinned
+from studies.timing.stage_cost import ROWS, stage_times
+
+REPEATS = 5
+
+
+def timing_file(root: Path, study: str, case: Case) -> Path:
+    """Where this machine's frame times of a case lie."""
+    return timing_path(case_path(root, study, case), machine_id())
+
+
+def can_be_timed(root: Path, study: str, case: Case) -> bool:
+    """Whether the case ran to its end: a run that broke off has no comparable frames."""
+    path = case_path(root, study, case)
+    return path.exists() and peek(path).status in (Status.OK, Status.INVERTED, Status.DRIFTED)
+
+
+def timing_is_current(root: Path, study: str, case: Case) -> bool:
+    """Whether this machine has timed this case with this code, or never will."""
+    if not can_be_timed(root, study, case):
+        return True
+    return is_current(timing_file(root, study, case), case.key, run_fingerprint())
+
+
+def read_timing(root: Path, study: str, case: Case) -> FrameTiming | None:
+    """This machine's frame times of a case; None where it has none from this code."""
+    path = timing_file(root, study, case)
+    if not is_current(path, case.key, run_fingerprint()):
+        return None
+    record = read_record(path)
+    attributes = record.attributes
+    return FrameTiming(record.fields["frame_ns"].values, attributes["core"], attributes["threads"])
+
+
+def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[[str], None]) -> None:
+    """Times cases alone on one pinned core. Cases that differ by method only take turns, so that their ratio is fair.
+
+    Raises StudyError when a file cannot be written.
+    """
+    groups: dict[str, list[Case]] = {}
+    for case in cases:
+        groups.setdefault(case.replaced(method=Free()).key, []).append(case)
+    with pinned(threads=1) as core:
+        for group in groups.values():
+            setups = {case.key: prepare(case).setup for case in group}
+            contestants = {key: (lambda s=setup: simulate(s).frame_ns) for key, setup in setups.items()}
+            measured = interleave(contestants, REPEATS)
+            for case in group:
+                stage_ns = stage_times(setups[case.key])
+                write_timing(root, study, case, FrameTiming(measured[case.key], core, stage_ns=stage_ns, stages=ROWS))
+                on_case(case.name)
+
+
+def write_timing(root: Path, study: str, case: Case, timing: FrameTiming) -> None:
+    """Stores frame times beside the record of their case."""
+    if not (timing.frame_ns > 0).all():
+        raise StudyError(f"case {case.name} broke off while it was timed; run it again")
+    record = new_record(
+        kind="timing",
+        key=case.key,
+        name=case.name,
+        status=Status.OK,
+        message="",
+        fingerprint=run_fingerprint(),
+        attributes=timing.attributes(),
+        fields=timing.fields(),
+    )
+    write_record(timing_file(root, study, case), record)

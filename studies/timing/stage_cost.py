@@ -1,0 +1,154 @@
+"""What a step of a scene costs, stage by stage, what the scene does not need, and what leaving that out saves.
+
+The stages are those that the frame loop of the method marks (massspring.kernels.jit.stage_clock): real steps of the
+real run, on one pinned core. The same frames without marks are run in turns; what they take beyond is the rest.
+"""
+
+from dataclasses import replace
+from functools import partial
+from time import perf_counter_ns
+
+import numba
+import numpy as np
+import pandas as pd
+
+from massspring import MassSpringError, Setup, State
+from massspring.kernels.jit.stage_clock import INTEGRATION, OUTSIDE, STAGES, Ticks, mark, new_ticks
+from massspring.run.history import EXTRA, Recorder
+from massspring.run.simulation import trouble
+from studies.runs.case import Case
+from studies.runs.prepare import prepare
+from studies.timing.protocol import pinned
+from studies.timing.skips import SKIPS
+
+FRAMES, REPEATS = 100, 5
+DEAR = 5.0
+"""Times the run as it is, from where one with a stage is run once only: that is far from the noise."""
+MARKS = 100_000
+"""Marks in a row, to learn what one costs."""
+CALL = "call of the frame"
+"""From Python into compiled code and back, with the copies that leave the old state as it was."""
+ROWS = (*STAGES, CALL)
+PATHS, RECORDING = "paths of obstacles and targets", "recording"
+ENERGIES = "energies: no metric reads them"
+"""Left out of recording, unless a case asks for them."""
+PLAIN, TICKED = "as it is", "with marks"
+STAGE, SKIPPED, FRAME = "stage", "skipped", "per frame"
+
+
+Run = tuple[np.ndarray, np.ndarray, State]
+"""Time of each frame [ns], (F,); of its ROWS, with what marking cost taken off, (rows, F); the last state."""
+
+
+def run_frames(setup: Setup, state: State, ticks: Ticks | None = None, frames: int | None = None) -> Run:
+    """Runs the first `frames` of a set-up, or all. Raises MassSpringError for a run that breaks off."""
+    state = replace(state, tally=state.tally._replace(ticks=ticks))
+    frames = setup.clock.frames if frames is None else frames
+    frame_ns, stage_ns = np.zeros(frames), np.zeros((len(ROWS), frames))
+    price = mark_ns() if ticks is not None else 0.0
+    for frame in range(frames):
+        drive = setup.drive(frame)
+        if ticks is not None:
+            ticks.spent[:], ticks.marks[:] = 0, 0
+        begin = perf_counter_ns()
+        state = setup.method.advance(state, drive)
+        frame_ns[frame] = perf_counter_ns() - begin
+        if ticks is not None:
+            # A stage of some nanoseconds may seem to cost less than its mark.
+            stage_ns[:OUTSIDE, frame] = np.maximum(ticks.spent[:OUTSIDE] - price * ticks.marks[:OUTSIDE], 0.0)
+            stage_ns[OUTSIDE, frame] = frame_ns[frame] - ticks.spent[:OUTSIDE].sum()
+        reason = trouble(state, setup.body)
+        if reason is not None:
+            raise MassSpringError(f"the run broke off while its cost was measured: {reason}; take a smaller dt")
+    return frame_ns, stage_ns, state
+
+
+def stage_times(setup: Setup) -> np.ndarray:
+    """Time of each of ROWS in each frame [ns], (rows, F); compiled before."""
+    run_frames(setup, setup.start(), new_ticks(), frames=1)
+    return run_frames(setup, setup.start(), new_ticks())[1]
+
+
+@numba.njit
+def _marks(ticks, count):
+    for _ in range(count):
+        mark(ticks, INTEGRATION)
+
+
+def mark_ns() -> float:
+    """What a mark costs [ns]."""
+    ticks = new_ticks()
+    _marks(ticks, 1)
+    begin = perf_counter_ns()
+    _marks(ticks, MARKS)
+    return (perf_counter_ns() - begin) / MARKS
+
+
+def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS) -> pd.DataFrame:
+    """Rows of stages, rest and the whole step [µs per step], skipped stages with what they would cost and how much of
+    them was skipped, and what Python does once per frame, over as many steps.
+
+    Raises StudyError or MassSpringError for a case that cannot run."""
+    setup = prepare(case.replaced(frames=min(frames, case.frames or case.scene.frames))).setup
+    skipped = [skip for skip in SKIPS if skip.applies(setup)]
+    runs = {PLAIN: partial(run_frames, setup, setup.start()), TICKED: partial(_ticked, setup)}
+    runs |= {skip.name: partial(run_frames, *skip.included(setup, setup.start())) for skip in skipped}
+    with pinned(threads=1):
+        found = _in_turns(runs, repeats)
+        outside = _per_frame(setup)
+    to_step = 1e-3 / setup.clock.steps
+    whole = {name: to_step * float(np.min([r[0] for r in results], axis=0).mean()) for name, results in found.items()}
+    step = whole[PLAIN]
+    stages = to_step * _fastest(found[TICKED]).mean(axis=1)
+    rows = [(STAGE, name, cost, "") for name, cost in zip(ROWS, stages, strict=True) if cost > 0]
+    rows += [(STAGE, "rest, not attributed", step - float(stages.sum()), ""), (STAGE, "whole step", step, "")]
+    end = found[PLAIN][0][2]
+    rows += [(SKIPPED, skip.name, whole[skip.name] - step, skip.told(setup, end)) for skip in skipped]
+    rows += [(SKIPPED if name == ENERGIES else FRAME, name, to_step * ns, "") for name, ns in outside.items()]
+    table = pd.DataFrame(rows, columns=["kind", "what", "µs per step", "how much"])
+    table.insert(3, "share of the step", table["µs per step"] / step)
+    return table
+
+
+def _ticked(setup: Setup, frames: int | None = None) -> Run:
+    return run_frames(setup, setup.start(), new_ticks(), frames)
+
+
+def _in_turns(runs: dict[str, partial[Run]], repeats: int) -> dict[str, list[Run]]:
+    """Every run `repeats` times, in turns, compiled before; one that is `DEAR`, once."""
+    for run in runs.values():
+        run(frames=1)
+    found: dict[str, list[Run]] = {name: [] for name in runs}
+    shortest = dict.fromkeys(runs, 0.0)
+    for turn in range(repeats):
+        for name, run in runs.items():
+            if shortest[name] > DEAR * shortest[PLAIN]:
+                continue
+            found[name].append(run())
+            took = float(found[name][-1][0].sum())
+            shortest[name] = min(took, shortest[name]) if turn else took
+    return found
+
+
+def _fastest(ticked: list[Run]) -> np.ndarray:
+    """Times of ROWS in the fastest repeat of each frame, (rows, F)."""
+    quickest = np.argmin([frame_ns for frame_ns, _, _ in ticked], axis=0)
+    stages = np.stack([stage_ns for _, stage_ns, _ in ticked])
+    return stages[quickest, :, np.arange(stages.shape[2])].T
+
+
+def _per_frame(setup: Setup) -> dict[str, float]:
+    """What is done once per frame, outside its time, and what recording the energies too would take: median [ns]."""
+    clock = setup.clock
+    recorded = (setup.body, clock, setup.obstacles, len(setup.attachments), frozenset[int]())
+    bare, full = Recorder(*recorded, ()), Recorder(*recorded, EXTRA)
+    state = setup.method.advance(setup.start(), setup.drive(0))
+    times = np.zeros((3, clock.frames))
+    for frame in range(clock.frames):
+        records = [partial(recorder.record, frame, state, 0) for recorder in (bare, full)]
+        for row, work in enumerate([partial(setup.drive, frame), *records]):
+            begin = perf_counter_ns()
+            work()
+            times[row, frame] = perf_counter_ns() - begin
+    paths, recording, energies = (float(t) for t in np.median(times, axis=1))
+    return {PATHS: paths, RECORDING: recording, ENERGIES: energies - recording}

@@ -1,0 +1,85 @@
+"""What frame times say, and what they cannot say: percentiles, missed deadlines, ratios with their spread."""
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from studies.base.errors import StudyError
+
+DEADLINES_MS = (1.0, 2.0, 25.0, 33.0)
+"""Haptics at 1 kHz and 500 Hz, the paper's 40 frames/s, video at 30 frames/s."""
+CONFIDENCE = 0.9  # five repeats give 0.9375; fewer than five cannot resolve anything
+
+
+def percentiles(frame_ns: np.ndarray) -> dict[str, float]:
+    """p50, p95, p99 and max of all frames of all repeats [ns]; frame_ns of any shape.
+
+    Of the frames that were measured, none between: the p99 is a time some frame really took.
+    """
+    p50, p95, p99 = np.percentile(frame_ns, [50, 95, 99], method="higher")
+    return {"p50": float(p50), "p95": float(p95), "p99": float(p99), "max": float(np.max(frame_ns))}
+
+
+def missed(frame_ns: np.ndarray, deadlines_ms: tuple[float, ...] = DEADLINES_MS) -> dict[float, float]:
+    """Deadline [ms] -> share of frames, 0 to 1, that took longer; frame_ns [ns] of any shape."""
+    frame_ns = np.asarray(frame_ns)
+    return {deadline: float(np.mean(frame_ns > 1e6 * deadline)) for deadline in deadlines_ms}
+
+
+def kernel_ns(frame_ns: np.ndarray) -> float:
+    """What a frame costs when nothing disturbs [ns]: the median over frames of the fastest repeat of each.
+
+    frame_ns: (repeat, F); every repeat computes the same frames.
+    """
+    return float(np.median(np.min(frame_ns, axis=0)))
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """A ratio of times with its interval; `confidence` is the chance that the interval holds the true median."""
+
+    median: float
+    low: float
+    high: float
+    confidence: float
+
+    @property
+    def resolvable(self) -> bool:
+        """Whether the difference is larger than the spread: enough repeats, and 1 outside the interval."""
+        return self.confidence >= CONFIDENCE and not self.low <= 1.0 <= self.high
+
+    def __str__(self) -> str:
+        interval = f"{self.low:.3g} to {self.high:.3g}"
+        return f"{self.median:.3g} ({interval})" if self.resolvable else f"not resolvable ({interval})"
+
+
+def ratio_with_spread(a: np.ndarray, b: np.ndarray) -> Ratio:
+    """How many times longer a frame of `a` takes than one of `b`; both (repeat, F) [ns], measured in turns.
+
+    Each repeat gives the ratio of the median frames of one round, so that a slow spell of the machine, which hits both,
+    cancels. Their median is the answer; its interval is the sign test's: between the k-th smallest and the k-th
+    largest ratio, no assumption on the distribution (Conover, Practical Nonparametric Statistics, ch. 3.2).
+    Raises StudyError when the repeats cannot be paired.
+    """
+    a, b = np.atleast_2d(a), np.atleast_2d(b)
+    if len(a) != len(b):
+        raise StudyError(
+            f"a ratio pairs the repeats of both, but there are {len(a)} and {len(b)}: measure them in turns"
+        )
+    ratios = np.sort(np.median(a, axis=1) / np.median(b, axis=1))
+    rank, confidence = _sign_test_rank(len(ratios))
+    return Ratio(float(np.median(ratios)), float(ratios[rank - 1]), float(ratios[-rank]), confidence)
+
+
+def _sign_test_rank(n: int) -> tuple[int, float]:
+    """The largest k for which (k-th smallest, k-th largest) of n holds the median with CONFIDENCE, else 1; and its
+    confidence 1 - 2 P(Binomial(n, 1/2) < k)."""
+    best = (1, 1.0 - 2.0 * 0.5**n)
+    below = 0.5**n
+    for k in range(2, n // 2 + 1):
+        below += comb(n, k - 1) * 0.5**n
+        if 1.0 - 2.0 * below < CONFIDENCE:
+            break
+        best = (k, 1.0 - 2.0 * below)
+    return best

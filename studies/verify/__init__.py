@@ -1,0 +1,1 @@
+"""The reference against known answers and other codes."""
