@@ -4,7 +4,7 @@ from massspring.analysis.stability import StepLimit, step_limit
 from massspring.body.body import Body, Material
 from massspring.body.build import surface_body, tetrahedral_body
 from massspring.body.membranes import membrane_body
-from massspring.body.volumes import Ramp, Volumes
+from massspring.body.volumes import Volumes
 from massspring.errors import MassSpringError
 from massspring.methods import (
     METHODS,
@@ -27,7 +27,8 @@ from massspring.methods import (
 from massspring.run.history import History
 from massspring.run.simulation import Setup, simulate
 from massspring.world.clock import Clock, make_clock
-from massspring.world.obstacles import Attachment, Capsule, Obstacle, Path, Plane, Probe, Sphere
+from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
+from massspring.world.trajectories import Path, Ramp
 
 __all__ = [
     "METHODS",

@@ -7,11 +7,10 @@ import numpy as np
 
 from massspring.body.springs import Springs, lengths
 from massspring.body.surface import check_finite, check_surface
-from massspring.body.volumes import Volumes
+from massspring.body.volumes import Volumes, tetrahedron_volumes
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.spring_layout import Membrane
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
-from massspring.kernels.forces.tetrahedra import tetrahedron_volumes_into
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
 
 SAME_VOLUME = 1e-9
@@ -171,9 +170,7 @@ class Body:
     @property
     def tetrahedron_volumes(self) -> np.ndarray:
         """Rest volumes [m³], (k,)."""
-        volumes = np.empty(len(self.tetrahedra))
-        tetrahedron_volumes_into(self.rest, self.tetrahedra, volumes)
-        return volumes
+        return tetrahedron_volumes(self.rest, self.tetrahedra)
 
     @property
     def size(self) -> float:

@@ -7,7 +7,7 @@ every tetrahedron around it, is a quarter of what their outer faces enclose.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array, vstack
@@ -16,34 +16,29 @@ from scipy.sparse.linalg import lsqr
 from massspring.body.partition import partition, tetrahedron_faces
 from massspring.body.surface import check_surface
 from massspring.errors import MassSpringError
-
-if TYPE_CHECKING:
-    from massspring.body.body import Body
+from massspring.kernels.forces.tetrahedra import tetrahedron_volumes_into
 
 DEPENDENT = 1e-8
 """Relative residual below which a volume is a sum of others; independent ones of a mesh leave more than 1e-4."""
 
 
-@dataclass(frozen=True)
-class Ramp:
-    """A number over time, straight between key values and still outside them."""
+class Solid(Protocol):
+    """What volumes are made of: a body, or any other mesh with these arrays."""
 
-    times: tuple[float, ...] = (0.0,)
-    """[s], ascending."""
-    values: tuple[float, ...] = (1.0,)
-    """One per time."""
+    @property
+    def rest(self) -> np.ndarray:
+        """Rest positions [m], (n, 3)."""
+        ...
 
-    def __post_init__(self) -> None:
-        if len(self.times) != len(self.values) or not self.times:
-            raise MassSpringError(f"a ramp has {len(self.times)} times for {len(self.values)} values; give one each")
-        if not (np.isfinite(self.times).all() and np.isfinite(self.values).all()):
-            raise MassSpringError("a ramp holds values that are not finite; give numbers")
-        if (np.diff(self.times) <= 0).any():
-            raise MassSpringError(f"the times of a ramp are {self.times} s; they must ascend")
+    @property
+    def triangles(self) -> np.ndarray:
+        """Closed surface, outward, (f, 3) uint32."""
+        ...
 
-    def __call__(self, t: float | np.ndarray) -> np.ndarray:
-        """Value at time(s) `t` [s], () or (q,)."""
-        return np.asarray(np.interp(t, self.times, self.values))
+    @property
+    def tetrahedra(self) -> np.ndarray:
+        """(k, 4) uint32, positive; (0, 4) where there are none."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,12 +93,12 @@ class Volumes:
         return Volumes(self.names + other.names, triangles, mine)
 
     @staticmethod
-    def whole(body: "Body") -> "Volumes":
+    def whole(body: Solid) -> "Volumes":
         """The tissue inside the body's surface."""
         return Volumes(("whole",), body.triangles, csr_array(np.ones((1, len(body.triangles)))))
 
     @staticmethod
-    def closed_surfaces(body: "Body", surfaces: Mapping[str, np.ndarray]) -> "Volumes":
+    def closed_surfaces(body: Solid, surfaces: Mapping[str, np.ndarray]) -> "Volumes":
         """One volume per closed surface: name -> triangles (f, 3) that enclose it with a positive volume.
 
         {"wall": all boundary triangles, "lumen": the inner ones turned round} for a hollow organ. Raises
@@ -123,18 +118,19 @@ class Volumes:
         return kept
 
     @staticmethod
-    def regions(body: "Body", count: int) -> "Volumes":
+    def regions(body: Solid, count: int) -> "Volumes":
         """`count` connected regions of tetrahedra of about equal volume. Raises MassSpringError for too many.
 
         More volumes than nodes would leave less than two of three motions of a node free: the body locks.
         """
         _need_tetrahedra(body, "regions")
-        if count > body.node_count:
+        if count > len(body.rest):
             raise MassSpringError(
-                f"{count} regions asked of a mesh of {body.node_count} nodes; more volumes than nodes lock it, "
-                f"give up to {body.node_count} or refine the mesh"
+                f"{count} regions asked of a mesh of {len(body.rest)} nodes; more volumes than nodes lock it, "
+                f"give up to {len(body.rest)} or refine the mesh"
             )
-        region = partition(body.rest, body.tetrahedra.astype(np.int64), body.tetrahedron_volumes, count)
+        sizes = tetrahedron_volumes(body.rest, body.tetrahedra)
+        region = partition(body.rest, body.tetrahedra.astype(np.int64), sizes, count)
         triangles, first, second = tetrahedron_faces(body.tetrahedra)
         a, b = region[first // 4], np.where(second >= 0, region[second // 4], -1)
         between = np.flatnonzero(a != b)
@@ -144,7 +140,7 @@ class Volumes:
         return Volumes(tuple(f"region {r}" for r in range(count)), triangles[between], share.tocsr()[:, between])
 
     @staticmethod
-    def nodal(body: "Body") -> "Volumes":
+    def nodal(body: Solid) -> "Volumes":
         """One volume per node: a quarter of every tetrahedron around it."""
         _need_tetrahedra(body, "nodal volumes")
         cells = body.tetrahedra.astype(np.int64)
@@ -154,11 +150,18 @@ class Volumes:
         rows = np.r_[cells.ravel()[first], cells.ravel()[second[inner]], around.ravel()]
         columns = np.r_[face, inner, np.repeat(outer, 3)]
         values = np.r_[np.full(len(face), 0.25), np.full(len(inner), -0.25), np.full(around.size, 0.25)]
-        share = coo_array((values, (rows, columns)), shape=(body.node_count, len(triangles))).tocsr()
-        return Volumes(tuple(f"node {i}" for i in range(body.node_count)), triangles, share)
+        share = coo_array((values, (rows, columns)), shape=(len(body.rest), len(triangles))).tocsr()
+        return Volumes(tuple(f"node {i}" for i in range(len(body.rest))), triangles, share)
 
 
-def _need_tetrahedra(body: "Body", what: str) -> None:
+def tetrahedron_volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    """Volumes [m³] of `tetrahedra` (k, 4) uint32 with nodes at `points` (n, 3) [m], (k,)."""
+    volumes = np.empty(len(tetrahedra))
+    tetrahedron_volumes_into(points, tetrahedra, volumes)
+    return volumes
+
+
+def _need_tetrahedra(body: Solid, what: str) -> None:
     if not len(body.tetrahedra):
         raise MassSpringError(f"{what} are made of tetrahedra, the body has none; fill its mesh or keep the whole")
 

@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
-from massspring.kernels.arrays.layout import VolumeRows
-from massspring.kernels.constraint.block_jacobi import SIZE, Clusters
+from massspring.kernels.arrays.volume_rows import SIZE, Clusters, VolumeRows
 from massspring.kernels.constraint.jacobian import rows_into
 from massspring.layout.sell_chunks import aligned
 

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from massspring.body.volumes import Volumes
-from massspring.kernels.arrays.layout import VolumeRows
+from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.jit.simd4 import LANES
 from massspring.layout.block_jacobi import each_alone
 from massspring.layout.ring_areas import edge_chains, quadrangles

@@ -3,13 +3,10 @@
 import numpy as np
 
 from massspring.body.body import Body
-from massspring.body.springs import EDGES_OF_TRIANGLE, lengths, unique_edges
-from massspring.body.surface import winding_number
+from massspring.body.inside import is_inside, mean_edge, new_pair, surface_distance
 from massspring.kernels.arrays.layout import Tally
 from massspring.kernels.probe.arrays import COUNTS, Probing, Rows
 from massspring.kernels.probe.broad_phase import TRIANGLE_BLOCK
-from massspring.kernels.probe.continuous import Pair
-from massspring.kernels.probe.point_query import distance_to
 from massspring.layout.morton import along_curve
 from massspring.world.obstacles import Probe
 
@@ -19,19 +16,9 @@ MOST_ROWS = 24
 """Point contacts of a step. A thin tip in a dimple touches one to eight triangles; what finds no row is carried."""
 
 
-def mean_edge(body: Body) -> float:
-    """Of the surface at rest [m]."""
-    return float(lengths(body.rest, unique_edges(body.triangles, EDGES_OF_TRIANGLE)).mean())
-
-
 def kept_radius(probe: Probe, body: Body) -> float:
     """How far the surface stays from the tip [m]: the probe's radius, or the skin of one without thickness."""
     return max(probe.radius, SKIN * mean_edge(body))
-
-
-def new_pair() -> Pair:
-    """One for everything: it is filled anew for each point and triangle."""
-    return Pair(np.zeros((2, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3))
 
 
 def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tally: Tally) -> Probing:
@@ -89,13 +76,3 @@ def tip_depth(probe: Probe, x: np.ndarray, triangles: np.ndarray, t: float) -> f
     tip = probe.anchor + probe.path(t)
     distance = surface_distance(tip, x, triangles)
     return probe.radius + distance if is_inside(tip, x, triangles) else probe.radius - distance
-
-
-def surface_distance(point: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> float:
-    """Of a point (3,) to a surface [m]."""
-    return float(distance_to(point, x, triangles, np.zeros((3, 3)), np.zeros(3)))
-
-
-def is_inside(point: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> bool:
-    """Whether the surface goes round the point."""
-    return abs(winding_number(point, x, triangles)) > 0.5

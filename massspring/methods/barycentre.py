@@ -19,9 +19,11 @@ from scipy.sparse import csr_array
 
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Drive
+from massspring.layout.allocate import start
+from massspring.layout.state import State
 from massspring.methods.families.known_pressure import check_modulus
 from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, one_filled, push_cells
-from massspring.methods.method import Method, State, start
+from massspring.methods.method import Method
 from massspring.world.obstacles import Attachment
 
 

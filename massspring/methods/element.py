@@ -19,7 +19,7 @@ from scipy.sparse import csr_array
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Accuracy, Drive
 from massspring.kernels.constraint.tetrahedra import any_idle, cell_forces_into, cell_rows_into, solve_cells
-from massspring.kernels.contact.active_set import find_contacts, revise_contacts
+from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, revise_contacts
 from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
 from massspring.kernels.jit.decorators import compiled
 from massspring.kernels.jit.stage_clock import (
@@ -33,12 +33,14 @@ from massspring.kernels.jit.stage_clock import (
     VOLUME,
     mark,
 )
-from massspring.kernels.step.advance import add_held_impulse, advance
+from massspring.kernels.step.advance import advance
+from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.predict import predict
+from massspring.layout.allocate import start
+from massspring.layout.state import State
 from massspring.methods.families.known_pressure import check_modulus
 from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, one_filled, own_cells, push_cells
-from massspring.methods.implicit_volume import CONTACT_PASSES
-from massspring.methods.method import Method, Remedy, State, begin_frame, start
+from massspring.methods.method import Method, Remedy, begin_frame
 from massspring.world.obstacles import Attachment
 
 

@@ -5,12 +5,15 @@ from typing import ClassVar
 
 from massspring.kernels.arrays.layout import Drive
 from massspring.kernels.contact.active_set import find_contacts
+from massspring.kernels.fused.padded import places_into
 from massspring.kernels.fused.sweep import predict_from_places
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, mark
 from massspring.kernels.probe.stage import meet_probes
-from massspring.kernels.step.advance import add_held_impulse, advance_to_places, places_into, prescribe_velocity_into
-from massspring.methods.method import Method, State, crewed_frame
+from massspring.kernels.step.advance import advance_to_places
+from massspring.kernels.step.attachments import add_held_impulse, prescribe_velocity_into
+from massspring.layout.state import State
+from massspring.methods.method import Method, crewed_frame
 
 
 @lean

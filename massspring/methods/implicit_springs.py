@@ -20,10 +20,12 @@ import numpy as np
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Accuracy, Drive
 from massspring.kernels.jit.stage_clock import OUTSIDE, mark
+from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
+from massspring.layout.state import State
 from massspring.methods.implicit.factor import Factors
 from massspring.methods.implicit.passes import Step
-from massspring.methods.method import Method, Remedy, State, begin_frame, start
+from massspring.methods.method import Method, Remedy, begin_frame
 from massspring.world.obstacles import Attachment
 
 

@@ -27,8 +27,10 @@ from massspring.kernels.constraint.jacobian import (
     steepest_of_row,
     transposed_rows_times_into,
 )
+from massspring.kernels.constraint.one_volume import capped_error, multiplier_of_sums, steepest, surely_short
 from massspring.kernels.constraint.schur import dense_into, solve_dense, solve_iteratively
-from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
+from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, pressure_reach, revise_contacts
+from massspring.kernels.fused.padded import places_into
 from massspring.kernels.fused.sweep import gather_and_predict, predict_from_places
 from massspring.kernels.jit.decorators import compiled, lean
 from massspring.kernels.jit.stage_clock import (
@@ -44,24 +46,13 @@ from massspring.kernels.jit.stage_clock import (
     mark,
 )
 from massspring.kernels.probe.stage import meet_probes
-from massspring.kernels.step.advance import (
-    add_held_impulse,
-    advance,
-    advance_to_places,
-    capped_error,
-    multiplier_of_sums,
-    places_into,
-    prescribe,
-    prescribe_velocity_into,
-    steepest,
-    surely_short,
-)
+from massspring.kernels.step.advance import advance, advance_to_places
+from massspring.kernels.step.attachments import add_held_impulse, prescribe, prescribe_velocity_into
+from massspring.layout.allocate import start
 from massspring.layout.block_jacobi import clusters_at_rest
-from massspring.methods.method import Method, Remedy, State, crewed_frame, start
+from massspring.layout.state import State
+from massspring.methods.method import Method, Remedy, crewed_frame
 from massspring.world.obstacles import Attachment
-
-CONTACT_PASSES = 3
-"""Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
 
 
 @lean

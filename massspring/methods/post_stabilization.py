@@ -12,8 +12,9 @@ from typing import ClassVar
 
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Drive
+from massspring.layout.state import State
 from massspring.methods.families.one_volume import Rule, advance_by
-from massspring.methods.method import Method, Remedy, State, one_whole
+from massspring.methods.method import Method, Remedy, one_whole
 
 
 @dataclass(frozen=True)

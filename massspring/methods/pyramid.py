@@ -14,8 +14,9 @@ from scipy.sparse import csr_array
 
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Drive
+from massspring.layout.state import State
 from massspring.methods.families.known_pressure import PYRAMIDS, check_modulus, push, volume_stiffness
-from massspring.methods.method import Method, Remedy, State, one_whole
+from massspring.methods.method import Method, Remedy, one_whole
 
 
 @dataclass(frozen=True)

@@ -23,15 +23,18 @@ from massspring.body.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import Drive
 from massspring.kernels.constraint.tetrahedra import relax_cells, relax_sum, relax_whole
-from massspring.kernels.contact.active_set import find_contacts, revise_contacts
+from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, revise_contacts
+from massspring.kernels.contact.constrained_motion import unpushed_into
 from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
 from massspring.kernels.jit.decorators import compiled
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, mark
-from massspring.kernels.step.advance import add_held_impulse, advance
-from massspring.kernels.step.predict import predict, unpushed_into
+from massspring.kernels.step.advance import advance
+from massspring.kernels.step.attachments import add_held_impulse
+from massspring.kernels.step.predict import predict
+from massspring.layout.allocate import start
+from massspring.layout.state import State
 from massspring.methods.families.tetrahedra import cells_of, one_filled, own_cells
-from massspring.methods.implicit_volume import CONTACT_PASSES
-from massspring.methods.method import Method, Remedy, State, begin_frame, one_whole, start
+from massspring.methods.method import Method, Remedy, begin_frame, one_whole
 from massspring.world.obstacles import Attachment
 
 

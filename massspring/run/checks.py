@@ -5,13 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from massspring.body.body import Body
+from massspring.body.inside import is_inside, mean_edge
 from massspring.body.surface import winding_number
-from massspring.body.volumes import Ramp
 from massspring.errors import MassSpringError
-from massspring.layout.probe_arrays import is_inside, mean_edge, tip_depth
+from massspring.layout.probe_arrays import tip_depth
 from massspring.layout.threads import cores
 from massspring.methods.method import Method
 from massspring.world.obstacles import Capsule, Plane, Probe, Sphere
+from massspring.world.trajectories import Ramp
 
 INSIDE = 1e-6
 """Of the body's size: what an obstacle may reach into it at the start, round-off of positions that touch."""

@@ -12,7 +12,7 @@ from massspring.kernels.forces.springs import spring_energy
 from massspring.kernels.forces.tetrahedra import smallest_ratio, tetrahedron_volumes_into
 from massspring.kernels.probe.arrays import COUNTS
 from massspring.layout.probe_arrays import tip_depth
-from massspring.methods.method import State
+from massspring.layout.state import State
 from massspring.world.clock import Clock
 from massspring.world.obstacles import Obstacle, Probe
 

@@ -8,7 +8,7 @@ import numpy as np
 from massspring.errors import MassSpringError
 from massspring.layout.jacobian_pattern import OF_EACH_VOLUME
 from massspring.layout.sell_chunks import aligned
-from massspring.methods.method import State
+from massspring.layout.state import State
 
 Precision = Literal["float64", "float32"]
 KEPT_DOUBLE = frozenset({"sums", "matrix", "scale", *OF_EACH_VOLUME})

@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from massspring.body.body import Body
+from massspring.layout.allocate import nodes_of, swept_surface
 from massspring.layout.sell_chunks import places_in_slices
-from massspring.methods.method import Method, State, nodes_of, swept_surface
+from massspring.layout.state import State
+from massspring.methods.method import Method
 from massspring.world.obstacles import Attachment
 
 MANY = 512

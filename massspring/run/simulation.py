@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from massspring.body.body import Body
-from massspring.body.volumes import Ramp
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import Drive, Tips
 from massspring.layout.probe_arrays import new_probing
+from massspring.layout.state import State
 from massspring.layout.threads import shared
-from massspring.methods.method import Method, State
+from massspring.methods.method import Method
 from massspring.run.checks import (
     check_held_apart,
     check_nodal,
@@ -32,6 +32,7 @@ from massspring.run.renumber import Numbered, numbered
 from massspring.world.clock import Clock
 from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
 from massspring.world.targets import fastest_filling, followed
+from massspring.world.trajectories import Ramp
 
 ESCAPED = 20.0
 """A node this many body sizes from rest, beyond any obstacle's push, has left: the run has diverged."""

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from massspring.body.body import Body
-from massspring.body.volumes import Ramp
+from massspring.world.trajectories import Ramp
 
 
 def fastest_filling(body: Body) -> float:

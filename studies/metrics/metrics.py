@@ -9,7 +9,7 @@ from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.geometry.surface.distance import hausdorff
 from studies.metrics.run import Run
 from studies.reference.ringing import ringing_frequency
-from studies.scene.scene import ALWAYS, allowed
+from studies.scene.quantities import ALWAYS, allowed
 from studies.store.record import Status
 
 PERCENT = 100.0

@@ -2,88 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from pathlib import Path
 
-import numpy as np
-from skfem import MeshTet2
-
-from reference_fem import Evaluator, surface_triangles
 from studies.base.errors import StudyError
+from studies.reference.solution import Solution
 from studies.reference.solve import Piece, pieces
 from studies.reference.uncertainty import Uncertainty, uncertainties
 from studies.scene.scene import Scene
 from studies.store.record import Record, Status, read_record
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """One stored load path."""
-
-    scene: Scene
-    record: Record
-
-    def field(self, name: str) -> np.ndarray:
-        """Stored values by name."""
-        return self.record.fields[name].values
-
-    @cached_property
-    def force(self) -> np.ndarray:
-        """The probed force at each checkpoint [N], (K,)."""
-        return self.scene.probe(self.field("contact_force"), self.field("held_force"))
-
-    @cached_property
-    def mesh(self) -> MeshTet2:
-        """The second-order mesh."""
-        return MeshTet2(np.ascontiguousarray(self.field("nodes").T), np.ascontiguousarray(self.field("tetrahedra").T))
-
-    @cached_property
-    def size(self) -> float:
-        """Diagonal of the whole body at rest [m]."""
-        return (2.0 if self.scene.symmetric else 1.0) * float(np.linalg.norm(np.ptp(self.field("nodes"), axis=0)))
-
-    @cached_property
-    def _evaluator(self) -> Evaluator:
-        return Evaluator(self.mesh)
-
-    @cached_property
-    def triangles(self) -> np.ndarray:
-        """Surface of linear triangles through all second-order nodes, (s, 3)."""
-        return surface_triangles(self.mesh)
-
-    def displacement(self, points: np.ndarray, checkpoint: int = -1) -> np.ndarray:
-        """Displacement [m] of the material points `points` (m, 3) [m]; of an octant, mirrored.
-
-        Kept for points asked before: metrics of all runs on one mesh ask for the same.
-        """
-        key = (points.tobytes(), checkpoint)
-        if key not in self._known:
-            sign = np.where(points < 0, -1.0, 1.0) if self.scene.symmetric else 1.0
-            found = self._evaluator.displacement(self.field("displacement")[checkpoint], sign * points)
-            self._known[key] = sign * found
-        return self._known[key]
-
-    @cached_property
-    def _known(self) -> dict[tuple[bytes, int], np.ndarray]:
-        return {}
-
-    def outside(self, triangles: np.ndarray) -> np.ndarray:
-        """Those of the boundary triangles (s, 3) that do not lie in a plane of symmetry."""
-        if not self.scene.symmetric:
-            return triangles
-        return triangles[~np.any(np.all(np.abs(self.field("nodes")[triangles]) < 1e-12, axis=1), axis=1)]
-
-    def surface(self, checkpoint: int = -1) -> tuple[np.ndarray, np.ndarray]:
-        """Deformed surface of the whole body: points (n, 3) [m], triangles (s, 3)."""
-        points = self.field("nodes") + self.field("displacement")[checkpoint]
-        if not self.scene.symmetric:
-            return points, self.triangles
-        part = self.outside(self.triangles)
-        signs = np.array(list(product((1.0, -1.0), repeat=3)))
-        faces = [
-            part + k * len(points) if s.prod() > 0 else part[:, ::-1] + k * len(points) for k, s in enumerate(signs)
-        ]
-        return (signs[:, None, :] * points).reshape(-1, 3), np.vstack(faces)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from studies.geometry.mesh.organ_mesh import boundary_triangles
 from studies.geometry.organs import SHAPES
 from studies.geometry.shape.levelset import Shape, project
 from studies.geometry.surface.distance import distance_to_surface
-from studies.runs.prepare import mesh_for, patch_nodes
+from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scene.scene import Held, Organ, Scene
 
 POLE_REFINEMENT = 0.35

@@ -21,7 +21,7 @@ from studies.base.errors import StudyError
 from studies.reference.checkpoints import drop, keep, kept
 from studies.reference.fields import fields_of
 from studies.reference.problem import reference_problem
-from studies.runs.case import scene_to_json
+from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
 from studies.store.fingerprint import source_fingerprint
 from studies.store.new_record import new_record

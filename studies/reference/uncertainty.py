@@ -17,10 +17,10 @@ from studies.geometry.mesh.organ_mesh import boundary_triangles, tetrahedron_vol
 from studies.geometry.surface.distance import hausdorff
 from studies.reference.ringing import ringing_frequency
 from studies.reference.solve import VARIANTS
-from studies.scene.scene import allowed
+from studies.scene.quantities import allowed
 
 if TYPE_CHECKING:
-    from studies.reference.load import Solution
+    from studies.reference.solution import Solution
 
 FAMILY = 3
 """Meshes that make an error bar, the finest ones; two make a large one."""

@@ -13,6 +13,7 @@ from massspring import METHODS, ImplicitVolume, Method
 from massspring.run.history import EXTRA
 from studies.base.errors import StudyError
 from studies.base.lookup import choose
+from studies.scene.as_json import _scene_adapter, scene_from_dict
 from studies.scene.scene import Scene
 
 Seconds = float | Literal["auto"]
@@ -197,21 +198,6 @@ def method_from_dict(data: Mapping[str, Any]) -> Method:
     if unknown:
         raise StudyError(f"method '{kind.name}' has no setting {', '.join(sorted(unknown))}")
     return _strict(kind).validate_python(dict(data["settings"]))
-
-
-def scene_to_json(scene: Scene) -> str:
-    """Canonical JSON of a scene."""
-    return json.dumps(_scene_adapter().dump_python(scene, mode="json"), sort_keys=True, ensure_ascii=False)
-
-
-def scene_from_dict(data: Mapping[str, Any]) -> Scene:
-    """The scene of a JSON-able form; pydantic checks every type."""
-    return _scene_adapter().validate_python(data)
-
-
-@cache
-def _scene_adapter() -> TypeAdapter[Scene]:
-    return TypeAdapter(Scene)
 
 
 @cache

@@ -20,17 +20,13 @@ from massspring import (
 from massspring.body.membranes import MEMBRANE_LAWS
 from massspring.body.volumes import Volumes
 from studies.base.errors import DoesNotApply, StudyError
-from studies.base.lookup import choose
-from studies.geometry import OrganMesh, fill, organ, read_mesh, scan
+from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
-from studies.geometry.organs import SHAPES
 from studies.runs.case import BodyRecipe, Case
+from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scene.scene import Scene
 
 LUMEN, WHOLE = "lumen", "whole"
-
-FILE_PARAMETERS = ("path", "unit", "remesh", "smooth", "wall")
-"""Of the organ "file"."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,27 +36,6 @@ class Prepared:
     mesh: OrganMesh
     setup: Setup
     limit: StepLimit
-
-
-def mesh_for(scene: Scene, nodes: int, filled: bool = True) -> OrganMesh:
-    """The scene's organ with `nodes` surface nodes. Raises StudyError.
-
-    A mesh file comes as it is, unless its parameters ask for a new surface: "remesh": true, or "smooth" or "wall" [m].
-    """
-    if choose(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
-        return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters)
-    parameters = scene.organ.parameters
-    if "path" not in parameters or "unit" not in parameters:
-        raise StudyError(
-            f"scene '{scene.name}': an organ from a file needs a path and a unit, it has {dict(parameters)}"
-        )
-    for key in parameters:
-        choose(key, FILE_PARAMETERS, "parameter of an organ from a file")
-    asked = {key: parameters[key] for key in ("smooth", "wall") if key in parameters}
-    if asked or parameters.get("remesh"):
-        return scan(parameters["path"], nodes, unit=parameters["unit"], fill=filled, **asked)
-    mesh = read_mesh(parameters["path"], unit=parameters["unit"])
-    return fill(mesh) if filled and not len(mesh.tetrahedra) else mesh
 
 
 def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh) -> Body:
@@ -126,13 +101,6 @@ def targets_for(scene: Scene, mesh: OrganMesh, body: Body) -> dict[str, Ramp]:
 def attachments_for(scene: Scene, mesh: OrganMesh) -> tuple[Attachment, ...]:
     """The nodes of each held region, found by geometry."""
     return tuple(Attachment(patch_nodes(mesh, held.name, held.region), held.path) for held in scene.held)
-
-
-def patch_nodes(mesh: OrganMesh, name: str, region: object) -> np.ndarray:
-    """Surface nodes of a patch: as the mesher outlined it, or for a mesh from a file those inside the region."""
-    if name in mesh.patches:
-        return mesh.patches[name]
-    return np.flatnonzero(region.level(mesh.points[: mesh.surface_count]) <= 0)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def prepare(case: Case) -> Prepared:

@@ -9,24 +9,11 @@ import numpy as np
 from massspring import Method, Obstacle, Path, Ramp
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace
-from studies.geometry.shape.levelset import Probe, Shape
+from studies.scene.placing import Vector
+from studies.scene.start import Start
+from studies.scene.tissues import Tissue
 
 Region = HalfSpace | BallRegion | EllipsoidRegion
-Vector = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Tissue:
-    """Nearly incompressible soft tissue; the mass-spring body matches mu, its volume constraint stands for kappa."""
-
-    shear_modulus: float
-    """mu [Pa]."""
-    density: float
-    """rho [kg/m³]."""
-    source: str
-    """Where the numbers come from."""
-    bulk_over_shear: float = 5000.0
-    """kappa/mu of the reference [1]."""
 
 
 @dataclass(frozen=True)
@@ -78,36 +65,6 @@ class Probed:
     def __post_init__(self) -> None:
         if self.what not in ("obstacle", "held"):
             raise StudyError(f"a force is probed at an 'obstacle' or a 'held' region, not at '{self.what}'")
-
-
-@dataclass(frozen=True)
-class Start:
-    """How a body starts that is not at rest. A shape is for the mass-spring solver alone, a speed for both."""
-
-    matrix: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    """Linear map of the rest positions about the middle of their box [1], row by row."""
-    scatter: float = 0.0
-    """How far every node is thrown from there, evenly in a cube: over half the longest side of the box [1]."""
-
-    speed: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    """Linear map from rest positions about the origin to velocities [1/s], row by row; without trace, or it asks an
-    incompressible body to swell."""
-
-    def velocities(self, rest: np.ndarray) -> np.ndarray | None:
-        """(n, 3) [m/s]; None where all is still."""
-        return rest @ np.asarray(self.speed).T if np.any(self.speed) else None
-
-    @property
-    def shaped(self) -> bool:
-        """Whether it begins in another shape than that at rest."""
-        return self.scatter != 0.0 or not np.array_equal(self.matrix, np.eye(3))
-
-    def positions(self, rest: np.ndarray) -> np.ndarray:
-        """(n, 3) [m]; the same nodes are always thrown to the same places."""
-        low, high = rest.min(axis=0), rest.max(axis=0)
-        thrown = np.random.default_rng(0).uniform(-1.0, 1.0, rest.shape) * 0.5 * (high - low).max()
-        middle = 0.5 * (low + high)
-        return middle + (rest - middle) @ np.asarray(self.matrix).T + self.scatter * thrown
 
 
 @dataclass(frozen=True)
@@ -190,51 +147,3 @@ class Scene:
         """The probed force [N], (…,), of forces on the body (…, o, 3) and (…, g, 3): positive for a press."""
         force = contact_force if self.probed.what == "obstacle" else held_force
         return force[..., self.probed.number, :] @ np.asarray(self.probed.direction)
-
-
-ALWAYS = ("volume",)
-"""Quantities with a truth of their own: a volume is compared with the body's own rest volume."""
-GAUGE_FREE = ("pressure", "lumen")
-"""Quantities that every scene at rest allows: a rigid turn does not change them."""
-
-
-def allowed(scene: Scene, quantity: str) -> bool:
-    """Whether the scene says that a quantity of its reference may be compared."""
-    word = quantity.split("_")[0]
-    if word == "lumen" and not scene.filled:
-        return False
-    moves = scene.reference is not None and scene.reference.dt is not None
-    return word in ALWAYS or word in scene.quantities or (word in GAUGE_FREE and not moves)
-
-
-KIDNEY = Tissue(4900.0, 1050.0, "kidney, MR elastography at 45 Hz: 4.9 ± 0.5 kPa; density about 1,050 kg/m³")
-SPLEEN = Tissue(
-    3600.0, 1060.0, "spleen, MR elastography at 60 Hz: 3.6 ± 0.3 kPa (Talwalkar et al. 2009); density as liver"
-)
-STOMACH = Tissue(640.0, 1058.0, "stomach wall, MR elastography: 0.64 kPa; wall tests at large stretch are far stiffer")
-BLADDER = Tissue(10_000.0, 1040.0, "bladder wall, assumed: published moduli span a decade; the pressure scales with mu")
-LIVER = Tissue(1800.0, 1060.0, "liver, MR elastography: 1.8 ± 0.4 kPa; density 1,060 kg/m³")
-
-
-def press_times(start: float, end: float, steps: int, rest: float) -> tuple[float, ...]:
-    """`steps` evenly spaced times up to the end of a press [s], the last moved to `rest`, when all is still."""
-    times = np.linspace(start, end, steps + 1)[1:]
-    return (*times[:-1].tolist(), rest)
-
-
-def probe_of(shape: Shape) -> Probe:
-    """Where the shape is palpated. Raises StudyError for a shape that does not say."""
-    if shape.probe is None:
-        raise StudyError(f"the shape '{shape.name}' names no probe point; give it one, or choose another organ")
-    return shape.probe
-
-
-def scaled(direction: Vector, length: float) -> Vector:
-    """length · direction."""
-    return (length * direction[0], length * direction[1], length * direction[2])
-
-
-def along(point: Vector, direction: Vector, length: float) -> Vector:
-    """point + length · direction."""
-    step = scaled(direction, length)
-    return (point[0] + step[0], point[1] + step[1], point[2] + step[2])

@@ -1,6 +1,8 @@
 """The scenes, one file each. Adding one: a file and a line in SCENES, where tests, commands and charts find it."""
 
-from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene, Start, Tissue
+from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
+from studies.scene.start import Start
+from studies.scene.tissues import Tissue
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_ringing import BALL_RINGING
 from studies.scenes.ball_squeeze import BALL_SQUEEZE

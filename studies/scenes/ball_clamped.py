@@ -2,7 +2,9 @@
 
 from massspring import Path
 from studies.geometry import HalfSpace
-from studies.scene.scene import LIVER, Held, Organ, Probed, ReferencePlan, Scene, press_times
+from studies.scene.placing import press_times
+from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
+from studies.scene.tissues import LIVER
 
 RADIUS = 0.05  # m
 CAP = 0.8  # the caps are |z| > CAP · RADIUS

@@ -1,6 +1,8 @@
 """A free ball struck so that it stretches and flattens in turn: does it ring as fast as the continuum does?"""
 
-from studies.scene.scene import LIVER, Organ, Probed, ReferencePlan, Scene, Start
+from studies.scene.scene import Organ, Probed, ReferencePlan, Scene
+from studies.scene.start import Start
+from studies.scene.tissues import LIVER
 
 RADIUS = 0.05  # m
 STRETCHING = 3.5  # 1/s: a swing of 5 % of the radius, an angular frequency of 2.6656 √(mu/rho)/R = 69 1/s

@@ -1,7 +1,9 @@
 """The paper's Figure 2: a ball squeezed by 30 % of its diameter between two frictionless planes, 800 frames."""
 
 from massspring import Path, Plane
-from studies.scene.scene import LIVER, Organ, Probed, ReferencePlan, Scene, press_times
+from studies.scene.placing import press_times
+from studies.scene.scene import Organ, Probed, ReferencePlan, Scene
+from studies.scene.tissues import LIVER
 
 RADIUS = 0.05  # m
 DEPTH = 0.30  # of the diameter; each plane does half of it

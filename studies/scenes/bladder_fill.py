@@ -2,7 +2,9 @@
 
 from massspring import Ramp
 from studies.geometry.organs.bladder import BLADDER_REGIONS
-from studies.scene.scene import BLADDER, Held, Lumen, Organ, Probed, ReferencePlan, Scene, press_times
+from studies.scene.placing import press_times
+from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
+from studies.scene.tissues import BLADDER
 
 FILLING = 1.2  # of the volume at rest; from 1.23 on a wall of one kept volume snaps through at the dome
 FILL_END = 3.0  # s

@@ -2,7 +2,9 @@
 
 from massspring import Path, Sphere
 from studies.geometry.organs.kidney import KIDNEY_REGIONS, kidney_shape
-from studies.scene.scene import KIDNEY, Held, Organ, Probed, ReferencePlan, Scene, along, press_times, probe_of, scaled
+from studies.scene.placing import along, press_times, probe_of, scaled
+from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
+from studies.scene.tissues import KIDNEY
 
 RADIUS = 0.015  # m, a fingertip; twice the edge of the coarsest reference mesh
 DEPTH = 0.006  # m, a seventh of the kidney's thickness

@@ -2,7 +2,9 @@
 
 from massspring import Path, Plane
 from studies.geometry import LIVER_PRESS_DIRECTION, LIVER_REGIONS
-from studies.scene.scene import LIVER, Held, Organ, Probed, ReferencePlan, Scene, press_times, scaled
+from studies.scene.placing import press_times, scaled
+from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
+from studies.scene.tissues import LIVER
 
 FRONT = -0.0686  # m: where the liver begins along the press direction
 GAP = 0.0014  # m between plane and liver at the start: curved facets of a coarse mesh bulge that far

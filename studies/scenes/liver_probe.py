@@ -2,7 +2,9 @@
 
 from massspring import Path, Sphere
 from studies.geometry import LIVER_PROBE_NORMAL, LIVER_PROBE_POINT, LIVER_REGIONS
-from studies.scene.scene import LIVER, Held, Organ, Probed, ReferencePlan, Scene, along, press_times, scaled
+from studies.scene.placing import along, press_times, scaled
+from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
+from studies.scene.tissues import LIVER
 
 RADIUS = 0.020  # m, a thumb; twice the edge of the coarsest reference mesh, so that the contact is resolved
 DEPTH = 0.010  # m

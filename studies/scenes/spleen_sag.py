@@ -1,7 +1,8 @@
 """A spleen hanging from its hilum: gravity alone, no contact. What holds it must carry its weight: a closed form."""
 
 from studies.geometry.organs.spleen import SPLEEN_REGIONS
-from studies.scene.scene import SPLEEN, Held, Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
+from studies.scene.tissues import SPLEEN
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s²: the patient stands
 DURATION = 4.0  # s: the swing of the drop has died away

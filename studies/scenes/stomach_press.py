@@ -2,7 +2,9 @@
 
 from massspring import Path, Plane
 from studies.geometry.organs.stomach import STOMACH_REGIONS
-from studies.scene.scene import STOMACH, Held, Lumen, Organ, Probed, ReferencePlan, Scene, press_times
+from studies.scene.placing import press_times
+from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
+from studies.scene.tissues import STOMACH
 
 FRONT, BACK = -0.0487, 0.0630  # m: the stomach reaches from FRONT to 0.0621, and a coarse curved mesh a little farther
 GAP = 0.0008  # m between plane and stomach at the start

@@ -2,19 +2,9 @@
 
 from massspring import Path, Plane, Sphere
 from studies.geometry.organs.stomach import STOMACH_REGIONS, stomach_shape
-from studies.scene.scene import (
-    STOMACH,
-    Held,
-    Lumen,
-    Organ,
-    Probed,
-    ReferencePlan,
-    Scene,
-    along,
-    press_times,
-    probe_of,
-    scaled,
-)
+from studies.scene.placing import along, press_times, probe_of, scaled
+from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
+from studies.scene.tissues import STOMACH
 from studies.scenes.stomach_press import BACK
 
 RADIUS = 0.025  # m; twice the edge of the coarsest reference mesh, so that the contact is resolved

@@ -6,7 +6,9 @@ point, under which a continuum gives way without limit (Boussinesq); a force or 
 
 from massspring import Path, Probe
 from studies.geometry.organs.stomach import STOMACH_REGIONS, stomach_shape
-from studies.scene.scene import STOMACH, Held, Organ, Probed, Scene, along, probe_of, scaled
+from studies.scene.placing import along, probe_of, scaled
+from studies.scene.scene import Held, Organ, Probed, Scene
+from studies.scene.tissues import STOMACH
 
 NODES = 19_500
 """Surface nodes, with 38,996 triangles: the paper's refined stomach has 19,000 and 39,000, rounded."""

@@ -1,6 +1,8 @@
 """A ball started from shapes that no organ has; nothing touches it. Not among SCENES: there is no reference."""
 
-from studies.scene.scene import LIVER, Organ, Probed, Scene, Start
+from studies.scene.scene import Organ, Probed, Scene
+from studies.scene.start import Start
+from studies.scene.tissues import LIVER
 
 DURATION = 4.0  # s: 3,000 steps and more of a fifth of the limit
 RADIUS = 0.05  # m

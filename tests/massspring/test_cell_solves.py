@@ -24,10 +24,11 @@ from massspring.kernels.constraint.tetrahedra import (
     relax_cells,
     solve_cells,
 )
+from massspring.kernels.contact.constrained_motion import unpushed_into
 from massspring.kernels.forces.volume import enclosed_volume
-from massspring.kernels.step.predict import predict, unpushed_into
+from massspring.kernels.step.predict import predict
+from massspring.layout.allocate import start
 from massspring.methods.families.tetrahedra import cells_of
-from massspring.methods.method import start
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.test_cells import cell_volumes, deformed, pressed
 from tests.massspring.test_methods import clock_for, thrown

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from massspring import Attachment, Body, ImplicitVolume, Volumes
-from massspring.kernels.constraint.block_jacobi import SIZE, answer, precondition_into, scale_into
+from massspring.kernels.arrays.volume_rows import SIZE
+from massspring.kernels.constraint.block_jacobi import answer, precondition_into, scale_into
 from massspring.kernels.constraint.jacobian import diagonal_into, rows_into
 from massspring.kernels.constraint.schur import solve_iteratively
+from massspring.layout.allocate import start
 from massspring.layout.block_jacobi import SHIFT, clusters_at_rest, each_alone
-from massspring.methods.method import State, start
+from massspring.layout.state import State
 from tests.massspring.test_kernels import moved
 from tests.massspring.test_rows import dense
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from massspring.body.inside import is_inside, new_pair, surface_distance
 from massspring.body.surface import winding_number
 from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, touching
-from massspring.layout.probe_arrays import is_inside, new_pair, surface_distance
 from tests.massspring.conftest import icosphere
 
 FLAT = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -24,7 +24,8 @@ from massspring import (
 )
 from massspring.kernels.contact.active_set import find_contacts
 from massspring.kernels.step.predict import predict
-from massspring.methods.method import State, begin_frame
+from massspring.layout.state import State
+from massspring.methods.method import begin_frame
 
 MOMENTUM_TOL = 1e-12  # relative: round-off of some thousand additions per step, over 40 steps
 

@@ -18,9 +18,10 @@ from massspring import (
 from massspring.kernels.arrays.layout import Accuracy
 from massspring.kernels.constraint.jacobian import diagonal_into, rows_into, transposed_rows_times_into
 from massspring.kernels.constraint.schur import solve_iteratively
+from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
+from massspring.layout.state import new_tally
 from massspring.methods.implicit_volume import set_right_side, solve_multipliers
-from massspring.methods.method import new_tally, start
 from tests.massspring.test_kernels import ROUND_OFF, directional, moved
 from tests.massspring.test_methods import clock_for, squeeze
 from tests.massspring.touched import list_touched, seat

@@ -18,7 +18,7 @@ from massspring import (
 )
 from massspring.body.membranes import membrane_body
 from massspring.kernels.fused.chunk import LANES
-from massspring.methods.method import start
+from massspring.layout.allocate import start
 from massspring.run.renumber import MANY, Numbered, numbered, renumbered
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.test_methods import clock_for, squeeze, thrown

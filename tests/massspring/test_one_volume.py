@@ -13,7 +13,7 @@ from massspring import (
     simulate,
 )
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
-from massspring.methods.method import start
+from massspring.layout.allocate import start
 from tests.massspring.test_methods import clock_for, squeeze, thrown
 from tests.massspring.touched import seat
 

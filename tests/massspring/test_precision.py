@@ -10,7 +10,7 @@ from numba.core.runtime import rtsys
 from massspring import Attachment, Free, ImplicitVolume, MassSpringError, Setup, simulate
 from massspring.kernels.contact.node_contact import round_gap
 from massspring.kernels.fused.sweep import gather_and_predict
-from massspring.methods.method import start
+from massspring.layout.allocate import start
 from massspring.run.precision import KEPT_DOUBLE, in_precision
 from tests.massspring.test_methods import clock_for, squeeze
 

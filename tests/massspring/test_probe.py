@@ -18,10 +18,10 @@ from massspring import (
     simulate,
     surface_body,
 )
+from massspring.body.inside import is_inside, mean_edge
 from massspring.kernels.probe.arrays import COMPARED, IN_CONTACT, LEFT_BEHIND, Stage
 from massspring.kernels.probe.contacts import solve_rows
 from massspring.kernels.probe.motion import gather
-from massspring.layout.probe_arrays import is_inside, mean_edge
 from massspring.methods.method import begin_frame
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.test_methods import clock_for, thrown

@@ -17,8 +17,8 @@ from massspring import (
     Setup,
     simulate,
 )
+from massspring.body.inside import is_inside, surface_distance
 from massspring.kernels.probe.arrays import LEFT_BEHIND
-from massspring.layout.probe_arrays import is_inside, surface_distance
 from massspring.run.simulation import pierced
 from tests.massspring.test_methods import clock_for
 from tests.massspring.test_probe import BALL, EDGE, METHODS, R, frames_of

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from massspring import Clock, ImplicitVolume, Path, Probe, Setup, Volumes
+from massspring.body.inside import mean_edge
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND, Stage
 from massspring.kernels.probe.contacts import solve_rows
 from massspring.kernels.probe.fallback import lead
 from massspring.kernels.probe.motion import gather, move
 from massspring.kernels.probe.pressure import change_of_rows, swelling
-from massspring.layout.probe_arrays import mean_edge
 from massspring.methods.method import begin_frame
 from tests.massspring.test_methods import clock_for
 from tests.massspring.test_probe import BALL, asked_of, pressed, rates_of

@@ -5,12 +5,12 @@ import pytest
 from scipy.sparse import csr_array
 
 from massspring import Body, Volumes
-from massspring.kernels.arrays.layout import VolumeRows
+from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.constraint.jacobian import diagonal_into, rows_into
 from massspring.kernels.constraint.schur import apply_schur
+from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.ring_areas import quadrangles
-from massspring.methods.method import start
 from massspring.run.precision import in_precision
 from tests.massspring.conftest import icosphere
 from tests.massspring.test_kernels import moved

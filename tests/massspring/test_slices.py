@@ -5,14 +5,15 @@ import pytest
 
 from massspring import Attachment, Body, Clock, Free, ImplicitVolume, Setup, Volumes, tetrahedral_body
 from massspring.body.springs import Springs
+from massspring.kernels.constraint.one_volume import multiplier_of_sums, volume_multiplier
 from massspring.kernels.forces.membrane import add_membrane_forces
 from massspring.kernels.forces.springs import spring_forces_into
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
 from massspring.kernels.fused.chunk import LANES
 from massspring.kernels.fused.sweep import gather_and_predict
-from massspring.kernels.step.advance import multiplier_of_sums, prescribe, volume_multiplier
+from massspring.kernels.step.attachments import prescribe
+from massspring.layout.allocate import start
 from massspring.layout.sell_chunks import LONGEST, rings, slices_of
-from massspring.methods.method import start
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.test_kernels import DIFFERENCE, STEP, moved
 from tests.massspring.touched import list_touched

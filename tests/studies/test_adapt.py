@@ -9,7 +9,8 @@ from massspring import MassSpringError, Path
 from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
 from studies.runs.case import BodyRecipe
-from studies.runs.prepare import attachments_for, body_for, mesh_for, patch_nodes, prepare
+from studies.runs.prepare import attachments_for, body_for, prepare
+from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scenes import Held
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from tests.geometry.boxes import box, split

@@ -89,7 +89,7 @@ def test_packages_and_modules_are_found_by_name():
     import studies.base.lookup
 
     assert source_fingerprint("studies.base.errors") == source_fingerprint(Path(studies.base.errors.__file__))
-    assert source_fingerprint("studies") == source_fingerprint(Path(studies.base.errors.__file__).parent)
+    assert source_fingerprint("studies.base") == source_fingerprint(Path(studies.base.errors.__file__).parent)
     assert source_fingerprint("studies.base.errors") != source_fingerprint("studies.base.errors", "studies.base.lookup")
 
 

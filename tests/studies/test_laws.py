@@ -9,8 +9,9 @@ from massspring import Volumes
 from reference_fem import exact
 from studies.base.errors import StudyError
 from studies.runs.case import BodyRecipe, Case
-from studies.runs.prepare import body_for, mesh_for, prepare
+from studies.runs.prepare import body_for, prepare
 from studies.runs.run import measure
+from studies.scene.meshing import mesh_for
 from studies.scenes import BALL_SQUEEZE, BLADDER_FILL
 from studies.scenes.ball_squeeze import DEPTH, PRESS_END, RADIUS
 from studies.store.record import Status

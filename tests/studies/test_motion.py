@@ -20,7 +20,8 @@ from studies.reference.uncertainty import Places, View
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.runs.run import measure
-from studies.scene.scene import Start, allowed
+from studies.scene.quantities import allowed
+from studies.scene.start import Start
 from studies.scenes import Lumen, ReferencePlan
 from studies.scenes.ball_ringing import BALL_RINGING, RADIUS
 from studies.scenes.ball_squeeze import BALL_SQUEEZE

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from massspring import Free
-from massspring.layout.probe_arrays import is_inside
+from massspring.body.inside import is_inside
 from studies.plots.figures import paper_ball, paper_slide
-from studies.runs.case import case_from_json, scene_from_dict, scene_to_json
+from studies.runs.case import case_from_json
 from studies.runs.paper import ball_case, moments, play, slide_case, tip_of
+from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scenes import SCENES, STOMACH_SLIDE, UNJUDGED
 from studies.scenes.stomach_slide import NODES
 

@@ -9,7 +9,8 @@ from massspring import Body, Clock, ImplicitVolume, Setup, step_limit
 from massspring.analysis.modes import natural_frequencies
 from reference_fem import exact
 from studies.runs.case import BodyRecipe
-from studies.runs.prepare import body_for, mesh_for
+from studies.runs.prepare import body_for
+from studies.scene.meshing import mesh_for
 from studies.scenes.ball_squeeze import BALL_SQUEEZE, RADIUS
 
 TISSUE = BALL_SQUEEZE.tissue

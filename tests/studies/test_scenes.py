@@ -12,9 +12,11 @@ from reference_fem.model.problem import find_held
 from reference_fem.system.saddle_point import System
 from studies.base.errors import StudyError
 from studies.reference.problem import anchor, kept_obstacles, reference_problem
-from studies.runs.case import BodyRecipe, Case, scene_from_dict, scene_to_json
-from studies.runs.prepare import mesh_for, patch_nodes, prepare
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames
+from studies.scene.as_json import scene_from_dict, scene_to_json
+from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scenes import SCENES, Start
 from studies.scenes.stress import STRESS_SCENES
 

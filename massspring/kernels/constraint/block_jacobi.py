@@ -1,34 +1,17 @@
 """A preconditioner for many multipliers: S⁻¹ within clusters of volumes, as if nothing lay between them (eq. 169)."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
+from massspring.kernels.arrays.volume_rows import SIZE
 from massspring.kernels.jit.decorators import inlined
 from massspring.kernels.jit.row_sums import INLINED
 from massspring.kernels.jit.simd4 import plus, spread_over
-
-SIZE = 64
-"""Volumes of a cluster: fewer take more iterations, the inverses of more take longer to read than they save."""
-
-
-class Clusters(NamedTuple):
-    """b clusters of m volumes that pull at each other's nodes; the last may be smaller."""
-
-    order: np.ndarray
-    """Volumes cluster by cluster, (m,) uint32."""
-    inverse: np.ndarray
-    """Of S at rest in each, scaled to a diagonal of 1; columns of one after those of the other, 0 beyond its volumes,
-    (64 b, 64) float32: it need not be exact."""
-    scale: np.ndarray
-    """1/√S_rr of the volumes in that order, 0 for what nothing can push [√(kg/m⁴)], (m,)."""
-    part: np.ndarray
-    """Scratch: what is asked of a cluster and its answer, (2, 64) float32."""
 
 
 @inlined

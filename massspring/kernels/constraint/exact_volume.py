@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring.kernels.contact.constrained_motion import pushed_by_into, unpushed_into
 from massspring.kernels.jit.decorators import compiled, inlined
-from massspring.kernels.step.predict import pushed_by_into, unpushed_into
 
 POLISHES = 4
 """Newton steps after the closed form: each doubles the digits that cancellation has left of it."""

@@ -1,10 +1,10 @@
 """The volumes of all tetrahedra solved for at the end of a step: together, or one after the other (eq. 166, 167)."""
 
+from massspring.kernels.contact.constrained_motion import pushed_by_into, unpushed_into
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.forces.tetrahedron_volumes import add_four, cell_slopes, mean_pressure
 from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.jit.decorators import compiled, inlined
-from massspring.kernels.step.predict import pushed_by_into, unpushed_into
 
 WRONG = 1e-6
 """Of a volume: an error that is counted where nothing can mend it; 1 % of what a kept volume may be off."""

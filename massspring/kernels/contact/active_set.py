@@ -12,6 +12,9 @@ from massspring.kernels.jit.blocks import BLOCK, any_within
 from massspring.kernels.jit.decorators import inlined, lean
 from massspring.kernels.jit.thread_team import SEARCH, call, join
 
+CONTACT_PASSES = 3
+"""Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
+
 
 @lean
 def seat(network, motion, drive, step, lam, count):

@@ -27,9 +27,9 @@ from massspring.kernels.fused.chunk import (
     total,
 )
 from massspring.kernels.fused.long_rows import add_walls, join_pieces
+from massspring.kernels.fused.padded import places_into
 from massspring.kernels.jit.decorators import inlined, lean
 from massspring.kernels.jit.thread_team import SPRINGS, SPRINGS_AND_VOLUME, call, join
-from massspring.kernels.step.advance import places_into
 
 
 @inlined

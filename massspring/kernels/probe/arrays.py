@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import Motion, Network, Tally, Tips, VolumeRows
+from massspring.kernels.arrays.layout import Motion, Network, Tally, Tips
+from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.probe.continuous import Pair
 
 COUNTS = (

@@ -2,10 +2,10 @@
 
 import math
 
+from massspring.kernels.contact.bookkeeping import settled
 from massspring.kernels.jit.decorators import comparing, lean
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.probe.arrays import COMPARED
-from massspring.kernels.step.advance import settled
 
 TRIANGLE_BLOCK = 8
 """Triangles that share one alarm: 39,000 triangles are 4,880 numbers a step while all sleep."""

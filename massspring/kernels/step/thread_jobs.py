@@ -1,6 +1,7 @@
 """What the other threads of a team do during a frame (kernels.team)."""
 
 from massspring.kernels.contact.gaps import clearances_into
+from massspring.kernels.fused.padded import places_into
 from massspring.kernels.fused.sweep import pass_slices
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.jit.thread_team import (
@@ -16,7 +17,7 @@ from massspring.kernels.jit.thread_team import (
     raise_by_one,
     wait_until_other_than,
 )
-from massspring.kernels.step.advance import advance_nodes, places_into
+from massspring.kernels.step.advance import advance_nodes
 
 
 @lean

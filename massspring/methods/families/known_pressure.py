@@ -19,9 +19,11 @@ from massspring.kernels.forces.volume import pyramid_volume, volume_gradient_int
 from massspring.kernels.jit.decorators import compiled
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, VOLUME, mark
 from massspring.kernels.probe.stage import meet_probes
-from massspring.kernels.step.advance import add_held_impulse, advance
+from massspring.kernels.step.advance import advance
+from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.predict import predict
-from massspring.methods.method import State, begin_frame
+from massspring.layout.state import State
+from massspring.methods.method import begin_frame
 
 PENALTY, GAS, PYRAMIDS = 0, 1, 2
 

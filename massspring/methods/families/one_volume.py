@@ -15,7 +15,8 @@ import numpy as np
 
 from massspring.kernels.arrays.layout import Drive
 from massspring.kernels.constraint.exact_volume import Line, line_into, nearest_root, volume_cubic
-from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
+from massspring.kernels.constraint.one_volume import capped_error, steepest, surely_short, volume_multiplier
+from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, pressure_reach, revise_contacts
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.jit.decorators import compiled
@@ -32,17 +33,11 @@ from massspring.kernels.jit.stage_clock import (
     mark,
 )
 from massspring.kernels.probe.stage import meet_probes
-from massspring.kernels.step.advance import (
-    add_held_impulse,
-    advance,
-    capped_error,
-    steepest,
-    surely_short,
-    volume_multiplier,
-)
+from massspring.kernels.step.advance import advance
+from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.predict import predict
-from massspring.methods.implicit_volume import CONTACT_PASSES
-from massspring.methods.method import State, begin_frame
+from massspring.layout.state import State
+from massspring.methods.method import begin_frame
 
 
 class Rule(NamedTuple):

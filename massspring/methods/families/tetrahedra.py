@@ -17,9 +17,11 @@ from massspring.kernels.forces.tetrahedron_volumes import (
 )
 from massspring.kernels.jit.decorators import compiled
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, OUTSIDE, SEARCH, SPRINGS, VOLUME, mark
-from massspring.kernels.step.advance import add_held_impulse, advance
+from massspring.kernels.step.advance import advance
+from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.predict import add_to_prediction, predict
-from massspring.methods.method import State, begin_frame, one_whole
+from massspring.layout.state import State
+from massspring.methods.method import begin_frame, one_whole
 
 
 def cells_of(body: Body) -> Cells:

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array, tril
 from scipy.sparse.linalg import splu
 
-from massspring.kernels.arrays.layout import Network, VolumeRows
+from massspring.kernels.arrays.layout import Network
+from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.constraint.ldl_solve import Triangular, respond_into
 
 

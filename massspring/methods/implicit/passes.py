@@ -8,12 +8,12 @@ from massspring.kernels.arrays.layout import Accuracy, Drive
 from massspring.kernels.constraint.jacobian import rows_into, rows_times_into, transposed_rows_times_into
 from massspring.kernels.forces.springs import spring_forces_into
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, REVISION, SEARCH, SPRINGS, VOLUME, mark
-from massspring.kernels.step.advance import add_held_impulse
+from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.implicit_step import imbalance_into
 from massspring.layout.jacobian_pattern import DENSE_UP_TO
+from massspring.layout.state import State
 from massspring.methods.implicit.contact import Contact, Touching
 from massspring.methods.implicit.factor import Factor
-from massspring.methods.method import State
 
 CONTACT_REVISIONS, LAST_REVISIONS = 3, 12
 """Of the touched set in one pass, and in the last one, after which no other pass finds a node that enters or is pulled.

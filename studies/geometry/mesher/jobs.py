@@ -143,7 +143,8 @@ def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: flo
             "OMP_NUM_THREADS": "1",
             "OPENBLAS_NUM_THREADS": "1",
         }
-        command = [sys.executable, "-m", "studies.geometry.mesher.worker", str(job), str(out)]
+        module = "scan_recipe" if recipe["kind"] == "scan" else "organ_recipe"
+        command = [sys.executable, "-m", f"studies.geometry.mesher.{module}", str(job), str(out)]
         try:
             done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit, check=False)
         except subprocess.TimeoutExpired as error:

@@ -1,5 +1,6 @@
 """Making a mesh from its recipe, inside the worker process. The same recipe gives the same mesh bit for bit."""
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from studies.geometry.mesh.wall_layers import fill_wall
 from studies.geometry.mesher.fill import fill_surface
 from studies.geometry.mesher.gmsh_calls import Remesher, fresh_model
 from studies.geometry.mesher.octant import build_octant
+from studies.geometry.mesher.worker import Arrays, work
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import ON_CURVE, Region, region_from_dict
@@ -18,19 +20,12 @@ from studies.geometry.surface.first_surface import first_surface
 from studies.geometry.surface.node_count import Surface, surface_with
 from studies.geometry.surface.snap import relax, snap_region
 
-Arrays = dict[str, np.ndarray]
-
 
 def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     """The arrays of jobs.PARTS for a recipe; `arrays` holds a given surface for kind "fill".
 
     Raises StudyError when the recipe cannot be made.
     """
-    if recipe["kind"] == "scan":
-        # Its compiled distances take half a second to import, which other meshes need not wait for.
-        from studies.geometry.mesher.scan_recipe import build_scan
-
-        return build_scan(recipe, arrays)
     return {"organ": build_organ, "fill": build_fill, "ball_octant": build_octant}[recipe["kind"]](recipe, arrays)
 
 
@@ -121,3 +116,7 @@ def arrays_of(
     """What the worker hands over, by the names of jobs.PARTS."""
     counts = {"surface_count": np.array(surface_count), "outer_count": np.array(outer_count)}
     return {"points": points, "triangles": triangles, "tetrahedra": tetrahedra, **counts}
+
+
+if __name__ == "__main__":
+    sys.exit(work(build, sys.argv[1], sys.argv[2]))

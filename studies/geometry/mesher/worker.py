@@ -1,19 +1,22 @@
-"""Process that meshes one recipe: `python -m studies.geometry.mesher.worker JOB.npz OUT.npz`.
+"""Process that meshes one recipe: `python -m studies.geometry.mesher.organ_recipe JOB.npz OUT.npz`, or scan_recipe.
 
-gmsh can hang without a word or crash; here it takes nobody with it. A StudyError goes to the output file as a sentence.
+gmsh can hang without a message or crash; in a process of its own it harms nothing else. Scans have a process of their
+own kind because their compiled distances take half a second to import, which other meshes need not wait for.
 """
 
 import json
-import sys
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.mesher.organ_recipe import build
+
+Arrays = dict[str, np.ndarray]
 
 
-def main(job_path: str, out_path: str) -> int:
-    """Read the job, write the mesh or the sentence of a StudyError; 0 or 2."""
+def work(build: Callable[[dict[str, Any], Arrays], Arrays], job_path: str, out_path: str) -> int:
+    """Reads the job, writes the mesh of `build` or the sentence of its StudyError; the exit code, 0 or 2."""
     with np.load(job_path, allow_pickle=False) as job:
         arrays = {key: job[key] for key in job.files if key != "recipe"}
         recipe = json.loads(str(job["recipe"]))
@@ -24,7 +27,3 @@ def main(job_path: str, out_path: str) -> int:
         return 2
     np.savez(out_path, allow_pickle=False, **result)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1], sys.argv[2]))

@@ -1,0 +1,72 @@
+"""The constraint Jacobian J = dV/dx of several volumes, and its preconditioner, as arrays."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+SIZE = 64
+"""Volumes of a cluster: fewer take more iterations, the inverses of more take longer to read than they save."""
+
+
+class Clusters(NamedTuple):
+    """b clusters of m volumes that pull at each other's nodes; the last may be smaller."""
+
+    order: np.ndarray
+    """Volumes cluster by cluster, (m,) uint32."""
+    inverse: np.ndarray
+    """Of S at rest in each, scaled to a diagonal of 1; columns of one after those of the other, 0 beyond its volumes,
+    (64 b, 64) float32: it need not be exact."""
+    scale: np.ndarray
+    """1/√S_rr of the volumes in that order, 0 for what nothing can push [√(kg/m⁴)], (m,)."""
+    part: np.ndarray
+    """Scratch: what is asked of a cluster and its answer, (2, 64) float32."""
+
+
+class VolumeRows(NamedTuple):
+    """m volumes: J = dV/dx as sparse rows with e entries, its transpose, and scratch."""
+
+    target: np.ndarray
+    """Of each entry of J that is summed from areas its place among all, its place node by node, and the same two of the
+    entry that is its negative (again its own where none is), (c, 4) uint32."""
+    ring_start: np.ndarray
+    """First quadrangle in the ring of each summed entry, (c + 1,) uint32."""
+    corner: np.ndarray
+    """Nodes round a quadrangle, the last one the first again where it is a triangle, (q, 4) uint32."""
+    corner_share: np.ndarray
+    """s_rf / 6 [1], (q,)."""
+    row_start: np.ndarray
+    """First entry of each volume, (m + 1,) uint32."""
+    column: np.ndarray
+    """Node of each entry, (e,) uint32."""
+    node_start: np.ndarray
+    """Where the entries of each node begin in the next two, (n + 1,) uint32."""
+    node_entry: np.ndarray
+    """Entries node by node, volumes ascending, (e,) uint32."""
+    node_row: np.ndarray
+    """Their volumes, (e,) uint32."""
+    value: np.ndarray
+    """J_rj [m²], (e, 4); the fourth number is 0 and fills a vector register."""
+    node_value: np.ndarray
+    """The same node by node, (e, 4)."""
+    volume: np.ndarray
+    """V_r [m³], (m,)."""
+    lam: np.ndarray
+    """Multipliers, on the way in those of the last step [Pa], (m,)."""
+    right: np.ndarray
+    """What the multipliers of the moment leave of the right-hand side [m³/s²], (m,)."""
+    free_diagonal: np.ndarray
+    """S_rr without contact [m⁴/kg], (m,)."""
+    diagonal: np.ndarray
+    """S_rr [m⁴/kg], (m,)."""
+    clusters: Clusters
+    """Of no volume where S is solved densely."""
+    matrix: np.ndarray
+    """S [m⁴/kg], (m, m); (0, 0) where it is solved iteratively."""
+    search: np.ndarray
+    """(m,)."""
+    image: np.ndarray
+    """(m,)."""
+    allowed: np.ndarray
+    """Residual at which the iteration ends, (m,)."""
+    node_vector: np.ndarray
+    """(n, 4); the fourth number is 0."""

@@ -1,0 +1,89 @@
+"""The multiplier of one volume, and how far a correction may move a node."""
+
+import math
+
+from massspring.kernels.contact.node_contact import allowed_part, taken_share
+from massspring.kernels.jit.decorators import inlined, lean
+
+NEGLIGIBLE = 1e-12
+"""A mobility this much smaller than what it was taken from is round-off."""
+
+
+@lean
+def volume_multiplier(motion, inverse_mass, volume_error, dt):
+    """lam = [(V0 − V) − dt G·ṽ] / (dt² G·W̃·G) [Pa]: one division (eq. 8). Returns (lam, G·W̃·G).
+
+    ṽ, W̃: velocity and inverse mass of a touched node act only along its obstacle (eq. 9). `volume_error` is V0 − V.
+    Limit: with no gradient there is nothing to push on; the caller skips when G·W̃·G is not positive.
+    """
+    flow = 0.0
+    mobility = 0.0
+    for i in range(inverse_mass.shape[0]):
+        g0, g1, g2 = motion.gradient[i, 0], motion.gradient[i, 1], motion.gradient[i, 2]
+        v0, v1, v2 = motion.v_star[i, 0], motion.v_star[i, 1], motion.v_star[i, 2]
+        flow += g0 * v0 + g1 * v1 + g2 * v2
+        square = g0 * g0 + g1 * g1 + g2 * g2
+        if motion.locked[i] > 0:
+            locked = motion.locked[i]
+            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
+            p0, p1, p2 = allowed_part(locked, d0, d1, d2, g0, g1, g2)
+            square = g0 * p0 + g1 * p1 + g2 * p2
+            p0, p1, p2 = allowed_part(locked, d0, d1, d2, v0, v1, v2)
+            flow += g0 * (p0 + motion.goal[i, 0] - v0)
+            flow += g1 * (p1 + motion.goal[i, 1] - v1)
+            flow += g2 * (p2 + motion.goal[i, 2] - v2)
+        mobility += inverse_mass[i] * square
+    if not mobility > 0.0:
+        return 0.0, mobility
+    return (volume_error - dt * flow) / (dt * dt * mobility), mobility
+
+
+@inlined
+def multiplier_of_sums(motion, inverse_mass, volume_error, dt, flow, mobility):
+    """The same from G·v* and G·W·G of all nodes, less what obstacles take of the few they touch (eq. 8, 9)."""
+    locked, direction, goal, gradient, v_star = (
+        motion.locked,
+        motion.direction,
+        motion.goal,
+        motion.gradient,
+        motion.v_star,
+    )
+    free = mobility
+    for k in range(motion.touching_count[0]):
+        i = motion.touching[k]
+        if locked[i] > 0:
+            g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
+            v0, v1, v2 = v_star[i, 0], v_star[i, 1], v_star[i, 2]
+            d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
+            mobility -= inverse_mass[i] * taken_share(locked[i], d0, d1, d2, g0, g1, g2, g0, g1, g2)
+            flow -= taken_share(locked[i], d0, d1, d2, g0, g1, g2, v0, v1, v2)
+            flow += g0 * goal[i, 0] + g1 * goal[i, 1] + g2 * goal[i, 2]
+    if mobility <= NEGLIGIBLE * free:
+        return 0.0, 0.0
+    return (volume_error - dt * flow) / (dt * dt * mobility), mobility
+
+
+@lean
+def steepest(gradient, inverse_mass):
+    """max_i w_i |G_i| [m²/kg]: how far the node that moves most goes per unit of pressure and dt²."""
+    largest = 0.0
+    for i in range(inverse_mass.shape[0]):
+        square = gradient[i, 0] ** 2 + gradient[i, 1] ** 2 + gradient[i, 2] ** 2
+        largest = max(largest, inverse_mass[i] * math.sqrt(square))
+    return largest
+
+
+@inlined
+def surely_short(volume_error, mobility, lightest, longest):
+    """Whether no node moves farther than `longest` [m] to make up for a wrong volume: |e| √(max w / G·W̃·G) ≤ longest.
+
+    max_i w_i |G_i| ≤ √(max w · G·W̃·G) without contact; the true reach is looked for only when this bound fails.
+    """
+    return volume_error * volume_error * lightest <= longest * longest * mobility
+
+
+@inlined
+def capped_error(volume_error, mobility, steepest, longest):
+    """V0 − V, at most `longest` · G·W̃·G / max w|G| [m³]: then no node moves farther than `longest` [m] (eq. 35)."""
+    most = longest * mobility / steepest if steepest > 0.0 else 0.0
+    return min(max(volume_error, -most), most)

@@ -1,0 +1,49 @@
+"""Nodes whose motion is prescribed."""
+
+from massspring.kernels.jit.decorators import inlined, lean
+
+
+@lean
+def prescribe_velocity_into(x, held_nodes, held_group, held_rest, displacement, dt, v_star):
+    """v*_i = (X_i + d_g − x_i)/dt [m/s] for every held node: it ends the step where its attachment is (eq. 7)."""
+    for h in range(held_nodes.shape[0]):
+        i = held_nodes[h]
+        g = held_group[h]
+        for axis in range(3):
+            v_star[i, axis] = (held_rest[h, axis] + displacement[g, axis] - x[i, axis]) / dt
+
+
+@inlined
+def prescribe(network, motion, displacement, dt):
+    """v* of held nodes (eq. 7); returns what that changes of G·v* [m³/s]."""
+    nodes, groups, rest = network.held_nodes, network.held_group, network.held_rest
+    x, v_star, gradient = motion.x, motion.v_star, motion.gradient
+    flow, per_step = 0.0, 1.0 / dt
+    for h in range(nodes.shape[0]):
+        i, g = nodes[h], groups[h]
+        for axis in range(3):
+            held = per_step * (rest[h, axis] + displacement[g, axis] - x[i, axis])
+            flow += gradient[i, axis] * (held - v_star[i, axis])
+            v_star[i, axis] = held
+    return flow
+
+
+@inlined
+def add_held_impulse(network, motion, lam, dt, gravity, held_impulse):
+    """I_g = −dt Σ_i∈g (f_i + lam G_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 11)."""
+    nodes, groups, mass = network.held_nodes, network.held_group, network.mass
+    force, gradient = motion.force, motion.gradient
+    h, count = 0, nodes.shape[0]
+    while h < count:
+        g = groups[h]
+        k0, k1, k2, carried = 0.0, 0.0, 0.0, 0.0
+        while h < count and groups[h] == g:
+            i = nodes[h]
+            k0 += force[i, 0] + lam * gradient[i, 0]
+            k1 += force[i, 1] + lam * gradient[i, 1]
+            k2 += force[i, 2] + lam * gradient[i, 2]
+            carried += mass[i]
+            h += 1
+        held_impulse[g, 0] -= dt * (k0 + carried * gravity[0])
+        held_impulse[g, 1] -= dt * (k1 + carried * gravity[1])
+        held_impulse[g, 2] -= dt * (k2 + carried * gravity[2])

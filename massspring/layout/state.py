@@ -1,0 +1,54 @@
+"""A body in motion, as every method is given it."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from massspring.kernels.arrays.layout import Motion, Network, Tally
+from massspring.kernels.arrays.volume_rows import VolumeRows
+from massspring.kernels.jit.stage_clock import Ticks
+from massspring.kernels.probe.arrays import Probing
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A body in motion. `advance` returns a new one and leaves the old as it was."""
+
+    network: Network
+    motion: Motion
+    lam: np.ndarray
+    """Interior gauge pressure of each kept volume in the last step, beyond what it is at rest [Pa], (m,); 0 for
+    methods that keep none."""
+    rows: VolumeRows | None = None
+    """None where one closed surface is kept: a division needs no rows."""
+    tally: Tally = field(default_factory=lambda: new_tally(0, 0))
+    """What the last frame measured of itself."""
+    memory: Any = None
+    """Arrays that only the method knows, made by its `start`."""
+    probing: Probing | None = None
+    """Of thin probes; None where there are none: the frame is then compiled without their stage."""
+    place: np.ndarray | None = None
+    """Where each node is in `network` and `motion`, (n,); None where they have the numbers of the body."""
+
+    @property
+    def x(self) -> np.ndarray:
+        """Positions [m], (n, 3)."""
+        return self.motion.x if self.place is None else self.motion.x[self.place]
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocities [m/s], (n, 3)."""
+        return self.motion.v if self.place is None else self.motion.v[self.place]
+
+    def moved_to(self, x: np.ndarray) -> "State":
+        """The same at positions `x` (n, 3) [m]."""
+        motion = self.motion._replace(x=self.motion.x.copy())
+        motion.x[slice(None) if self.place is None else self.place] = x
+        return replace(self, motion=motion)
+
+
+def new_tally(obstacles: int, attachments: int, ticks: Ticks | None = None) -> Tally:
+    """A tally at zero; the ticks go on."""
+    skipped, capped, iterations = (np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
+    return Tally(np.zeros((obstacles, 3)), np.zeros((attachments, 3)), skipped, capped, iterations, ticks)

@@ -1,0 +1,25 @@
+"""A scene as JSON text, and back."""
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from studies.scene.scene import Scene
+
+
+def scene_to_json(scene: Scene) -> str:
+    """Canonical JSON of a scene."""
+    return json.dumps(_scene_adapter().dump_python(scene, mode="json"), sort_keys=True, ensure_ascii=False)
+
+
+def scene_from_dict(data: Mapping[str, Any]) -> Scene:
+    """The scene of a JSON-able form; pydantic checks every type."""
+    return _scene_adapter().validate_python(data)
+
+
+@cache
+def _scene_adapter() -> TypeAdapter[Scene]:
+    return TypeAdapter(Scene)

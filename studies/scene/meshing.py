@@ -1,0 +1,40 @@
+"""The mesh of a scene's organ, and the nodes of its held regions."""
+
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.base.lookup import choose
+from studies.geometry import OrganMesh, fill, organ, read_mesh, scan
+from studies.geometry.organs import SHAPES
+from studies.scene.scene import Scene
+
+FILE_PARAMETERS = ("path", "unit", "remesh", "smooth", "wall")
+"""Of the organ "file"."""
+
+
+def mesh_for(scene: Scene, nodes: int, filled: bool = True) -> OrganMesh:
+    """The scene's organ with `nodes` surface nodes. Raises StudyError.
+
+    A mesh file comes as it is, unless its parameters ask for a new surface: "remesh": true, or "smooth" or "wall" [m].
+    """
+    if choose(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
+        return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters)
+    parameters = scene.organ.parameters
+    if "path" not in parameters or "unit" not in parameters:
+        raise StudyError(
+            f"scene '{scene.name}': an organ from a file needs a path and a unit, it has {dict(parameters)}"
+        )
+    for key in parameters:
+        choose(key, FILE_PARAMETERS, "parameter of an organ from a file")
+    asked = {key: parameters[key] for key in ("smooth", "wall") if key in parameters}
+    if asked or parameters.get("remesh"):
+        return scan(parameters["path"], nodes, unit=parameters["unit"], fill=filled, **asked)
+    mesh = read_mesh(parameters["path"], unit=parameters["unit"])
+    return fill(mesh) if filled and not len(mesh.tetrahedra) else mesh
+
+
+def patch_nodes(mesh: OrganMesh, name: str, region: object) -> np.ndarray:
+    """Surface nodes of a patch: as the mesher outlined it, or for a mesh from a file those inside the region."""
+    if name in mesh.patches:
+        return mesh.patches[name]
+    return np.flatnonzero(region.level(mesh.points[: mesh.surface_count]) <= 0)  # pyright: ignore[reportAttributeAccessIssue]

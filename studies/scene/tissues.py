@@ -1,0 +1,34 @@
+"""Tissues with the sources of their constants."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Tissue:
+    """Nearly incompressible soft tissue; the mass-spring body matches mu, its volume constraint stands for kappa."""
+
+    shear_modulus: float
+    """mu [Pa]."""
+    density: float
+    """rho [kg/m³]."""
+    source: str
+    """Where the numbers come from."""
+    bulk_over_shear: float = 5000.0
+    """kappa/mu of the reference [1]."""
+
+
+KIDNEY = Tissue(4900.0, 1050.0, "kidney, MR elastography at 45 Hz: 4.9 ± 0.5 kPa; density about 1,050 kg/m³")
+
+
+SPLEEN = Tissue(
+    3600.0, 1060.0, "spleen, MR elastography at 60 Hz: 3.6 ± 0.3 kPa (Talwalkar et al. 2009); density as liver"
+)
+
+
+STOMACH = Tissue(640.0, 1058.0, "stomach wall, MR elastography: 0.64 kPa; wall tests at large stretch are far stiffer")
+
+
+BLADDER = Tissue(10_000.0, 1040.0, "bladder wall, assumed: published moduli span a decade; the pressure scales with mu")
+
+
+LIVER = Tissue(1800.0, 1060.0, "liver, MR elastography: 1.8 ± 0.4 kPa; density 1,060 kg/m³")
