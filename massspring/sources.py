@@ -20,6 +20,8 @@ from massspring.errors import MassSpringError
 
 OWN = ("massspring", "reference_fem", "studies")
 """The packages of this distribution, installed side by side; other packages are known by their versions."""
+APART = ("massspring.compile_cache", "massspring.sources")
+"""Own modules that keep account of code and change no result."""
 ROOT = Path(__file__).parents[1]
 FACE = "_FACE"
 """A package that loads its names when they are asked for lists them under this name: {name: module}."""
@@ -50,7 +52,7 @@ def source_fingerprint(*modules: str, within: tuple[str, ...] = OWN) -> str:
         if name in known:
             continue
         known[name] = _source(name)
-        waiting += [other for other in _followed(known[name]) if _is_within(other, within)]
+        waiting += [other for other in _followed(known[name]) if _is_within(other, within) and other not in APART]
     _remembered().keep()
     digest = hashlib.sha256()
     for name in sorted(known):
