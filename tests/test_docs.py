@@ -8,7 +8,7 @@ import pytest
 
 from massspring import Body, Clock, Material, Setup, simulate, surface_body
 from studies.catalog import STUDIES
-from studies.publish import BEGIN, END, EXTRAS, PUBLISHED
+from studies.report.publish import BEGIN, END, EXTRAS, PUBLISHED
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.store.record import Status
