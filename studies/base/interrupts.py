@@ -26,8 +26,8 @@ def _press(number: int, frame: FrameType | None) -> None:
 
 @contextmanager
 def listening() -> Iterator[None]:
-    """Inside, a Ctrl-C is remembered besides raising KeyboardInterrupt. Does nothing where somebody else handles it: a
-    job in the background ignores it."""
+    """Inside, a Ctrl-C is remembered besides raising KeyboardInterrupt. Does nothing where SIGINT has another handler:
+    a job in the background ignores it."""
     before = signal.getsignal(signal.SIGINT)
     _Heard.pressed = False
     if before is not signal.default_int_handler:

@@ -98,7 +98,7 @@ def write_record(path: Path, record: Record) -> None:
 def read_record(path: Path, fields: Iterable[str] | None = None) -> Record:
     """The record in `path`, with all fields or only the named ones. The file is opened read-only.
 
-    Raises StudyError when the file is missing, cut off, not ours, of another schema, or lacks a named field.
+    Raises StudyError when the file is missing, cut off, of another program, of another schema, or lacks a named field.
     """
     with open_results(path) as file:
         header, attributes = _attributes(path, file)
@@ -142,7 +142,7 @@ def canonical(key: str) -> str:
 
 @contextmanager
 def open_results(path: Path) -> Iterator[h5py.File]:
-    """The HDF5 file read-only, with the library's errors told in one sentence (StudyError)."""
+    """The HDF5 file read-only, with the library's errors as one sentence (StudyError)."""
     path = Path(path)
     if not path.is_file():
         raise StudyError(f"there is no results file {path}: `organbench status` says which cases are stored")

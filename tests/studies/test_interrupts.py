@@ -88,7 +88,7 @@ def test_a_process_that_starts_meanwhile_waits_until_it_is_ready(ready, code):
 
 
 class Swallowing:
-    """An exception inside a destructor is told and forgotten by Python."""
+    """Python prints an exception inside a destructor and goes on."""
 
     def __del__(self):
         press()
