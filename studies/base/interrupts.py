@@ -32,8 +32,8 @@ def _press(number: int, frame: FrameType | None) -> None:
 
 @contextmanager
 def listening() -> Iterator[None]:
-    """Inside, a signal is remembered besides raising KeyboardInterrupt. Does nothing where somebody else handles it: a
-    job in the background ignores Ctrl-C."""
+    """Inside, a signal is remembered besides raising KeyboardInterrupt. Does nothing for a signal that
+    has another handler: a job in the background ignores Ctrl-C."""
     before = {number: signal.getsignal(number) for number in SIGNALS}
     usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
     ours = [number for number in SIGNALS if before[number] is usual[number]]

@@ -22,13 +22,13 @@ TABLE, CHART = "uncertainty.csv", "uncertainty.png"
 
 
 def known_references(root: Path, scenes: Iterable[Scene]) -> dict[str, Reference]:
-    """Those that are solved on all their meshes, by the name of their scene; the others are told of by their study."""
+    """Those that are solved on all their meshes, by the name of their scene; the study reports the others."""
     found = {}
     for scene in scenes:
         try:
             reference = load_reference(root, scene)
         except StudyError:
-            continue  # load_runs says which piece is missing, and why
+            continue  # load_runs reports which piece is missing, and why
         if reference is not None:
             found[scene.name] = reference
     return found

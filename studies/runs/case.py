@@ -180,7 +180,7 @@ def case_from_json(text: str) -> Case:
 
 
 def method_from_dict(data: Mapping[str, Any]) -> Method:
-    """The method of {"name": …, "settings": {…}}; a setting that no one reads is an error. Raises StudyError."""
+    """The method of {"name": …, "settings": {…}}; an unknown setting is an error. Raises StudyError."""
     kind = choose(data["name"], {method.name: method for method in METHODS}, "method")
     unknown = set(data["settings"]) - set(kind.__dataclass_fields__)  # pyright: ignore[reportAttributeAccessIssue]
     if unknown:

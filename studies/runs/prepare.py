@@ -32,7 +32,7 @@ LUMEN, WHOLE = "lumen", "whole"
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """All that a run needs, and what a report says about it."""
+    """All that a run needs, and what a report shows of it."""
 
     mesh: OrganMesh
     setup: Setup

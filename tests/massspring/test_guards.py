@@ -56,7 +56,7 @@ def case(request, kept_body):
 
 
 def test_a_body_on_a_line_is_counted_and_not_thrown(case):
-    """G = 0: each step of a method that would mend the volume is counted, and nobody divides by nothing."""
+    """G = 0: each step of a method that would mend the volume is counted, and nothing is divided by 0."""
     clock = clock_for(case.body, 3, 10, fraction=0.2, method=case.method)
     history = simulate(case.setup(clock, damping=20.0, positions=start_of(case.body, LINE)))
     assert history.outcome == "finished"
@@ -100,7 +100,7 @@ def test_a_capped_correction_moves_no_node_farther_than_it_claims(case):
 
 @pytest.mark.parametrize("start", FAR_OFF)
 def test_a_volume_far_off_comes_back(case, start):
-    """At 0.2 dt_c: as closely as a kept volume is kept; what a force keeps is on its way, and nobody is torn apart."""
+    """At 0.2 dt_c: as closely as a kept volume is kept; what a force keeps is on its way, and no body is torn apart."""
     if case.body.kept.count == case.body.node_count and start == "flattened":
         pytest.skip("the volumes of all nodes at once: what each may move alone adds up to hundreds of times as much")
     nodal = case.body.kept.count == case.body.node_count

@@ -57,7 +57,7 @@ CONTESTANTS = {
     "element_hard": Element(hard=True),
     "xpbd_whole": Xpbd(volumes="whole"),
 }
-"""Every method as it comes, and those with a switch the other way round."""
+"""Every method with its default settings, and those with a switch the other way round."""
 
 
 @pytest.fixture(params=CONTESTANTS.values(), ids=CONTESTANTS.keys())

@@ -1,4 +1,4 @@
-"""Rest stays at rest, for as long as anybody will watch."""
+"""A body at rest stays at rest, over many frames."""
 
 import numpy as np
 import pytest

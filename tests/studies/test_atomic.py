@@ -75,7 +75,7 @@ def test_kill_9_leaves_a_whole_file(tmp_path):
         content = path.read_bytes()
         assert len(content) == 3_000_000
         assert len(set(content)) == 1
-    write_whole(path, b"next")  # a leftover .part is in nobody's way
+    write_whole(path, b"next")  # a leftover .part does not disturb
     assert path.read_bytes() == b"next"
 
 

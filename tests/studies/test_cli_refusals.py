@@ -260,7 +260,7 @@ def test_a_key_that_is_no_case_cannot_be_replayed(refused, results):
 
 @pytest.mark.parametrize("command", [("run",), ("plot",), ("table", "--csv", "TARGET")])
 def test_results_that_cannot_be_written(refused, tiny_file, finished_sweep, tmp_path, command):
-    """A folder below a file can be written by nobody, the superuser included."""
+    """A folder below a file cannot be written, not even by the superuser."""
     (tmp_path / "file").write_text("no folder")
     root = finished_sweep if command[0] == "table" else tmp_path / "file"
     target = [str(tmp_path / "file" / "t.csv") if word == "TARGET" else word for word in command[1:]]

@@ -143,7 +143,7 @@ def test_a_process_whose_parent_is_gone_before_it_listens_ends_too():
 
 
 class Swallowing:
-    """An exception inside a destructor is told and forgotten by Python."""
+    """Python prints an exception inside a destructor and goes on."""
 
     def __del__(self):
         press()

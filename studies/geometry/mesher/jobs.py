@@ -111,7 +111,7 @@ def maker(kind: str) -> str:
 
 
 def read_cached(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | None:
-    """The stored arrays, or None when there are none or the file is damaged (said in a warning)."""
+    """The stored arrays, or None when there are none or the file is damaged (a warning names it)."""
     if not path.exists():
         return None
     try:
