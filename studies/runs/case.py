@@ -9,8 +9,9 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 
-from massspring import METHODS, ImplicitVolume, Method
+from massspring import METHODS, ImplicitVolume, MassSpringError, Method
 from massspring.run.history import EXTRA
+from massspring.run.precision import check_precision
 from studies.base.errors import StudyError
 from studies.base.lookup import choose
 from studies.scene.as_json import _scene_adapter, scene_from_dict
@@ -70,7 +71,7 @@ class Case:
     beyond_limit: bool = False
     """Whether a step above the stability limit is wanted; it is refused otherwise."""
     precision: Literal["float64", "float32"] = "float64"
-    """Of the mass-spring state."""
+    """Of the mass-spring state; float32 for methods that claim it."""
     recorded: tuple[str, ...] = ()
     """Fields beside those that metrics read: of `massspring.run.history.EXTRA`, the energies."""
     timed: bool = False
@@ -87,8 +88,10 @@ class Case:
             )
         if self.frames is not None and (type(self.frames) is not int or self.frames < 1):
             raise StudyError(f"frames is {self.frames!r}; give a whole number from 1 on, or None for the scene's own")
-        if self.precision not in ("float64", "float32"):
-            raise StudyError(f"the precision is '{self.precision}'; choose float64 or float32")
+        try:
+            check_precision(self.precision, self.method)
+        except MassSpringError as error:
+            raise StudyError(str(error)) from error
         unknown = sorted(set(self.recorded) - set(EXTRA))
         if unknown:
             raise StudyError(f"no extra field is called '{unknown[0]}'; there are {', '.join(EXTRA)}")

@@ -112,7 +112,7 @@ def prepare(case: Case) -> Prepared:
     # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.
     mesh = mesh_for(scene, case.body.nodes, filled=case.body.kind == "tetrahedral" or scene.lumen is not None)
     body = body_for(scene, case.body, mesh)
-    reason = case.method.applies(body)
+    reason = case.method.why_not(body)
     if reason is not None:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to the {case.body.kind} body: {reason}")
     targets = targets_for(scene, mesh, body)
@@ -122,7 +122,7 @@ def prepare(case: Case) -> Prepared:
     held = np.concatenate([a.nodes for a in attachments]) if attachments else None
     limit = step_limit(body, scene.damping, held, case.method.added_stiffness(body))
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
-    beyond = case.beyond_limit or not case.method.limited
+    beyond = case.beyond_limit or not case.method.capabilities.conditionally_stable
     clock = make_clock(scene.duration, case.frames or scene.frames, dt, limit, beyond)
     setup = Setup(
         body,
