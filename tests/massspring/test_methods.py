@@ -8,6 +8,7 @@ import pytest
 
 import massspring.kernels.step.advance as motion_kernels
 from massspring import Body, Clock, ImplicitVolume, Method, Path, Plane, Setup, simulate, step_limit
+from massspring.kernels.constraint.one_volume import volume_multiplier
 from massspring.kernels.contact.active_set import find_contacts
 from massspring.kernels.step.predict import predict
 from massspring.layout.state import State
@@ -196,7 +197,7 @@ class SixfoldGradient(Method):
             error = drive.volume_target[step, 0] - predict(net, mo, drive, step, True)[0]
             mo.gradient[:] *= 6
             find_contacts(net, mo, drive, step, 0.0)
-            lam, _ = motion_kernels.volume_multiplier(mo, net.inverse_mass, error, drive.dt)
+            lam, _ = volume_multiplier(mo, net.inverse_mass, error, drive.dt)
             motion_kernels.advance(mo, net.mass, net.inverse_mass, lam, drive.dt, after.tally.contact_impulse)
         return after
 

@@ -6,6 +6,7 @@ import pytest
 from massspring import Clock, ImplicitVolume, Setup, simulate, step_limit, surface_body
 from tests.massspring.conftest import SOFT, icosphere
 
+
 @pytest.mark.parametrize("steps", [20_000, pytest.param(1_000_000, marks=pytest.mark.campaign)])
 def test_a_ball_at_rest_stays_there(steps):
     """Round-off is not pumped up: it wanders by 2e-14 of the body in a million steps; a bias of one last digit a step
