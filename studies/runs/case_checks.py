@@ -22,7 +22,7 @@ def check_settings(case: Any) -> None:
     if case.frames is not None and (type(case.frames) is not int or case.frames < 1):
         raise StudyError(f"frames is {case.frames!r}; give a whole number from 1 on, or None for the scene's own")
     try:
-        check_precision(case.precision, case.method)
+        check_precision(case.precision, case.method)  # pyright: ignore[reportArgumentType]
     except MassSpringError as error:
         raise StudyError(str(error)) from error
     if not isinstance(case.recorded, tuple):
