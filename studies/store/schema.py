@@ -12,9 +12,8 @@ import numpy as np
 
 NUMBER, INDEX, TEXT = "number", "whole number", "text"
 DTYPES = {NUMBER: "fiu", INDEX: "iu", TEXT: "U"}
-"""Kinds of fields, and the letters numpy has for them."""
 TYPES = {NUMBER: (int, float), INDEX: (int,), TEXT: (str,)}
-"""Of attributes."""
+"""What fields of a kind are to numpy, and attributes to Python."""
 
 
 class Status(StrEnum):

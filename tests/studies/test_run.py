@@ -201,18 +201,18 @@ def test_replay_tells_a_changed_value(ran, tmp_path, name):
 def test_replay_tells_another_shape_a_lost_field_and_another_end(ran, tmp_path):
     path = tmp_path / "copy.h5"
     path.write_bytes(ran[1].read_bytes())
-    spoil(path, "t", lambda v: v[:-1])
-    assert "'t' has another shape" in replay(path)[2]
+    spoil(path, "tetrahedra", lambda v: v[:-1])
+    assert "'tetrahedra' has another shape" in replay(path)[2]
     record = read_record(ran[1])
-    write_record(path, replace(record, fields={k: v for k, v in record.fields.items() if k != "t"}))
-    assert "'t' is not stored" in replay(path)[2]
+    write_record(path, replace(record, fields=record.fields | {"kinetic": replace(record.fields["min_j"], unit="J")}))
+    assert "'kinetic' is no longer computed" in replay(path)[2]
     write_record(path, replace(record, status=Status.DIVERGED, message="gone"))
     assert "it was diverged, now it is ok" in replay(path)[2]
 
 
 def test_only_runs_are_replayed(ran, tmp_path):
     record = read_record(ran[1])
-    write_record(tmp_path / "a.h5", replace(record, kind="timing"))
+    write_record(tmp_path / "a.h5", replace(record, kind="made up"))
     with pytest.raises(StudyError, match="only a run can be replayed"):
         replay(tmp_path / "a.h5")
 
