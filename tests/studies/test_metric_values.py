@@ -24,6 +24,15 @@ def test_rest_distance_sees_no_rigid_motion_but_a_mirror_image():
     assert of("rest_distance", final=skew * [1, 1, -1], values={"rest": skew}) > 10
 
 
+def test_rest_distance_counts_a_node_by_its_mass():
+    """A node without mass may be anywhere; with mass it cannot."""
+    mass, final = np.ones(len(POINTS)), POINTS.copy()
+    final[0] += SHIFT
+    assert of("rest_distance", final=final, values={"mass": mass}) > 1
+    mass[0] = 0
+    assert of("rest_distance", final=final, values={"mass": mass}) == pytest.approx(0.0, abs=1e-10)
+
+
 def test_the_truth_has_no_error():
     for name in ("force_error", "force_end", "surface_error", "interior_error", "mean_error", "silhouette_error"):
         # Differences of numbers near 0.1 m and 2 N: rounding alone.
@@ -151,3 +160,21 @@ def test_times():
     assert of("frame_time_p99", timing=timing) == pytest.approx(99.01, rel=1e-12)
     assert of("real_time", timing=timing) == pytest.approx(1 / 0.0505, rel=1e-12)
     assert np.isnan([of(name) for name in ("frame_time", "step_time", "frame_time_p99", "real_time")]).all()
+
+
+def test_of_several_volumes_the_farthest_off_counts():
+    """Of three frames the second volume is the one that is off, in the last frame the first is, the other way."""
+    ratios = np.array([[1.0, 1.0], [1.0, 0.98], [1.01, 0.95], [1.03, 0.99]])
+    target = EDGE**3 * np.array([[1.0, 3.0]] * 4)
+    values = {"volume": ratios * target, "volume_target": target}
+    assert of("volume_worst", values=values) == pytest.approx(5.0, rel=1e-12)
+    assert of("volume_end", values=values) == pytest.approx(3.0, rel=1e-12)
+
+
+def test_pressure_of_the_tissue_is_weighted_by_volume_and_leaves_the_lumen_out():
+    """Volumes 1 and 3 at 40 and 20 Pa: 25 Pa, where the truth is 20 Pa. A lumen of any size between them is none."""
+    target, pressure = EDGE**3 * np.array([[1.0, 3.0]] * 4), np.array([[40.0, 20.0]] * 4)
+    tissue = {"volume_target": target, "pressure": pressure}
+    assert of("pressure_error", values=tissue) == pytest.approx(25.0, rel=1e-12)
+    values = {"volume_target": np.insert(target, 1, EDGE**3, axis=1), "pressure": np.insert(pressure, 1, 30.0, axis=1)}
+    assert of("pressure_error", values=values, attributes={"lumen_column": 1}) == pytest.approx(25.0, rel=1e-12)
