@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 from massspring import Free
 from studies.metrics.metrics import Run
-from studies.plots.bodies import body_looks
+from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, finish, grouped, page
 from studies.plots.style.style import BLACK, GREY, NORMAL, heading, method_colour, readable, save, styled
 from studies.timing.statistics import Ratio, ratio_with_spread

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from massspring import Path as Motion
 from studies.metrics.metrics import COMPARABLE, METRICS, Run, force_end
-from studies.plots.bodies import BodyLook, body_looks, body_method_handles
+from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
     band_handle,
     blank,

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from studies.metrics.metrics import Run
-from studies.plots.bodies import body_looks
+from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import band_handle, blank, finish, grouped, log_axis, page, panels, remarks
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, save, styled
 from studies.timing.protocol import FrameTiming

@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator
 
 from massspring import Method
 from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run
-from studies.plots.bodies import body_looks
+from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, by_scene, doubt_mark, doubts, finish, log_axis, page, panels, remarks
 from studies.plots.style.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, heading, readable, save, styled
 from studies.plots.work_precision import cost

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from studies.metrics.metrics import Run
 from studies.metrics.table import metric
-from studies.plots.bodies import BodyLook, body_looks, body_method_handles
+from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import blank, by_scene, finish, good_frames, grouped, has_frames, log_axis, page, panels
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, save, styled
 from studies.runs.case import BodyRecipe

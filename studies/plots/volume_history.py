@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
 from studies.metrics.metrics import COMPARABLE, Run
-from studies.plots.bodies import body_looks, body_method_handles
+from studies.plots.style.bodies import body_looks, body_method_handles
 from studies.plots.style.page import (
     blank,
     by_scene,

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run, real_time
-from studies.plots.bodies import BodyLook, body_looks
+from studies.plots.style.bodies import BodyLook, body_looks
 from studies.plots.style.page import (
     band_handle,
     blank,

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from massspring import METHODS, Free, ImplicitVolume
 from studies.plots import force_path, laws, methods, recovery, stability, volume_history
 from studies.plots import work_precision as work
-from studies.plots.bodies import body_looks
+from studies.plots.style.bodies import body_looks
 from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, styled
 from studies.scenes.stomach_press import STOMACH_PRESS
 from tests.plots.made_up import run
