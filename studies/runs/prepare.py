@@ -23,6 +23,7 @@ from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.runs.case import BodyRecipe, Case
+from studies.runs.limits import check_size
 from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scene.scene import Scene
 
@@ -106,7 +107,7 @@ def attachments_for(scene: Scene, mesh: OrganMesh) -> tuple[Attachment, ...]:
 def prepare(case: Case) -> Prepared:
     """Mesh, body, clock, surroundings of a case. Raises StudyError, MassSpringError."""
     scene = case.scene
-    reason = scene.skip(case.method)
+    reason = scene.skip(case.method.name)
     if reason is not None:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
     # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.
@@ -122,8 +123,10 @@ def prepare(case: Case) -> Prepared:
     held = np.concatenate([a.nodes for a in attachments]) if attachments else None
     limit = step_limit(body, scene.damping, held, case.method.added_stiffness(body))
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
+    frames = case.frames or scene.frames
+    check_size(scene.duration, frames, dt, limit, body, len(scene.obstacles) + len(attachments))
     beyond = case.beyond_limit or not case.method.limited
-    clock = make_clock(scene.duration, case.frames or scene.frames, dt, limit, beyond)
+    clock = make_clock(scene.duration, frames, dt, limit, beyond)
     setup = Setup(
         body,
         case.method,
