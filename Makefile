@@ -21,18 +21,19 @@ study-%: setup-run ## run one study and draw it: make study-volume_loss
 	$(BIN)/organbench run $*
 	$(BIN)/organbench plot $*
 
-verify: setup-run ## the reference against closed forms, published numbers and other codes (minutes)
+verify: setup-test ## the reference against closed forms, published numbers and other codes; test campaigns (minutes)
 	$(BIN)/organbench verify
+	$(PYTEST) -m campaign
 
 smoke: setup-run ## every study with its smallest settings: does it all hang together?
 	$(BIN)/organbench run --smoke $(STUDIES)
 
-test: setup-test ## every test
-	$(PYTEST)
+test: setup-test ## every test but the campaigns, which `make verify` runs
+	$(PYTEST) -m "not campaign"
 
 # Asked for both, `make check test` leaves the fast tests to `test`.
 check: lint docs setup-dev ## lint, types, import contracts, links of the docs and the fast tests
-	$(if $(filter test,$(MAKECMDGOALS)),,$(PYTEST) -m "not slow")
+	$(if $(filter test,$(MAKECMDGOALS)),,$(PYTEST) -m "not slow and not campaign")
 
 lint: setup-dev ## ruff, pyright and the import contracts alone
 	$(BIN)/ruff check .

@@ -90,3 +90,11 @@ def test_tests_run_once_also_where_check_and_test_are_asked_for(goals, fast, all
         all_of_them,
     ]
     assert any("ruff check" in line for line in lines) == ("check" in goals)
+    assert all("not campaign" in line for line in runs)
+
+
+def test_campaigns_run_in_verify():
+    command = ["make", "--dry-run", "--silent", "verify"]
+    lines = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert any(line.endswith("organbench verify") for line in lines)
+    assert any(line.endswith("pytest -q -n 2 --dist loadfile -m campaign") for line in lines)

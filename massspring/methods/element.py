@@ -38,9 +38,10 @@ from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.predict import predict
 from massspring.layout.allocate import start
 from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.families.known_pressure import check_modulus
-from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, one_filled, own_cells, push_cells
-from massspring.methods.method import Method, Remedy, begin_frame
+from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, own_cells, push_cells
+from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 
 
@@ -98,15 +99,16 @@ class Element(Method):
     name: ClassVar[str] = "element"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
-    remedy: ClassVar[Remedy | None] = "force"
-    misses_probes: ClassVar[str | None] = "what a contact does to the volumes of all tetrahedra is not solved for"
+    capabilities: ClassVar[Capabilities] = Capabilities(
+        "tetrahedra",
+        "penalty",
+        thin_probes=No("what a contact does to the volumes of all tetrahedra is not solved for"),
+    )
 
     def __post_init__(self) -> None:
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)
-
-    def applies(self, body: Body) -> str | None:
-        """Needs tetrahedra, and a body that keeps no more than them."""
-        return one_filled(body)
+        if self.hard:
+            object.__setattr__(self, "capabilities", replace(self.capabilities, correction="full"))
 
     def added_stiffness(self, body: Body) -> csr_array | None:
         """K/V_t0 dV_t/dx dV_t/dxᵀ of every cell; nothing where it is hard."""

@@ -13,6 +13,7 @@ from massspring.kernels.probe.stage import meet_probes
 from massspring.kernels.step.advance import advance_to_places
 from massspring.kernels.step.attachments import add_held_impulse, prescribe_velocity_into
 from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities
 from massspring.methods.method import Method, crewed_frame
 
 
@@ -49,9 +50,7 @@ class Free(Method):
     name: ClassVar[str] = "free"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
-    follows_targets: ClassVar[bool] = False
-    misses_probes: ClassVar[str | None] = None
-    threaded: ClassVar[bool] = True
+    capabilities: ClassVar[Capabilities] = Capabilities("none", thin_probes=True, threads=True, float32=True)
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""

@@ -51,7 +51,8 @@ from massspring.kernels.step.attachments import add_held_impulse, prescribe, pre
 from massspring.layout.allocate import start
 from massspring.layout.block_jacobi import clusters_at_rest
 from massspring.layout.state import State
-from massspring.methods.method import Method, Remedy, crewed_frame
+from massspring.methods.capabilities import Capabilities
+from massspring.methods.method import Method, crewed_frame
 from massspring.world.obstacles import Attachment
 
 
@@ -200,10 +201,9 @@ class ImplicitVolume(Method):
     name: ClassVar[str] = "implicit_volume"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 3e-4
-    remedy: ClassVar[Remedy | None] = "capped"
-    holds_apart: ClassVar[bool] = True
-    misses_probes: ClassVar[str | None] = None
-    threaded: ClassVar[bool] = True
+    capabilities: ClassVar[Capabilities] = Capabilities(
+        "several", "limited", prestress=True, thin_probes=True, threads=True, float32=True
+    )
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """The body at rest, or with velocities `v` (n, 3) [m/s], and clusters of its volumes where they are many."""

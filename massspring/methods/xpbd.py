@@ -33,8 +33,9 @@ from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.predict import predict
 from massspring.layout.allocate import start
 from massspring.layout.state import State
-from massspring.methods.families.tetrahedra import cells_of, one_filled, own_cells
-from massspring.methods.method import Method, Remedy, begin_frame, one_whole
+from massspring.methods.capabilities import Capabilities, No
+from massspring.methods.families.tetrahedra import cells_of, own_cells
+from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 
 
@@ -96,9 +97,12 @@ class Xpbd(Method):
     name: ClassVar[str] = "xpbd"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-4
-    remedy: ClassVar[Remedy | None] = "whole"
-    misses_probes: ClassVar[str | None] = "what a contact does to the volumes that it has mended is not made up for"
-    keeps_spin: ClassVar[bool] = False
+    conserves_angular_momentum: ClassVar[bool] = False
+    capabilities: ClassVar[Capabilities] = Capabilities(
+        "tetrahedra",
+        "full",
+        thin_probes=No("what a contact does to the volumes that it has mended is not made up for"),
+    )
 
     def __post_init__(self) -> None:
         if self.volumes not in ("element", "whole"):
@@ -107,10 +111,8 @@ class Xpbd(Method):
             raise MassSpringError(f"xpbd's iterations are {self.iterations}; it needs at least one")
         if not 0.0 <= self.compliance < float("inf"):
             raise MassSpringError(f"xpbd's compliance is {self.compliance} 1/Pa; it must be 0 or positive, and finite")
-
-    def applies(self, body: Body) -> str | None:
-        """Per element it needs tetrahedra; in either way it keeps one body of tissue."""
-        return one_whole(body) if self.volumes == "whole" else one_filled(body)
+        if self.volumes == "whole":
+            object.__setattr__(self, "capabilities", replace(self.capabilities, keeps="whole"))
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """With the cells at rest."""

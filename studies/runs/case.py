@@ -69,7 +69,7 @@ class Case:
     beyond_limit: bool = False
     """Whether a step above the stability limit is wanted; it is refused otherwise."""
     precision: Literal["float64", "float32"] = "float64"
-    """Of the mass-spring state."""
+    """Of the mass-spring state; float32 for methods that claim it."""
     recorded: tuple[str, ...] = ()
     """Fields beside those that metrics read: of `massspring.run.history.EXTRA`, the energies."""
     timed: bool = False

@@ -4,10 +4,10 @@ import math
 from dataclasses import is_dataclass
 from typing import Any
 
+from massspring import MassSpringError
 from massspring.run.history import EXTRA
+from massspring.run.precision import check_precision
 from studies.base.errors import StudyError
-
-PRECISIONS = ("float64", "float32")
 
 
 def check_settings(case: Any) -> None:
@@ -21,8 +21,10 @@ def check_settings(case: Any) -> None:
         raise StudyError(f"dt_fraction is {case.dt_fraction!r}; it must be positive, 1 is the stability limit itself")
     if case.frames is not None and (type(case.frames) is not int or case.frames < 1):
         raise StudyError(f"frames is {case.frames!r}; give a whole number from 1 on, or None for the scene's own")
-    if case.precision not in PRECISIONS:
-        raise StudyError(f"the precision is '{case.precision}'; choose {' or '.join(PRECISIONS)}")
+    try:
+        check_precision(case.precision, case.method)
+    except MassSpringError as error:
+        raise StudyError(str(error)) from error
     if not isinstance(case.recorded, tuple):
         raise StudyError(f"recorded is {case.recorded!r}; give a tuple, such as ({EXTRA[0]!r},)")
     unknown = sorted(set(case.recorded) - set(EXTRA))

@@ -113,7 +113,7 @@ def prepare(case: Case) -> Prepared:
     # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.
     mesh = mesh_for(scene, case.body.nodes, filled=case.body.kind == "tetrahedral" or scene.lumen is not None)
     body = body_for(scene, case.body, mesh)
-    reason = case.method.applies(body)
+    reason = case.method.why_not(body)
     if reason is not None:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to the {case.body.kind} body: {reason}")
     targets = targets_for(scene, mesh, body)
@@ -125,7 +125,7 @@ def prepare(case: Case) -> Prepared:
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
     frames = case.frames or scene.frames
     check_size(scene.duration, frames, dt, limit, body, len(scene.obstacles) + len(attachments))
-    beyond = case.beyond_limit or not case.method.limited
+    beyond = case.beyond_limit or not case.method.capabilities.conditionally_stable
     clock = make_clock(scene.duration, frames, dt, limit, beyond)
     setup = Setup(
         body,

@@ -151,7 +151,7 @@ def test_with_fewer_volumes_or_no_pressure_it_is_refused(taut):
     whole = replace(taut, volumes=None)
     with pytest.raises(MassSpringError, match="keeps 1 volumes for 48 nodes; keep one volume per node"):
         Setup(whole, ImplicitVolume(), Clock(0.01, 1, 10))
-    with pytest.raises(MassSpringError, match="method 'free' has no pressure at rest"):
+    with pytest.raises(MassSpringError, match=r"method 'free' does not apply .* no springs without length"):
         Setup(taut, Free(), Clock(0.01, 1, 10))
 
 

@@ -12,6 +12,7 @@ from massspring import (
     Sphere,
     simulate,
 )
+from massspring.kernels.constraint.one_volume import volume_multiplier
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
 from massspring.layout.allocate import start
 from tests.massspring.test_methods import clock_for, squeeze, thrown
@@ -45,7 +46,7 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     approach = seat(mo, touched, rng)
     wanted = 1.02 * body.volume
     error = wanted - volume_gradient_into(mo.x, net.triangles, mo.gradient)
-    lam, _ = motion_kernels.volume_multiplier(mo, net.inverse_mass, error, dt)
+    lam, _ = volume_multiplier(mo, net.inverse_mass, error, dt)
 
     n = 3 * body.node_count
     rows = [dt * mo.gradient.ravel()]

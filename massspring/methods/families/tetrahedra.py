@@ -1,11 +1,11 @@
-"""What methods on tetrahedra share: their arrays, which bodies they apply to, and the loop of known pressures."""
+"""What methods on tetrahedra share: their arrays, and the loop of known pressures."""
 
 from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from massspring.body.body import SAME_VOLUME, Body
+from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Drive
 from massspring.kernels.contact.active_set import find_contacts
 from massspring.kernels.forces.tetrahedron_volumes import (
@@ -21,7 +21,7 @@ from massspring.kernels.step.advance import advance
 from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.predict import add_to_prediction, predict
 from massspring.layout.state import State
-from massspring.methods.method import begin_frame, one_whole
+from massspring.methods.method import begin_frame
 
 
 def cells_of(body: Body) -> Cells:
@@ -39,16 +39,6 @@ def cells_of(body: Body) -> Cells:
         **{name: np.zeros(k) for name in ("pressure", "right", "diagonal", "search", "image")},
         **{name: np.zeros((n, 3)) for name in ("y", "gradient")},
     )
-
-
-def one_filled(body: Body) -> str | None:
-    """Why a method that keeps every tetrahedron does not apply; None when it does."""
-    if not len(body.tetrahedra):
-        return "it keeps the volume of every tetrahedron, the body has none; fill its mesh"
-    reason = one_whole(body)
-    if reason is None and abs(body.rest_volumes[0] / body.tetrahedron_volumes.sum() - 1.0) > SAME_VOLUME:
-        return "it keeps the volume of every tetrahedron, the body keeps a lumen too; take implicit_volume"
-    return reason
 
 
 def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_array:
