@@ -11,8 +11,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import yaml
-
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "docs" / "site"
 STAGE = ROOT / "build" / "docs"
@@ -85,11 +83,15 @@ def foreign(site: Path) -> list[str]:
 
 def main() -> int:
     """Copies, writes, builds and checks; the exit code."""
-    config = yaml.safe_load((SITE / "config.yml").read_text(encoding="utf-8"))
-    config |= {"docs_dir": str(STAGE), "site_dir": str(ROOT / "site"), "nav": [*copy_pages(), {"API": api_pages()}]}
-    config["plugins"][-1]["mkdocstrings"]["custom_templates"] = str(SITE / "templates")
+    config = {
+        "INHERIT": str(SITE / "config.yml"),
+        "docs_dir": str(STAGE),
+        "site_dir": str(ROOT / "site"),
+        "nav": [*copy_pages(), {"API": api_pages()}],
+        "plugins": {"mkdocstrings": {"custom_templates": str(SITE / "templates")}},
+    }
     file = ROOT / "build" / "mkdocs.yml"
-    file.write_text(yaml.safe_dump(config, sort_keys=False, allow_unicode=True), encoding="utf-8")
+    file.write_text(json.dumps(config), encoding="utf-8")  # JSON is YAML
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", str(file)]
     code = subprocess.run(command, cwd=ROOT, check=False).returncode
     loads = foreign(ROOT / "site")

@@ -55,7 +55,7 @@ def close_ears() -> None:
 
 
 def are_heard() -> bool:
-    """Whether Ctrl-C would be remembered now: then a KeyboardInterrupt without one was raised by somebody's code."""
+    """Whether Ctrl-C would be remembered now: then a KeyboardInterrupt without one was raised by other code."""
     return signal.getsignal(signal.SIGINT) is _press
 
 

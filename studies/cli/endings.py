@@ -1,4 +1,4 @@
-"""How a command ends: what is said of an error, and what happens when nobody can read it."""
+"""How a command ends: the message for an error, and what happens when it cannot be written."""
 
 import errno
 import os
@@ -15,7 +15,7 @@ errors = Console(stderr=True, soft_wrap=True)
 
 
 def told(error: Exception) -> str:
-    """The sentence for an error. Raises what nobody foresaw: a fault of this program, to be seen with its place."""
+    """The sentence for an error. Raises an unforeseen error again: a fault of this program keeps its traceback."""
     if isinstance(error, (StudyError, MassSpringError, ReferenceProblem)):
         return str(error)
     own = fault_of_study_file(error)
@@ -49,7 +49,7 @@ def flushed(code: str | int | None) -> str | int | None:
         output.flush()
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), output.fileno())
-        if code or isinstance(error, BrokenPipeError):  # it was said before, or the reader has seen enough
+        if code or isinstance(error, BrokenPipeError):  # it was printed before, or the reader has closed the pipe
             return code
         say(f"organbench: {unwritten(error)}")
         return 2

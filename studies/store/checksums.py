@@ -1,7 +1,7 @@
 """Whether a results file still says what was written: a digest of the whole file, and one of every part of it.
 
 The first is quick, and is looked at before the HDF5 library sees the file: there are single bits that send it into an
-endless loop. The second says which part has changed, and lets a file pass to which somebody added parts.
+endless loop. The second names the part that has changed, and accepts a file with added parts.
 """
 
 import hashlib

@@ -92,8 +92,8 @@ def read_record(path: Path, fields: Iterable[str] | None = None) -> Record:
     """The record in `path`, with all fields or only the named ones, each held to its checksum; with all of them, the
     record also to its table (studies.store.schema). The file is opened read-only. Parts that others added are left out.
 
-    Raises StudyError when the file is missing, not ours or lacks a named field, DamagedFile when it does not say what
-    was written, OtherVersion for another schema.
+    Raises StudyError when the file is missing, of another program or lacks a named field, DamagedFile when its content
+    is not what was written, OtherVersion for another schema.
     """
     with open_results(path) as (file, _):
         record, digests = _header(path, file)

@@ -1,4 +1,4 @@
-"""A study by name: of the catalogue, or of a Python file that somebody wrote."""
+"""A study by name: of the catalogue, or of a Python file of the user."""
 
 import importlib.util
 import sys

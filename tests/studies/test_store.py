@@ -289,7 +289,7 @@ def test_a_record_that_is_not_as_its_table_says_is_not_written(tmp_path):
 
 
 def test_parts_that_others_add_are_left_alone(tmp_path):
-    """A note, a group, a data set without a unit: not ours, and no damage."""
+    """A note, a group, a data set without a unit: foreign parts are no damage."""
     path, stored = tmp_path / "a.h5", made_up_run.run().record
     write_record(path, stored)
     with h5py.File(path, "r+") as file:

@@ -35,7 +35,7 @@ def organ(
     """
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
-    if not FEWEST <= nodes <= MOST:  # said here, before the mesher is loaded
+    if not FEWEST <= nodes <= MOST:  # checked here, before the mesher is loaded
         raise StudyError(f"{name}: {nodes} surface nodes asked for, but the mesher offers {FEWEST} to {MOST}")
     shape = make_shape(name, parameters or {})
     own = shape.regions if regions is None else regions
