@@ -10,8 +10,8 @@ from massspring import METHODS
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.family import true_volume
 from studies.plots.recovery import RETURNED
-from studies.publish import PUBLISHED
 from studies.reference.solve import VARIANTS
+from studies.report.publish import PUBLISHED
 from studies.scenes import BALL_SQUEEZE, LIVER_PRESS
 from studies.scenes.ball_squeeze import RADIUS
 from studies.scenes.stress import STRESS_SCENES

@@ -6,9 +6,9 @@ iteration: Δp = (V0 − V(y) − C V0 p)/(dt² ∇V·W̃∇V + C V0), in the un
 eq. 167). p is kept over the iterations of a step: without it the answer is hard whatever the compliance C, a mistake in
 public implementations. As iterations go on, it is the compliant volume solved for at the end of the step.
 
-Ours: a sweep over tetrahedra ends with one constraint more, the sum of their volumes, as the same pressure on all
-(eq. 170). What the cells end up with stays the same, but cells that mend themselves after each other take hundreds of
-sweeps to see what all of them lack: five leave 2e-4 of the whole without it and 2e-8 with it (ball of 200 nodes).
+Not in the publication: a sweep over tetrahedra ends with one constraint more, the sum of their volumes, as the same
+pressure on all (eq. 170). The final pressures stay the same, but corrections of one cell after the other need hundreds
+of sweeps to mend what all cells lack: five leave 2e-4 of the whole without it and 2e-8 with it (ball of 200 nodes).
 
 Limits: what the iterations have not reached depends on their number and on dt. The gradients are those of positions
 under way, so that spin is not kept. Per tetrahedron it locks as `element` does.

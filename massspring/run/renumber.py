@@ -1,6 +1,6 @@
 """The numbers nodes have during a run: those of a slice follow each other, and neighbours are near in memory.
 
-Whoever makes a body or reads a run keeps the numbers of the mesh: `State.x` and `State.v` are in them.
+Outside of a run the numbers of the mesh hold: `State.x` and `State.v` are in them.
 """
 
 from dataclasses import dataclass, replace

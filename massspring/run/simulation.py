@@ -219,7 +219,7 @@ def simulate(
 ) -> History:
     """Runs all frames, or up to the first that diverges, and returns what happened.
 
-    `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is told after each.
+    `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is called after each.
     A run longer than `time_limit` [s] of wall time ends early. `extra`: which of `history.EXTRA` are recorded; raises
     MassSpringError for another name. Frame times are those of `advance` alone.
     """

@@ -24,7 +24,7 @@ from studies.report.results import write_table
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.scenes.ball_squeeze import BALL_SQUEEZE, PRESS_END, RADIUS
-from studies.stamps import set_stamp
+from studies.store.stamps import set_stamp
 from studies.timing.protocol import pinned
 
 APPROACHES = (0.10, 0.20, 0.30)

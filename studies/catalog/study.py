@@ -4,12 +4,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from studies.base.errors import StudyError
 from studies.metrics.metrics import Run
 from studies.runs.case import Case
 from studies.scenes import Scene
+from studies.store.paths import readable
 
 SMOKE_NODES, SMOKE_NODES_HOLLOW = 150, 400
 """A wall folds on a coarser surface."""
+RESERVED = ("cache", "figures", "reference", "smoke", "verify")
+"""Folders of the results that are no study's."""
 SMOKE_FRAMES = 20
 
 
@@ -19,6 +23,14 @@ class Chart:
 
     file: str
     draw: Callable[[Sequence[Run], Path], None]
+
+    def __post_init__(self) -> None:
+        if readable(self.file) != self.file:
+            raise StudyError(
+                f"a chart cannot be called {self.file!r}; use letters, digits, '.', '_' and '-', no folder"
+            )
+        if not callable(self.draw):
+            raise StudyError(f"chart '{self.file}' is drawn by {self.draw!r}; give a function of the runs and a path")
 
 
 @dataclass(frozen=True)
@@ -31,6 +43,17 @@ class Study:
     charts: tuple[Chart, ...]
     columns: tuple[str, ...]
     """Metrics shown in its table."""
+
+    def __post_init__(self) -> None:
+        if self.name in RESERVED:
+            raise StudyError(f"a study cannot be called '{self.name}': other files of the program lie in that folder")
+        for what, kind in (("cases", Case), ("charts", Chart), ("columns", str)):
+            given = getattr(self, what)
+            if not isinstance(given, tuple | list):
+                raise StudyError(f"{what} is {given!r}; give a tuple, such as ({given!r},)")
+            odd = [item for item in given if not isinstance(item, kind)]
+            if odd:
+                raise StudyError(f"{what} holds {odd[0]!r}, which is no {kind.__name__}")
 
     def smoke(self) -> "Study":
         """The same study on small meshes, few frames and the two coarsest reference meshes: does it work at all?"""

@@ -1,5 +1,6 @@
 """The command line: reads words, calls the library, prints. Bad input ends in one sentence and exit code 2."""
 
+import io
 import sys
 import warnings
 from pathlib import Path
@@ -10,29 +11,32 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from massspring import METHODS, MassSpringError
-from reference_fem import ReferenceProblem
+from massspring import METHODS
 from studies.base import interrupts
-from studies.base.errors import StudyError
+from studies.base.atomic import sweep_parts
 from studies.base.lookup import choose
 from studies.catalog import STUDIES, Study
 from studies.cli.cost import cost
-from studies.cli.find import find_study
+from studies.cli.endings import errors, flushed, say, told
 from studies.cli.mesh import check, mesh
 from studies.cli.progress import TerminalProgress
 from studies.cli.publish import publish
 from studies.cli.safe_dt import safe_dt
 from studies.cli.show import describe
 from studies.cli.verify import verify
+from studies.geometry.mesher.jobs import cache_folder
 from studies.geometry.organs import SHAPES
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import study_table
+from studies.reference.solve import STUDY as REFERENCES
 from studies.report import results as reports
 from studies.report.references import reference_listing
 from studies.runs.run import replay as replay_run
 from studies.scenes import SCENES, UNJUDGED
 from studies.store.links import link_study
 from studies.store.paths import study_folder
+from studies.store.staleness import MISSING
+from studies.sweep.find_study import find_study
 from studies.sweep.run_studies import failed, load_runs, run_studies, standings, warnings_of
 
 app = typer.Typer(
@@ -42,27 +46,29 @@ app = typer.Typer(
     help="How accurate, how fast and how stable are volume-preserving mass-spring organs, against finite elements.",
 )
 console = Console(soft_wrap=True)
-errors = Console(stderr=True, soft_wrap=True)
 Results = Annotated[Path, typer.Option("--results", envvar="ORGANBENCH_RESULTS", help="folder of the results")]
 StudyName = Annotated[str, typer.Argument(help="a study (see `organbench list`), or a FILE.py that defines STUDY")]
 SMOKE = "smoke"
 
 
 def main() -> None:
-    """Entry point: exit code 0 done, 2 bad input, 130 interrupted."""
-    warnings.showwarning = lambda message, *_: errors.print(f"warning: {message}", markup=False, highlight=False)  # type: ignore[assignment]
+    """Entry point: exit code 0 done, 2 bad input or output that cannot be written, 130 interrupted, 143 ended."""
+    warnings.showwarning = lambda message, *_: say(f"warning: {message}")  # type: ignore[assignment]
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that has no "±" shows "?"
     try:
         code = _exit_code()
     except KeyboardInterrupt:  # between two lines of it
-        code = interrupts.CODE
-    if code == interrupts.CODE:
+        code = interrupts.exit_code()
+    if code in (interrupts.CODE, interrupts.exit_code()):
         interrupts.close_ears()
-        errors.print("organbench: interrupted; what is finished is stored, the same command goes on from there")
-    sys.exit(code)
+        what = "interrupted" if code == interrupts.CODE else "ended by SIGTERM"
+        say(f"organbench: {what}; what is finished is stored, the same command goes on from there")
+    sys.exit(flushed(code))
 
 
 def _exit_code() -> str | int | None:
-    """Runs the command. Whatever came of it, once Ctrl-C was pressed it counts as interrupted."""
+    """Runs the command. Whatever came of it, once a signal came it counts as interrupted."""
     code: str | int | None = 0
     try:
         app()
@@ -70,11 +76,9 @@ def _exit_code() -> str | int | None:
         code = stop.code
     except Exception as error:
         if not interrupts.pressed():
-            if not isinstance(error, (StudyError, MassSpringError, ReferenceProblem)):
-                raise
-            errors.print(f"organbench: {error}", markup=False, highlight=False)
+            say(f"organbench: {told(error)}")
             code = 2
-    return interrupts.CODE if interrupts.pressed() else code
+    return interrupts.exit_code() if interrupts.pressed() else code
 
 
 @app.command("list")
@@ -109,6 +113,8 @@ def run(
         study = found.smoke() if smoke else found
         with TerminalProgress(console) as progress:
             count = run_studies(root, [study], jobs, progress, wanted)
+        for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
+            sweep_parts(folder)
         for sentence in link_study(root, study.name):
             errors.print(f"warning: {sentence}", markup=False)
         said = warnings_of(root, study) if count else []
@@ -123,7 +129,7 @@ def run(
 def _filter(only: str):
     if not only:
         return None
-    rules = {"failed": failed, "stale": lambda task: task.path().exists() and not task.is_current()}
+    rules = {"failed": failed, "stale": lambda task: task.why_stale() not in (None, MISSING)}
     chosen = [choose(word.strip(), rules, "filter") for word in only.split(",")]
     return lambda task: any(rule(task) for rule in chosen)
 

@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from studies import publish as publishing
 from studies.catalog import STUDIES
+from studies.report import publish as publishing
 
 console = Console(soft_wrap=True)
 

@@ -9,14 +9,15 @@ from rich.text import Text
 from rich.tree import Tree
 
 from studies.base.errors import StudyError
-from studies.store.record import INDEX_KIND, Field, Record, Status, open_results, peek, read_record
+from studies.store.opening import open_results
+from studies.store.record import INDEX_KIND, Field, Record, Status, peek, read_record
 
 
 def describe(path: Path) -> Tree:
     """A rich tree of the results file `path`: header, attributes, fields with shape, unit, range and description; or,
     of a study's index, its cases with their status. Raises StudyError as read_record does."""
     path = Path(path)
-    with open_results(path) as file:
+    with open_results(path) as (file, _):
         links = _links(file) if file.attrs.get("kind") == INDEX_KIND else None
     return _index(path, links) if links is not None else _record(path, read_record(path))
 

@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 
 from reference_fem import crosscheck
-from studies.stamps import set_stamp
+from studies.store.stamps import set_stamp
 from studies.verify.verification import FOLDER, Verdict, run_pack, tolerance, write_kappa, write_verdicts
 
 console = Console(soft_wrap=True)

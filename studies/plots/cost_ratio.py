@@ -1,4 +1,4 @@
-"""How much longer a frame takes with the constraint than without, and whether that can be told at all."""
+"""How much longer a frame takes with the constraint than without, and whether the difference is resolvable."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -33,7 +33,7 @@ APART = 0.12
 
 
 def label(method: Method) -> str:
-    """Its name, and the settings that are not as they come: "element (bulk modulus 1e+06, hard)"."""
+    """Its name, and the settings that are not the defaults: "element (bulk modulus 1e+06, hard)"."""
     said = []
     for name, value in chosen_settings(method).items():
         number = f" {value:g}" if not isinstance(value, (bool, str)) else f" {value}" if isinstance(value, str) else ""

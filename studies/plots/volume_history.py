@@ -63,7 +63,7 @@ def _stiffness(shown: Sequence[Run]) -> list[str]:
 
 
 def _draw_run(upper: Axes, lower: Axes, run: Run, line: LineStyleType, finer: bool) -> None:
-    """The first run of a series in full; the same with another step as a thin line where it can be told apart."""
+    """The first run of a series in full; the same with another step as a thin line where the two differ visibly."""
     good = slice(0, good_frames(run))
     change = PERCENT * (run.volume_ratio[good] - 1)
     look = {"color": method_colour(run.case.method.name), "linestyle": line}

@@ -26,7 +26,8 @@ from studies.scene.scene import Scene
 from studies.store.fingerprint import source_fingerprint
 from studies.store.new_record import new_record
 from studies.store.paths import record_path
-from studies.store.record import Status, is_current, peek, why_stale, write_record
+from studies.store.record import Status, peek, write_record
+from studies.store.staleness import CASE_CHANGED, CODE_CHANGED, MISSING, is_current, why_stale
 
 STUDY = "reference"
 PENALTY_FACTOR, KAPPA_FACTOR, STEP_FACTOR = 3.0, 10.0, 2.0
@@ -77,8 +78,12 @@ class Piece:
         return record_path(root, STUDY, self.name, self.key)
 
     def is_current(self, root: Path) -> bool:
-        """Whether it is there, from this code."""
+        """Whether it is there, from this code, as it was written."""
         return is_current(self.path(root), self.key, reference_fingerprint())
+
+    def why_stale(self, root: Path) -> str | None:
+        """Why it must be solved (again) (studies.store.staleness); None when it need not."""
+        return why_stale(self.path(root), self.key, reference_fingerprint())
 
     @property
     def stamp(self) -> str:
@@ -89,10 +94,10 @@ class Piece:
         """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""
         if kept(self.path(root), self.stamp) is not None:
             return "half-way"
-        why = why_stale(self.path(root), self.key, reference_fingerprint())
+        why = self.why_stale(root)
         if why is None:
             return str(peek(self.path(root)).status)
-        return why if why == "missing" else "unreadable" if why.startswith("unreadable") else "stale"
+        return "missing" if why == MISSING else "stale" if why in (CASE_CHANGED, CODE_CHANGED) else "unreadable"
 
     @property
     def weight(self) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from studies.base.atomic import write_whole
+from studies.base.atomic import is_there, write_whole
 from studies.base.errors import StudyError
 from studies.catalog import Study
 from studies.geometry import SHAPES, organ
@@ -20,9 +20,10 @@ from studies.report.kept_volume import kept_volumes
 from studies.report.references import refresh_uncertainty, state_of
 from studies.runs.paper import play, slide_case, squeezed_balls
 from studies.runs.run import case_path
-from studies.stamps import set_stamp
 from studies.store.machine import write_machine
 from studies.store.paths import study_folder
+from studies.store.stamps import set_stamp
+from studies.sweep.find_study import fault_of_study_file, is_of_study_file
 from studies.sweep.run_studies import load_runs
 from studies.timing.cases import timing_file
 
@@ -35,14 +36,24 @@ HEADLINE = "volume_loss"
 
 
 def draw_charts(root: Path, study: Study, runs: Sequence[Run]) -> list[Path]:
-    """Draws all charts of a study; their paths."""
+    """Draws all charts of a study; their paths. Raises StudyError for those that a study file draws and cannot, after
+    the others were drawn."""
     folder = study_folder(root, study.name)
     make_folder(folder)
-    drawn = []
+    failures = []
     for chart in study.charts:
-        chart.draw(runs, folder / chart.file)
-        drawn.append(folder / chart.file)
-    return drawn
+        try:
+            chart.draw(runs, folder / chart.file)
+        except Exception as error:  # a user's own chart may fail in any way
+            own = fault_of_study_file(error)
+            if own is None and is_of_study_file(chart.draw):  # it could not even be called
+                own = f"its function fails: {type(error).__name__}: {error}"
+            if own is None:
+                raise
+            failures.append(f"chart {chart.file} is not drawn, {own}")
+    if failures:
+        raise StudyError("; ".join(failures))
+    return [folder / chart.file for chart in study.charts]
 
 
 def make_folder(folder: Path) -> None:
@@ -62,7 +73,7 @@ def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]
     """
     written, remarks, absent = [], [], []
     for study in studies:
-        if not any(case_path(root, study.name, case).exists() for case in study.cases):
+        if not any(is_there(case_path(root, study.name, case)) for case in study.cases):
             absent.append(study.name)
             continue
         paths, missing = refresh(root, study)
@@ -90,17 +101,26 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
         paths.append(root / "summary.md")
     stamp = root / "cache" / f"{study.name}.drawn.json"
     shown = {"inputs": inputs_of(root, study), "remarks": []}
-    if all(path.exists() for path in paths) and stamp.exists():
-        before = json.loads(stamp.read_text(encoding="utf-8"))
-        if before["inputs"] == shown["inputs"]:
-            return paths, before["remarks"]
+    before = _stamped(stamp)
+    if before.get("inputs") == shown["inputs"] and all(path.exists() for path in paths):
+        return paths, before["remarks"]
     runs, shown["remarks"] = load_runs(root, study)
-    draw_charts(root, study, runs)
     write_table(table, study_table(runs, study.columns))
     if study.name == HEADLINE:
         write_whole(root / "summary.md", (summary_of({HEADLINE: runs}) + "\n").encode())
+    draw_charts(root, study, runs)
     write_whole(stamp, json.dumps(shown).encode())
     return paths, shown["remarks"]
+
+
+def _stamped(stamp: Path) -> dict[str, Any]:
+    """What was drawn last; nothing when that is not known, or cannot be read: then it is drawn again."""
+    try:
+        before = json.loads(stamp.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    known = isinstance(before, dict) and isinstance(before.get("inputs"), str)
+    return before if known and isinstance(before.get("remarks"), list) else {}
 
 
 def inputs_of(root: Path, study: Study) -> str:

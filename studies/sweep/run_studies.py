@@ -6,22 +6,25 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 
-from studies.base.atomic import write_whole
-from studies.base.errors import StudyError
+from studies.base.atomic import is_there, write_whole
+from studies.base.errors import OtherVersion, StudyError
 from studies.base.interrupts import die_quietly, died_of_it, held_back
 from studies.catalog import Study
 from studies.metrics.metrics import Run
-from studies.reference.load import Reference, load_reference
+from studies.reference.load import load_reference
 from studies.reference.solve import Piece, pieces, solve
 from studies.runs.case import Case
-from studies.runs.run import case_is_current, case_path, run_case
+from studies.runs.run import case_path, run_case, why_case_is_stale
 from studies.store.record import Record, Status, peek, read_record
+from studies.store.staleness import MISSING
 from studies.timing.cases import read_timing, time_cases, timing_is_current
 
+T = TypeVar("T")
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Every process computes on one core: the cores are shared out by cases, not inside them."""
 
@@ -60,9 +63,13 @@ class Task:
 
     def is_current(self) -> bool:
         """Whether it need not run."""
+        return self.why_stale() is None
+
+    def why_stale(self) -> str | None:
+        """Why it must run (again) (studies.store.staleness); None when it need not."""
         if isinstance(self.work, Piece):
-            return self.work.is_current(self.root)
-        return case_is_current(self.root, self.study, self.work)
+            return self.work.why_stale(self.root)
+        return why_case_is_stale(self.root, self.study, self.work)
 
     def path(self) -> Path:
         """Where its record lies."""
@@ -108,7 +115,7 @@ def perform(tasks: list[Task], jobs: int, progress: Progress) -> None:
     except BrokenProcessPool as error:
         pool.shutdown()  # waits until every exit code is known
         if any(died_of_it(worker.exitcode) for worker in workers):
-            raise KeyboardInterrupt from error  # ours is still under way
+            raise KeyboardInterrupt from error  # the interrupt of this process is still being handled
         raise StudyError(
             "a computing process died (out of memory, or killed); what is finished is stored, run the command again"
         ) from error
@@ -160,27 +167,36 @@ def check_writable(root: Path) -> None:
 
 
 def load_runs(root: Path, study: Study) -> tuple[list[Run], list[str]]:
-    """The stored runs of a study with references and timings, and what is missing, a sentence each."""
-    references: dict[str, Reference | None] = {}
-    remarks: list[str] = []
-    for scene in study.scenes:
+    """The stored runs of a study with references and timings, and what is missing or damaged, a sentence each."""
+    problems: list[StudyError] = []
+
+    def tried(load: Callable[[], T]) -> T | None:
         try:
-            references[scene.name] = load_reference(root, scene)
+            return load()
         except StudyError as error:
-            references[scene.name] = None
-            remarks.append(str(error))
+            problems.append(error)
+            return None
+
+    references = {scene.name: tried(partial(load_reference, root, scene)) for scene in study.scenes}
     runs = []
     for case in study.cases:
         path = case_path(root, study.name, case)
-        if not path.exists():
-            remarks.append(f"case {case.name} has not run")
+        if not is_there(path):
+            problems.append(StudyError(f"case {case.name} has not run"))
             continue
-        try:
-            timing = read_timing(root, study.name, case) if case.timed else None
-            runs.append(Run(case, read_record(path), references[case.scene.name], timing))
-        except StudyError as error:
-            remarks.append(str(error))
-    return runs, remarks
+        record = tried(partial(read_record, path))
+        if record is not None:
+            timing = tried(partial(read_timing, root, study.name, case)) if case.timed else None
+            runs.append(Run(case, record, references[case.scene.name], timing))
+    return runs, _remarks(problems)
+
+
+def _remarks(problems: list[StudyError]) -> list[str]:
+    """A sentence each, but one for all files of another version: after an update these are all files."""
+    others = [str(problem) for problem in problems if isinstance(problem, OtherVersion)]
+    more = f" (and {len(others) - 1} more files)" if len(others) > 1 else ""
+    said = [str(problem) for problem in problems if not isinstance(problem, OtherVersion)]
+    return [*said, others[0] + more] if others else said
 
 
 def warnings_of(root: Path, study: Study) -> list[str]:
@@ -212,15 +228,12 @@ def standings(root: Path, study: Study) -> list[Standing]:
     """Every piece of a study: ok, failed in some way, stale or missing."""
     found = []
     for task in tasks_of(root, [study]):
-        path = task.path()
-        if not path.exists():
-            found.append(Standing(task, "missing", "has not run"))
-        elif not task.is_current():
-            damaged = "its file is damaged" if stored(path) is None else "the code or the case has changed since"
-            found.append(Standing(task, "stale", damaged))
-        else:
-            record = peek(path)
+        why = task.why_stale()
+        if why is None:
+            record = peek(task.path())
             found.append(Standing(task, str(record.status), record.message))
+        else:
+            found.append(Standing(task, "missing" if why == MISSING else "stale", why))
     return found
 
 

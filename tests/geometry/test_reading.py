@@ -136,7 +136,7 @@ def test_what_is_no_mesh_gets_a_sentence(tmp_path, surface, capfd):
         with pytest.raises(StudyError, match=sentence) as caught:
             read_mesh(path)
         assert "\n" not in str(caught.value)
-        assert capfd.readouterr() == ("", "")  # the reader's own chatter is not ours to print
+        assert capfd.readouterr() == ("", "")  # the reader's own output is not shown
     with pytest.raises(StudyError, match="unit 'inch' is not known; use one of m, cm, mm"):
         read_mesh(text, unit="inch")
 

@@ -80,7 +80,7 @@ def test_every_pair_meets(options, exclude):
 
 @guard()
 def test_a_body_on_a_line_is_counted_and_not_thrown(case):
-    """G = 0: each step of a method that would mend the volume is counted, and nobody divides by nothing."""
+    """G = 0: each step of a method that would mend the volume is counted, and nothing is divided by 0."""
     clock = clock_for(case.body, 3, 10, fraction=0.2, method=case.method)
     history = simulate(case.setup(clock, damping=20.0, positions=start_of(case.body, LINE)))
     assert history.outcome == "finished"

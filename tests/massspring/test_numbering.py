@@ -1,4 +1,4 @@
-"""A run numbers the nodes of a large body its own way; nobody outside can tell."""
+"""A run numbers the nodes of a large body its own way; outside of the run it cannot be seen."""
 
 from dataclasses import replace
 

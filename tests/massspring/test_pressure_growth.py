@@ -67,7 +67,7 @@ def fastest_mode(body):
 
 
 def test_projection_gains_energy_under_pressure_as_predicted_and_hcj05_does_not(ball_body):
-    """A gradient one step ahead is a negative damping dt lam H; in the end the fastest mode is what one sees."""
+    """A gradient one step ahead is a negative damping dt lam H; in the end the fastest mode dominates."""
     predicted = fastest_mode(ball_body)
     assert predicted > 1.0
     assert kinetic_growth(ball_body, Projection(), 3.0) == pytest.approx(predicted, rel=0.15)

@@ -144,7 +144,7 @@ def test_contacts_beside_obstacles_equal_the_full_saddle_point(seed):
     # But where obstacles hold all that a contact would push.
     movable = np.einsum("kni,nij,knj->k", c, mobile, c) > 1e-9 * w.max()
     assert movable.sum() >= 4 and (gap[movable] > -1e-6 * np.abs(ask).max()).all()
-    # What the broad phase goes by: nothing is faster than it was told.
+    # What the broad phase goes by: nothing is faster than the speed it was given.
     assert np.linalg.norm(found - u, axis=1).max() <= bound
     swollen = np.array([swelling(stage, None, i) for i in range(len(u))])
     assert 0 < np.linalg.norm(swollen, axis=1).max() <= change_of_rows(stage)

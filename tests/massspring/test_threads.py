@@ -63,7 +63,7 @@ def test_threads_change_no_bit(ball, method, precision):
 
 
 def test_threads_search_all_nodes_where_obstacles_are_in_that_step(ball):
-    """Also those that nothing comes near: their distances tell whether somebody looked."""
+    """Also those that nothing comes near: their distances show whether they were searched."""
     found = []
     for threads in (1, 2, 3):
         setup = slid(ball, Free(), threads=threads)

@@ -11,10 +11,10 @@ from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Chart
 from studies.cli import app as cli
 from studies.cli import publish as command
-from studies.publish import BEGIN, END, EXTRAS, PUBLISHED, publish, write_readme
+from studies.report.publish import BEGIN, END, EXTRAS, PUBLISHED, publish, write_readme
 from studies.runs import run
 from studies.runs.run import case_path
-from studies.stamps import is_stamped, set_stamp
+from studies.store.stamps import is_stamped, set_stamp
 from studies.timing.cases import timing_file
 from tests.studies.tiny import tiny_case, tiny_study
 
@@ -135,7 +135,7 @@ def test_a_stamp_holds_for_one_code(tmp_path, monkeypatch):
     assert not is_stamped(tmp_path, "bench.csv")
     set_stamp(tmp_path, "bench.csv")
     assert is_stamped(tmp_path, "bench.csv") and not is_stamped(tmp_path, "geometry.csv")
-    monkeypatch.setattr("studies.stamps.source_fingerprint", lambda *sources: "another code")
+    monkeypatch.setattr("studies.store.stamps.source_fingerprint", lambda *sources: "another code")
     assert not is_stamped(tmp_path, "bench.csv")
 
 

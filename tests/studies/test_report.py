@@ -126,3 +126,14 @@ def test_the_headline_study_writes_the_summary_too(results):
     paths, remarks = refresh(results, replace(tiny_study(), name="volume_loss"))
     assert paths[-1] == results / "summary.md" and paths[-1].is_file()
     assert len(remarks) == 3, "none of its cases has run under this name"
+
+
+@pytest.mark.parametrize("text", ['{"inp', "[]", "{}", '{"inputs": 1, "remarks": []}', "\udcff"])
+def test_a_stamp_that_is_damaged_is_drawn_again(results, text):
+    study = tiny_study(charts=(Chart("one.png", lambda runs, path: path.write_bytes(b"picture")),))
+    refresh(results, study)
+    stamp = results / "cache" / f"{study.name}.drawn.json"
+    whole = stamp.read_bytes()
+    stamp.write_bytes(text.encode(errors="surrogateescape"))
+    refresh(results, study)
+    assert stamp.read_bytes() == whole

@@ -155,4 +155,4 @@ class Tally(NamedTuple):
     iterations: np.ndarray
     """Iterations for the multipliers: their sum, and the most in one step, (2,) int64; 0 where they are direct."""
     ticks: Ticks | None = None
-    """Where the time goes; None where nobody asks."""
+    """Where the time goes; None where it is not measured."""

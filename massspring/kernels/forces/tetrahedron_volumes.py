@@ -54,7 +54,7 @@ def cell_slopes(x, a, b, c, d):
 
 @inlined
 def add_four(out, nodes, f, p, q, r):
-    """Adds f p, f q, f r to the last three of four nodes and minus their sum to the first: nobody is pushed about."""
+    """Adds f p, f q, f r to the last three of four nodes and minus their sum to the first: net force 0."""
     a, b, c, d = nodes
     p0, p1, p2 = f * p[0], f * p[1], f * p[2]
     q0, q1, q2 = f * q[0], f * q[1], f * q[2]

@@ -2,7 +2,7 @@
 
 Seen from the tip a triangle of carried nodes rests, so it is not passed. One that is held at a corner still turns:
 its carried corners then go ahead of the tip, until the point that was passed rests too. With all three corners held
-there is nothing to move: the tip goes through, and the run says so.
+there is nothing to move: the tip goes through, and the run records it.
 """
 
 import math

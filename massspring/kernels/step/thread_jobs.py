@@ -22,7 +22,7 @@ from massspring.kernels.step.advance import advance_nodes
 
 @lean
 def serve(network, motion, drive, rank):
-    """Does part number `rank` of every job of a frame, until it is told to rest."""
+    """Does part number `rank` of every job of a frame, until the frame ends."""
     team = motion.team
     first, last = team.slices[rank], team.slices[rank + 1]
     begin, end = team.nodes[rank], team.nodes[rank + 1]

@@ -60,7 +60,7 @@ class Step:
         return force
 
     def mark(self, stage: int) -> None:
-        """Books the time since the last mark, where somebody asks."""
+        """Adds the time since the last mark to this stage, if stages are timed."""
         if self.tally.ticks is not None:
             mark(self.tally.ticks, stage)
 

@@ -1,4 +1,4 @@
-"""One look for all charts: colours that everybody can tell apart, type that survives half size, one way to save."""
+"""One look for all charts: colours for colour-blind readers too, type that survives half size, one way to save."""
 
 import functools
 import io
