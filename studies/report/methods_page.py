@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any
 
 from massspring import METHODS, Method
 from massspring.methods import VARIANTS
@@ -73,17 +72,17 @@ def capabilities_of(method: Method) -> list[str]:
     return [words(method), own.keeps, own.correction or "–", stable, *answers]
 
 
-def reasons(methods: Iterable[Method]) -> list[str]:
-    """For each option the reasons why not, and which methods give them."""
-    lines = []
+def reasons(methods: Iterable[Method]) -> list[list[str]]:
+    """Rows of the last table: for each option the reasons why not, and which methods give them."""
+    rows = []
     for name, title in OPTIONS.items():
         found: dict[str, list[str]] = {}
         for method in methods:
-            answer: Any = getattr(method.capabilities, name)
+            answer = getattr(method.capabilities, name)
             if isinstance(answer, No):
                 found.setdefault(answer.because, []).append(words(method))
-        lines += [f"- **{title}**, {'; '.join(who)}: {because}." for because, who in found.items()]
-    return lines
+        rows += [[title, "; ".join(who), because] for because, who in found.items()]
+    return rows
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -97,9 +96,8 @@ def methods_page() -> str:
     claims = table(("method", "order", "volume", "angular momentum", "what it does"), map(claims_of, methods))
     head = ("method", "keeps", "correction", "stable", *OPTIONS.values())
     supported = table(head, map(capabilities_of, methods))
-    return "\n".join([HEAD, CLAIMS, claims, CAPABILITIES, supported, REASONS, *reasons(methods), ""]).replace(
-        "\n\n\n", "\n\n"
-    )
+    why = table(("not supported", "by", "because"), reasons(methods))
+    return "\n".join([HEAD + CLAIMS, claims, CAPABILITIES, supported, REASONS, why, ""])
 
 
 if __name__ == "__main__":
