@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from massspring import Clock, Free, ImplicitVolume, Path, Probe, Setup
+from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
 from massspring.kernels.probe.arrays import IN_CONTACT
 from massspring.kernels.probe.broad_phase import TRIANGLE_BLOCK, fastest_node
 from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, stays_off
@@ -37,9 +38,9 @@ def test_no_node_is_faster_than_the_fastest(fast, precision):
     net, motion = state.network, state.motion
     for trial in range(20):
         motion.v_star[:], motion.gradient[:] = rng.normal(size=(2, *motion.x.shape)) * [[[1.0]], [[1e-4]]]
-        motion.locked[:] = 0
+        motion.locked[:] = FREE
         chosen = rng.choice(BALL.node_count, 5, replace=False)
-        motion.locked[chosen] = [1, 1, 2, 3, 3]
+        motion.locked[chosen] = [SLIDES, SLIDES, ON_EDGE, STICKS, STICKS]
         list_touched(motion)
         motion.direction[chosen] = np.eye(3)[rng.integers(3, size=5)]
         motion.goal[chosen] = 0.1 * rng.normal(size=(5, 3))
@@ -50,7 +51,9 @@ def test_no_node_is_faster_than_the_fastest(fast, precision):
         u = motion.v_star + dt * lam * net.inverse_mass[:, None] * motion.gradient
         for i in chosen:
             d = motion.direction[i]
-            kept = {1: np.eye(3) - np.outer(d, d), 2: np.outer(d, d), 3: np.zeros((3, 3))}[int(motion.locked[i])]
+            kept = {SLIDES: np.eye(3) - np.outer(d, d), ON_EDGE: np.outer(d, d), STICKS: np.zeros((3, 3))}[
+                int(motion.locked[i])
+            ]
             u[i] = kept @ u[i] + motion.goal[i]
         truth = np.linalg.norm(u, axis=1).max()
         found = fastest_node(net, motion, lam, dt)

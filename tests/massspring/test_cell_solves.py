@@ -25,6 +25,7 @@ from massspring.kernels.constraint.tetrahedra import (
     solve_cells,
 )
 from massspring.kernels.contact.constrained_motion import unpushed_into
+from massspring.kernels.contact.modes import SLIDES
 from massspring.kernels.forces.volume import enclosed_volume
 from massspring.kernels.step.predict import predict
 from massspring.layout.allocate import start
@@ -62,7 +63,7 @@ def test_the_hard_solve_equals_the_full_saddle_point(block_body):
     touched = np.array([1, 5, 9])
     normals = rng.normal(size=(3, 3))
     mo.normal[touched] = normals / np.linalg.norm(normals, axis=1)[:, None]
-    mo.direction[touched], mo.locked[touched] = mo.normal[touched], 1
+    mo.direction[touched], mo.locked[touched] = mo.normal[touched], SLIDES
     mo.goal[touched] = 0.05 * mo.normal[touched]
     cell_rows_into(mo.x, cells, cells.right)
     cells.pressure[:] = 100.0  # a warm start must not matter

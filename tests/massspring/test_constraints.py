@@ -16,6 +16,7 @@ from massspring import (
     Shake,
     simulate,
 )
+from massspring.kernels.contact.modes import FREE, SLIDES
 from massspring.kernels.forces.volume import enclosed_volume
 from massspring.methods.families.one_volume import Rule, advance_by, correct_positions
 from massspring.methods.method import begin_frame
@@ -193,8 +194,8 @@ def test_contact_and_held_nodes_are_inside_shake_s_multiplier(ball_body):
     state = setup.start()
     for frame in range(60):
         before, state = state, setup.method.advance(state, setup.drive(frame))
-    free = (state.network.inverse_mass > 0) & (state.motion.locked == 0)
-    touched = state.motion.locked == 1
+    free = (state.network.inverse_mass > 0) & (state.motion.locked == FREE)
+    touched = state.motion.locked == SLIDES
     assert touched.sum() > 3
     _, slope = gradient(before.x, ball_body.triangles)
     pushed = (state.v - state.motion.v_star) / clock.dt * ball_body.mass[:, None] - state.lam[0] * slope

@@ -7,6 +7,7 @@ import pytest
 
 from massspring import Capsule, Clock, ImplicitVolume, Path, Plane, Setup, Sphere, surface_body
 from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
+from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
 from tests.massspring.conftest import SOFT, icosphere
 
 DT = 1e-3
@@ -67,12 +68,12 @@ class Scene:
         """v⁺ = P u + goal (n, 3) [m/s] (eq. 9, 10)."""
         mo, u = self.motion, self.free_velocity(lam)
         kept = {
-            0: u,
-            1: u - (u * mo.normal).sum(axis=1)[:, None] * mo.normal,
-            2: (u * mo.direction).sum(axis=1)[:, None] * mo.direction,
-            3: 0 * u,
+            FREE: u,
+            SLIDES: u - (u * mo.normal).sum(axis=1)[:, None] * mo.normal,
+            ON_EDGE: (u * mo.direction).sum(axis=1)[:, None] * mo.direction,
+            STICKS: 0 * u,
         }
-        return np.choose(mo.locked[:, None], list(kept.values())) + np.where(mo.locked[:, None] > 0, mo.goal, 0.0)
+        return np.choose(mo.locked[:, None], list(kept.values())) + np.where(mo.locked[:, None] > FREE, mo.goal, 0.0)
 
     def gaps(self, y: np.ndarray) -> np.ndarray:
         """(obstacles, n) [m] at the end of the step."""
@@ -101,13 +102,13 @@ def test_nodes_sit_on_the_obstacle_that_they_would_enter_deepest(shell, name):
     scene = Scene(shell, *OBSTACLES[name]).find()
     gaps = scene.gaps(scene.x + DT * scene.free_velocity(LAM))
     inner = np.setdiff1d(np.arange(len(scene.x)), scene.nodes)
-    away = scene.motion.locked == 0
+    away = scene.motion.locked == FREE
     assert np.abs(scene.motion.clearance - gaps.min(axis=0))[away].max() < ROUND_OFF
     assert (scene.motion.clearance[~away] == np.inf).all()
     wanted = np.where(gaps.min(axis=0) < 0, gaps.argmin(axis=0) + 1, 0)
     wanted[inner] = 0
     assert (scene.motion.touched == wanted).all() and len(np.unique(wanted)) == len(scene.obstacles) + 1
-    one = np.flatnonzero(scene.motion.locked == 1)
+    one = np.flatnonzero(scene.motion.locked == SLIDES)
     ends = scene.gaps(scene.x + DT * scene.velocity(LAM))[wanted[one] - 1, one]
     assert np.abs(ends).max() < ROUND_OFF  # also beside a rod: no node here comes near its ends
 
@@ -126,7 +127,7 @@ def test_a_new_pressure_finds_the_one_node_that_it_moves(shell, change):
     assert 0 < fall < reach < 1.001 * fall
     scene.motion.x[node, 2] = FLOOR.point[2] + 0.5 * fall - DT * scene.free_velocity(LAM)[node, 2]
     assert scene.find().motion.clearance[node] == pytest.approx(0.5 * fall, rel=1e-6) and not scene.motion.locked.any()
-    assert scene.revise(LAM + change) == 1 and scene.motion.locked[node] == 1
+    assert scene.revise(LAM + change) == 1 and scene.motion.locked[node] == SLIDES
 
 
 def test_the_next_step_knows_nothing_of_the_last(shell):
@@ -146,14 +147,14 @@ def test_revised_contacts_are_those_of_the_new_pressure(shell, name, way):
     scene, changed, again = Scene(shell, *OBSTACLES[name]).find(), 0, 0
     let_go = np.zeros(len(scene.x), dtype=bool)
     for lam in LAM * np.array(way):
-        held = scene.motion.locked == 1
+        held = scene.motion.locked == SLIDES
         u = scene.free_velocity(lam)
         pulled = held & (((scene.motion.goal - u) * scene.motion.normal).sum(axis=1) < 0)
         enters = ~held & (scene.gaps(scene.x + DT * u)[0] < 0)
         enters[np.setdiff1d(np.arange(len(u)), scene.nodes)] = False
         count = scene.revise(lam)
         assert count == pulled.sum() + enters.sum()
-        assert np.array_equal(scene.motion.locked == 1, (held & ~pulled) | enters)
+        assert np.array_equal(scene.motion.locked == SLIDES, (held & ~pulled) | enters)
         changed, again, let_go = changed + count, again + (enters & let_go).sum(), let_go | pulled
     assert changed > 10 and again > 0
 
@@ -164,7 +165,7 @@ def test_slip_loses_what_coulomb_says(shell, name, friction):
     """Beside an obstacle that moves: v⁺ = w + s max(0, 1 − mu p/|s|) along it, p what it pushes by."""
     (still,), _ = OBSTACLES[name]
     smooth, rough = (Scene(shell, (type(still)(*_shape(still), ALONG, mu),)).find() for mu in (0.0, friction))
-    on = np.flatnonzero(smooth.motion.locked == 1)
+    on = np.flatnonzero(smooth.motion.locked == SLIDES)
     n, u = smooth.motion.normal[on], smooth.free_velocity(LAM)[on]
     p = ((smooth.motion.goal[on] - u) * n).sum(axis=1)
     w = np.array(ALONG.displacements[1])
@@ -173,7 +174,7 @@ def test_slip_loses_what_coulomb_says(shell, name, friction):
     across = (smooth.motion.goal[on] * n).sum(axis=1)[:, None] * n
     expected = w - (n @ w)[:, None] * n + left[:, None] * slip + across
     assert np.abs(rough.velocity(LAM)[on] - expected).max() < ROUND_OFF
-    assert np.array_equal(rough.motion.locked[on] == 3, left == 0)
+    assert np.array_equal(rough.motion.locked[on] == STICKS, left == 0)
     assert 0 < (left == 0).sum() < len(on), "all of them slip, or none"
 
 
@@ -185,7 +186,7 @@ def test_what_sticks_too_hard_at_the_new_pressure_slips(shell):
     """k = v⁺ − u is what sticking takes; of its part along the obstacle mu times the other is left (eq. 36)."""
     mu, lam = 1.2, 0.4 * LAM
     scene = Scene(shell, (Plane((0, 0, -0.0501), (0, 0, 1), ALONG, mu),)).find()
-    sticks = np.flatnonzero(scene.motion.locked == 3)
+    sticks = np.flatnonzero(scene.motion.locked == STICKS)
     u = scene.free_velocity(lam)[sticks]
     k, n = scene.motion.goal[sticks] - u, scene.motion.normal[sticks]
     p = (k * n).sum(axis=1)
@@ -194,7 +195,7 @@ def test_what_sticks_too_hard_at_the_new_pressure_slips(shell):
     pushed, slips = p > 0, (p > 0) & (asked > mu * p)
     scene.revise(lam)
     locked = scene.motion.locked[sticks]
-    assert np.array_equal(locked == 1, slips) and np.array_equal(locked == 3, pushed & ~slips)
+    assert np.array_equal(locked == SLIDES, slips) and np.array_equal(locked == STICKS, pushed & ~slips)
     expected = u + p[:, None] * n + (mu * p / asked)[:, None] * aside
     assert np.abs(scene.velocity(lam)[sticks] - expected)[slips].max() < ROUND_OFF
     assert slips.sum() > 3 and (pushed & ~slips).sum() > 3 and (~pushed).sum() > 3
@@ -214,7 +215,7 @@ def test_between_two_obstacles_nodes_keep_both(shell, name):
         m = slopes(obstacles[second], y[on])
         edge = np.cross(n, m)
         both = (gap < 0) & (np.linalg.norm(edge, axis=1) > 0.01)
-        assert np.array_equal(scene.motion.locked[on] == 2, both)
+        assert np.array_equal(scene.motion.locked[on] == ON_EDGE, both)
         new = scene.velocity(LAM)[on]
         assert np.abs(new - v[on])[~both].max(initial=0.0) < ROUND_OFF
         for k in np.flatnonzero(both):
@@ -232,4 +233,4 @@ def test_a_node_that_slides_fast_round_a_sphere_is_not_between_it_and_itself(she
     scene = Scene(shell, (*OBSTACLES["a sphere"][0], far))
     scene.motion.v_star[:, :2] += 3.0
     scene.find()
-    assert (scene.motion.locked == 1).sum() > 10 and not (scene.motion.locked == 2).any()
+    assert (scene.motion.locked == SLIDES).sum() > 10 and not (scene.motion.locked == ON_EDGE).any()

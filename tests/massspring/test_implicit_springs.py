@@ -19,6 +19,7 @@ from massspring import (
     step_limit,
     tetrahedral_body,
 )
+from massspring.kernels.contact.modes import ON_EDGE, SLIDES, STICKS
 from massspring.methods.implicit.contact import Touching
 from massspring.methods.implicit.factor import Factor
 from tests.massspring.conftest import SOFT, block, icosphere
@@ -68,7 +69,7 @@ def test_the_response_past_obstacles_is_that_of_the_saddle_point_system(started)
     for name in ("normal", "second_normal"):
         vectors = rng.normal(size=motion.x.shape)
         getattr(motion, name)[:] = vectors / np.linalg.norm(vectors, axis=1)[:, None]
-    motion.locked[[3, 5, 8, 20]] = [1, 3, 2, 1]
+    motion.locked[[3, 5, 8, 20]] = [SLIDES, STICKS, ON_EDGE, SLIDES]
     motion.touched[[3, 5, 8, 20]], motion.second[8] = 1, 2
     motion.goal[:] = rng.normal(size=motion.x.shape)
     touching = Touching(factor, motion, np.arange(len(motion.x), dtype=np.uint32), dt)

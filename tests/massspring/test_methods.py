@@ -6,7 +6,6 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import massspring.kernels.step.advance as motion_kernels
 from massspring import (
     METHODS,
     Body,
@@ -22,7 +21,9 @@ from massspring import (
     simulate,
     step_limit,
 )
+from massspring.kernels.constraint.one_volume import volume_multiplier
 from massspring.kernels.contact.active_set import find_contacts
+from massspring.kernels.step.advance import advance
 from massspring.kernels.step.predict import predict
 from massspring.layout.state import State
 from massspring.methods.method import begin_frame
@@ -207,8 +208,8 @@ class SixfoldGradient(Method):
             error = drive.volume_target[step, 0] - predict(net, mo, drive, step, True)[0]
             mo.gradient[:] *= 6
             find_contacts(net, mo, drive, step, 0.0)
-            lam, _ = motion_kernels.volume_multiplier(mo, net.inverse_mass, error, drive.dt)
-            motion_kernels.advance(mo, net.mass, net.inverse_mass, lam, drive.dt, after.tally.contact_impulse)
+            lam, _ = volume_multiplier(mo, net.inverse_mass, error, drive.dt)
+            advance(mo, net.mass, net.inverse_mass, lam, drive.dt, after.tally.contact_impulse)
         return after
 
 

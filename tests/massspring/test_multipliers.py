@@ -18,6 +18,7 @@ from massspring import (
 from massspring.kernels.arrays.layout import Accuracy
 from massspring.kernels.constraint.jacobian import diagonal_into, rows_into, transposed_rows_times_into
 from massspring.kernels.constraint.schur import solve_iteratively
+from massspring.kernels.contact.modes import ON_EDGE, STICKS
 from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.state import new_tally
@@ -57,7 +58,7 @@ def touched_and_held(body: Body, dt: float):
     approach = seat(mo, touched, random)
     edge, wedged, stuck = np.linalg.qr(random.normal(size=(3, 3)))[0], 31, 40
     mo.touched[[wedged, stuck]] = 1
-    mo.locked[[wedged, stuck]] = 2, 3
+    mo.locked[[wedged, stuck]] = ON_EDGE, STICKS
     list_touched(mo)
     mo.direction[wedged] = edge[0]
     mo.goal[wedged] = 0.03 * edge[1] - 0.02 * edge[2]

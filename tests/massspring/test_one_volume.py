@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import massspring.kernels.step.advance as motion_kernels
 from massspring import (
     Attachment,
     Free,
@@ -12,7 +11,9 @@ from massspring import (
     Sphere,
     simulate,
 )
+from massspring.kernels.constraint.one_volume import volume_multiplier
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
+from massspring.kernels.step.advance import advance
 from massspring.layout.allocate import start
 from tests.massspring.test_methods import clock_for, squeeze, thrown
 from tests.massspring.touched import seat
@@ -45,7 +46,7 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     approach = seat(mo, touched, rng)
     wanted = 1.02 * body.volume
     error = wanted - volume_gradient_into(mo.x, net.triangles, mo.gradient)
-    lam, _ = motion_kernels.volume_multiplier(mo, net.inverse_mass, error, dt)
+    lam, _ = volume_multiplier(mo, net.inverse_mass, error, dt)
 
     n = 3 * body.node_count
     rows = [dt * mo.gradient.ravel()]
@@ -69,7 +70,7 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
 
     x = mo.x.copy()
     mo.places[:, :3] = x
-    motion_kernels.advance(mo, net.mass, net.inverse_mass, lam, dt, np.zeros((1, 3)))
+    advance(mo, net.mass, net.inverse_mass, lam, dt, np.zeros((1, 3)))
     assert np.allclose(mo.v.ravel(), solution[:n], atol=1e-12)
     assert np.allclose(mo.x, x + dt * mo.v)
 

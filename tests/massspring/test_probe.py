@@ -19,6 +19,7 @@ from massspring import (
     surface_body,
 )
 from massspring.body.inside import is_inside, mean_edge
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.probe.arrays import COMPARED, IN_CONTACT, LEFT_BEHIND, Stage
 from massspring.kernels.probe.contacts import solve_rows
 from massspring.kernels.probe.motion import gather
@@ -124,7 +125,7 @@ def disturbed_contact():
     motion, net, rows, rng = after.motion, after.network, after.probing.rows, np.random.default_rng(4)
     motion.v_star[:] = 0.02 * rng.normal(size=motion.v_star.shape)
     motion.v_star[net.held_nodes] = 0.0
-    motion.locked[:] = 0
+    motion.locked[:] = FREE
     motion.touching_count[0] = 0
     count = int(rows.count[0])
     rows.direction[:count] += 0.3 * rng.normal(size=(count, 3))

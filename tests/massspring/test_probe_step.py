@@ -7,6 +7,7 @@ import pytest
 
 from massspring import Clock, ImplicitVolume, Path, Probe, Setup, Volumes
 from massspring.body.inside import mean_edge
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND, Stage
 from massspring.kernels.probe.contacts import solve_rows
 from massspring.kernels.probe.fallback import lead
@@ -81,7 +82,7 @@ def some_rows(stage, rng, count=5):
     # The tip in their midst: some ask for a push, some for none.
     at = np.einsum("kq,kqi->ki", rows.weight[:count], motion.x[rows.node[:count]])
     stage.tips.end[0, 0] = at.mean(axis=0)
-    motion.locked[:] = 0
+    motion.locked[:] = FREE
     among, others = np.unique(rows.node[:count]), np.arange(BALL.node_count)
     chosen = np.concatenate([rng.permutation(among)[:3], np.setdiff1d(others, among)[:30]])
     motion.locked[chosen] = rng.permutation(np.arange(len(chosen)) % 3 + 1)
@@ -106,7 +107,7 @@ def random_step(seed, lam):
     motion.gradient[:] *= 0.01
     stage = Stage(net, motion, drive.tips, probing, None, 0.0, 0, drive.dt)
     some_rows(stage, rng)
-    motion.locked[net.held_nodes] = 0
+    motion.locked[net.held_nodes] = FREE
     kept, g = np.eye(3) - taken_from(motion), motion.gradient
     stage = stage._replace(mobility=float(np.einsum("n,ni,nij,nj->", net.inverse_mass, g, kept, g)))
     probing.near[0], probing.near_count[0] = np.arange(len(probing.surface)), len(probing.surface)
@@ -124,7 +125,7 @@ def test_contacts_beside_obstacles_equal_the_full_saddle_point(seed):
     bound = solve_rows(stage, None)
     move(stage, None)
     u = np.einsum("nij,nj->ni", kept, motion.v_star + dt * lam * w[:, None] * g)
-    u += motion.goal * (motion.locked > 0)[:, None]
+    u += motion.goal * (motion.locked > FREE)[:, None]
     on = np.unique(BALL.triangles)
     assert np.allclose(probing.base[on], u[on], atol=1e-14)
     found = np.where(np.isin(np.arange(len(u)), on)[:, None], probing.velocity, u)

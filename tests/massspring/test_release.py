@@ -6,6 +6,7 @@ import pytest
 from massspring import Attachment, Clock, ImplicitVolume, Path, Plane, Setup, surface_body
 from massspring.analysis.stability import step_limit
 from massspring.kernels.contact.friction import release_wedged
+from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.test_rubbing import wedge_of
 from tests.massspring.touched import list_touched
@@ -39,7 +40,7 @@ def test_no_obstacle_pulls_a_node(shell, angle):
     for frame in range(clock.frames):
         drive = setup.drive(frame)
         state = setup.method.advance(state, drive)
-        motion, on_one = state.motion, state.motion.locked == 1
+        motion, on_one = state.motion, state.motion.locked == SLIDES
         push = drive.dt * state.lam[0] * state.network.inverse_mass[:, None]
         pushed = ((motion.goal - motion.v_star - push * motion.gradient) * motion.normal).sum(axis=1)
         met += int(on_one.sum())
@@ -60,8 +61,8 @@ def test_a_wedge_lets_go_of_a_node_that_either_side_would_pull(shell, first, sec
     u = motion.v_star[node] + drive.dt * lam * state.network.inverse_mass[node] * motion.gradient[node]
     motion.normal[node], motion.second_normal[node] = n, m
     motion.goal[node] = u + first * n + second * m
-    motion.touched[node], motion.second[node], motion.locked[node] = 1, 2, 2
+    motion.touched[node], motion.second[node], motion.locked[node] = 1, 2, ON_EDGE
     list_touched(motion)
     free = first < 0 or second < 0
     assert release_wedged(state.network, motion, drive, lam) == int(free)
-    assert motion.locked[node] == (0 if free else 2)
+    assert motion.locked[node] == (FREE if free else ON_EDGE)

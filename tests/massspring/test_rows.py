@@ -8,6 +8,7 @@ from massspring import Body, Volumes
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.constraint.jacobian import diagonal_into, rows_into
 from massspring.kernels.constraint.schur import apply_schur
+from massspring.kernels.contact.modes import ON_EDGE, SLIDES, STICKS
 from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.ring_areas import quadrangles
@@ -118,7 +119,7 @@ def test_the_diagonal_knows_of_contact(block_body, precision):
     jacobian = dense(rows, block_body.node_count)
     stuck = np.flatnonzero(np.abs(jacobian[0]).max(axis=1))
     axes = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
-    motion.locked[[30, 31]], motion.locked[35], motion.locked[stuck] = 1, 2, 3
+    motion.locked[[30, 31]], motion.locked[35], motion.locked[stuck] = SLIDES, ON_EDGE, STICKS
     motion.direction[[30, 31, 35]] = axes
     mobile = weight[:, None, None] * np.eye(3)
     mobile[[30, 31]] -= weight[[30, 31], None, None] * axes[:2, :, None] * axes[:2, None, :]

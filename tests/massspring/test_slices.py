@@ -6,6 +6,7 @@ import pytest
 from massspring import Attachment, Body, Clock, Free, ImplicitVolume, Setup, Volumes, tetrahedral_body
 from massspring.body.springs import Springs
 from massspring.kernels.constraint.one_volume import multiplier_of_sums, volume_multiplier
+from massspring.kernels.contact.modes import ON_EDGE, SLIDES, STICKS
 from massspring.kernels.forces.membrane import add_membrane_forces
 from massspring.kernels.forces.springs import spring_forces_into
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
@@ -168,7 +169,7 @@ def test_the_multiplier_from_sums_is_the_one_over_all_nodes(ball_body):
     state, drive, (volume, flow, mobility) = gathered(ball_body, moved(ball_body), held=held)
     net, motion, rng = state.network, state.motion, np.random.default_rng(1)
     flow += prescribe(net, motion, np.array([[0.01, 0.0, -0.02]]), drive.dt)
-    for kind, nodes in ((1, [5, 6, 50]), (2, [9, 10]), (3, [60, 61])):
+    for kind, nodes in ((SLIDES, [5, 6, 50]), (ON_EDGE, [9, 10]), (STICKS, [60, 61])):
         motion.locked[nodes] = kind
         motion.direction[nodes] = rng.normal(size=(len(nodes), 3))
         motion.direction[nodes] /= np.linalg.norm(motion.direction[nodes], axis=1)[:, None]
@@ -184,7 +185,7 @@ def test_the_multiplier_from_sums_is_the_one_over_all_nodes(ball_body):
 def test_a_body_that_obstacles_hold_everywhere_has_no_multiplier(ball_body):
     """What is left of G·W·G is round-off then; dividing by it would be a pressure of any size."""
     state, drive, (volume, flow, mobility) = gathered(ball_body, moved(ball_body))
-    state.motion.locked[:] = 3
+    state.motion.locked[:] = STICKS
     list_touched(state.motion)
     args = (state.motion, state.network.inverse_mass, 0.01 * volume, drive.dt, flow, mobility)
     assert multiplier_of_sums(*args) == (0.0, 0.0)

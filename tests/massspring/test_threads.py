@@ -21,7 +21,7 @@ from massspring import (
 from massspring import Path as Motion
 from massspring.analysis.stability import step_limit
 from massspring.kernels.jit.blocks import BLOCK
-from massspring.kernels.jit.thread_team import JOB, REST, SPRINGS, call, join, team_of
+from massspring.kernels.jit.thread_team import JOB, JOB_END, JOB_SPRINGS, call, join, team_of
 from massspring.layout.threads import crew, shared
 from tests.massspring.conftest import SOFT, icosphere
 
@@ -77,7 +77,7 @@ def test_each_thread_writes_on_scratch_of_its_own(ball):
     motion, untouched = state.motion, -7.0
     motion.tile[:] = untouched
     with crew(state.network, motion, setup.drive(0)):
-        call(motion.team, SPRINGS, 0, 0.0)
+        call(motion.team, JOB_SPRINGS, 0, 0.0)
         join(motion.team)
     assert (motion.tile[0] == untouched).all() and not (motion.tile[1] == untouched).all()
 
@@ -111,7 +111,7 @@ def test_a_frame_that_fails_sends_the_threads_home(ball):
     state, drive = setup.start(), setup.drive(0)
     with pytest.raises(RuntimeError, match="halfway"), crew(state.network, state.motion, drive):
         raise RuntimeError("halfway")
-    assert state.motion.team is not None and state.motion.team.signal[JOB] == REST
+    assert state.motion.team is not None and state.motion.team.signal[JOB] == JOB_END
     before = time.thread_time_ns(), time.process_time_ns()
     time.sleep(0.2)
     spent = time.process_time_ns() - before[1] - (time.thread_time_ns() - before[0])

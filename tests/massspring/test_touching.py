@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from massspring import Clock, ImplicitSprings, Path, Plane, Setup
-from massspring.methods.implicit.contact import SLIDES, STICKS, STILL, Contact, Touching
+from massspring.kernels.contact.modes import SLIDES, STICKS
+from massspring.methods.implicit.contact import SLIP_RESOLUTION, Contact, Touching
 
 DT, MU = 5e-3, 0.5
 BELOW = 1e-3
@@ -93,7 +94,7 @@ def test_what_friction_would_drive_sticks(sole):
 def test_a_slip_that_is_round_off_is_none(sole, way, sticks):
     """Just below and just above the bound: its direction would be chance, and its friction as large as any."""
     sole.slide()
-    slip = np.array([0.6, -0.8, 0.0]) * way * STILL * sole.network.longest_correction / DT
+    slip = np.array([0.6, -0.8, 0.0]) * way * SLIP_RESOLUTION * sole.network.longest_correction / DT
     sole.motion.x[sole.nodes] = 0.0  # so that the way is known as closely as it is asked
     carried = sole.drive.velocity[0, 0]
     carried[:] = 0.0

@@ -3,6 +3,7 @@
 import numpy as np
 
 from massspring.kernels.arrays.layout import Motion
+from massspring.kernels.contact.modes import SLIDES
 
 
 def list_touched(motion: Motion) -> None:
@@ -17,7 +18,7 @@ def seat(motion: Motion, nodes: np.ndarray, rng: np.random.Generator) -> np.ndar
     normals = rng.normal(size=(len(nodes), 3))
     motion.normal[nodes] = normals / np.linalg.norm(normals, axis=1)[:, None]
     approach = 0.05 * rng.normal(size=len(nodes))
-    motion.touched[nodes], motion.locked[nodes] = 1, 1
+    motion.touched[nodes], motion.locked[nodes] = 1, SLIDES
     motion.direction[nodes] = motion.normal[nodes]
     motion.goal[nodes] = approach[:, None] * motion.normal[nodes]
     list_touched(motion)

@@ -62,7 +62,7 @@ class Motion(NamedTuple):
     second: np.ndarray
     """1 + the other obstacle of a node in a wedge, (n,) uint32."""
     locked: np.ndarray
-    """Directions that obstacles take from a node: 0, 1 (slides on one), 2 (in a wedge) or 3 (sticks), (n,) uint8."""
+    """Directions that obstacles take from a node: its contact mode (kernels.contact.modes), (n,) uint8."""
     normal: np.ndarray
     """Unit normal of the touched obstacle, towards the body, (n, 3)."""
     second_normal: np.ndarray

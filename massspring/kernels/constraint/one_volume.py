@@ -2,10 +2,11 @@
 
 import math
 
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part, taken_share
 from massspring.kernels.jit.decorators import inlined, lean
 
-NEGLIGIBLE = 1e-12
+NEGLIGIBLE_MOBILITY = 1e-12
 """A mobility this much smaller than what it was taken from is round-off."""
 
 
@@ -23,7 +24,7 @@ def volume_multiplier(motion, inverse_mass, volume_error, dt):
         v0, v1, v2 = motion.v_star[i, 0], motion.v_star[i, 1], motion.v_star[i, 2]
         flow += g0 * v0 + g1 * v1 + g2 * v2
         square = g0 * g0 + g1 * g1 + g2 * g2
-        if motion.locked[i] > 0:
+        if motion.locked[i] > FREE:
             locked = motion.locked[i]
             d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
             p0, p1, p2 = allowed_part(locked, d0, d1, d2, g0, g1, g2)
@@ -51,14 +52,14 @@ def multiplier_of_sums(motion, inverse_mass, volume_error, dt, flow, mobility):
     free = mobility
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
-        if locked[i] > 0:
+        if locked[i] > FREE:
             g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
             v0, v1, v2 = v_star[i, 0], v_star[i, 1], v_star[i, 2]
             d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
             mobility -= inverse_mass[i] * taken_share(locked[i], d0, d1, d2, g0, g1, g2, g0, g1, g2)
             flow -= taken_share(locked[i], d0, d1, d2, g0, g1, g2, v0, v1, v2)
             flow += g0 * goal[i, 0] + g1 * goal[i, 1] + g2 * goal[i, 2]
-    if mobility <= NEGLIGIBLE * free:
+    if mobility <= NEGLIGIBLE_MOBILITY * free:
         return 0.0, 0.0
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
 

@@ -3,7 +3,8 @@
 import math
 
 from massspring.kernels.constraint.block_jacobi import precondition_into, scale_into
-from massspring.kernels.constraint.jacobian import NEGLIGIBLE, mobilised_into, padded_rows_times_into
+from massspring.kernels.constraint.jacobian import NEGLIGIBLE_DIAGONAL, mobilised_into, padded_rows_times_into
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import compiled, inlined, lean, summing
 
@@ -19,7 +20,7 @@ def dense_into(rows, motion, inverse_mass, matrix):
         for k in range(rows.node_start[j], rows.node_start[j + 1]):
             e, r = rows.node_entry[k], rows.node_row[k]
             g0, g1, g2 = rows.value[e, 0], rows.value[e, 1], rows.value[e, 2]
-            if motion.locked[j] > 0:
+            if motion.locked[j] > FREE:
                 d0, d1, d2 = motion.direction[j, 0], motion.direction[j, 1], motion.direction[j, 2]
                 g0, g1, g2 = allowed_part(motion.locked[j], d0, d1, d2, g0, g1, g2)
             g0, g1, g2 = w * g0, w * g1, w * g2
@@ -48,7 +49,7 @@ def factor_dense(matrix):
         pivot = diagonal
         for q in range(k):
             pivot -= matrix[k, q] * matrix[k, q]
-        if pivot > NEGLIGIBLE * diagonal:
+        if pivot > NEGLIGIBLE_DIAGONAL * diagonal:
             root = math.sqrt(pivot)
             matrix[k, k] = root
             for i in range(k + 1, m):

@@ -1,6 +1,7 @@
 """The volumes of all tetrahedra solved for at the end of a step: together, or one after the other (eq. 166, 167)."""
 
 from massspring.kernels.contact.constrained_motion import pushed_by_into, unpushed_into
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.forces.tetrahedron_volumes import add_four, cell_slopes, mean_pressure
 from massspring.kernels.forces.volume import volume_gradient_into
@@ -56,7 +57,7 @@ def moved_by(inverse_mass, locked, direction, i, g0, g1, g2):
     """W̃ g at node i (eq. 9)."""
     w = inverse_mass[i]
     d0, d1, d2 = w * g0, w * g1, w * g2
-    if locked[i] > 0:
+    if locked[i] > FREE:
         d0, d1, d2 = allowed_part(locked[i], direction[i, 0], direction[i, 1], direction[i, 2], d0, d1, d2)
     return d0, d1, d2
 

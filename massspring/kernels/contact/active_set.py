@@ -7,10 +7,11 @@ import math
 
 from massspring.kernels.contact.friction import release_slipping, release_wedged, rub, wedge
 from massspring.kernels.contact.gaps import clearances_into, gap_and_normal, pushed_velocity
+from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from massspring.kernels.contact.node_contact import round_contact
 from massspring.kernels.jit.blocks import BLOCK, any_within
 from massspring.kernels.jit.decorators import inlined, lean
-from massspring.kernels.jit.thread_team import SEARCH, call, join
+from massspring.kernels.jit.thread_team import JOB_SEARCH, call, join
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
@@ -40,7 +41,7 @@ def seat(network, motion, drive, step, lam, count):
                     axis = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
                     n0, n1, n2, lift = round_contact((s0, s1, s2), (r0, r1, r2), axis, drive.radius[o])
                 a = n0 * u0 + n1 * u1 + n2 * u2 + lift / dt
-                motion.touched[i], motion.locked[i] = o + 1, 1
+                motion.touched[i], motion.locked[i] = o + 1, SLIDES
                 motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2] = n0, n1, n2
                 motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2] = n0, n1, n2
                 motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = a * n0, a * n1, a * n2
@@ -51,7 +52,7 @@ def let_go(motion):
     """No node is touched."""
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
-        motion.touched[i], motion.locked[i] = 0, 0
+        motion.touched[i], motion.locked[i] = 0, FREE
     motion.touching_count[0] = 0
 
 
@@ -62,7 +63,7 @@ def admit(motion, count):
     listed = motion.touching_count[0]
     for k in range(count):
         i = entering[k]
-        if locked[i] > 0:
+        if locked[i] > FREE:
             touching[listed] = i
             motion.clearance[i] = math.inf
             listed += 1
@@ -75,7 +76,7 @@ def forget_released(motion):
     touching, locked, kept = motion.touching, motion.locked, 0
     for k in range(motion.touching_count[0]):
         i = touching[k]
-        if locked[i] > 0:
+        if locked[i] > FREE:
             touching[kept] = i
             kept += 1
     motion.touching_count[0] = kept
@@ -87,7 +88,7 @@ def clear_all(network, motion, drive, step, lam, team):
     if team is None:
         clearances_into(network, motion, drive, step, lam, 0, motion.x.shape[0])
     else:
-        call(team, SEARCH, step, lam)
+        call(team, JOB_SEARCH, step, lam)
         clearances_into(network, motion, drive, step, lam, team.nodes[0], team.nodes[1])
         join(team)
 
@@ -127,13 +128,13 @@ def release_pulled(network, motion, drive, lam):
     changes = 0
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
-        if motion.locked[i] == 0 or motion.locked[i] == 2:
+        if motion.locked[i] == FREE or motion.locked[i] == ON_EDGE:
             continue
         n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
         u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
         if motion.goal[i, 0] * n0 + motion.goal[i, 1] * n1 + motion.goal[i, 2] * n2 < u0 * n0 + u1 * n1 + u2 * n2:
             # A released node is looked at again in the next pass, whatever the pressure becomes.
-            motion.touched[i], motion.locked[i], motion.clearance[i] = 0, 0, 0.0
+            motion.touched[i], motion.locked[i], motion.clearance[i] = 0, FREE, 0.0
             changes += 1
     return changes
 
@@ -168,7 +169,7 @@ def revise_contacts(network, motion, drive, step, lam, reach):
         if not any_within(clearance, begin, reach):
             continue
         for i in range(begin, min(begin + BLOCK, clearance.shape[0])):
-            if clearance[i] > reach or motion.locked[i] > 0 or touchable[i] == 0:
+            if clearance[i] > reach or motion.locked[i] > FREE or touchable[i] == 0:
                 continue
             if enters(network, motion, drive, step, lam, i):
                 entering[count] = i

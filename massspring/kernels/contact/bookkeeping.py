@@ -1,6 +1,7 @@
 """Velocities that obstacles leave to touched nodes, and the impulses of the obstacles."""
 
 from massspring.kernels.contact.friction import shares
+from massspring.kernels.contact.modes import FREE, ON_EDGE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import inlined, lean
 
@@ -32,7 +33,7 @@ def book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse):
     impulse = real(dt * lam)
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
-        if locked[i] == 0:
+        if locked[i] == FREE:
             continue
         push = impulse * real(inverse_mass[i])
         u0, u1 = v_star[i, 0] + push * gradient[i, 0], v_star[i, 1] + push * gradient[i, 1]
@@ -43,7 +44,7 @@ def book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse):
         contact_impulse[o, 0] += k0
         contact_impulse[o, 1] += k1
         contact_impulse[o, 2] += k2
-        if locked[i] == 2:
+        if locked[i] == ON_EDGE:
             m0, m1, m2 = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
             n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
             _, beta = shares((k0, k1, k2), (n0, n1, n2), (m0, m1, m2))

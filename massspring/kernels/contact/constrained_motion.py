@@ -1,5 +1,6 @@
 """What contact lets through: motion without pressure, and motion by a force."""
 
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import compiled
 
@@ -9,7 +10,7 @@ def unpushed_into(motion, dt, y):
     """y = x + dt ṽ [m], (n, 3): where the step ends without pressure, contact included (eq. 9, 10)."""
     for i in range(y.shape[0]):
         u0, u1, u2 = motion.v_star[i, 0], motion.v_star[i, 1], motion.v_star[i, 2]
-        if motion.locked[i] > 0:
+        if motion.locked[i] > FREE:
             e0, e1, e2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
             u0, u1, u2 = allowed_part(motion.locked[i], e0, e1, e2, u0, u1, u2)
             u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
@@ -24,7 +25,7 @@ def pushed_by_into(motion, inverse_mass, factor, force, d):
     for i in range(d.shape[0]):
         push = factor * inverse_mass[i]
         d0, d1, d2 = push * force[i, 0], push * force[i, 1], push * force[i, 2]
-        if motion.locked[i] > 0:
+        if motion.locked[i] > FREE:
             e0, e1, e2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
             d0, d1, d2 = allowed_part(motion.locked[i], e0, e1, e2, d0, d1, d2)
         d[i, 0], d[i, 1], d[i, 2] = d0, d1, d2

@@ -3,6 +3,7 @@
 import math
 
 from massspring.kernels.contact.gaps import gap_and_normal, pushed_velocity
+from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import inlined, lean
 
@@ -17,7 +18,7 @@ def rub(network, motion, drive, step, lam):
     """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 36)."""
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
-        if motion.locked[i] != 1 or not drive.friction[motion.touched[i] - 1] > 0.0:
+        if motion.locked[i] != SLIDES or not drive.friction[motion.touched[i] - 1] > 0.0:
             continue
         o = motion.touched[i] - 1
         n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
@@ -25,11 +26,11 @@ def rub(network, motion, drive, step, lam):
         g0, g1, g2 = motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2]
         pressed = drive.friction[o] * ((g0 - u0) * n0 + (g1 - u1) * n1 + (g2 - u2) * n2)
         w0, w1, w2 = drive.velocity[step, o, 0], drive.velocity[step, o, 1], drive.velocity[step, o, 2]
-        s0, s1, s2 = allowed_part(1, n0, n1, n2, u0 - w0, u1 - w1, u2 - w2)
+        s0, s1, s2 = allowed_part(SLIDES, n0, n1, n2, u0 - w0, u1 - w1, u2 - w2)
         slip = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
         if slip <= pressed:
-            w0, w1, w2 = allowed_part(1, n0, n1, n2, w0, w1, w2)
-            motion.locked[i] = 3
+            w0, w1, w2 = allowed_part(SLIDES, n0, n1, n2, w0, w1, w2)
+            motion.locked[i] = STICKS
             motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = g0 + w0, g1 + w1, g2 + w2
         else:
             lost = pressed / slip
@@ -42,7 +43,7 @@ def release_slipping(network, motion, drive, lam):
     changes = 0
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
-        if motion.locked[i] != 3:
+        if motion.locked[i] != STICKS:
             continue
         push = drive.dt * lam * network.inverse_mass[i]
         n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
@@ -50,12 +51,12 @@ def release_slipping(network, motion, drive, lam):
         k1 = motion.goal[i, 1] - motion.v_star[i, 1] - push * motion.gradient[i, 1]
         k2 = motion.goal[i, 2] - motion.v_star[i, 2] - push * motion.gradient[i, 2]
         along = k0 * n0 + k1 * n1 + k2 * n2
-        s0, s1, s2 = allowed_part(1, n0, n1, n2, k0, k1, k2)
+        s0, s1, s2 = allowed_part(SLIDES, n0, n1, n2, k0, k1, k2)
         needed, most = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2), drive.friction[motion.touched[i] - 1] * along
         if along > 0.0 and needed > SLIPS * most:
             a = motion.goal[i, 0] * n0 + motion.goal[i, 1] * n1 + motion.goal[i, 2] * n2
             g0, g1, g2 = a * n0 + most / needed * s0, a * n1 + most / needed * s1, a * n2 + most / needed * s2
-            motion.locked[i] = 1
+            motion.locked[i] = SLIDES
             motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = g0, g1, g2
             changes += 1
     return changes
@@ -71,11 +72,11 @@ def wedge(network, motion, drive, step, lam):
     dt = drive.dt
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
-        if motion.locked[i] != 1:
+        if motion.locked[i] != SLIDES:
             continue
         n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
         u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
-        u0, u1, u2 = allowed_part(1, n0, n1, n2, u0, u1, u2)
+        u0, u1, u2 = allowed_part(SLIDES, n0, n1, n2, u0, u1, u2)
         u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
         y0, y1, y2 = motion.x[i, 0] + dt * u0, motion.x[i, 1] + dt * u1, motion.x[i, 2] + dt * u2
         deepest = 0.0
@@ -99,7 +100,7 @@ def wedge(network, motion, drive, step, lam):
                 motion.goal[i, 1] = alpha * n1 + beta * m1
                 motion.goal[i, 2] = alpha * n2 + beta * m2
         if deepest < 0.0:
-            motion.locked[i] = 2
+            motion.locked[i] = ON_EDGE
             changes += 1
     return changes
 
@@ -124,7 +125,7 @@ def release_wedged(network, motion, drive, lam):
     changes = 0
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
-        if motion.locked[i] != 2:
+        if motion.locked[i] != ON_EDGE:
             continue
         u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
         # What the edge leaves free is at right angles to both normals and takes no share.
@@ -132,6 +133,6 @@ def release_wedged(network, motion, drive, lam):
         m = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
         alpha, beta = shares((motion.goal[i, 0] - u0, motion.goal[i, 1] - u1, motion.goal[i, 2] - u2), n, m)
         if alpha < 0.0 or beta < 0.0:
-            motion.touched[i], motion.locked[i], motion.clearance[i] = 0, 0, 0.0
+            motion.touched[i], motion.locked[i], motion.clearance[i] = 0, FREE, 0.0
             changes += 1
     return changes

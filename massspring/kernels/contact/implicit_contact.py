@@ -1,6 +1,7 @@
 """Contact for methods whose steps are long and solved as a whole."""
 
 from massspring.kernels.contact.active_set import admit, enters, forget_released, seat
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.jit.decorators import compiled
 
 
@@ -14,7 +15,7 @@ def seat_entering(network, motion, drive, step):
     count = 0
     for c in range(network.surface_nodes.shape[0]):
         i = network.surface_nodes[c]
-        if network.inverse_mass[i] == 0.0 or motion.locked[i] > 0:
+        if network.inverse_mass[i] == 0.0 or motion.locked[i] > FREE:
             continue
         if enters(network, motion, drive, step, 0.0, i):
             motion.entering[count] = i

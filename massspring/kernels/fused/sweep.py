@@ -29,7 +29,7 @@ from massspring.kernels.fused.chunk import (
 from massspring.kernels.fused.long_rows import add_walls, join_pieces
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.jit.decorators import inlined, lean
-from massspring.kernels.jit.thread_team import SPRINGS, SPRINGS_AND_VOLUME, call, join
+from massspring.kernels.jit.thread_team import JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, call, join
 
 
 @inlined
@@ -149,7 +149,7 @@ def pass_all(motion, drive, slices, keeps, team):
     if team is None:
         pass_slices(motion, drive, slices, 0, slices.lanes.shape[0], keeps, motion.tile[0])
     else:
-        call(team, SPRINGS_AND_VOLUME if keeps else SPRINGS, 0, 0.0)
+        call(team, JOB_SPRINGS_AND_VOLUME if keeps else JOB_SPRINGS, 0, 0.0)
         pass_slices(motion, drive, slices, team.slices[0], team.slices[1], keeps, motion.tile[0])
         join(team)
 

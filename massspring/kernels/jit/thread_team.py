@@ -18,8 +18,8 @@ from massspring.kernels.jit.decorators import inlined
 LINE = 8
 """Numbers of a line of the cache: counters in one line would slow each other down."""
 ROUND, DONE, JOB, STEP, READY = (LINE * line for line in range(5))
-REST, SPRINGS, SPRINGS_AND_VOLUME, SEARCH, MOVE = range(5)
-"""Jobs; REST ends the frame."""
+JOB_END, JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, JOB_SEARCH, JOB_MOVE = range(5)
+"""JOB_END ends the frame."""
 PATIENCE = 20_000
 """Looks at a counter before the thread offers its core to others: 5 to 10 µs."""
 

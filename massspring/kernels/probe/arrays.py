@@ -21,7 +21,7 @@ COUNTS = (
     "nodes carried",
 )
 """What `Probing.counts` counts."""
-IN_CONTACT, ROUNDS, CARRYING, LEFT_BEHIND, COMPARED, TESTED, CARRIED = range(len(COUNTS))
+IN_CONTACT, SEARCH_ROUNDS, CARRYING, LEFT_BEHIND, COMPARED, TESTED, CARRIED = range(len(COUNTS))
 
 
 class Rows(NamedTuple):

@@ -3,6 +3,7 @@
 import math
 
 from massspring.kernels.contact.bookkeeping import settled
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.jit.decorators import comparing, lean
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.probe.arrays import COMPARED
@@ -37,7 +38,7 @@ def fastest_node(network, motion, lam, dt):
     fastest = float(fastest_free(v_star, gradient, weight, real(dt * lam)))
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
-        if locked[i] > 0:
+        if locked[i] > FREE:
             w = dt * lam * weight[i]
             u0, u1 = v_star[3 * i] + w * gradient[3 * i], v_star[3 * i + 1] + w * gradient[3 * i + 1]
             u0, u1, u2 = settled(motion, i, u0, u1, v_star[3 * i + 2] + w * gradient[3 * i + 2])

@@ -9,6 +9,7 @@ Eliminating the change of pressure δ leaves A c ≥ right with A_kl = Σ_i b_ki
 """
 
 from massspring.kernels.constraint.schur import solve_dense
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.probe.pressure import answer_into, change_of_rows, flow_into
@@ -66,7 +67,7 @@ def aim_rows(stage):
             approach += b * (d0 * probes.base[i, 0] + d1 * probes.base[i, 1] + d2 * probes.base[i, 2])
             gap += b * (d0 * motion.x[i, 0] + d1 * motion.x[i, 1] + d2 * motion.x[i, 2])
             w, m0, m1, m2 = stage.network.inverse_mass[i], d0, d1, d2
-            if motion.locked[i] > 0:
+            if motion.locked[i] > FREE:
                 e0, e1, e2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
                 m0, m1, m2 = allowed_part(motion.locked[i], e0, e1, e2, m0, m1, m2)
             rows.moves[k, q, 0], rows.moves[k, q, 1], rows.moves[k, q, 2] = w * m0, w * m1, w * m2

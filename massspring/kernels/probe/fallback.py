@@ -7,6 +7,7 @@ there is nothing to move: the tip goes through, and the run says so.
 
 import math
 
+from massspring.kernels.contact.modes import FREE, STICKS
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND
 from massspring.kernels.probe.broad_phase import ROOM, find_near
@@ -15,15 +16,13 @@ from massspring.kernels.probe.motion import carried_speed, gather, move
 from massspring.kernels.probe.pressure import answer_into, faster_by, prepare, pressed_on
 from massspring.kernels.probe.search import look
 
-ROUNDS = 400
+CARRY_ROUNDS = 400
 """Of taking more nodes along, or of sending them farther ahead."""
 LEFT = 1e-9
 """Share of G·W̃·G that nodes that are not carried must have for the volume to be left to them."""
 FREE_SHARE = 0.02
 """Weight of the carried corners where a tip hits a triangle, below which its held ones stop it: to stay ahead, a free
 corner would have to go fifty times as far as the tip."""
-STUCK = 3
-"""Of `Motion.locked`: moves in no direction of its own."""
 
 
 @lean
@@ -34,7 +33,7 @@ def take(stage, p, i):
     probes.taken[probes.taken_count[0]] = i
     probes.taken_count[0] += 1
     probes.counts[CARRIED] += 1
-    motion.locked[i] = STUCK
+    motion.locked[i] = STICKS
     for axis in range(3):
         # What the node would do; `gather` has no more use for it.
         motion.goal[i, axis] = probes.base[i, axis]
@@ -90,7 +89,7 @@ def take_along(stage, p):
         fresh = False
         for k in range(3):
             i = probes.surface[probes.near[p, n], k]
-            if network.inverse_mass[i] > 0.0 and motion.locked[i] == 0:
+            if network.inverse_mass[i] > 0.0 and motion.locked[i] == FREE:
                 take(stage, p, i)
                 fresh = True
         more |= fresh or lead(stage, p, n)
@@ -144,7 +143,7 @@ def carry(stage, volumes, lam, plain, horizon):
     probes.rows.count[0] = 0
     probes.change[:] = 0.0
     reach = plain
-    for _ in range(ROUNDS):
+    for _ in range(CARRY_ROUNDS):
         move(stage, volumes)
         more = False
         for p in range(probes.radius.shape[0]):
@@ -197,5 +196,5 @@ def settle_carried(stage, lam):
             motion.v_star[i, axis] += gain
             tally.contact_impulse[first + p, axis] += network.mass[i] * gain
             probes.push[i, axis] = 0.0
-        probes.carried[i], motion.locked[i] = 0, 0
+        probes.carried[i], motion.locked[i] = 0, FREE
     probes.taken_count[0] = 0

@@ -2,6 +2,7 @@
 
 import math
 
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.probe.pressure import swelling
@@ -18,7 +19,7 @@ def gather(stage, lam):
                 i = triangles[probes.near[p, n], k]
                 push = stage.dt * lam * weight[i]
                 u0, u1, u2 = v[i, 0] + push * g[i, 0], v[i, 1] + push * g[i, 1], v[i, 2] + push * g[i, 2]
-                if motion.locked[i] > 0:
+                if motion.locked[i] > FREE:
                     d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
                     u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
                     u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]

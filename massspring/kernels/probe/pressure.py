@@ -7,6 +7,7 @@ import math
 
 from massspring.kernels.constraint.jacobian import diagonal_into, transposed_rows_times_into
 from massspring.kernels.constraint.schur import dense_into, factor_dense, solve_iteratively, substitute
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import lean
 
@@ -98,7 +99,7 @@ def swelling(stage, volumes, i):
             s2 += p * volumes.value[e, 2]
     push = stage.dt * stage.network.inverse_mass[i]
     s0, s1, s2 = push * s0, push * s1, push * s2
-    if motion.locked[i] > 0:
+    if motion.locked[i] > FREE:
         d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
         s0, s1, s2 = allowed_part(motion.locked[i], d0, d1, d2, s0, s1, s2)
     return s0, s1, s2

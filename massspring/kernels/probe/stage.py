@@ -7,7 +7,7 @@ contact, and the search begins again until nothing crosses (docs/theory.md, sect
 import math
 
 from massspring.kernels.jit.decorators import lean
-from massspring.kernels.probe.arrays import IN_CONTACT, ROUNDS, Stage
+from massspring.kernels.probe.arrays import IN_CONTACT, SEARCH_ROUNDS, Stage
 from massspring.kernels.probe.broad_phase import ROOM, SAFE, fastest_node, find_near
 from massspring.kernels.probe.contacts import solve_rows
 from massspring.kernels.probe.fallback import carry
@@ -42,7 +42,7 @@ def meet_probes(network, motion, drive, step, probes, lam, mobility, volumes):
         if sweep == 0:
             prepare(stage, volumes)
         reach = plain + dt * solve_rows(stage, volumes)
-        probes.counts[ROUNDS] += 1
+        probes.counts[SEARCH_ROUNDS] += 1
         if reach > horizon:
             horizon = ROOM * reach
             find_near(motion, drive.tips, step, probes, horizon)

@@ -1,10 +1,11 @@
 """Time stepping: symplectic Euler, prescribed nodes, and the multiplier of one volume."""
 
 from massspring.kernels.contact.bookkeeping import book_contacts, settled
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.jit.decorators import inlined, lean
 from massspring.kernels.jit.flat import flat
-from massspring.kernels.jit.thread_team import MOVE, call, join
+from massspring.kernels.jit.thread_team import JOB_MOVE, call, join
 
 NEAR = 4096
 """Nodes of which a step's end fits the second cache."""
@@ -26,7 +27,7 @@ def advance_nodes(motion, inverse_mass, lam, dt, first, last):
     x, v, places = motion.x, motion.v, motion.places
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
-        if first <= i < last and locked[i] > 0:
+        if first <= i < last and locked[i] > FREE:
             v[i, 0], v[i, 1], v[i, 2] = settled(motion, i, v[i, 0], v[i, 1], v[i, 2])
             for axis in range(3):
                 x[i, axis] = places[i, axis] + step * v[i, axis]
@@ -52,7 +53,7 @@ def move_all(motion, inverse_mass, lam, dt, team):
     if team is None:
         move(motion, inverse_mass, lam, dt, 0, motion.x.shape[0])
     else:
-        call(team, MOVE, 0, lam)
+        call(team, JOB_MOVE, 0, lam)
         move(motion, inverse_mass, lam, dt, team.nodes[0], team.nodes[1])
         join(team)
 

@@ -7,11 +7,11 @@ from massspring.kernels.jit.decorators import lean
 from massspring.kernels.jit.thread_team import (
     DONE,
     JOB,
-    REST,
+    JOB_END,
+    JOB_SEARCH,
+    JOB_SPRINGS,
+    JOB_SPRINGS_AND_VOLUME,
     ROUND,
-    SEARCH,
-    SPRINGS,
-    SPRINGS_AND_VOLUME,
     STEP,
     call,
     raise_by_one,
@@ -30,13 +30,13 @@ def serve(network, motion, drive, rank):
     while True:
         known = wait_until_other_than(team.signal, ROUND, known)
         job, step, lam = team.signal[JOB], team.signal[STEP], team.pressure[0]
-        if job == REST:
+        if job == JOB_END:
             return
-        if job == SPRINGS:
+        if job == JOB_SPRINGS:
             pass_slices(motion, drive, network.slices, first, last, False, motion.tile[rank])
-        elif job == SPRINGS_AND_VOLUME:
+        elif job == JOB_SPRINGS_AND_VOLUME:
             pass_slices(motion, drive, network.slices, first, last, True, motion.tile[rank])
-        elif job == SEARCH:
+        elif job == JOB_SEARCH:
             clearances_into(network, motion, drive, step, lam, begin, end)
         else:
             advance_nodes(motion, network.inverse_mass, lam, drive.dt, begin, end)
@@ -47,4 +47,4 @@ def serve(network, motion, drive, rank):
 @lean
 def dismiss(team):
     """Ends the frame for the other threads."""
-    call(team, REST, 0, 0.0)
+    call(team, JOB_END, 0, 0.0)

@@ -17,6 +17,7 @@ from massspring.kernels.arrays.layout import Drive
 from massspring.kernels.constraint.exact_volume import Line, line_into, nearest_root, volume_cubic
 from massspring.kernels.constraint.one_volume import capped_error, steepest, surely_short, volume_multiplier
 from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, pressure_reach, revise_contacts
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.jit.decorators import compiled
@@ -118,7 +119,7 @@ def correct_positions(network, motion, target, dt):
     for i in range(motion.x.shape[0]):
         push = network.inverse_mass[i] * part / mobility
         p0, p1, p2 = push * motion.gradient[i, 0], push * motion.gradient[i, 1], push * motion.gradient[i, 2]
-        if motion.locked[i] > 0:
+        if motion.locked[i] > FREE:
             d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
             p0, p1, p2 = allowed_part(motion.locked[i], d0, d1, d2, p0, p1, p2)
         motion.x[i, 0] += p0

@@ -7,12 +7,11 @@ from massspring.kernels.arrays.layout import Drive, Motion, Network
 from massspring.kernels.contact.active_set import let_go
 from massspring.kernels.contact.friction import wedge
 from massspring.kernels.contact.implicit_contact import seat_entering
+from massspring.kernels.contact.modes import FREE, HIDDEN, ON_EDGE, SLIDES, STICKS
 from massspring.methods.implicit.factor import Factor
 
 FACTORED, SOLVED = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
-SLIDES, WEDGED, STICKS, AWAY = 1, 2, 3, 4
-"""Values of `motion.locked`; AWAY hides a node from the search."""
-STILL = 1e-11
+SLIP_RESOLUTION = 1e-11
 """Over the longest correction, 0.3 of an edge: a node that slides less than that in a step does not slide. Solves leave
 1e-15 to 1e-14 of it where a node sticks (measured), and friction would take its direction from that."""
 
@@ -22,7 +21,7 @@ class Touching:
 
     def __init__(self, factor: Factor, motion: Motion, surface_nodes: np.ndarray, dt: float) -> None:
         locked = motion.locked[surface_nodes]
-        slides, wedged, sticks = (surface_nodes[locked == kind].astype(np.int64) for kind in (SLIDES, WEDGED, STICKS))
+        slides, wedged, sticks = (surface_nodes[locked == kind].astype(np.int64) for kind in (SLIDES, ON_EDGE, STICKS))
         axes = np.tile(np.eye(3), (len(sticks), 1))
         self.nodes = np.concatenate([slides, wedged, wedged, np.repeat(sticks, 3)])
         self.direction = np.concatenate(
@@ -78,7 +77,7 @@ class Contact:
         sticks = motion.locked[nodes] == STICKS
         inward = np.where(sticks, np.einsum("ci,ci->c", motion.normal[nodes], pushes[nodes]), impulses)
         leaving = np.unique(nodes[inward < 0.0])
-        motion.locked[leaving], motion.touched[leaving] = 0, 0
+        motion.locked[leaving], motion.touched[leaving] = FREE, 0
         self.rubbed[leaving] = 0.0
         slipped = self._let_slip(pushes) if self.drive.rough else 0
         entered = self._seat(leaving, (end - motion.x) / self.drive.dt)
@@ -111,7 +110,7 @@ class Contact:
         normal, carried = motion.normal[nodes], drive.velocity[self.step][obstacle]
         slip = _aside((end[nodes] - motion.x[nodes]) / drive.dt - carried, normal)
         speed = np.linalg.norm(slip, axis=1)
-        still = speed * drive.dt <= STILL * self.network.longest_correction
+        still = speed * drive.dt <= SLIP_RESOLUTION * self.network.longest_correction
         driven = still | (np.einsum("ci,ci->c", slip, self.rubbed[nodes]) > 0.0)
         most = drive.friction[obstacle] * np.maximum(impulses[slides], 0.0)
         self.rubbed[nodes[~driven]] = -(most[~driven] / speed[~driven])[:, None] * slip[~driven]
@@ -131,9 +130,9 @@ class Contact:
         if not len(drive.radius):
             return 0
         motion.v_star[:] = velocity
-        motion.locked[leaving] = AWAY
+        motion.locked[leaving] = HIDDEN
         count = seat_entering(self.network, motion, drive, self.step)
-        motion.locked[leaving] = 0
+        motion.locked[leaving] = FREE
         if drive.rough:
             new = motion.entering[:count].astype(np.int64)
             obstacle = motion.touched[new].astype(np.int64) - 1
@@ -141,7 +140,7 @@ class Contact:
             self._stick(new[rough], drive.velocity[self.step][obstacle[rough]])
         if len(drive.radius) > 1:
             count += wedge(self.network, motion, drive, self.step, 0.0)
-            self.rubbed[motion.locked == WEDGED] = 0.0
+            self.rubbed[motion.locked == ON_EDGE] = 0.0
         return count
 
 

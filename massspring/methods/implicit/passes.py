@@ -18,7 +18,7 @@ from massspring.methods.implicit.factor import Factor
 CONTACT_REVISIONS, LAST_REVISIONS = 3, 12
 """Of the touched set in one pass, and in the last one, after which no other pass finds a node that enters or is pulled.
 The last solution always belongs to the set that is applied."""
-NEGLIGIBLE = 1e-12
+NEGLIGIBLE_RESPONSE = 1e-12
 """Contact and held nodes that leave a volume this little of its response leave nothing but round-off."""
 
 SOFTNESS = 1e-10
@@ -159,7 +159,7 @@ class Step:
     def directly(self, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(Δlam, dt² A⁻¹ Jᵀ Δlam) of few volumes by a dense solve (eq. 93)."""
         assert self.answers is not None
-        able = np.diag(self.schur) > NEGLIGIBLE * self.drive.dt**2 * self.factor.alone(self.rows)[0]
+        able = np.diag(self.schur) > NEGLIGIBLE_RESPONSE * self.drive.dt**2 * self.factor.alone(self.rows)[0]
         pressure = np.zeros(len(error))
         if able.any():
             inner = self.schur[np.ix_(able, able)]
