@@ -59,6 +59,7 @@ def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
         node_value=aligned((len(entries), SIMD_WIDTH), np.dtype(np.float64)),
         matrix=np.zeros((dense, dense)),
         node_vector=aligned((nodes, SIMD_WIDTH), np.dtype(np.float64)),
+        push=aligned((nodes, 3), np.dtype(np.float64)),
         clusters=each_alone(0 if dense else m),
         **{name: np.zeros(m) for name in OF_EACH_VOLUME},
     )

@@ -6,6 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
 
+import numpy as np
+
 from massspring.kernels.arrays.layout import Drive, Motion, Network
 from massspring.kernels.fused.chunk import TILE
 from massspring.kernels.jit.blocks import BLOCK
@@ -26,8 +28,11 @@ def shared(motion: Motion, network: Network, threads: int) -> Motion:
 
 
 @contextmanager
-def crew(network: Network, motion: Motion, drive: Drive) -> Iterator[None]:
-    """Inside, the other threads of `motion.team` wait for their parts; without a team nothing happens."""
+def crew(network: Network, motion: Motion, drive: Drive, direction: np.ndarray) -> Iterator[None]:
+    """Inside, the other threads of `motion.team` wait for their parts; without a team nothing happens.
+
+    `direction` (n, 3): of the pushes of the frame.
+    """
     team = motion.team
     if team is None:
         yield
@@ -36,10 +41,10 @@ def crew(network: Network, motion: Motion, drive: Drive) -> Iterator[None]:
     if not team.signal[READY]:
         # A thread that had to compile, or could not, would keep the frame waiting.
         dismiss(team)
-        serve(network, motion, drive, 1)
+        serve(network, motion, drive, direction, 1)
         team.signal[READY] = 1
     team.signal[ROUND] = 0
-    parts = [_pool(os.getpid(), len(others)).submit(serve, network, motion, drive, rank) for rank in others]
+    parts = [_pool(os.getpid(), len(others)).submit(serve, network, motion, drive, direction, rank) for rank in others]
     try:
         yield
     finally:

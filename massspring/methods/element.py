@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Accuracy, Drive
+from massspring.kernels.arrays.layout import Accuracy, Drive, Push
 from massspring.kernels.constraint.tetrahedra import any_idle, cell_forces_into, cell_rows_into, solve_cells
 from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, revise_contacts
 from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
@@ -46,19 +46,19 @@ from massspring.world.obstacles import Attachment
 
 @compiled
 def hard_frame(network, cells, motion, drive, tally, compliance, accuracy):
-    """One frame, all cells and contact inside the solve (eq. 6–13, 166); F = Jᵀ p is pushed with a pressure of 1."""
-    dt = drive.dt
+    """One frame, all cells and contact inside the solve (eq. 6–13, 166); the mean pressure [Pa]."""
+    dt, push = drive.dt, Push(cells.push, 1.0)
     mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         fill(cells, drive, step)
         predict(network, motion, drive, step, False)
         mark(tally.ticks, SPRINGS)
         cell_rows_into(motion.x, cells, cells.right)
-        cell_forces_into(cells, cells.pressure, motion.gradient)
+        cell_forces_into(cells, cells.pressure, cells.push)
         mark(tally.ticks, VOLUME)
         passes = 1
         if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, 1.0)
+            find_contacts(network, motion, drive, step, push)
             mark(tally.ticks, SEARCH)
             passes = CONTACT_PASSES
         for sweep in range(passes):
@@ -66,18 +66,18 @@ def hard_frame(network, cells, motion, drive, tally, compliance, accuracy):
             count = solve_cells(motion, network.inverse_mass, cells, dt, compliance, accuracy)
             tally.iterations[0] += count
             tally.iterations[1] = max(tally.iterations[1], count)
-            cell_forces_into(cells, cells.pressure, motion.gradient)
+            cell_forces_into(cells, cells.pressure, cells.push)
             mark(tally.ticks, MULTIPLIER)
             if sweep + 1 == passes:
                 break
-            changes = revise_contacts(network, motion, drive, step, 1.0, np.inf)
+            changes = revise_contacts(network, motion, drive, step, push, np.inf)
             mark(tally.ticks, REVISION)
             if changes == 0:
                 break
         tally.skipped[0] += any_idle(cells, compliance, accuracy.tolerance)
-        add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
+        add_held_impulse(network, motion, push, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, 1.0, dt, tally.contact_impulse)
+        advance(motion, network.mass, network.inverse_mass, push, dt, tally.contact_impulse)
         mark(tally.ticks, INTEGRATION)
     return mean_pressure(cells)
 

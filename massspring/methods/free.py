@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import Drive, Push
 from massspring.kernels.contact.active_set import find_contacts
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.fused.sweep import predict_from_places
@@ -19,7 +19,7 @@ from massspring.methods.method import Method, crewed_frame
 @lean
 def free_frame(network, motion, drive, tally, probing):
     """One frame of symplectic Euler with contact (eq. 6, 7, 10, 12)."""
-    dt = drive.dt
+    dt, push = drive.dt, Push(motion.gradient, 0.0)
     mark(tally.ticks, OUTSIDE)
     places_into(motion, 0, motion.x.shape[0])
     for step in range(drive.position.shape[0]):
@@ -31,14 +31,14 @@ def free_frame(network, motion, drive, tally, probing):
         )
         mark(tally.ticks, HELD)
         if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, 0.0)
+            find_contacts(network, motion, drive, step, push)
             mark(tally.ticks, SEARCH)
         if probing is not None:
-            meet_probes(network, motion, drive, step, probing, 0.0, 0.0, None)
+            meet_probes(network, motion, drive, step, probing, push, 0.0, None)
             mark(tally.ticks, PROBES)
-        add_held_impulse(network, motion, 0.0, dt, drive.gravity, tally.held_impulse)
+        add_held_impulse(network, motion, push, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
-        advance_to_places(motion, network.mass, network.inverse_mass, 0.0, dt, tally.contact_impulse)
+        advance_to_places(motion, network.mass, network.inverse_mass, push, dt, tally.contact_impulse)
         mark(tally.ticks, INTEGRATION)
 
 

@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Accuracy, Drive
+from massspring.kernels.arrays.layout import Accuracy, Drive, Push
 from massspring.kernels.constraint.jacobian import (
     diagonal_into,
     padded_rows_times_into,
@@ -71,7 +71,7 @@ def implicit_volume_frame(network, motion, drive, tally, lam, probing):
         predicted = lam
         passes = 1
         if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, predicted)
+            find_contacts(network, motion, drive, step, Push(motion.gradient, predicted))
             mark(tally.ticks, SEARCH)
             passes = CONTACT_PASSES
         for sweep in range(passes):
@@ -86,18 +86,19 @@ def implicit_volume_frame(network, motion, drive, tally, lam, probing):
             if sweep + 1 == passes:
                 break
             reach = pressure_reach(lam - predicted, left, lightest, dt)
-            changes = revise_contacts(network, motion, drive, step, lam, reach)
+            changes = revise_contacts(network, motion, drive, step, Push(motion.gradient, lam), reach)
             mark(tally.ticks, REVISION)
             if changes == 0:
                 break
         if not left > 0.0:
             tally.skipped[0] += 1
         if probing is not None:
-            lam = meet_probes(network, motion, drive, step, probing, lam, left, None)
+            lam = meet_probes(network, motion, drive, step, probing, Push(motion.gradient, lam), left, None)
             mark(tally.ticks, PROBES)
-        add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
+        push = Push(motion.gradient, lam)
+        add_held_impulse(network, motion, push, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
-        advance_to_places(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
+        advance_to_places(motion, network.mass, network.inverse_mass, push, dt, tally.contact_impulse)
         mark(tally.ticks, INTEGRATION)
     return lam
 
@@ -108,7 +109,7 @@ def set_right_side(network, rows, motion, target, dt, tolerance):
 
     Returns whether a volume was capped, and whether a wrong one had nothing to push on.
     """
-    pushed_velocity_into(motion, network.inverse_mass, dt, rows.node_vector)
+    pushed_velocity_into(motion, network.inverse_mass, rows.push, dt, rows.node_vector)
     padded_rows_times_into(rows, rows.node_vector, rows.right)
     diagonal_into(rows, motion, network.inverse_mass, rows.diagonal)
     lightest, per_second = network.largest_inverse_mass, 1.0 / dt
@@ -129,7 +130,7 @@ def set_right_side(network, rows, motion, target, dt, tolerance):
 
 @compiled
 def solve_multipliers(network, rows, motion, tally, accuracy):
-    """lam += S⁻¹ rhs for the contacts of the moment (eq. 33, 34); then F = Jᵀ lam [N] in the place of lam G."""
+    """lam += S⁻¹ rhs for the contacts of the moment (eq. 33, 34); then Jᵀ lam [N] into `rows.push`."""
     if rows.matrix.shape[0] > 0:
         dense_into(rows, motion, network.inverse_mass, rows.matrix)
         solve_dense(rows.matrix, rows.right, rows.search)
@@ -141,16 +142,13 @@ def solve_multipliers(network, rows, motion, tally, accuracy):
         tally.iterations[1] = max(tally.iterations[1], count)
         if count == 0:
             return
-    transposed_rows_times_into(rows, rows.lam, motion.gradient)
+    transposed_rows_times_into(rows, rows.lam, rows.push)
 
 
 @compiled
 def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy, probing):
-    """One frame of HCJ05 with several volumes (eq. 6–13, 32–35); `rows.lam` [Pa] comes in and goes out.
-
-    `motion.gradient` holds F = Jᵀ lam [N], so that with a pressure of 1 all shared kernels push with it.
-    """
-    dt = drive.dt
+    """One frame of HCJ05 with several volumes (eq. 6–13, 32–35); `rows.lam` [Pa] comes in and goes out."""
+    dt, push = drive.dt, Push(rows.push, 1.0)
     mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         gather_and_predict(network, motion, drive, False)
@@ -161,11 +159,11 @@ def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy, probin
         )
         mark(tally.ticks, HELD)
         rows_into(motion.x, network.inverse_mass, rows)
-        transposed_rows_times_into(rows, rows.lam, motion.gradient)
+        transposed_rows_times_into(rows, rows.lam, rows.push)
         mark(tally.ticks, VOLUME)
         passes = 1
         if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, 1.0)
+            find_contacts(network, motion, drive, step, push)
             mark(tally.ticks, SEARCH)
             passes = CONTACT_PASSES
         for sweep in range(passes):
@@ -174,18 +172,18 @@ def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy, probin
             mark(tally.ticks, MULTIPLIER)
             if sweep + 1 == passes:
                 break
-            changes = revise_contacts(network, motion, drive, step, 1.0, math.inf)
+            changes = revise_contacts(network, motion, drive, step, push, math.inf)
             mark(tally.ticks, REVISION)
             if changes == 0:
                 break
         tally.capped[0] += capped
         tally.skipped[0] += idle
         if probing is not None:
-            meet_probes(network, motion, drive, step, probing, 1.0, 0.0, rows)
+            meet_probes(network, motion, drive, step, probing, push, 0.0, rows)
             mark(tally.ticks, PROBES)
-        add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
+        add_held_impulse(network, motion, push, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, 1.0, dt, tally.contact_impulse)
+        advance(motion, network.mass, network.inverse_mass, push, dt, tally.contact_impulse)
         mark(tally.ticks, INTEGRATION)
 
 

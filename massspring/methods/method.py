@@ -89,5 +89,6 @@ def begin_frame(state: State, drive: Drive) -> State:
 def crewed_frame(state: State, drive: Drive) -> Iterator[State]:
     """A copy to advance in place; inside, all threads of the state are there."""
     after = begin_frame(state, drive)
-    with crew(after.network, after.motion, drive):
+    direction = after.motion.gradient if after.rows is None else after.rows.push
+    with crew(after.network, after.motion, drive, direction):
         yield after

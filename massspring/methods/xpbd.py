@@ -21,7 +21,7 @@ import numpy as np
 
 from massspring.body.body import Body
 from massspring.errors import MassSpringError
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import Drive, Push
 from massspring.kernels.constraint.tetrahedra import relax_cells, relax_sum, relax_whole
 from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, revise_contacts
 from massspring.kernels.contact.constrained_motion import unpushed_into
@@ -40,8 +40,8 @@ from massspring.world.obstacles import Attachment
 
 @compiled
 def xpbd_frame(network, cells, motion, drive, tally, compliance, iterations, whole):
-    """One frame (eq. 6–13, 167): F in the place of lam G, pushed with a pressure of 1; returns the last one [Pa]."""
-    lam, idle, dt = 0.0, False, drive.dt
+    """One frame (eq. 6–13, 167); returns the last pressure, of cells their mean [Pa]."""
+    lam, idle, dt, push = 0.0, False, drive.dt, Push(cells.push, 1.0)
     mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         fill(cells, drive, step)
@@ -49,34 +49,34 @@ def xpbd_frame(network, cells, motion, drive, tally, compliance, iterations, who
         mark(tally.ticks, SPRINGS)
         passes = 1
         if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, 1.0)
+            find_contacts(network, motion, drive, step, push)
             mark(tally.ticks, SEARCH)
             passes = CONTACT_PASSES
         for sweep in range(passes):
             unpushed_into(motion, dt, cells.y)
-            motion.gradient[:] = 0.0
+            cells.push[:] = 0.0
             cells.pressure[:] = 0.0
             lam, idle = 0.0, False
             target = drive.volume_target[step, 0]
             for _ in range(iterations):
                 if whole:
-                    lam, idle = relax_whole(network, motion, cells, target, dt * dt, compliance, lam, motion.gradient)
+                    lam, idle = relax_whole(network, motion, cells, target, dt * dt, compliance, lam, cells.push)
                 else:
-                    idle = relax_cells(motion, network.inverse_mass, cells, dt * dt, compliance, motion.gradient)
-                    idle |= relax_sum(network, motion, cells, target, dt * dt, compliance, motion.gradient)
+                    idle = relax_cells(motion, network.inverse_mass, cells, dt * dt, compliance, cells.push)
+                    idle |= relax_sum(network, motion, cells, target, dt * dt, compliance, cells.push)
             mark(tally.ticks, MULTIPLIER)
             if sweep + 1 == passes:
                 break
-            changes = revise_contacts(network, motion, drive, step, 1.0, np.inf)
+            changes = revise_contacts(network, motion, drive, step, push, np.inf)
             mark(tally.ticks, REVISION)
             if changes == 0:
                 break
         tally.skipped[0] += idle
         tally.iterations[0] += iterations
         tally.iterations[1] = iterations
-        add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
+        add_held_impulse(network, motion, push, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, 1.0, dt, tally.contact_impulse)
+        advance(motion, network.mass, network.inverse_mass, push, dt, tally.contact_impulse)
         mark(tally.ticks, INTEGRATION)
     return lam if whole else mean_pressure(cells)
 
@@ -120,7 +120,9 @@ class Xpbd(Method):
         """One frame."""
         after, cells = begin_frame(state, drive), own_cells(state)
         # The last forces tell where contact will be; the old state keeps its own.
-        motion = after.motion._replace(gradient=state.motion.gradient.copy())
+        cells = cells._replace(push=cells.push.copy())
         whole = self.volumes == "whole"
-        lam = xpbd_frame(after.network, cells, motion, drive, after.tally, self.compliance, self.iterations, whole)
-        return replace(after, motion=motion, lam=np.array([lam]), memory=cells)
+        lam = xpbd_frame(
+            after.network, cells, after.motion, drive, after.tally, self.compliance, self.iterations, whole
+        )
+        return replace(after, lam=np.array([lam]), memory=cells)

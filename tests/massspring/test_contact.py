@@ -18,6 +18,7 @@ from massspring import (
     step_limit,
     tetrahedral_body,
 )
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.test_methods import clock_for, squeeze
@@ -198,12 +199,12 @@ def test_looking_only_at_near_nodes_changes_no_bit(ball_body):
         for factor in (-3.0, 0.5, 1.0, 5.0):
             near, far = (_copied(state.motion) for _ in range(2))
             for motion in (near, far):
-                find_contacts(net, motion, drive, 0, state.lam[0])
+                find_contacts(net, motion, drive, 0, Push(motion.gradient, state.lam[0]))
             lam = factor * state.lam[0]
             mobility = float((net.inverse_mass[:, None] * near.gradient**2).sum())
             reach = pressure_reach(lam - state.lam[0], mobility, lightest, dt)
-            changed = revise_contacts(net, near, drive, 0, lam, reach)
-            assert changed == revise_contacts(net, far, drive, 0, lam, np.inf)
+            changed = revise_contacts(net, near, drive, 0, Push(near.gradient, lam), reach)
+            assert changed == revise_contacts(net, far, drive, 0, Push(far.gradient, lam), np.inf)
             for name in ("touched", "locked", "normal", "goal"):
                 assert np.array_equal(getattr(near, name), getattr(far, name))
             changes += changed

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from massspring import Capsule, Clock, ImplicitVolume, Path, Plane, Setup, Sphere, surface_body
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
 from tests.massspring.conftest import SOFT, icosphere
@@ -80,14 +81,14 @@ class Scene:
         return np.array([obstacle.gap(y, DT) for obstacle in self.obstacles])
 
     def find(self, lam: float = LAM) -> "Scene":
-        find_contacts(self.network, self.motion, self.drive, 0, lam)
+        find_contacts(self.network, self.motion, self.drive, 0, Push(self.motion.gradient, lam))
         return self
 
     def revise(self, lam: float, found_at: float = LAM) -> int:
         square = (self.motion.gradient**2).sum(axis=1)
         mobility = float(self.network.inverse_mass @ square)
         reach = pressure_reach(lam - found_at, mobility, self.network.largest_inverse_mass, DT)
-        return revise_contacts(self.network, self.motion, self.drive, 0, lam, reach)
+        return revise_contacts(self.network, self.motion, self.drive, 0, Push(self.motion.gradient, lam), reach)
 
 
 def slopes(obstacle: Any, y: np.ndarray) -> np.ndarray:

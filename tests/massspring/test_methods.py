@@ -21,6 +21,7 @@ from massspring import (
     simulate,
     step_limit,
 )
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.constraint.one_volume import volume_multiplier
 from massspring.kernels.contact.active_set import find_contacts
 from massspring.kernels.step.advance import advance
@@ -207,9 +208,9 @@ class SixfoldGradient(Method):
         for step in range(len(drive.position)):
             error = drive.volume_target[step, 0] - predict(net, mo, drive, step, True)[0]
             mo.gradient[:] *= 6
-            find_contacts(net, mo, drive, step, 0.0)
+            find_contacts(net, mo, drive, step, Push(mo.gradient, 0.0))
             lam, _ = volume_multiplier(mo, net.inverse_mass, error, drive.dt)
-            advance(mo, net.mass, net.inverse_mass, lam, drive.dt, after.tally.contact_impulse)
+            advance(mo, net.mass, net.inverse_mass, Push(mo.gradient, lam), drive.dt, after.tally.contact_impulse)
         return after
 
 

@@ -11,6 +11,7 @@ from massspring import (
     Sphere,
     simulate,
 )
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.constraint.one_volume import volume_multiplier
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
 from massspring.kernels.step.advance import advance
@@ -70,7 +71,7 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
 
     x = mo.x.copy()
     mo.places[:, :3] = x
-    advance(mo, net.mass, net.inverse_mass, lam, dt, np.zeros((1, 3)))
+    advance(mo, net.mass, net.inverse_mass, Push(mo.gradient, lam), dt, np.zeros((1, 3)))
     assert np.allclose(mo.v.ravel(), solution[:n], atol=1e-12)
     assert np.allclose(mo.x, x + dt * mo.v)
 

@@ -19,6 +19,7 @@ from massspring import (
     surface_body,
 )
 from massspring.body.inside import is_inside, mean_edge
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.probe.arrays import COMPARED, IN_CONTACT, LEFT_BEHIND, Stage
 from massspring.kernels.probe.contacts import solve_rows
@@ -141,7 +142,7 @@ def test_contacts_and_volume_equal_the_full_saddle_point_solve():
     probing, motion, net, dt = stage.probes, stage.motion, stage.network, stage.dt
     g, rows, count = motion.gradient, probing.rows, int(probing.rows.count[0])
     u = motion.v_star + dt * lam * net.inverse_mass[:, None] * g
-    gather(stage, lam)
+    gather(stage, Push(stage.motion.gradient, lam))
     solve_rows(stage, None)
     beside = lam + probing.change[0]
     impulse = rows.impulse[:count]

@@ -7,6 +7,7 @@ import pytest
 
 from massspring import Clock, ImplicitVolume, Path, Probe, Setup, Volumes
 from massspring.body.inside import mean_edge
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND, Stage
 from massspring.kernels.probe.contacts import solve_rows
@@ -111,7 +112,7 @@ def random_step(seed, lam):
     kept, g = np.eye(3) - taken_from(motion), motion.gradient
     stage = stage._replace(mobility=float(np.einsum("n,ni,nij,nj->", net.inverse_mass, g, kept, g)))
     probing.near[0], probing.near_count[0] = np.arange(len(probing.surface)), len(probing.surface)
-    gather(stage, lam)
+    gather(stage, Push(stage.motion.gradient, lam))
     return stage, kept
 
 

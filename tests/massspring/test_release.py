@@ -5,6 +5,7 @@ import pytest
 
 from massspring import Attachment, Clock, ImplicitVolume, Path, Plane, Setup, surface_body
 from massspring.analysis.stability import step_limit
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.friction import release_wedged
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from tests.massspring.conftest import SOFT, icosphere
@@ -64,5 +65,5 @@ def test_a_wedge_lets_go_of_a_node_that_either_side_would_pull(shell, first, sec
     motion.touched[node], motion.second[node], motion.locked[node] = 1, 2, ON_EDGE
     list_touched(motion)
     free = first < 0 or second < 0
-    assert release_wedged(state.network, motion, drive, lam) == int(free)
+    assert release_wedged(state.network, motion, drive, Push(motion.gradient, lam)) == int(free)
     assert motion.locked[node] == (FREE if free else ON_EDGE)

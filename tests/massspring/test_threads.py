@@ -76,7 +76,7 @@ def test_each_thread_writes_on_scratch_of_its_own(ball):
     state = setup.start()
     motion, untouched = state.motion, -7.0
     motion.tile[:] = untouched
-    with crew(state.network, motion, setup.drive(0)):
+    with crew(state.network, motion, setup.drive(0), motion.gradient):
         call(motion.team, JOB_SPRINGS, 0, 0.0)
         join(motion.team)
     assert (motion.tile[0] == untouched).all() and not (motion.tile[1] == untouched).all()
@@ -109,7 +109,7 @@ def test_the_load_is_even():
 def test_a_frame_that_fails_sends_the_threads_home(ball):
     setup = slid(ball, ImplicitVolume(), threads=2)
     state, drive = setup.start(), setup.drive(0)
-    with pytest.raises(RuntimeError, match="halfway"), crew(state.network, state.motion, drive):
+    with pytest.raises(RuntimeError, match="halfway"), crew(state.network, state.motion, drive, state.motion.gradient):
         raise RuntimeError("halfway")
     assert state.motion.team is not None and state.motion.team.signal[JOB] == JOB_END
     before = time.thread_time_ns(), time.process_time_ns()

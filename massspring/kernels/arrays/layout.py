@@ -56,7 +56,7 @@ class Motion(NamedTuple):
     force: np.ndarray
     """Spring forces [N], (n, 3)."""
     gradient: np.ndarray
-    """G = dV/dx [m²], (n, 3)."""
+    """G = dV/dx of the one volume that is kept [m²], (n, 3); 0 where none is, or several."""
     touched: np.ndarray
     """0 for a free node, else 1 + the obstacle it lies on, (n,) uint32."""
     second: np.ndarray
@@ -89,6 +89,20 @@ class Motion(NamedTuple):
     """Scratch: shares of the slices in 18 V, G·v* and G·W·G, (S + 1, 3) float64; last those of nodes in pieces."""
     team: Team | None = None
     """Threads that share the longest loops; None for one thread: nothing is compiled for them then."""
+
+
+class Push(NamedTuple):
+    """The force that keeps volumes on every node, f_i = factor · direction_i [N].
+
+    One volume: lam G_i; several: (Jᵀ lam)_i, summed before, with a factor of 1. Kernels see the product alone. It stays
+    one because G is known a step's work before lam: a field of forces would be one more pass over all nodes whenever
+    lam changes, and dt w (lam G) is rounded otherwise than (dt lam w) G.
+    """
+
+    direction: np.ndarray
+    """G [m²] or Jᵀ lam [N], (n, 3)."""
+    factor: float
+    """lam [Pa] or 1."""
 
 
 class Tips(NamedTuple):

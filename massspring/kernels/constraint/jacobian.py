@@ -72,13 +72,13 @@ def transposed_rows_times_into(rows, p, out):
 
 
 @compiled
-def pushed_velocity_into(motion, inverse_mass, dt, u):
-    """u = ṽ + dt W̃ F [m/s], (n, 3), with F = Jᵀ lam in `motion.gradient` [N] (eq. 9, 10)."""
+def pushed_velocity_into(motion, inverse_mass, force, dt, u):
+    """u = ṽ + dt W̃ F [m/s], (n, 3), with a force F [N] on every node (eq. 9, 10)."""
     for i in range(u.shape[0]):
-        push = dt * inverse_mass[i]
-        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
-        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
-        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+        w = dt * inverse_mass[i]
+        u0 = motion.v_star[i, 0] + w * force[i, 0]
+        u1 = motion.v_star[i, 1] + w * force[i, 1]
+        u2 = motion.v_star[i, 2] + w * force[i, 2]
         if motion.locked[i] > FREE:
             d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
             u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)

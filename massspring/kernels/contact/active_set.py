@@ -18,7 +18,7 @@ CONTACT_PASSES = 3
 
 
 @lean
-def seat(network, motion, drive, step, lam, count):
+def seat(network, motion, drive, step, push, count):
     """Puts the first `count` nodes of `motion.entering` on the obstacle each would enter deepest (eq. 12).
 
     `goal` n a, a = n·(target − x)/dt, ends the step on the obstacle. A round one pushes along n = (x − c)/|x − c| of
@@ -27,7 +27,7 @@ def seat(network, motion, drive, step, lam, count):
     dt = drive.dt
     for k in range(count):
         i = motion.entering[k]
-        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
+        u0, u1, u2 = pushed_velocity(network, motion, drive, push, i)
         deepest = 0.0
         for o in range(drive.radius.shape[0]):
             s0 = motion.x[i, 0] - drive.position[step, o, 0]
@@ -83,26 +83,26 @@ def forget_released(motion):
 
 
 @inlined
-def clear_all(network, motion, drive, step, lam, team):
+def clear_all(network, motion, drive, step, push, team):
     """`clearances_into` of all nodes, by as many threads as there are."""
     if team is None:
-        clearances_into(network, motion, drive, step, lam, 0, motion.x.shape[0])
+        clearances_into(network, motion, drive, step, push, 0, motion.x.shape[0])
     else:
-        call(team, JOB_SEARCH, step, lam)
-        clearances_into(network, motion, drive, step, lam, team.nodes[0], team.nodes[1])
+        call(team, JOB_SEARCH, step, push.factor)
+        clearances_into(network, motion, drive, step, push, team.nodes[0], team.nodes[1])
         join(team)
 
 
 @inlined
-def find_contacts(network, motion, drive, step, lam):
-    """Touched nodes of the step when the last pressure acts as a force: u = v* + dt lam W G (eq. 12)."""
+def find_contacts(network, motion, drive, step, push):
+    """Touched nodes of the step when the push of the last one acts on them: u = v* + dt W f (eq. 12)."""
     let_go(motion)
-    clear_all(network, motion, drive, step, lam, motion.team)
-    enter(network, motion, drive, step, lam)
+    clear_all(network, motion, drive, step, push, motion.team)
+    enter(network, motion, drive, step, push)
 
 
 @inlined
-def enter(network, motion, drive, step, lam):
+def enter(network, motion, drive, step, push):
     """Seats the nodes whose clearance is negative (eq. 12)."""
     touchable, clearance, entering = network.touchable, motion.clearance, motion.entering
     count = 0
@@ -114,16 +114,16 @@ def enter(network, motion, drive, step, lam):
                 entering[count] = i
                 count += 1
     if count > 0:
-        seat(network, motion, drive, step, lam, count)
+        seat(network, motion, drive, step, push, count)
         admit(motion, count)
     if drive.rough:
-        rub(network, motion, drive, step, lam)
+        rub(network, motion, drive, step, push)
     if drive.radius.shape[0] > 1:
-        wedge(network, motion, drive, step, lam)
+        wedge(network, motion, drive, step, push)
 
 
 @inlined
-def release_pulled(network, motion, drive, lam):
+def release_pulled(network, motion, drive, push):
     """Releases nodes that their one obstacle would pull (eq. 13); how many."""
     changes = 0
     for k in range(motion.touching_count[0]):
@@ -131,7 +131,7 @@ def release_pulled(network, motion, drive, lam):
         if motion.locked[i] == FREE or motion.locked[i] == ON_EDGE:
             continue
         n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
+        u0, u1, u2 = pushed_velocity(network, motion, drive, push, i)
         if motion.goal[i, 0] * n0 + motion.goal[i, 1] * n1 + motion.goal[i, 2] * n2 < u0 * n0 + u1 * n1 + u2 * n2:
             # A released node is looked at again in the next pass, whatever the pressure becomes.
             motion.touched[i], motion.locked[i], motion.clearance[i] = 0, FREE, 0.0
@@ -140,10 +140,10 @@ def release_pulled(network, motion, drive, lam):
 
 
 @inlined
-def enters(network, motion, drive, step, lam, i):
+def enters(network, motion, drive, step, push, i):
     """Whether the free node i would end the step in an obstacle (eq. 12)."""
     dt = drive.dt
-    u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
+    u0, u1, u2 = pushed_velocity(network, motion, drive, push, i)
     y0, y1, y2 = motion.x[i, 0] + dt * u0, motion.x[i, 1] + dt * u1, motion.x[i, 2] + dt * u2
     for o in range(drive.radius.shape[0]):
         p0, p1, p2 = drive.position[step, o, 0], drive.position[step, o, 1], drive.position[step, o, 2]
@@ -153,7 +153,7 @@ def enters(network, motion, drive, step, lam, i):
 
 
 @inlined
-def revise_contacts(network, motion, drive, step, lam, reach):
+def revise_contacts(network, motion, drive, step, push, reach):
     """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 13).
 
     `reach` [m] is how far the new pressure can have moved a node from where `clearance` was measured: distances to
@@ -162,23 +162,23 @@ def revise_contacts(network, motion, drive, step, lam, reach):
     touchable, clearance, entering = network.touchable, motion.clearance, motion.entering
     count, changes = 0, 0
     if drive.rough:
-        changes += release_slipping(network, motion, drive, lam)
+        changes += release_slipping(network, motion, drive, push)
     if drive.radius.shape[0] > 1:
-        changes += release_wedged(network, motion, drive, lam) + wedge(network, motion, drive, step, lam)
+        changes += release_wedged(network, motion, drive, push) + wedge(network, motion, drive, step, push)
     for begin in range(0, clearance.shape[0], BLOCK):
         if not any_within(clearance, begin, reach):
             continue
         for i in range(begin, min(begin + BLOCK, clearance.shape[0])):
             if clearance[i] > reach or motion.locked[i] > FREE or touchable[i] == 0:
                 continue
-            if enters(network, motion, drive, step, lam, i):
+            if enters(network, motion, drive, step, push, i):
                 entering[count] = i
                 count += 1
-    changes += release_pulled(network, motion, drive, lam)
+    changes += release_pulled(network, motion, drive, push)
     if changes > 0:
         forget_released(motion)
     if count > 0:
-        seat(network, motion, drive, step, lam, count)
+        seat(network, motion, drive, step, push, count)
         admit(motion, count)
     return changes + count
 

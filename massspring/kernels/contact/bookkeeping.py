@@ -26,18 +26,18 @@ def settled(motion, i, u0, u1, u2):
 
 
 @inlined
-def book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse):
+def book_contacts(motion, mass, inverse_mass, push, dt, contact_impulse):
     """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 10); u is what a node would do without them."""
-    v_star, gradient, locked = motion.v_star, motion.gradient, motion.locked
+    v_star, direction, locked = motion.v_star, push.direction, motion.locked
     real = motion.x.dtype.type
-    impulse = real(dt * lam)
+    impulse = real(dt * push.factor)
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
         if locked[i] == FREE:
             continue
-        push = impulse * real(inverse_mass[i])
-        u0, u1 = v_star[i, 0] + push * gradient[i, 0], v_star[i, 1] + push * gradient[i, 1]
-        u2 = v_star[i, 2] + push * gradient[i, 2]
+        w = impulse * real(inverse_mass[i])
+        u0, u1 = v_star[i, 0] + w * direction[i, 0], v_star[i, 1] + w * direction[i, 1]
+        u2 = v_star[i, 2] + w * direction[i, 2]
         w0, w1, w2 = settled(motion, i, u0, u1, u2)
         o, m = motion.touched[i] - 1, mass[i]
         k0, k1, k2 = m * (w0 - u0), m * (w1 - u1), m * (w2 - u2)

@@ -14,7 +14,7 @@ PARALLEL = 1e-4
 
 
 @lean
-def rub(network, motion, drive, step, lam):
+def rub(network, motion, drive, step, push):
     """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 36)."""
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
@@ -22,7 +22,7 @@ def rub(network, motion, drive, step, lam):
             continue
         o = motion.touched[i] - 1
         n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
+        u0, u1, u2 = pushed_velocity(network, motion, drive, push, i)
         g0, g1, g2 = motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2]
         pressed = drive.friction[o] * ((g0 - u0) * n0 + (g1 - u1) * n1 + (g2 - u2) * n2)
         w0, w1, w2 = drive.velocity[step, o, 0], drive.velocity[step, o, 1], drive.velocity[step, o, 2]
@@ -38,18 +38,18 @@ def rub(network, motion, drive, step, lam):
 
 
 @lean
-def release_slipping(network, motion, drive, lam):
+def release_slipping(network, motion, drive, push):
     """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 36)."""
     changes = 0
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
         if motion.locked[i] != STICKS:
             continue
-        push = drive.dt * lam * network.inverse_mass[i]
+        w, direction = drive.dt * push.factor * network.inverse_mass[i], push.direction
         n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        k0 = motion.goal[i, 0] - motion.v_star[i, 0] - push * motion.gradient[i, 0]
-        k1 = motion.goal[i, 1] - motion.v_star[i, 1] - push * motion.gradient[i, 1]
-        k2 = motion.goal[i, 2] - motion.v_star[i, 2] - push * motion.gradient[i, 2]
+        k0 = motion.goal[i, 0] - motion.v_star[i, 0] - w * direction[i, 0]
+        k1 = motion.goal[i, 1] - motion.v_star[i, 1] - w * direction[i, 1]
+        k2 = motion.goal[i, 2] - motion.v_star[i, 2] - w * direction[i, 2]
         along = k0 * n0 + k1 * n1 + k2 * n2
         s0, s1, s2 = allowed_part(SLIDES, n0, n1, n2, k0, k1, k2)
         needed, most = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2), drive.friction[motion.touched[i] - 1] * along
@@ -63,7 +63,7 @@ def release_slipping(network, motion, drive, lam):
 
 
 @lean
-def wedge(network, motion, drive, step, lam):
+def wedge(network, motion, drive, step, push):
     """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 37); how many.
 
     Obstacles that face each other have no edge: the deeper one wins, and the other's penetration is recorded.
@@ -75,7 +75,7 @@ def wedge(network, motion, drive, step, lam):
         if motion.locked[i] != SLIDES:
             continue
         n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
+        u0, u1, u2 = pushed_velocity(network, motion, drive, push, i)
         u0, u1, u2 = allowed_part(SLIDES, n0, n1, n2, u0, u1, u2)
         u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
         y0, y1, y2 = motion.x[i, 0] + dt * u0, motion.x[i, 1] + dt * u1, motion.x[i, 2] + dt * u2
@@ -120,14 +120,14 @@ def shares(k, n, m):
 
 
 @lean
-def release_wedged(network, motion, drive, lam):
+def release_wedged(network, motion, drive, push):
     """Frees nodes in a wedge that one of their obstacles would pull; the next search finds the other (eq. 37)."""
     changes = 0
     for k in range(motion.touching_count[0]):
         i = motion.touching[k]
         if motion.locked[i] != ON_EDGE:
             continue
-        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
+        u0, u1, u2 = pushed_velocity(network, motion, drive, push, i)
         # What the edge leaves free is at right angles to both normals and takes no share.
         n = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
         m = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]

@@ -6,8 +6,8 @@ from massspring.kernels.jit.decorators import compiled
 
 
 @compiled
-def seat_entering(network, motion, drive, step):
-    """Puts free surface nodes that `v_star` carries into an obstacle onto it (eq. 12) and lists them; how many.
+def seat_entering(network, motion, drive, step, push):
+    """Puts free surface nodes that would enter an obstacle onto it (eq. 12) and lists them; how many.
 
     Those that have been released since the last search leave the list.
     """
@@ -17,10 +17,10 @@ def seat_entering(network, motion, drive, step):
         i = network.surface_nodes[c]
         if network.inverse_mass[i] == 0.0 or motion.locked[i] > FREE:
             continue
-        if enters(network, motion, drive, step, 0.0, i):
+        if enters(network, motion, drive, step, push, i):
             motion.entering[count] = i
             count += 1
     if count > 0:
-        seat(network, motion, drive, step, 0.0, count)
+        seat(network, motion, drive, step, push, count)
         admit(motion, count)
     return count

@@ -7,6 +7,7 @@ there is nothing to move: the tip goes through, and the run says so.
 
 import math
 
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.modes import FREE, STICKS
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND
@@ -133,10 +134,10 @@ def give_way(stage, volumes):
 
 
 @lean
-def carry(stage, volumes, lam, plain, horizon):
+def carry(stage, volumes, push, plain, horizon):
     """Nodes of triangles that a tip would pass move with the tip or ahead of it, so that nothing passes it (eq. 147).
 
-    Returns the pressure of the one volume [Pa] and what any node moves at most [m].
+    Returns the factor of the push beside it and what any node moves at most [m].
     """
     probes = stage.probes
     clear_push(probes.rows, probes.push)
@@ -158,12 +159,12 @@ def carry(stage, volumes, lam, plain, horizon):
         if reach > horizon:
             horizon = ROOM * reach
             find_near(stage.motion, stage.tips, stage.step, probes, horizon)
-            gather(stage, lam)
+            gather(stage, push)
     probes.counts[CARRYING] += 1
     note_passed(stage)
-    lam = pressed_on(stage, volumes, lam)
-    settle_carried(stage, lam)
-    return lam, reach
+    factor = pressed_on(stage, volumes, push)
+    settle_carried(stage, Push(push.direction, factor))
+    return factor, reach
 
 
 @lean
@@ -182,7 +183,7 @@ def note_passed(stage):
 
 
 @lean
-def settle_carried(stage, lam):
+def settle_carried(stage, push):
     """Carried nodes end the step where they were carried: v* takes the difference, the tip's impulse [N s]."""
     probes, network, motion, tally = stage.probes, stage.network, stage.motion, stage.probes.tally
     first = tally.contact_impulse.shape[0] - probes.radius.shape[0]
@@ -190,9 +191,9 @@ def settle_carried(stage, lam):
         i = probes.taken[k]
         p = probes.carried[i] - 1
         speed = carried_speed(stage, i)
-        push = stage.dt * lam * network.inverse_mass[i]
+        w = stage.dt * push.factor * network.inverse_mass[i]
         for axis in range(3):
-            gain = speed[axis] - push * motion.gradient[i, axis] - motion.v_star[i, axis]
+            gain = speed[axis] - w * push.direction[i, axis] - motion.v_star[i, axis]
             motion.v_star[i, axis] += gain
             tally.contact_impulse[first + p, axis] += network.mass[i] * gain
             probes.push[i, axis] = 0.0

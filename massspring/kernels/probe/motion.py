@@ -9,16 +9,16 @@ from massspring.kernels.probe.pressure import swelling
 
 
 @lean
-def gather(stage, lam):
+def gather(stage, push):
     """u_i of the corners of all near triangles (eq. 9, 10), and v⁺ = u."""
     motion, probes, triangles, weight = stage.motion, stage.probes, stage.probes.surface, stage.network.inverse_mass
-    v, g, base, velocity = motion.v_star, motion.gradient, probes.base, probes.velocity
+    v, f, base, velocity = motion.v_star, push.direction, probes.base, probes.velocity
     for p in range(probes.radius.shape[0]):
         for n in range(probes.near_count[p]):
             for k in range(3):
                 i = triangles[probes.near[p, n], k]
-                push = stage.dt * lam * weight[i]
-                u0, u1, u2 = v[i, 0] + push * g[i, 0], v[i, 1] + push * g[i, 1], v[i, 2] + push * g[i, 2]
+                w = stage.dt * push.factor * weight[i]
+                u0, u1, u2 = v[i, 0] + w * f[i, 0], v[i, 1] + w * f[i, 1], v[i, 2] + w * f[i, 2]
                 if motion.locked[i] > FREE:
                     d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
                     u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)

@@ -106,11 +106,11 @@ def swelling(stage, volumes, i):
 
 
 @lean
-def pressed_on(stage, volumes, lam):
-    """The pressure of one volume with its change [Pa]; several have theirs in `lam`, and their force in `gradient`."""
+def pressed_on(stage, volumes, push):
+    """The factor of the push with the change of pressures; of several volumes the push itself changes."""
     if volumes is None:
-        return lam + stage.probes.change[0]
+        return push.factor + stage.probes.change[0]
     for r in range(volumes.lam.shape[0]):
         volumes.lam[r] += stage.probes.change[r]
-    transposed_rows_times_into(volumes, volumes.lam, stage.motion.gradient)
-    return lam
+    transposed_rows_times_into(volumes, volumes.lam, volumes.push)
+    return push.factor

@@ -20,20 +20,20 @@ PASSES = 24
 
 
 @lean
-def meet_probes(network, motion, drive, step, probes, lam, mobility, volumes):
+def meet_probes(network, motion, drive, step, probes, push, mobility, volumes):
     """Contact with thin probes, once pressures and the other contacts of the step are known (eq. 141–147).
 
-    One volume: its pressure `lam` [Pa] and `mobility` G·W̃·G [m⁴/kg]; returns the pressure beside the contacts. Several:
-    `volumes`, with their force in `motion.gradient` and lam 1; changed in place. None: lam and mobility 0.
+    Returns the factor of the push beside the contacts. One volume: `mobility` is G·W̃·G [m⁴/kg], the factor its pressure
+    [Pa]. Several: `volumes`, whose lam and push are changed in place. A push that contacts do not change: mobility 0.
     """
-    dt = drive.dt
+    dt, factor = drive.dt, push.factor
     stage = Stage(network, motion, drive.tips, probes, volumes, mobility, step, dt)
-    plain = dt * fastest_node(network, motion, lam, dt) + longest_way(drive.tips, step)
+    plain = dt * fastest_node(network, motion, push, dt) + longest_way(drive.tips, step)
     if not plain < math.inf:
-        return lam
+        return factor
     reach, horizon, crosses = plain, ROOM * plain, False
     find_near(motion, drive.tips, step, probes, horizon)
-    gather(stage, lam)
+    gather(stage, push)
     probes.rows.count[0] = 0
     for sweep in range(PASSES):
         found, crosses = search(stage)
@@ -46,13 +46,13 @@ def meet_probes(network, motion, drive, step, probes, lam, mobility, volumes):
         if reach > horizon:
             horizon = ROOM * reach
             find_near(motion, drive.tips, step, probes, horizon)
-            gather(stage, lam)
+            gather(stage, push)
         move(stage, volumes)
     probes.counts[IN_CONTACT] += probes.rows.count[0] > 0
     if crosses:
-        lam, reach = carry(stage, volumes, lam, plain, horizon)
+        factor, reach = carry(stage, volumes, push, plain, horizon)
     elif probes.rows.count[0] > 0:
         settle(stage)
-        lam = pressed_on(stage, volumes, lam)
+        factor = pressed_on(stage, volumes, push)
     probes.travel[0] += SAFE * reach
-    return lam
+    return factor

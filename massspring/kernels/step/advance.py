@@ -12,16 +12,16 @@ NEAR = 4096
 
 
 @inlined
-def advance_nodes(motion, inverse_mass, lam, dt, first, last):
-    """v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺ (eq. 10) of some nodes; `places` holds the x of the step's start."""
+def advance_nodes(motion, inverse_mass, push, dt, first, last):
+    """v⁺ = ṽ + dt W̃ f, x⁺ = x + dt v⁺ (eq. 10) of some nodes; `places` holds the x of the step's start."""
     flat_x, flat_v = flat(motion.x, first, last), flat(motion.v, first, last)
-    flat_v_star, flat_gradient = flat(motion.v_star, first, last), flat(motion.gradient, first, last)
+    flat_v_star, direction = flat(motion.v_star, first, last), flat(push.direction, first, last)
     weights, locked, real = flat(inverse_mass, first, last), motion.locked, motion.x.dtype.type
-    step, impulse = real(dt), real(dt * lam)
+    step, impulse = real(dt), real(dt * push.factor)
     for i in range(weights.shape[0]):
-        push = impulse * real(weights[i])
+        w = impulse * real(weights[i])
         for axis in range(3):
-            u = flat_v_star[3 * i + axis] + push * flat_gradient[3 * i + axis]
+            u = flat_v_star[3 * i + axis] + w * direction[3 * i + axis]
             flat_v[3 * i + axis] = u
             flat_x[3 * i + axis] += step * u
     x, v, places = motion.x, motion.v, motion.places
@@ -34,34 +34,34 @@ def advance_nodes(motion, inverse_mass, lam, dt, first, last):
 
 
 @lean
-def advance(motion, mass, inverse_mass, lam, dt, contact_impulse):
+def advance(motion, mass, inverse_mass, push, dt, contact_impulse):
     """The end of a step of all nodes (eq. 10); adds the impulse of each obstacle to `contact_impulse`."""
-    book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse)
-    advance_nodes(motion, inverse_mass, lam, dt, 0, motion.x.shape[0])
+    book_contacts(motion, mass, inverse_mass, push, dt, contact_impulse)
+    advance_nodes(motion, inverse_mass, push, dt, 0, motion.x.shape[0])
 
 
 @inlined
-def advance_to_places(motion, mass, inverse_mass, lam, dt, contact_impulse):
+def advance_to_places(motion, mass, inverse_mass, push, dt, contact_impulse):
     """The same, by as many threads as there are; `places` holds the new positions too."""
-    book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse)
-    move_all(motion, inverse_mass, lam, dt, motion.team)
+    book_contacts(motion, mass, inverse_mass, push, dt, contact_impulse)
+    move_all(motion, inverse_mass, push, dt, motion.team)
 
 
 @inlined
-def move_all(motion, inverse_mass, lam, dt, team):
+def move_all(motion, inverse_mass, push, dt, team):
     """`advance_nodes` and `places_into` of all nodes, by as many threads as there are."""
     if team is None:
-        move(motion, inverse_mass, lam, dt, 0, motion.x.shape[0])
+        move(motion, inverse_mass, push, dt, 0, motion.x.shape[0])
     else:
-        call(team, JOB_MOVE, 0, lam)
-        move(motion, inverse_mass, lam, dt, team.nodes[0], team.nodes[1])
+        call(team, JOB_MOVE, 0, push.factor)
+        move(motion, inverse_mass, push, dt, team.nodes[0], team.nodes[1])
         join(team)
 
 
 @inlined
-def move(motion, inverse_mass, lam, dt, first, last):
+def move(motion, inverse_mass, push, dt, first, last):
     """`advance_nodes` and `places_into` of some nodes; `NEAR` at a time, so that new positions are still at hand."""
     for begin in range(first, last, NEAR):
         end = min(begin + NEAR, last)
-        advance_nodes(motion, inverse_mass, lam, dt, begin, end)
+        advance_nodes(motion, inverse_mass, push, dt, begin, end)
         places_into(motion, begin, end)

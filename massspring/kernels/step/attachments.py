@@ -29,19 +29,19 @@ def prescribe(network, motion, displacement, dt):
 
 
 @inlined
-def add_held_impulse(network, motion, lam, dt, gravity, held_impulse):
-    """I_g = −dt Σ_i∈g (f_i + lam G_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 11)."""
+def add_held_impulse(network, motion, push, dt, gravity, held_impulse):
+    """I_g = −dt Σ_i∈g (f_i + push_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 11)."""
     nodes, groups, mass = network.held_nodes, network.held_group, network.mass
-    force, gradient = motion.force, motion.gradient
+    force, direction, factor = motion.force, push.direction, push.factor
     h, count = 0, nodes.shape[0]
     while h < count:
         g = groups[h]
         k0, k1, k2, carried = 0.0, 0.0, 0.0, 0.0
         while h < count and groups[h] == g:
             i = nodes[h]
-            k0 += force[i, 0] + lam * gradient[i, 0]
-            k1 += force[i, 1] + lam * gradient[i, 1]
-            k2 += force[i, 2] + lam * gradient[i, 2]
+            k0 += force[i, 0] + factor * direction[i, 0]
+            k1 += force[i, 1] + factor * direction[i, 1]
+            k2 += force[i, 2] + factor * direction[i, 2]
             carried += mass[i]
             h += 1
         held_impulse[g, 0] -= dt * (k0 + carried * gravity[0])

@@ -1,5 +1,6 @@
 """What the other threads of a team do during a frame (kernels.team)."""
 
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.gaps import clearances_into
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.fused.sweep import pass_slices
@@ -21,15 +22,16 @@ from massspring.kernels.step.advance import advance_nodes
 
 
 @lean
-def serve(network, motion, drive, rank):
-    """Does part number `rank` of every job of a frame, until it is told to rest."""
+def serve(network, motion, drive, direction, rank):
+    """Does part number `rank` of every job of a frame up to its end; `direction` is that of its pushes."""
     team = motion.team
     first, last = team.slices[rank], team.slices[rank + 1]
     begin, end = team.nodes[rank], team.nodes[rank + 1]
     known = 0
     while True:
         known = wait_until_other_than(team.signal, ROUND, known)
-        job, step, lam = team.signal[JOB], team.signal[STEP], team.pressure[0]
+        job, step = team.signal[JOB], team.signal[STEP]
+        push = Push(direction, team.factor[0])
         if job == JOB_END:
             return
         if job == JOB_SPRINGS:
@@ -37,9 +39,9 @@ def serve(network, motion, drive, rank):
         elif job == JOB_SPRINGS_AND_VOLUME:
             pass_slices(motion, drive, network.slices, first, last, True, motion.tile[rank])
         elif job == JOB_SEARCH:
-            clearances_into(network, motion, drive, step, lam, begin, end)
+            clearances_into(network, motion, drive, step, push, begin, end)
         else:
-            advance_nodes(motion, network.inverse_mass, lam, drive.dt, begin, end)
+            advance_nodes(motion, network.inverse_mass, push, drive.dt, begin, end)
             places_into(motion, begin, end)
         raise_by_one(team.signal, DONE)
 

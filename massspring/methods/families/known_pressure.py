@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 
 from massspring.body.body import Body
 from massspring.errors import MassSpringError
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import Drive, Push
 from massspring.kernels.contact.active_set import find_contacts
 from massspring.kernels.forces.volume import pyramid_volume, volume_gradient_into
 from massspring.kernels.jit.decorators import compiled
@@ -51,15 +51,16 @@ def pressure_frame(network, motion, drive, tally, bulk_modulus, law, probing):
             lam = 0.0
             tally.skipped[0] += 1
         mark(tally.ticks, VOLUME)
+        push = Push(motion.gradient, lam)
         if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, lam)
+            find_contacts(network, motion, drive, step, push)
             mark(tally.ticks, SEARCH)
         if probing is not None:  # the pressure is a force that no contact changes: no mobility
-            meet_probes(network, motion, drive, step, probing, lam, 0.0, None)
+            meet_probes(network, motion, drive, step, probing, push, 0.0, None)
             mark(tally.ticks, PROBES)
-        add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
+        add_held_impulse(network, motion, push, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
+        advance(motion, network.mass, network.inverse_mass, push, dt, tally.contact_impulse)
         mark(tally.ticks, INTEGRATION)
     return lam
 

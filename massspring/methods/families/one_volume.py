@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import Drive, Push
 from massspring.kernels.constraint.exact_volume import Line, line_into, nearest_root, volume_cubic
 from massspring.kernels.constraint.one_volume import capped_error, steepest, surely_short, volume_multiplier
 from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, pressure_reach, revise_contacts
@@ -146,7 +146,7 @@ def constraint_frame(network, motion, line, drive, tally, lam, rule, probing):
         predicted = lam
         passes = 1
         if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, predicted)
+            find_contacts(network, motion, drive, step, Push(motion.gradient, predicted))
             mark(tally.ticks, SEARCH)
             passes = CONTACT_PASSES
         for sweep in range(passes):
@@ -158,18 +158,19 @@ def constraint_frame(network, motion, line, drive, tally, lam, rule, probing):
             if sweep + 1 == passes:
                 break
             reach = pressure_reach(lam - predicted, mobility, lightest, dt)
-            changes = revise_contacts(network, motion, drive, step, lam, reach)
+            changes = revise_contacts(network, motion, drive, step, Push(motion.gradient, lam), reach)
             mark(tally.ticks, REVISION)
             if changes == 0:
                 break
         if not mobility > 0.0:
             tally.skipped[0] += 1
         if probing is not None:
-            lam = meet_probes(network, motion, drive, step, probing, lam, mobility, None)
+            lam = meet_probes(network, motion, drive, step, probing, Push(motion.gradient, lam), mobility, None)
             mark(tally.ticks, PROBES)
-        add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
+        push = Push(motion.gradient, lam)
+        add_held_impulse(network, motion, push, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
+        advance(motion, network.mass, network.inverse_mass, push, dt, tally.contact_impulse)
         mark(tally.ticks, INTEGRATION)
         if rule.stabilised:
             tally.capped[0] += correct_positions(network, motion, target, dt)

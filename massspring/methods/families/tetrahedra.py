@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from massspring.body.body import SAME_VOLUME, Body
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import Drive, Push
 from massspring.kernels.contact.active_set import find_contacts
 from massspring.kernels.forces.tetrahedron_volumes import (
     Cells,
@@ -37,7 +37,7 @@ def cells_of(body: Body) -> Cells:
         rest_reach=reach,
         slope=np.zeros((k, 3, 3)),
         **{name: np.zeros(k) for name in ("pressure", "right", "diagonal", "search", "image")},
-        **{name: np.zeros((n, 3)) for name in ("y", "gradient")},
+        **{name: np.zeros((n, 3)) for name in ("y", "gradient", "push")},
     )
 
 
@@ -63,25 +63,25 @@ def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_ar
 @compiled
 def cells_frame(network, cells, motion, drive, tally, bulk_modulus, barycentric):
     """One frame of symplectic Euler with a known pressure in every cell (eq. 6, 7, 10, 12, 164, 165)."""
-    dt = drive.dt
+    dt, push = drive.dt, Push(motion.gradient, 0.0)
     mark(tally.ticks, OUTSIDE)
     for step in range(drive.position.shape[0]):
         fill(cells, drive, step)
         predict(network, motion, drive, step, False)
         mark(tally.ticks, SPRINGS)
-        cells.gradient[:] = 0.0
+        cells.push[:] = 0.0
         if barycentric:
-            add_barycentre_forces(motion.x, cells, bulk_modulus, cells.gradient)
+            add_barycentre_forces(motion.x, cells, bulk_modulus, cells.push)
         else:
-            tally.skipped[0] += add_volume_forces(motion.x, cells, bulk_modulus, cells.gradient)
-        add_to_prediction(network, motion, cells.gradient, dt)
+            tally.skipped[0] += add_volume_forces(motion.x, cells, bulk_modulus, cells.push)
+        add_to_prediction(network, motion, cells.push, dt)
         mark(tally.ticks, VOLUME)
         if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, 0.0)
+            find_contacts(network, motion, drive, step, push)
             mark(tally.ticks, SEARCH)
-        add_held_impulse(network, motion, 0.0, dt, drive.gravity, tally.held_impulse)
+        add_held_impulse(network, motion, push, dt, drive.gravity, tally.held_impulse)
         mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, 0.0, dt, tally.contact_impulse)
+        advance(motion, network.mass, network.inverse_mass, push, dt, tally.contact_impulse)
         mark(tally.ticks, INTEGRATION)
     return mean_pressure(cells)
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from massspring.kernels.arrays.layout import Drive, Motion, Network
+from massspring.kernels.arrays.layout import Drive, Motion, Network, Push
 from massspring.kernels.contact.active_set import let_go
 from massspring.kernels.contact.friction import wedge
 from massspring.kernels.contact.implicit_contact import seat_entering
@@ -131,7 +131,8 @@ class Contact:
             return 0
         motion.v_star[:] = velocity
         motion.locked[leaving] = HIDDEN
-        count = seat_entering(self.network, motion, drive, self.step)
+        unpushed = Push(motion.gradient, 0.0)
+        count = seat_entering(self.network, motion, drive, self.step, unpushed)
         motion.locked[leaving] = FREE
         if drive.rough:
             new = motion.entering[:count].astype(np.int64)
@@ -139,7 +140,7 @@ class Contact:
             rough = drive.friction[obstacle] > 0.0
             self._stick(new[rough], drive.velocity[self.step][obstacle[rough]])
         if len(drive.radius) > 1:
-            count += wedge(self.network, motion, drive, self.step, 0.0)
+            count += wedge(self.network, motion, drive, self.step, unpushed)
             self.rubbed[motion.locked == ON_EDGE] = 0.0
         return count
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import Accuracy, Drive
+from massspring.kernels.arrays.layout import Accuracy, Drive, Push
 from massspring.kernels.constraint.jacobian import rows_into, rows_times_into, transposed_rows_times_into
 from massspring.kernels.forces.springs import spring_forces_into
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, REVISION, SEARCH, SPRINGS, VOLUME, mark
@@ -207,5 +207,5 @@ class Step:
             rubbed = np.flatnonzero(self.contact.rubbed.any(axis=1))
             np.add.at(given, motion.touched[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
         spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, motion.force)
-        motion.gradient[:] = self.pushed(self.rows.lam)
-        add_held_impulse(net, motion, 1.0, dt, self.drive.gravity, self.tally.held_impulse)
+        push = Push(self.pushed(self.rows.lam), 1.0)
+        add_held_impulse(net, motion, push, dt, self.drive.gravity, self.tally.held_impulse)
