@@ -72,40 +72,40 @@ def transposed_rows_times_into(rows, p, out):
 
 
 @compiled
-def pushed_velocity_into(motion, inverse_mass, force, dt, u):
+def pushed_velocity_into(nodes, contacts, inverse_mass, force, dt, u):
     """u = ṽ + dt W̃ F [m/s], (n, 3), with a force F [N] on every node (eq. 9, 10)."""
     for i in range(u.shape[0]):
         w = dt * inverse_mass[i]
-        u0 = motion.v_star[i, 0] + w * force[i, 0]
-        u1 = motion.v_star[i, 1] + w * force[i, 1]
-        u2 = motion.v_star[i, 2] + w * force[i, 2]
-        if motion.locked[i] > FREE:
-            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-            u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
-            u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
+        u0 = nodes.v_star[i, 0] + w * force[i, 0]
+        u1 = nodes.v_star[i, 1] + w * force[i, 1]
+        u2 = nodes.v_star[i, 2] + w * force[i, 2]
+        if contacts.mode[i] > FREE:
+            d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
+            u0, u1, u2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
+            u0, u1, u2 = u0 + contacts.goal[i, 0], u1 + contacts.goal[i, 1], u2 + contacts.goal[i, 2]
         u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
 
 
 @lean
-def mobilised_into(rows, motion, inverse_mass, p, u):
+def mobilised_into(rows, contacts, inverse_mass, p, u):
     """u = W̃ Jᵀ p, (n, 4): no motion of a held node, none into an obstacle (eq. 9)."""
-    start, row, value, locked, direction = (
+    start, row, value, mode, direction = (
         rows.node_start,
         rows.node_row,
         rows.node_value,
-        motion.locked,
-        motion.direction,
+        contacts.mode,
+        contacts.direction,
     )
     for i in range(u.shape[0]):
         sum_of_scaled(start[i], start[i + 1], row, value, p, inverse_mass[i], u, i)
     for i in range(u.shape[0]):
-        if locked[i] > FREE:
+        if mode[i] > FREE:
             d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
-            u[i, 0], u[i, 1], u[i, 2] = allowed_part(locked[i], d0, d1, d2, u[i, 0], u[i, 1], u[i, 2])
+            u[i, 0], u[i, 1], u[i, 2] = allowed_part(mode[i], d0, d1, d2, u[i, 0], u[i, 1], u[i, 2])
 
 
 @compiled
-def diagonal_into(rows, motion, inverse_mass, diagonal):
+def diagonal_into(rows, contacts, inverse_mass, diagonal):
     """S_rr = Σ_j J_rj · W̃_j J_rj [m⁴/kg], (m,), from what it is without contact (eq. 9).
 
     0 where contact and held nodes leave nothing but round-off.
@@ -113,11 +113,11 @@ def diagonal_into(rows, motion, inverse_mass, diagonal):
     for r in range(diagonal.shape[0]):
         diagonal[r] = rows.free_diagonal[r]
     for j in range(inverse_mass.shape[0]):
-        if motion.locked[j] > FREE:
-            d0, d1, d2 = motion.direction[j, 0], motion.direction[j, 1], motion.direction[j, 2]
+        if contacts.mode[j] > FREE:
+            d0, d1, d2 = contacts.direction[j, 0], contacts.direction[j, 1], contacts.direction[j, 2]
             for k in range(rows.node_start[j], rows.node_start[j + 1]):
                 g0, g1, g2 = rows.node_value[k, 0], rows.node_value[k, 1], rows.node_value[k, 2]
-                p0, p1, p2 = allowed_part(motion.locked[j], d0, d1, d2, g0, g1, g2)
+                p0, p1, p2 = allowed_part(contacts.mode[j], d0, d1, d2, g0, g1, g2)
                 taken = g0 * (g0 - p0) + g1 * (g1 - p1) + g2 * (g2 - p2)
                 diagonal[rows.node_row[k]] -= inverse_mass[j] * taken
     for r in range(diagonal.shape[0]):

@@ -12,16 +12,17 @@ from massspring.kernels.jit.flat import flat
 
 
 @inlined
-def clearances_into(network, motion, drive, step, push, first, last):
+def clearances_into(network, nodes, contacts, drive, step, push, part):
     """clearance_i = min over obstacles of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 12).
 
-    Of the nodes from `first` to `last`, those that nothing can touch among them.
+    Of the nodes first ≤ i < last in `part`, those that nothing can touch among them.
     """
-    real = motion.x.dtype.type
-    x, v_star = flat(motion.x, first, last), flat(motion.v_star, first, last)
+    first, last = part
+    real = nodes.x.dtype.type
+    x, v_star = flat(nodes.x, first, last), flat(nodes.v_star, first, last)
     direction, inverse_mass = flat(push.direction, first, last), flat(network.inverse_mass, first, last)
     course = x, v_star, direction, inverse_mass, real(drive.dt), real(drive.dt * push.factor)
-    clearance = flat(motion.clearance, first, last)
+    clearance = flat(contacts.clearance, first, last)
     for i in range(clearance.shape[0]):
         clearance[i] = math.inf
     for o in range(drive.radius.shape[0]):
@@ -72,12 +73,12 @@ def capsule_clearance(course, clearance, p0, p1, p2, a0, a1, a2, radius):
 
 
 @inlined
-def pushed_velocity(network, motion, drive, push, i):
+def pushed_velocity(network, nodes, drive, push, i):
     """u = v* + dt W f of node i when what keeps volumes acts as a force f [m/s] (eq. 12)."""
     w, direction = drive.dt * push.factor * network.inverse_mass[i], push.direction
-    u0 = motion.v_star[i, 0] + w * direction[i, 0]
-    u1 = motion.v_star[i, 1] + w * direction[i, 1]
-    u2 = motion.v_star[i, 2] + w * direction[i, 2]
+    u0 = nodes.v_star[i, 0] + w * direction[i, 0]
+    u1 = nodes.v_star[i, 1] + w * direction[i, 1]
+    u2 = nodes.v_star[i, 2] + w * direction[i, 2]
     return u0, u1, u2
 
 

@@ -30,18 +30,18 @@ def fastest_free(v_star, direction, inverse_mass, impulse):
 
 
 @lean
-def fastest_node(network, motion, push, dt):
+def fastest_node(network, nodes, contacts, push, dt):
     """At least |v⁺_i| [m/s] of every node in the step as it stands, without thin probes (eq. 10)."""
-    n, locked, real = network.inverse_mass.shape[0], motion.locked, motion.x.dtype.type
-    v_star, direction = flat(motion.v_star, 0, n), flat(push.direction, 0, n)
+    n, mode, real = network.inverse_mass.shape[0], contacts.mode, nodes.x.dtype.type
+    v_star, direction = flat(nodes.v_star, 0, n), flat(push.direction, 0, n)
     weight = flat(network.inverse_mass, 0, n)
     fastest = float(fastest_free(v_star, direction, weight, real(dt * push.factor)))
-    for k in range(motion.touching_count[0]):
-        i = motion.touching[k]
-        if locked[i] > FREE:
+    for k in range(contacts.touching_count[0]):
+        i = contacts.touching[k]
+        if mode[i] > FREE:
             w = dt * push.factor * weight[i]
             u0, u1 = v_star[3 * i] + w * direction[3 * i], v_star[3 * i + 1] + w * direction[3 * i + 1]
-            u0, u1, u2 = settled(motion, i, u0, u1, v_star[3 * i + 2] + w * direction[3 * i + 2])
+            u0, u1, u2 = settled(contacts, i, u0, u1, v_star[3 * i + 2] + w * direction[3 * i + 2])
             fastest = max(fastest, u0 * u0 + u1 * u1 + u2 * u2)
     return math.sqrt(fastest)
 
@@ -57,7 +57,7 @@ def box_gap(x, triangles, f, p0, p1, p2):
 
 
 @lean
-def find_near(motion, tips, step, probes, reach):
+def find_near(nodes, tips, step, probes, reach):
     """Fills `near` with the triangles whose box may come within the radius of a tip in `reach` [m] of motion (eq. 145).
 
     A block whose nearest triangle is g away sleeps until the travel has grown by g: none of its boxes is looked at.
@@ -72,7 +72,7 @@ def find_near(motion, tips, step, probes, reach):
             begin, end = TRIANGLE_BLOCK * block, min(TRIANGLE_BLOCK * (block + 1), surface.shape[0])
             nearest = math.inf
             for f in range(begin, end):
-                gap = box_gap(motion.x, surface, f, p0, p1, p2) - probes.radius[p]
+                gap = box_gap(nodes.x, surface, f, p0, p1, p2) - probes.radius[p]
                 nearest = min(nearest, gap)
                 if not probes.skipping or gap <= reach:
                     probes.near[p, count] = f

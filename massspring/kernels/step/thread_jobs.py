@@ -1,4 +1,4 @@
-"""What the other threads of a team do during a frame (kernels.team)."""
+"""What the other threads of a team do during a frame (kernels.jit.thread_team)."""
 
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.gaps import clearances_into
@@ -22,11 +22,11 @@ from massspring.kernels.step.advance import advance_nodes
 
 
 @lean
-def serve(network, motion, drive, direction, rank):
+def serve(frame, team, direction, rank):
     """Does part number `rank` of every job of a frame up to its end; `direction` is that of its pushes."""
-    team = motion.team
-    first, last = team.slices[rank], team.slices[rank + 1]
-    begin, end = team.nodes[rank], team.nodes[rank + 1]
+    network, nodes, contacts, work, drive = frame.network, frame.nodes, frame.contacts, frame.work, frame.drive
+    slices = team.slices[rank], team.slices[rank + 1]
+    part = team.nodes[rank], team.nodes[rank + 1]
     known = 0
     while True:
         known = wait_until_other_than(team.signal, ROUND, known)
@@ -35,14 +35,14 @@ def serve(network, motion, drive, direction, rank):
         if job == JOB_END:
             return
         if job == JOB_SPRINGS:
-            pass_slices(motion, drive, network.slices, first, last, False, motion.tile[rank])
+            pass_slices(nodes, work, drive, network.slices, slices, False, work.tile[rank])
         elif job == JOB_SPRINGS_AND_VOLUME:
-            pass_slices(motion, drive, network.slices, first, last, True, motion.tile[rank])
+            pass_slices(nodes, work, drive, network.slices, slices, True, work.tile[rank])
         elif job == JOB_SEARCH:
-            clearances_into(network, motion, drive, step, push, begin, end)
+            clearances_into(network, nodes, contacts, drive, step, push, part)
         else:
-            advance_nodes(motion, network.inverse_mass, push, drive.dt, begin, end)
-            places_into(motion, begin, end)
+            advance_nodes(nodes, contacts, work, network.inverse_mass, push, drive.dt, part)
+            places_into(nodes, work, part[0], part[1])
         raise_by_one(team.signal, DONE)
 
 

@@ -32,9 +32,10 @@ class Step:
     def __init__(self, state: State, drive: Drive, step: int, factor: Factor, accuracy: Accuracy) -> None:
         assert state.rows is not None  # start() made them
         self.drive, self.step, self.factor, self.accuracy = drive, step, factor, accuracy
-        self.network, self.motion, self.rows, self.tally = state.network, state.motion, state.rows, state.tally
+        self.network, self.nodes, self.contacts = state.network, state.nodes, state.contacts
+        self.rows, self.tally = state.rows, state.tally
         # Without gravity: passes that start from balance must stay there, or a sum of few would be biased.
-        self.p = self.motion.x + drive.dt * self.motion.v
+        self.p = self.nodes.x + drive.dt * self.nodes.v
         held = self.network.held_nodes
         self.p[held] = self.network.held_rest + drive.held_displacement[step][self.network.held_group]
         self.few = len(self.rows.lam) <= DENSE_UP_TO
@@ -44,7 +45,7 @@ class Step:
         """Whether a volume is so far off that only a part of it is made up for."""
         self.idle = False
         """Whether a volume has had nothing to push on."""
-        self.contact = Contact(self.network, self.motion, drive, step)
+        self.contact = Contact(self.network, self.nodes, self.contacts, drive, step)
         self.answers: np.ndarray | None = None
 
     def times(self, field: np.ndarray) -> np.ndarray:
@@ -66,7 +67,7 @@ class Step:
 
     def take(self, passes: int) -> None:
         """So many passes; then v⁺ = (x⁺ − x)/dt."""
-        rows_into(self.motion.x, self.network.inverse_mass, self.rows)
+        rows_into(self.nodes.x, self.network.inverse_mass, self.rows)
         begun = self.rows.volume.copy()
         touching, impulses = self.touch(), np.zeros(0)
         obstacles = len(self.drive.radius) > 0
@@ -103,13 +104,13 @@ class Step:
         self.tally.skipped[0] += self.idle
         self.book(touching, impulses)
         self.mark(HELD)
-        self.motion.v[:] = (self.p - self.motion.x) / self.drive.dt
-        self.motion.x[:] = self.p
+        self.nodes.v[:] = (self.p - self.nodes.x) / self.drive.dt
+        self.nodes.x[:] = self.p
         self.mark(INTEGRATION)
 
     def touch(self) -> Touching:
         """The touched nodes of the moment, and how volumes answer their pressures past them."""
-        touching = Touching(self.factor, self.motion, self.network.surface_nodes, self.drive.dt)
+        touching = Touching(self.factor, self.nodes, self.contacts, self.network.surface_nodes, self.drive.dt)
         if self.answers is not None:
             self.reach(touching)
             self.answer()
@@ -142,7 +143,7 @@ class Step:
     def imbalance(self) -> np.ndarray:
         """J, V at p, and the right-hand side for the pressures of the moment [kg m], (n, 3) (eq. 92)."""
         out = np.empty_like(self.p)
-        imbalance_into(self.network, self.motion, self.rows, self.p, self.drive, out)
+        imbalance_into(self.network, self.nodes, self.rows, self.p, self.drive, out)
         return out
 
     def solve(self, free: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
@@ -200,12 +201,12 @@ class Step:
 
     def book(self, touching: Touching, impulses: np.ndarray) -> None:
         """Impulses of obstacles and attachments [N s] (eq. 11)."""
-        motion, net, dt = self.motion, self.network, self.drive.dt
+        nodes, contacts, net, dt = self.nodes, self.contacts, self.network, self.drive.dt
         given = self.tally.contact_impulse
         np.add.at(given, touching.obstacle, impulses[:, None] / dt * touching.direction)
         if self.drive.rough:
             rubbed = np.flatnonzero(self.contact.rubbed.any(axis=1))
-            np.add.at(given, motion.touched[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
-        spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, motion.force)
+            np.add.at(given, contacts.touched[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
+        spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, nodes.force)
         push = Push(self.pushed(self.rows.lam), 1.0)
-        add_held_impulse(net, motion, push, dt, self.drive.gravity, self.tally.held_impulse)
+        add_held_impulse(net, nodes, push, dt, self.drive.gravity, self.tally.held_impulse)
