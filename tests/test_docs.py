@@ -8,7 +8,7 @@ import pytest
 
 from massspring import Body, Clock, Material, Setup, simulate, surface_body
 from studies.catalog import STUDIES
-from studies.report.results import BEGIN, END
+from studies.publish import BEGIN, END, EXTRAS, PUBLISHED
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.store.record import Status
@@ -114,15 +114,17 @@ def test_an_added_organ_has_the_volume_of_its_formula():
 def test_the_table_of_readme_is_the_stored_one():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     shown = text.split(BEGIN)[1].split(END)[0].strip()
-    assert shown == (ROOT / "results" / "summary.md").read_text(encoding="utf-8").strip()
+    assert shown == (ROOT / PUBLISHED / "summary.md").read_text(encoding="utf-8").strip()
 
 
 def test_readme_names_only_charts_that_are_made():
-    linked = set(re.findall(r"\(results/(\w+)/(\w+\.png)\)", (ROOT / "README.md").read_text(encoding="utf-8")))
+    linked = set(
+        re.findall(r"\(results/published/(\w+)/(\w+\.png)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    )
     made = {(study.name, chart.file) for study in STUDIES for chart in study.charts}
-    assert {link for link in linked if link[0] not in ("figures", "reference", "verify")} <= made
+    assert {link for link in linked if link[0] not in (*EXTRAS, "reference")} <= made
     for folder, file in linked:
-        assert (ROOT / "results" / folder / file).is_file()
+        assert (ROOT / PUBLISHED / folder / file).is_file()
 
 
 def test_every_equation_the_code_cites_is_in_the_theory():

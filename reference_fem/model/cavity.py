@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
+from reference_fem.compiled import compiled
 from reference_fem.elements.shapes import basis_table, facet_nodes, nodes
 from reference_fem.elements.surface import scatter
 from reference_fem.errors import ReferenceProblem
@@ -95,7 +95,7 @@ def facet_shares(element):
     return triples.astype(np.uint32), np.asarray(shares)
 
 
-@njit(cache=True)
+@compiled()
 def add_wall(x, wall, pressure, gradient, values, tangent):
     """gradient += dV/dx [m²] and, if tangent, values -= pressure d²V/dx²; returns the enclosed V [m³] (eq. 41).
 

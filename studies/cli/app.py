@@ -20,6 +20,7 @@ from studies.cli.cost import cost
 from studies.cli.find import find_study
 from studies.cli.mesh import check, mesh
 from studies.cli.progress import TerminalProgress
+from studies.cli.publish import publish
 from studies.cli.safe_dt import safe_dt
 from studies.cli.show import describe
 from studies.cli.verify import verify
@@ -190,14 +191,11 @@ def plot(study: StudyName, results: Results = Path("results")) -> None:
 def report(
     results: Results = Path("results"),
     figures: Annotated[bool, typer.Option(help="also the pictures of organs and of the squeezed ball")] = False,
-    readme: Annotated[bool, typer.Option(help="also put the summary into README.md")] = False,
 ) -> None:
     """All charts and tables, and the summary; names what it wrote."""
     written, remarks = reports.report(results, STUDIES)
     if figures:
         written += reports.draw_figures(results)
-    if readme:
-        reports.write_readme(Path("README.md"), (results / "summary.md").read_text(encoding="utf-8"))
     for sentence in remarks:
         errors.print(f"warning: {sentence}", markup=False, highlight=False)
     for path in written:
@@ -220,6 +218,7 @@ def replay(path: Path) -> None:
 
 
 app.command()(verify)
+app.command()(publish)
 app.command()(cost)
 app.command()(mesh)
 app.command()(check)

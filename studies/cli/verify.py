@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 
 from reference_fem import crosscheck
+from studies.stamps import set_stamp
 from studies.verify.verification import FOLDER, Verdict, run_pack, tolerance, write_kappa, write_verdicts
 
 console = Console(soft_wrap=True)
@@ -27,6 +28,7 @@ def verify(
     written = write_verdicts(root / FOLDER, verdicts)
     if not fast:
         written += write_kappa(root / FOLDER)
+        set_stamp(root, FOLDER)
     for path in written:
         console.print(str(path), markup=False, highlight=False)
     if not crosscheck.available():

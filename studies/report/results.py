@@ -20,14 +20,13 @@ from studies.report.kept_volume import kept_volumes
 from studies.report.references import refresh_uncertainty, state_of
 from studies.runs.paper import play, slide_case, squeezed_balls
 from studies.runs.run import case_path
+from studies.stamps import set_stamp
 from studies.store.machine import write_machine
 from studies.store.paths import study_folder
 from studies.sweep.run_studies import load_runs
 from studies.timing.cases import timing_file
 
-BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
-"""Between these lines of README.md stands the summary; `organbench report --readme` writes it."""
-
+FIGURES = "figures"
 FIGURE_NODES = 550
 PAPER_NODES = {"liver": 544, "stomach": 550}
 """Surface nodes of the organs in Figure 1 of Jung, Hong and Choi (2005)."""
@@ -113,11 +112,13 @@ def inputs_of(root: Path, study: Study) -> str:
 
 def draw_figures(root: Path) -> list[Path]:
     """The gallery of all organs, and Figures 1 to 4 of Jung, Hong and Choi (2005) from our runs; their paths."""
-    gallery, springs = root / "figures" / "organs.png", root / "figures" / "organ_springs.png"
+    gallery, springs = root / FIGURES / "organs.png", root / FIGURES / "organ_springs.png"
     make_folder(gallery.parent)
     draw_organs({name: organ(name, FIGURE_NODES) for name in SHAPES}, gallery)
     draw_organ_springs({name: organ(name, nodes, fill=False) for name, nodes in PAPER_NODES.items()}, springs)
-    return [gallery, springs, *draw_paper(gallery.parent)]
+    paper = draw_paper(gallery.parent)
+    set_stamp(root, FIGURES)
+    return [gallery, springs, *paper]
 
 
 def draw_paper(folder: Path) -> list[Path]:
@@ -182,15 +183,3 @@ def _cell(row: Mapping[Hashable, Any], column: str) -> str:
     digits = max(0, -math.floor(math.log10(floor)))  # as many as the uncertainty has
     mark = f" {DOUBT_MARK}" if column.split(" [")[0] in str(row.get(DOUBTFUL, "")).split() else ""
     return f"{value:{sign}.{digits}f} ± {floor:.{digits}f}{mark}".replace("-", "−")
-
-
-def write_readme(readme: Path, summary: str) -> None:
-    """Replaces what stands between the marks in README.md. Raises StudyError when the marks are missing."""
-    if not readme.is_file():
-        raise StudyError(f"there is no file {readme} to put the table into; run the command where it lies")
-    text = readme.read_text(encoding="utf-8")
-    if BEGIN not in text or END not in text:
-        raise StudyError(f"{readme} has no lines '{BEGIN}' and '{END}' to put the table between")
-    head, rest = text.split(BEGIN, 1)
-    tail = rest.split(END, 1)[1]
-    write_whole(readme, f"{head}{BEGIN}\n{summary.strip()}\n{END}{tail}".encode())

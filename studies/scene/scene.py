@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from massspring import Method, Obstacle, Path, Ramp
+from massspring import Obstacle, Path, Ramp
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace
 from studies.scene.placing import Vector
@@ -124,9 +124,9 @@ class Scene:
     not_for: tuple[tuple[str, str], ...] = ()
     """(method, reason): combinations that make no sense."""
 
-    def skip(self, method: Method) -> str | None:
-        """Why `method` does not apply here; None when it does."""
-        return dict(self.not_for).get(method.name)
+    def skip(self, method: str) -> str | None:
+        """Why the method of that name does not apply here; None when it does."""
+        return dict(self.not_for).get(method)
 
     @property
     def regions(self) -> dict[str, Region]:

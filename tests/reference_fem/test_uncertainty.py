@@ -128,4 +128,5 @@ def test_a_setting_of_order_one_is_extrapolated_exactly(factor):
 
 def test_shares_add_as_independent_ones():
     assert combined({"mesh": 3.0, "contact": 4.0, "steps": 0.0}) == pytest.approx(5.0, rel=1e-15)
+    assert combined({"mesh": 3.0, "contact": 4.0, "steps": 12.0}) == pytest.approx(13.0, rel=1e-15)
     assert combined({}) == 0.0

@@ -56,6 +56,18 @@ def test_mean_error_is_over_the_largest_displacement():
     assert of("mean_error", final=final, reference=stretch) == pytest.approx(10 * share, rel=1e-12)
 
 
+@pytest.mark.parametrize("corner", [0, 4, 13, 26])
+def test_mean_error_counts_a_node_by_its_share_of_the_area(corner):
+    """One node off by a tenth of the largest displacement: 1 % times a third of its triangles over all of them."""
+    even = reference(lambda x: np.tile(SHIFT, (len(x), 1)))
+    final = POINTS + SHIFT
+    final[corner] += 0.1 * SHIFT
+    share = (corner == TRIANGLES).sum() / (3 * len(TRIANGLES))  # all triangles of the cube have the same area
+    found = of("mean_error", final=final, reference=even)
+    assert found == pytest.approx(10 * share, rel=1e-9, abs=1e-10)
+    assert found != pytest.approx(10 / len(POINTS), rel=0.05)  # what the plain mean would be
+
+
 def test_weights_are_the_masses_inside_and_the_areas_outside():
     """The error sits on the one inner node: no surface metric sees it, and its mass decides what the interior sees."""
     inner = int(np.flatnonzero(np.abs(POINTS).max(axis=1) == 0.0)[0])
@@ -101,6 +113,24 @@ def test_the_spread_of_j_is_that_of_the_bulk_of_the_volume():
     assert of("j_spread", final=1.1 * POINTS) == pytest.approx(0.0, abs=1e-10)
     stretched = np.where(POINTS > 0, [[2, 1, 1]], 1.0) * POINTS
     assert of("j_spread", final=stretched) == pytest.approx(100.0, rel=1e-12)
+
+
+def stretched_cells(volumes, ratios):
+    """Separate tetrahedra of these rest volumes, stretched so that J of each is its ratio: the spread of J [%]."""
+    corner = np.vstack([np.zeros(3), np.eye(3)])
+    rest = np.concatenate([np.cbrt(6 * volume) * corner for volume in volumes])
+    final = np.concatenate([np.cbrt(6 * v) * corner * [1, 1, j] for v, j in zip(volumes, ratios, strict=True)])
+    cells = np.arange(len(rest)).reshape(-1, 4)
+    return of("j_spread", values={"rest": rest, "snapshots": final[None], "tetrahedra": cells})
+
+
+def test_the_spread_of_j_leaves_out_a_twentieth_of_the_volume_at_either_end():
+    """50 tetrahedra of 2 % of the volume, J = 1.00, 1.01, …: the third is reached at 5 %, the 48th at 95 %."""
+    rising = 1 + 0.01 * np.arange(50)
+    assert stretched_cells(np.full(50, 1e-6), rising) == pytest.approx(45.0, rel=1e-9)
+    # The first holds a tenth of the volume, the last a twenty-fifth: 5 % lie in the first, 95 % in the one before it.
+    volumes = np.array([0.10, *np.full(43, 0.02), 0.04]) * 1e-4
+    assert stretched_cells(volumes, rising[:45]) == pytest.approx(43.0, rel=1e-9)
 
 
 def test_local_volume():
