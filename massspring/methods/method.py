@@ -51,16 +51,17 @@ class Method(Protocol):
 
 def begin_frame(state: State, drive: Drive) -> State:
     """A copy to advance in place, so that the caller's state stays what it was."""
-    motion = state.motion._replace(x=state.motion.x.copy(), v=state.motion.v.copy())
+    nodes = state.nodes._replace(x=state.nodes.x.copy(), v=state.nodes.v.copy())
     obstacles = len(drive.radius) + drive.tips.end.shape[1]
     tally = new_tally(obstacles, drive.held_displacement.shape[1], state.tally.ticks)
     probing = None if state.probing is None else fresh(state.probing, tally)
-    return replace(state, motion=motion, tally=tally, probing=probing)
+    return replace(state, nodes=nodes, tally=tally, probing=probing)
 
 
 @contextmanager
 def crewed_frame(state: State, drive: Drive) -> Iterator[State]:
     """A copy to advance in place; inside, all threads of the state are there."""
     after = begin_frame(state, drive)
-    with crew(after.network, after.motion, drive):
+    direction = after.nodes.gradient if after.rows is None else after.rows.push
+    with crew(after.frame(drive), direction):
         yield after

@@ -38,8 +38,10 @@ def in_precision(state: State, precision: Precision) -> State:
     if precision == "float64":
         return state
     rows = None if state.rows is None else _cast(state.rows, np.dtype(np.float32))
-    network, motion = (_cast(part, np.dtype(np.float32)) for part in (state.network, state.motion))
-    return replace(state, network=network, motion=motion, rows=rows)
+    parts = {
+        name: _cast(getattr(state, name), np.dtype(np.float32)) for name in ("network", "nodes", "contacts", "work")
+    }
+    return replace(state, rows=rows, **parts)
 
 
 def _cast(part: Any, real: np.dtype) -> Any:

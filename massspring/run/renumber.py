@@ -43,7 +43,7 @@ class Numbered:
 
 
 def numbered(body: Body) -> Numbered:
-    """The nodes of a large body in the order in which `kernels.slices` passes over them."""
+    """The nodes of a large body in the order in which `kernels.fused` passes over them."""
     if body.node_count < MANY:
         return Numbered(body, None)
     place = places_in_slices(body.springs, swept_surface(body), body.rest)

@@ -126,7 +126,7 @@ class Setup:
         state = in_precision(state, self.precision)
         if self.threads == 1:
             return state
-        return replace(state, motion=shared(state.motion, state.network, self.threads))
+        return shared(state, self.threads)
 
     @cached_property
     def _unmoved(self) -> dict[str, Any]:

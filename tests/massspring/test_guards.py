@@ -222,7 +222,7 @@ def test_nan_in_one_node_ends_every_solve(case):
     """Whatever iterates must end on NaN: an iteration that waits for a small residual would wait for ever."""
     setup = case.setup(clock_for(case.body, 1, 3))
     state = begin_frame(setup.start(), setup.drive(0))
-    state.motion.x[4] = np.nan
+    state.nodes.x[4] = np.nan
     assert not np.isfinite(case.method.advance(state, setup.drive(0)).x).all()
 
 
@@ -245,8 +245,8 @@ class Poisoned(Method):
             return after
         if self.what == "pressure":
             return replace(after, lam=np.full_like(after.lam, np.nan))
-        poisoned = after.motion._replace(v=np.full_like(after.v, np.nan))
-        return Free().advance(replace(after, motion=poisoned), drive)
+        poisoned = after.nodes._replace(v=np.full_like(after.v, np.nan))
+        return Free().advance(replace(after, nodes=poisoned), drive)
 
 
 @pytest.mark.parametrize(("what", "reason"), [("force", "positions are no longer"), ("pressure", "pressures are no")])

@@ -138,7 +138,7 @@ def test_squeezed_it_presses_and_comes_back(taut):
     assert float(taut.rest_volumes @ pressed.pressure[-1]) > 0.02 * MU * taut.volume
     assert pressed.elastic[-1] > 0
     state = Setup(taut, ImplicitVolume(), clock, damping=60.0).start()
-    state.motion.x[:] = pressed.final
+    state.nodes.x[:] = pressed.final
     free = Setup(taut, ImplicitVolume(), clock, damping=60.0)
     for frame in range(clock.frames):
         state = free.method.advance(state, free.drive(frame))

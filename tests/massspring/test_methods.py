@@ -6,11 +6,11 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import massspring.kernels.step.advance as motion_kernels
 from massspring import Body, Clock, ImplicitVolume, Method, Path, Plane, Setup, simulate, step_limit
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.constraint.one_volume import volume_multiplier
-from massspring.kernels.contact.active_set import find_contacts
-from massspring.kernels.step.predict import predict
+from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
+from massspring.kernels.step.end import end_step
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
 from massspring.methods.method import begin_frame
@@ -162,7 +162,7 @@ def volume_claim_holds(method, body) -> bool:
     """Whether a body blown up by 0.9 % of its volume has it back, as closely as claimed, after each of 20 steps."""
     setup = Setup(body, method, clock_for(body, 20, 1, method=method), damping=30.0)
     state = setup.start()
-    state.motion.x[:] = 1.003 * body.rest - 0.003 * body.rest.mean(axis=0)
+    state.nodes.x[:] = 1.003 * body.rest - 0.003 * body.rest.mean(axis=0)
     worst = 0.0
     for frame in range(20):
         state = method.advance(state, setup.drive(frame))
@@ -192,13 +192,14 @@ class SixfoldGradient(Method):
 
     def advance(self, state: State, drive) -> State:
         after = begin_frame(state, drive)
-        net, mo = after.network, after.motion
+        net, nodes, contacts, frame = after.network, after.nodes, after.contacts, after.frame(drive)
+        open_frame(frame)
         for step in range(len(drive.position)):
-            error = drive.volume_target[step, 0] - predict(net, mo, drive, step, True)[0]
-            mo.gradient[:] *= 6
-            find_contacts(net, mo, drive, step, 0.0)
-            lam, _ = volume_multiplier(mo, net.inverse_mass, error, drive.dt)
-            motion_kernels.advance(mo, net.mass, net.inverse_mass, lam, drive.dt, after.tally.contact_impulse)
+            error = drive.volume_target[step, 0] - begin_step(frame, step, True)[0]
+            nodes.gradient[:] *= 6
+            search_contacts(frame, step, Push(nodes.gradient, 0.0))
+            lam, _ = volume_multiplier(nodes, contacts, net.inverse_mass, error, drive.dt)
+            end_step(frame, step, Push(nodes.gradient, lam), 0.0, None)
         return after
 
 

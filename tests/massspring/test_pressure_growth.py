@@ -41,7 +41,7 @@ def come_to_rest(body, method):
 def kinetic_growth(body, method, seconds):
     """Exponential rate of the kinetic energy [1/s] about the balance of springs and pressure at 1.3 V0, undamped."""
     state = come_to_rest(body, method)
-    state.motion.v[:] += 1e-6 * np.random.default_rng(2).normal(size=body.rest.shape)
+    state.nodes.v[:] += 1e-6 * np.random.default_rng(2).normal(size=body.rest.shape)
     setup = filled(body, method, damping=0.0)
     frames = round(seconds / setup.clock.frame)
     energy = []

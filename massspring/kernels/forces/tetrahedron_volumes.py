@@ -24,6 +24,8 @@ class Cells(NamedTuple):
     """What every cell should have of its rest volume [1], (1,)."""
     pressure: np.ndarray
     """p_t [Pa], (k,)."""
+    push: np.ndarray
+    """Σ_t p_t dV_t/dx, the force of all cells on each node [N], (n, 3)."""
     slope: np.ndarray
     """dV_t/dx of the second, third and fourth node [m²], (k, 3, 3); the first has minus their sum."""
     right: np.ndarray
