@@ -15,9 +15,9 @@ partly in contact; between fewer the body sinks in, three to thirty times deeper
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from reference_fem.elements.surface import Surface, add_point_stiffness, point_positions, scatter
+from reference_fem.jit import njit
 from reference_fem.model.obstacles import gap_into, gaps
 
 

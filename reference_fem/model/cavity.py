@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
 from reference_fem.elements.shapes import basis_table, facet_nodes, nodes
 from reference_fem.elements.surface import scatter
 from reference_fem.errors import ReferenceProblem
+from reference_fem.jit import njit
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from reference_fem.errors import ReferenceProblem
+from reference_fem.jit import njit
 
 
 def check_modulus(name, value):

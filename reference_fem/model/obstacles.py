@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from reference_fem.errors import ReferenceProblem
+from reference_fem.jit import njit
 
 PLANE, SPHERE, CAPSULE = 0, 1, 2
 SLIP = ("frictionless", "no_slip")

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from reference_fem.contact.augmented import Touch
 from reference_fem.elements.surface import point_positions
+from reference_fem.jit import njit
 from reference_fem.model.obstacles import gap_into
 from reference_fem.statics.tangent import Tangent
 from reference_fem.system.saddle_point import System

@@ -1,9 +1,9 @@
 """Residual and tangent of all elements, added into a prebuilt pattern."""
 
 import numpy as np
-from numba import njit
 
 from reference_fem.elements.shapes import Elements
+from reference_fem.jit import njit
 from reference_fem.model.material import cofactor_into, response_into
 
 CONTRACT = {"contract"}
