@@ -46,7 +46,8 @@ if TYPE_CHECKING:
     from studies.scenes.stomach_probe import STOMACH_PROBE
     from studies.scenes.stomach_slide import STOMACH_SLIDE
     from studies.store.record import Record, Status, read_record
-    from studies.sweep.run_studies import load_runs, run_studies
+    from studies.sweep.load import load_runs
+    from studies.sweep.run_studies import run_studies
 
 _FACE = {
     "BALL_CLAMPED": "studies.scenes.ball_clamped",
@@ -96,7 +97,7 @@ _FACE = {
     "StudyError": "studies.base.errors",
     "Tissue": "studies.scene.tissues",
     "Xpbd": "massspring.methods.xpbd",
-    "load_runs": "studies.sweep.run_studies",
+    "load_runs": "studies.sweep.load",
     "measure": "studies.runs.run",
     "organ": "studies.geometry.api.organs",
     "read_record": "studies.store.record",

@@ -18,6 +18,12 @@ def metric(name: str) -> Metric:
     return choose(name, {m.name: m for m in METRICS}, "metric")
 
 
+def check_columns(names: Sequence[str]) -> None:
+    """Raises StudyError for a name that is no metric, before minutes are spent on a table without it."""
+    for name in names:
+        metric(name)
+
+
 def study_table(runs: Sequence[Run], columns: Sequence[str]) -> pd.DataFrame:
     """Metrics `columns` of `runs`; a column "… floor" follows where the reference has an uncertainty of its own."""
     metrics = [metric(name) for name in columns]

@@ -2,9 +2,12 @@
 
 import pickle
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from reference_fem import Checkpoint
 from studies.base.atomic import write_whole
+
+if TYPE_CHECKING:
+    from reference_fem import Checkpoint
 
 
 def steps_path(record: Path) -> Path:
@@ -12,12 +15,12 @@ def steps_path(record: Path) -> Path:
     return record.with_suffix(".steps")
 
 
-def keep(record: Path, stamp: str, checkpoint: Checkpoint) -> None:
+def keep(record: Path, stamp: str, checkpoint: "Checkpoint") -> None:
     """Stores how far the path is, whole or not at all; `stamp` says what problem and what code it belongs to."""
     write_whole(steps_path(record), pickle.dumps((stamp, checkpoint)))
 
 
-def kept(record: Path, stamp: str) -> Checkpoint | None:
+def kept(record: Path, stamp: str) -> "Checkpoint | None":
     """Where the path of this very problem and code stopped; None when it did not begin, or is of another."""
     file = steps_path(record)
     if not file.exists():

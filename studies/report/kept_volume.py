@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 
 from studies.base.errors import StudyError
-from studies.catalog import Study
+from studies.catalog.study import Study
 from studies.metrics.metrics import COMPARABLE
 from studies.runs.case import Case
-from studies.runs.run import case_path
+from studies.runs.current import case_path
 from studies.store.record import read_record
 
 PROMISED = 1e-4

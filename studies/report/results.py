@@ -8,21 +8,21 @@ from typing import Any
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
-from studies.catalog import Study
+from studies.catalog.study import Study
 from studies.geometry import SHAPES, organ
 from studies.metrics.metrics import Run
 from studies.metrics.table import DOUBTFUL, study_table, write_table
 from studies.plots.figures import paper_ball, paper_slide
 from studies.plots.figures.organ_springs import draw_organ_springs
 from studies.plots.figures.organs import draw_organs
-from studies.reference.solve import pieces
+from studies.reference.pieces import pieces
 from studies.report.kept_volume import kept_volumes
 from studies.report.references import refresh_uncertainty, state_of
+from studies.runs.current import case_path
 from studies.runs.paper import play, slide_case, squeezed_balls
-from studies.runs.run import case_path
 from studies.store.machine import write_machine
 from studies.store.paths import study_folder
-from studies.sweep.run_studies import load_runs
+from studies.sweep.load import load_runs
 from studies.timing.cases import timing_file
 
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"

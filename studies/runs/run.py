@@ -1,19 +1,21 @@
 """One case: prepared, simulated, judged, stored. Whatever happens is a result; only a full disk is not."""
 
+import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from massspring import History, MassSpringError, simulate
+from studies.base.compile_watch import watching
 from studies.base.errors import DoesNotApply, StudyError
 from studies.runs.case import Case, case_from_json
+from studies.runs.current import case_path, run_fingerprint
 from studies.runs.prepare import LUMEN, Prepared, prepare
-from studies.store.fingerprint import source_fingerprint
 from studies.store.new_record import new_record
-from studies.store.paths import record_path
-from studies.store.record import Field, Record, Status, is_current, read_record, write_record
+from studies.store.record import Field, Record, Status, read_record, write_record
 
 DRIFT = 0.01
 """A method that keeps the volume and is this far from it has drifted: thirty times what the worst claims allow."""
@@ -21,25 +23,16 @@ TIME_LIMIT = 600.0
 """Wall time after which a run is given up [s]: ten times the longest case of the catalogue."""
 
 
-def run_fingerprint() -> str:
-    """Hash of all code that a run depends on; the scene itself is part of the case."""
-    return source_fingerprint("massspring", "studies.geometry", "studies.runs.prepare", "studies.runs.run")
-
-
-def case_path(root: Path, study: str, case: Case) -> Path:
-    """Where the record of a case lies."""
-    return record_path(root, study, case.name, case.key)
-
-
-def case_is_current(root: Path, study: str, case: Case) -> bool:
-    """Whether it is there, from this code."""
-    return is_current(case_path(root, study, case), case.key, run_fingerprint())
-
-
 def run_case(root: Path, study: str, case: Case, on_frame: Callable[[int], object] | None = None) -> Path:
-    """Runs a case and stores what came of it, a failure too. Raises StudyError only when it cannot be stored."""
+    """Runs a case and stores what came of it, a failure too, with the seconds that it took without compiling.
+
+    Raises StudyError only when it cannot be stored."""
     path = case_path(root, study, case)
-    write_record(path, measure(case, on_frame))
+    started = time.perf_counter()
+    with watching(lambda name: None) as watch:
+        record = measure(case, on_frame)
+    seconds = time.perf_counter() - started - watch.seconds
+    write_record(path, replace(record, attributes={**record.attributes, "seconds": seconds}))
     return path
 
 

@@ -2,16 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from massspring import Method, Obstacle, Path, Ramp
+from massspring.world.obstacles import Obstacle
+from massspring.world.trajectories import Path, Ramp
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace
 from studies.scene.placing import Vector
 from studies.scene.start import Start
 from studies.scene.tissues import Tissue
+
+if TYPE_CHECKING:
+    from massspring import Method
 
 Region = HalfSpace | BallRegion | EllipsoidRegion
 
@@ -124,7 +128,7 @@ class Scene:
     not_for: tuple[tuple[str, str], ...] = ()
     """(method, reason): combinations that make no sense."""
 
-    def skip(self, method: Method) -> str | None:
+    def skip(self, method: "Method") -> str | None:
         """Why `method` does not apply here; None when it does."""
         return dict(self.not_for).get(method.name)
 

@@ -14,8 +14,8 @@ from studies.catalog import STUDIES
 from studies.cli import app as cli
 from studies.geometry.organs import SHAPES
 from studies.metrics.metrics import METRICS
-from studies.reference.solve import pieces
-from studies.runs.run import case_path
+from studies.reference.pieces import pieces
+from studies.runs.current import case_path
 from studies.scenes import SCENES
 from studies.store.paths import index_path
 from studies.store.record import Field, read_record, write_record

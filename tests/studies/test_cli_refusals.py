@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from studies.cli import app as cli
-from studies.runs.run import case_path
+from studies.runs.current import case_path
 from studies.store.paths import record_files
 from studies.store.record import Status, read_record, write_record
 from tests.studies.tiny import TINY, content, cube, tiny_case, write_obj

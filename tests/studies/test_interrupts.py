@@ -14,7 +14,8 @@ from studies.base.errors import StudyError
 from studies.cli import app as cli
 from studies.store.paths import record_files
 from studies.store.record import Status, peek
-from studies.sweep.run_studies import perform, run_studies, standings
+from studies.sweep.run_studies import perform, run_studies
+from studies.sweep.standings import standings
 from tests.studies.tiny import Silent, tiny_case, tiny_study
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and process groups")

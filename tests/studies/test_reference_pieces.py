@@ -12,12 +12,13 @@ from studies.base.errors import StudyError
 from studies.reference import checkpoints
 from studies.reference import solve as module
 from studies.reference.load import load_reference
-from studies.reference.solve import Piece, pieces, solve
+from studies.reference.pieces import Piece, pieces
+from studies.reference.solve import solve
 from studies.report.references import reference_listing, refresh_uncertainty
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.store.record import Status, read_record
-from studies.sweep.run_studies import load_runs
+from studies.sweep.load import load_runs
 from tests.studies.octant import LEVELS, SCENE
 from tests.studies.tiny import tiny_case, tiny_study
 

@@ -24,10 +24,10 @@ from studies.report.results import (
     write_readme,
     write_table,
 )
-from studies.runs.run import case_path
+from studies.runs.current import case_path
 from studies.store.machine import machine_id
 from studies.store.record import Status
-from studies.sweep.run_studies import load_runs
+from studies.sweep.load import load_runs
 from tests.studies.tiny import tiny_case, tiny_study
 
 REPOSITORY = Path(__file__).parents[2]

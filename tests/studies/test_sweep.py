@@ -7,12 +7,15 @@ from dataclasses import replace
 import pytest
 
 from studies.base.errors import StudyError
-from studies.runs.run import case_path
+from studies.runs.current import case_path
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status, read_record, write_record
 from studies.sweep import run_studies as module
-from studies.sweep.run_studies import Task, failed, load_runs, perform, run_studies, standings, tasks_of
+from studies.sweep.load import load_runs
+from studies.sweep.run_studies import perform, run_studies
+from studies.sweep.standings import failed, standings
+from studies.sweep.tasks import Task, tasks_of
 from studies.timing import cases as timed
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
 

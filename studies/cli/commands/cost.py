@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.table import Table
 
 from studies.cli.case_options import BodyKind, MethodName, SurfaceNodes, chosen_case
+from studies.cli.terminal import console
 from studies.metrics.table import write_table
 from studies.timing.stage_cost import FRAME, SKIPPED, STAGE, cost_table
 
-console = Console(soft_wrap=True)
 HEADINGS = {STAGE: "stages of a step", SKIPPED: "left out here; what it would cost", FRAME: "Python between two frames"}
 
 
