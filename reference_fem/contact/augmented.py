@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from reference_fem.compiled import compiled
 from reference_fem.elements.surface import Surface, add_point_stiffness, point_positions, scatter
-from reference_fem.jit import njit
 from reference_fem.model.obstacles import gap_into, gaps
 
 
@@ -66,7 +66,7 @@ def touch(rows, shift, multiplier, penalty, grip=NO_GRIP, guess=NO_GUESS) -> Tou
     return Touch(rows, shift, multiplier, penalty, grip, guess, *zeros)
 
 
-@njit(cache=True)
+@compiled()
 def add_contact(x, surface, touch, values, residual, tangent):
     """residual -= w (t n + T) N and, if tangent, values += w d²(potential) N N; fills touch (eq. 19, 43).
 
@@ -111,7 +111,7 @@ def add_contact(x, surface, touch, values, residual, tangent):
                 scatter(K, positions[f], values)
 
 
-@njit(cache=True)
+@compiled()
 def counted(touch, o, f):
     """Whether a point of a facet has a multiplier, or a pressure that the tangent counts with."""
     for q in range(touch.multiplier.shape[2]):
@@ -120,7 +120,7 @@ def counted(touch, o, f):
     return False
 
 
-@njit(cache=True)
+@compiled()
 def out_of_reach(row, nodes):
     """Whether no point of a facet without multipliers can feel an obstacle: farther than the facet extends.
 
@@ -139,7 +139,7 @@ def out_of_reach(row, nodes):
     return gap_into(row, centre, n, along)[0] > 2.0 * np.sqrt(reach)
 
 
-@njit(cache=True)
+@compiled()
 def press_point(touch, o, f, q, y, push, k):
     """push = t n + T (3,) and k = -d push/dy (3, 3) at the point y; False when both are zero.
 
@@ -165,7 +165,7 @@ def press_point(touch, o, f, q, y, push, k):
     return True
 
 
-@njit(cache=True)
+@compiled()
 def hold_point(touch, o, f, q, y, push, k):
     """push += T (3,) and k -= dT/dy (3, 3) of a stuck point y."""
     row, grip, eps = touch.rows[o], touch.grip, touch.penalty[f]

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_fem.jit import njit
+from reference_fem.compiled import compiled
 
 
 class Surface(NamedTuple):
@@ -30,7 +30,7 @@ def point_positions(x, surface: Surface):
     return np.einsum("qa,fia->fqi", surface.values, moved)
 
 
-@njit(cache=True)
+@compiled()
 def add_point_stiffness(N, k, K):
     """K[ia, jb] += k_ij N_a N_b."""
     count = len(N)
@@ -41,7 +41,7 @@ def add_point_stiffness(N, k, K):
                     K[count * i + a, count * j + b] += k[i, j] * N[a] * N[b]
 
 
-@njit(cache=True)
+@compiled()
 def scatter(K, positions, values):
     """values[positions] += packed upper triangle of K."""
     slot = 0

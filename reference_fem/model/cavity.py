@@ -14,10 +14,10 @@ import numpy as np
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
+from reference_fem.compiled import compiled
 from reference_fem.elements.shapes import basis_table, facet_nodes, nodes
 from reference_fem.elements.surface import scatter
 from reference_fem.errors import ReferenceProblem
-from reference_fem.jit import njit
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ def facet_shares(element):
     return triples.astype(np.uint32), np.asarray(shares)
 
 
-@njit(cache=True)
+@compiled()
 def add_wall(x, wall, pressure, gradient, values, tangent):
     """gradient += dV/dx [m²] and, if tangent, values -= pressure d²V/dx²; returns the enclosed V [m³] (eq. 41).
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reference_fem.compiled import compiled
 from reference_fem.errors import ReferenceProblem
-from reference_fem.jit import njit
 
 
 def check_modulus(name, value):
@@ -113,7 +113,7 @@ class MooneyRivlin(TwoTermLaw):
 Material = NeoHookean | MooneyRivlin
 
 
-@njit(cache=True)
+@compiled()
 def cofactor_into(F, cof):
     """cof = dJ/dF (3, 3) and J = det F."""
     for i in range(3):
@@ -124,7 +124,7 @@ def cofactor_into(F, cof):
     return F[0, 0] * cof[0, 0] + F[0, 1] * cof[0, 1] + F[0, 2] * cof[0, 2]
 
 
-@njit(cache=True)
+@compiled()
 def response_into(F, p, parameters, H, P, A, scratch):
     """P = dW/dF (3, 3) [Pa], A = dP/dF (9, 9) [Pa], H = F^-T; returns J, and J <= 0 leaves the rest unset.
 
@@ -158,7 +158,7 @@ def response_into(F, p, parameters, H, P, A, scratch):
     return J
 
 
-@njit(cache=True)
+@compiled()
 def add_second_invariant(F, H, I1, m, P, A, scratch):
     """P += m (D - 2/3 I2 H), A += its derivative, m = 2 c2 J^-4/3; I2 = (I1² - |C|²)/2, D = I1 F - F C.
 

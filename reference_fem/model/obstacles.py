@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reference_fem.compiled import compiled
 from reference_fem.errors import ReferenceProblem
-from reference_fem.jit import njit
 
 PLANE, SPHERE, CAPSULE = 0, 1, 2
 SLIP = ("frictionless", "no_slip")
@@ -101,7 +101,7 @@ def place(rows, obstacles, t):
     return moved
 
 
-@njit(cache=True)
+@compiled()
 def gap_into(row, y, n, along):
     """Gap g [m] between point y and an obstacle; unit normal n towards the body, curvature of g [1/m].
 

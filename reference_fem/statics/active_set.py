@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
+from reference_fem.compiled import compiled
 from reference_fem.contact.augmented import Touch
 from reference_fem.elements.surface import point_positions
-from reference_fem.jit import njit
 from reference_fem.model.obstacles import gap_into
 from reference_fem.statics.tangent import Tangent
 from reference_fem.system.saddle_point import System
@@ -50,7 +50,7 @@ class Points(NamedTuple):
     """Obstacle, facet and point of each."""
 
 
-@njit(cache=True)
+@compiled()
 def look_at(rows, y, gap, normal):
     """Gaps (no, nf, nq) [m] and normals (no, nf, nq, 3) of the points y (nf, nq, 3) [m]."""
     along = np.empty(3)

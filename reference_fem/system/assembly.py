@@ -2,15 +2,15 @@
 
 import numpy as np
 
+from reference_fem.compiled import compiled
 from reference_fem.elements.shapes import Elements
-from reference_fem.jit import njit
 from reference_fem.model.material import cofactor_into, response_into
 
 CONTRACT = {"contract"}
 """Fused multiply-add only: no reordering, so two runs agree bitwise."""
 
 
-@njit(cache=True, fastmath=CONTRACT)
+@compiled(fastmath=CONTRACT)
 def add_elements(x, elements, parameters, positions, values, residual, tangent):
     """residual += dPi/dx, values += d²Pi/dx² (if tangent); returns the smallest J, and stops at J <= 0.
 
@@ -48,7 +48,7 @@ def add_elements(x, elements, parameters, positions, values, residual, tangent):
     return smallest
 
 
-@njit(cache=True, fastmath=CONTRACT, inline="always")
+@compiled(fastmath=CONTRACT, inline="always")
 def deformation_into(ue, G, functions, F):
     """F = 1 + sum u_a grad N_a (3, 3)."""
     count = len(functions)
@@ -60,7 +60,7 @@ def deformation_into(ue, G, functions, F):
             F[i, r] = s
 
 
-@njit(cache=True)
+@compiled()
 def mean_pressure(ue, gradients, weights, functions, parameters):
     """kappa (sum w J / sum w - 1): the pressure [Pa] that solves an element's own volume equation (eq. 61)."""
     F, cof, change, volume = np.empty((3, 3)), np.empty((3, 3)), 0.0, 0.0
@@ -71,7 +71,7 @@ def mean_pressure(ue, gradients, weights, functions, parameters):
     return parameters[2] * change / volume
 
 
-@njit(cache=True)
+@compiled()
 def condense(K, n):
     """K[:n, :n] -= K[:n, n] K[:n, n]ᵀ / K[n, n], upper triangle: the last unknown eliminated."""
     for a in range(n):
@@ -80,7 +80,7 @@ def condense(K, n):
             K[a, b] -= share * K[b, n]
 
 
-@njit(cache=True, fastmath=CONTRACT)
+@compiled(fastmath=CONTRACT)
 def integrate_element(ue, gradients, pressures, weights, functions, constraints, parameters, re, K, tangent):
     """Adds one element's residual re and upper tangent K; returns its smallest J."""
     F, H, P = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -107,7 +107,7 @@ def integrate_element(ue, gradients, pressures, weights, functions, constraints,
     return smallest
 
 
-@njit(cache=True, fastmath=CONTRACT)
+@compiled(fastmath=CONTRACT)
 def add_displacement_block(G, A, w, functions, T, K):
     """K[ia, kb] += w G_Ja A_iJkL G_Lb, blocks k >= i, through T = A·G (9, 3 nu)."""
     count = len(functions)
@@ -123,7 +123,7 @@ def add_displacement_block(G, A, w, functions, T, K):
                 K[count * i + a, c] += g0 * T[3 * i, c] + g1 * T[3 * i + 1, c] + g2 * T[3 * i + 2, c]
 
 
-@njit(cache=True, fastmath=CONTRACT)
+@compiled(fastmath=CONTRACT)
 def add_pressure_blocks(G, H, M, wJ, w_kappa, functions, constraints, K):
     """K[ia, q] += w J H_iJ G_Ja M_q and K[q, r] -= w M_q M_r / kappa."""
     count = len(functions)

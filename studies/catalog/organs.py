@@ -10,7 +10,7 @@ METHODS = (Free(), ImplicitVolume())
 
 
 def _cases(scene: Scene, *bodies: BodyRecipe) -> tuple[Case, ...]:
-    return tuple(Case(scene, body, m) for body in bodies for m in METHODS if scene.skip(m) is None)
+    return tuple(Case(scene, body, m) for body in bodies for m in METHODS if scene.skip(m.name) is None)
 
 
 ORGANS = Study(

@@ -106,7 +106,7 @@ def attachments_for(scene: Scene, mesh: OrganMesh) -> tuple[Attachment, ...]:
 def prepare(case: Case) -> Prepared:
     """Mesh, body, clock, surroundings of a case. Raises StudyError, MassSpringError."""
     scene = case.scene
-    reason = scene.skip(case.method)
+    reason = scene.skip(case.method.name)
     if reason is not None:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
     # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.

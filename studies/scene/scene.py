@@ -2,20 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from massspring.world.obstacles import Obstacle
-from massspring.world.trajectories import Path, Ramp
+from massspring import Obstacle, Path, Ramp
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace
 from studies.scene.placing import Vector
 from studies.scene.start import Start
 from studies.scene.tissues import Tissue
-
-if TYPE_CHECKING:
-    from massspring import Method
 
 Region = HalfSpace | BallRegion | EllipsoidRegion
 
@@ -128,9 +124,9 @@ class Scene:
     not_for: tuple[tuple[str, str], ...] = ()
     """(method, reason): combinations that make no sense."""
 
-    def skip(self, method: "Method") -> str | None:
-        """Why `method` does not apply here; None when it does."""
-        return dict(self.not_for).get(method.name)
+    def skip(self, method: str) -> str | None:
+        """Why the method of that name does not apply here; None when it does."""
+        return dict(self.not_for).get(method)
 
     @property
     def regions(self) -> dict[str, Region]:

@@ -54,9 +54,15 @@ def test_every_part_of_the_recipe_counts(monkeypatch):
     names = [recipe_hash(RECIPE | change, {}) for change in changes]
     points = np.zeros((4, 3))
     names += [recipe_hash(RECIPE, {"points": points}), recipe_hash(RECIPE, {"points": points + 1e-16})]
-    monkeypatch.setattr(jobs, "code_hash", lambda: "other code")
+    monkeypatch.setattr(jobs, "code_hash", lambda kind: "other code")
     names.append(recipe_hash(RECIPE, {}))
     assert len(set(names)) == len(names)
+
+
+def test_the_code_of_a_mesh_is_what_its_kind_needs():
+    """Organs do not depend on the code of scans; every shape counts, and what moves a surface onto it."""
+    assert len({jobs.code_hash(kind) for kind in ("organ", "scan", "curved")}) == 3
+    assert jobs.code_hash("organ") == jobs.code_hash("ball_octant")
 
 
 def test_a_mesher_that_hangs_is_stopped(own_cache):

@@ -1,56 +1,20 @@
-"""The decorator of all kernels: numba, cached on disk under a key that changes when any kernel source changes."""
+"""The decorators of all kernels: numba, kept on disk (massspring.compile_cache)."""
 
-import contextlib
-import hashlib
-import os
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
-from numba.core import config
 
-PACKAGE = Path(__file__).resolve().parents[2]
+from massspring.compile_cache import kept
+
 Function = TypeVar("Function", bound=Callable[..., Any])
-
-
-def source_key() -> str:
-    """Hash of the sources that end up in compiled code: numba itself only notices edits in the file it compiles."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted([*(PACKAGE / "kernels").rglob("*.py"), *(PACKAGE / "methods").rglob("*.py")]):
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:12]
-
-
-def _cache_folder() -> str:
-    """NUMBA_CACHE_DIR where the user set it, else a folder of the user's cache named after the sources."""
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    if chosen:
-        return str(Path(chosen) / f"massspring-{source_key()}")
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return str(home / "organbench" / f"massspring-{source_key()}")
-
-
-CACHE_FOLDER = _cache_folder()
-
-
-@contextlib.contextmanager
-def _keyed_cache() -> Iterator[None]:
-    """numba reads its folder while it decorates; other packages in the process keep theirs."""
-    before = config.CACHE_DIR  # pyright: ignore[reportAttributeAccessIssue]
-    config.CACHE_DIR = CACHE_FOLDER  # pyright: ignore[reportAttributeAccessIssue]
-    try:
-        yield
-    finally:
-        config.CACHE_DIR = before  # pyright: ignore[reportAttributeAccessIssue]
-
 
 OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True}
 """Kept on disk; division follows IEEE: a zero gives inf, and the run has diverged; other threads run meanwhile."""
 
 
 def _jit(function: Function, **options: Any) -> Function:
-    with _keyed_cache():
+    with kept():
         return numba.njit(**OPTIONS, **options)(function)  # pyright: ignore[reportReturnType]
 
 

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from massspring.sources import ROOT, source_fingerprint
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import OrganMesh
 from studies.geometry.shape.regions import ON_CURVE, region_from_dict
@@ -27,7 +28,8 @@ TIME_LIMIT = 300.0
 PARTS = ("points", "triangles", "tetrahedra", "surface_count", "outer_count")
 """What the worker makes and the cache keeps."""
 
-HERE = Path(__file__).parents[1]
+MADE_ELSEWHERE = {"scan": "studies.geometry.mesher.scan_recipe", "curved": "studies.geometry.mesh.second_order"}
+"""Kinds of recipes that the module of all others does not make."""
 
 
 def mesh_from(
@@ -86,7 +88,7 @@ def cache_folder() -> Path:
 
 def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:
     """Hash of all that decides the mesh: recipe, given arrays, our code, the mesher's version."""
-    digest = hashlib.sha256(code_hash().encode())
+    digest = hashlib.sha256(code_hash(recipe["kind"]).encode())
     digest.update(json.dumps(recipe, sort_keys=True).encode())
     for key in sorted(arrays):
         digest.update(
@@ -95,14 +97,16 @@ def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:
     return digest.hexdigest()[:16]
 
 
-@lru_cache(maxsize=1)
-def code_hash() -> str:
-    """Hash of the sources of this package and of the libraries that decide a mesh."""
-    digest = hashlib.sha256()
-    for path in sorted(HERE.rglob("*.py")):
-        digest.update(path.relative_to(HERE).as_posix().encode() + path.read_bytes())
-    digest.update(" ".join(version(name) for name in ("gmsh", "scikit-image", "numpy", "scipy")).encode())
-    return digest.hexdigest()
+@lru_cache
+def code_hash(kind: str) -> str:
+    """Hash of the code that makes a kind of recipe, and of the versions of the libraries that decide a mesh."""
+    versions = " ".join(version(name) for name in ("gmsh", "scikit-image", "numpy", "scipy"))
+    return f"{source_fingerprint(maker(kind))} {versions}"
+
+
+def maker(kind: str) -> str:
+    """The module that makes a kind of recipe."""
+    return MADE_ELSEWHERE.get(kind, "studies.geometry.mesher.organ_recipe")
 
 
 def read_cached(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | None:
@@ -136,15 +140,14 @@ def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: flo
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder, "job.npz"), Path(folder, "out.npz")
         np.savez(job, allow_pickle=False, recipe=np.array(json.dumps(recipe)), **arrays)
-        root = str(HERE.parents[1])
+        root = str(ROOT)
         paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
         environment = os.environ | {
             "PYTHONPATH": os.pathsep.join(paths),
             "OMP_NUM_THREADS": "1",
             "OPENBLAS_NUM_THREADS": "1",
         }
-        module = "scan_recipe" if recipe["kind"] == "scan" else "organ_recipe"
-        command = [sys.executable, "-m", f"studies.geometry.mesher.{module}", str(job), str(out)]
+        command = [sys.executable, "-m", maker(recipe["kind"]), str(job), str(out)]
         try:
             done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit, check=False)
         except subprocess.TimeoutExpired as error:

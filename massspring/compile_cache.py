@@ -1,0 +1,65 @@
+"""Where compiled code is kept between processes, and when it is out of date.
+
+numba itself compares the file of a function, not the files which that imports, and takes a new comment for new code.
+Here the state of all code that can be compiled into a function decides (massspring.sources).
+"""
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from numba.core import caching, config
+
+from massspring.sources import cache_folder, own_file, source_fingerprint
+
+COMPILED = ("massspring.kernels", "massspring.methods", "reference_fem")
+"""Where compiled functions and the constants in them live; a compiled function uses nothing else (tested)."""
+
+
+def folder() -> Path:
+    """NUMBA_CACHE_DIR where the user set it, else a folder of the user's cache."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    return Path(chosen) if chosen else cache_folder() / "compiled"
+
+
+class ByMeaning(caching.UserProvidedCacheLocator):
+    """numba's locator for functions of this distribution: a folder for each state of the code of a module."""
+
+    def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
+        super().__init__(py_func, py_file)
+        module = py_func.__module__
+        self._stamp = source_fingerprint(module, within=COMPILED)
+        self._cache_path = str(folder() / f"{module}-{self._stamp[:16]}")
+
+    def get_source_stamp(self) -> str:
+        """What the stored code must have been compiled from."""
+        return self._stamp
+
+    def get_disambiguator(self) -> str:
+        """Nothing: a line number would change with the comments above the function."""
+        return ""
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> "ByMeaning | None":
+        """None for functions of others, which numba keeps in its own way."""
+        if own_file(py_func.__module__) is None:
+            return None
+        return super().from_function(py_func, py_file)  # pyright: ignore[reportReturnType]
+
+
+LOCATORS = f"{__name__}.{ByMeaning.__name__}"
+OTHERS = ",".join(locator.__name__ for locator in caching.CacheImpl._locator_classes)
+
+
+@contextlib.contextmanager
+def kept() -> Iterator[None]:
+    """numba asks for its folder while it decorates; functions of other packages keep theirs."""
+    before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES  # pyright: ignore[reportAttributeAccessIssue]
+    config.CACHE_DIR = str(folder())  # pyright: ignore[reportAttributeAccessIssue]
+    config.CACHE_LOCATOR_CLASSES = f"{LOCATORS},{OTHERS}"  # pyright: ignore[reportAttributeAccessIssue]
+    try:
+        yield
+    finally:
+        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before  # pyright: ignore[reportAttributeAccessIssue]

@@ -1,0 +1,194 @@
+"""The state of the code as one number: what was computed, meshed or compiled is current while it stays the same.
+
+The number of a module covers its own syntax tree, without docstrings, and those of all own modules that it imports,
+directly or through others. So an edit makes stale what can depend on it and nothing else, and rewording makes nothing
+stale.
+"""
+
+import ast
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from massspring.errors import MassSpringError
+
+OWN = ("massspring", "reference_fem", "studies")
+"""The packages of this distribution, installed side by side; other packages are known by their versions."""
+APART = ("massspring.compile_cache", "massspring.sources")
+"""Own modules that keep account of code and change no result."""
+ROOT = Path(__file__).parents[1]
+FACE = "_FACE"
+"""A package that loads its names when they are asked for lists them under this name: {name: module}."""
+
+
+class Source(NamedTuple):
+    """What a module is, read from its text."""
+
+    meaning: str
+    """SHA-256 of its syntax tree without docstrings (hex)."""
+    imports: list[tuple[str, str]]
+    """(module, name) of each name that is imported; an empty name for the module itself."""
+    exports: dict[str, str]
+    """Module of each name that it passes on."""
+
+
+@cache
+def source_fingerprint(*modules: str, within: tuple[str, ...] = OWN) -> str:
+    """SHA-256 (hex) over `modules`, by dotted name, and all that they import of the packages or modules `within`.
+
+    Read once per process: a running process computes with the code that it has loaded.
+    Raises MassSpringError for a module that does not exist, or is no Python.
+    """
+    known: dict[str, Source] = {}
+    waiting = list(modules)
+    while waiting:
+        name = waiting.pop()
+        if name in known:
+            continue
+        known[name] = _source(name)
+        waiting += [other for other in _followed(known[name]) if _is_within(other, within) and other not in APART]
+    _remembered().keep()
+    digest = hashlib.sha256()
+    for name in sorted(known):
+        digest.update(f"{name}\0{known[name].meaning}\0".encode())
+    return digest.hexdigest()
+
+
+def own_file(module: str) -> Path | None:
+    """The file of an own module or package; None where there is none."""
+    if module.split(".")[0] not in OWN:
+        return None
+    path = ROOT.joinpath(*module.split("."))
+    candidates = (path.with_suffix(".py"), path / "__init__.py")
+    return next((file for file in candidates if file.is_file()), None)
+
+
+def _is_within(module: str, within: tuple[str, ...]) -> bool:
+    return any(module == part or module.startswith(part + ".") for part in within)
+
+
+def _followed(source: Source) -> Iterator[str]:
+    """The modules that the imported names come from; a package that passes a name on is passed over."""
+    for module, name in source.imports:
+        if own_file(module) is not None:
+            yield _origin(module, name)
+
+
+def _origin(module: str, name: str) -> str:
+    if name and own_file(f"{module}.{name}") is not None:
+        return f"{module}.{name}"
+    passed_on = _source(module).exports.get(name)
+    return module if passed_on is None or own_file(passed_on) is None else _origin(passed_on, name)
+
+
+@cache
+def _source(module: str) -> Source:
+    file = own_file(module)
+    if file is None:
+        raise MassSpringError(f"there is no module {module!r} in {', '.join(OWN)}: its state cannot be known")
+    return _remembered().get(module, file)
+
+
+class _Memory:
+    """What files said when they were last read, by the hash of their bytes: parsing all takes a second."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.grown = False
+        self.known: dict[str, list] = {}
+        with suppress(OSError, ValueError):
+            stored = json.loads(path.read_text(encoding="utf-8"))
+            self.known = stored if isinstance(stored, dict) and len(stored) < MOST else {}
+
+    def get(self, module: str, file: Path) -> Source:
+        content = file.read_bytes()
+        key = hashlib.sha256(f"{VERSION} {module} {file.name}\0".encode() + content).hexdigest()
+        if key not in self.known:
+            self.known[key] = list(read_source(content, module, file))
+            self.grown = True
+        meaning, imports, exports = self.known[key]
+        return Source(meaning, [(pair[0], pair[1]) for pair in imports], exports)
+
+    def keep(self) -> None:
+        """Written whole or not at all; where nothing can be written, everything is read again next time."""
+        if not self.grown:
+            return
+        self.grown = False
+        with suppress(OSError):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile("w", dir=self.path.parent, suffix=".part", delete=False) as part:
+                json.dump(self.known, part)
+            os.replace(part.name, self.path)
+
+
+VERSION = 1
+"""Of what is remembered."""
+MOST = 20_000
+"""Texts that are remembered; then it begins anew, for most are of former versions."""
+
+
+@cache
+def _remembered() -> _Memory:
+    return _Memory(cache_folder() / "sources.json")
+
+
+def cache_folder() -> Path:
+    """Folder of the user's cache for what can be made again: $XDG_CACHE_HOME/organbench, or ~/.cache/organbench."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "organbench"
+
+
+def read_source(content: bytes, module: str, file: Path) -> Source:
+    """What the text of `module` says. Raises MassSpringError for a text that is no Python."""
+    try:
+        tree = ast.parse(content)
+    except SyntaxError as error:
+        raise MassSpringError(f"{file} is no Python ({error.msg}, line {error.lineno}): correct it") from error
+    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+    imports = sorted(set(_imports(tree, package)))
+    exports = {name: origin for origin, name in imports if name} | _face(tree)
+    _drop_docstrings(tree)
+    return Source(hashlib.sha256(ast.dump(tree).encode()).hexdigest(), imports, exports)
+
+
+def _imports(tree: ast.AST, package: str) -> Iterator[tuple[str, str]]:
+    """(module, name) of every import, those inside functions too; those for the type checker alone left out."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            continue
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, "") for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.rsplit(".", node.level - 1)[0] if node.level else ""
+            module = ".".join(filter(None, (above, node.module)))
+            yield from ((module, alias.name) for alias in node.names)
+        else:
+            yield from _imports(node, package)
+
+
+def _face(tree: ast.Module) -> dict[str, str]:
+    for node in tree.body:
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            if any(isinstance(target, ast.Name) and target.id == FACE for target in targets):
+                return ast.literal_eval(node.value)
+    return {}
+
+
+def _drop_docstrings(tree: ast.AST) -> None:
+    """Takes away the strings that stand by themselves: docstrings, and those below a field or a constant."""
+    for node in ast.walk(tree):
+        for name in ("body", "orelse", "finalbody"):
+            block = getattr(node, name, None)
+            if isinstance(block, list):
+                setattr(node, name, [statement for statement in block if not _is_remark(statement)])
+
+
+def _is_remark(statement: ast.stmt) -> bool:
+    value = statement.value if isinstance(statement, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)

@@ -1,0 +1,210 @@
+"""What is stale after which edit: on copies of small packages, and on the compiled functions of this distribution."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+from massspring import compile_cache, sources
+from massspring.compile_cache import COMPILED, kept
+from massspring.errors import MassSpringError
+from massspring.sources import ROOT, own_file, read_source, source_fingerprint
+
+FILES = {
+    "massspring/__init__.py": "from massspring.light import light\nfrom massspring.heavy import heavy\n",
+    "massspring/light.py": "'''Light.'''\nfrom massspring.table import LIMIT\n\n\ndef light():\n    return LIMIT\n",
+    "massspring/heavy.py": "def heavy():\n    from massspring.late import late\n    return late()\n",
+    "massspring/late.py": "def late():\n    return 1\n",
+    "massspring/table.py": "LIMIT = 3\n'''[1].'''\n",
+    "studies/__init__.py": "_FACE = {'ask': 'studies.ask'}\n",
+    "studies/ask.py": "from massspring import light\n\n\ndef ask():\n    return light()\n",
+    "studies/user.py": "from studies import ask\n",
+    "studies/typed.py": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from massspring import heavy\n",
+}
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(sources, "ROOT", tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path
+
+
+def fresh(*modules: str, **within) -> str:
+    """As another process would find it."""
+    for known in (source_fingerprint, sources._source, sources._remembered):
+        known.cache_clear()
+    return source_fingerprint(*modules, **within)
+
+
+@pytest.fixture(autouse=True)
+def forget():
+    yield
+    for known in (source_fingerprint, sources._source, sources._remembered):
+        known.cache_clear()
+
+
+EDITS = {
+    # (file, before, after): the modules whose number changes
+    ("massspring/table.py", "3", "4"): {"massspring.light", "studies.ask", "studies.user"},
+    ("massspring/late.py", "1", "2"): {"massspring.heavy"},
+    ("massspring/heavy.py", "return", "yield"): {"massspring.heavy"},
+    ("studies/ask.py", "ask()", "ask(x=1)"): {"studies.ask", "studies.user"},
+    ("massspring/light.py", "Light", "Lighter"): set(),
+    ("massspring/table.py", "[1]", "[m]"): set(),
+    ("massspring/late.py", "def", "\n\n# a comment\ndef"): set(),
+    ("massspring/__init__.py", "from massspring.heavy import heavy\n", ""): set(),
+    ("massspring/table.py", "LIMIT = 3\n", "LIMIT = 3\r\n"): set(),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS, ids=lambda edit: f"{edit[0]}: {edit[1]!r} -> {edit[2]!r}")
+def test_an_edit_makes_stale_what_imports_it_and_nothing_else(checkout, edit):
+    modules = ["massspring.light", "massspring.heavy", "studies.ask", "studies.user", "studies.typed"]
+    before = {module: fresh(module) for module in modules}
+    file, old, new = edit
+    text = (checkout / file).read_text()
+    assert old in text
+    (checkout / file).write_bytes(text.replace(old, new).encode())
+    assert {module for module in modules if fresh(module) != before[module]} == EDITS[edit]
+
+
+def test_within_leaves_the_rest_out(checkout):
+    before = fresh("studies.ask", within=("studies",))
+    (checkout / "massspring" / "table.py").write_text("LIMIT = 4\n")
+    assert fresh("studies.ask", within=("studies",)) == before != fresh("studies.ask")
+
+
+def test_a_damaged_or_unwritable_memory_costs_time_only(checkout):
+    before = fresh("studies.ask")
+    memory = checkout / "cache" / "organbench" / "sources.json"
+    assert memory.is_file() and not list(memory.parent.glob("*.part"))
+    for damage in ("{", "[]", ""):
+        memory.write_text(damage)
+        assert fresh("studies.ask") == before
+    memory.unlink()
+    memory.mkdir()
+    assert fresh("studies.ask") == before
+
+
+def test_refusals(checkout):
+    with pytest.raises(MassSpringError, match=r"no module 'studies.nothing' in massspring"):
+        fresh("studies.nothing")
+    (checkout / "studies" / "user.py").write_text("x = = 1\n")
+    with pytest.raises(MassSpringError, match=r"user\.py is no Python \(.*, line 1\)"):
+        fresh("studies.user")
+
+
+def test_relative_imports_are_followed():
+    found = read_source(b"from .b import c\nfrom .. import d\nimport massspring.e\n", "massspring.x.a", Path("a.py"))
+    assert found.imports == [("massspring", "d"), ("massspring.e", ""), ("massspring.x.b", "c")]
+
+
+def faces() -> list[Path]:
+    return [file for package in sources.OWN for file in (ROOT / package).rglob("__init__.py")]
+
+
+@pytest.mark.parametrize("file", faces(), ids=lambda file: str(file.relative_to(ROOT)))
+def test_a_package_passes_names_on_and_computes_nothing(file):
+    """The number of a module leaves out the packages around it: they must hold nothing that could change a result."""
+    for node in ast.parse(file.read_text()).body:
+        plain = isinstance(node, ast.Import | ast.ImportFrom | ast.Assign | ast.AnnAssign)
+        assert plain or sources._is_remark(node) or getattr(node, "name", "") in ("__getattr__", "__dir__"), node.lineno
+
+
+def compiled_modules() -> list[str]:
+    """Modules whose functions carry one of the decorators of compiled code."""
+    found = []
+    for package in sources.OWN:
+        for file in sorted((ROOT / package).rglob("*.py")):
+            tree = ast.parse(file.read_text())
+            if any(decorated(node) for node in ast.walk(tree)):
+                found.append(".".join(file.relative_to(ROOT).with_suffix("").parts))
+    return found
+
+
+DECORATORS = ("compiled", "lean", "inlined", "comparing", "summing")
+
+
+def decorated(node: ast.AST) -> bool:
+    """Whether it is a function to compile."""
+    marks = getattr(node, "decorator_list", [])
+    return any(ast.unparse(mark).split("(")[0] in DECORATORS for mark in marks)
+
+
+@pytest.mark.parametrize("module", compiled_modules())
+def test_compiled_functions_use_nothing_from_where_edits_go_unseen(module):
+    """A constant or function of another folder would be compiled in, and its edit would leave stale code in use."""
+    file = own_file(module)
+    assert file is not None
+    tree = ast.parse(file.read_text())
+    imported = {
+        alias.asname or alias.name: node.module
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module
+        for alias in node.names
+    }
+    for function in filter(decorated, ast.walk(tree)):
+        for node in ast.walk(function):
+            origin = imported.get(node.id) if isinstance(node, ast.Name) else None
+            own = origin is not None and origin.split(".")[0] in sources.OWN
+            assert not own or origin.startswith(COMPILED) or origin == module, f"{node.id} comes from {origin}"
+
+
+KERNEL = """from massspring.table import LIMIT
+
+
+def kernel(x):
+    '''Adds the limit [1].'''
+    return x + LIMIT
+"""
+
+
+def compiled_now(folder: Path):
+    """The kernel of the copy, as a new process would import it, called once."""
+    fresh("massspring.kernel")
+    names = {"LIMIT": 3, "__name__": "massspring.kernel"}
+    file = folder / "massspring" / "kernel.py"
+    body = "\n" + file.read_text().split("\n", 1)[1]  # the import is of the copy, LIMIT is given
+    exec(compile(body, file, "exec"), names)
+    with kept():
+        function = numba.njit(cache=True)(names["kernel"])
+    assert function(1) == 4
+    return function.stats
+
+
+def test_rewording_compiles_nothing_anew_and_an_edit_does(checkout, monkeypatch):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(compile_cache, "COMPILED", ("massspring",))
+    file = checkout / "massspring" / "kernel.py"
+    file.write_text(KERNEL)
+    assert sum(compiled_now(checkout).cache_misses.values()) == 1
+    file.write_text(
+        KERNEL.replace("Adds the limit", "Plus the limit,\n    as it stands").replace("LIMIT\n\n", "LIMIT\n\n\n")
+    )
+    assert not compiled_now(checkout).cache_misses
+    (checkout / "massspring" / "table.py").write_text("LIMIT = 3.0\n")
+    assert sum(compiled_now(checkout).cache_misses.values()) == 1
+
+
+def test_numba_keeps_both_packages_in_the_folder_that_the_user_chose(tmp_path):
+    code = (
+        "from massspring.kernels.forces.springs import spring_forces_into as f\n"
+        "from reference_fem.system.assembly import integrate_element as g\n"
+        "print(f.stats.cache_path)\nprint(g.stats.cache_path)"
+    )
+    chosen = str(tmp_path / "chosen")
+    environment = {"NUMBA_CACHE_DIR": chosen, "PYTHONPATH": str(ROOT), "PATH": "", "HOME": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    paths = [Path(line) for line in done.stdout.split()]
+    assert all(path.parent == Path(chosen) for path in paths)
+    assert [path.name.rsplit("-", 1)[0] for path in paths] == [
+        "massspring.kernels.forces.springs",
+        "reference_fem.system.assembly",
+    ]
