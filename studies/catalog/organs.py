@@ -29,14 +29,14 @@ ORGANS = Study(
     ),
     columns=(
         "volume_worst",
-        "force_error",
         "force_end",
-        "surface_error",
         "interior_error",
         "mean_error",
         "silhouette_error",
+        "min_j",
+        "force_error",
+        "surface_error",
         "pressure_error",
         "lumen_pressure_error",
-        "min_j",
     ),
 )

@@ -29,14 +29,14 @@ VOLUME_LOSS = Study(
     ),
     columns=(
         "volume_worst",
-        "volume_end",
-        "force_error",
         "force_end",
-        "surface_error",
         "interior_error",
         "mean_error",
         "silhouette_error",
-        "pressure_error",
         "min_j",
+        "force_error",
+        "surface_error",
+        "pressure_error",
+        "volume_end",
     ),
 )

@@ -1,7 +1,6 @@
 """What people look at: charts, tables as CSV, the summary of results that README shows."""
 
 import json
-import math
 from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,8 @@ from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.geometry import SHAPES, organ
-from studies.metrics.metrics import Run
+from studies.metrics.cells import DOUBT_MARK, value_cell
+from studies.metrics.run import Run
 from studies.metrics.table import DOUBTFUL, study_table, write_table
 from studies.plots.figures import paper_ball, paper_slide
 from studies.plots.figures.organ_springs import draw_organ_springs
@@ -146,7 +146,6 @@ def summary_of(runs_of: dict[str, list[Run]]) -> str:
     return "\n".join(lines)
 
 
-DOUBT_MARK = "†"
 SUMMARY_METRICS = ("volume_worst", "force_end", "interior_error", "mean_error", "silhouette_error", "min_j")
 SUMMARY_COLUMNS = (
     "volume_worst [%]",
@@ -176,12 +175,8 @@ def _cell(row: Mapping[Hashable, Any], column: str) -> str:
     if column.startswith("volume"):
         return f"{value:.2g}"
     floor = float(row.get(column.replace(" [", " floor ["), float("nan")))
-    sign = "+" if column.startswith("force") else ""
-    if not floor > 0:
-        return f"{value:{sign}.3g}"
-    digits = max(0, -math.floor(math.log10(floor)))  # as many as the uncertainty has
-    mark = f" {DOUBT_MARK}" if column.split(" [")[0] in str(row.get(DOUBTFUL, "")).split() else ""
-    return f"{value:{sign}.{digits}f} ± {floor:.{digits}f}{mark}".replace("-", "−")
+    doubtful = column.split(" [")[0] in str(row.get(DOUBTFUL, "")).split()
+    return value_cell(value, floor, signed=column.startswith("force"), doubtful=doubtful)
 
 
 def write_readme(readme: Path, summary: str) -> None:

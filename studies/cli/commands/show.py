@@ -1,38 +1,63 @@
-"""A results file for the eye: what it is, how it ended, what is in it. Used by `organbench show`."""
+"""`organbench show`: a results file for the eye: what it is, how it ended, what is in it."""
 
 from pathlib import Path
+from typing import Annotated
 
 import h5py
 import numpy as np
+import typer
+from rich.columns import Columns
 from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
 from studies.base.errors import StudyError
+from studies.cli.terminal import console
 from studies.store.record import INDEX_KIND, Field, Record, Status, open_results, peek, read_record
 
+WIDE, NARROW = 120, 70
+"""Columns of a terminal from which descriptions stand beside the numbers, and below which shape and unit go."""
 
-def describe(path: Path) -> Tree:
-    """A rich tree of the results file `path`: header, attributes, fields with shape, unit, range and description; or,
-    of a study's index, its cases with their status. Raises StudyError as read_record does."""
+
+def show(
+    path: Annotated[Path, typer.Argument(help="results/STUDY/CASE.h5, or a study's index results/STUDY/STUDY.h5")],
+    every: Annotated[bool, typer.Option("--all", help="also the case as JSON, and what each field means")] = False,
+) -> None:
+    """What is in a results file: tree, units, status, key numbers."""
+    console.print(describe(path, console.width, every))
+
+
+def describe(path: Path, width: int = WIDE, every: bool = True) -> Tree:
+    """A rich tree of the results file `path`: header, attributes, fields with shape, unit and range, and if `every`
+    with the case as JSON and what the fields mean; or, of a study's index, its cases with their status.
+
+    Raises StudyError as read_record does."""
     path = Path(path)
     with open_results(path) as file:
         links = _links(file) if file.attrs.get("kind") == INDEX_KIND else None
-    return _index(path, links) if links is not None else _record(path, read_record(path))
+    return _index(path, links) if links is not None else _record(path, read_record(path), width, every)
 
 
-def _record(path: Path, record: Record) -> Tree:
-    tree = Tree(Text.assemble((record.name, "bold"), f"  ({record.kind}, {path.name})"))
+def _record(path: Path, record: Record, width: int, every: bool) -> Tree:
+    tree = Tree(Text.assemble((record.name, "bold"), f"\n{record.kind} in {path.name}"))
     tree.add(_verdict(record))
     origin = f"machine {record.machine or '-'}, code {record.fingerprint[:8] or '-'}, schema {record.schema}"
     tree.add(Text(origin))
-    tree.add(Text("case " + record.key))
+    if every:
+        tree.add(Text("case " + record.key))
     if record.attributes:
         numbers = tree.add("attributes")
-        for name, value in sorted(record.attributes.items()):
-            numbers.add(Text(f"{name} = {_number(value)}"))
+        texts = [Text(f"{name} = {_number(value)}") for name, value in sorted(record.attributes.items())]
+        numbers.add(Columns(texts, padding=(0, 3), column_first=True))
     if record.fields:
-        tree.add(_table(record.fields))
+        tree.add(_table(record.fields, width))
+    lost = {name: n for name, field in sorted(record.fields.items()) if (n := _not_finite(field.values))}
+    if lost:
+        tree.add(Text("not finite: " + ", ".join(f"{n} of {name}" for name, n in lost.items())))
+    if every and width < WIDE:
+        meanings = tree.add("meaning")
+        for name, field in sorted(record.fields.items()):
+            meanings.add(Text(f"{name}: {field.description}"))
     return tree
 
 
@@ -41,28 +66,33 @@ def _verdict(record: Record) -> Text:
     return Text.assemble(("status " + record.status, colour), f": {record.message}" if record.message else "")
 
 
-def _table(fields: dict[str, Field]) -> Table:
+def _table(fields: dict[str, Field], width: int) -> Table:
+    headings = ["field", "shape", "unit", "min", "max", "last"] + ["meaning"] * (width >= WIDE)
     table = Table(box=None, pad_edge=False)
-    for heading in ("field", "shape", "unit", "min", "max", "last", "description"):
-        table.add_column(heading, justify="right" if heading in ("min", "max", "last") else "left", overflow="fold")
+    shown = [k for k, heading in enumerate(headings) if width >= NARROW or heading in ("field", "min", "max")]
+    for k in shown:
+        numbers = headings[k] in ("min", "max", "last")
+        table.add_column(headings[k], justify="right" if numbers else "left", no_wrap=headings[k] != "meaning")
     for name, item in sorted(fields.items()):
         shape = " x ".join(map(str, item.values.shape)) or "scalar"
-        low, high, last = _range(item.values)
-        table.add_row(*map(Text, (name, shape, item.unit, low, high, last, item.description)))
+        cells = (name, shape, item.unit, *_range(item.values), item.description)
+        table.add_row(*(Text(cells[k]) for k in shown))
     return table
 
 
+def _not_finite(values: np.ndarray) -> int:
+    return int((~np.isfinite(values)).sum()) if values.dtype.kind == "f" else 0
+
+
 def _range(values: np.ndarray) -> tuple[str, str, str]:
-    """Smallest, largest and last finite value; how many are not finite stands beside the last."""
+    """Smallest, largest and, of a series, last finite value, to four digits."""
     if values.dtype.kind not in "biuf" or values.size == 0:
         return "", "", ""
     finite = values[np.isfinite(values)]
-    lost = values.size - finite.size
-    note = f" ({lost} not finite)" if lost else ""
     if finite.size == 0:
-        return "", "", note.strip()
-    last = _number(finite[-1].item()) if values.ndim <= 1 else ""
-    return _number(finite.min().item()), _number(finite.max().item()), last + note
+        return "", "", ""
+    low, high, last = (f"{float(value):.4g}" for value in (finite.min(), finite.max(), finite[-1]))
+    return low, high, last if values.ndim <= 1 else ""
 
 
 def _number(value: object) -> str:
