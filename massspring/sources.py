@@ -60,6 +60,7 @@ def source_fingerprint(*modules: str, within: tuple[str, ...] = OWN) -> str:
     return digest.hexdigest()
 
 
+@cache
 def own_file(module: str) -> Path | None:
     """The file of an own module or package; None where there is none."""
     if module.split(".")[0] not in OWN:

@@ -1,7 +1,8 @@
 """Progress on the terminal: a bar for what takes longer than a moment, plain lines where there is no terminal."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext
 from types import TracebackType
 
 from rich.console import Console
@@ -89,6 +90,24 @@ class TerminalProgress:
 
     def _line(self, text: str) -> None:
         self.console.print(text, markup=False, highlight=False)
+
+
+@contextmanager
+def compiling(console: Console, doing: str) -> Iterator[Callable[[str], None]]:
+    """Inside, what is given names is told as being compiled: on a terminal in a line that moves, beside what is being
+    done; in a log once, and then at most every QUIET_SECONDS."""
+    told = -QUIET_SECONDS
+    with console.status(f"{doing} …") if console.is_terminal else nullcontext() as status:
+
+        def tell(name: str) -> None:
+            nonlocal told
+            if status is not None:
+                status.update(f"{doing}: compiling {name} (kept for the next time) …")
+            elif time.monotonic() - told > QUIET_SECONDS:
+                told = time.monotonic()
+                console.print(f"compiling {name} (kept for the next time)", markup=False, highlight=False)
+
+        yield tell
 
 
 def dry_run(console: Console, study: str, planned: list[Planned], jobs: int) -> None:

@@ -8,12 +8,12 @@ import pandas as pd
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
-from studies.metrics.table import write_table
 from studies.plots.uncertainty import draw
 from studies.reference.load import Reference, load_reference
 from studies.reference.pieces import STUDY, pieces
 from studies.reference.solve import VARIANTS
 from studies.scene.scene import Scene
+from studies.store.csv_table import write_table
 from studies.store.fingerprint import source_fingerprint
 from studies.store.paths import study_folder
 

@@ -11,7 +11,7 @@ from studies.catalog.study import Study
 from studies.geometry import SHAPES, organ
 from studies.metrics.cells import DOUBT_MARK, value_cell
 from studies.metrics.run import Run
-from studies.metrics.table import DOUBTFUL, study_table, write_table
+from studies.metrics.table import DOUBTFUL, study_table
 from studies.plots.figures import paper_ball, paper_slide
 from studies.plots.figures.organ_springs import draw_organ_springs
 from studies.plots.figures.organs import draw_organs
@@ -20,6 +20,7 @@ from studies.report.kept_volume import kept_volumes
 from studies.report.references import refresh_uncertainty, state_of
 from studies.runs.current import case_path
 from studies.runs.paper import play, slide_case, squeezed_balls
+from studies.store.csv_table import write_table
 from studies.store.machine import write_machine
 from studies.store.paths import study_folder
 from studies.sweep.load import load_runs

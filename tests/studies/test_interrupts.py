@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from operator import methodcaller
 from pathlib import Path
 
 import pytest
@@ -69,7 +70,7 @@ class PressedInWorker:
 
 def test_a_worker_that_dies_of_it_first_is_an_interruption():
     with pytest.raises(KeyboardInterrupt):
-        perform([PressedInWorker()], 1, Silent())
+        perform([PressedInWorker()], 1, Silent(), do=methodcaller("perform"))
 
 
 def test_held_back_it_waits_and_is_not_lost():

@@ -4,9 +4,9 @@ import h5py
 import numpy as np
 import pytest
 from rich.console import Console
-from studies.cli.show import describe
 
 from studies.base.errors import StudyError
+from studies.cli.commands.show import describe
 from studies.store.links import link_study
 from studies.store.paths import index_path, key_hash, readable, record_files, record_path, timing_files, timing_path
 from studies.store.record import SCHEMA, Field, Record, Status, read_record, write_record

@@ -13,18 +13,9 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.catalog import Chart
-from studies.report.results import (
-    BEGIN,
-    DOUBT_MARK,
-    END,
-    draw_charts,
-    refresh,
-    report,
-    summary_of,
-    write_readme,
-    write_table,
-)
+from studies.report.results import BEGIN, DOUBT_MARK, END, draw_charts, refresh, report, summary_of, write_readme
 from studies.runs.current import case_path
+from studies.store.csv_table import write_table
 from studies.store.machine import machine_id
 from studies.store.record import Status
 from studies.sweep.load import load_runs

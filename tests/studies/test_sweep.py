@@ -3,6 +3,7 @@
 import os
 import signal
 from dataclasses import replace
+from operator import methodcaller
 
 import pytest
 
@@ -133,7 +134,7 @@ class Doomed:
 
 def test_a_process_that_dies_is_one_sentence(tmp_path):
     with pytest.raises(StudyError, match=r"process died .* what is finished is stored"):
-        perform([Doomed()], 1, Silent())
+        perform([Doomed()], 1, Silent(), do=methodcaller("perform"))
 
 
 def test_the_number_of_threads_is_given_back(monkeypatch, tmp_path):
