@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from studies.base.lookup import choose
+
 
 class Entry(NamedTuple):
     """A command: the module and the function it is, and its line in the list of commands."""
@@ -31,9 +33,9 @@ def lazy_group(entries: dict[str, Entry]) -> type[TyperGroup]:
             return None if entry is None else TyperCommand(cmd_name, help=entry.help)
 
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-            """The command that the words call, with its module loaded."""
-            name, found, rest = super().resolve_command(ctx, args)
-            return name, found and loaded(str(name), entries[str(name)]), rest
+            """The command that the words call, with its module loaded. Raises StudyError with the nearest match."""
+            name, *rest = args
+            return name, loaded(name, choose(name, entries, "command")), rest
 
     return LazyGroup
 

@@ -7,9 +7,10 @@ from pathlib import Path
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.reference.pieces import Piece
-from studies.store.record import peek
+from studies.runs.current import run_fingerprint
+from studies.store.record import peek, why_stale
 from studies.sweep.tasks import Task, tasks_of
-from studies.timing.cases import can_be_timed, timing_file, timing_is_current
+from studies.timing.cases import can_be_timed, timing_file
 
 PHYSICS, TIMING = "physics", "timing"
 """The stages: the first in several processes, the second alone."""
@@ -40,10 +41,9 @@ def plan(root: Path, study: Study, wanted: Callable[[Task], bool] | None = None)
     for case in study.cases:
         if not case.timed or (wanted is not None and case.name not in runs):
             continue
-        again = case.name in runs
-        if again or (can_be_timed(root, study.name, case) and not timing_is_current(root, study.name, case)):
-            file = timing_file(root, study.name, case)
-            why = "its case runs" if again else "missing" if not file.exists() else "the code changed"
+        file = timing_file(root, study.name, case)
+        why = why_stale(file, case.key, run_fingerprint())
+        if why is not None and (case.name in runs or can_be_timed(root, study.name, case)):
             found.append(Planned(TIMING, "timing", case.name, why, _seconds(file)))
     return found
 

@@ -108,7 +108,8 @@ def test_show_tells_status_units_and_numbers(tmp_path):
         "worst = 0.000125",
         "m^3",
         "enclosed volume",
-        "0.5 (1 not finite)",
+        "0.5",
+        "not finite: 1 of ",
     ):
         assert part in text, part
 

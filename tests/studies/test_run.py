@@ -8,6 +8,7 @@ import pytest
 from massspring import Element, Free, Xpbd, simulate
 from massspring.run.history import EXTRA
 from studies.base.errors import StudyError
+from studies.runs import current
 from studies.runs import run as module
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import case_is_current, case_path
@@ -112,7 +113,7 @@ def test_it_is_current_until_case_or_code_change(ran, monkeypatch):
     assert path == case_path(root, "tiny", tiny_case())
     assert case_is_current(root, "tiny", tiny_case())
     assert not case_is_current(root, "tiny", tiny_case(dt_fraction=0.4))
-    monkeypatch.setattr(module, "run_fingerprint", lambda: "edited")
+    monkeypatch.setattr(current, "run_fingerprint", lambda: "edited")
     assert not case_is_current(root, "tiny", tiny_case())
 
 

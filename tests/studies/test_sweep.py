@@ -15,7 +15,7 @@ from studies.store.record import Status, read_record, write_record
 from studies.sweep import run_studies as module
 from studies.sweep.load import load_runs
 from studies.sweep.run_studies import perform, run_studies
-from studies.sweep.standings import failed, standings
+from studies.sweep.standings import failed, standings, warnings_of
 from studies.sweep.tasks import Task, tasks_of
 from studies.timing import cases as timed
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
@@ -81,7 +81,7 @@ def test_a_damaged_file_is_stale_and_runs_again(results):
     assert len(runs) == 2
     assert len(remarks) == 1
     assert "damaged" in remarks[0] or "cut off" in remarks[0]
-    assert module.warnings_of(results, study) == []
+    assert warnings_of(results, study) == []
     assert not failed(Task(results, "tiny", diverging_case()))
     assert run_studies(results, [study], 1, Silent()) == 1
     assert load_runs(results, study)[1] == []
