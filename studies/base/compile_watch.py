@@ -27,7 +27,7 @@ class CompileWatch(event.Listener):
         self.depth += 1
         if self.depth == 1:
             self.since = time.perf_counter()
-            name = getattr(event.data["dispatcher"], "__name__", "a function")
+            name = getattr((event.data or {}).get("dispatcher"), "__name__", "a function")
             self.names.append(name)
             self.begun(name)
 

@@ -1,6 +1,6 @@
 """`organbench table`: the metrics of a study, a row per case."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -45,7 +45,7 @@ def table(
     draw(rows, chosen, every)
 
 
-def draw(rows: list[Row], metrics: list[Metric], every: bool) -> None:
+def draw(rows: Sequence[Row], metrics: list[Metric], every: bool) -> None:
     """What all rows share in a line, then as many metrics as the terminal is wide, or all in blocks."""
     shared = [words.format(setting(rows[0], key)) for key, words in SETTINGS.items() if len(values(rows, key)) == 1]
     if shared:
@@ -64,7 +64,7 @@ def draw(rows: list[Row], metrics: list[Metric], every: bool) -> None:
         say(f"not shown (--all, --csv FILE, --metrics): {', '.join(metric.name for metric in rest)}")
 
 
-def fitting(rows: list[Row], metrics: list[Metric]) -> int:
+def fitting(rows: Sequence[Row], metrics: list[Metric]) -> int:
     """How many of the first metrics fit beside the labels; one at least."""
     for count in range(len(metrics), 1, -1):
         if max(map(len, block(rows, metrics[:count]))) <= console.width:
@@ -72,7 +72,7 @@ def fitting(rows: list[Row], metrics: list[Metric]) -> int:
     return 1
 
 
-def block(rows: list[Row], metrics: list[Metric]) -> list[str]:
+def block(rows: Sequence[Row], metrics: list[Metric]) -> list[str]:
     """Lines: a head with the units, then all rows, under a heading for each scene and body."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
@@ -107,7 +107,7 @@ def head(metric: Metric) -> list[str]:
     return [*metric.name.split("_"), f"[{metric.unit}]"]
 
 
-def values(rows: list[Row], key: str) -> set[str]:
+def values(rows: Sequence[Row], key: str) -> set[str]:
     """What a setting is in the rows, as it is printed."""
     return {setting(row, key) for row in rows}
 
