@@ -6,7 +6,7 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study verify smoke test check lint figures bench clean distclean setup-run setup-test setup-dev FORCE
+.PHONY: help study verify smoke test check lint docs figures bench clean distclean setup-run setup-test setup-dev FORCE
 
 help: ## this list
 	@echo "make TARGET"
@@ -21,24 +21,28 @@ study-%: setup-run ## run one study and draw it: make study-volume_loss
 	$(BIN)/organbench run $*
 	$(BIN)/organbench plot $*
 
-verify: setup-run ## the reference against closed forms, published numbers and other codes (minutes)
+verify: setup-test ## the reference against closed forms, published numbers and other codes; test campaigns (minutes)
 	$(BIN)/organbench verify
+	$(PYTEST) -m campaign
 
 smoke: setup-run ## every study with its smallest settings: does it all hang together?
 	$(BIN)/organbench run --smoke $(STUDIES)
 
-test: setup-test ## every test
-	$(PYTEST)
+test: setup-test ## every test but the campaigns, which `make verify` runs
+	$(PYTEST) -m "not campaign"
 
 # Asked for both, `make check test` leaves the fast tests to `test`.
-check: lint setup-dev ## lint, types, import contracts and the fast tests
-	$(if $(filter test,$(MAKECMDGOALS)),,$(PYTEST) -m "not slow")
+check: lint docs setup-dev ## lint, types, import contracts, links of the docs and the fast tests
+	$(if $(filter test,$(MAKECMDGOALS)),,$(PYTEST) -m "not slow and not campaign")
 
 lint: setup-dev ## ruff, pyright and the import contracts alone
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
+
+docs: setup-dev ## the documentation as a site: open site/index.html; a broken link is an error
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python docs/site/build.py
 
 figures: setup-run ## draw the charts again from the stored results
 	$(BIN)/organbench report --figures
@@ -58,7 +62,7 @@ results/%.csv: setup-run FORCE ## one table by its file name: make results/volum
 
 clean: ## remove caches and unfinished files; results and .venv stay
 	find . \( -name .venv -o -name .git \) -prune -o \( -name __pycache__ -o -name '*.egg-info' \) -type d -prune -exec rm -rf {} +
-	rm -rf build dist .pytest_cache .hypothesis .ruff_cache .import_linter_cache .numba_cache results/cache
+	rm -rf build dist site .pytest_cache .hypothesis .ruff_cache .import_linter_cache .numba_cache results/cache
 	find . \( -name .venv -o -name .git \) -prune -o -name '*.part' -type f -exec rm -f {} +
 
 distclean: clean ## clean, and remove .venv and the raw results too (charts and tables stay)

@@ -101,7 +101,7 @@ def _source(module: str) -> Source:
 
 
 class _Memory:
-    """What files said when they were last read, by the hash of their bytes: parsing all takes a second."""
+    """Syntax trees of files read before, by the hash of their bytes: parsing all takes a second."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

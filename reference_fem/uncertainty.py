@@ -91,7 +91,7 @@ def mesh_error(sizes: Sequence[float], values: Sequence) -> MeshError:
 def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray) -> MeshError:
     """Error of the finest of two or three fields (n, c) at the same n points of weight (n,), fine to coarse.
 
-    Over hundreds of points two parts can be told apart: f_i = f + a h_i^p + b_i, where a is the same field on every
+    Over hundreds of points two parts can be separated: f_i = f + a h_i^p + b_i, where a is the same field on every
     mesh and b_i, of size b h_i^p, comes from where the elements of mesh i happen to lie. Then, with squares of norms,
 
         |f2 − f1|² = a² (h2^p − h1^p)² + b² (h1^2p + h2^2p), |f3 − f2|² alike,

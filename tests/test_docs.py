@@ -1,6 +1,7 @@
 """README and CONTRIBUTING say what is true: code runs, recipes satisfy the contracts, the table is the stored one."""
 
 import re
+import unicodedata
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from massspring import Body, Clock, Material, Setup, simulate, surface_body
 from studies.catalog import STUDIES
-from studies.report.results import BEGIN, END
+from studies.report.publish import BEGIN, END, EXTRAS, PUBLISHED
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.store.record import Status
@@ -16,6 +17,10 @@ from studies.sweep.load import load_runs
 from studies.sweep.run_studies import run_studies
 
 ROOT = Path(__file__).parent.parent
+PACKAGES = ("massspring", "reference_fem", "studies")
+PROSE = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/how-a-run-works.md", "docs/theory.md",
+         "docs/notation.md", "docs/equations.md", "docs/meshes.md", "docs/paper.md", "docs/results.md",
+         "docs/methods.md")  # fmt: skip
 FENCE = re.compile(r"```python\n(.*?)```", re.DOTALL)
 
 
@@ -115,22 +120,86 @@ def test_an_added_organ_has_the_volume_of_its_formula():
 def test_the_table_of_readme_is_the_stored_one():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     shown = text.split(BEGIN)[1].split(END)[0].strip()
-    assert shown == (ROOT / "results" / "summary.md").read_text(encoding="utf-8").strip()
+    assert shown == (ROOT / PUBLISHED / "summary.md").read_text(encoding="utf-8").strip()
 
 
 def test_readme_names_only_charts_that_are_made():
-    linked = set(re.findall(r"\(results/(\w+)/(\w+\.png)\)", (ROOT / "README.md").read_text(encoding="utf-8")))
+    linked = set(
+        re.findall(r"\(results/published/(\w+)/(\w+\.png)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    )
     made = {(study.name, chart.file) for study in STUDIES for chart in study.charts}
-    assert {link for link in linked if link[0] not in ("figures", "reference", "verify")} <= made
+    assert {link for link in linked if link[0] not in (*EXTRAS, "reference")} <= made
     for folder, file in linked:
-        assert (ROOT / "results" / folder / file).is_file()
+        assert (ROOT / PUBLISHED / folder / file).is_file()
+
+
+NUMBER = r"\d+(?:\.\d+)?"
+CITED = re.compile(rf"\beqs?\. ((?:{NUMBER}(?:, | ?– ?| to | and )?)+)")
+
+
+def labels() -> list[str]:
+    """Numbers of the equations, in the order of docs/theory.md."""
+    return re.findall(rf"\*\*\(({NUMBER})\)\*\*", (ROOT / "docs/theory.md").read_text(encoding="utf-8"))
 
 
 def test_every_equation_the_code_cites_is_in_the_theory():
-    numbers = re.findall(r"\*\*\((\d+)\)\*\*", (ROOT / "docs/theory.md").read_text(encoding="utf-8"))
-    known = set(numbers)
-    assert len(known) == len(numbers), "a number stands for two equations"
-    for source in [*ROOT.glob("massspring/**/*.py"), *ROOT.glob("studies/**/*.py")]:
-        for group in re.findall(r"eq\. ([\d, –]+)", source.read_text(encoding="utf-8")):
-            for number in re.findall(r"\d+", group):
-                assert number in known, f"{source.name} cites equation {number}"
+    known, cited = set(labels()), 0
+    for package in (*PACKAGES, "tests"):
+        for source in ROOT.glob(f"{package}/**/*.py"):
+            for group in CITED.findall(source.read_text(encoding="utf-8")):
+                for number in re.findall(NUMBER, group):
+                    assert number in known, f"{source.name} cites equation {number}"
+                    cited += 1
+    assert cited > 250
+
+
+def test_equations_are_numbered_once_and_the_table_of_old_numbers_is_complete():
+    rows = re.findall(r"^\| (\S+) \| (\d+\.\d+) \|", (ROOT / "docs/equations.md").read_text(encoding="utf-8"), re.M)
+    old, new = [old for old, _ in rows if old != "–"], [new for _, new in rows]
+    assert labels() in (old, new)
+    assert len(set(old)) == len(old)
+    for section in range(1, 13):
+        assert [n for n in new if n.startswith(f"{section}.")] == [
+            f"{section}.{k + 1}" for k in range(sum(n.startswith(f"{section}.") for n in new))
+        ]
+
+
+def test_how_a_run_works_names_what_is_there():
+    """Each step's folder, each name with its file; the drawing shows the same folders, and types that are defined."""
+    page = (ROOT / "docs/how-a-run-works.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\d+) ([\w -]+) \| (\S+) \|", page, re.M)
+    assert [int(number) for number, _, _ in rows] == list(range(1, len(rows) + 1))
+    assert all((ROOT / folder / "__init__.py").is_file() for _, _, folder in rows)
+    named = re.findall(r"`(\w+)` \(([\w/]+\.py)\)", page)
+    assert len(named) > 20
+    for name, file in named:
+        source = (ROOT / file).read_text(encoding="utf-8")
+        assert re.search(rf"^(?:class|def) {name}\b", source, re.M), f"{file} defines no {name}"
+    drawing = (ROOT / "docs/how-a-run-works.svg").read_text(encoding="utf-8")
+    shown = re.findall(r'class="title"[^>]*>(\d+) ([^<]+)</text>\n<text class="room"[^>]*>([^<]+)<', drawing)
+    assert sorted(shown, key=lambda row: int(row[0])) == rows
+    types = set(re.findall(r'class="type"[^>]*>(\w+)<', drawing))
+    assert len(types) > 8 and types <= {name for name, _ in named}
+    assert len(drawing) < 40_000
+
+
+def test_names_of_the_notation_stand_in_the_code():
+    code = "".join(file.read_text(encoding="utf-8") for package in PACKAGES for file in ROOT.glob(f"{package}/**/*.py"))
+    table = (ROOT / "docs/notation.md").read_text(encoding="utf-8").split("## Names in the code")[1]
+    names = {name for row in re.findall(r"^\| ([^|]+) \|", table, re.M) for name in re.findall(r"`(\w+)`", row)}
+    assert len(names) > 20
+    gone = sorted(name for name in names if not re.search(rf"\b{name}\b", code))
+    assert not gone, f"docs/notation.md names what the code does not have: {', '.join(gone)}"
+
+
+def test_prose_of_the_docs_fits_a_screen():
+    """At most 120 columns, but for tables and lines that hold a link."""
+    for page in map(ROOT.joinpath, PROSE):
+        for line in page.read_text(encoding="utf-8").split("\n"):
+            width = sum(not unicodedata.combining(letter) for letter in line)
+            assert width <= 120 or line.startswith(("|", "    ")) or "](" in line, f"{page.name}: {line[:60]}"
+
+
+def test_the_first_link_of_readme_is_the_way_of_a_run():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r"(?<!!)\[[^\]]*\]\(([^)]+)\)", text)[0] == "docs/how-a-run-works.md"

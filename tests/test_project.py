@@ -76,7 +76,7 @@ def test_the_solvers_import_little(package, allowed):
 
 def test_make_alone_lists_the_targets():
     text = subprocess.run(["make", "-s"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    for target in ("study", "study-%", "smoke", "test", "check", "figures", "bench", "clean", "results/%.png"):
+    for target in ("study", "study-%", "smoke", "test", "check", "docs", "figures", "bench", "clean", "results/%.png"):
         assert re.search(rf"^  {re.escape(target)} +\S", text, re.MULTILINE), target
 
 
@@ -90,3 +90,12 @@ def test_tests_run_once_also_where_check_and_test_are_asked_for(goals, fast, all
         all_of_them,
     ]
     assert any("ruff check" in line for line in lines) == ("check" in goals)
+    assert any("docs/site/build.py" in line for line in lines) == ("check" in goals)
+    assert all("not campaign" in line for line in runs)
+
+
+def test_campaigns_run_in_verify():
+    command = ["make", "--dry-run", "--silent", "verify"]
+    lines = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert any(line.endswith("organbench verify") for line in lines)
+    assert any(line.endswith("pytest -q -n 2 --dist loadfile -m campaign") for line in lines)

@@ -8,7 +8,7 @@ from massspring.body.body import Body
 from massspring.body.springs import EDGES_OF_TRIANGLE, lengths
 from massspring.body.volumes import Volumes
 from massspring.errors import MassSpringError
-from massspring.kernels.arrays.layout import Motion, Network
+from massspring.kernels.arrays.layout import Contacts, Network, Nodes, Workspace
 from massspring.kernels.fused.chunk import RESULT, TILE
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.sell_chunks import aligned, slices_of
@@ -30,30 +30,31 @@ def start(
         raise MassSpringError(f"velocities have shape {velocity.shape}; the body has {n} nodes, give ({n}, 3)")
     real = np.dtype(np.float64)
     slices = network.slices
-    motion = Motion(
+    nodes = Nodes(
         x=body.rest.copy(),
         v=velocity,
         v_star=aligned((n, 3), real),
         force=np.zeros((n, 3)),
         gradient=aligned((n, 3), real),
-        touched=np.zeros(n, dtype=np.uint32),
-        second=np.zeros(n, dtype=np.uint32),
-        touching=np.zeros(n, dtype=np.uint32),
-        entering=np.zeros(n, dtype=np.uint32),
-        touching_count=np.zeros(1, dtype=np.int64),
-        locked=np.zeros(n, dtype=np.uint8),
-        normal=np.zeros((n, 3)),
-        second_normal=np.zeros((n, 3)),
-        direction=np.zeros((n, 3)),
-        goal=np.zeros((n, 3)),
-        clearance=np.zeros(n),
+    )
+    work = Workspace(
         places=aligned((n, 4), real),
         tile=aligned((1, TILE), real),
         pulled=aligned((slices.pieces, RESULT), real),
         sums=np.zeros((len(slices.lanes) + 1, 3)),
     )
     rows = None if keeps_one(kept) else volume_rows(kept, n)
-    return State(network, motion, np.zeros(kept.count), rows, memory=memory)
+    return State(network, nodes, _no_contacts(n), work, np.zeros(kept.count), rows, memory=memory)
+
+
+def _no_contacts(n: int) -> Contacts:
+    return Contacts(
+        **{name: np.zeros(n, dtype=np.uint32) for name in ("touched", "second", "touching", "entering")},
+        mode=np.zeros(n, dtype=np.uint8),
+        **{name: np.zeros((n, 3)) for name in ("normal", "second_normal", "direction", "goal")},
+        touching_count=np.zeros(1, dtype=np.int64),
+        clearance=np.zeros(n),
+    )
 
 
 def keeps_one(volumes: Volumes) -> bool:

@@ -1,4 +1,4 @@
-"""The neighbours of all nodes as `kernels.slices` wants them: rings first, 64 nodes with lists of like length."""
+"""The neighbours of all nodes as `kernels.fused` wants them: rings first, 64 nodes with lists of like length."""
 
 from dataclasses import dataclass
 

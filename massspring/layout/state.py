@@ -5,10 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import Motion, Network, Tally
+from massspring.kernels.arrays.layout import Contacts, Drive, Network, Nodes, Tally, Workspace
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.jit.stage_clock import Ticks
+from massspring.kernels.jit.thread_team import Team
 from massspring.kernels.probe.arrays import Probing
+from massspring.kernels.step.frame import Frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,7 +18,9 @@ class State:
     """A body in motion. `advance` returns a new one and leaves the old as it was."""
 
     network: Network
-    motion: Motion
+    nodes: Nodes
+    contacts: Contacts
+    work: Workspace
     lam: np.ndarray
     """Interior gauge pressure of each kept volume in the last step, beyond what it is at rest [Pa], (m,); 0 for
     methods that keep none."""
@@ -29,23 +33,30 @@ class State:
     probing: Probing | None = None
     """Of thin probes; None where there are none: the frame is then compiled without their stage."""
     place: np.ndarray | None = None
-    """Where each node is in `network` and `motion`, (n,); None where they have the numbers of the body."""
+    """Where each node is in `network` and `nodes`, (n,); None where they have the numbers of the body."""
+
+    team: Team | None = None
+    """Threads that share the longest loops of a frame; None for one thread."""
 
     @property
     def x(self) -> np.ndarray:
         """Positions [m], (n, 3)."""
-        return self.motion.x if self.place is None else self.motion.x[self.place]
+        return self.nodes.x if self.place is None else self.nodes.x[self.place]
 
     @property
     def v(self) -> np.ndarray:
         """Velocities [m/s], (n, 3)."""
-        return self.motion.v if self.place is None else self.motion.v[self.place]
+        return self.nodes.v if self.place is None else self.nodes.v[self.place]
+
+    def frame(self, drive: Drive) -> Frame:
+        """What a frame loop is given."""
+        return Frame(self.network, self.nodes, self.contacts, self.work, drive, self.tally, self.probing, self.team)
 
     def moved_to(self, x: np.ndarray) -> "State":
         """The same at positions `x` (n, 3) [m]."""
-        motion = self.motion._replace(x=self.motion.x.copy())
-        motion.x[slice(None) if self.place is None else self.place] = x
-        return replace(self, motion=motion)
+        nodes = self.nodes._replace(x=self.nodes.x.copy())
+        nodes.x[slice(None) if self.place is None else self.place] = x
+        return replace(self, nodes=nodes)
 
 
 def new_tally(obstacles: int, attachments: int, ticks: Ticks | None = None) -> Tally:

@@ -1,17 +1,21 @@
-"""The other threads of a frame: called when it begins, dismissed when it ends (kernels.team)."""
+"""The other threads of a frame: called when it begins, dismissed when it ends (kernels.jit.thread_team)."""
 
 import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
 
-from massspring.kernels.arrays.layout import Drive, Motion, Network
+import numpy as np
+
 from massspring.kernels.fused.chunk import TILE
 from massspring.kernels.jit.blocks import BLOCK
 from massspring.kernels.jit.thread_team import READY, ROUND, team_of
+from massspring.kernels.step.frame import Frame
 from massspring.kernels.step.thread_jobs import dismiss, serve
 from massspring.layout.sell_chunks import aligned
+from massspring.layout.state import State
 
 
 def cores() -> int:
@@ -19,16 +23,20 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def shared(motion: Motion, network: Network, threads: int) -> Motion:
-    """`motion` to be advanced by so many threads, two or more; each has scratch of its own."""
-    team = team_of(threads, network.slices.start, len(motion.x), BLOCK)
-    return motion._replace(team=team, tile=aligned((threads, TILE), motion.tile.dtype))
+def shared(state: State, threads: int) -> State:
+    """`state` to be advanced by so many threads, two or more; each has scratch of its own."""
+    team = team_of(threads, state.network.slices.start, len(state.nodes.x), BLOCK)
+    work = state.work._replace(tile=aligned((threads, TILE), state.work.tile.dtype))
+    return replace(state, work=work, team=team)
 
 
 @contextmanager
-def crew(network: Network, motion: Motion, drive: Drive) -> Iterator[None]:
-    """Inside, the other threads of `motion.team` wait for their parts; without a team nothing happens."""
-    team = motion.team
+def crew(frame: Frame, direction: np.ndarray) -> Iterator[None]:
+    """Inside, the other threads of `frame.team` wait for their parts; without a team nothing happens.
+
+    `direction` (n, 3): of the pushes of the frame.
+    """
+    team = frame.team
     if team is None:
         yield
         return
@@ -36,10 +44,10 @@ def crew(network: Network, motion: Motion, drive: Drive) -> Iterator[None]:
     if not team.signal[READY]:
         # A thread that had to compile, or could not, would keep the frame waiting.
         dismiss(team)
-        serve(network, motion, drive, 1)
+        serve(frame, team, direction, 1)
         team.signal[READY] = 1
     team.signal[ROUND] = 0
-    parts = [_pool(os.getpid(), len(others)).submit(serve, network, motion, drive, rank) for rank in others]
+    parts = [_pool(os.getpid(), len(others)).submit(serve, frame, team, direction, rank) for rank in others]
     try:
         yield
     finally:

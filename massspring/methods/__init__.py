@@ -33,8 +33,12 @@ METHODS: tuple[type[Method], ...] = (
     ImplicitSprings,
 )
 
+VARIANTS: tuple[Method, ...] = (Element(hard=True), Xpbd(volumes="whole"))
+"""Settings with which a method supports something else than by default."""
+
 __all__ = [
     "METHODS",
+    "VARIANTS",
     "Barycentre",
     "Baumgarte",
     "Element",

@@ -21,8 +21,9 @@ from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Drive
 from massspring.layout.allocate import start
 from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities
 from massspring.methods.families.known_pressure import check_modulus
-from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, one_filled, push_cells
+from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, push_cells
 from massspring.methods.method import Method
 from massspring.world.obstacles import Attachment
 
@@ -38,13 +39,10 @@ class Barycentre(Method):
     name: ClassVar[str] = "barycentre"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
+    capabilities: ClassVar[Capabilities] = Capabilities("tetrahedra")
 
     def __post_init__(self) -> None:
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)
-
-    def applies(self, body: Body) -> str | None:
-        """Needs tetrahedra, and a body that keeps no more than them."""
-        return one_filled(body)
 
     def added_stiffness(self, body: Body) -> csr_array:
         """9 K V_t0/(Σ|r|_0)² of every cell."""

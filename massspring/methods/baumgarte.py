@@ -10,12 +10,12 @@ root of eq. 106 is what a step leaves of it. 2 alpha = beta = 1/dt is HCJ05 with
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.body.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import Drive
 from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities
 from massspring.methods.families.one_volume import Rule, advance_by
-from massspring.methods.method import Method, Remedy, one_whole
+from massspring.methods.method import Method
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,7 @@ class Baumgarte(Method):
     name: ClassVar[str] = "baumgarte"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
-    remedy: ClassVar[Remedy | None] = "capped"
-    misses_probes: ClassVar[str | None] = None
+    capabilities: ClassVar[Capabilities] = Capabilities("whole", "limited", thin_probes=True)
 
     def __post_init__(self) -> None:
         for name in ("alpha", "beta"):
@@ -44,10 +43,6 @@ class Baumgarte(Method):
     def stable(self) -> bool:
         """Whether a wrong volume dies away: (beta dt)² + 4 alpha dt < 4 and 2 alpha dt < 2 (eq. 106)."""
         return self.beta**2 + 4.0 * self.alpha < 4.0 and 2.0 * self.alpha < 2.0
-
-    def applies(self, body: Body) -> str | None:
-        """Keeps the whole only."""
-        return one_whole(body)
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""

@@ -17,68 +17,44 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Accuracy, Drive
+from massspring.kernels.arrays.layout import Accuracy, Drive, Push
 from massspring.kernels.constraint.tetrahedra import any_idle, cell_forces_into, cell_rows_into, solve_cells
-from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, revise_contacts
 from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
-from massspring.kernels.jit.decorators import compiled
-from massspring.kernels.jit.stage_clock import (
-    HELD,
-    INTEGRATION,
-    MULTIPLIER,
-    OUTSIDE,
-    REVISION,
-    SEARCH,
-    SPRINGS,
-    VOLUME,
-    mark,
-)
-from massspring.kernels.step.advance import advance
-from massspring.kernels.step.attachments import add_held_impulse
-from massspring.kernels.step.predict import predict
+from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.stage_clock import VOLUME, mark
+from massspring.kernels.step.begin import begin_step, count_iterations, multiplier_stands, open_frame, search_contacts
+from massspring.kernels.step.end import end_step
 from massspring.layout.allocate import start
 from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.families.known_pressure import check_modulus
-from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, one_filled, own_cells, push_cells
-from massspring.methods.method import Method, Remedy, begin_frame
+from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, own_cells, push_cells
+from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 
 
-@compiled
-def hard_frame(network, cells, motion, drive, tally, compliance, accuracy):
-    """One frame, all cells and contact inside the solve (eq. 6–13, 166); F = Jᵀ p is pushed with a pressure of 1."""
-    dt = drive.dt
-    mark(tally.ticks, OUTSIDE)
+@lean
+def hard_frame(frame, cells, compliance, accuracy):
+    """One frame, all cells and contact inside the solve (eq. 6–13, 166); the mean pressure [Pa]."""
+    nodes, contacts, drive, tally = frame.nodes, frame.contacts, frame.drive, frame.tally
+    push = Push(cells.push, 1.0)
+    open_frame(frame)
     for step in range(drive.position.shape[0]):
         fill(cells, drive, step)
-        predict(network, motion, drive, step, False)
-        mark(tally.ticks, SPRINGS)
-        cell_rows_into(motion.x, cells, cells.right)
-        cell_forces_into(cells, cells.pressure, motion.gradient)
+        begin_step(frame, step, False)
+        cell_rows_into(nodes.x, cells, cells.right)
+        cell_forces_into(cells, cells.pressure, cells.push)
         mark(tally.ticks, VOLUME)
-        passes = 1
-        if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, 1.0)
-            mark(tally.ticks, SEARCH)
-            passes = CONTACT_PASSES
+        passes = search_contacts(frame, step, push)
         for sweep in range(passes):
-            cell_rows_into(motion.x, cells, cells.right)
-            count = solve_cells(motion, network.inverse_mass, cells, dt, compliance, accuracy)
-            tally.iterations[0] += count
-            tally.iterations[1] = max(tally.iterations[1], count)
-            cell_forces_into(cells, cells.pressure, motion.gradient)
-            mark(tally.ticks, MULTIPLIER)
-            if sweep + 1 == passes:
-                break
-            changes = revise_contacts(network, motion, drive, step, 1.0, np.inf)
-            mark(tally.ticks, REVISION)
-            if changes == 0:
+            cell_rows_into(nodes.x, cells, cells.right)
+            count = solve_cells(nodes, contacts, frame.network.inverse_mass, cells, drive.dt, compliance, accuracy)
+            count_iterations(tally, count)
+            cell_forces_into(cells, cells.pressure, cells.push)
+            if multiplier_stands(frame, step, push, np.inf, sweep + 1 == passes):
                 break
         tally.skipped[0] += any_idle(cells, compliance, accuracy.tolerance)
-        add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
-        mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, 1.0, dt, tally.contact_impulse)
-        mark(tally.ticks, INTEGRATION)
+        end_step(frame, step, push, 0.0, None)
     return mean_pressure(cells)
 
 
@@ -98,15 +74,16 @@ class Element(Method):
     name: ClassVar[str] = "element"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
-    remedy: ClassVar[Remedy | None] = "force"
-    misses_probes: ClassVar[str | None] = "what a contact does to the volumes of all tetrahedra is not solved for"
+    capabilities: ClassVar[Capabilities] = Capabilities(
+        "tetrahedra",
+        "penalty",
+        thin_probes=No("what a contact does to the volumes of all tetrahedra is not solved for"),
+    )
 
     def __post_init__(self) -> None:
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)
-
-    def applies(self, body: Body) -> str | None:
-        """Needs tetrahedra, and a body that keeps no more than them."""
-        return one_filled(body)
+        if self.hard:
+            object.__setattr__(self, "capabilities", replace(self.capabilities, correction="full"))
 
     def added_stiffness(self, body: Body) -> csr_array | None:
         """K/V_t0 dV_t/dx dV_t/dxᵀ of every cell; nothing where it is hard."""
@@ -127,5 +104,5 @@ class Element(Method):
             return push_cells(state, drive, self.bulk_modulus, False)
         after, cells = begin_frame(state, drive), own_cells(state)
         accuracy = Accuracy(self.tolerance, self.most_iterations)
-        lam = hard_frame(after.network, cells, after.motion, drive, after.tally, 1.0 / self.bulk_modulus, accuracy)
+        lam = hard_frame(after.frame(drive), cells, 1.0 / self.bulk_modulus, accuracy)
         return replace(after, lam=np.array([lam]), memory=cells)

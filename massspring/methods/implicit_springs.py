@@ -23,9 +23,10 @@ from massspring.kernels.jit.stage_clock import OUTSIDE, mark
 from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.implicit.factor import Factors
 from massspring.methods.implicit.passes import Step
-from massspring.methods.method import Method, Remedy, begin_frame
+from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 
 
@@ -42,15 +43,15 @@ class ImplicitSprings(Method):
     name: ClassVar[str] = "implicit_springs"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-6
-    remedy: ClassVar[Remedy | None] = "capped"
-    misses_probes: ClassVar[str | None] = "a contact there moves all nodes at once, which is solved for at nodes only"
-    keeps_spin: ClassVar[bool] = False
-    holds_apart: ClassVar[bool] = True
-    limited: ClassVar[bool] = False
-
-    def applies(self, body: Body) -> str | None:
-        """Triangle springs harden without bound: no constant matrix lies above them."""
-        return "its constant matrix knows no triangle springs; take implicit_volume" if len(body.membrane[0]) else None
+    conserves_angular_momentum: ClassVar[bool] = False
+    capabilities: ClassVar[Capabilities] = Capabilities(
+        "several",
+        "limited",
+        conditionally_stable=False,
+        triangle_springs=No("they harden without bound, and no constant matrix lies above them"),
+        prestress=True,
+        thin_probes=No("a contact there moves all nodes at once, which is solved for at nodes only"),
+    )
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """The body at rest, or with velocities `v` (n, 3) [m/s], and no matrix factored yet."""

@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Accuracy, Drive
+from massspring.kernels.arrays.layout import Accuracy, Drive, Push
 from massspring.kernels.constraint.jacobian import (
     diagonal_into,
     padded_rows_times_into,
@@ -29,88 +29,73 @@ from massspring.kernels.constraint.jacobian import (
 )
 from massspring.kernels.constraint.one_volume import capped_error, multiplier_of_sums, steepest, surely_short
 from massspring.kernels.constraint.schur import dense_into, solve_dense, solve_iteratively
-from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, pressure_reach, revise_contacts
-from massspring.kernels.fused.padded import places_into
-from massspring.kernels.fused.sweep import gather_and_predict, predict_from_places
-from massspring.kernels.jit.decorators import compiled, lean
-from massspring.kernels.jit.stage_clock import (
-    HELD,
-    INTEGRATION,
-    MULTIPLIER,
-    OUTSIDE,
-    PROBES,
-    REVISION,
-    SEARCH,
-    SPRINGS,
-    VOLUME,
-    mark,
+from massspring.kernels.contact.active_set import pressure_reach
+from massspring.kernels.jit.decorators import compiled, inlined, lean
+from massspring.kernels.jit.stage_clock import VOLUME, mark
+from massspring.kernels.step.begin import (
+    begin_step,
+    begin_summed_step,
+    count_iterations,
+    multiplier_stands,
+    open_frame,
+    search_contacts,
 )
-from massspring.kernels.probe.stage import meet_probes
-from massspring.kernels.step.advance import advance, advance_to_places
-from massspring.kernels.step.attachments import add_held_impulse, prescribe, prescribe_velocity_into
+from massspring.kernels.step.end import end_step
 from massspring.layout.allocate import start
 from massspring.layout.block_jacobi import clusters_at_rest
 from massspring.layout.state import State
-from massspring.methods.method import Method, Remedy, crewed_frame
+from massspring.methods.capabilities import Capabilities
+from massspring.methods.method import Method, crewed_frame
 from massspring.world.obstacles import Attachment
 
 
 @lean
-def implicit_volume_frame(network, motion, drive, tally, lam, probing):
+def implicit_volume_frame(frame, lam):
     """One frame of HCJ05 with contact inside the multiplier (eq. 6–13); returns the last lam [Pa]."""
-    dt = drive.dt
-    lightest = network.largest_inverse_mass
-    mark(tally.ticks, OUTSIDE)
-    places_into(motion, 0, motion.x.shape[0])
+    network, nodes, drive, tally = frame.network, frame.nodes, frame.drive, frame.tally
+    gradient, dt = nodes.gradient, drive.dt
+    open_frame(frame)
     for step in range(drive.position.shape[0]):
-        volume, flow, mobility = predict_from_places(network, motion, drive, True)
-        mark(tally.ticks, SPRINGS)
-        flow += prescribe(network, motion, drive.held_displacement[step], dt)
-        mark(tally.ticks, HELD)
+        volume, flow, mobility = begin_summed_step(frame, step)
         error = drive.volume_target[step, 0] - volume
-        predicted = lam
-        passes = 1
-        if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, predicted)
-            mark(tally.ticks, SEARCH)
-            passes = CONTACT_PASSES
+        predicted, left = lam, 0.0
+        passes = search_contacts(frame, step, Push(gradient, predicted))
         for sweep in range(passes):
-            lam, left = multiplier_of_sums(motion, network.inverse_mass, error, dt, flow, mobility)
-            if left > 0.0 and not surely_short(error, left, lightest, network.longest_correction):
-                reachable = steepest(motion.gradient, network.inverse_mass)
-                part = capped_error(error, left, reachable, network.longest_correction)
-                if part != error:
-                    lam, _ = multiplier_of_sums(motion, network.inverse_mass, part, dt, flow, mobility)
-                    tally.capped[0] += sweep == 0
-            mark(tally.ticks, MULTIPLIER)
-            if sweep + 1 == passes:
-                break
-            reach = pressure_reach(lam - predicted, left, lightest, dt)
-            changes = revise_contacts(network, motion, drive, step, lam, reach)
-            mark(tally.ticks, REVISION)
-            if changes == 0:
+            lam, left, capped = limited_multiplier(
+                network, frame.nodes, frame.contacts, error, drive.dt, flow, mobility
+            )
+            tally.capped[0] += capped and sweep == 0
+            reach = pressure_reach(lam - predicted, left, network.largest_inverse_mass, dt)
+            if multiplier_stands(frame, step, Push(gradient, lam), reach, sweep + 1 == passes):
                 break
         if not left > 0.0:
             tally.skipped[0] += 1
-        if probing is not None:
-            lam = meet_probes(network, motion, drive, step, probing, lam, left, None)
-            mark(tally.ticks, PROBES)
-        add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
-        mark(tally.ticks, HELD)
-        advance_to_places(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
-        mark(tally.ticks, INTEGRATION)
+        lam = end_step(frame, step, Push(gradient, lam), left, None)
     return lam
 
 
+@inlined
+def limited_multiplier(network, nodes, contacts, error, dt, flow, mobility):
+    """lam [Pa] of the sums over all nodes (eq. 8), G·W̃·G, and whether only a part of the error is made up for (35)."""
+    weights, longest = network.inverse_mass, network.longest_correction
+    lam, left = multiplier_of_sums(nodes, contacts, weights, error, dt, flow, mobility)
+    if not left > 0.0 or surely_short(error, left, network.largest_inverse_mass, longest):
+        return lam, left, False
+    part = capped_error(error, left, steepest(nodes.gradient, weights), longest)
+    if part != error:
+        lam, _ = multiplier_of_sums(nodes, contacts, weights, part, dt, flow, mobility)
+    return lam, left, part != error
+
+
 @compiled
-def set_right_side(network, rows, motion, target, dt, tolerance):
+def set_right_side(network, rows, nodes, contacts, target, dt, tolerance):
     """rhs_r = (V0_r − V_r)/dt² − (J u)_r/dt [m³/s²] with capped errors (eq. 33, 35), u = ṽ + dt W̃ Jᵀ lam.
 
     Returns whether a volume was capped, and whether a wrong one had nothing to push on.
     """
-    pushed_velocity_into(motion, network.inverse_mass, dt, rows.node_vector)
+    pushed_velocity_into(nodes, contacts, network.inverse_mass, rows.push, dt, rows.node_vector)
     padded_rows_times_into(rows, rows.node_vector, rows.right)
-    diagonal_into(rows, motion, network.inverse_mass, rows.diagonal)
+    diagonal_into(rows, contacts, network.inverse_mass, rows.diagonal)
     lightest, per_second = network.largest_inverse_mass, 1.0 / dt
     capped, idle = False, False
     for r in range(target.shape[0]):
@@ -128,65 +113,43 @@ def set_right_side(network, rows, motion, target, dt, tolerance):
 
 
 @compiled
-def solve_multipliers(network, rows, motion, tally, accuracy):
-    """lam += S⁻¹ rhs for the contacts of the moment (eq. 33, 34); then F = Jᵀ lam [N] in the place of lam G."""
+def solve_multipliers(network, rows, contacts, tally, accuracy):
+    """lam += S⁻¹ rhs for the contacts of the moment (eq. 33, 34); then Jᵀ lam [N] into `rows.push`."""
     if rows.matrix.shape[0] > 0:
-        dense_into(rows, motion, network.inverse_mass, rows.matrix)
+        dense_into(rows, contacts, network.inverse_mass, rows.matrix)
         solve_dense(rows.matrix, rows.right, rows.search)
         for r in range(rows.lam.shape[0]):
             rows.lam[r] += rows.search[r]
     else:
-        count = solve_iteratively(rows, motion, network.inverse_mass, rows.lam, rows.allowed, accuracy.most_iterations)
-        tally.iterations[0] += count
-        tally.iterations[1] = max(tally.iterations[1], count)
+        count = solve_iteratively(
+            rows, contacts, network.inverse_mass, rows.lam, rows.allowed, accuracy.most_iterations
+        )
+        count_iterations(tally, count)
         if count == 0:
             return
-    transposed_rows_times_into(rows, rows.lam, motion.gradient)
+    transposed_rows_times_into(rows, rows.lam, rows.push)
 
 
-@compiled
-def implicit_volumes_frame(network, rows, motion, drive, tally, accuracy, probing):
-    """One frame of HCJ05 with several volumes (eq. 6–13, 32–35); `rows.lam` [Pa] comes in and goes out.
-
-    `motion.gradient` holds F = Jᵀ lam [N], so that with a pressure of 1 all shared kernels push with it.
-    """
-    dt = drive.dt
-    mark(tally.ticks, OUTSIDE)
+@lean
+def implicit_volumes_frame(frame, rows, accuracy):
+    """One frame of HCJ05 with several volumes (eq. 6–13, 32–35); `rows.lam` [Pa] comes in and goes out."""
+    network, nodes, contacts, drive, tally = frame.network, frame.nodes, frame.contacts, frame.drive, frame.tally
+    push, capped, idle = Push(rows.push, 1.0), False, False
+    open_frame(frame)
     for step in range(drive.position.shape[0]):
-        gather_and_predict(network, motion, drive, False)
-        mark(tally.ticks, SPRINGS)
-        held = drive.held_displacement[step]
-        prescribe_velocity_into(
-            motion.x, network.held_nodes, network.held_group, network.held_rest, held, dt, motion.v_star
-        )
-        mark(tally.ticks, HELD)
-        rows_into(motion.x, network.inverse_mass, rows)
-        transposed_rows_times_into(rows, rows.lam, motion.gradient)
+        begin_step(frame, step, False)
+        rows_into(nodes.x, network.inverse_mass, rows)
+        transposed_rows_times_into(rows, rows.lam, rows.push)
         mark(tally.ticks, VOLUME)
-        passes = 1
-        if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, 1.0)
-            mark(tally.ticks, SEARCH)
-            passes = CONTACT_PASSES
+        target, passes = drive.volume_target[step], search_contacts(frame, step, push)
         for sweep in range(passes):
-            capped, idle = set_right_side(network, rows, motion, drive.volume_target[step], dt, accuracy.tolerance)
-            solve_multipliers(network, rows, motion, tally, accuracy)
-            mark(tally.ticks, MULTIPLIER)
-            if sweep + 1 == passes:
-                break
-            changes = revise_contacts(network, motion, drive, step, 1.0, math.inf)
-            mark(tally.ticks, REVISION)
-            if changes == 0:
+            capped, idle = set_right_side(network, rows, nodes, contacts, target, drive.dt, accuracy.tolerance)
+            solve_multipliers(network, rows, contacts, tally, accuracy)
+            if multiplier_stands(frame, step, push, math.inf, sweep + 1 == passes):
                 break
         tally.capped[0] += capped
         tally.skipped[0] += idle
-        if probing is not None:
-            meet_probes(network, motion, drive, step, probing, 1.0, 0.0, rows)
-            mark(tally.ticks, PROBES)
-        add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
-        mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, 1.0, dt, tally.contact_impulse)
-        mark(tally.ticks, INTEGRATION)
+        end_step(frame, step, push, 0.0, rows)
 
 
 @dataclass(frozen=True)
@@ -200,10 +163,9 @@ class ImplicitVolume(Method):
     name: ClassVar[str] = "implicit_volume"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 3e-4
-    remedy: ClassVar[Remedy | None] = "capped"
-    holds_apart: ClassVar[bool] = True
-    misses_probes: ClassVar[str | None] = None
-    threaded: ClassVar[bool] = True
+    capabilities: ClassVar[Capabilities] = Capabilities(
+        "several", "limited", prestress=True, thin_probes=True, threads=True, float32=True
+    )
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """The body at rest, or with velocities `v` (n, 3) [m/s], and clusters of its volumes where they are many."""
@@ -211,18 +173,16 @@ class ImplicitVolume(Method):
         rows = state.rows
         if rows is None or len(rows.matrix):
             return state
-        clusters = clusters_at_rest(rows, state.motion.x, state.network.inverse_mass)
+        clusters = clusters_at_rest(rows, state.nodes.x, state.network.inverse_mass)
         return replace(state, rows=rows._replace(clusters=clusters))
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""
         with crewed_frame(state, drive) as after:
             if after.rows is None:
-                lam = implicit_volume_frame(
-                    after.network, after.motion, drive, after.tally, float(after.lam[0]), after.probing
-                )
+                lam = implicit_volume_frame(after.frame(drive), float(after.lam[0]))
                 return replace(after, lam=np.array([lam]))
             after.rows.lam[:] = after.lam + after.network.rest_lam
             accuracy = Accuracy(self.tolerance, self.most_iterations)
-            implicit_volumes_frame(after.network, after.rows, after.motion, drive, after.tally, accuracy, after.probing)
+            implicit_volumes_frame(after.frame(drive), after.rows, accuracy)
             return replace(after, lam=after.rows.lam - after.network.rest_lam)

@@ -15,8 +15,9 @@ from scipy.sparse import csr_array
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Drive
 from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities
 from massspring.methods.families.known_pressure import PENALTY, check_modulus, push, volume_stiffness
-from massspring.methods.method import Method, Remedy, one_whole
+from massspring.methods.method import Method
 
 
 @dataclass(frozen=True)
@@ -30,15 +31,10 @@ class Penalty(Method):
     name: ClassVar[str] = "penalty"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
-    remedy: ClassVar[Remedy | None] = "force"
-    misses_probes: ClassVar[str | None] = None
+    capabilities: ClassVar[Capabilities] = Capabilities("whole", "penalty", thin_probes=True)
 
     def __post_init__(self) -> None:
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)
-
-    def applies(self, body: Body) -> str | None:
-        """Keeps the whole only."""
-        return one_whole(body)
 
     def added_stiffness(self, body: Body) -> csr_array:
         """(K/V0) G Gᵀ, of rank one."""

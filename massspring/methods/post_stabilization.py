@@ -10,11 +10,11 @@ and no exact spin. A target that moves is followed by the positions alone.
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Drive
 from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.families.one_volume import Rule, advance_by
-from massspring.methods.method import Method, Remedy, one_whole
+from massspring.methods.method import Method
 
 
 @dataclass(frozen=True)
@@ -24,13 +24,12 @@ class PostStabilization(Method):
     name: ClassVar[str] = "post_stabilization"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-4
-    remedy: ClassVar[Remedy | None] = "capped"
-    misses_probes: ClassVar[str | None] = "it moves nodes once more after the step, where no probe is looked for"
-    keeps_spin: ClassVar[bool] = False
-
-    def applies(self, body: Body) -> str | None:
-        """Keeps the whole only."""
-        return one_whole(body)
+    conserves_angular_momentum: ClassVar[bool] = False
+    capabilities: ClassVar[Capabilities] = Capabilities(
+        "whole",
+        "limited",
+        thin_probes=No("it moves nodes once more after the step, where no probe is looked for"),
+    )
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""

@@ -11,11 +11,11 @@ without damping the body gains energy at the rate of eq. 107, and spin where it 
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Drive
 from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities
 from massspring.methods.families.one_volume import Rule, advance_by
-from massspring.methods.method import Method, Remedy, one_whole
+from massspring.methods.method import Method
 
 
 @dataclass(frozen=True)
@@ -25,13 +25,8 @@ class Projection(Method):
     name: ClassVar[str] = "projection"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-12
-    remedy: ClassVar[Remedy | None] = "whole"
-    misses_probes: ClassVar[str | None] = None
-    keeps_spin: ClassVar[bool] = False
-
-    def applies(self, body: Body) -> str | None:
-        """Keeps the whole only."""
-        return one_whole(body)
+    conserves_angular_momentum: ClassVar[bool] = False
+    capabilities: ClassVar[Capabilities] = Capabilities("whole", "full", thin_probes=True)
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""

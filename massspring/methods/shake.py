@@ -8,11 +8,11 @@ Newton step of it.
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Drive
 from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities
 from massspring.methods.families.one_volume import Rule, advance_by
-from massspring.methods.method import Method, Remedy, one_whole
+from massspring.methods.method import Method
 
 
 @dataclass(frozen=True)
@@ -22,12 +22,7 @@ class Shake(Method):
     name: ClassVar[str] = "shake"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-12
-    remedy: ClassVar[Remedy | None] = "whole"
-    misses_probes: ClassVar[str | None] = None
-
-    def applies(self, body: Body) -> str | None:
-        """Keeps the whole only."""
-        return one_whole(body)
+    capabilities: ClassVar[Capabilities] = Capabilities("whole", "full", thin_probes=True)
 
     def advance(self, state: State, drive: Drive) -> State:
         """One frame."""

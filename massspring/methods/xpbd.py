@@ -6,9 +6,9 @@ iteration: Δp = (V0 − V(y) − C V0 p)/(dt² ∇V·W̃∇V + C V0), in the un
 eq. 167). p is kept over the iterations of a step: without it the answer is hard whatever the compliance C, a mistake in
 public implementations. As iterations go on, it is the compliant volume solved for at the end of the step.
 
-Ours: a sweep over tetrahedra ends with one constraint more, the sum of their volumes, as the same pressure on all
-(eq. 170). What the cells end up with stays the same, but cells that mend themselves after each other take hundreds of
-sweeps to see what all of them lack: five leave 2e-4 of the whole without it and 2e-8 with it (ball of 200 nodes).
+Not in the publication: a sweep over tetrahedra ends with one constraint more, the sum of their volumes, as the same
+pressure on all (eq. 170). The final pressures stay the same, but corrections of one cell after the other need hundreds
+of sweeps to mend what all cells lack: five leave 2e-4 of the whole without it and 2e-8 with it (ball of 200 nodes).
 
 Limits: what the iterations have not reached depends on their number and on dt. The gradients are those of positions
 under way, so that spin is not kept. Per tetrahedron it locks as `element` does.
@@ -21,64 +21,58 @@ import numpy as np
 
 from massspring.body.body import Body
 from massspring.errors import MassSpringError
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import Drive, Push
 from massspring.kernels.constraint.tetrahedra import relax_cells, relax_sum, relax_whole
-from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, revise_contacts
 from massspring.kernels.contact.constrained_motion import unpushed_into
 from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
-from massspring.kernels.jit.decorators import compiled
-from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, mark
-from massspring.kernels.step.advance import advance
-from massspring.kernels.step.attachments import add_held_impulse
-from massspring.kernels.step.predict import predict
+from massspring.kernels.jit.decorators import lean
+from massspring.kernels.step.begin import begin_step, multiplier_stands, open_frame, search_contacts
+from massspring.kernels.step.end import end_step
 from massspring.layout.allocate import start
 from massspring.layout.state import State
-from massspring.methods.families.tetrahedra import cells_of, one_filled, own_cells
-from massspring.methods.method import Method, Remedy, begin_frame, one_whole
+from massspring.methods.capabilities import Capabilities, No
+from massspring.methods.families.tetrahedra import cells_of, own_cells
+from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 
 
-@compiled
-def xpbd_frame(network, cells, motion, drive, tally, compliance, iterations, whole):
-    """One frame (eq. 6–13, 167): F in the place of lam G, pushed with a pressure of 1; returns the last one [Pa]."""
-    lam, idle, dt = 0.0, False, drive.dt
-    mark(tally.ticks, OUTSIDE)
+@lean
+def xpbd_frame(frame, cells, compliance, iterations, whole):
+    """One frame (eq. 6–13, 167); returns the last pressure, of cells their mean [Pa]."""
+    nodes, contacts, drive, tally = frame.nodes, frame.contacts, frame.drive, frame.tally
+    lam, idle, push = 0.0, False, Push(cells.push, 1.0)
+    open_frame(frame)
     for step in range(drive.position.shape[0]):
         fill(cells, drive, step)
-        predict(network, motion, drive, step, False)
-        mark(tally.ticks, SPRINGS)
-        passes = 1
-        if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, 1.0)
-            mark(tally.ticks, SEARCH)
-            passes = CONTACT_PASSES
+        begin_step(frame, step, False)
+        passes = search_contacts(frame, step, push)
         for sweep in range(passes):
-            unpushed_into(motion, dt, cells.y)
-            motion.gradient[:] = 0.0
+            unpushed_into(nodes, contacts, drive.dt, cells.y)
+            cells.push[:] = 0.0
             cells.pressure[:] = 0.0
-            lam, idle = 0.0, False
-            target = drive.volume_target[step, 0]
-            for _ in range(iterations):
-                if whole:
-                    lam, idle = relax_whole(network, motion, cells, target, dt * dt, compliance, lam, motion.gradient)
-                else:
-                    idle = relax_cells(motion, network.inverse_mass, cells, dt * dt, compliance, motion.gradient)
-                    idle |= relax_sum(network, motion, cells, target, dt * dt, compliance, motion.gradient)
-            mark(tally.ticks, MULTIPLIER)
-            if sweep + 1 == passes:
-                break
-            changes = revise_contacts(network, motion, drive, step, 1.0, np.inf)
-            mark(tally.ticks, REVISION)
-            if changes == 0:
+            lam, idle = mend(frame, cells, drive.volume_target[step, 0], compliance, iterations, whole)
+            if multiplier_stands(frame, step, push, np.inf, sweep + 1 == passes):
                 break
         tally.skipped[0] += idle
         tally.iterations[0] += iterations
         tally.iterations[1] = iterations
-        add_held_impulse(network, motion, 1.0, dt, drive.gravity, tally.held_impulse)
-        mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, 1.0, dt, tally.contact_impulse)
-        mark(tally.ticks, INTEGRATION)
+        end_step(frame, step, push, 0.0, None)
     return lam if whole else mean_pressure(cells)
+
+
+@lean
+def mend(frame, cells, target, compliance, iterations, whole):
+    """So many sweeps over the volumes (eq. 167, 170); the pressure of the whole [Pa], and whether a wrong volume had
+    nothing to push on in the last of them."""
+    network, contacts, scale = frame.network, frame.contacts, frame.drive.dt * frame.drive.dt
+    lam, idle = 0.0, False
+    for _ in range(iterations):
+        if whole:
+            lam, idle = relax_whole(network, contacts, cells, target, scale, compliance, lam)
+        else:
+            idle = relax_cells(contacts, network.inverse_mass, cells, scale, compliance)
+            idle |= relax_sum(network, contacts, cells, target, scale, compliance)
+    return lam, idle
 
 
 @dataclass(frozen=True)
@@ -89,16 +83,19 @@ class Xpbd(Method):
     """Each tetrahedron's, or the one of the whole."""
     iterations: int = 5
     """Sweeps over the volumes in a step. What five leave of single tetrahedra shows in the force on a pressed ball: it
-    still grows with every further sweep, towards the locked one. The whole is kept from two on."""
+    still grows with every further sweep, towards the mode one. The whole is kept from two on."""
     compliance: float = 0.0
     """C = 1/K [1/Pa]; 0 is hard."""
 
     name: ClassVar[str] = "xpbd"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 1e-4
-    remedy: ClassVar[Remedy | None] = "whole"
-    misses_probes: ClassVar[str | None] = "what a contact does to the volumes that it has mended is not made up for"
-    keeps_spin: ClassVar[bool] = False
+    conserves_angular_momentum: ClassVar[bool] = False
+    capabilities: ClassVar[Capabilities] = Capabilities(
+        "tetrahedra",
+        "full",
+        thin_probes=No("what a contact does to the volumes that it has mended is not made up for"),
+    )
 
     def __post_init__(self) -> None:
         if self.volumes not in ("element", "whole"):
@@ -107,10 +104,8 @@ class Xpbd(Method):
             raise MassSpringError(f"xpbd's iterations are {self.iterations}; it needs at least one")
         if not 0.0 <= self.compliance < float("inf"):
             raise MassSpringError(f"xpbd's compliance is {self.compliance} 1/Pa; it must be 0 or positive, and finite")
-
-    def applies(self, body: Body) -> str | None:
-        """Per element it needs tetrahedra; in either way it keeps one body of tissue."""
-        return one_whole(body) if self.volumes == "whole" else one_filled(body)
+        if self.volumes == "whole":
+            object.__setattr__(self, "capabilities", replace(self.capabilities, keeps="whole"))
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """With the cells at rest."""
@@ -120,7 +115,7 @@ class Xpbd(Method):
         """One frame."""
         after, cells = begin_frame(state, drive), own_cells(state)
         # The last forces tell where contact will be; the old state keeps its own.
-        motion = after.motion._replace(gradient=state.motion.gradient.copy())
+        cells = cells._replace(push=cells.push.copy())
         whole = self.volumes == "whole"
-        lam = xpbd_frame(after.network, cells, motion, drive, after.tally, self.compliance, self.iterations, whole)
-        return replace(after, motion=motion, lam=np.array([lam]), memory=cells)
+        lam = xpbd_frame(after.frame(drive), cells, self.compliance, self.iterations, whole)
+        return replace(after, lam=np.array([lam]), memory=cells)

@@ -10,6 +10,7 @@ from massspring.body.surface import winding_number
 from massspring.errors import MassSpringError
 from massspring.layout.probe_arrays import tip_depth
 from massspring.layout.threads import cores
+from massspring.methods.capabilities import No
 from massspring.methods.method import Method
 from massspring.world.obstacles import Capsule, Plane, Probe, Sphere
 from massspring.world.trajectories import Ramp
@@ -46,10 +47,11 @@ def check_nodal(what: str, values: np.ndarray | None, body: Body) -> None:
 def check_targets(targets: Mapping[str, Ramp], body: Body, method: Method) -> None:
     """Raises MassSpringError for a target that the method would not read, of a volume that is not kept, or one that
     falls to nothing."""
-    if targets and not method.follows_targets:
+    supported = method.capabilities.targets
+    if targets and isinstance(supported, No):
         raise MassSpringError(
-            f"a target is given for volume '{next(iter(targets))}', which method '{method.name}' does not follow; "
-            "leave it out, or take implicit_volume"
+            f"a target is given for volume '{next(iter(targets))}', which method '{method.name}' does not follow: "
+            f"{supported.because}; leave it out, or take implicit_volume"
         )
     for name, ramp in targets.items():
         if name not in body.kept.names:
@@ -59,31 +61,25 @@ def check_targets(targets: Mapping[str, Ramp], body: Body, method: Method) -> No
             raise MassSpringError(f"target '{name}' falls to {min(ramp.values):g} of its rest volume; keep it positive")
 
 
-def check_held_apart(body: Body, method: Method) -> None:
-    """Springs without length need a volume at every node and a method that starts with their rest pressure.
+def check_prestress(body: Body) -> None:
+    """Springs without length need a volume at every node: one for many nodes would let some shrink as others grow.
 
-    One volume for many nodes would let some shrink as others grow. Raises MassSpringError.
+    Raises MassSpringError.
     """
-    if not body.rest_pressure:
-        return
-    if body.kept.count < body.node_count:
+    if body.rest_pressure and body.kept.count < body.node_count:
         raise MassSpringError(
             f"springs of law '{body.law}' pull every part of the body together, and it keeps {body.kept.count} "
             f"volumes for {body.node_count} nodes; keep one volume per node"
-        )
-    if not method.holds_apart:
-        raise MassSpringError(
-            f"method '{method.name}' has no pressure at rest to hold springs of law '{body.law}' apart; "
-            "use implicit_volume, or another law"
         )
 
 
 def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.ndarray) -> None:
     """Raises MassSpringError for a thin probe that the method does not meet, that starts inside the body at `x` (n, 3)
     or is too thick for contact with single triangles."""
-    if method.misses_probes is not None:
+    supported = method.capabilities.thin_probes
+    if isinstance(supported, No):
         raise MassSpringError(
-            f"obstacle {number} is a thin probe, which method '{method.name}' does not meet: {method.misses_probes}; "
+            f"obstacle {number} is a thin probe, which method '{method.name}' does not meet: {supported.because}; "
             "use a Sphere, or implicit_volume"
         )
     edge = mean_edge(body)
@@ -129,5 +125,6 @@ def check_threads(threads: int, method: Method) -> None:
         raise MassSpringError(f"{threads!r} is no number of threads; give 1 or more")
     if threads > cores():
         raise MassSpringError(f"{threads} threads need as many cores, this process may use {cores()}; give fewer")
-    if threads > 1 and not method.threaded:
-        raise MassSpringError(f"method '{method.name}' runs on one thread; leave threads at 1")
+    supported = method.capabilities.threads
+    if threads > 1 and isinstance(supported, No):
+        raise MassSpringError(f"method '{method.name}' runs on one thread, {supported.because}; leave threads at 1")

@@ -9,16 +9,25 @@ from massspring.errors import MassSpringError
 from massspring.layout.jacobian_pattern import OF_EACH_VOLUME
 from massspring.layout.sell_chunks import aligned
 from massspring.layout.state import State
+from massspring.methods.capabilities import No
+from massspring.methods.method import Method
 
 Precision = Literal["float64", "float32"]
 KEPT_DOUBLE = frozenset({"sums", "matrix", "scale", *OF_EACH_VOLUME})
 """Sums over many nodes and what is solved with them: as long as there are slices or volumes, so they cost nothing."""
 
 
-def check_precision(precision: str) -> None:
-    """Raises MassSpringError for what is neither float64 nor float32."""
+def check_precision(precision: str, method: Method) -> None:
+    """Raises MassSpringError for what is neither float64 nor float32, and for float32 where `method` does not claim
+    it."""
     if precision not in ("float64", "float32"):
         raise MassSpringError(f"unknown precision '{precision}'; choose float64 or float32")
+    supported = method.capabilities.float32
+    if precision == "float32" and isinstance(supported, No):
+        raise MassSpringError(
+            f"method '{method.name}' runs in float64 only, {supported.because}; "
+            "leave precision at float64, or take implicit_volume"
+        )
 
 
 def in_precision(state: State, precision: Precision) -> State:
@@ -29,8 +38,10 @@ def in_precision(state: State, precision: Precision) -> State:
     if precision == "float64":
         return state
     rows = None if state.rows is None else _cast(state.rows, np.dtype(np.float32))
-    network, motion = (_cast(part, np.dtype(np.float32)) for part in (state.network, state.motion))
-    return replace(state, network=network, motion=motion, rows=rows)
+    parts = {
+        name: _cast(getattr(state, name), np.dtype(np.float32)) for name in ("network", "nodes", "contacts", "work")
+    }
+    return replace(state, rows=rows, **parts)
 
 
 def _cast(part: Any, real: np.dtype) -> Any:

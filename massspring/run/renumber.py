@@ -1,6 +1,6 @@
 """The numbers nodes have during a run: those of a slice follow each other, and neighbours are near in memory.
 
-Whoever makes a body or reads a run keeps the numbers of the mesh: `State.x` and `State.v` are in them.
+Outside of a run the numbers of the mesh hold: `State.x` and `State.v` are in them.
 """
 
 from dataclasses import dataclass, replace
@@ -43,7 +43,7 @@ class Numbered:
 
 
 def numbered(body: Body) -> Numbered:
-    """The nodes of a large body in the order in which `kernels.slices` passes over them."""
+    """The nodes of a large body in the order in which `kernels.fused` passes over them."""
     if body.node_count < MANY:
         return Numbered(body, None)
     place = places_in_slices(body.springs, swept_surface(body), body.rest)

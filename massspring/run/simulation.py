@@ -18,8 +18,8 @@ from massspring.layout.state import State
 from massspring.layout.threads import shared
 from massspring.methods.method import Method
 from massspring.run.checks import (
-    check_held_apart,
     check_nodal,
+    check_prestress,
     check_probe,
     check_solid,
     check_surroundings,
@@ -59,17 +59,18 @@ class Setup:
     positions: np.ndarray | None = None
     """Initial positions [m], (n, 3); None: those at rest."""
     precision: Precision = "float64"
-    """Of the state; "float32" is faster and meets volumes to 1e-5."""
+    """Of the state; "float32" is faster and meets volumes to 1e-5, for methods that claim it."""
     threads: int = 1
     """That share a step; the result is the same to the last bit. Pays for bodies of some thousand nodes."""
 
     def __post_init__(self) -> None:
-        reason = self.method.applies(self.body)
+        reason = self.method.why_not(self.body)
         if reason is not None:
             raise MassSpringError(f"method '{self.method.name}' does not apply to this body: {reason}")
-        check_precision(self.precision)
+        check_precision(self.precision, self.method)
         check_threads(self.threads, self.method)
-        check_surroundings(self.gravity, self.damping, self.clock.dt if self.method.limited else 0.0)
+        limited = self.method.capabilities.conditionally_stable
+        check_surroundings(self.gravity, self.damping, self.clock.dt if limited else 0.0)
         check_nodal("initial velocities", self.velocity, self.body)
         check_nodal("initial positions", self.positions, self.body)
         x = self.body.rest if self.positions is None else self.positions
@@ -78,7 +79,7 @@ class Setup:
                 check_probe(number, obstacle, self.method, self.body, x)
             else:
                 check_solid(number, obstacle, self.body, x)
-        check_held_apart(self.body, self.method)
+        check_prestress(self.body)
         check_targets(self.targets, self.body, self.method)
         rate = fastest_filling(self.body)
         for name in self.ramped:
@@ -125,7 +126,7 @@ class Setup:
         state = in_precision(state, self.precision)
         if self.threads == 1:
             return state
-        return replace(state, motion=shared(state.motion, state.network, self.threads))
+        return shared(state, self.threads)
 
     @cached_property
     def _unmoved(self) -> dict[str, Any]:
@@ -218,7 +219,7 @@ def simulate(
 ) -> History:
     """Runs all frames, or up to the first that diverges, and returns what happened.
 
-    `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is told after each.
+    `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is called after each.
     A run longer than `time_limit` [s] of wall time ends early. `extra`: which of `history.EXTRA` are recorded; raises
     MassSpringError for another name. Frame times are those of `advance` alone.
     """

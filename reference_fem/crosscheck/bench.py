@@ -21,7 +21,7 @@ FIRST = 0.02
 
 
 def iteration_ratio(n=7, repeats=3) -> dict:
-    """Seconds of an iteration (tangent, residual, factors, solution), ours over the faster of NGSolve's.
+    """Seconds of an iteration (tangent, residual, factors, solution), of reference_fem over the faster of NGSolve's.
 
     By turns, least of the repeats after one that warms up. Keys: unknowns, own_s, ngsolve_s, ratio, inverse.
     Raises ReferenceProblem where the extra is missing.

@@ -17,7 +17,7 @@ STEPS = (0.25, 0.5, 0.75, 1.0)
 
 
 def straight(mesh) -> MeshTet:
-    """The vertices of a curved mesh, joined by straight edges: NGSolve's curves are not ours."""
+    """The vertices of a curved mesh, joined by straight edges: NGSolve curves elements differently."""
     return MeshTet(np.ascontiguousarray(mesh.doflocs[:, : mesh.nvertices]), mesh.t)
 
 

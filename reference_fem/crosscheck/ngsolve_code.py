@@ -161,7 +161,7 @@ class Model:
         return iterations
 
     def iterate(self, inverse, tolerance, most):
-        """(status, iterations) of NGSolve's own Newton; what it prints is said by the status."""
+        """(status, iterations) of NGSolve's own Newton; what it prints is dropped: the status holds it."""
         newton = load("ngsolve.solvers").Newton
         with redirect_stdout(StringIO()):
             return newton(

@@ -1,4 +1,4 @@
-"""The second opinion as oracles: NGSolve's answers beside ours."""
+"""The second opinion as oracles: NGSolve's answers beside those of reference_fem."""
 
 from collections.abc import Callable
 from importlib.metadata import version

@@ -8,6 +8,8 @@ from pathlib import Path
 from studies.base.errors import StudyError
 
 STALE_SECONDS = 3600.0  # a write takes seconds: a .part this old belongs to a process that was killed
+ORPHAN_SECONDS = 60.0
+"""After which that is true of a part whose process is not known here; on a shared disk it may be another machine's."""
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -32,13 +34,39 @@ def write_whole(path: Path, content: bytes) -> None:
         _remove(part)
 
 
+def is_there(path: Path) -> bool:
+    """Whether `path` exists. Raises StudyError when that cannot be seen, as in a folder that may not be entered."""
+    try:
+        os.stat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError as problem:
+        reason = problem.strerror or str(problem)
+        raise StudyError(f"{path} cannot be looked at ({reason}): change the permissions of its folder") from problem
+    return True
+
+
 def sweep_parts(folder: Path) -> int:
     """Removes the .part files that killed processes left in `folder`; returns how many."""
-    limit = time.time() - STALE_SECONDS
-    old = [part for part in Path(folder).glob("*.part") if _modified(part) < limit]
+    now = time.time()
+    old = [part for part in Path(folder).glob("*.part") if now - _modified(part) > _patience(part)]
     for part in old:
         _remove(part)
     return len(old)
+
+
+def _patience(part: Path) -> float:
+    """Seconds that a .part may lie: it is called NAME.PROCESS.part."""
+    process = part.name.split(".")[-2]
+    if os.name != "posix" or not process.isdigit():
+        return STALE_SECONDS
+    try:
+        os.kill(int(process), 0)
+    except (ProcessLookupError, OverflowError):
+        return ORPHAN_SECONDS
+    except PermissionError:  # another user's
+        return STALE_SECONDS
+    return STALE_SECONDS
 
 
 def _modified(part: Path) -> float:

@@ -7,3 +7,11 @@ class StudyError(ValueError):
 
 class DoesNotApply(StudyError):
     """A method does not apply to a scene or a body: no failure, and the message says why."""
+
+
+class DamagedFile(StudyError):
+    """A stored file does not say what was written."""
+
+
+class OtherVersion(StudyError):
+    """A stored file has the layout of another version."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Line:
-    """A promised number beside the measured one; without a target it says what the machine gives, whatever the code."""
+    """A promised number beside the measured one; without a target it measures the machine, not the code."""
 
     what: str
     measured: float

@@ -24,6 +24,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.scenes.ball_squeeze import BALL_SQUEEZE, PRESS_END, RADIUS
 from studies.store.csv_table import write_table
+from studies.store.stamps import set_stamp
 from studies.timing.protocol import pinned
 
 APPROACHES = (0.10, 0.20, 0.30)
@@ -134,7 +135,9 @@ def main() -> None:
         }
     )
     Console(soft_wrap=True).print(table.to_string(index=False, float_format=lambda v: f"{v:.4g}"), markup=False)
-    write_table(Path("results") / "bench.csv", table)
+    root = Path("results")
+    write_table(root / "bench.csv", table)
+    set_stamp(root, "bench.csv")
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ from studies.geometry.mesh.quality import (
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.family import true_volume
 from studies.store.csv_table import write_table
+from studies.store.stamps import set_stamp
 
 ORGANS = ("liver", "stomach", "kidney", "spleen", "bladder")
 Row = dict[str, Any]
@@ -198,6 +199,7 @@ def main() -> int:
         console.print(f"{row['organ']} {row['seed']}: {fault}", markup=False)
     console.print(f"{len(rows) - len(bad)} of {len(rows)} organs are sound")
     console.print(f"wrote {write_table(wish.results / 'geometry.csv', pd.DataFrame(rows))}", markup=False)
+    set_stamp(wish.results, "geometry.csv")
     return int(len(bad) > 0)
 
 

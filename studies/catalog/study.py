@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from studies.base.errors import StudyError
 from studies.runs.case import Case
 from studies.scene.scene import Scene
+from studies.store.paths import readable
 
 if TYPE_CHECKING:
     from studies.metrics.run import Run
@@ -18,6 +19,8 @@ Drawing = Callable[[Sequence["Run"], Path], None]
 
 SMOKE_NODES, SMOKE_NODES_HOLLOW = 150, 400
 """A wall folds on a coarser surface."""
+RESERVED = ("cache", "figures", "reference", "smoke", "verify")
+"""Folders of the results that are no study's."""
 SMOKE_FRAMES = 20
 
 
@@ -42,6 +45,17 @@ class Chart:
                 f"chart {self.file}: there is no function {self.drawing!r} ({error}); give 'package.module:function'"
             ) from error
 
+    def __post_init__(self) -> None:
+        if readable(self.file) != self.file:
+            raise StudyError(
+                f"a chart cannot be called {self.file!r}; use letters, digits, '.', '_' and '-', no folder"
+            )
+        if not callable(self.drawing) and ":" not in str(self.drawing):
+            raise StudyError(
+                f"chart '{self.file}' is drawn by {self.drawing!r}; give a function of the runs and a path, "
+                "or 'package.module:function'"
+            )
+
 
 @dataclass(frozen=True)
 class Study:
@@ -53,6 +67,17 @@ class Study:
     charts: tuple[Chart, ...]
     columns: tuple[str, ...]
     """Metrics shown in its table."""
+
+    def __post_init__(self) -> None:
+        if self.name in RESERVED:
+            raise StudyError(f"a study cannot be called '{self.name}': other files of the program lie in that folder")
+        for what, kind in (("cases", Case), ("charts", Chart), ("columns", str)):
+            given = getattr(self, what)
+            if not isinstance(given, tuple | list):
+                raise StudyError(f"{what} is {given!r}; give a tuple, such as ({given!r},)")
+            odd = [item for item in given if not isinstance(item, kind)]
+            if odd:
+                raise StudyError(f"{what} holds {odd[0]!r}, which is no {kind.__name__}")
 
     def smoke(self) -> "Study":
         """The same study on small meshes, few frames and the two coarsest reference meshes: does it work at all?"""

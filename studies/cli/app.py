@@ -1,16 +1,14 @@
 """The command line: reads words, calls the library, prints. Bad input ends in one sentence and exit code 2."""
 
+import io
 import sys
 import warnings
 
 import typer
 
-from massspring.errors import MassSpringError
-from reference_fem.errors import ReferenceProblem
 from studies.base import interrupts
-from studies.base.errors import StudyError
+from studies.cli.endings import complain, flushed, told
 from studies.cli.group import Entry, lazy_group
-from studies.cli.terminal import errors
 
 COMMANDS = {
     name: Entry(f"studies.cli.commands.{module}", function, line)
@@ -23,6 +21,7 @@ COMMANDS = {
         ("plot", "plot", "plot", "Draws the charts and the table of a study from what is stored."),
         ("report", "report", "report", "All charts and tables, and the summary; names what it wrote."),
         ("replay", "replay", "replay", "Runs exactly that case again, and says whether it is the same."),
+        ("publish", "publish", "publish", "Copies tables and charts to results/published, and the summary."),
         ("verify", "verify", "verify", "Holds the reference against closed forms and published numbers."),
         ("cost", "cost", "cost", "Microseconds per stage of a step, and what the scene leaves out."),
         ("mesh", "mesh", "mesh", "Makes a mesh: of a synthetic organ, or from a file."),
@@ -39,20 +38,23 @@ def organbench() -> None:
 
 
 def main() -> None:
-    """Entry point: exit code 0 done, 2 bad input, 130 interrupted."""
-    warnings.showwarning = lambda message, *_: errors.print(f"warning: {message}", markup=False, highlight=False)  # type: ignore[assignment]
+    """Entry point: exit code 0 done, 2 bad input or output that cannot be written, 130 interrupted, 143 ended."""
+    warnings.showwarning = lambda message, *_: complain(f"warning: {message}")  # type: ignore[assignment]
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that has no "±" shows "?"
     try:
         code = _exit_code()
     except KeyboardInterrupt:  # between two lines of it
-        code = interrupts.CODE
-    if code == interrupts.CODE:
+        code = interrupts.exit_code()
+    if code in (interrupts.CODE, interrupts.exit_code()):
         interrupts.close_ears()
-        errors.print("organbench: interrupted; what is finished is stored, the same command goes on from there")
-    sys.exit(code)
+        what = "interrupted" if code == interrupts.CODE else "ended by SIGTERM"
+        complain(f"organbench: {what}; what is finished is stored, the same command goes on from there")
+    sys.exit(flushed(code))
 
 
 def _exit_code() -> str | int | None:
-    """Runs the command. Whatever came of it, once Ctrl-C was pressed it counts as interrupted."""
+    """Runs the command. Whatever came of it, once a signal came it counts as interrupted."""
     code: str | int | None = 0
     try:
         app()
@@ -60,8 +62,6 @@ def _exit_code() -> str | int | None:
         code = stop.code
     except Exception as error:
         if not interrupts.pressed():
-            if not isinstance(error, (StudyError, MassSpringError, ReferenceProblem)):
-                raise
-            errors.print(f"organbench: {error}", markup=False, highlight=False)
+            complain(f"organbench: {told(error)}")
             code = 2
-    return interrupts.CODE if interrupts.pressed() else code
+    return interrupts.exit_code() if interrupts.pressed() else code

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.metrics.metrics import DOUBT, METRICS, Metric, Run
+from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
     band_handle,
     blank,
-    body_method_handles,
     by_scene,
     doubt_mark,
     doubts,
@@ -24,7 +24,8 @@ from studies.plots.style.page import (
     panels,
     remarks,
 )
-from studies.plots.style.style import BLACK, BODY_MARKERS, GREY, SMALL, heading, method_colour, remark, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, remark, save, styled
+from studies.runs.case import BodyRecipe
 
 TITLE = "Error against the reference"
 QUANTITIES = {
@@ -46,7 +47,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     if not shown:
         return blank(TITLE, "no run has recorded a frame yet")
     metrics = [metric for metric in METRICS if metric.name in QUANTITIES]
-    scenes = by_scene(shown)
+    scenes, looks = by_scene(shown), body_looks(shown)
     columns = min(2, len(scenes))
     rows = -(-len(scenes) // columns)
     sheet = page(5.2 * columns, 3.0 * rows + 0.4)
@@ -56,17 +57,19 @@ def figure(runs: Sequence[Run]) -> Figure:
     values = [0.1, 100.0]
     for panel, (name, group) in zip(axes.flat, scenes.items(), strict=False):
         panel.set_title(heading(name) + doubt_mark(group, metrics))
-        values += _draw_scene(panel, group, metrics)
+        values += _draw_scene(panel, group, metrics, looks)
     for panel in axes[:, 0]:
         log_axis(panel.yaxis)
         panel.set_ylim(min(values) / ROOM, ROOM * max(values))
         panel.set_ylabel("relative error [%]")
-    return finish(sheet, TITLE, _handles(shown), [*_notes(), *doubts(shown, metrics), *remarks(runs)], columns=3)
+    return finish(sheet, TITLE, _handles(shown, looks), [*_notes(), *doubts(shown, metrics), *remarks(runs)], columns=3)
 
 
-def _draw_scene(axes: Axes, group: Sequence[Run], metrics: Sequence[Metric]) -> list[float]:
+def _draw_scene(
+    axes: Axes, group: Sequence[Run], metrics: Sequence[Metric], looks: dict[BodyRecipe, BodyLook]
+) -> list[float]:
     """The values drawn, errors and floors."""
-    series = grouped(group, lambda run: (run.case.body.series, run.case.method.name))
+    series = grouped(group, lambda run: (looks[run.case.body], run.case.method.name))
     offsets = np.linspace(-REACH, REACH, len(series) + 2)[1:-1]
     drawn: list[float] = []
     for place, metric in enumerate(metrics):
@@ -75,8 +78,9 @@ def _draw_scene(axes: Axes, group: Sequence[Run], metrics: Sequence[Metric]) -> 
             axes.fill_between([place - REACH, place + REACH], 0, floor, color=GREY, alpha=0.3, linewidth=0)
             drawn.append(floor)
         points = [(place + off, run) for off, same in zip(offsets, series, strict=True) for run in same]
-        drawn += [_draw_point(axes, x, metric(run), floor, run) for x, run in points if metric(run) == metric(run)]
-        if group[0].reference is not None and all(metric(run) != metric(run) for _, run in points):
+        values = [(x, run, metric(run)) for x, run in points]
+        drawn += [_draw_point(axes, x, error, floor, run, looks) for x, run, error in values if error == error]
+        if group[0].reference is not None and all(error != error for _, _, error in values):
             axes.text(
                 place, 0.1, "not\ncompared", transform=axes.get_xaxis_transform(), ha="center", color=GREY, size=SMALL
             )
@@ -89,20 +93,20 @@ def _draw_scene(axes: Axes, group: Sequence[Run], metrics: Sequence[Metric]) -> 
     return drawn
 
 
-def _draw_point(axes: Axes, x: float, error: float, floor: float, run: Run) -> float:
+def _draw_point(axes: Axes, x: float, error: float, floor: float, run: Run, looks: dict[BodyRecipe, BodyLook]) -> float:
     """A filled marker where the floor is small beside the error, else a hollow one; never below the floor."""
     height = max(error, floor)
     colour = method_colour(run.case.method.name)
     face = colour if floor <= DOUBT * error else "white"
-    marker = BODY_MARKERS[run.case.body.series] if error > floor else "_"
+    marker = looks[run.case.body].marker if error > floor else "_"
     axes.plot(x, height, marker=marker, color=colour, markerfacecolor=face, markersize=7.5, markeredgewidth=1.6)
     return height
 
 
-def _handles(shown: Sequence[Run]) -> list:
+def _handles(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list:
     hollow = {"marker": "o", "linestyle": "", "markersize": 7, "markerfacecolor": "white", "color": BLACK}
     return [
-        *body_method_handles(shown, markers=True),
+        *body_method_handles(shown, looks, markers=True),
         Line2D([], [], label="hollow: the reference is not ten times better", **hollow),
         band_handle("reference's own uncertainty"),
     ]

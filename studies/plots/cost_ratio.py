@@ -1,4 +1,4 @@
-"""How much longer a frame takes with the constraint than without, and whether that can be told at all."""
+"""How much longer a frame takes with the constraint than without, and whether the difference is resolvable."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,6 +9,7 @@ from matplotlib.lines import Line2D
 
 from massspring import Free
 from studies.metrics.metrics import Run
+from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, finish, grouped, page
 from studies.plots.style.style import BLACK, GREY, NORMAL, heading, method_colour, readable, save, styled
 from studies.timing.statistics import Ratio, ratio_with_spread
@@ -50,13 +51,14 @@ def figure(runs: Sequence[Run]) -> Figure:
 def ratios(runs: Sequence[Run]) -> list[Row]:
     """Every timed method over the free one on the same body in the same scene, with its interval."""
     rows: list[Row] = []
+    looks = body_looks(runs, ignored=("nodes",))
     for body in grouped([run for run in runs if run.timing], lambda run: run.case.replaced(method=Free()).key):
         free = next((run.timing for run in body if run.case.method.name == Free.name), None)
         for run in body:
             if free is None or run.timing is None or run.case.method.name == Free.name:
                 continue
             case = run.case
-            name = f"{heading(case.scene.name)}, {case.body.kind}, {case.body.nodes:,}"
+            name = f"{heading(case.scene.name)}, {looks[case.body].name}, {case.body.nodes:,}"
             rows.append((name, case.method.name, ratio_with_spread(run.timing.frame_ns, free.frame_ns)))
     return rows
 

@@ -10,10 +10,10 @@ from matplotlib.ticker import MaxNLocator
 
 from massspring import Path as Motion
 from studies.metrics.metrics import COMPARABLE, METRICS, Run, force_end
+from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
     band_handle,
     blank,
-    body_method_handles,
     by_scene,
     doubt_mark,
     doubts,
@@ -27,7 +27,8 @@ from studies.plots.style.page import (
     remarks,
     spread_out,
 )
-from studies.plots.style.style import BLACK, BODY_LINES, GREY, SMALL, heading, method_colour, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, save, styled
+from studies.runs.case import BodyRecipe
 from studies.scenes import Scene
 
 TITLE = "Force of the press against the reference"
@@ -45,27 +46,27 @@ def figure(runs: Sequence[Run]) -> Figure:
     shown = [run for run in runs if has_frames(run) and "force" in run.case.scene.quantities]
     if not shown:
         return blank(TITLE, "no run of a scene that asks for a force has recorded a frame yet")
-    scenes = by_scene(shown)
+    scenes, looks = by_scene(shown), body_looks(shown)
     columns = min(2, len(scenes))
     sheet = page(5.2 * columns, 3.0 * -(-len(scenes) // columns) + 0.4)
     axes = panels(sheet, -(-len(scenes) // columns), columns)
     for spare in axes.flat[len(scenes) :]:
         spare.set_axis_off()
     for panel, group in zip(axes.flat, scenes.values(), strict=False):
-        _draw_scene(panel, group)
+        _draw_scene(panel, group, looks)
     reference = reference_handle(linestyle="-", linewidth=1)
-    handles = [*body_method_handles(shown), reference, band_handle("± its uncertainty")]
+    handles = [*body_method_handles(shown, looks), reference, band_handle("± its uncertainty")]
     notes = ["At the end of each line: its error there, after all has come to rest. Dotted: the press stops."]
     return finish(sheet, TITLE, handles, [*notes, *doubts(shown, FORCES), *remarks(runs)], columns=3)
 
 
-def _draw_scene(axes: Axes, group: Sequence[Run]) -> None:
+def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> None:
     ends = []
     for same in grouped(group, lambda run: (run.case.body, run.case.method.name)):
         run = same[0]  # another time step lies on the same line; the table shows by how much it does not
         good = slice(0, good_frames(run))
         colour = method_colour(run.case.method.name)
-        axes.plot(run.field("t")[good], run.force[good], color=colour, linestyle=BODY_LINES[run.case.body.series])
+        axes.plot(run.field("t")[good], run.force[good], color=colour, linestyle=looks[run.case.body].line)
         ends.append((float(run.force[good][-1]), _error(run), colour))
     top = ROOM * _largest(group)
     motion = _motion(group[0].case.scene)

@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from studies.metrics.metrics import Run
+from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import band_handle, blank, finish, grouped, log_axis, page, panels, remarks
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, save, styled
 from studies.timing.protocol import FrameTiming
@@ -31,13 +32,14 @@ def figure(runs: Sequence[Run]) -> Figure:
     if not timed:
         return blank(TITLE, "no frame times from this machine and this code yet")
     bodies = grouped([run for run, _ in timed], lambda run: (run.case.scene.name, run.case.body))
+    names = _names([run for run, _ in timed])
     rows, strip = -(-len(bodies) // COLUMNS), 0.27 * len(timed) + 1.1
     sheet = page(11, 2.6 * rows + strip)
     above, below = sheet.subfigures(2, 1, height_ratios=[2.6 * rows, strip])  # pyright: ignore[reportGeneralTypeIssues]
     axes = panels(above, rows, COLUMNS, sharey=True)
     span = _span([timing for _, timing in timed])
     for panel, body in zip(axes.flat, bodies, strict=False):
-        _draw_history(panel, body, span)
+        _draw_history(panel, body, span, names[id(body[0])])
     for last in [*axes[:-1, -1], axes.flat[len(bodies) - 1]]:
         _label_deadlines(last)
     for spare in axes.flat[len(bodies) :]:
@@ -46,7 +48,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         left.set_ylabel("frame time [ms]")
     for low in axes.flat[max(0, len(bodies) - COLUMNS) : len(bodies)]:
         low.set_xlabel("simulated time [s]")
-    _draw_percentiles(below.subplots(), bodies, span)
+    _draw_percentiles(below.subplots(), bodies, span, names)
     return finish(
         sheet, TITLE, _handles(timed), [_protocol([t for _, t in timed]), *remarks(_untimed(runs))], columns=7
     )
@@ -64,7 +66,7 @@ def _span(timings: Sequence[FrameTiming]) -> tuple[float, float]:
     return fastest / 1.6, 1.6 * max(slowest, max(DEADLINES_MS))
 
 
-def _draw_history(axes: Axes, body: Sequence[Run], span: tuple[float, float]) -> None:
+def _draw_history(axes: Axes, body: Sequence[Run], span: tuple[float, float], name: str) -> None:
     for run in body:
         assert run.timing is not None  # figure() chose those
         frames, t = run.timing.frame_ns / NS_PER_MS, run.field("t")
@@ -77,9 +79,7 @@ def _draw_history(axes: Axes, body: Sequence[Run], span: tuple[float, float]) ->
     log_axis(axes.yaxis)
     axes.set(ylim=span, xlim=(0, body[0].case.scene.duration))
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
-    axes.set_title(
-        f"{_name(body[0])}\n{attributes['steps']} steps of {1e3 * attributes['dt']:.2g} ms", size=SMALL + 0.5
-    )
+    axes.set_title(f"{name}\n{attributes['steps']} steps of {1e3 * attributes['dt']:.2g} ms", size=SMALL + 0.5)
 
 
 def _label_deadlines(axes: Axes) -> None:
@@ -87,11 +87,17 @@ def _label_deadlines(axes: Axes) -> None:
         axes.text(1.02, deadline, words, transform=axes.get_yaxis_transform(), size=SMALL, color=GREY, va="center")
 
 
-def _name(run: Run) -> str:
-    return f"{heading(run.case.scene.name)}, {run.case.body.kind}, {run.case.body.nodes:,}"
+def _names(runs: Sequence[Run]) -> dict[int, str]:
+    """By the id of a run: its scene, its body and the surface nodes."""
+    looks = body_looks(runs, ignored=("nodes",))
+    return {
+        id(run): f"{heading(run.case.scene.name)}, {looks[run.case.body].name}, {run.case.body.nodes:,}" for run in runs
+    }
 
 
-def _draw_percentiles(axes: Axes, bodies: Sequence[Sequence[Run]], span: tuple[float, float]) -> None:
+def _draw_percentiles(
+    axes: Axes, bodies: Sequence[Sequence[Run]], span: tuple[float, float], names: dict[int, str]
+) -> None:
     """One line per case from the median to the slowest frame."""
     labels: list[str] = []
     for body in bodies:
@@ -102,7 +108,7 @@ def _draw_percentiles(axes: Axes, bodies: Sequence[Sequence[Run]], span: tuple[f
             axes.plot([found["p50"], found["max"]], [len(labels)] * 2, color=colour, linewidth=1)
             for name, marker in QUANTILE_MARKERS.items():
                 axes.plot(found[name], len(labels), marker=marker, color=colour, markersize=6, markeredgewidth=1.8)
-            labels.append(_name(run) if place == 0 else "")
+            labels.append(names[id(run)] if place == 0 else "")
     for deadline in DEADLINES_MS:
         axes.axvline(deadline, color=GREY, linewidth=1, linestyle=DASHES)
         words, place = f"{deadline:g} ms", (deadline, 1.01)

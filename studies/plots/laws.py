@@ -1,12 +1,14 @@
 """What the stiffness law does: force error and step limit over mesh size, with one volume and with nodal volumes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.typing import LineStyleType
 
 from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run
 from studies.plots.style.page import (
@@ -27,9 +29,11 @@ from studies.plots.style.style import (
     BLUE,
     GREEN,
     GREY,
+    MUTED,
     ORANGE,
     PURPLE,
     SKY,
+    SPARE_LOOKS,
     VERMILLION,
     heading,
     readable,
@@ -47,14 +51,17 @@ COLOURS = {
     "cotangent": GREEN,
     "per_kind": VERMILLION,
 }
-"""Of laws; one that is not named here, as chosen weights, is black."""
+"""Of laws."""
 VOLUMES = {
-    "scene": ("one volume", (0, (4, 1.6)), "o"),
-    "whole": ("one volume", (0, (4, 1.6)), "o"),
-    "regions": ("regions", (0, (1, 1.2)), "s"),
-    "nodal": ("one volume per node", "-", "^"),
+    "tetrahedral": ("one volume", (0, (4, 1.6)), "o"),
+    "tetrahedral, one volume": ("one volume", (0, (4, 1.6)), "o"),
+    "surface": ("one volume", (0, (4, 1.6)), "o"),
+    "surface, one volume": ("one volume", (0, (4, 1.6)), "o"),
+    "tetrahedral, nodal volumes": ("one volume per node", "-", "^"),
 }
-"""Of a recipe -> (words, line, marker)."""
+"""Of BodyRecipe.series -> (words, line, marker); another body takes a spare look and its own words."""
+Look = tuple[str, str, tuple[str, LineStyleType, str]]
+"""Law, its colour, and words, line and marker of the volumes."""
 FORCE, MS_PER_S = "force_end", 1e3
 
 
@@ -65,7 +72,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     if not shown:
         return blank(TITLE, "no run has ended yet")
     (metric,) = (metric for metric in METRICS if metric.name == FORCE)
-    scenes = by_scene(shown)
+    scenes, looks = by_scene(shown), _looks(shown)
     sheet = page(9.6, 3.4 * len(scenes) + 0.4)
     axes = panels(sheet, len(scenes), 2, sharex="col")
     sizes = sorted({run.case.body.nodes for run in shown})
@@ -73,8 +80,8 @@ def figure(runs: Sequence[Run]) -> Figure:
         row[0].set_title(heading(name) + doubt_mark(group, [metric]))
         row[0].set_ylabel("force error, last checkpoint [%]")
         row[1].set_ylabel("step limit [ms]")
-        _draw_force(row[0], group, metric)
-        _draw_lines(row[1], group, lambda run: MS_PER_S * run.record.attributes["dt_limit"])
+        _draw_force(row[0], group, metric, looks)
+        _draw_lines(row[1], group, lambda run: MS_PER_S * run.record.attributes["dt_limit"], looks)
         log_axis(row[1].yaxis)
         for panel in row:
             panel.set_xscale("log")
@@ -83,20 +90,34 @@ def figure(runs: Sequence[Run]) -> Figure:
     for panel in axes[-1]:
         panel.set_xlabel("surface nodes [1]")
     notes = ["The step limit is that of symplectic Euler with the scene's damping; volumes do not lower it."]
-    return finish(sheet, TITLE, _handles(shown), [*notes, *doubts(shown, [metric]), *remarks(runs)], columns=4)
+    return finish(sheet, TITLE, _handles(looks), [*notes, *doubts(shown, [metric]), *remarks(runs)], columns=4)
 
 
-def _look(run: Run) -> tuple[str, str, tuple]:
-    law = str(run.record.attributes.get("law", run.case.body.law))
-    return law, COLOURS.get(law, BLACK), VOLUMES[run.case.body.volumes]
+def _looks(shown: Sequence[Run]) -> dict[int, Look]:
+    """By the id of a run. Laws and bodies that are not named above take the next spare colour and look."""
+    laws, bodies = dict(COLOURS), dict(VOLUMES)
+    colours, spare = cycle((BLACK, *MUTED)), cycle(SPARE_LOOKS)
+    looks = {}
+    for run in shown:
+        law, series = _law(run), run.case.body.series
+        if law not in laws:
+            laws[law] = next(colours)
+        if series not in bodies:
+            bodies[series] = (series, *next(spare))
+        looks[id(run)] = (law, laws[law], bodies[series])
+    return looks
 
 
-def _draw_lines(axes: Axes, group: Sequence[Run], value) -> int:
+def _law(run: Run) -> str:
+    return str(run.record.attributes.get("law", run.case.body.law))
+
+
+def _draw_lines(axes: Axes, group: Sequence[Run], value: Callable[[Run], float], looks: dict[int, Look]) -> int:
     """Number of points drawn."""
     drawn = 0
-    for same in grouped(group, _look):
+    for same in grouped(group, lambda run: looks[id(run)]):
         points = sorted((run.case.body.nodes, value(run)) for run in same if np.isfinite(value(run)))
-        _, colour, (_, line, marker) = _look(same[0])
+        _, colour, (_, line, marker) = looks[id(same[0])]
         if points:
             look = {"linestyle": line, "marker": marker, "markerfacecolor": _face(colour, marker)}
             axes.plot(*zip(*points, strict=True), color=colour, **look)
@@ -104,19 +125,18 @@ def _draw_lines(axes: Axes, group: Sequence[Run], value) -> int:
     return drawn
 
 
-def _draw_force(axes: Axes, group: Sequence[Run], metric: Metric) -> None:
+def _draw_force(axes: Axes, group: Sequence[Run], metric: Metric, looks: dict[int, Look]) -> None:
     floor = metric.floor(group[0])
     if floor == floor:
         axes.axhspan(-floor, floor, color=GREY, alpha=0.3, linewidth=0)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
-    if not _draw_lines(axes, group, metric):
+    if not _draw_lines(axes, group, metric, looks):
         remark(axes, "no reference, no error" if group[0].reference is None else "not compared in this scene")
 
 
-def _handles(shown: Sequence[Run]) -> list:
-    looks = dict.fromkeys(_look(run) for run in shown)
-    laws = {law: colour for law, colour, _ in looks}
-    volumes = dict.fromkeys(volumes for _, _, volumes in looks)
+def _handles(looks: dict[int, Look]) -> list:
+    laws = {law: colour for law, colour, _ in looks.values()}
+    volumes = dict.fromkeys(volumes for _, _, volumes in looks.values())
     return [
         *(Line2D([], [], color=colour, linewidth=4, label=readable(law)) for law, colour in laws.items()),
         *(Line2D([], [], linestyle=line, marker=m, markerfacecolor=_face(BLACK, m), color=BLACK, label=words)

@@ -10,6 +10,7 @@ from matplotlib.ticker import LogLocator
 
 from massspring import Method
 from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run
+from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, by_scene, doubt_mark, doubts, finish, log_axis, page, panels, remarks
 from studies.plots.style.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, heading, readable, save, styled
 from studies.plots.work_precision import cost
@@ -32,7 +33,7 @@ APART = 0.12
 
 
 def label(method: Method) -> str:
-    """Its name, and the settings that are not as they come: "element (bulk modulus 1e+06, hard)"."""
+    """Its name, and the settings that are not the defaults: "element (bulk modulus 1e+06, hard)"."""
     said = []
     for name, value in chosen_settings(method).items():
         number = f" {value:g}" if not isinstance(value, (bool, str)) else f" {value}" if isinstance(value, str) else ""
@@ -40,10 +41,18 @@ def label(method: Method) -> str:
     return readable(method.name) + (f" ({', '.join(said)})" if said else "")
 
 
-def row(run: Run) -> str:
-    """The method, the volumes that it keeps where the body says which, and its step where that was chosen."""
-    step = "" if run.case.dt == "auto" else f", steps of {1e3 * run.case.dt:g} ms"
-    return label(run.case.method) + run.case.body.series.removeprefix(run.case.body.kind) + step
+def row_names(runs: Sequence[Run]) -> dict[int, str]:
+    """By the id of a run: its method, what sets its body apart from the others, and its step where that was chosen."""
+    looks = body_looks(runs)
+    common = {run.case.body.kind for run in runs}
+    names = {}
+    for run in runs:
+        body = ", " + looks[run.case.body].name
+        if len(common) == 1:
+            body = body.removeprefix(f", {run.case.body.kind}")
+        step = "" if run.case.dt == "auto" else f", steps of {1e3 * run.case.dt:g} ms"
+        names[id(run)] = label(run.case.method) + body + step
+    return names
 
 
 @styled
@@ -52,7 +61,8 @@ def figure(runs: Sequence[Run]) -> Figure:
     shown = [run for run in runs if run.record.status in COMPARABLE]
     if not shown:
         return blank(TITLE, "no run has ended yet")
-    rows = list(dict.fromkeys(row(run) for run in shown))
+    names = row_names(shown)
+    rows = list(dict.fromkeys(names.values()))
     metrics = [metric for name in QUANTITIES for metric in METRICS if metric.name == name]
     timed = any(run.timing is not None for run in shown)
     scenes = by_scene(shown)
@@ -61,10 +71,10 @@ def figure(runs: Sequence[Run]) -> Figure:
     axes = panels(sheet, 2, columns, sharey=True)
     for panel, metric in zip(axes.flat, metrics, strict=False):
         panel.set_xlabel(QUANTITIES[metric.name])
-        _draw(panel, rows, scenes, metric)
+        _draw(panel, names, scenes, metric)
     if timed:
         axes.flat[len(metrics)].set_xlabel(COST)
-        _draw(axes.flat[len(metrics)], rows, scenes, None)
+        _draw(axes.flat[len(metrics)], names, scenes, None)
     for spare in axes.flat[len(metrics) + timed :]:
         spare.set_axis_off()
     for panel in axes[:, 0]:
@@ -73,9 +83,10 @@ def figure(runs: Sequence[Run]) -> Figure:
     return finish(sheet, TITLE, _handles(scenes, metrics), _notes(shown, metrics, runs), columns=4)
 
 
-def _draw(axes: Axes, rows: Sequence[str], scenes: dict[str, list[Run]], metric: Metric | None) -> None:
+def _draw(axes: Axes, names: dict[int, str], scenes: dict[str, list[Run]], metric: Metric | None) -> None:
     """One quantity; None is the computing time."""
     drawn: list[float] = []
+    rows = list(dict.fromkeys(names.values()))
     for number, group in enumerate(scenes.values()):
         colour, marker = SCENE_LOOKS[number % len(SCENE_LOOKS)]
         floor = metric.floor(group[0]) if metric is not None and metric.name != "volume_worst" else float("nan")
@@ -87,7 +98,7 @@ def _draw(axes: Axes, rows: Sequence[str], scenes: dict[str, list[Run]], metric:
             if value != value:
                 continue
             least = max(LEAST, floor) if floor == floor else LEAST
-            height = rows.index(row(run)) + APART * (2 * number - len(scenes) + 1)
+            height = rows.index(names[id(run)]) + APART * (2 * number - len(scenes) + 1)
             shape = marker if value > least else "<"
             face = "white" if metric is not None and metric.doubtful(run) else colour
             axes.plot(max(value, least), height, marker=shape, color=colour, markerfacecolor=face, markersize=6)

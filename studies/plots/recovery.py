@@ -9,18 +9,10 @@ from matplotlib.figure import Figure
 
 from studies.metrics.metrics import Run
 from studies.metrics.table import metric
-from studies.plots.style.page import (
-    blank,
-    body_method_handles,
-    by_scene,
-    finish,
-    good_frames,
-    has_frames,
-    log_axis,
-    page,
-    panels,
-)
-from studies.plots.style.style import BLACK, BODY_LINES, GREY, SMALL, heading, method_colour, readable, save, styled
+from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
+from studies.plots.style.page import blank, by_scene, finish, good_frames, grouped, has_frames, log_axis, page, panels
+from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, save, styled
+from studies.runs.case import BodyRecipe
 
 TITLE = "From which starts a body finds its rest shape again"
 LOWEST, HIGHEST = -1.6, 1.15
@@ -35,7 +27,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     shown = [run for run in runs if has_frames(run) and len(run.field("tetrahedra"))]
     if not shown:
         return blank(TITLE, "no run of a body with tetrahedra has recorded a frame yet")
-    scenes = by_scene(shown)
+    scenes, looks = by_scene(shown), body_looks(shown)
     columns = min(COLUMNS, len(scenes))
     rows = -(-len(scenes) // columns)
     sheet = page(3.1 * columns + 0.6, 2.7 * rows + 0.3)
@@ -43,7 +35,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     for spare in axes.flat[len(scenes) :]:
         spare.set_axis_off()
     for panel, (name, group) in zip(axes.flat, scenes.items(), strict=False):
-        _draw_start(panel, group)
+        _draw_start(panel, group, looks)
         panel.set_title(heading(name.removeprefix("stress_")))
     for panel in axes[:, 0]:
         panel.set_ylabel("smallest J [1]")
@@ -53,12 +45,12 @@ def figure(runs: Sequence[Run]) -> Figure:
     notes = [
         "J is the volume of a tetrahedron over its rest volume: 1 at rest, 0 flat, below 0 inside out. "
         f"Less than {LOWEST:g} is drawn there.",
-        *_ends(shown),
+        *_ends(shown, looks),
     ]
-    return finish(sheet, TITLE, body_method_handles(shown), notes, columns=3)
+    return finish(sheet, TITLE, body_method_handles(shown, looks), notes, columns=3)
 
 
-def _draw_start(axes: Axes, group: Sequence[Run]) -> None:
+def _draw_start(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> None:
     axes.axhspan(LOWEST - 1, 0.0, color=GREY, alpha=0.13, linewidth=0)
     axes.axhline(1.0, color=BLACK, linewidth=0.8)
     axes.annotate(
@@ -73,18 +65,18 @@ def _draw_start(axes: Axes, group: Sequence[Run]) -> None:
     )
     for run in group:
         good = slice(0, good_frames(run))
-        look = {"color": method_colour(run.case.method.name), "linestyle": BODY_LINES[run.case.body.series]}
+        look = {"color": method_colour(run.case.method.name), "linestyle": looks[run.case.body].line}
         axes.plot(run.field("t")[good], np.maximum(run.field("min_j")[good], LOWEST), **look)
     axes.set_ylim(LOWEST - 0.05, HIGHEST)
     log_axis(axes.xaxis)
 
 
-def _ends(shown: Sequence[Run]) -> list[str]:
+def _ends(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list[str]:
     """How many starts each model comes back from."""
     inverted, distance = metric("inverted_share"), metric("rest_distance")
     sentences = []
-    for label in dict.fromkeys((run.case.body.series, run.case.method.name) for run in shown):
-        group = [run for run in shown if (run.case.body.series, run.case.method.name) == label]
+    for group in grouped(shown, lambda run: (looks[run.case.body], run.case.method.name)):
+        body, method = looks[group[0].case.body].name, readable(group[0].case.method.name)
         lost = [run for run in group if not distance(run) < RETURNED]
         shares = np.array([share for share in map(inverted, lost) if share == share])
         left = ""
@@ -93,7 +85,7 @@ def _ends(shown: Sequence[Run]) -> list[str]:
                 f"{share:.2g}" if share < 10 else f"{share:.0f}" for share in (shares.min(), shares.max())
             )
             left = f"; elsewhere {' to '.join(span)} % of tetrahedra stay flat or turned"
-        sentences.append(f"{label[0]}, {readable(label[1])}: back from {len(group) - len(lost)} of {len(group)}{left}.")
+        sentences.append(f"{body}, {method}: back from {len(group) - len(lost)} of {len(group)}{left}.")
     return sentences
 
 

@@ -1,5 +1,6 @@
 """Where a method breaks: status over time step and stiffness, with the theoretical limit drawn over it."""
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,11 +11,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from studies.metrics.metrics import Run
+from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, finish, grouped, log_axis, page, panels
 from studies.plots.style.style import BLACK, STATUS_LOOKS, heading, readable, save, styled
 from studies.store.record import Status
 
 TITLE = "Stability: time step × stiffness"
+TITLE_LETTERS = 52
+"""Letters of a line over a panel."""
 MS = 1e3
 
 
@@ -24,7 +28,8 @@ def figure(runs: Sequence[Run]) -> Figure:
     placed = [run for run in runs if "dt" in run.record.attributes]
     if not placed:
         return blank(TITLE, "no run yet")
-    groups = grouped(placed, lambda run: (run.case.scene.name, run.case.body.kind, run.case.method.name))
+    looks = body_looks(placed, ignored=("stiffness",))
+    groups = grouped(placed, lambda run: (run.case.scene.name, looks[run.case.body], run.case.method.name))
     columns = min(2, len(groups))
     rows = -(-len(groups) // columns)
     sheet = page(5.2 * columns + 0.6, 3.5 * rows + 0.3)
@@ -33,6 +38,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         spare.set_axis_off()
     for panel, group in zip(axes.flat, groups, strict=False):
         _draw_map(panel, group)
+        panel.set_title(_title(group[0], looks[group[0].case.body].name))
     for left in axes[:, 0]:
         left.set_ylabel("stiffness factor [1]")
     for right in [*axes[:-1, -1], axes.flat[len(groups) - 1]]:
@@ -65,9 +71,11 @@ def _draw_map(axes: Axes, group: Sequence[Run]) -> None:
     axes.set_ylim(min(low for low, _ in edges_y.values()), max(high for _, high in edges_y.values()))
     axes.grid(visible=False)
     axes.set_xlabel("time step dt [ms]")
-    axes.set_title(
-        f"{heading(group[0].case.scene.name)}, {group[0].case.body.kind}, {readable(group[0].case.method.name)}"
-    )
+
+
+def _title(run: Run, body: str) -> str:
+    """Scene, body and method, on two lines where one is too short."""
+    return textwrap.fill(f"{heading(run.case.scene.name)}, {body}, {readable(run.case.method.name)}", TITLE_LETTERS)
 
 
 def _edges(values: np.ndarray) -> dict[float, tuple[float, float]]:

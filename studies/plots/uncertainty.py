@@ -22,7 +22,7 @@ WORDS = {
     "steps": "load steps (halved)",
 }
 LOWEST = 1e-4
-"""Where a smaller share is drawn [%]: nobody asks whether it is a millionth or less."""
+"""Where a smaller share is drawn [%]: smaller ones do not matter."""
 PERCENT = 100.0
 
 

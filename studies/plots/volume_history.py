@@ -7,11 +7,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.typing import LineStyleType
 
 from studies.metrics.metrics import COMPARABLE, Run
+from studies.plots.style.bodies import body_looks, body_method_handles
 from studies.plots.style.page import (
     blank,
-    body_method_handles,
     by_scene,
     finish,
     good_frames,
@@ -22,7 +23,7 @@ from studies.plots.style.page import (
     reference_handle,
     remarks,
 )
-from studies.plots.style.style import BLACK, BODY_LINES, GREY, heading, method_colour, save, styled
+from studies.plots.style.style import BLACK, GREY, heading, method_colour, save, styled
 
 TITLE = "How much volume each model loses"
 PERCENT = 100.0
@@ -36,18 +37,18 @@ def figure(runs: Sequence[Run]) -> Figure:
     shown = [run for run in runs if has_frames(run)]
     if not shown:
         return blank(TITLE, "no run has recorded a frame yet")
-    scenes = by_scene(shown)
+    scenes, looks = by_scene(shown), body_looks(shown)
     sheet = page(2.7 * len(scenes) + 0.9, 6.0)
     axes = panels(sheet, 2, len(scenes), sharex="col", sharey="row")
     for (name, group), (upper, lower) in zip(scenes.items(), axes.T, strict=True):
         upper.set_title(heading(name))
         for same in grouped(group, lambda run: (run.case.body, run.case.method.name)):
             for run in same:
-                _draw_run(upper, lower, run, finer=run is not same[0])
+                _draw_run(upper, lower, run, looks[run.case.body].line, finer=run is not same[0])
         _draw_reference(upper, lower, group[0])
         lower.set_xlabel("time [s]")
     _scale(axes, shown)
-    handles = [*body_method_handles(shown), reference_handle()]
+    handles = [*body_method_handles(shown, looks), reference_handle()]
     if len(shown) > len({(run.case.scene.name, run.case.body, run.case.method.name) for run in shown}):
         handles.append(Line2D([], [], color=GREY, linewidth=0.9, label="thin: the same at a smaller time step"))
     return finish(sheet, TITLE, handles, [*_stiffness(shown), *remarks(runs)], columns=3)
@@ -61,11 +62,11 @@ def _stiffness(shown: Sequence[Run]) -> list[str]:
     return [f"The tissue of the reference gives way a little: κ/μ = {', '.join(f'{ratio:,.0f}' for ratio in ratios)}."]
 
 
-def _draw_run(upper: Axes, lower: Axes, run: Run, finer: bool) -> None:
-    """The first run of a series in full; the same with another step as a thin line where it can be told apart."""
+def _draw_run(upper: Axes, lower: Axes, run: Run, line: LineStyleType, finer: bool) -> None:
+    """The first run of a series in full; the same with another step as a thin line where the two differ visibly."""
     good = slice(0, good_frames(run))
     change = PERCENT * (run.volume_ratio[good] - 1)
-    look = {"color": method_colour(run.case.method.name), "linestyle": BODY_LINES[run.case.body.series]}
+    look = {"color": method_colour(run.case.method.name), "linestyle": line}
     if not finer:
         upper.plot(run.field("t")[good], change, **look)
     # Zero has no logarithm; an exact volume lies on the bottom of the axis.

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run, real_time
+from studies.plots.style.bodies import BodyLook, body_looks
 from studies.plots.style.page import (
     band_handle,
     blank,
@@ -23,6 +24,7 @@ from studies.plots.style.page import (
     remarks,
 )
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, remark, save, styled
+from studies.runs.case import BodyRecipe
 from studies.store.record import Status
 
 TITLE = "Accuracy for computing time"
@@ -37,7 +39,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     timed = [run for run in runs if run.timing is not None and run.record.status in COMPARABLE]
     if not timed:
         return blank(TITLE, "no frame times from this machine and this code yet")
-    scenes = by_scene(timed)
+    scenes, looks = by_scene(timed), body_looks(timed, ignored=("nodes",))
     metrics = [metric for name in ROWS for metric in METRICS if metric.name == name]
     sheet = page(4.6 * len(scenes) + 0.8, 6.4)
     axes = panels(sheet, len(metrics), len(scenes), sharex="col", sharey=True)
@@ -47,14 +49,14 @@ def figure(runs: Sequence[Run]) -> Figure:
         column[0].set_title(heading(name) + doubt_mark(group, metrics))
         column[-1].set_xlabel("computing time per simulated second [ms/s]")
         for panel, metric in zip(column, metrics, strict=True):
-            values += _draw_panel(panel, group, metric, steps)
+            values += _draw_panel(panel, group, metric, steps, looks)
             log_axis(panel.xaxis)
     for panel, metric in zip(axes[:, 0], metrics, strict=True):
         log_axis(panel.yaxis)
         panel.set_ylabel(ROWS[metric.name])
     axes[0, 0].set_ylim(0.7 * min(values), 1.2 * max(values))
     return finish(
-        sheet, TITLE, _handles(timed, steps), [_meaning(), *doubts(timed, metrics), *remarks(runs)], columns=3
+        sheet, TITLE, _handles(timed, steps, looks), [_meaning(), *doubts(timed, metrics), *remarks(runs)], columns=3
     )
 
 
@@ -70,14 +72,16 @@ def _step(run: Run) -> float:
     return round(run.record.attributes["dt"] / run.record.attributes["dt_limit"], 2)
 
 
-def _draw_panel(axes: Axes, group: Sequence[Run], metric: Metric, steps: Sequence[float]) -> list[float]:
+def _draw_panel(
+    axes: Axes, group: Sequence[Run], metric: Metric, steps: Sequence[float], looks: dict[BodyRecipe, BodyLook]
+) -> list[float]:
     """The values drawn."""
     floor = metric.floor(group[0])
     if floor == floor:
         axes.axhspan(1e-12, floor, color=GREY, alpha=0.3, linewidth=0)
     drawn: list[float] = [floor] if floor == floor else []
     lines = []
-    for same in grouped(group, lambda run: (run.case.method.name, _step(run), run.case.body.kind, run.case.body.law)):
+    for same in grouped(group, lambda run: (run.case.method.name, _step(run), looks[run.case.body])):
         line = sorted((run for run in same if metric(run) == metric(run)), key=lambda run: run.case.body.nodes)
         # Closer to the reference than it is to itself means no more than: as good as it.
         heights = [max(metric(run), floor) if floor == floor else metric(run) for run in line]
@@ -85,7 +89,7 @@ def _draw_panel(axes: Axes, group: Sequence[Run], metric: Metric, steps: Sequenc
         dashes = STEP_LINES[steps.index(_step(same[0])) % len(STEP_LINES)]
         axes.plot([cost(run) for run in line], heights, color=colour, linestyle=dashes, linewidth=1.5)
         for run, height in zip(line, heights, strict=True):
-            _draw_point(axes, run, height, colour)
+            _draw_point(axes, run, height, looks[run.case.body].marker)
         lines.append((line, heights))
         drawn += heights
     if metric.name == next(iter(ROWS)) and lines:
@@ -109,11 +113,12 @@ def _upper_left(line: Sequence[Run], heights: Sequence[float]) -> float:
     return float(np.mean(np.log(heights) - np.log([cost(run) for run in line]))) if line else -np.inf
 
 
-def _draw_point(axes: Axes, run: Run, height: float, colour: str) -> None:
+def _draw_point(axes: Axes, run: Run, height: float, marker: str) -> None:
     """A marker as large as its mesh; white inside where the run ended with a fault."""
+    colour = method_colour(run.case.method.name)
     face = colour if run.record.status == Status.OK else "white"
-    size = _size(run.case.body.nodes)
-    axes.plot(cost(run), height, marker="o", color=colour, markerfacecolor=face, markersize=size, markeredgewidth=1.5)
+    look = {"color": colour, "markerfacecolor": face, "markeredgewidth": 1.5}
+    axes.plot(cost(run), height, marker=marker, markersize=_size(run.case.body.nodes), **look)
 
 
 def _size(nodes: int) -> float:
@@ -121,7 +126,7 @@ def _size(nodes: int) -> float:
     return 0.36 * np.sqrt(nodes)
 
 
-def _handles(timed: Sequence[Run], steps: Sequence[float]) -> list:
+def _handles(timed: Sequence[Run], steps: Sequence[float], looks: dict[BodyRecipe, BodyLook]) -> list:
     methods = dict.fromkeys(run.case.method.name for run in timed)
     look = {"color": BLACK, "linewidth": 1.5}
     lines = [
@@ -129,10 +134,13 @@ def _handles(timed: Sequence[Run], steps: Sequence[float]) -> list:
         for k, step in enumerate(steps)
     ]
     hollow = {"marker": "o", "color": BLACK, "markerfacecolor": "white", "linestyle": "", "markersize": 7}
+    bodies = dict.fromkeys(looks.values())
+    marks = [Line2D([], [], color=BLACK, marker=b.marker, linestyle="", markersize=7, label=b.name) for b in bodies]
     faults = sorted({readable(run.record.status) for run in timed if run.record.status != Status.OK})
     return [
         *(Line2D([], [], color=method_colour(name), marker="o", label=readable(name)) for name in methods),
         *lines,
+        *(marks if len(marks) > 1 else []),
         band_handle("the reference's own uncertainty"),
         *([Line2D([], [], label=f"hollow: ended {', '.join(faults)}", **hollow)] if faults else []),
     ]

@@ -33,7 +33,7 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
     Raises StudyError for a mesh that cannot be made.
     """
     plan = scene.reference
-    assert plan is not None  # nobody asks for the mesh of a scene without one
+    assert plan is not None  # never called for a scene without one
     if scene.symmetric:
         return _curved_octant(scene, _straight(_octant(scene, level))), [], np.empty((0, 3))
     organ_mesh = mesh_for(scene, int(level))

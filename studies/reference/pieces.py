@@ -9,7 +9,8 @@ from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
 from studies.store.fingerprint import source_fingerprint
 from studies.store.paths import record_path
-from studies.store.record import is_current, peek, why_stale
+from studies.store.record import peek
+from studies.store.staleness import CASE_CHANGED, CODE_CHANGED, MISSING, why_stale
 
 STUDY = "reference"
 
@@ -58,8 +59,12 @@ class Piece:
         return record_path(root, STUDY, self.name, self.key)
 
     def is_current(self, root: Path) -> bool:
-        """Whether it is there, from this code."""
-        return is_current(self.path(root), self.key, reference_fingerprint())
+        """Whether it is there, from this code, as it was written."""
+        return self.why_stale(root) is None
+
+    def why_stale(self, root: Path) -> str | None:
+        """Why it must be solved (again) (studies.store.staleness); None when it need not."""
+        return why_stale(self.path(root), self.key, reference_fingerprint())
 
     @property
     def stamp(self) -> str:
@@ -70,10 +75,10 @@ class Piece:
         """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""
         if kept(self.path(root), self.stamp) is not None:
             return "half-way"
-        why = why_stale(self.path(root), self.key, reference_fingerprint())
+        why = self.why_stale(root)
         if why is None:
             return str(peek(self.path(root)).status)
-        return why if why == "missing" else "unreadable" if why.startswith("unreadable") else "stale"
+        return "missing" if why == MISSING else "stale" if why in (CASE_CHANGED, CODE_CHANGED) else "unreadable"
 
     @property
     def weight(self) -> float:

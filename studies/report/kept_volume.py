@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.metrics.metrics import COMPARABLE
@@ -36,7 +37,7 @@ def kept_volumes(root: Path, studies: Sequence[Study]) -> pd.DataFrame:
         for case in filter(promised, study.cases):
             path = case_path(root, study.name, case)
             try:
-                record = read_record(path, ("volume", "volume_target")) if path.exists() else None
+                record = read_record(path, ("volume", "volume_target")) if is_there(path) else None
             except StudyError:  # a run that failed has no volumes
                 record = None
             if record is None or record.status not in COMPARABLE:

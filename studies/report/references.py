@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from studies.base.atomic import write_whole
+from studies.base.atomic import is_there, write_whole
 from studies.base.errors import StudyError
 from studies.plots.uncertainty import draw
 from studies.reference.load import Reference, load_reference
@@ -21,13 +21,13 @@ TABLE, CHART = "uncertainty.csv", "uncertainty.png"
 
 
 def known_references(root: Path, scenes: Iterable[Scene]) -> dict[str, Reference]:
-    """Those that are solved on all their meshes, by the name of their scene; the others are told of by their study."""
+    """Those that are solved on all their meshes, by the name of their scene; the study reports the others."""
     found = {}
     for scene in scenes:
         try:
             reference = load_reference(root, scene)
         except StudyError:
-            continue  # load_runs says which piece is missing, and why
+            continue  # load_runs reports which piece is missing, and why
         if reference is not None:
             found[scene.name] = reference
     return found
@@ -59,7 +59,7 @@ def state_of(files: Iterable[Path]) -> str:
     """Hash of all that charts and tables are made from: result files with their sizes and times, and the code."""
     digest = hashlib.sha256(source_fingerprint("studies", "massspring", "reference_fem").encode())
     for file in files:
-        state = file.stat() if file.exists() else None
+        state = file.stat() if is_there(file) else None
         digest.update(f"{file.name} {state and (state.st_mtime_ns, state.st_size)}\n".encode())
     return digest.hexdigest()
 
@@ -70,7 +70,7 @@ def refresh_uncertainty(root: Path, scenes: Iterable[Scene]) -> list[Path]:
     folder = study_folder(root, STUDY)
     paths = [folder / TABLE, folder / CHART]
     stamp, state = root / "cache" / f"{STUDY}.drawn", state_of(p.path(root) for scene in each for p in pieces(scene))
-    if all(path.exists() for path in (*paths, stamp)) and stamp.read_text(encoding="utf-8") == state:
+    if all(path.exists() for path in (*paths, stamp)) and stamp.read_bytes() == state.encode():
         return paths
     references = known_references(root, each)
     if not references:

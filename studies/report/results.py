@@ -5,8 +5,9 @@ from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from studies.base.atomic import write_whole
+from studies.base.atomic import is_there, write_whole
 from studies.base.errors import StudyError
+from studies.base.study_file import fault_of_study_file, is_of_study_file
 from studies.catalog.study import Study
 from studies.geometry import SHAPES, organ
 from studies.metrics.cells import DOUBT_MARK, value_cell
@@ -23,12 +24,11 @@ from studies.runs.paper import play, slide_case, squeezed_balls
 from studies.store.csv_table import write_table
 from studies.store.machine import write_machine
 from studies.store.paths import study_folder
+from studies.store.stamps import set_stamp
 from studies.sweep.load import load_runs
 from studies.timing.cases import timing_file
 
-BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
-"""Between these lines of README.md stands the summary; `organbench report --readme` writes it."""
-
+FIGURES = "figures"
 FIGURE_NODES = 550
 PAPER_NODES = {"liver": 544, "stomach": 550}
 """Surface nodes of the organs in Figure 1 of Jung, Hong and Choi (2005)."""
@@ -37,14 +37,24 @@ HEADLINE = "volume_loss"
 
 
 def draw_charts(root: Path, study: Study, runs: Sequence[Run]) -> list[Path]:
-    """Draws all charts of a study; their paths."""
+    """Draws all charts of a study; their paths. Raises StudyError for those that a study file draws and cannot, after
+    the others were drawn."""
     folder = study_folder(root, study.name)
     make_folder(folder)
-    drawn = []
+    failures = []
     for chart in study.charts:
-        chart.draw(runs, folder / chart.file)
-        drawn.append(folder / chart.file)
-    return drawn
+        try:
+            chart.draw(runs, folder / chart.file)
+        except Exception as error:  # a user's own chart may fail in any way
+            own = fault_of_study_file(error)
+            if own is None and is_of_study_file(chart.draw):  # it could not even be called
+                own = f"its function fails: {type(error).__name__}: {error}"
+            if own is None:
+                raise
+            failures.append(f"chart {chart.file} is not drawn, {own}")
+    if failures:
+        raise StudyError("; ".join(failures))
+    return [folder / chart.file for chart in study.charts]
 
 
 def make_folder(folder: Path) -> None:
@@ -64,7 +74,7 @@ def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]
     """
     written, remarks, absent = [], [], []
     for study in studies:
-        if not any(case_path(root, study.name, case).exists() for case in study.cases):
+        if not any(is_there(case_path(root, study.name, case)) for case in study.cases):
             absent.append(study.name)
             continue
         paths, missing = refresh(root, study)
@@ -92,17 +102,26 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
         paths.append(root / "summary.md")
     stamp = root / "cache" / f"{study.name}.drawn.json"
     shown = {"inputs": inputs_of(root, study), "remarks": []}
-    if all(path.exists() for path in paths) and stamp.exists():
-        before = json.loads(stamp.read_text(encoding="utf-8"))
-        if before["inputs"] == shown["inputs"]:
-            return paths, before["remarks"]
+    before = _stamped(stamp)
+    if before.get("inputs") == shown["inputs"] and all(path.exists() for path in paths):
+        return paths, before["remarks"]
     runs, shown["remarks"] = load_runs(root, study)
-    draw_charts(root, study, runs)
     write_table(table, study_table(runs, study.columns))
     if study.name == HEADLINE:
         write_whole(root / "summary.md", (summary_of({HEADLINE: runs}) + "\n").encode())
+    draw_charts(root, study, runs)
     write_whole(stamp, json.dumps(shown).encode())
     return paths, shown["remarks"]
+
+
+def _stamped(stamp: Path) -> dict[str, Any]:
+    """What was drawn last; nothing when that is not known, or cannot be read: then it is drawn again."""
+    try:
+        before = json.loads(stamp.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    known = isinstance(before, dict) and isinstance(before.get("inputs"), str)
+    return before if known and isinstance(before.get("remarks"), list) else {}
 
 
 def inputs_of(root: Path, study: Study) -> str:
@@ -114,11 +133,13 @@ def inputs_of(root: Path, study: Study) -> str:
 
 def draw_figures(root: Path) -> list[Path]:
     """The gallery of all organs, and Figures 1 to 4 of Jung, Hong and Choi (2005) from our runs; their paths."""
-    gallery, springs = root / "figures" / "organs.png", root / "figures" / "organ_springs.png"
+    gallery, springs = root / FIGURES / "organs.png", root / FIGURES / "organ_springs.png"
     make_folder(gallery.parent)
     draw_organs({name: organ(name, FIGURE_NODES) for name in SHAPES}, gallery)
     draw_organ_springs({name: organ(name, nodes, fill=False) for name, nodes in PAPER_NODES.items()}, springs)
-    return [gallery, springs, *draw_paper(gallery.parent)]
+    paper = draw_paper(gallery.parent)
+    set_stamp(root, FIGURES)
+    return [gallery, springs, *paper]
 
 
 def draw_paper(folder: Path) -> list[Path]:
@@ -178,15 +199,3 @@ def _cell(row: Mapping[Hashable, Any], column: str) -> str:
     floor = float(row.get(column.replace(" [", " floor ["), float("nan")))
     doubtful = column.split(" [")[0] in str(row.get(DOUBTFUL, "")).split()
     return value_cell(value, floor, signed=column.startswith("force"), doubtful=doubtful)
-
-
-def write_readme(readme: Path, summary: str) -> None:
-    """Replaces what stands between the marks in README.md. Raises StudyError when the marks are missing."""
-    if not readme.is_file():
-        raise StudyError(f"there is no file {readme} to put the table into; run the command where it lies")
-    text = readme.read_text(encoding="utf-8")
-    if BEGIN not in text or END not in text:
-        raise StudyError(f"{readme} has no lines '{BEGIN}' and '{END}' to put the table between")
-    head, rest = text.split(BEGIN, 1)
-    tail = rest.split(END, 1)[1]
-    write_whole(readme, f"{head}{BEGIN}\n{summary.strip()}\n{END}{tail}".encode())

@@ -1,7 +1,6 @@
 """A case: scene × body recipe × method × time step, and its form as JSON, under which it is stored and found again."""
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
@@ -10,9 +9,9 @@ from typing import Any, Literal
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 
 from massspring import METHODS, ImplicitVolume, Method
-from massspring.run.history import EXTRA
 from studies.base.errors import StudyError
 from studies.base.lookup import choose
+from studies.runs.case_checks import check_settings
 from studies.scene.as_json import _scene_adapter, scene_from_dict
 from studies.scene.scene import Scene
 
@@ -70,28 +69,17 @@ class Case:
     beyond_limit: bool = False
     """Whether a step above the stability limit is wanted; it is refused otherwise."""
     precision: Literal["float64", "float32"] = "float64"
-    """Of the mass-spring state."""
+    """Of the mass-spring state; float32 for methods that claim it."""
     recorded: tuple[str, ...] = ()
     """Fields beside those that metrics read: of `massspring.run.history.EXTRA`, the energies."""
     timed: bool = False
     """Whether frame times are measured by the timing protocol."""
 
     def __post_init__(self) -> None:
-        if self.dt != "auto" and not _positive(self.dt):
-            raise StudyError(
-                f"dt is {self.dt!r} s; it must be positive, or 'auto' for a fraction of the stability limit"
-            )
-        if not _positive(self.dt_fraction):
-            raise StudyError(
-                f"dt_fraction is {self.dt_fraction!r}; it must be positive, 1 is the stability limit itself"
-            )
-        if self.frames is not None and (type(self.frames) is not int or self.frames < 1):
-            raise StudyError(f"frames is {self.frames!r}; give a whole number from 1 on, or None for the scene's own")
-        if self.precision not in ("float64", "float32"):
-            raise StudyError(f"the precision is '{self.precision}'; choose float64 or float32")
-        unknown = sorted(set(self.recorded) - set(EXTRA))
-        if unknown:
-            raise StudyError(f"no extra field is called '{unknown[0]}'; there are {', '.join(EXTRA)}")
+        for given, kind in ((self.scene, Scene), (self.body, BodyRecipe)):
+            if not isinstance(given, kind):
+                raise StudyError(f"a case needs a {kind.__name__}, not {given!r}; see `organbench list`")
+        check_settings(self)
 
     @property
     def name(self) -> str:
@@ -192,7 +180,7 @@ def case_from_json(text: str) -> Case:
 
 
 def method_from_dict(data: Mapping[str, Any]) -> Method:
-    """The method of {"name": …, "settings": {…}}; a setting that no one reads is an error. Raises StudyError."""
+    """The method of {"name": …, "settings": {…}}; an unknown setting is an error. Raises StudyError."""
     kind = choose(data["name"], {method.name: method for method in METHODS}, "method")
     unknown = set(data["settings"]) - set(kind.__dataclass_fields__)  # pyright: ignore[reportAttributeAccessIssue]
     if unknown:
@@ -219,9 +207,9 @@ def _unread(given: Any, understood: Any, where: str = "") -> list[str]:
     return []
 
 
-def _positive(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0 < value < math.inf
-
-
 def _first_line(error: Exception) -> str:
-    return " ".join(str(error).split("\n")[:3])
+    if isinstance(error, ValidationError):
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        return f"{where} = {str(first['input'])[:60]!r}: {first['msg']}"
+    return str(error).split("\n")[0]

@@ -5,7 +5,7 @@ from pathlib import Path
 from studies.runs.case import Case
 from studies.store.fingerprint import source_fingerprint
 from studies.store.paths import record_path
-from studies.store.record import is_current
+from studies.store.staleness import why_stale
 
 
 def run_fingerprint() -> str:
@@ -18,6 +18,6 @@ def case_path(root: Path, study: str, case: Case) -> Path:
     return record_path(root, study, case.name, case.key)
 
 
-def case_is_current(root: Path, study: str, case: Case) -> bool:
-    """Whether it is there, from this code."""
-    return is_current(case_path(root, study, case), case.key, run_fingerprint())
+def why_case_is_stale(root: Path, study: str, case: Case) -> str | None:
+    """Why it must run (again) (studies.store.staleness); None when it need not."""
+    return why_stale(case_path(root, study, case), case.key, run_fingerprint())

@@ -23,6 +23,7 @@ from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.runs.case import BodyRecipe, Case
+from studies.runs.limits import check_size
 from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scene.scene import Scene
 
@@ -31,7 +32,7 @@ LUMEN, WHOLE = "lumen", "whole"
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """All that a run needs, and what a report says about it."""
+    """All that a run needs, and what a report shows of it."""
 
     mesh: OrganMesh
     setup: Setup
@@ -112,7 +113,7 @@ def prepare(case: Case) -> Prepared:
     # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.
     mesh = mesh_for(scene, case.body.nodes, filled=case.body.kind == "tetrahedral" or scene.lumen is not None)
     body = body_for(scene, case.body, mesh)
-    reason = case.method.applies(body)
+    reason = case.method.why_not(body)
     if reason is not None:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to the {case.body.kind} body: {reason}")
     targets = targets_for(scene, mesh, body)
@@ -122,8 +123,10 @@ def prepare(case: Case) -> Prepared:
     held = np.concatenate([a.nodes for a in attachments]) if attachments else None
     limit = step_limit(body, scene.damping, held, case.method.added_stiffness(body))
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
-    beyond = case.beyond_limit or not case.method.limited
-    clock = make_clock(scene.duration, case.frames or scene.frames, dt, limit, beyond)
+    frames = case.frames or scene.frames
+    check_size(scene.duration, frames, dt, limit, body, len(scene.obstacles) + len(attachments))
+    beyond = case.beyond_limit or not case.method.capabilities.conditionally_stable
+    clock = make_clock(scene.duration, frames, dt, limit, beyond)
     setup = Setup(
         body,
         case.method,

@@ -13,14 +13,14 @@ from studies.base.compile_watch import watching
 from studies.base.errors import DoesNotApply, StudyError
 from studies.runs.case import Case, case_from_json
 from studies.runs.current import case_path, run_fingerprint
+from studies.runs.limits import TIME_LIMIT
 from studies.runs.prepare import LUMEN, Prepared, prepare
-from studies.store.new_record import new_record
+from studies.store.new_record import new_fields, new_record
 from studies.store.record import Field, Record, Status, read_record, write_record
+from studies.store.schema import RUN_FIELDS
 
 DRIFT = 0.01
 """A method that keeps the volume and is this far from it has drifted: thirty times what the worst claims allow."""
-TIME_LIMIT = 600.0
-"""Wall time after which a run is given up [s]: ten times the longest case of the catalogue."""
 
 
 def run_case(root: Path, study: str, case: Case, on_frame: Callable[[int], object] | None = None) -> Path:
@@ -117,30 +117,24 @@ def _attributes(prepared: Prepared, history: History) -> dict[str, float | int |
 
 def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field]:
     body = prepared.setup.body
-    energies = {
-        "kinetic": Field(history.kinetic, "J", "kinetic energy"),
-        "elastic": Field(history.elastic, "J", "energy of the springs"),
+    values = {
+        "t": history.t,
+        "volume": history.volume,
+        "volume_target": history.volume_target,
+        "pressure": history.pressure,
+        "contact_force": history.contact_force,
+        "penetration": history.penetration,
+        "held_force": history.held_force,
+        "iterations": history.iterations,
+        "min_j": history.min_j,
+        "snapshot_frame": history.snapshot_frames,
+        "snapshots": history.snapshots,
+        "rest": body.rest,
+        "mass": body.mass,
+        "triangles": body.triangles,
+        "tetrahedra": body.tetrahedra,
     }
-    return {
-        **{name: energies[name] for name in case.recorded},
-        "t": Field(history.t, "s", "end of each frame"),
-        "volume": Field(history.volume, "m^3", "enclosed volume, one column per kept volume"),
-        "volume_target": Field(history.volume_target, "m^3", "what each kept volume should be"),
-        "pressure": Field(history.pressure, "Pa", "multiplier of each kept volume in the last step of the frame"),
-        "contact_force": Field(history.contact_force, "N", "force of each obstacle on the body, mean of the frame"),
-        "penetration": Field(history.penetration, "m", "depth of the deepest surface node in each obstacle"),
-        "held_force": Field(history.held_force, "N", "force of each held region on the body, mean of the frame"),
-        "iterations": Field(history.iterations, "1", "for the multipliers: sum of the frame, most in a step"),
-        "min_j": Field(history.min_j, "1", "smallest tetrahedron volume ratio; NaN without tetrahedra"),
-        "snapshot_frame": Field(
-            history.snapshot_frames, "1", "number of the frame after which each snapshot was taken"
-        ),
-        "snapshots": Field(history.snapshots, "m", "positions at the scene's checkpoints"),
-        "rest": Field(body.rest, "m", "rest positions"),
-        "mass": Field(body.mass, "kg", "mass of each node"),
-        "triangles": Field(body.triangles, "1", "nodes of each surface triangle, outward"),
-        "tetrahedra": Field(body.tetrahedra, "1", "nodes of each tetrahedron"),
-    }
+    return new_fields(RUN_FIELDS, values | {name: getattr(history, name) for name in case.recorded})
 
 
 def replay(path: Path) -> tuple[Record, Record, str | None]:

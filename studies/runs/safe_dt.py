@@ -27,7 +27,7 @@ class SafeStep:
     """The step that dt = "auto" takes [s]."""
     tried: tuple[tuple[float, Status], ...]
     """(time step [s], how the run ended), ascending."""
-    limited: bool = True
+    conditionally_stable: bool = True
     """False for a method whose steps have no limit of stability; `limit` is then that of explicit methods."""
 
     @property
@@ -49,7 +49,7 @@ class SafeStep:
 
         Where there is none, whether no run diverged.
         """
-        if not self.limited:
+        if not self.conditionally_stable:
             return all(status != Status.DIVERGED for _, status in self.tried)
         found = self.bracket
         return found is not None and found[0] < self.limit.damped < found[1]
@@ -57,7 +57,7 @@ class SafeStep:
     @property
     def verdict(self) -> str:
         """What the runs say of the prediction, in a sentence."""
-        if not self.limited:
+        if not self.conditionally_stable:
             held = "verified" if self.verified else "not verified"
             return f"no stability limit, {held}; accuracy alone limits the step: try half of it and compare"
         if self.verified:
@@ -77,9 +77,9 @@ def safe_step(case: Case) -> SafeStep:
     """
     prepared = prepare(case)
     limit, auto = prepared.limit, prepared.setup.clock.dt
-    if not case.method.limited:
+    if not case.method.capabilities.conditionally_stable:
         longer = [_tried(case, factor * limit.damped) for factor in FAR_BEYOND]
-        return SafeStep(limit, auto, tuple(longer), limited=False)
+        return SafeStep(limit, auto, tuple(longer), conditionally_stable=False)
     tried = [_tried(case, fraction * limit.damped) for fraction in (BELOW, ABOVE)]
     while len(tried) < MOST_RUNS and tried[0][1] == Status.DIVERGED:
         tried.insert(0, _tried(case, tried[0][0] / WIDER))

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import h5py
 
-from studies.base.atomic import sweep_parts, write_whole
+from studies.base.atomic import is_there, sweep_parts, write_whole
 from studies.base.errors import StudyError
+from studies.store.checksums import BLOCK, sealed
 from studies.store.paths import index_path, record_files, timing_files
 from studies.store.record import INDEX_KIND, SCHEMA, peek
 
@@ -24,11 +25,13 @@ def link_study(root: Path, study: str) -> list[str]:
     targets, unreadable = _targets(record_files(root, study))
     timings, more = _targets(timing_files(root, study), by_machine=True)
     image = io.BytesIO()
-    with h5py.File(image, "w") as file:
+    with h5py.File(image, "w", userblock_size=BLOCK) as file:
         file.attrs.update({"schema": SCHEMA, "kind": INDEX_KIND, "name": study})
         for name, target in (targets | timings).items():
             file[name] = h5py.ExternalLink(target.name, "/")
-    write_whole(index, image.getvalue())
+    content = sealed(image.getvalue())
+    if not is_there(index) or index.read_bytes() != content:  # a folder that cannot be written to may be looked at
+        write_whole(index, content)
     return unreadable + more
 
 

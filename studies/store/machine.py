@@ -31,7 +31,7 @@ class Machine:
     virtual: bool | None
     """Whether a hypervisor lies in between (None: not known): other guests may then take time away."""
     clock: dict[str, str | int | None]
-    """max_mhz and governor of core 0 (None: not told by the system); the timer and its resolution [ns]."""
+    """max_mhz and governor of core 0 (None: the system does not report it); the timer and its resolution [ns]."""
     memory_gb: int | None
     system: str
     python: str

@@ -3,8 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from studies.base.errors import StudyError
 from studies.store.machine import machine_id
 from studies.store.record import SCHEMA, Field, Record, Status
+from studies.store.schema import FieldSpec
 
 
 def new_record(
@@ -20,3 +24,14 @@ def new_record(
 ) -> Record:
     """A record with the current schema and this machine's id filled in."""
     return Record(SCHEMA, kind, key, name, status, message, fingerprint, machine_id(), dict(attributes), dict(fields))
+
+
+def new_fields(specs: Mapping[str, FieldSpec], values: Mapping[str, np.ndarray]) -> dict[str, Field]:
+    """`values` as fields, with the units and descriptions of their table (studies.store.schema).
+
+    Raises StudyError for a name that the table lacks.
+    """
+    unknown = sorted(set(values) - set(specs))
+    if unknown:
+        raise StudyError(f"no table of studies/store/schema.py lists the field {unknown[0]!r}; give it a line there")
+    return {name: Field(np.asarray(v), specs[name].unit, specs[name].description) for name, v in values.items()}

@@ -1,14 +1,12 @@
 """What a case produced, in one HDF5 file that explains itself: status, units, a description of every array.
 
-A failure is a record too, with its status, its message and NaN after the moment it failed. Layout: docs/results.md.
+A failure is a record too, with its status, its message and NaN after the moment it failed. Layout: schema.py.
 """
 
 import io
 import json
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
-from enum import StrEnum
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,27 +14,19 @@ import h5py
 import numpy as np
 
 from studies.base.atomic import write_whole
-from studies.base.errors import StudyError
+from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.base.lookup import choose
+from studies.store.checksums import BLOCK, attribute_digest, field_digest, manifest, plain, sealed
+from studies.store.opening import AGAIN, open_results
+from studies.store.schema import Status, fault
 
 INDEX_KIND = "index"
 """Of the file that holds links to a study's records and none of their parts."""
-SCHEMA = 1
-"""Version of the layout; raised when a reader of the old one would misread the new one."""
-
-
-class Status(StrEnum):
-    """How a case ended."""
-
-    OK = "ok"
-    DIVERGED = "diverged"
-    INVERTED = "inverted"
-    DRIFTED = "drifted"
-    NOT_CONVERGED = "not-converged"
-    BLOCKED = "blocked"
-    TIMED_OUT = "timed-out"
-    FAILED = "failed"
-    SKIPPED = "skipped"
+SCHEMA = 2
+"""Version of the layout (studies.store.schema); raised when a reader of the old one would misread the new one. 1 had no
+checksums."""
+CHECKSUMS = "checksums"
+"""Attribute with the digests of all others and of all fields (studies.store.checksums)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,79 +72,53 @@ def write_record(path: Path, record: Record) -> None:
     _check(record)
     # Built in memory: a full disk then fails in one plain write, never half-way inside the HDF5 library.
     image = io.BytesIO()
-    with h5py.File(image, "w") as file:
-        for name in HEADER:
-            file.attrs[name] = _storable(getattr(record, name))
-        for name, value in record.attributes.items():
+    # Since 1.10 the format has checksums of its own for all but the values.
+    with h5py.File(image, "w", userblock_size=BLOCK) as file:
+        attributes = {name: getattr(record, name) for name in HEADER} | record.attributes
+        for name, value in attributes.items():
             file.attrs[name] = _storable(value)
+        file.attrs[CHECKSUMS] = manifest(attributes, record.fields)
         for name, item in record.fields.items():
             data = np.asarray(item.values)
             text = h5py.string_dtype() if data.dtype.kind == "U" else None
-            dataset = file.create_dataset(name, data=data.astype(object) if text else data, dtype=text)
+            # Checksums of values need chunks, which scalars, nothing and text of any length cannot have.
+            checked = {"chunks": data.shape, "fletcher32": True} if data.ndim and data.size and not text else {}
+            dataset = file.create_dataset(name, data=data.astype(object) if text else data, dtype=text, **checked)
             dataset.attrs["unit"], dataset.attrs["description"] = item.unit, item.description
-    write_whole(Path(path), image.getvalue())
+    write_whole(Path(path), sealed(image.getvalue()))
 
 
 def read_record(path: Path, fields: Iterable[str] | None = None) -> Record:
-    """The record in `path`, with all fields or only the named ones. The file is opened read-only.
+    """The record in `path`, with all fields or only the named ones, each held to its checksum; with all of them, the
+    record also to its table (studies.store.schema). The file is opened read-only. Parts that others added are left out.
 
-    Raises StudyError when the file is missing, cut off, not ours, of another schema, or lacks a named field.
+    Raises StudyError when the file is missing, of another program or lacks a named field, DamagedFile when its content
+    is not what was written, OtherVersion for another schema.
     """
-    with open_results(path) as file:
-        header, attributes = _attributes(path, file)
-        datasets = _datasets(file)
-        names = datasets if fields is None else [choose(name, list(datasets), "field") for name in fields]
-        return Record(**header, attributes=attributes, fields={n: _field(datasets[n]) for n in names})
+    with open_results(path) as (file, _):
+        record, digests = _header(path, file)
+        names = digests if fields is None else [choose(name, list(digests), "field") for name in fields]
+        record = replace(record, fields={name: _field(path, file, name, digests[name]) for name in names})
+    wrong = None if fields is not None else fault(record.kind, record.status, record.attributes, record.fields)
+    if wrong:
+        raise DamagedFile(f"{path} {wrong}: {AGAIN}")
+    return record
 
 
 def peek(path: Path) -> Record:
-    """The record in `path` without its fields: about a millisecond, whatever the size. Errors as read_record."""
-    with open_results(path) as file:
-        header, attributes = _attributes(path, file)
-        return Record(**header, attributes=attributes)
-
-
-def why_stale(path: Path, key: str, fingerprint: str) -> str | None:
-    """Why the case must run (again): "missing", "unreadable: ...", "the case changed", "the code changed"; or None."""
-    if not Path(path).exists():
-        return "missing"
-    try:
-        record = peek(path)
-    except StudyError as problem:
-        return f"unreadable: {problem}"
-    if canonical(record.key) != canonical(key):
-        return "the case changed"
-    return None if record.fingerprint == fingerprint else "the code changed"
-
-
-def is_current(path: Path, key: str, fingerprint: str) -> bool:
-    """Whether `path` holds the result of this very case by this very code (ok or failed alike)."""
-    return why_stale(path, key, fingerprint) is None
+    """The record in `path` without its fields, but held to all checksums: some milliseconds, and one for every
+    megabyte. Errors as read_record."""
+    with open_results(path) as (file, untouched):
+        record = _header(path, file)[0]
+    return record if untouched else replace(read_record(path), fields={})
 
 
 def canonical(key: str) -> str:
     """The JSON text of a case with sorted names and no blanks, so that equal cases are equal text."""
     try:
         return json.dumps(json.loads(key), sort_keys=True, separators=(",", ":"))
-    except ValueError as problem:
-        raise StudyError(f"a case must be JSON text, not {key[:60]!r} ({problem})") from problem
-
-
-@contextmanager
-def open_results(path: Path) -> Iterator[h5py.File]:
-    """The HDF5 file read-only, with the library's errors told in one sentence (StudyError)."""
-    path = Path(path)
-    if not path.is_file():
-        raise StudyError(f"there is no results file {path}: `organbench status` says which cases are stored")
-    try:
-        # Stored files never change, so no lock is needed; some network folders cannot give one.
-        with h5py.File(path, "r", locking=False) as file:
-            yield file
-    except (OSError, RuntimeError, KeyError) as problem:
-        if isinstance(problem, PermissionError):
-            raise StudyError(f"{path} may not be read by this user: change its permissions") from problem
-        what = "is cut off or damaged" if h5py.is_hdf5(path) else "is not an HDF5 file, or was cut off"
-        raise StudyError(f"{path} {what} ({path.stat().st_size} bytes): delete it and run its case again") from problem
+    except (TypeError, ValueError, RecursionError) as problem:
+        raise StudyError(f"a case must be JSON text, not {str(key)[:60]!r} ({problem})") from problem
 
 
 def _check(record: Record) -> None:
@@ -163,13 +127,15 @@ def _check(record: Record) -> None:
     canonical(record.key)
     choose(record.status, [str(status) for status in Status], "status")
     for name, value in record.attributes.items():
-        plain = value is None or isinstance(value, (str, bool, int, float, np.number, np.bool_))
-        if name in HEADER or not (plain or _is_short_list(value)):
+        simple = value is None or isinstance(value, (str, bool, int, float, np.number, np.bool_))
+        if name in (*HEADER, CHECKSUMS) or not (simple or _is_short_list(value)):
             raise StudyError(
                 f"attribute {name!r} = {str(value)[:60]!r} of record {record.name!r} cannot be stored: "
                 f"its name must not be one of {', '.join(HEADER)} and its value a number, text, None or a short list"
                 " of numbers; an array is a field"
             )
+    for name in (name for name in HEADER if "\0" in str(getattr(record, name))):
+        raise StudyError(f"{name} {getattr(record, name)[:60]!r} of a record holds a zero byte, which no file can keep")
     for name, item in record.fields.items():
         kind = np.asarray(item.values).dtype.kind
         if kind not in "biufU" or not item.description or (not item.unit and kind != "U"):
@@ -177,6 +143,9 @@ def _check(record: Record) -> None:
                 f"field {name!r} of record {record.name!r} needs numbers or text (not dtype kind {kind!r}), "
                 f"a unit ('1' for none; it has {item.unit!r}) and a description (it has {item.description!r})"
             )
+    wrong = fault(record.kind, record.status, record.attributes, record.fields)
+    if wrong:
+        raise StudyError(f"record {record.name!r} {wrong}; studies/store/schema.py lists what a {record.kind} holds")
 
 
 def _is_short_list(value: Any) -> bool:
@@ -186,23 +155,31 @@ def _is_short_list(value: Any) -> bool:
     return array.dtype.kind in "biuf" and array.nbytes <= 4096
 
 
-def _attributes(path: Path, file: h5py.File) -> tuple[dict[str, Any], dict[str, Any]]:
-    values = {name: _plain(value) for name, value in file.attrs.items()}
-    missing = [name for name in HEADER if name not in values]
-    if "schema" in missing:
+def _header(path: Path, file: h5py.File) -> tuple[Record, dict[str, str]]:
+    """The record without fields, and the digest of each field by name."""
+    if "schema" not in file.attrs:
         raise StudyError(f"{path} is an HDF5 file, but not a results file of organbench: it has no schema version")
-    if values["schema"] != SCHEMA:
-        raise StudyError(
-            f"{path} has results schema {values['schema']}, this version reads {SCHEMA}: run its case again, "
+    schema = _plain(file.attrs["schema"])
+    if schema != SCHEMA:
+        raise OtherVersion(
+            f"{path} has results schema {schema}, this version reads {SCHEMA}: run its case again, "
             "or read it with the version that wrote it"
         )
-    if values.get("kind") == INDEX_KIND:
+    if _plain(file.attrs.get("kind")) == INDEX_KIND:
         raise StudyError(f"{path} is the index of a study, not a case: give one of the files beside it")
-    if missing:
-        raise StudyError(f"{path} lacks the attribute {missing[0]!r}: delete it and run its case again")
+    if CHECKSUMS not in file.attrs:
+        raise DamagedFile(f"{path} lacks the attribute {CHECKSUMS!r}: {AGAIN}")
+    digests = json.loads(str(file.attrs[CHECKSUMS]))
+    values = {}
+    for name, digest in digests["attributes"].items():
+        if name not in file.attrs:
+            raise DamagedFile(f"{path} lacks the attribute {name!r}: {AGAIN}")
+        values[name] = _plain(file.attrs[name])
+        if attribute_digest(values[name]) != digest:
+            raise DamagedFile(f"{path}: the attribute {name!r} has changed since it was written: {AGAIN}")
     header = {name: values.pop(name) for name in HEADER}
     header["status"] = Status(choose(header["status"], [str(status) for status in Status], f"status in {path}"))
-    return header, values
+    return Record(**header, attributes=values), digests["fields"]
 
 
 def _storable(value: Any) -> Any:
@@ -212,19 +189,21 @@ def _storable(value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, h5py.Empty):
-        return None
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+    return None if isinstance(value, h5py.Empty) else plain(value)
 
 
-def _datasets(file: h5py.File) -> dict[str, h5py.Dataset]:
-    found: dict[str, h5py.Dataset] = {}
-    file.visititems(lambda name, item: found.update({name: item}) if isinstance(item, h5py.Dataset) else None)
-    return found
-
-
-def _field(dataset: h5py.Dataset) -> Field:
+def _field(path: Path, file: h5py.File, name: str, digest: str) -> Field:
+    dataset = file.get(name)
+    if not isinstance(dataset, h5py.Dataset):
+        raise DamagedFile(f"{path} lacks {name!r}: {AGAIN}")
+    for part in ("unit", "description"):
+        if part not in dataset.attrs:
+            raise DamagedFile(f"{path}: {name!r} has lost its {part}: {AGAIN}")
     text = h5py.check_string_dtype(dataset.dtype) is not None
+    if not text and dataset.nbytes > path.stat().st_size:  # nothing is compressed
+        raise DamagedFile(f"{path}: {name!r} claims {dataset.nbytes} bytes, more than the file has: {AGAIN}")
     values = np.asarray(dataset.asstr()[()] if text else dataset[()])
-    unit, description = str(dataset.attrs["unit"]), str(dataset.attrs["description"])
-    return Field(values.astype(str) if text else values, unit, description)
+    found = Field(values.astype(str) if text else values, str(dataset.attrs["unit"]), str(dataset.attrs["description"]))
+    if field_digest(found) != digest:
+        raise DamagedFile(f"{path}: {name!r} has changed since it was written: {AGAIN}")
+    return found

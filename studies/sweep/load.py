@@ -1,35 +1,50 @@
 """The stored runs of a study, beside their references and frame times."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
-from studies.base.errors import StudyError
+from studies.base.atomic import is_there
+from studies.base.errors import OtherVersion, StudyError
 from studies.catalog.study import Study
 from studies.metrics.run import Run
-from studies.reference.load import Reference, load_reference
+from studies.reference.load import load_reference
 from studies.runs.current import case_path
 from studies.store.record import read_record
 from studies.timing.cases import read_timing
 
+T = TypeVar("T")
+
 
 def load_runs(root: Path, study: Study) -> tuple[list[Run], list[str]]:
-    """The stored runs of a study with references and timings, and what is missing, a sentence each."""
-    references: dict[str, Reference | None] = {}
-    remarks: list[str] = []
-    for scene in study.scenes:
+    """The stored runs of a study with references and timings, and what is missing or damaged, a sentence each."""
+    problems: list[StudyError] = []
+
+    def tried(load: Callable[[], T]) -> T | None:
         try:
-            references[scene.name] = load_reference(root, scene)
+            return load()
         except StudyError as error:
-            references[scene.name] = None
-            remarks.append(str(error))
+            problems.append(error)
+            return None
+
+    references = {scene.name: tried(partial(load_reference, root, scene)) for scene in study.scenes}
     runs = []
     for case in study.cases:
         path = case_path(root, study.name, case)
-        if not path.exists():
-            remarks.append(f"case {case.name} has not run")
+        if not is_there(path):
+            problems.append(StudyError(f"case {case.name} has not run"))
             continue
-        try:
-            timing = read_timing(root, study.name, case) if case.timed else None
-            runs.append(Run(case, read_record(path), references[case.scene.name], timing))
-        except StudyError as error:
-            remarks.append(str(error))
-    return runs, remarks
+        record = tried(partial(read_record, path))
+        if record is not None:
+            timing = tried(partial(read_timing, root, study.name, case)) if case.timed else None
+            runs.append(Run(case, record, references[case.scene.name], timing))
+    return runs, _remarks(problems)
+
+
+def _remarks(problems: list[StudyError]) -> list[str]:
+    """A sentence each, but one for all files of another version: after an update these are all files."""
+    others = [str(problem) for problem in problems if isinstance(problem, OtherVersion)]
+    more = f" (and {len(others) - 1} more files)" if len(others) > 1 else ""
+    said = [str(problem) for problem in problems if not isinstance(problem, OtherVersion)]
+    return [*said, others[0] + more] if others else said

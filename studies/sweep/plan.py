@@ -8,7 +8,8 @@ from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.reference.pieces import Piece
 from studies.runs.current import run_fingerprint
-from studies.store.record import peek, why_stale
+from studies.store.record import peek
+from studies.store.staleness import why_stale
 from studies.sweep.tasks import Task, tasks_of
 from studies.timing.cases import can_be_timed, timing_file
 
@@ -36,7 +37,9 @@ def plan(root: Path, study: Study, wanted: Callable[[Task], bool] | None = None)
     found = []
     for task in todo:
         kind = "reference" if isinstance(task.work, Piece) else "case"
-        found.append(Planned(PHYSICS, kind, task.label, task.why() or "its result is a failure", _seconds(task.path())))
+        found.append(
+            Planned(PHYSICS, kind, task.label, task.why_stale() or "its result is a failure", _seconds(task.path()))
+        )
     runs = {task.label for task in todo}
     for case in study.cases:
         if not case.timed or (wanted is not None and case.name not in runs):
@@ -49,8 +52,6 @@ def plan(root: Path, study: Study, wanted: Callable[[Task], bool] | None = None)
 
 
 def _seconds(path: Path) -> float | None:
-    if not path.exists():
-        return None
     try:
         return peek(path).attributes.get("seconds")
     except StudyError:

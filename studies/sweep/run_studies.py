@@ -109,7 +109,7 @@ def perform(
     except BrokenProcessPool as error:
         pool.shutdown()  # waits until every exit code is known
         if any(died_of_it(worker.exitcode) for worker in workers):
-            raise KeyboardInterrupt from error  # ours is still under way
+            raise KeyboardInterrupt from error  # the interrupt of this process is still being handled
         raise StudyError(
             "a computing process died (out of memory, or killed); what is finished is stored, run the command again"
         ) from error

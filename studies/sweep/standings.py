@@ -7,6 +7,7 @@ from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.runs.current import case_path
 from studies.store.record import Record, Status, peek
+from studies.store.staleness import MISSING
 from studies.sweep.tasks import Task, tasks_of
 
 
@@ -39,15 +40,12 @@ def standings(root: Path, study: Study) -> list[Standing]:
     """Every piece of a study: ok, failed in some way, stale or missing."""
     found = []
     for task in tasks_of(root, [study]):
-        path = task.path()
-        if not path.exists():
-            found.append(Standing(task, "missing", "has not run"))
-        elif not task.is_current():
-            damaged = "its file is damaged" if stored(path) is None else "the code or the case has changed since"
-            found.append(Standing(task, "stale", damaged))
-        else:
-            record = peek(path)
+        why = task.why_stale()
+        if why is None:
+            record = peek(task.path())
             found.append(Standing(task, str(record.status), record.message))
+        else:
+            found.append(Standing(task, "missing" if why == MISSING else "stale", why))
     return found
 
 

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studies.catalog.study import Study
-from studies.reference.pieces import Piece, pieces, reference_fingerprint
+from studies.reference.pieces import Piece, pieces
 from studies.runs.case import Case
-from studies.runs.current import case_is_current, case_path, run_fingerprint
-from studies.store.record import why_stale
+from studies.runs.current import case_path, why_case_is_stale
 
 
 @dataclass(frozen=True)
@@ -33,14 +32,13 @@ class Task:
 
     def is_current(self) -> bool:
         """Whether it need not run."""
-        if isinstance(self.work, Piece):
-            return self.work.is_current(self.root)
-        return case_is_current(self.root, self.study, self.work)
+        return self.why_stale() is None
 
-    def why(self) -> str | None:
-        """Why it must run, as studies.store.record.why_stale says; None when it need not."""
-        piece = isinstance(self.work, Piece)
-        return why_stale(self.path(), self.work.key, reference_fingerprint() if piece else run_fingerprint())
+    def why_stale(self) -> str | None:
+        """Why it must run (again) (studies.store.staleness); None when it need not."""
+        if isinstance(self.work, Piece):
+            return self.work.why_stale(self.root)
+        return why_case_is_stale(self.root, self.study, self.work)
 
     def path(self) -> Path:
         """Where its record lies."""

@@ -5,15 +5,17 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from massspring import Free, simulate
+from studies.base.atomic import is_there
 from studies.base.compile_watch import watching
-from studies.base.errors import StudyError
+from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.runs.case import Case
 from studies.runs.current import case_path, run_fingerprint
 from studies.runs.prepare import prepare
 from studies.store.machine import machine_id
 from studies.store.new_record import new_record
 from studies.store.paths import timing_path
-from studies.store.record import Status, is_current, peek, read_record, write_record
+from studies.store.record import Status, canonical, peek, read_record, write_record
+from studies.store.staleness import is_current
 from studies.timing.protocol import FrameTiming, interleave, pinned
 from studies.timing.stage_cost import ROWS, stage_times
 
@@ -26,9 +28,13 @@ def timing_file(root: Path, study: str, case: Case) -> Path:
 
 
 def can_be_timed(root: Path, study: str, case: Case) -> bool:
-    """Whether the case ran to its end: a run that broke off has no comparable frames."""
+    """Whether the case ran to its end: a run that broke off has no comparable frames, and one that cannot be read
+    has none yet."""
     path = case_path(root, study, case)
-    return path.exists() and peek(path).status in (Status.OK, Status.INVERTED, Status.DRIFTED)
+    try:
+        return is_there(path) and peek(path).status in (Status.OK, Status.INVERTED, Status.DRIFTED)
+    except (DamagedFile, OtherVersion):
+        return False
 
 
 def timing_is_current(root: Path, study: str, case: Case) -> bool:
@@ -39,11 +45,16 @@ def timing_is_current(root: Path, study: str, case: Case) -> bool:
 
 
 def read_timing(root: Path, study: str, case: Case) -> FrameTiming | None:
-    """This machine's frame times of a case; None where it has none from this code."""
+    """This machine's frame times of a case; None where it has none from this code.
+
+    Raises StudyError when they cannot be read.
+    """
     path = timing_file(root, study, case)
-    if not is_current(path, case.key, run_fingerprint()):
+    if not is_there(path):
         return None
     record = read_record(path)
+    if canonical(record.key) != canonical(case.key) or record.fingerprint != run_fingerprint():
+        return None
     attributes = record.attributes
     return FrameTiming(record.fields["frame_ns"].values, attributes["core"], attributes["threads"])
 

@@ -12,7 +12,9 @@ from numba.core import config
 from threadpoolctl import threadpool_limits
 
 from studies.base.errors import StudyError
+from studies.store.new_record import new_fields
 from studies.store.record import Field
+from studies.store.schema import TIMING_FIELDS
 from studies.timing.statistics import DEADLINES_MS, Ratio, kernel_ns, missed, percentiles, ratio_with_spread
 
 __all__ = ["DEADLINES_MS", "FrameTiming", "Ratio", "interleave", "kernel_ns", "missed", "percentiles"]
@@ -46,11 +48,10 @@ class FrameTiming:
 
     def fields(self) -> dict[str, Field]:
         """What goes into the fields of a timing record."""
-        fields = {"frame_ns": Field(self.frame_ns, "ns", "time of each frame, (repeat, frame)")}
+        values = {"frame_ns": self.frame_ns}
         if self.stage_ns is not None:
-            fields["stage_ns"] = Field(self.stage_ns, "ns", "time of each stage in each frame, (stage, frame)")
-            fields["stages"] = Field(np.array(self.stages), "", "names of the stages")
-        return fields
+            values |= {"stage_ns": self.stage_ns, "stages": np.array(self.stages)}
+        return new_fields(TIMING_FIELDS, values)
 
 
 @contextmanager

@@ -19,7 +19,7 @@ class Skip:
     """A stage that a scene may not need."""
 
     name: str
-    applies: Callable[[Setup], bool]
+    left_out: Callable[[Setup], bool]
     """Whether a set-up leaves it out."""
     included: Callable[[Setup, State], tuple[Setup, State]]
     """The same run with the stage."""
@@ -71,7 +71,7 @@ def _is_division(setup: Setup) -> bool:
 
 SKIPS: tuple[Skip, ...] = (
     Skip("contact of nodes: no plane, sphere or capsule", lambda s: not s.solids, _with_far),
-    Skip("thin probe: none", lambda s: not s.probes and s.method.misses_probes is None, _with_probe),
+    Skip("thin probe: none", lambda s: not s.probes and bool(s.method.capabilities.thin_probes), _with_probe),
     Skip("gravity: none in this scene", lambda s: not any(s.gravity), _with_gravity),
     Skip("friction: no obstacle has any", lambda s: bool(s.solids) and not s.drive(0).rough, _with_friction),
     Skip("linear solve: one volume is a division", _is_division, _with_rows),

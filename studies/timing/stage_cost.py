@@ -93,7 +93,7 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget:
 
     Raises StudyError or MassSpringError for a case that cannot run."""
     setup = prepare(case.replaced(frames=min(frames, case.frames or case.scene.frames))).setup
-    skipped = [skip for skip in SKIPS if skip.applies(setup)]
+    skipped = [skip for skip in SKIPS if skip.left_out(setup)]
     runs = {PLAIN: partial(run_frames, setup, setup.start()), TICKED: partial(_ticked, setup)}
     runs |= {skip.name: partial(run_frames, *skip.included(setup, setup.start())) for skip in skipped}
     with pinned(threads=1):

@@ -20,7 +20,7 @@ def together(*surfaces):
 
 
 def split(points, faces, times=1):
-    """Every triangle in four, as often as said; shared points stay shared."""
+    """Every triangle in four, `times` times; shared points stay shared."""
     for _ in range(times):
         edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         unique, which = np.unique(edges, axis=0, return_inverse=True)

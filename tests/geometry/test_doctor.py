@@ -1,4 +1,4 @@
-"""The mesh doctor: every fault is found, counted and said, with the option that mends it; sound meshes have none."""
+"""The mesh doctor: every fault is found, counted and reported, with its option; sound meshes have none."""
 
 import json
 import re

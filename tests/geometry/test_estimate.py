@@ -1,4 +1,4 @@
-"""Sizes are told from the header, before anything is read."""
+"""Sizes are estimated from the header, before anything is read."""
 
 import numpy as np
 import pytest

@@ -82,6 +82,13 @@ def test_inside_out_is_said_and_mended_on_request(tmp_path, balls, surface):
     assert read_mesh(path, flip=True).volume == pytest.approx(body.volume, rel=1e-12)
 
 
+@pytest.mark.parametrize(("unit", "metres"), [("m", 1.0), ("cm", 0.01), ("mm", 0.001)])
+def test_a_file_is_as_large_as_its_unit_says(tmp_path, surface, unit, metres):
+    points, triangles = surface
+    mesh = read_mesh(write(tmp_path / "b.vtu", points / metres, triangle=triangles), unit=unit)
+    np.testing.assert_allclose(np.ptp(mesh.points, axis=0), np.ptp(points, axis=0), rtol=1e-12)
+
+
 def test_millimetres_in_a_metre_scene_are_suspected(tmp_path, surface):
     points, triangles = surface
     path = write(tmp_path / "b.vtu", 1e3 * points, triangle=triangles)
@@ -129,7 +136,7 @@ def test_what_is_no_mesh_gets_a_sentence(tmp_path, surface, capfd):
         with pytest.raises(StudyError, match=sentence) as caught:
             read_mesh(path)
         assert "\n" not in str(caught.value)
-        assert capfd.readouterr() == ("", "")  # the reader's own chatter is not ours to print
+        assert capfd.readouterr() == ("", "")  # the reader's own output is not shown
     with pytest.raises(StudyError, match="unit 'inch' is not known; use one of m, cm, mm"):
         read_mesh(text, unit="inch")
 

@@ -1,4 +1,4 @@
-"""Mending: every change is made, counted and said."""
+"""Mending: every change is made, counted and reported."""
 
 import numpy as np
 import pytest

@@ -24,7 +24,7 @@ def write(path, points, triangles):
     return path
 
 
-@pytest.mark.parametrize("name", [*COARSE, *(pytest.param(n, marks=pytest.mark.slow) for n in NAMES[3:])])
+@pytest.mark.parametrize("name", [*COARSE, *(pytest.param(n, marks=pytest.mark.campaign) for n in NAMES[3:])])
 def test_real_organs_at_550_nodes(name):
     path = real_surface(name)
     points, triangles = raw_surface(path)

@@ -79,7 +79,7 @@ def test_random_organs_are_organs(name):
     check_variant(name, 4, spread=0.3)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ORGANS)
 def test_forty_random_organs_are_organs(name):
     for seed in range(40):

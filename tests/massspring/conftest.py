@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 from massspring import Body, Material, Volumes, surface_body, tetrahedral_body
+from tests.massspring.rows import KINDS
 
 SOFT = Material(shear_modulus=1800.0, density=1060.0)
 CUBE_TETRAHEDRA = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
@@ -108,10 +109,14 @@ def hollow_body() -> Body:
     return body.keeping(Volumes.closed_surfaces(body, {"wall": triangles, "lumen": lumen}))
 
 
-@pytest.fixture(params=["block", "ball", "hollow", "regions", "nodal"])
+@pytest.fixture(params=KINDS)
 def kept_body(request: pytest.FixtureRequest) -> Body:
     """Every kind of volumes: the whole of either kind of body, wall and lumen, regions, one per node."""
-    kind = request.param
+    return body_of(request.param, request)
+
+
+def body_of(kind: str, request: pytest.FixtureRequest) -> Body:
+    """The body of a kind of KINDS."""
     if kind in ("regions", "nodal"):
         block_body = request.getfixturevalue("block_body")
         return block_body.keeping(Volumes.nodal(block_body) if kind == "nodal" else Volumes.regions(block_body, 7))

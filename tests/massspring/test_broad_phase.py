@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from massspring import Clock, Free, ImplicitVolume, Path, Probe, Setup
+from massspring.kernels.arrays.layout import Push
+from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
 from massspring.kernels.probe.arrays import IN_CONTACT
 from massspring.kernels.probe.broad_phase import TRIANGLE_BLOCK, fastest_node
 from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, stays_off
@@ -34,26 +36,28 @@ def test_no_node_is_faster_than_the_fastest(fast, precision):
     """Outside truth: v⁺ of all nodes by numpy; the node that is fastest is free, or slides on an obstacle."""
     setup = replace(pressed(ImplicitVolume()), precision=precision)
     state, dt, lam, rng = setup.start(), setup.clock.dt, 30.0, np.random.default_rng(3)
-    net, motion = state.network, state.motion
+    net, nodes, contacts = state.network, state.nodes, state.contacts
     for trial in range(20):
-        motion.v_star[:], motion.gradient[:] = rng.normal(size=(2, *motion.x.shape)) * [[[1.0]], [[1e-4]]]
-        motion.locked[:] = 0
+        nodes.v_star[:], nodes.gradient[:] = rng.normal(size=(2, *nodes.x.shape)) * [[[1.0]], [[1e-4]]]
+        contacts.mode[:] = FREE
         chosen = rng.choice(BALL.node_count, 5, replace=False)
-        motion.locked[chosen] = [1, 1, 2, 3, 3]
-        list_touched(motion)
-        motion.direction[chosen] = np.eye(3)[rng.integers(3, size=5)]
-        motion.goal[chosen] = 0.1 * rng.normal(size=(5, 3))
+        contacts.mode[chosen] = [SLIDES, SLIDES, ON_EDGE, STICKS, STICKS]
+        list_touched(contacts)
+        contacts.direction[chosen] = np.eye(3)[rng.integers(3, size=5)]
+        contacts.goal[chosen] = 0.1 * rng.normal(size=(5, 3))
         if fast == "free":
-            motion.v_star[np.setdiff1d(np.arange(BALL.node_count), chosen)[trial]] *= 10.0
+            nodes.v_star[np.setdiff1d(np.arange(BALL.node_count), chosen)[trial]] *= 10.0
         else:
-            motion.goal[chosen[trial % 5]] *= 100.0
-        u = motion.v_star + dt * lam * net.inverse_mass[:, None] * motion.gradient
+            contacts.goal[chosen[trial % 5]] *= 100.0
+        u = nodes.v_star + dt * lam * net.inverse_mass[:, None] * nodes.gradient
         for i in chosen:
-            d = motion.direction[i]
-            kept = {1: np.eye(3) - np.outer(d, d), 2: np.outer(d, d), 3: np.zeros((3, 3))}[int(motion.locked[i])]
-            u[i] = kept @ u[i] + motion.goal[i]
+            d = contacts.direction[i]
+            kept = {SLIDES: np.eye(3) - np.outer(d, d), ON_EDGE: np.outer(d, d), STICKS: np.zeros((3, 3))}[
+                int(contacts.mode[i])
+            ]
+            u[i] = kept @ u[i] + contacts.goal[i]
         truth = np.linalg.norm(u, axis=1).max()
-        found = fastest_node(net, motion, lam, dt)
+        found = fastest_node(net, nodes, contacts, Push(nodes.gradient, lam), dt)
         assert found >= truth * (1 - 1e-6)  # what SAFE makes up for
         assert found <= truth * (1 + 1e-6)  # the fastest is made to stand out: the bound is sharp
 

@@ -25,8 +25,9 @@ from massspring.kernels.constraint.tetrahedra import (
     solve_cells,
 )
 from massspring.kernels.contact.constrained_motion import unpushed_into
+from massspring.kernels.contact.modes import SLIDES
 from massspring.kernels.forces.volume import enclosed_volume
-from massspring.kernels.step.predict import predict
+from massspring.kernels.step.begin import begin_step, open_frame
 from massspring.layout.allocate import start
 from massspring.methods.families.tetrahedra import cells_of
 from tests.massspring.conftest import SOFT, block
@@ -34,41 +35,41 @@ from tests.massspring.test_cells import cell_volumes, deformed, pressed
 from tests.massspring.test_methods import clock_for, thrown
 
 
-def saddle_point(body, cells, net, mo, dt, compliance):
+def saddle_point(body, cells, nodes, contacts, dt, compliance):
     """Outside truth: [M/dt², −Jᵀ; J, C V0] solved densely, touched nodes as further rows."""
     n, k = body.node_count, len(body.tetrahedra)
     jacobian = np.zeros((k, n, 3))
     slopes = np.concatenate([-cells.slope.sum(axis=1, keepdims=True), cells.slope], axis=1)
     for corner in range(4):
         np.add.at(jacobian, (np.arange(k), body.tetrahedra[:, corner]), slopes[:, corner])
-    touched = np.flatnonzero(mo.locked)
+    touched = np.flatnonzero(contacts.mode)
     normal = np.zeros((len(touched), n, 3))
-    normal[np.arange(len(touched)), touched] = mo.normal[touched]
+    normal[np.arange(len(touched)), touched] = contacts.normal[touched]
     rows = np.concatenate([dt * jacobian.reshape(k, -1), normal.reshape(len(touched), -1)])
     mass = np.repeat(body.mass, 3)
     soft = np.diag(np.concatenate([compliance * cells.rest_volume, np.zeros(len(touched))]))
     system = np.block([[np.diag(mass), -rows.T], [rows, soft]])
-    approach = np.einsum("ij,ij->i", mo.goal[touched], mo.normal[touched])
-    right = np.concatenate([mass * mo.v_star.ravel(), cells.rest_volume - cell_volumes(body, mo.x), approach])
+    approach = np.einsum("ij,ij->i", contacts.goal[touched], contacts.normal[touched])
+    right = np.concatenate([mass * nodes.v_star.ravel(), cells.rest_volume - cell_volumes(body, nodes.x), approach])
     return np.linalg.solve(system, right)[: 3 * n + k]
 
 
 def test_the_hard_solve_equals_the_full_saddle_point(block_body):
     body, dt, compliance = block_body, 1e-3, 1e-5
     state, cells, rng = start(block_body), cells_of(block_body), np.random.default_rng(0)
-    net, mo = state.network, state.motion
-    mo.x[:] = deformed(body, 0.002)
-    mo.v_star[:] = 0.1 * rng.normal(size=body.rest.shape)
+    net, nodes, contacts = state.network, state.nodes, state.contacts
+    nodes.x[:] = deformed(body, 0.002)
+    nodes.v_star[:] = 0.1 * rng.normal(size=body.rest.shape)
     touched = np.array([1, 5, 9])
     normals = rng.normal(size=(3, 3))
-    mo.normal[touched] = normals / np.linalg.norm(normals, axis=1)[:, None]
-    mo.direction[touched], mo.locked[touched] = mo.normal[touched], 1
-    mo.goal[touched] = 0.05 * mo.normal[touched]
-    cell_rows_into(mo.x, cells, cells.right)
+    contacts.normal[touched] = normals / np.linalg.norm(normals, axis=1)[:, None]
+    contacts.direction[touched], contacts.mode[touched] = contacts.normal[touched], SLIDES
+    contacts.goal[touched] = 0.05 * contacts.normal[touched]
+    cell_rows_into(nodes.x, cells, cells.right)
     cells.pressure[:] = 100.0  # a warm start must not matter
-    count = solve_cells(mo, net.inverse_mass, cells, dt, compliance, Accuracy(1e-12, 2000))
+    count = solve_cells(nodes, contacts, net.inverse_mass, cells, dt, compliance, Accuracy(1e-12, 2000))
     assert count < 35  # 22 in conjugate directions, 46 along the steepest ones
-    truth = saddle_point(body, cells, net, mo, dt, compliance)[3 * body.node_count :]
+    truth = saddle_point(body, cells, nodes, contacts, dt, compliance)[3 * body.node_count :]
     assert np.abs(cells.pressure - truth).max() < 1e-6 * np.abs(truth).max()
 
 
@@ -86,7 +87,7 @@ def one_step(body, method, dt=1e-3):
     """After a step out of a shape that is 3 % too small, with some velocity."""
     setup = Setup(body, method, Clock(dt, 1, 1), velocity=0.1 * thrown(body))
     state = setup.start()
-    state.motion.x[:] = 0.99 * body.rest
+    state.nodes.x[:] = 0.99 * body.rest
     return method.advance(state, setup.drive(0))
 
 
@@ -112,13 +113,14 @@ def test_xpbd_that_forgets_its_multipliers_is_hard_whatever_its_compliance(block
     kept = one_step(block_body, method)
     setup = Setup(block_body, method, Clock(1e-3, 1, 1), velocity=0.1 * thrown(block_body))
     state, drive = setup.start(), setup.drive(0)
-    state.motion.x[:] = 0.99 * block_body.rest
-    net, mo, cells = state.network, state.motion, state.memory
-    predict(net, mo, drive, 0, False)
-    unpushed_into(mo, drive.dt, cells.y)
+    state.nodes.x[:] = 0.99 * block_body.rest
+    net, nodes, contacts, cells = state.network, state.nodes, state.contacts, state.memory
+    open_frame(state.frame(drive))
+    begin_step(state.frame(drive), 0, False)
+    unpushed_into(nodes, contacts, drive.dt, cells.y)
     for _ in range(method.iterations):
         cells.pressure[:] = 0.0
-        relax_cells(mo, net.inverse_mass, cells, drive.dt**2, method.compliance, mo.gradient)
+        relax_cells(contacts, net.inverse_mass, cells, drive.dt**2, method.compliance)
     short = [np.abs(1 - cell_volumes(block_body, x) / block_body.tetrahedron_volumes).max() for x in (kept.x, cells.y)]
     assert short[1] < 0.1 * short[0]
 

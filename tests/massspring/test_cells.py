@@ -170,7 +170,7 @@ def rest_forces(method, body, x):
     speeds = []
     for setup in (still, without):
         state = setup.start()
-        state.motion.x[:] = x
+        state.nodes.x[:] = x
         speeds.append(setup.method.advance(state, setup.drive(0)).v)
     return (speeds[0] - speeds[1]) * body.mass[:, None] / 1e-7
 
@@ -210,6 +210,6 @@ def test_settings_that_make_no_sense_are_refused(bad):
 
 def test_bodies_that_do_not_fit_are_told_why(ball_body, hollow_body):
     for method in (Barycentre(), Element(), Xpbd()):
-        assert "fill its mesh" in method.applies(ball_body)
-        assert "keeps 2" in method.applies(hollow_body)
-    assert Xpbd("whole").applies(ball_body) is None and Shake().applies(ball_body) is None
+        assert "fill its mesh" in method.why_not(ball_body)
+        assert "keeps 2" in method.why_not(hollow_body)
+    assert Xpbd("whole").why_not(ball_body) is None and Shake().why_not(ball_body) is None

@@ -29,7 +29,7 @@ def kept(filled_ball: Body) -> tuple[State, np.ndarray]:
     assert rows is not None and body.node_count > SIZE and body.node_count % SIZE  # more than one, one not full
     state = replace(state, rows=rows._replace(clusters=clusters_at_rest(rows, body.rest, weight)))
     jacobian = dense(rows, body.node_count)
-    diagonal_into(rows, state.motion, weight, rows.diagonal)
+    diagonal_into(rows, state.contacts, weight, rows.diagonal)
     return state, np.einsum("rja,j,sja->rs", jacobian, weight, jacobian)
 
 
@@ -84,10 +84,10 @@ def test_volumes_without_a_node_to_push_are_left_out(filled_ball):
     state = ImplicitVolume().start(body, (Attachment(np.unique(cells).astype(np.int64)),))
     rows = state.rows
     assert rows is not None and np.isfinite(rows.clusters.inverse).all()
-    diagonal_into(rows, state.motion, state.network.inverse_mass, rows.diagonal)
+    diagonal_into(rows, state.contacts, state.network.inverse_mass, rows.diagonal)
     assert rows.diagonal[9] == 0.0
     rows.right[:], rows.allowed[:], rows.lam[:] = 1.0, 1e-6, 3.0
-    count = solve_iteratively(rows, state.motion, state.network.inverse_mass, rows.lam, rows.allowed, 200)
+    count = solve_iteratively(rows, state.contacts, state.network.inverse_mass, rows.lam, rows.allowed, 200)
     assert 0 < count < 200 and rows.lam[9] == 3.0 and np.isfinite(rows.lam).all()
 
 
@@ -100,13 +100,13 @@ def test_it_saves_iterations(kept, filled_ball, bent):
     rows_into(x, weight, rows)
     jacobian = dense(rows, len(x))
     today = np.einsum("rja,j,sja->rs", jacobian, weight, jacobian)
-    diagonal_into(rows, state.motion, weight, rows.diagonal)
+    diagonal_into(rows, state.contacts, weight, rows.diagonal)
     wanted = np.random.default_rng(4).normal(size=m)
     right, counts = today @ wanted, []
     for clusters in (rows.clusters, each_alone(m)):
         trial = rows._replace(clusters=clusters, lam=np.zeros(m))
         trial.right[:], trial.allowed[:] = right, 1e-6 * np.abs(right).max()
-        counts.append(solve_iteratively(trial, state.motion, weight, trial.lam, trial.allowed, 500))
+        counts.append(solve_iteratively(trial, state.contacts, weight, trial.lam, trial.allowed, 500))
         left = np.abs(right - today @ trial.lam).max()
         assert left < 1.01e-6 * np.abs(right).max()  # what is followed and what is so differ by round-off
     assert counts[0] < 0.8 * counts[1]

@@ -16,6 +16,7 @@ from massspring import (
     Shake,
     simulate,
 )
+from massspring.kernels.contact.modes import FREE, SLIDES
 from massspring.kernels.forces.volume import enclosed_volume
 from massspring.methods.families.one_volume import Rule, advance_by, correct_positions
 from massspring.methods.method import begin_frame
@@ -47,8 +48,8 @@ def test_hcj05_is_one_rule_of_the_family(body):
     """
     setup = pressed(body, ImplicitVolume(), clock_for(body, 10, 20))
     mine, other = setup.start(), setup.start()
-    mine.motion.x[:] *= 0.8  # so that the guard cuts
-    other.motion.x[:] = mine.x
+    mine.nodes.x[:] *= 0.8  # so that the guard cuts
+    other.nodes.x[:] = mine.x
     for frame in range(10):
         mine, other = advance_by(Rule(), mine, setup.drive(frame)), setup.method.advance(other, setup.drive(frame))
         assert np.abs(mine.x - other.x).max() < 1e-11 * body.size
@@ -88,7 +89,7 @@ def test_baumgarte_at_hcj05_s_rates_differs_by_the_convective_term(body):
     for method in (Baumgarte(alpha=0.5, beta=1.0), ImplicitVolume()):
         setup = Setup(body, method, clock, velocity=v)
         state = setup.start()
-        state.motion.x[:] *= 1.0001
+        state.nodes.x[:] *= 1.0001
         pressures.append(method.advance(state, setup.drive(0)).lam[0])
     moved = replace(body, rest=1.0001 * body.rest)
     _, slope = gradient(moved.rest, body.triangles)
@@ -103,7 +104,7 @@ def volume_errors(body, method, steps, scale=1 + 1e-9):
     clock = clock_for(body, steps, 1, fraction=0.1)
     setup = Setup(body, method, clock)
     state = setup.start()
-    state.motion.x[:] *= scale
+    state.nodes.x[:] *= scale
     errors = []
     for frame in range(steps):
         state = method.advance(state, setup.drive(frame))
@@ -156,9 +157,9 @@ def test_post_stabilization_moves_nodes_and_no_velocity(body):
     left = []
     for scale in (1.002, 1.001):
         moved = begin_frame(state, setup.drive(0))
-        moved.motion.x[:] = scale * body.rest
+        moved.nodes.x[:] = scale * body.rest
         v = moved.v.copy()
-        correct_positions(moved.network, moved.motion, body.volume, setup.clock.dt)
+        correct_positions(moved.network, moved.nodes, moved.contacts, body.volume, setup.clock.dt)
         assert np.array_equal(moved.v, v)
         left.append(enclosed_volume(moved.x, body.triangles) / body.volume - 1)
     assert left[0] / left[1] == pytest.approx(4.0, rel=0.02)
@@ -171,7 +172,7 @@ def test_a_body_crushed_to_a_thousandth_comes_back_in_one_step_of_shake(body):
     """The linear step without its guard asks for 1e6 times the length there is, and the run diverges."""
     setup = Setup(body, Shake(), clock_for(body, 400, 10), damping=30.0)
     state = setup.start()
-    state.motion.x[:] = 1e-3 * body.rest
+    state.nodes.x[:] = 1e-3 * body.rest
     state = setup.method.advance(state, setup.drive(0))
     for frame in range(1, 400):
         state = setup.method.advance(state, setup.drive(frame))
@@ -181,7 +182,7 @@ def test_a_body_crushed_to_a_thousandth_comes_back_in_one_step_of_shake(body):
     assert np.abs(lengths / body.springs.rest_length - 1).max() < 1e-9, "it did not come back to its shape"
     wild = setup.start()
     wild = replace(wild, network=wild.network._replace(longest_correction=np.inf))
-    wild.motion.x[:] = 1e-3 * body.rest
+    wild.nodes.x[:] = 1e-3 * body.rest
     wild = advance_by(Rule(), wild, setup.drive(0))
     assert not np.abs(wild.x).max() < 1e3 * body.size
 
@@ -193,14 +194,14 @@ def test_contact_and_held_nodes_are_inside_shake_s_multiplier(ball_body):
     state = setup.start()
     for frame in range(60):
         before, state = state, setup.method.advance(state, setup.drive(frame))
-    free = (state.network.inverse_mass > 0) & (state.motion.locked == 0)
-    touched = state.motion.locked == 1
+    free = (state.network.inverse_mass > 0) & (state.contacts.mode == FREE)
+    touched = state.contacts.mode == SLIDES
     assert touched.sum() > 3
     _, slope = gradient(before.x, ball_body.triangles)
-    pushed = (state.v - state.motion.v_star) / clock.dt * ball_body.mass[:, None] - state.lam[0] * slope
+    pushed = (state.v - state.nodes.v_star) / clock.dt * ball_body.mass[:, None] - state.lam[0] * slope
     scale = state.lam[0] * np.abs(slope).max()
     assert np.abs(pushed[free]).max() < 1e-9 * scale
-    normal = state.motion.normal[touched]
+    normal = state.contacts.normal[touched]
     along = (pushed[touched] * normal).sum(axis=1)
     assert np.abs(pushed[touched] - along[:, None] * normal).max() < 1e-9 * scale
     assert along.min() > -1e-9 * scale, "an obstacle pulls"

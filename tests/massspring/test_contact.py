@@ -18,6 +18,7 @@ from massspring import (
     step_limit,
     tetrahedral_body,
 )
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.test_methods import clock_for, squeeze
@@ -196,20 +197,21 @@ def test_looking_only_at_near_nodes_changes_no_bit(ball_body):
         drive, net, dt = setup.drive(frame), state.network, clock.dt
         lightest = net.inverse_mass.max()
         for factor in (-3.0, 0.5, 1.0, 5.0):
-            near, far = (_copied(state.motion) for _ in range(2))
-            for motion in (near, far):
-                find_contacts(net, motion, drive, 0, state.lam[0])
+            nodes, push = state.nodes, Push(state.nodes.gradient, state.lam[0])
+            near, far = (_copied(state.contacts) for _ in range(2))
+            for contacts in (near, far):
+                find_contacts(net, nodes, contacts, drive, 0, push, None)
             lam = factor * state.lam[0]
-            mobility = float((net.inverse_mass[:, None] * near.gradient**2).sum())
+            mobility = float((net.inverse_mass[:, None] * nodes.gradient**2).sum())
             reach = pressure_reach(lam - state.lam[0], mobility, lightest, dt)
-            changed = revise_contacts(net, near, drive, 0, lam, reach)
-            assert changed == revise_contacts(net, far, drive, 0, lam, np.inf)
-            for name in ("touched", "locked", "normal", "goal"):
+            changed = revise_contacts(net, nodes, near, drive, 0, Push(nodes.gradient, lam), reach)
+            assert changed == revise_contacts(net, nodes, far, drive, 0, Push(nodes.gradient, lam), np.inf)
+            for name in ("touched", "mode", "normal", "goal"):
                 assert np.array_equal(getattr(near, name), getattr(far, name))
             changes += changed
             skipped += int((near.clearance[ball_body.surface_nodes] > reach).sum())
     assert changes > 0 and skipped > 0, "the test saw no change of contact, or nothing to skip"
 
 
-def _copied(motion):
-    return motion._replace(**{name: getattr(motion, name).copy() for name in motion._fields if name != "team"})
+def _copied(contacts):
+    return type(contacts)(*(values.copy() for values in contacts))

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from massspring import Capsule, Clock, ImplicitVolume, Path, Plane, Setup, Sphere, surface_body
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
+from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
 from tests.massspring.conftest import SOFT, icosphere
 
 DT = 1e-3
@@ -48,45 +50,50 @@ class Scene:
         self.obstacles = obstacles
         setup = Setup(shell, ImplicitVolume(), Clock(DT, 1, 1), obstacles)
         state, self.drive = setup.start(), setup.drive(0)
-        self.network, self.motion, random = state.network, state.motion, np.random.default_rng(4)
+        self.state, self.network, random = state, state.network, np.random.default_rng(4)
+        self.contacts = state.contacts
         self.nodes = self.network.surface_nodes.astype(np.int64)
-        self.motion.x[:] = random.uniform(*box, self.x.shape)
-        self.motion.v_star[:] = 2.0 * random.normal(size=self.x.shape)
+        self.state.nodes.x[:] = random.uniform(*box, self.x.shape)
+        self.state.nodes.v_star[:] = 2.0 * random.normal(size=self.x.shape)
         size = 1.0 / (DT * LAM * self.network.inverse_mass[:, None])
-        self.motion.gradient[:] = 2.0 * size * random.normal(size=self.x.shape)
+        self.state.nodes.gradient[:] = 2.0 * size * random.normal(size=self.x.shape)
 
     @property
     def x(self) -> np.ndarray:
-        return self.motion.x
+        return self.state.nodes.x
 
     def free_velocity(self, lam: float) -> np.ndarray:
         """u (n, 3) [m/s]."""
-        return self.motion.v_star + DT * lam * self.network.inverse_mass[:, None] * self.motion.gradient
+        return self.state.nodes.v_star + DT * lam * self.network.inverse_mass[:, None] * self.state.nodes.gradient
 
     def velocity(self, lam: float) -> np.ndarray:
         """v⁺ = P u + goal (n, 3) [m/s] (eq. 9, 10)."""
-        mo, u = self.motion, self.free_velocity(lam)
+        contacts, u = self.contacts, self.free_velocity(lam)
         kept = {
-            0: u,
-            1: u - (u * mo.normal).sum(axis=1)[:, None] * mo.normal,
-            2: (u * mo.direction).sum(axis=1)[:, None] * mo.direction,
-            3: 0 * u,
+            FREE: u,
+            SLIDES: u - (u * contacts.normal).sum(axis=1)[:, None] * contacts.normal,
+            ON_EDGE: (u * contacts.direction).sum(axis=1)[:, None] * contacts.direction,
+            STICKS: 0 * u,
         }
-        return np.choose(mo.locked[:, None], list(kept.values())) + np.where(mo.locked[:, None] > 0, mo.goal, 0.0)
+        return np.choose(contacts.mode[:, None], list(kept.values())) + np.where(
+            contacts.mode[:, None] > FREE, contacts.goal, 0.0
+        )
 
     def gaps(self, y: np.ndarray) -> np.ndarray:
         """(obstacles, n) [m] at the end of the step."""
         return np.array([obstacle.gap(y, DT) for obstacle in self.obstacles])
 
     def find(self, lam: float = LAM) -> "Scene":
-        find_contacts(self.network, self.motion, self.drive, 0, lam)
+        push = Push(self.state.nodes.gradient, lam)
+        find_contacts(self.network, self.state.nodes, self.contacts, self.drive, 0, push, None)
         return self
 
     def revise(self, lam: float, found_at: float = LAM) -> int:
-        square = (self.motion.gradient**2).sum(axis=1)
+        square = (self.state.nodes.gradient**2).sum(axis=1)
         mobility = float(self.network.inverse_mass @ square)
         reach = pressure_reach(lam - found_at, mobility, self.network.largest_inverse_mass, DT)
-        return revise_contacts(self.network, self.motion, self.drive, 0, lam, reach)
+        push = Push(self.state.nodes.gradient, lam)
+        return revise_contacts(self.network, self.state.nodes, self.contacts, self.drive, 0, push, reach)
 
 
 def slopes(obstacle: Any, y: np.ndarray) -> np.ndarray:
@@ -101,13 +108,13 @@ def test_nodes_sit_on_the_obstacle_that_they_would_enter_deepest(shell, name):
     scene = Scene(shell, *OBSTACLES[name]).find()
     gaps = scene.gaps(scene.x + DT * scene.free_velocity(LAM))
     inner = np.setdiff1d(np.arange(len(scene.x)), scene.nodes)
-    away = scene.motion.locked == 0
-    assert np.abs(scene.motion.clearance - gaps.min(axis=0))[away].max() < ROUND_OFF
-    assert (scene.motion.clearance[~away] == np.inf).all()
+    away = scene.contacts.mode == FREE
+    assert np.abs(scene.contacts.clearance - gaps.min(axis=0))[away].max() < ROUND_OFF
+    assert (scene.contacts.clearance[~away] == np.inf).all()
     wanted = np.where(gaps.min(axis=0) < 0, gaps.argmin(axis=0) + 1, 0)
     wanted[inner] = 0
-    assert (scene.motion.touched == wanted).all() and len(np.unique(wanted)) == len(scene.obstacles) + 1
-    one = np.flatnonzero(scene.motion.locked == 1)
+    assert (scene.contacts.touched == wanted).all() and len(np.unique(wanted)) == len(scene.obstacles) + 1
+    one = np.flatnonzero(scene.contacts.mode == SLIDES)
     ends = scene.gaps(scene.x + DT * scene.velocity(LAM))[wanted[one] - 1, one]
     assert np.abs(ends).max() < ROUND_OFF  # also beside a rod: no node here comes near its ends
 
@@ -118,25 +125,27 @@ def test_a_new_pressure_finds_the_one_node_that_it_moves(shell, change):
     down there is a floor."""
     scene = Scene(shell, OBSTACLES["a floor"][0])
     node = int(np.argmax(scene.network.inverse_mass * np.isin(np.arange(len(scene.x)), scene.nodes)))
-    scene.motion.v_star[:], scene.motion.gradient[:] = 0.0, 0.0
-    scene.motion.gradient[node, 2] = -np.sign(change) * 3e-5
+    scene.state.nodes.v_star[:], scene.state.nodes.gradient[:] = 0.0, 0.0
+    scene.state.nodes.gradient[node, 2] = -np.sign(change) * 3e-5
     fall = -DT * (scene.free_velocity(LAM + change) - scene.free_velocity(LAM))[node, 2]
-    mobility = float(scene.network.inverse_mass @ (scene.motion.gradient**2).sum(axis=1))
+    mobility = float(scene.network.inverse_mass @ (scene.state.nodes.gradient**2).sum(axis=1))
     reach = pressure_reach(change, mobility, scene.network.inverse_mass[node], DT)
     assert 0 < fall < reach < 1.001 * fall
-    scene.motion.x[node, 2] = FLOOR.point[2] + 0.5 * fall - DT * scene.free_velocity(LAM)[node, 2]
-    assert scene.find().motion.clearance[node] == pytest.approx(0.5 * fall, rel=1e-6) and not scene.motion.locked.any()
-    assert scene.revise(LAM + change) == 1 and scene.motion.locked[node] == 1
+    scene.state.nodes.x[node, 2] = FLOOR.point[2] + 0.5 * fall - DT * scene.free_velocity(LAM)[node, 2]
+    assert (
+        scene.find().contacts.clearance[node] == pytest.approx(0.5 * fall, rel=1e-6) and not scene.contacts.mode.any()
+    )
+    assert scene.revise(LAM + change) == 1 and scene.contacts.mode[node] == SLIDES
 
 
 def test_the_next_step_knows_nothing_of_the_last(shell):
     """Obstacles gone: no clearance, no touch is left of them."""
     scene = Scene(shell, *OBSTACLES["two spheres"]).find()
-    assert scene.motion.touched.any()
+    assert scene.contacts.touched.any()
     scene.drive.position[:] -= 1.0
     scene.find()
-    assert not scene.motion.touched.any() and not scene.motion.locked.any()
-    assert scene.motion.clearance.min() > 0.9
+    assert not scene.contacts.touched.any() and not scene.contacts.mode.any()
+    assert scene.contacts.clearance.min() > 0.9
 
 
 @pytest.mark.parametrize("name", ["a floor", "a sphere"])
@@ -146,14 +155,14 @@ def test_revised_contacts_are_those_of_the_new_pressure(shell, name, way):
     scene, changed, again = Scene(shell, *OBSTACLES[name]).find(), 0, 0
     let_go = np.zeros(len(scene.x), dtype=bool)
     for lam in LAM * np.array(way):
-        held = scene.motion.locked == 1
+        held = scene.contacts.mode == SLIDES
         u = scene.free_velocity(lam)
-        pulled = held & (((scene.motion.goal - u) * scene.motion.normal).sum(axis=1) < 0)
+        pulled = held & (((scene.contacts.goal - u) * scene.contacts.normal).sum(axis=1) < 0)
         enters = ~held & (scene.gaps(scene.x + DT * u)[0] < 0)
         enters[np.setdiff1d(np.arange(len(u)), scene.nodes)] = False
         count = scene.revise(lam)
         assert count == pulled.sum() + enters.sum()
-        assert np.array_equal(scene.motion.locked == 1, (held & ~pulled) | enters)
+        assert np.array_equal(scene.contacts.mode == SLIDES, (held & ~pulled) | enters)
         changed, again, let_go = changed + count, again + (enters & let_go).sum(), let_go | pulled
     assert changed > 10 and again > 0
 
@@ -164,16 +173,16 @@ def test_slip_loses_what_coulomb_says(shell, name, friction):
     """Beside an obstacle that moves: v⁺ = w + s max(0, 1 − mu p/|s|) along it, p what it pushes by."""
     (still,), _ = OBSTACLES[name]
     smooth, rough = (Scene(shell, (type(still)(*_shape(still), ALONG, mu),)).find() for mu in (0.0, friction))
-    on = np.flatnonzero(smooth.motion.locked == 1)
-    n, u = smooth.motion.normal[on], smooth.free_velocity(LAM)[on]
-    p = ((smooth.motion.goal[on] - u) * n).sum(axis=1)
+    on = np.flatnonzero(smooth.contacts.mode == SLIDES)
+    n, u = smooth.contacts.normal[on], smooth.free_velocity(LAM)[on]
+    p = ((smooth.contacts.goal[on] - u) * n).sum(axis=1)
     w = np.array(ALONG.displacements[1])
     slip = u - w - ((u - w) * n).sum(axis=1)[:, None] * n
     left = np.maximum(0.0, 1 - friction * p / np.linalg.norm(slip, axis=1))
-    across = (smooth.motion.goal[on] * n).sum(axis=1)[:, None] * n
+    across = (smooth.contacts.goal[on] * n).sum(axis=1)[:, None] * n
     expected = w - (n @ w)[:, None] * n + left[:, None] * slip + across
     assert np.abs(rough.velocity(LAM)[on] - expected).max() < ROUND_OFF
-    assert np.array_equal(rough.motion.locked[on] == 3, left == 0)
+    assert np.array_equal(rough.contacts.mode[on] == STICKS, left == 0)
     assert 0 < (left == 0).sum() < len(on), "all of them slip, or none"
 
 
@@ -185,16 +194,16 @@ def test_what_sticks_too_hard_at_the_new_pressure_slips(shell):
     """k = v⁺ − u is what sticking takes; of its part along the obstacle mu times the other is left (eq. 36)."""
     mu, lam = 1.2, 0.4 * LAM
     scene = Scene(shell, (Plane((0, 0, -0.0501), (0, 0, 1), ALONG, mu),)).find()
-    sticks = np.flatnonzero(scene.motion.locked == 3)
+    sticks = np.flatnonzero(scene.contacts.mode == STICKS)
     u = scene.free_velocity(lam)[sticks]
-    k, n = scene.motion.goal[sticks] - u, scene.motion.normal[sticks]
+    k, n = scene.contacts.goal[sticks] - u, scene.contacts.normal[sticks]
     p = (k * n).sum(axis=1)
     aside = k - p[:, None] * n
     asked = np.linalg.norm(aside, axis=1)
     pushed, slips = p > 0, (p > 0) & (asked > mu * p)
     scene.revise(lam)
-    locked = scene.motion.locked[sticks]
-    assert np.array_equal(locked == 1, slips) and np.array_equal(locked == 3, pushed & ~slips)
+    locked = scene.contacts.mode[sticks]
+    assert np.array_equal(locked == SLIDES, slips) and np.array_equal(locked == STICKS, pushed & ~slips)
     expected = u + p[:, None] * n + (mu * p / asked)[:, None] * aside
     assert np.abs(scene.velocity(lam)[sticks] - expected)[slips].max() < ROUND_OFF
     assert slips.sum() > 3 and (pushed & ~slips).sum() > 3 and (~pushed).sum() > 3
@@ -207,21 +216,21 @@ def test_between_two_obstacles_nodes_keep_both(shell, name):
     scene, wedged = Scene(shell, obstacles, box).find(), 0
     for first, second in ((0, 1), (1, 0)):
         alone = Scene(shell, (obstacles[first],), box).find()
-        on = np.flatnonzero(scene.motion.touched == first + 1)
+        on = np.flatnonzero(scene.contacts.touched == first + 1)
         v = alone.velocity(LAM)
         y = alone.x + DT * v
-        n, gap = alone.motion.normal[on], obstacles[second].gap(y, DT)[on]
+        n, gap = alone.contacts.normal[on], obstacles[second].gap(y, DT)[on]
         m = slopes(obstacles[second], y[on])
         edge = np.cross(n, m)
         both = (gap < 0) & (np.linalg.norm(edge, axis=1) > 0.01)
-        assert np.array_equal(scene.motion.locked[on] == 2, both)
+        assert np.array_equal(scene.contacts.mode[on] == ON_EDGE, both)
         new = scene.velocity(LAM)[on]
         assert np.abs(new - v[on])[~both].max(initial=0.0) < ROUND_OFF
         for k in np.flatnonzero(both):
             right = [n[k] @ v[on[k]], m[k] @ v[on[k]] - gap[k] / DT, edge[k] @ v[on[k]]]
             expected = np.linalg.solve(np.array([n[k], m[k], edge[k]]), right)
             assert np.abs(new[k] - expected).max() < 1e-4  # normals are known to 1e-6, edges as short as 0.01
-            assert scene.motion.second[on[k]] == second + 1
+            assert scene.contacts.second[on[k]] == second + 1
         wedged += both.sum()
     assert wedged == 0 if name == "almost one plane" else wedged > 3
 
@@ -230,6 +239,6 @@ def test_a_node_that_slides_fast_round_a_sphere_is_not_between_it_and_itself(she
     """Its normal turns by more than counts as parallel within the step, and it ends on the sphere but for round-off."""
     far = Sphere((0.0, 0.0, 1.0), 0.02)
     scene = Scene(shell, (*OBSTACLES["a sphere"][0], far))
-    scene.motion.v_star[:, :2] += 3.0
+    scene.state.nodes.v_star[:, :2] += 3.0
     scene.find()
-    assert (scene.motion.locked == 1).sum() > 10 and not (scene.motion.locked == 2).any()
+    assert (scene.contacts.mode == SLIDES).sum() > 10 and not (scene.contacts.mode == ON_EDGE).any()

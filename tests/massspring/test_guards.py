@@ -1,15 +1,20 @@
 """Guards, one table over all methods: what a step does where a volume has no gradient or is far off, what a run does
-behind a target that jumps, and how it ends where numbers are lost. What holds for a method is read from its claims."""
+behind a target that jumps, and how it ends where numbers are lost. What holds for a method is read from its claims and
+capabilities."""
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
-from massspring import METHODS, Attachment, Body, Clock, Free, Method, Path, Plane, Ramp, Setup, simulate
+from massspring import Attachment, Body, Clock, Free, Method, Path, Plane, Ramp, Setup, simulate
+from massspring.methods.capabilities import Capabilities
 from massspring.methods.method import begin_frame
 from massspring.world.targets import fastest_filling
+from tests.massspring.conftest import body_of
+from tests.massspring.rows import CONTESTANTS, by_pairs, kinds_of
 from tests.massspring.test_methods import clock_for, squeeze
 from tests.massspring.test_stress import start_of
 
@@ -22,8 +27,9 @@ FAR_OFF = {
     "40 % too small": 0.6 ** (1 / 3) * np.eye(3),
     "40 % too large": 1.4 ** (1 / 3) * np.eye(3),
 }
-QUICK = ("free", "implicit_volume")
-"""Compiled in single precision for other tests anyway."""
+AT_ONCE = [("nodal", "flattened")]
+"""Left out: with the volumes of all nodes wrong at once, what each may move alone adds up to hundreds of times as
+much."""
 
 
 @dataclass(frozen=True)
@@ -38,30 +44,48 @@ class Case:
         return Setup(self.body, self.method, clock, precision=self.precision, **options)
 
 
-def rows():
-    for method in METHODS:
-        for precision in ("float64", "float32"):
-            slow = precision == "float32" and method.name not in QUICK
-            name = f"{method.name}-{precision}"
-            yield pytest.param((method, precision), id=name, marks=pytest.mark.slow if slow else ())
+@pytest.fixture
+def case(row, request):
+    method, kind, precision, _ = row
+    return Case(CONTESTANTS[method], body_of(kind, request), precision)
 
 
-@pytest.fixture(params=rows())
-def case(request, kept_body):
-    method, precision = request.param
-    reason = method().applies(kept_body)
-    if reason:
-        pytest.skip(reason)
-    return Case(method(), kept_body, precision)
+@pytest.fixture
+def option(row):
+    return row[3]
 
 
+def guard(options=("",), exclude=(), where=lambda method, kind: True):
+    """Runs a test for every pair of method, body, precision and option that goes together."""
+    chosen = [row for row in by_pairs(options, exclude) if where(CONTESTANTS[row[0]], row[1])]
+    return pytest.mark.parametrize("row", chosen, ids=["-".join(filter(None, map(str, row))) for row in chosen])
+
+
+@pytest.mark.parametrize(("options", "exclude"), [(("",), ()), ((10.0, 1e6), ()), (tuple(FAR_OFF), AT_ONCE)])
+def test_every_pair_meets(options, exclude):
+    """Against the product of all that goes together, pair by pair; far fewer rows where there are options."""
+    product = {
+        (name, kind, precision, option)
+        for name, method in CONTESTANTS.items()
+        for kind in kinds_of(method)
+        for precision in (("float64", "float32") if method.capabilities.float32 else ("float64",))
+        for option in options
+        if (kind, option) not in exclude
+    }
+    met = set(by_pairs(options, exclude))
+    assert met <= product and len(met) <= (1.0 if len(options) == 1 else 0.85) * len(product)
+    for a, b in combinations(range(4), 2):
+        assert {(row[a], row[b]) for row in product} == {(row[a], row[b]) for row in met}
+
+
+@guard()
 def test_a_body_on_a_line_is_counted_and_not_thrown(case):
-    """G = 0: each step of a method that would mend the volume is counted, and nobody divides by nothing."""
+    """G = 0: each step of a method that would mend the volume is counted, and nothing is divided by 0."""
     clock = clock_for(case.body, 3, 10, fraction=0.2, method=case.method)
     history = simulate(case.setup(clock, damping=20.0, positions=start_of(case.body, LINE)))
     assert history.outcome == "finished"
     assert np.isfinite(history.pressure).all()
-    assert history.skipped_steps == (30 if case.method.remedy else 0)
+    assert history.skipped_steps == (30 if case.method.capabilities.correction else 0)
     assert history.capped_steps == 0, "a step that makes up for nothing is not one that makes up for a part"
     assert np.abs(history.final[:, 1:] - case.body.rest[:, 1:].mean(axis=0)).max() < 1e-6 * case.body.size
 
@@ -81,12 +105,12 @@ def corrected(case: Case, matrix, clock: Clock) -> tuple[float, int]:
     return far / setup.start().network.longest_correction, ends[0][1]
 
 
-def test_a_capped_correction_moves_no_node_farther_than_it_claims(case):
-    """0.3 mean spring lengths, at half the limit of the springs; where it says it cut, it went all that way."""
-    if case.method.remedy != "capped":
-        pytest.skip(f"its remedy for a volume far off is '{case.method.remedy}': nothing is cut")
-    if case.body.kept.count > 1:
-        pytest.skip("the bound is on what each volume moves alone; several add up")
+@guard(where=lambda method, kind: method.capabilities.correction == "limited" and kind in ("block", "ball"))
+def test_a_limited_correction_moves_no_node_farther_than_it_claims(case):
+    """0.3 mean spring lengths, at half the limit of the springs; where it says it cut, it went all that way.
+
+    The bound is on what each volume moves alone; several add up.
+    """
     # A force goes that far in a long step only; what is solved for goes at once, and short steps leave springs out.
     fraction = 0.02 if case.method.volume_tol else 0.5
     reached = 0
@@ -98,29 +122,24 @@ def test_a_capped_correction_moves_no_node_farther_than_it_claims(case):
     assert 0 < reached < 4, "either nothing was cut or everything"
 
 
-@pytest.mark.parametrize("start", FAR_OFF)
-def test_a_volume_far_off_comes_back(case, start):
-    """At 0.2 dt_c: as closely as a kept volume is kept; what a force keeps is on its way, and nobody is torn apart."""
-    if case.body.kept.count == case.body.node_count and start == "flattened":
-        pytest.skip("the volumes of all nodes at once: what each may move alone adds up to hundreds of times as much")
-    nodal = case.body.kept.count == case.body.node_count
-    if nodal and start == "40 % too small" and (case.method.name, case.precision) == ("implicit_springs", "float32"):
-        pytest.skip("single precision is too short for its stiff solves there: the run diverges, and says so")
+@guard(tuple(FAR_OFF), AT_ONCE)
+def test_a_volume_far_off_comes_back(case, option):
+    """At 0.2 dt_c: as closely as a kept volume is kept; what a force keeps is on its way, and no body is torn apart."""
+    correction, start = case.method.capabilities.correction, FAR_OFF[option]
     clock = clock_for(case.body, 4, 30, fraction=0.2, method=case.method)
-    history = simulate(case.setup(clock, damping=20.0, positions=start_of(case.body, FAR_OFF[start])))
-    if case.method.remedy == "unbounded" and history.outcome == "diverged":
-        assert np.linalg.det(FAR_OFF[start]) < 0.1 and "diverged in frame 1 " in history.message
+    history = simulate(case.setup(clock, damping=20.0, positions=start_of(case.body, start)))
+    if correction == "unbounded" and history.outcome == "diverged":
+        assert np.linalg.det(start) < 0.1 and "diverged in frame 1 " in history.message
         return
     assert history.outcome == "finished"
     assert np.abs(history.final - case.body.rest).max() < 3 * case.body.size
-    if case.method.remedy:
+    if correction:
         error = np.abs(history.volume / case.body.rest_volumes - 1)[-1].max()
         assert error < (1e-3 if case.method.volume_tol else 0.5)
 
 
+@guard(where=lambda method, kind: method.capabilities.targets)
 def test_a_target_that_jumps_is_followed_behind_a_warning(case):
-    if not case.method.follows_targets:
-        pytest.skip("it follows no target, and refuses one")
     clock = clock_for(case.body, 12, 10, fraction=0.1, method=case.method)
     jump = dict.fromkeys(case.body.kept.names, Ramp((0.0,), (1.1,)))
     with pytest.warns(
@@ -137,13 +156,13 @@ def test_a_target_that_jumps_is_followed_behind_a_warning(case):
 
 
 @pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning", "ignore:invalid:RuntimeWarning")
-@pytest.mark.parametrize("fraction", [10.0, 1e6])
-def test_steps_far_above_the_limit_end_the_run(case, fraction):
+@guard((10.0, 1e6))
+def test_steps_far_above_the_limit_end_the_run(case, option):
     """Where no step is unstable, passes from where nodes would fly by themselves still lose their way in the end."""
-    clock = clock_for(case.body, 4, 60, fraction=fraction, method=case.method)
+    clock = clock_for(case.body, 4, 60, fraction=option, method=case.method)
     v = 0.01 * np.random.default_rng(1).normal(size=case.body.rest.shape)
     setup = case.setup(clock, velocity=v)
-    if case.method.limited or fraction > 1e3:
+    if case.method.capabilities.conditionally_stable or option > 1e3:
         stops(setup, "", 0)
     else:
         assert simulate(setup).outcome == "finished"
@@ -171,6 +190,7 @@ def stops(setup, reason: str, good: int):
     return history
 
 
+@guard()
 def test_an_obstacle_that_loses_its_place_stops_the_run(case):
     """Comparisons with NaN are false: without the guard the obstacle would just be gone."""
     clock = clock_for(case.body, FRAMES, 10, method=case.method)
@@ -179,6 +199,7 @@ def test_an_obstacle_that_loses_its_place_stops_the_run(case):
     stops(case.setup(clock, obstacles=(below,), damping=20.0), "obstacle 0 is no longer finite", 3)
 
 
+@guard()
 def test_an_attachment_that_loses_its_place_stops_the_run(case):
     clock = clock_for(case.body, FRAMES, 10, method=case.method)
     held = Attachment(np.array([0]), Broken(until=LOST_AFTER * clock.frame))
@@ -186,21 +207,22 @@ def test_an_attachment_that_loses_its_place_stops_the_run(case):
 
 
 @pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning", "ignore:invalid:RuntimeWarning")
-@pytest.mark.parametrize("speed", [1e200, 1e308])
-def test_numbers_that_overflow_stop_the_run(case, speed):
+@guard((1e200, 1e308))
+def test_numbers_that_overflow_stop_the_run(case, option):
     """One node shot off at a speed whose square, or whose way within a step, is no number any more."""
     v = np.zeros_like(case.body.rest)
-    v[3] = [speed, 0.0, 0.0]
+    v[3] = [option, 0.0, 0.0]
     clock = clock_for(case.body, FRAMES, 10)
     planes = squeeze(case.body, 0.002, clock.duration)
     stops(case.setup(clock, obstacles=planes, damping=5.0, velocity=v), "", 0)
 
 
+@guard()
 def test_nan_in_one_node_ends_every_solve(case):
     """Whatever iterates must end on NaN: an iteration that waits for a small residual would wait for ever."""
     setup = case.setup(clock_for(case.body, 1, 3))
     state = begin_frame(setup.start(), setup.drive(0))
-    state.motion.x[4] = np.nan
+    state.nodes.x[4] = np.nan
     assert not np.isfinite(case.method.advance(state, setup.drive(0)).x).all()
 
 
@@ -214,6 +236,7 @@ class Poisoned(Method):
     name: ClassVar[str] = "poisoned"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
+    capabilities: ClassVar[Capabilities] = Free.capabilities
 
     def advance(self, state, drive):
         self.frames.append(1)
@@ -222,8 +245,8 @@ class Poisoned(Method):
             return after
         if self.what == "pressure":
             return replace(after, lam=np.full_like(after.lam, np.nan))
-        poisoned = after.motion._replace(v=np.full_like(after.v, np.nan))
-        return Free().advance(replace(after, motion=poisoned), drive)
+        poisoned = after.nodes._replace(v=np.full_like(after.v, np.nan))
+        return Free().advance(replace(after, nodes=poisoned), drive)
 
 
 @pytest.mark.parametrize(("what", "reason"), [("force", "positions are no longer"), ("pressure", "pressures are no")])

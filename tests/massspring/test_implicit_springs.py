@@ -19,6 +19,7 @@ from massspring import (
     step_limit,
     tetrahedral_body,
 )
+from massspring.kernels.contact.modes import ON_EDGE, SLIDES, STICKS
 from massspring.methods.implicit.contact import Touching
 from massspring.methods.implicit.factor import Factor
 from tests.massspring.conftest import SOFT, block, icosphere
@@ -64,20 +65,20 @@ def test_the_factor_is_that_of_the_matrix(started):
 def test_the_response_past_obstacles_is_that_of_the_saddle_point_system(started):
     """Outside truth: [A, −Cᵀ; C, 0] solved densely, for nodes that slide, stick and lie in a wedge."""
     state, factor, dt = started
-    motion, rng = state.motion, np.random.default_rng(1)
+    nodes, contacts, rng = state.nodes, state.contacts, np.random.default_rng(1)
     for name in ("normal", "second_normal"):
-        vectors = rng.normal(size=motion.x.shape)
-        getattr(motion, name)[:] = vectors / np.linalg.norm(vectors, axis=1)[:, None]
-    motion.locked[[3, 5, 8, 20]] = [1, 3, 2, 1]
-    motion.touched[[3, 5, 8, 20]], motion.second[8] = 1, 2
-    motion.goal[:] = rng.normal(size=motion.x.shape)
-    touching = Touching(factor, motion, np.arange(len(motion.x), dtype=np.uint32), dt)
+        vectors = rng.normal(size=nodes.x.shape)
+        getattr(contacts, name)[:] = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+    contacts.mode[[3, 5, 8, 20]] = [SLIDES, STICKS, ON_EDGE, SLIDES]
+    contacts.touched[[3, 5, 8, 20]], contacts.second[8] = 1, 2
+    contacts.goal[:] = rng.normal(size=nodes.x.shape)
+    touching = Touching(factor, nodes, contacts, np.arange(len(nodes.x), dtype=np.uint32), dt)
     assert len(touching.nodes) == 1 + 3 + 2 + 1 and sorted(set(touching.obstacle)) == [0, 1]
-    rows = np.zeros((len(touching.nodes), motion.x.size))
+    rows = np.zeros((len(touching.nodes), nodes.x.size))
     for row, node, direction in zip(rows, touching.nodes, touching.direction, strict=True):
         row[3 * node : 3 * node + 3] = direction
     inverse = np.kron(dense(state.network, dt, 3.0), np.eye(3))
-    forces = rng.normal(size=motion.x.shape)
+    forces = rng.normal(size=nodes.x.shape)
     base = inverse @ forces.ravel()
     gamma = np.linalg.solve(rows @ inverse @ rows.T, -rows @ base)
     exact = (base + inverse @ rows.T @ gamma).reshape(-1, 3)
@@ -187,7 +188,7 @@ def test_what_it_cannot_do_is_said():
 def test_a_collapsed_body_has_nothing_to_push_on(ball_body):
     setup = Setup(ball_body, ImplicitSprings(passes=1), Clock(1e-3, 1, 1))
     state = setup.start()
-    state.motion.x[:] = np.outer(np.linspace(0, 0.1, ball_body.node_count), [1.0, 0.0, 0.0])
+    state.nodes.x[:] = np.outer(np.linspace(0, 0.1, ball_body.node_count), [1.0, 0.0, 0.0])
     after = setup.method.advance(state, setup.drive(0))
     assert after.tally.skipped[0] == 1 and np.isfinite(after.x).all()
 

@@ -138,7 +138,7 @@ def test_squeezed_it_presses_and_comes_back(taut):
     assert float(taut.rest_volumes @ pressed.pressure[-1]) > 0.02 * MU * taut.volume
     assert pressed.elastic[-1] > 0
     state = Setup(taut, ImplicitVolume(), clock, damping=60.0).start()
-    state.motion.x[:] = pressed.final
+    state.nodes.x[:] = pressed.final
     free = Setup(taut, ImplicitVolume(), clock, damping=60.0)
     for frame in range(clock.frames):
         state = free.method.advance(state, free.drive(frame))
@@ -151,7 +151,7 @@ def test_with_fewer_volumes_or_no_pressure_it_is_refused(taut):
     whole = replace(taut, volumes=None)
     with pytest.raises(MassSpringError, match="keeps 1 volumes for 48 nodes; keep one volume per node"):
         Setup(whole, ImplicitVolume(), Clock(0.01, 1, 10))
-    with pytest.raises(MassSpringError, match="method 'free' has no pressure at rest"):
+    with pytest.raises(MassSpringError, match=r"method 'free' does not apply .* no springs without length"):
         Setup(taut, Free(), Clock(0.01, 1, 10))
 
 

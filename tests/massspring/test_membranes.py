@@ -158,7 +158,7 @@ def test_every_loop_feels_them(balloon, method):
     for body in (balloon, bare):
         setup = Setup(body, method, Clock(dt, 1, 1))
         state = setup.start()
-        state.motion.x[:] = shaken(balloon.rest)
+        state.nodes.x[:] = shaken(balloon.rest)
         ends.append(method.advance(state, setup.drive(0)))
     felt = balloon.mass[:, None] * (ends[0].v - ends[1].v)
     wall = dt * force(shaken(balloon.rest), balloon.membrane)

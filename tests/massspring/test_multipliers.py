@@ -5,19 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import massspring.kernels.step.advance as motion_kernels
 import massspring.layout.jacobian_pattern as rows_module
 from massspring import (
     Attachment,
     Body,
+    Clock,
     ImplicitVolume,
     Setup,
     Volumes,
     simulate,
 )
-from massspring.kernels.arrays.layout import Accuracy
+from massspring.kernels.arrays.layout import Accuracy, Push
 from massspring.kernels.constraint.jacobian import diagonal_into, rows_into, transposed_rows_times_into
 from massspring.kernels.constraint.schur import solve_iteratively
+from massspring.kernels.contact.modes import ON_EDGE, STICKS
+from massspring.kernels.step.advance import advance
+from massspring.kernels.step.begin import open_frame
 from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.state import new_tally
@@ -51,22 +54,22 @@ def touched_and_held(body: Body, dt: float):
     random = np.random.default_rng(0)
     held, touched = np.array([5, 17]), np.array([20, 21, 30])
     state = start(body, (Attachment(held),), v=0.1 * random.normal(size=body.rest.shape))
-    mo, rows = state.motion, state.rows
-    mo.v_star[:] = state.v
-    mo.v_star[held] = [0.02, 0.0, -0.01]
-    approach = seat(mo, touched, random)
+    nodes, contacts, rows = state.nodes, state.contacts, state.rows
+    nodes.v_star[:] = state.v
+    nodes.v_star[held] = [0.02, 0.0, -0.01]
+    approach = seat(contacts, touched, random)
     edge, wedged, stuck = np.linalg.qr(random.normal(size=(3, 3)))[0], 31, 40
-    mo.touched[[wedged, stuck]] = 1
-    mo.locked[[wedged, stuck]] = 2, 3
-    list_touched(mo)
-    mo.direction[wedged] = edge[0]
-    mo.goal[wedged] = 0.03 * edge[1] - 0.02 * edge[2]
-    mo.goal[stuck] = [0.01, -0.02, 0.03]
+    contacts.touched[[wedged, stuck]] = 1
+    contacts.mode[[wedged, stuck]] = ON_EDGE, STICKS
+    list_touched(contacts)
+    contacts.direction[wedged] = edge[0]
+    contacts.goal[wedged] = 0.03 * edge[1] - 0.02 * edge[2]
+    contacts.goal[stuck] = [0.01, -0.02, 0.03]
     fixed = [(wedged, edge[1], 0.03), (wedged, edge[2], -0.02)]
-    fixed += [(stuck, axis, float(axis @ mo.goal[stuck])) for axis in np.eye(3)]
-    fixed += [(i, mo.normal[i], a) for i, a in zip(touched, approach, strict=True)]
-    fixed += [(i, axis, float(axis @ mo.v_star[i])) for i in held for axis in np.eye(3)]
-    rows_into(mo.x, state.network.inverse_mass, rows)
+    fixed += [(stuck, axis, float(axis @ contacts.goal[stuck])) for axis in np.eye(3)]
+    fixed += [(i, contacts.normal[i], a) for i, a in zip(touched, approach, strict=True)]
+    fixed += [(i, axis, float(axis @ nodes.v_star[i])) for i in held for axis in np.eye(3)]
+    rows_into(nodes.x, state.network.inverse_mass, rows)
     return state, fixed
 
 
@@ -77,12 +80,12 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
         monkeypatch.setattr(rows_module, "DENSE_UP_TO", 0)
     dt = 1e-3
     state, fixed = touched_and_held(several, dt)
-    mo, rows, n = state.motion, state.rows, several.node_count
+    nodes, contacts, rows, n = state.nodes, state.contacts, state.rows, several.node_count
     target = 1.001 * several.rest_volumes
     network = state.network._replace(longest_correction=np.inf)
-    set_right_side(network, rows, mo, target, dt, 1e-13)
+    set_right_side(network, rows, nodes, contacts, target, dt, 1e-13)
     tally = new_tally(1, 1)
-    solve_multipliers(network, rows, mo, tally, Accuracy(1e-13, 2000))
+    solve_multipliers(network, rows, contacts, tally, Accuracy(1e-13, 2000))
     jacobian = np.zeros((several.kept.count, n, 3))
     for r in range(several.kept.count):
         entries = slice(rows.row_start[r], rows.row_start[r + 1])
@@ -93,14 +96,16 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
     right = np.concatenate([target - rows.volume, [velocity for _, _, velocity in fixed]])
     mass, empty = np.repeat(several.mass, 3), np.zeros((len(rectangle), len(rectangle)))
     system = np.block([[np.diag(mass), -rectangle.T], [rectangle, empty]])
-    solution = np.linalg.lstsq(system, np.concatenate([mass * mo.v_star.ravel(), right]), rcond=1e-14)[0]
+    solution = np.linalg.lstsq(system, np.concatenate([mass * nodes.v_star.ravel(), right]), rcond=1e-14)[0]
     lam = solution[3 * n : 3 * n + len(jacobian)]
     force = np.einsum("r,rja->ja", lam, jacobian)
-    assert np.abs(mo.gradient - force).max() < 1e-6 * np.abs(force).max()
+    assert np.abs(rows.push - force).max() < 1e-6 * np.abs(force).max()
     if several.kept.count < n:  # pressures of nodes may hold a part that moves nothing
         assert np.abs(rows.lam - lam).max() < 1e-6 * np.abs(lam).max()
-    motion_kernels.advance(mo, several.mass, network.inverse_mass, 1.0, dt, np.zeros((2, 3)))
-    assert np.allclose(mo.v.ravel(), solution[: 3 * n], atol=1e-7)  # a millionth of the velocities of 0.1 m/s
+    drive = Setup(several, ImplicitVolume(), Clock(dt, 1, 1)).drive(0)
+    open_frame(state.frame(drive))
+    advance(replace(state, tally=new_tally(2, 1)).frame(drive), Push(rows.push, 1.0))
+    assert np.allclose(nodes.v.ravel(), solution[: 3 * n], atol=1e-7)  # a millionth of the velocities of 0.1 m/s
     assert (tally.iterations[1] > 0) != dense
 
 
@@ -108,9 +113,9 @@ def test_an_iteration_ends_as_soon_as_a_residual_is_no_number(block_body, monkey
     monkeypatch.setattr(rows_module, "DENSE_UP_TO", 0)
     state, _ = touched_and_held(block_body.keeping(Volumes.nodal(block_body)), 1e-3)
     rows = state.rows
-    diagonal_into(rows, state.motion, state.network.inverse_mass, rows.diagonal)
+    diagonal_into(rows, state.contacts, state.network.inverse_mass, rows.diagonal)
     rows.right[:], rows.right[7] = 1.0, np.nan
-    count = solve_iteratively(rows, state.motion, state.network.inverse_mass, rows.lam, rows.allowed, 10**9)
+    count = solve_iteratively(rows, state.contacts, state.network.inverse_mass, rows.lam, rows.allowed, 10**9)
     assert count <= 1 and np.isnan(rows.right).any()
 
 
@@ -121,10 +126,10 @@ def test_conjugate_directions_need_no_more_iterations_than_volumes(kind, block_b
     body = hollow_body if kind == "hollow" else block_body.keeping(Volumes.regions(block_body, 7))
     state, _ = touched_and_held(body, 1e-3)
     rows = state.rows
-    diagonal_into(rows, state.motion, state.network.inverse_mass, rows.diagonal)
+    diagonal_into(rows, state.contacts, state.network.inverse_mass, rows.diagonal)
     rows.right[:] = -np.random.default_rng(1).uniform(0.5, 1.0, body.kept.count)
     rows.allowed[:] = 1e-6  # the residuals start at 1; the preconditioner rounds directions to 6e-8
-    count = solve_iteratively(rows, state.motion, state.network.inverse_mass, rows.lam, rows.allowed, 100)
+    count = solve_iteratively(rows, state.contacts, state.network.inverse_mass, rows.lam, rows.allowed, 100)
     assert 1 < count <= body.kept.count
     assert np.abs(rows.right).max() <= 1e-6
 

@@ -1,4 +1,4 @@
-"""A run numbers the nodes of a large body its own way; nobody outside can tell."""
+"""A run numbers the nodes of a large body its own way; outside of the run it cannot be seen."""
 
 from dataclasses import replace
 
@@ -129,4 +129,4 @@ def test_attachments_of_large_bodies_are_refused_by_the_mesh_s_numbers(ball, nod
 def test_small_bodies_keep_the_numbers_of_the_mesh(ball_body):
     assert ball_body.node_count < MANY
     state = Setup(ball_body, Free(), clock_for(ball_body, 1, 1)).start()
-    assert state.place is None and state.x is state.motion.x
+    assert state.place is None and state.x is state.nodes.x

@@ -1,19 +1,26 @@
 """HCJ05 with one volume: its residual, its multiplier by another solve, and what must not change it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-import massspring.kernels.step.advance as motion_kernels
 from massspring import (
     Attachment,
+    Clock,
     Free,
     ImplicitVolume,
     Setup,
     Sphere,
     simulate,
 )
+from massspring.kernels.arrays.layout import Push
+from massspring.kernels.constraint.one_volume import volume_multiplier
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
+from massspring.kernels.step.advance import advance
+from massspring.kernels.step.begin import open_frame
 from massspring.layout.allocate import start
+from massspring.layout.state import new_tally
 from tests.massspring.test_methods import clock_for, squeeze, thrown
 from tests.massspring.touched import seat
 
@@ -38,21 +45,21 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     body = ball_body
     rng = np.random.default_rng(0)
     state = start(body, (Attachment(np.array([5, 17])),), v=0.1 * rng.normal(size=body.rest.shape))
-    net, mo, dt = state.network, state.motion, 1e-3
-    mo.v_star[:] = state.v
-    mo.v_star[net.held_nodes] = [0.02, 0.0, -0.01]
+    net, nodes, contacts, dt = state.network, state.nodes, state.contacts, 1e-3
+    nodes.v_star[:] = state.v
+    nodes.v_star[net.held_nodes] = [0.02, 0.0, -0.01]
     touched = np.array([40, 41, 90])
-    approach = seat(mo, touched, rng)
+    approach = seat(contacts, touched, rng)
     wanted = 1.02 * body.volume
-    error = wanted - volume_gradient_into(mo.x, net.triangles, mo.gradient)
-    lam, _ = motion_kernels.volume_multiplier(mo, net.inverse_mass, error, dt)
+    error = wanted - volume_gradient_into(nodes.x, net.triangles, nodes.gradient)
+    lam, _ = volume_multiplier(nodes, contacts, net.inverse_mass, error, dt)
 
     n = 3 * body.node_count
-    rows = [dt * mo.gradient.ravel()]
+    rows = [dt * nodes.gradient.ravel()]
     right = [error]
     for i, a in zip(touched, approach, strict=True):
         row = np.zeros((body.node_count, 3))
-        row[i] = mo.normal[i]
+        row[i] = contacts.normal[i]
         rows.append(row.ravel())
         right.append(a)
     for i in net.held_nodes:
@@ -60,24 +67,26 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
             row = np.zeros((body.node_count, 3))
             row[i, axis] = 1.0
             rows.append(row.ravel())
-            right.append(mo.v_star[i, axis])
+            right.append(nodes.v_star[i, axis])
     constraints = np.array(rows)
     mass = np.repeat(body.mass, 3)
     system = np.block([[np.diag(mass), -constraints.T], [constraints, np.zeros((len(rows), len(rows)))]])
-    solution = np.linalg.solve(system, np.concatenate([mass * mo.v_star.ravel(), right]))
+    solution = np.linalg.solve(system, np.concatenate([mass * nodes.v_star.ravel(), right]))
     assert lam == pytest.approx(solution[n], rel=1e-9)  # the row is dt G, so its multiplier is the pressure
 
-    x = mo.x.copy()
-    mo.places[:, :3] = x
-    motion_kernels.advance(mo, net.mass, net.inverse_mass, lam, dt, np.zeros((1, 3)))
-    assert np.allclose(mo.v.ravel(), solution[:n], atol=1e-12)
-    assert np.allclose(mo.x, x + dt * mo.v)
+    x = nodes.x.copy()
+    drive = Setup(body, ImplicitVolume(), Clock(dt, 1, 1)).drive(0)
+    frame = replace(state, tally=new_tally(1, 1)).frame(drive)
+    open_frame(frame)
+    advance(frame, Push(nodes.gradient, lam))
+    assert np.allclose(nodes.v.ravel(), solution[:n], atol=1e-12)
+    assert np.allclose(nodes.x, x + dt * nodes.v)
 
 
 def test_a_body_without_a_volume_gradient_is_counted_not_crashed(ball_body):
     setup = Setup(ball_body, ImplicitVolume(), clock_for(ball_body, 1, 1))
     state = setup.start()
-    state.motion.x[:] = np.outer(np.linspace(0, 0.1, ball_body.node_count), [1.0, 0.0, 0.0])
+    state.nodes.x[:] = np.outer(np.linspace(0, 0.1, ball_body.node_count), [1.0, 0.0, 0.0])
     after = setup.method.advance(state, setup.drive(0))
     assert after.tally.skipped[0] == 1
     assert after.lam == 0.0 and np.isfinite(after.x).all()

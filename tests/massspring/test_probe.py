@@ -19,6 +19,8 @@ from massspring import (
     surface_body,
 )
 from massspring.body.inside import is_inside, mean_edge
+from massspring.kernels.arrays.layout import Push
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.probe.arrays import COMPARED, IN_CONTACT, LEFT_BEHIND, Stage
 from massspring.kernels.probe.contacts import solve_rows
 from massspring.kernels.probe.motion import gather
@@ -109,7 +111,7 @@ def asked_of(stage, rates):
     rows, probes = stage.probes.rows, stage.probes
     probe, direction = rows.probe[: len(rates)], rows.direction[: len(rates)]
     tip = np.einsum("ki,ki->k", direction, stage.tips.end[stage.step, probe])
-    return (probes.radius[probe] - np.einsum("kij,ij->k", rates, stage.motion.x) + tip) / stage.dt
+    return (probes.radius[probe] - np.einsum("kij,ij->k", rates, stage.nodes.x) + tip) / stage.dt
 
 
 def disturbed_contact():
@@ -121,31 +123,32 @@ def disturbed_contact():
             break
     drive = setup.drive(59)
     after = begin_frame(state, drive)
-    motion, net, rows, rng = after.motion, after.network, after.probing.rows, np.random.default_rng(4)
-    motion.v_star[:] = 0.02 * rng.normal(size=motion.v_star.shape)
-    motion.v_star[net.held_nodes] = 0.0
-    motion.locked[:] = 0
-    motion.touching_count[0] = 0
+    nodes, contacts, net = after.nodes, after.contacts, after.network
+    rows, rng = after.probing.rows, np.random.default_rng(4)
+    nodes.v_star[:] = 0.02 * rng.normal(size=nodes.v_star.shape)
+    nodes.v_star[net.held_nodes] = 0.0
+    contacts.mode[:] = FREE
+    contacts.touching_count[0] = 0
     count = int(rows.count[0])
     rows.direction[:count] += 0.3 * rng.normal(size=(count, 3))
     rows.direction[:count] /= np.linalg.norm(rows.direction[:count], axis=1)[:, None]
-    mobility = float((net.inverse_mass[:, None] * motion.gradient**2).sum())
+    mobility = float((net.inverse_mass[:, None] * nodes.gradient**2).sum())
     after.probing.near[0], after.probing.near_count[0] = np.arange(len(net.triangles)), len(net.triangles)
-    return Stage(net, motion, drive.tips, after.probing, None, mobility, 0, drive.dt)
+    return Stage(net, nodes, contacts, drive.tips, after.probing, None, mobility, 0, drive.dt)
 
 
 def test_contacts_and_volume_equal_the_full_saddle_point_solve():
     """Outside truth: [M, −Cᵀ, −Gᵀ; C, 0; G, 0] solved densely for the rows that press."""
     stage, lam = disturbed_contact(), 50.0
-    probing, motion, net, dt = stage.probes, stage.motion, stage.network, stage.dt
-    g, rows, count = motion.gradient, probing.rows, int(probing.rows.count[0])
-    u = motion.v_star + dt * lam * net.inverse_mass[:, None] * g
-    gather(stage, lam)
+    probing, nodes, net, dt = stage.probes, stage.nodes, stage.network, stage.dt
+    g, rows, count = nodes.gradient, probing.rows, int(probing.rows.count[0])
+    u = nodes.v_star + dt * lam * net.inverse_mass[:, None] * g
+    gather(stage, Push(stage.nodes.gradient, lam))
     solve_rows(stage, None)
     beside = lam + probing.change[0]
     impulse = rows.impulse[:count]
     assert (impulse >= 0).all() and (impulse > 0).sum() > 0
-    found = motion.v_star + net.inverse_mass[:, None] * dt * beside * g + probing.push
+    found = nodes.v_star + net.inverse_mass[:, None] * dt * beside * g + probing.push
     assert np.array_equal(rows.node[:count], probing.surface[rows.triangle[:count]])
     c = rates_of(rows, count, u.shape)
     ask = asked_of(stage, c)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from massspring import METHODS, Clock, ImplicitVolume, MassSpringError, Probe, Setup, simulate
+from massspring import METHODS, ImplicitVolume, Probe, Setup, simulate
 from massspring.kernels.probe.arrays import COMPARED, IN_CONTACT
 from tests.massspring.conftest import SOFT
 from tests.massspring.test_methods import clock_for, thrown
@@ -19,7 +19,7 @@ MODULUS = {"penalty": "bulk_modulus", "pyramid": "bulk_modulus", "pressure": "am
 MEETING = [
     m(**({MODULUS[m.name]: SOFT_MODULUS} if m.name in MODULUS else {}))
     for m in METHODS
-    if m.misses_probes is None and m.name not in ("free", "implicit_volume")
+    if m.capabilities.thin_probes and m.name not in ("free", "implicit_volume")
 ]
 """Those two have tests of their own."""
 EACH = pytest.mark.parametrize("method", MEETING, ids=lambda m: m.name)
@@ -29,14 +29,6 @@ WAYS = {name: way for name, way in PATHS.items() if name != "method"}
 def test_every_method_that_keeps_one_volume_by_one_pressure_and_one_motion_meets_probes():
     names = {method.name for method in MEETING}
     assert names == {"shake", "projection", "baumgarte", "penalty", "pressure", "pyramid"}
-
-
-@pytest.mark.parametrize("chosen", METHODS, ids=lambda m: m.name)
-def test_a_method_that_misses_probes_says_why(chosen, block_body):
-    if chosen.misses_probes is None:
-        pytest.skip("it meets them")
-    with pytest.raises(MassSpringError, match=f"'{chosen.name}' does not meet: {chosen.misses_probes}; use a Sphere"):
-        Setup(block_body, chosen(), Clock(0.01, 1, 10), (Probe((0.0, 0.0, 1.0)),))
 
 
 @EACH

@@ -7,6 +7,8 @@ import pytest
 
 from massspring import Clock, ImplicitVolume, Path, Probe, Setup, Volumes
 from massspring.body.inside import mean_edge
+from massspring.kernels.arrays.layout import Push
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND, Stage
 from massspring.kernels.probe.contacts import solve_rows
 from massspring.kernels.probe.fallback import lead
@@ -66,12 +68,12 @@ def test_a_step_that_carries_nodes_keeps_volumes_and_books_what_the_tip_gives(an
     assert np.abs(jacobian @ v.ravel()).max() < 1e-6 * (np.abs(jacobian) @ np.abs(v.ravel())).max()
     assert np.abs(v[~carried]).max() > 0.01 * np.linalg.norm(tip)
     # And nothing is left over for the next step.
-    assert not after.probing.carried.any() and not after.probing.push.any() and not after.motion.locked.any()
+    assert not after.probing.carried.any() and not after.probing.push.any() and not after.contacts.mode.any()
 
 
 def some_rows(stage, rng, count=5):
     """Contacts of one tip with triangles that share nodes, some of which obstacles or attachments hold."""
-    rows, motion = stage.probes.rows, stage.motion
+    rows, nodes, contacts = stage.probes.rows, stage.nodes, stage.contacts
     rows.count[0], rows.probe[:count] = count, 0
     rows.triangle[:count] = rng.choice(8, count, replace=False)
     rows.node[:count] = stage.probes.surface[rows.triangle[:count]]
@@ -79,38 +81,40 @@ def some_rows(stage, rng, count=5):
     rows.direction[:count] = rng.normal(size=(count, 3))
     rows.direction[:count] /= np.linalg.norm(rows.direction[:count], axis=1)[:, None]
     # The tip in their midst: some ask for a push, some for none.
-    at = np.einsum("kq,kqi->ki", rows.weight[:count], motion.x[rows.node[:count]])
+    at = np.einsum("kq,kqi->ki", rows.weight[:count], nodes.x[rows.node[:count]])
     stage.tips.end[0, 0] = at.mean(axis=0)
-    motion.locked[:] = 0
+    contacts.mode[:] = FREE
     among, others = np.unique(rows.node[:count]), np.arange(BALL.node_count)
     chosen = np.concatenate([rng.permutation(among)[:3], np.setdiff1d(others, among)[:30]])
-    motion.locked[chosen] = rng.permutation(np.arange(len(chosen)) % 3 + 1)
-    motion.direction[chosen] = rng.normal(size=(len(chosen), 3))
-    motion.direction[chosen] /= np.linalg.norm(motion.direction[chosen], axis=1)[:, None]
-    motion.goal[chosen] = np.einsum("nij,nj->ni", taken_from(motion)[chosen], 0.02 * rng.normal(size=(len(chosen), 3)))
+    contacts.mode[chosen] = rng.permutation(np.arange(len(chosen)) % 3 + 1)
+    contacts.direction[chosen] = rng.normal(size=(len(chosen), 3))
+    contacts.direction[chosen] /= np.linalg.norm(contacts.direction[chosen], axis=1)[:, None]
+    contacts.goal[chosen] = np.einsum(
+        "nij,nj->ni", taken_from(contacts)[chosen], 0.02 * rng.normal(size=(len(chosen), 3))
+    )
 
 
-def taken_from(motion):
+def taken_from(contacts):
     """The projection on the directions that obstacles take from each node, (n, 3, 3)."""
-    outer = np.einsum("ni,nj->nij", motion.direction, motion.direction)
-    return np.choose(motion.locked[:, None, None], [0 * outer, outer, np.eye(3) - outer, 0 * outer + np.eye(3)])
+    outer = np.einsum("ni,nj->nij", contacts.direction, contacts.direction)
+    return np.choose(contacts.mode[:, None, None], [0 * outer, outer, np.eye(3) - outer, 0 * outer + np.eye(3)])
 
 
 def random_step(seed, lam):
     """A step with contacts beside obstacles and attachments, velocities at random; what is left to each node."""
     setup, rng = pressed(METHOD), np.random.default_rng(seed)
     after, drive = begin_frame(setup.start(), setup.drive(0)), setup.drive(0)
-    probing, motion, net = after.probing, after.motion, after.network
-    motion.v_star[:], motion.gradient[:] = 0.02 * rng.normal(size=(2, *motion.x.shape))
-    motion.v_star[net.held_nodes] = 0.0
-    motion.gradient[:] *= 0.01
-    stage = Stage(net, motion, drive.tips, probing, None, 0.0, 0, drive.dt)
+    probing, nodes, contacts, net = after.probing, after.nodes, after.contacts, after.network
+    nodes.v_star[:], nodes.gradient[:] = 0.02 * rng.normal(size=(2, *nodes.x.shape))
+    nodes.v_star[net.held_nodes] = 0.0
+    nodes.gradient[:] *= 0.01
+    stage = Stage(net, nodes, contacts, drive.tips, probing, None, 0.0, 0, drive.dt)
     some_rows(stage, rng)
-    motion.locked[net.held_nodes] = 0
-    kept, g = np.eye(3) - taken_from(motion), motion.gradient
+    contacts.mode[net.held_nodes] = FREE
+    kept, g = np.eye(3) - taken_from(contacts), nodes.gradient
     stage = stage._replace(mobility=float(np.einsum("n,ni,nij,nj->", net.inverse_mass, g, kept, g)))
     probing.near[0], probing.near_count[0] = np.arange(len(probing.surface)), len(probing.surface)
-    gather(stage, lam)
+    gather(stage, Push(stage.nodes.gradient, lam))
     return stage, kept
 
 
@@ -119,12 +123,12 @@ def test_contacts_beside_obstacles_equal_the_full_saddle_point(seed):
     """Outside truth: Newton's law for all nodes with every constraint in one dense system: least squares of numpy."""
     lam = 40.0
     stage, kept = random_step(seed, lam)
-    probing, motion, dt = stage.probes, stage.motion, stage.dt
-    g, w = motion.gradient, stage.network.inverse_mass
+    probing, nodes, contacts, dt = stage.probes, stage.nodes, stage.contacts, stage.dt
+    g, w = nodes.gradient, stage.network.inverse_mass
     bound = solve_rows(stage, None)
     move(stage, None)
-    u = np.einsum("nij,nj->ni", kept, motion.v_star + dt * lam * w[:, None] * g)
-    u += motion.goal * (motion.locked > 0)[:, None]
+    u = np.einsum("nij,nj->ni", kept, nodes.v_star + dt * lam * w[:, None] * g)
+    u += contacts.goal * (contacts.mode > FREE)[:, None]
     on = np.unique(BALL.triangles)
     assert np.allclose(probing.base[on], u[on], atol=1e-14)
     found = np.where(np.isin(np.arange(len(u)), on)[:, None], probing.velocity, u)
@@ -144,7 +148,7 @@ def test_contacts_beside_obstacles_equal_the_full_saddle_point(seed):
     # But where obstacles hold all that a contact would push.
     movable = np.einsum("kni,nij,knj->k", c, mobile, c) > 1e-9 * w.max()
     assert movable.sum() >= 4 and (gap[movable] > -1e-6 * np.abs(ask).max()).all()
-    # What the broad phase goes by: nothing is faster than it was told.
+    # What the broad phase goes by: nothing is faster than the speed it was given.
     assert np.linalg.norm(found - u, axis=1).max() <= bound
     swollen = np.array([swelling(stage, None, i) for i in range(len(u))])
     assert 0 < np.linalg.norm(swollen, axis=1).max() <= change_of_rows(stage)
@@ -160,7 +164,7 @@ def led(weight, held, radius=0.0):
     probing.velocity[corners] = 0.1 * rng.normal(size=(3, 3))
     probing.pair.tip[:] = 1e-3 * rng.normal(size=(2, 3))
     probing.carried[np.delete(corners, held)] = 1
-    stage = Stage(after.network, after.motion, drive.tips, probing, None, 0.0, 0, drive.dt)
+    stage = Stage(after.network, after.nodes, after.contacts, drive.tips, probing, None, 0.0, 0, drive.dt)
     return stage, corners, lead(stage, 0, 0)
 
 

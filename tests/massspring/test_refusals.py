@@ -59,5 +59,7 @@ def test_an_obstacle_is_looked_for_where_the_body_starts(ball_body):
 
 def test_a_target_that_nothing_would_read_is_refused(block_body):
     """Springs alone keep no volume: a run that never fills would look like one that does."""
-    with pytest.raises(MassSpringError, match="volume 'whole', which method 'free' does not follow; leave it out"):
+    with pytest.raises(
+        MassSpringError, match="volume 'whole', which method 'free' does not follow: it keeps no volume; leave it out"
+    ):
         Setup(block_body, Free(), clock_for(block_body, 1, 1), targets={"whole": Ramp((0.0, 1e3), (1.0, 1.1))})

@@ -5,7 +5,9 @@ import pytest
 
 from massspring import Attachment, Clock, ImplicitVolume, Path, Plane, Setup, surface_body
 from massspring.analysis.stability import step_limit
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.friction import release_wedged
+from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.test_rubbing import wedge_of
 from tests.massspring.touched import list_touched
@@ -39,9 +41,9 @@ def test_no_obstacle_pulls_a_node(shell, angle):
     for frame in range(clock.frames):
         drive = setup.drive(frame)
         state = setup.method.advance(state, drive)
-        motion, on_one = state.motion, state.motion.locked == 1
+        nodes, contacts, on_one = state.nodes, state.contacts, state.contacts.mode == SLIDES
         push = drive.dt * state.lam[0] * state.network.inverse_mass[:, None]
-        pushed = ((motion.goal - motion.v_star - push * motion.gradient) * motion.normal).sum(axis=1)
+        pushed = ((contacts.goal - nodes.v_star - push * nodes.gradient) * contacts.normal).sum(axis=1)
         met += int(on_one.sum())
         assert (pushed[on_one] > -ROUND_OFF).all(), frame
     assert met > 5000
@@ -52,16 +54,16 @@ def test_a_wedge_lets_go_of_a_node_that_either_side_would_pull(shell, first, sec
     """goal − u = α n + β n' with α, β given; the normals are neither parallel nor at right angles."""
     setup = Setup(shell, ImplicitVolume(), Clock(1e-3, 1, 1), wedge_of(0.0, 1.0, 0.4))
     state, drive = setup.start(), setup.drive(0)
-    motion, node = state.motion, int(state.network.surface_nodes[3])
+    nodes, contacts, node = state.nodes, state.contacts, int(state.network.surface_nodes[3])
     n, m = (np.array(plane.unit_normal) for plane in setup.obstacles)
-    motion.v_star[node] = (0.1, -0.2, 0.3)
-    motion.gradient[node] = (1e-3, 2e-3, -1e-3)
+    nodes.v_star[node] = (0.1, -0.2, 0.3)
+    nodes.gradient[node] = (1e-3, 2e-3, -1e-3)
     lam = 50.0
-    u = motion.v_star[node] + drive.dt * lam * state.network.inverse_mass[node] * motion.gradient[node]
-    motion.normal[node], motion.second_normal[node] = n, m
-    motion.goal[node] = u + first * n + second * m
-    motion.touched[node], motion.second[node], motion.locked[node] = 1, 2, 2
-    list_touched(motion)
+    u = nodes.v_star[node] + drive.dt * lam * state.network.inverse_mass[node] * nodes.gradient[node]
+    contacts.normal[node], contacts.second_normal[node] = n, m
+    contacts.goal[node] = u + first * n + second * m
+    contacts.touched[node], contacts.second[node], contacts.mode[node] = 1, 2, ON_EDGE
+    list_touched(contacts)
     free = first < 0 or second < 0
-    assert release_wedged(state.network, motion, drive, lam) == int(free)
-    assert motion.locked[node] == (0 if free else 2)
+    assert release_wedged(state.network, nodes, contacts, drive, Push(nodes.gradient, lam)) == int(free)
+    assert contacts.mode[node] == (FREE if free else ON_EDGE)

@@ -8,6 +8,7 @@ from massspring import Body, Volumes
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.constraint.jacobian import diagonal_into, rows_into
 from massspring.kernels.constraint.schur import apply_schur
+from massspring.kernels.contact.modes import ON_EDGE, SLIDES, STICKS
 from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.ring_areas import quadrangles
@@ -110,21 +111,21 @@ def test_a_ring_takes_half_as_many_quadrangles_as_it_has_nodes():
 def test_the_diagonal_knows_of_contact(block_body, precision):
     """Nodes that slide, lie in a wedge or stick, one held; and a volume of which every node sticks."""
     state = in_precision(start(nodal(block_body)), precision)
-    motion, rows, weight = state.motion, state.rows, state.network.inverse_mass
+    nodes, contacts, rows, weight = state.nodes, state.contacts, state.rows, state.network.inverse_mass
     assert rows is not None
-    motion.x[:] = moved(block_body)
+    nodes.x[:] = moved(block_body)
     weight[12] = 0.0
-    rows_into(motion.x, weight, rows)
+    rows_into(nodes.x, weight, rows)
     jacobian = dense(rows, block_body.node_count)
     stuck = np.flatnonzero(np.abs(jacobian[0]).max(axis=1))
     axes = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
-    motion.locked[[30, 31]], motion.locked[35], motion.locked[stuck] = 1, 2, 3
-    motion.direction[[30, 31, 35]] = axes
+    contacts.mode[[30, 31]], contacts.mode[35], contacts.mode[stuck] = SLIDES, ON_EDGE, STICKS
+    contacts.direction[[30, 31, 35]] = axes
     mobile = weight[:, None, None] * np.eye(3)
     mobile[[30, 31]] -= weight[[30, 31], None, None] * axes[:2, :, None] * axes[:2, None, :]
     mobile[35], mobile[stuck] = weight[35] * np.outer(axes[2], axes[2]), 0.0
     exact = np.einsum("rja,jab,rjb->r", jacobian, mobile, jacobian)
-    diagonal_into(rows, motion, weight, rows.diagonal)
+    diagonal_into(rows, contacts, weight, rows.diagonal)
     assert np.abs(rows.diagonal - exact).max() < 10 * float(np.finfo(precision).eps) * exact.max()
     assert rows.diagonal[0] == 0.0 < rows.free_diagonal[0]
 
@@ -138,7 +139,7 @@ def test_the_product_of_all_volumes_equals_dense_matrices(block_body):
     jacobian = dense(rows, n)
     matrix = np.einsum("rja,j,sja->rs", jacobian, state.network.inverse_mass, jacobian)
     p, product = np.random.default_rng(3).normal(size=n), np.empty(n)
-    apply_schur(rows, state.motion, state.network.inverse_mass, p, product)
+    apply_schur(rows, state.contacts, state.network.inverse_mass, p, product)
     assert np.abs(product - matrix @ p).max() < MANY * np.abs(matrix).sum(axis=1).max() * np.abs(p).max()
     assert (rows.value[:, 3] == 0).all() and (rows.node_vector[:, 3] == 0).all()
 

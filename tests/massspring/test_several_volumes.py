@@ -68,7 +68,7 @@ def test_a_crushed_body_comes_back(kept_body):
     body = kept_body
     setup = Setup(body, ImplicitVolume(), clock_for(body, 400, 10, fraction=0.2), damping=60.0)
     state = setup.start()
-    state.motion.x[:] = 1e-3 * body.rest
+    state.nodes.x[:] = 1e-3 * body.rest
     capped = 0
     for frame in range(400):
         state = setup.method.advance(state, setup.drive(frame))

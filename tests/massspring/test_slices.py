@@ -6,6 +6,7 @@ import pytest
 from massspring import Attachment, Body, Clock, Free, ImplicitVolume, Setup, Volumes, tetrahedral_body
 from massspring.body.springs import Springs
 from massspring.kernels.constraint.one_volume import multiplier_of_sums, volume_multiplier
+from massspring.kernels.contact.modes import ON_EDGE, SLIDES, STICKS
 from massspring.kernels.forces.membrane import add_membrane_forces
 from massspring.kernels.forces.springs import spring_forces_into
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
@@ -27,9 +28,9 @@ def gathered(body: Body, x: np.ndarray, keeps: bool = True, held: tuple[int, ...
     attached = (Attachment(np.array(held)),) if held else ()
     setup = Setup(body, ImplicitVolume(), clock, attachments=attached, gravity=(0.3, 1.0, -9.81), damping=7.0)
     state, drive = start(body, attached), setup.drive(0)
-    state.motion.x[:] = x
-    state.motion.v[:] = np.random.default_rng(4).normal(size=x.shape)
-    return state, drive, gather_and_predict(state.network, state.motion, drive, keeps)
+    state.nodes.x[:] = x
+    state.nodes.v[:] = np.random.default_rng(4).normal(size=x.shape)
+    return state, drive, gather_and_predict(state.network, state.nodes, state.work, drive, keeps)
 
 
 def predicted(net, v: np.ndarray, force: np.ndarray, drive) -> np.ndarray:
@@ -45,15 +46,15 @@ def test_it_equals_the_plain_kernels(kept_body):
     x = moved(kept_body)
     held = tuple(range(0, kept_body.node_count, 7))
     state, drive, (volume, flow, mobility) = gathered(kept_body, x, held=held)
-    net, motion = state.network, state.motion
+    net, nodes = state.network, state.nodes
     force, gradient = np.zeros_like(x), np.zeros_like(x)
     spring_forces_into(x, net.ends, net.rest_length, net.stiffness, force)
     add_membrane_forces(x, net.membrane, force)
     expected = volume_gradient_into(x, net.triangles, gradient)
-    v_star = predicted(net, motion.v, force, drive)
-    assert far_apart(motion.force[list(held)], force[list(held)]) < ROUND_OFF
-    assert far_apart(motion.gradient, gradient) < ROUND_OFF
-    assert far_apart(motion.v_star, v_star) < ROUND_OFF
+    v_star = predicted(net, nodes.v, force, drive)
+    assert far_apart(nodes.force[list(held)], force[list(held)]) < ROUND_OFF
+    assert far_apart(nodes.gradient, gradient) < ROUND_OFF
+    assert far_apart(nodes.v_star, v_star) < ROUND_OFF
     assert volume == pytest.approx(expected, rel=ROUND_OFF)
     # Flows in and out nearly cancel: relative to their size, not to their sum.
     assert flow == pytest.approx(float((gradient * v_star).sum()), abs=ROUND_OFF * np.abs(gradient * v_star).sum())
@@ -62,7 +63,7 @@ def test_it_equals_the_plain_kernels(kept_body):
 
 def test_its_gradient_is_the_derivative_of_its_volume(kept_body):
     x, direction = moved(kept_body), np.random.default_rng(5).uniform(-1, 1, kept_body.rest.shape)
-    exact = float((gathered(kept_body, x)[0].motion.gradient * direction).sum())
+    exact = float((gathered(kept_body, x)[0].nodes.gradient * direction).sum())
     step = STEP * np.abs(x).max()
     ahead, behind = (gathered(kept_body, x + side * step * direction)[2][0] for side in (1, -1))
     assert (ahead - behind) / (2 * step) == pytest.approx(exact, rel=DIFFERENCE)
@@ -77,7 +78,7 @@ def test_the_volume_keeps_its_digits_far_from_the_origin(ball_body):
 def test_without_a_volume_the_forces_are_the_same_to_the_last_bit(ball_body):
     """A skip: springs of a ring pull in the same order whether or not the ring is walked for its area."""
     x = moved(ball_body)
-    with_it, without = (gathered(ball_body, x, keeps)[0].motion for keeps in (True, False))
+    with_it, without = (gathered(ball_body, x, keeps)[0].nodes for keeps in (True, False))
     assert np.array_equal(with_it.v_star, without.v_star)
     assert not without.gradient.any()
 
@@ -86,10 +87,10 @@ def test_springs_at_rest_pull_with_nothing_at_all(body):
     """Rest is rest to the last bit only if c = k − k L/|d| is 0 and not round-off of k."""
     state = start(body)
     drive = Setup(body, Free(), Clock(0.01, 1, 10)).drive(0)
-    gather_and_predict(state.network, state.motion, drive, True)
+    gather_and_predict(state.network, state.nodes, state.work, drive, True)
     # The length of a spring at rest is summed in another order here: a bit off in some.
     unit = body.springs.stiffness.max() * body.springs.rest_length.max() / body.mass.min() * drive.dt
-    assert np.abs(state.motion.v_star).max() < 1e-15 * unit * LONGEST
+    assert np.abs(state.nodes.v_star).max() < 1e-15 * unit * LONGEST
 
 
 def test_a_ring_goes_round_every_surface_node_once():
@@ -166,25 +167,27 @@ def test_the_multiplier_from_sums_is_the_one_over_all_nodes(ball_body):
     """Touched nodes of every kind and held ones: what they take is taken from the sums."""
     held = (3, 40, 77)
     state, drive, (volume, flow, mobility) = gathered(ball_body, moved(ball_body), held=held)
-    net, motion, rng = state.network, state.motion, np.random.default_rng(1)
-    flow += prescribe(net, motion, np.array([[0.01, 0.0, -0.02]]), drive.dt)
-    for kind, nodes in ((1, [5, 6, 50]), (2, [9, 10]), (3, [60, 61])):
-        motion.locked[nodes] = kind
-        motion.direction[nodes] = rng.normal(size=(len(nodes), 3))
-        motion.direction[nodes] /= np.linalg.norm(motion.direction[nodes], axis=1)[:, None]
-        motion.goal[nodes] = rng.normal(size=(len(nodes), 3))
-    list_touched(motion)
+    net, nodes, contacts, rng = state.network, state.nodes, state.contacts, np.random.default_rng(1)
+    flow += prescribe(net, nodes, np.array([[0.01, 0.0, -0.02]]), drive.dt)
+    for kind, some in ((SLIDES, [5, 6, 50]), (ON_EDGE, [9, 10]), (STICKS, [60, 61])):
+        contacts.mode[some] = kind
+        contacts.direction[some] = rng.normal(size=(len(some), 3))
+        contacts.direction[some] /= np.linalg.norm(contacts.direction[some], axis=1)[:, None]
+        contacts.goal[some] = rng.normal(size=(len(some), 3))
+    list_touched(contacts)
     error = 0.01 * volume
-    expected = volume_multiplier(motion, net.inverse_mass, error, drive.dt)
-    found = multiplier_of_sums(motion, net.inverse_mass, error, drive.dt, flow, mobility)
+    expected = volume_multiplier(nodes, contacts, net.inverse_mass, error, drive.dt)
+    found = multiplier_of_sums(nodes, contacts, net.inverse_mass, error, drive.dt, flow, mobility)
     assert found == pytest.approx(expected, rel=1e-12)
-    assert found[0] != pytest.approx(volume_multiplier(motion, 0.9 * net.inverse_mass, error, drive.dt)[0], rel=1e-3)
+    assert found[0] != pytest.approx(
+        volume_multiplier(nodes, contacts, 0.9 * net.inverse_mass, error, drive.dt)[0], rel=1e-3
+    )
 
 
 def test_a_body_that_obstacles_hold_everywhere_has_no_multiplier(ball_body):
     """What is left of G·W·G is round-off then; dividing by it would be a pressure of any size."""
     state, drive, (volume, flow, mobility) = gathered(ball_body, moved(ball_body))
-    state.motion.locked[:] = 3
-    list_touched(state.motion)
-    args = (state.motion, state.network.inverse_mass, 0.01 * volume, drive.dt, flow, mobility)
+    state.contacts.mode[:] = STICKS
+    list_touched(state.contacts)
+    args = (state.nodes, state.contacts, state.network.inverse_mass, 0.01 * volume, drive.dt, flow, mobility)
     assert multiplier_of_sums(*args) == (0.0, 0.0)

@@ -16,8 +16,10 @@ from massspring import (
 )
 from massspring.analysis.stability import largest_frequency, scaled_stiffness
 from massspring.body.springs import Springs
+from tests.massspring.conftest import body_of
+from tests.massspring.rows import CONTESTANTS, rows
 from tests.massspring.test_kernels import forces
-from tests.massspring.test_methods import CONTESTANTS, thrown
+from tests.massspring.test_methods import thrown
 
 
 def test_the_stiffness_matrix_is_minus_the_derivative_of_the_forces(body):
@@ -39,7 +41,10 @@ def test_held_nodes_do_not_swing(block_body):
     assert largest_frequency(block_body, held) < largest_frequency(block_body)
 
 
-KEEPING_ALL_CELLS = (CONTESTANTS["xpbd"], CONTESTANTS["element_hard"])
+KEEPING_ALL_CELLS = ("xpbd", "element_hard")
+"""The volumes of all cells take the stiffest modes away: such methods hold above the limit of the springs too."""
+LIMITED = [name for name, method in CONTESTANTS.items() if method.capabilities.conditionally_stable]
+"""Steps of 200 limits of the others are in test_implicit_springs.py."""
 
 
 def stiffest_mode(body, method):
@@ -51,27 +56,25 @@ def stiffest_mode(body, method):
     return np.linalg.eigh(matrix)[1][:, -1].reshape(-1, 3) / np.sqrt(body.mass)[:, None]
 
 
-@pytest.mark.parametrize("method", CONTESTANTS.values(), ids=CONTESTANTS.keys())
-@pytest.mark.parametrize(("fraction", "outcome"), [(0.97, "finished"), (1.05, "diverged")])
-def test_runs_stay_below_the_limit_and_diverge_above_it(body, method, fraction, outcome):
-    """Constraints do not lower the limit (Cauchy interlacing), forces do. The stiffest mode, 4,000 steps.
-
-    The volumes of all cells take the stiffest modes away: such methods hold above it too.
-    """
-    if method.applies(body) is not None:
-        pytest.skip(method.applies(body))
-    if not method.limited:
-        pytest.skip("it has no limit: at 200 of the springs' in test_implicit_springs.py")
-    if outcome == "diverged" and method in KEEPING_ALL_CELLS:
-        pytest.skip("the limit is that of the springs, and longer with every cell kept")
+def in_the_stiffest_mode(body, method, fraction):
+    """The history of 4,000 steps of `fraction` of the limit."""
     dt = fraction * step_limit(body, added=method.added_stiffness(body)).undamped
     v = 1e-6 * stiffest_mode(body, method) * np.sqrt(body.mass.min())
-    history = simulate(Setup(body, method, Clock(400 * dt, 10, 400), velocity=v))
-    if outcome == "finished":
-        assert history.outcome == "finished" and history.kinetic[-1] < 100 * history.kinetic[0] + 1e-12
-    else:
-        grown = history.outcome == "diverged" or history.kinetic[-1] > 1e4 * max(history.kinetic[0], 1e-20)
-        assert grown, "a run above the limit stayed quiet"
+    return simulate(Setup(body, method, Clock(400 * dt, 10, 400), velocity=v))
+
+
+@pytest.mark.parametrize("row", rows(LIMITED, ("block", "ball")))
+def test_runs_stay_below_the_limit(row, request):
+    """Constraints do not lower the limit (Cauchy interlacing), forces do."""
+    history = in_the_stiffest_mode(body_of(row[1], request), CONTESTANTS[row[0]], 0.97)
+    assert history.outcome == "finished" and history.kinetic[-1] < 100 * history.kinetic[0] + 1e-12
+
+
+@pytest.mark.parametrize("row", rows([name for name in LIMITED if name not in KEEPING_ALL_CELLS], ("block", "ball")))
+def test_runs_diverge_above_the_limit(row, request):
+    history = in_the_stiffest_mode(body_of(row[1], request), CONTESTANTS[row[0]], 1.05)
+    grown = history.outcome == "diverged" or history.kinetic[-1] > 1e4 * max(history.kinetic[0], 1e-20)
+    assert grown, "a run above the limit stayed quiet"
 
 
 def test_viscous_damping_lowers_the_limit_as_predicted():

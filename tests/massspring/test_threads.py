@@ -21,7 +21,7 @@ from massspring import (
 from massspring import Path as Motion
 from massspring.analysis.stability import step_limit
 from massspring.kernels.jit.blocks import BLOCK
-from massspring.kernels.jit.thread_team import JOB, REST, SPRINGS, call, join, team_of
+from massspring.kernels.jit.thread_team import JOB, JOB_END, JOB_SPRINGS, call, join, team_of
 from massspring.layout.threads import crew, shared
 from tests.massspring.conftest import SOFT, icosphere
 
@@ -63,23 +63,23 @@ def test_threads_change_no_bit(ball, method, precision):
 
 
 def test_threads_search_all_nodes_where_obstacles_are_in_that_step(ball):
-    """Also those that nothing comes near: their distances tell whether somebody looked."""
+    """Also those that nothing comes near: their distances show whether they were searched."""
     found = []
     for threads in (1, 2, 3):
         setup = slid(ball, Free(), threads=threads)
-        found.append(setup.method.advance(setup.start(), setup.drive(0)).motion.clearance)
+        found.append(setup.method.advance(setup.start(), setup.drive(0)).contacts.clearance)
     assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
 
 
 def test_each_thread_writes_on_scratch_of_its_own(ball):
     setup = slid(ball, Free(), threads=2)
     state = setup.start()
-    motion, untouched = state.motion, -7.0
-    motion.tile[:] = untouched
-    with crew(state.network, motion, setup.drive(0)):
-        call(motion.team, SPRINGS, 0, 0.0)
-        join(motion.team)
-    assert (motion.tile[0] == untouched).all() and not (motion.tile[1] == untouched).all()
+    work, team, untouched = state.work, state.team, -7.0
+    work.tile[:] = untouched
+    with crew(state.frame(setup.drive(0)), state.nodes.gradient):
+        call(team, JOB_SPRINGS, 0, 0.0)
+        join(team)
+    assert (work.tile[0] == untouched).all() and not (work.tile[1] == untouched).all()
 
 
 def test_threads_change_no_bit_of_several_volumes(filled_ball):
@@ -109,9 +109,9 @@ def test_the_load_is_even():
 def test_a_frame_that_fails_sends_the_threads_home(ball):
     setup = slid(ball, ImplicitVolume(), threads=2)
     state, drive = setup.start(), setup.drive(0)
-    with pytest.raises(RuntimeError, match="halfway"), crew(state.network, state.motion, drive):
+    with pytest.raises(RuntimeError, match="halfway"), crew(state.frame(drive), state.nodes.gradient):
         raise RuntimeError("halfway")
-    assert state.motion.team is not None and state.motion.team.signal[JOB] == REST
+    assert state.team is not None and state.team.signal[JOB] == JOB_END
     before = time.thread_time_ns(), time.process_time_ns()
     time.sleep(0.2)
     spent = time.process_time_ns() - before[1] - (time.thread_time_ns() - before[0])
@@ -124,7 +124,7 @@ def test_a_frame_that_fails_sends_the_threads_home(ball):
 def test_without_threads_none_is_made(ball):
     before = threading.active_count()
     setup = slid(ball, ImplicitVolume())
-    assert setup.start().motion.team is None
+    assert setup.start().team is None
     simulate(setup)
     assert threading.active_count() == before
 
@@ -149,6 +149,6 @@ def test_a_method_that_runs_on_one_thread(ball):
 
 def test_scratch_of_its_own_for_each_thread(ball):
     state = slid(ball, Free()).start()
-    motion = shared(state.motion, state.network, 3)
-    assert motion.tile.shape[0] == 3 and motion.tile.dtype == state.motion.tile.dtype
-    assert motion.x is state.motion.x
+    together = shared(state, 3)
+    assert together.work.tile.shape[0] == 3 and together.work.tile.dtype == state.work.tile.dtype
+    assert together.nodes is state.nodes

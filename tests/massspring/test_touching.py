@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from massspring import Clock, ImplicitSprings, Path, Plane, Setup
-from massspring.methods.implicit.contact import SLIDES, STICKS, STILL, Contact, Touching
+from massspring.kernels.contact.modes import SLIDES, STICKS
+from massspring.methods.implicit.contact import SLIP_RESOLUTION, Contact, Touching
 
 DT, MU = 5e-3, 0.5
 BELOW = 1e-3
@@ -20,23 +21,23 @@ class Sole:
         fall = np.tile([0.0, 0.0, -1.0], (body.node_count, 1))
         setup = Setup(body, ImplicitSprings(), Clock(DT, 1, 1), (floor,), velocity=fall)
         state, self.drive = setup.start(), setup.drive(0)
-        self.network, self.motion = state.network, state.motion
+        self.state, self.network, self.contacts = state, state.network, state.contacts
         self.factor = state.memory.at(self.network, DT, 0.0)
-        self.contact = Contact(self.network, self.motion, self.drive, 0)
-        self.nodes = np.flatnonzero(self.motion.locked == STICKS)
-        self.place = (floor.point[2] - self.motion.x[self.nodes, 2]) / DT
+        self.contact = Contact(self.network, state.nodes, self.contacts, self.drive, 0)
+        self.nodes = np.flatnonzero(self.contacts.mode == STICKS)
+        self.place = (floor.point[2] - self.state.nodes.x[self.nodes, 2]) / DT
         """Speed [m/s] that ends the step on the floor."""
 
     def touching(self) -> Touching:
-        return Touching(self.factor, self.motion, self.network.surface_nodes, DT)
+        return Touching(self.factor, self.state.nodes, self.contacts, self.network.surface_nodes, DT)
 
     def slide(self) -> None:
-        self.motion.locked[self.nodes] = SLIDES
-        self.motion.goal[self.nodes, :2] = 0.0
+        self.contacts.mode[self.nodes] = SLIDES
+        self.contacts.goal[self.nodes, :2] = 0.0
 
     def end(self, slip: np.ndarray) -> np.ndarray:
         """Where nodes end that slip on the floor by so much [m/s]."""
-        end = self.motion.x.copy()
+        end = self.state.nodes.x.copy()
         end[self.nodes] += DT * (CARRIED + slip)
         return end
 
@@ -55,11 +56,11 @@ def test_a_node_sticks_up_to_what_its_friction_can_take(sole, asked, slips):
     impulses[0] = (0.0, asked, 1.0)
     changed = sole.contact.revise(sole.end(np.zeros(3)), touching, impulses.ravel())
     assert changed == slips
-    assert sole.motion.locked[first] == (SLIDES if slips else STICKS)
-    assert (sole.motion.locked[others] == STICKS).all()
+    assert sole.contacts.mode[first] == (SLIDES if slips else STICKS)
+    assert (sole.contacts.mode[others] == STICKS).all()
     # Up to the floor within the step; along it with the floor, or freely.
     expected = [*(0.0 * CARRIED[:2] if slips else CARRIED[:2]), sole.place[0]]
-    assert np.allclose(sole.motion.goal[first], expected, rtol=0, atol=1e-12)
+    assert np.allclose(sole.contacts.goal[first], expected, rtol=0, atol=1e-12)
     rubbed = [0.0, MU, 0.0] if slips else [0.0, 0.0, 0.0]
     assert np.allclose(sole.contact.rubbed[first], rubbed, rtol=0, atol=1e-15)
 
@@ -73,7 +74,7 @@ def test_friction_acts_against_the_slip(sole):
     expected = -MU * np.maximum(impulses, 0.0)[:, None] * slip / 0.05
     # A way of 0.25 mm is known to 1e-17 m.
     assert np.abs(sole.contact.rubbed[sole.nodes] - expected).max() < 1e-11
-    assert (sole.motion.locked[sole.nodes] == SLIDES).all()
+    assert (sole.contacts.mode[sole.nodes] == SLIDES).all()
 
 
 def test_what_friction_would_drive_sticks(sole):
@@ -84,21 +85,21 @@ def test_what_friction_would_drive_sticks(sole):
     sole.contact.rubbed[sole.nodes] = -slip
     sole.contact.rubbed[first] = slip
     assert sole.contact.rub(sole.end(slip), sole.touching(), np.ones(len(sole.nodes)))
-    assert sole.motion.locked[first] == STICKS and (sole.motion.locked[others] == SLIDES).all()
+    assert sole.contacts.mode[first] == STICKS and (sole.contacts.mode[others] == SLIDES).all()
     assert (sole.contact.rubbed[first] == 0).all()
-    assert np.allclose(sole.motion.goal[first, :2], CARRIED[:2], rtol=0, atol=1e-15)
+    assert np.allclose(sole.contacts.goal[first, :2], CARRIED[:2], rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(("way", "sticks"), [(0.0, True), (0.5, True), (2.0, False)])
 def test_a_slip_that_is_round_off_is_none(sole, way, sticks):
     """Just below and just above the bound: its direction would be chance, and its friction as large as any."""
     sole.slide()
-    slip = np.array([0.6, -0.8, 0.0]) * way * STILL * sole.network.longest_correction / DT
-    sole.motion.x[sole.nodes] = 0.0  # so that the way is known as closely as it is asked
+    slip = np.array([0.6, -0.8, 0.0]) * way * SLIP_RESOLUTION * sole.network.longest_correction / DT
+    sole.state.nodes.x[sole.nodes] = 0.0  # so that the way is known as closely as it is asked
     carried = sole.drive.velocity[0, 0]
     carried[:] = 0.0
-    end = sole.motion.x.copy()
+    end = sole.state.nodes.x.copy()
     end[sole.nodes] = DT * slip
     assert sole.contact.rub(end, sole.touching(), np.ones(len(sole.nodes))) == sticks
-    assert (sole.motion.locked[sole.nodes] == (STICKS if sticks else SLIDES)).all()
+    assert (sole.contacts.mode[sole.nodes] == (STICKS if sticks else SLIDES)).all()
     assert np.linalg.norm(sole.contact.rubbed, axis=1).max() == pytest.approx(0.0 if sticks else MU, rel=1e-9)

@@ -116,7 +116,7 @@ def run(scene=BALL_SQUEEZE, kind="tetrahedral", method=None, status=Status.OK, e
 
 
 def frame_ns(milliseconds, repeats=5):
-    """Frame times [ns], (repeats, F): the same for everybody but for a slow frame and a slower repeat."""
+    """Frame times [ns], (repeats, F): the same for all but for a slow frame and a slower repeat."""
     times = np.full((repeats, FRAMES), 1e6 * milliseconds)
     times[:, 7] *= 3
     return times * (1 + 0.01 * np.arange(repeats)[:, None])

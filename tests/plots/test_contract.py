@@ -27,6 +27,7 @@ from studies.plots import work_precision as work
 from studies.plots.style.style import DPI, SMALL, styled
 from studies.store.record import Status
 from tests.plots.made_up import grid, laws_grid, run, stability_grid, timed_grid, without_reference
+from tests.plots.test_bodies import RECIPES
 
 GOOD = {
     volume_history: grid,
@@ -49,6 +50,8 @@ ODD = {
     "each status": lambda: [run(status=status) for status in Status],
     "one timed run": lambda: [run(frame_ms=0.5)],
     "exact": lambda: [run(error=0.0, volume_end=0.0, frame_ms=0.5), run(error=0.0, method=Free(), frame_ms=0.5)],
+    "bodies of all kinds": lambda: [run(frame_ms=0.5, **each) for each in RECIPES],
+    "one body, several regions": lambda: [run(frame_ms=0.5, recipe={"volumes": "regions", "regions": 5})],
     "exploding": lambda: [run(volume_end=1e30, error=-1e30, status=Status.DRIFTED), run()],
 }
 CHARTS = pytest.mark.parametrize("chart", GOOD, ids=lambda chart: chart.__name__.rsplit(".", 1)[-1])

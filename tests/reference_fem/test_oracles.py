@@ -1,4 +1,5 @@
-"""The fast half of the oracle pack, and the pack's own contract. The slow half runs in `organbench verify`."""
+"""The fast half of the oracle pack, and the pack's own contract. The slow half runs in `organbench verify`; those of
+the fast half that take longest are a campaign."""
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from reference_fem.oracles import ORACLES, Check, Curve, manufactured
 
 LONG = ("thick_sphere", "cylinder", "manufactured")
 FAST = [
-    pytest.param(oracle, id=oracle.name, marks=[pytest.mark.slow] if oracle.name in LONG else [])
+    pytest.param(oracle, id=oracle.name, marks=[pytest.mark.campaign] if oracle.name in LONG else [])
     for oracle in ORACLES
     if oracle.fast
 ]

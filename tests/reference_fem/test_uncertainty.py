@@ -128,4 +128,11 @@ def test_a_setting_of_order_one_is_extrapolated_exactly(factor):
 
 def test_shares_add_as_independent_ones():
     assert combined({"mesh": 3.0, "contact": 4.0, "steps": 0.0}) == pytest.approx(5.0, rel=1e-15)
+    assert combined({"mesh": 3.0, "contact": 4.0, "steps": 12.0}) == pytest.approx(13.0, rel=1e-15)
     assert combined({}) == 0.0
+
+
+def test_the_bar_is_as_wide_as_the_theory_says():
+    """Equation (20) of docs/theory.md: 1.25 times the change left; twice the spread where values go to and fro."""
+    assert mesh_error(SIZES, law(2.0)).uncertainty == pytest.approx(1.25 * 0.3, rel=1e-9)
+    assert mesh_error(SIZES, [7.0, 7.2, 6.9]).uncertainty == pytest.approx(2 * 0.3, rel=1e-9)

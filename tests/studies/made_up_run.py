@@ -9,8 +9,9 @@ from studies.metrics.metrics import Run
 from studies.metrics.table import metric
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.store.new_record import new_record
-from studies.store.record import Field, Status
+from studies.store.new_record import new_fields, new_record
+from studies.store.record import Status
+from studies.store.schema import RUN_FIELDS
 from tests.studies.tiny import cube
 
 EDGE = 0.1
@@ -29,6 +30,26 @@ SHIFT = np.array([0.03, 0.0, 0.0])
 
 
 FLOORS = ("force", "force_end", "surface", "interior", "silhouette", "volume", "pressure", "lumen", "frequency")
+
+
+ATTRIBUTES = {
+    "rest_volume": EDGE**3,
+    "dt": 0.05,
+    "dt_limit": 0.1,
+    "steps": 20,
+    "frame": 1.0,
+    "frames": 4,
+    "good_frames": 4,
+    "nodes": len(POINTS),
+    "springs": 0,
+    "triangles": len(TRIANGLES),
+    "law": "uniform",
+    "skipped_steps": 0,
+    "capped_steps": 0,
+    "volumes": 1,
+    "lumen_column": -1,
+    "warnings": "",
+}
 
 
 def bend(x, checkpoint=-1):
@@ -57,10 +78,12 @@ def run(final=None, volume=(1.0, 1.0, 1.0, 1.0), force=(0.5, 1.0, 1.5, 2.0), **c
         "volume": EDGE**3 * np.array(volume)[:, None],
         "volume_target": np.full((len(volume), 1), EDGE**3),
         "pressure": np.full((4, 1), 5.0),
-        "contact_force": np.zeros((4, 0, 3)),
+        "contact_force": np.zeros((4, 1, 3)),
         "held_force": held,
         "penetration": np.zeros((4, 1)),
+        "iterations": np.zeros((4, 2), dtype=int),
         "min_j": np.array([1.0, 0.8, 0.6, 0.7]),
+        "snapshot_frame": np.array([2, 4]),
         "snapshots": np.stack([POINTS, final]),
         "rest": POINTS,
         "mass": np.full(len(POINTS), 1.0),
@@ -74,9 +97,8 @@ def run(final=None, volume=(1.0, 1.0, 1.0, 1.0), force=(0.5, 1.0, 1.5, 2.0), **c
         status=changes.pop("status", Status.OK),
         message="",
         fingerprint="",
-        attributes={"rest_volume": EDGE**3, "steps": 20, "frame": 1.0, "dt": 0.05, "dt_limit": 0.1}
-        | changes.pop("attributes", {}),
-        fields={name: Field(np.asarray(v), "1", "made up") for name, v in values.items()},
+        attributes=ATTRIBUTES | changes.pop("attributes", {}),
+        fields=new_fields(RUN_FIELDS, values),
     )
     case = Case(changes.pop("scene", SCENE), BodyRecipe())
     return Run(case, record, changes.pop("reference", reference()), changes.pop("timing", None))

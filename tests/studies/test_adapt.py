@@ -13,6 +13,7 @@ from studies.runs.prepare import attachments_for, body_for, prepare
 from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scenes import Held
 from studies.scenes.ball_clamped import BALL_CLAMPED
+from studies.scenes.stomach_press import STOMACH_PRESS
 from tests.geometry.boxes import box, split
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
 
@@ -37,6 +38,22 @@ def test_stiffness_multiplies_every_spring(ball_mesh):
     soft, stiff = (body_for(CLAMPED, BodyRecipe(nodes=NODES, stiffness=k), ball_mesh) for k in (1.0, 4.0))
     np.testing.assert_allclose(stiff.springs.stiffness, 4.0 * soft.springs.stiffness, rtol=1e-15)
     np.testing.assert_array_equal(stiff.mass, soft.mass)
+
+
+@pytest.mark.parametrize("kind", ["tetrahedral", "surface"])
+def test_the_masses_add_up_to_density_times_volume(ball_mesh, kind):
+    """A body of the scene's tissue, whatever the stiffness; sums of a few hundred terms round far below 1e-12."""
+    dense = replace(CLAMPED, tissue=replace(CLAMPED.tissue, density=1234.5))
+    for scene in (CLAMPED, dense):
+        body = body_for(scene, BodyRecipe(kind, NODES, stiffness=3.0), ball_mesh)
+        assert body.mass.sum() == pytest.approx(scene.tissue.density * ball_mesh.volume, rel=1e-12)
+
+
+def test_a_membrane_weighs_as_much_as_wall_and_content(mesh_cache):
+    """The content has the tissue's density (wall_for): together the density times all that the outer surface holds."""
+    mesh = mesh_for(STOMACH_PRESS, 200)
+    body = body_for(STOMACH_PRESS, BodyRecipe("membrane", 200, law="delingette"), mesh)
+    assert body.mass.sum() == pytest.approx(STOMACH_PRESS.tissue.density * mesh.outer_volume, rel=1e-9)
 
 
 def test_the_laws_differ_and_match_the_tissue(ball_mesh):

@@ -75,7 +75,7 @@ def test_kill_9_leaves_a_whole_file(tmp_path):
         content = path.read_bytes()
         assert len(content) == 3_000_000
         assert len(set(content)) == 1
-    write_whole(path, b"next")  # a leftover .part is in nobody's way
+    write_whole(path, b"next")  # a leftover .part does not disturb
     assert path.read_bytes() == b"next"
 
 
@@ -86,3 +86,17 @@ def test_old_leftovers_are_swept_and_fresh_ones_kept(tmp_path):
         os.utime(tmp_path / name, (time.time() - 7200,) * 2)
     assert sweep_parts(tmp_path) == 1
     assert sorted(p.name for p in tmp_path.iterdir()) == ["b.h5.2.part", "c.h5"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="processes by number")
+def test_parts_of_the_dead_go_after_a_minute_and_of_the_living_after_an_hour(tmp_path):
+    gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
+    dead, living = (tmp_path / f"a.h5.{number}.part" for number in (int(gone.stdout), os.getpid()))
+    for part in (dead, living):
+        part.write_bytes(b"")
+    assert sweep_parts(tmp_path) == 0, "it may be another machine's"
+    for part in (dead, living):
+        os.utime(part, (time.time() - 120,) * 2)
+    assert sweep_parts(tmp_path) == 1 and living.exists()
+    os.utime(living, (time.time() - 7200,) * 2)
+    assert sweep_parts(tmp_path) == 1

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from massspring import METHODS, Element, Free, ImplicitVolume, Xpbd
+from massspring import METHODS, Element, Free, ImplicitVolume, Penalty, Xpbd
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.runs.case import BodyRecipe, Case, case_from_json, case_to_dict
@@ -42,9 +42,10 @@ def changed(edit) -> str:
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
 def test_key_read_back_is_the_same_case(scene, method):
+    precision = "float32" if method().capabilities.float32 else "float64"
     for case in (
         Case(scene, method=method()),
-        Case(scene, BodyRecipe("surface", 80, stiffness=2.5), method(), 1e-3, 0.7, 12, precision="float32"),
+        Case(scene, BodyRecipe("surface", 80, stiffness=2.5), method(), 1e-3, 0.7, 12, precision=precision),
     ):
         again = case_from_json(case.key)
         assert again == case
@@ -75,6 +76,18 @@ def test_names_are_readable_and_distinct_within_a_study():
     assert other.name == "ball_squeeze-tetrahedral-550-free-dt2ms-uniform-k4"
     weighted = Case(SCENES[0], BodyRecipe("surface", weights=(1.0, 0.5, 0.25, 1.0)), Free())
     assert weighted.name == "ball_squeeze-surface-550-free-dt0.5-w1_0.5_0.25_1"
+
+
+@pytest.mark.parametrize(
+    ("method", "precision", "told"),
+    [
+        (Free(), "float16", "unknown precision 'float16'; choose float64 or float32"),
+        (Penalty(), "float32", "method 'penalty' runs in float64 only, its claims are measured in float64; leave"),
+    ],
+)
+def test_a_precision_that_the_method_does_not_claim_is_refused(method, precision, told):
+    with pytest.raises(StudyError, match=told):
+        Case(SCENES[0], method=method, precision=precision)
 
 
 def test_a_setting_that_is_not_chosen_leaves_old_keys_as_they_were():

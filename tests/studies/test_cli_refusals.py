@@ -1,6 +1,10 @@
 """The command line on bad input: one sentence, exit code 2, and nothing stored is lost."""
 
+import errno
+import io
 import json
+import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -14,6 +18,7 @@ from studies.cli.commands import table
 from studies.runs.current import case_path
 from studies.store.paths import record_files
 from studies.store.record import Status, read_record, write_record
+from studies.timing.cases import timing_file
 from tests.studies.tiny import TINY, content, cube, tiny_case, write_obj
 
 REPOSITORY = Path(__file__).parents[2]
@@ -53,6 +58,50 @@ BROKEN = {
         "STUDY = tiny_study(cases=(tiny_case(method=Mine()),))\n",
         "unknown method 'frei'; did you mean 'free'",
     ),
+}
+
+
+OWN = "from studies.catalog import Chart\nfrom massspring import Free\nfrom tests.studies.tiny import *\n"
+BROKEN |= {
+    "sys.exit": ("import sys\nsys.exit(3)\n", "cannot be loaded: SystemExit in line 2: 3"),
+    "BaseException": ("raise BaseException\n", "cannot be loaded: BaseException in line 1; mend it"),
+    "method class": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(method=Free),))\n",
+        "in line 4: the method is Free",
+    ),
+    "no body": (
+        OWN + "STUDY = tiny_study(cases=(Case(SQUEEZE, None),))\n",
+        "in line 4: a case needs a BodyRecipe, not None",
+    ),
+    "no scene": (OWN + "STUDY = tiny_study(cases=(tiny_case(scene=None),))\n", "a case needs a Scene, not None"),
+    "nan": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(stiffness=float('nan'))),))\n",
+        "body.stiffness = nan cannot be stored and read back",
+    ),
+    "text for a number": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes='100')),))\n",
+        "body.nodes = '100' cannot be stored and read back",
+    ),
+    "half a node": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes=100.5)),))\n",
+        "nodes = '100.5': Input should be a valid integer",
+    ),
+    "columns": (OWN + "STUDY = tiny_study(columns='volume_worst')\n", "columns is 'volume_worst'; give a tuple"),
+    "no case": (OWN + "STUDY = tiny_study(cases=(3,))\n", "cases holds 3, which is no Case"),
+    "reserved": (OWN + "STUDY = tiny_study(name='cache')\n", "a study cannot be called 'cache'"),
+    "chart elsewhere": (
+        OWN + "STUDY = tiny_study(charts=(Chart('../../a.png', print),))\n",
+        "a chart cannot be called",
+    ),
+    "zero byte": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(scene=replace(SQUEEZE, name='a\\0b')),))\n",
+        "has a name with characters that cannot be printed",
+    ),
+    "recorded": (OWN + "STUDY = tiny_study(cases=(tiny_case(recorded='kinetic'),))\n", "recorded is 'kinetic'; give"),
+}
+CHARTS = {
+    "lambda r, p: 1/0": "chart a.png is not drawn, mine.py fails: ZeroDivisionError in line 4: division by zero",
+    "lambda r: 1": "chart a.png is not drawn, its function fails: TypeError",
 }
 
 
@@ -100,6 +149,16 @@ def test_a_study_file_that_is_wrong(refused, tmp_path, fault):
     assert not (tmp_path / "results").exists()
 
 
+@pytest.mark.parametrize("draw", CHARTS)
+def test_a_chart_that_fails_is_a_sentence_after_all_else_is_done(refused, results, tmp_path, draw):
+    path = tmp_path / "mine.py"
+    other = "Chart('b.txt', lambda r, p: p.write_text('drawn'))"
+    path.write_text(OWN + f"STUDY = tiny_study(charts=(Chart('a.png', {draw}), {other}))\n")
+    assert CHARTS[draw] in refused("plot", path, "--results", results)
+    assert (results / "tiny" / "b.txt").read_text() == "drawn"
+    assert (results / "tiny" / "tiny.csv").exists()
+
+
 def damage(kind, good: bytes, path: Path):
     if kind == "foreign":
         with h5py.File(path, "w") as file:
@@ -131,6 +190,65 @@ def test_a_cut_off_file_hides_no_other(organbench, tiny_file, results):
     assert "free" in out
 
 
+@pytest.mark.parametrize("fault", ["the key", "a field", "a number", "the timing"])
+def test_one_damaged_file_costs_one_case(organbench, tiny_file, results, fault):
+    path = case_path(results, "tiny", tiny_case())
+    whole = path.read_bytes()
+    if fault == "the key":
+        place = whole.index(b'"dt_fraction"')
+        path.write_bytes(whole[:place] + b"#" + whole[place + 1 :])
+    elif fault == "the timing":
+        path = timing_file(results, "tiny", tiny_case(timed=True))
+        path.write_bytes(path.read_bytes()[:-1])
+    else:
+        with h5py.File(path, "r+") as file:
+            if fault == "a field":
+                del file["volume"]
+            else:
+                file["volume"][-1, 0] *= 1.5
+    code, out, err = organbench("table", tiny_file, "--results", results)
+    assert code == 0 and path.name in err and len(err.splitlines()) == 1
+    assert len(out.splitlines()) == 1 + (3 if fault == "the timing" else 2)
+    code, out, _ = organbench("status", tiny_file, "--results", results)
+    assert code == 0 and (fault == "the timing" or {"1 ok", "1 stale"} < set(re.findall(r"\d \w+", out)))
+    assert ("its file is damaged" in out) == (fault != "the timing")
+
+
+def test_a_terminal_without_the_letters_shows_question_marks(organbench, monkeypatch):
+    shown = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(shown, encoding="ascii"))
+    code, _, err = organbench("list")
+    assert (code, err) == (0, "")
+    assert b"volume_loss" in shown.getvalue() and b"?" in shown.getvalue()
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
+def test_output_that_nobody_takes(organbench, monkeypatch):
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        code, _, err = organbench("list")
+    assert code == 2
+    assert err == (
+        "organbench: the output could not be written (No space left on device); what was stored before is kept\n"
+    )
+
+
+def test_a_folder_that_may_not_be_entered(refused, tiny_file, results, monkeypatch):
+    """The superuser may enter every folder, so the system's answer is made up."""
+    asked = os.stat
+
+    def stat(path, *words, **more):
+        if str(path).startswith(str(results / "tiny")):
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return asked(path, *words, **more)
+
+    monkeypatch.setattr(os, "stat", stat)
+    for command in ("status", "run", "table"):
+        assert "cannot be looked at (Permission denied): change the permissions of its folder" in refused(
+            command, tiny_file, "--results", results
+        )
+
+
 def test_a_key_that_is_no_case_cannot_be_replayed(refused, results):
     path = case_path(results, "tiny", tiny_case())
     record = read_record(path)
@@ -142,7 +260,7 @@ def test_a_key_that_is_no_case_cannot_be_replayed(refused, results):
 
 @pytest.mark.parametrize("command", [("run",), ("plot",), ("table", "--csv", "TARGET")])
 def test_results_that_cannot_be_written(refused, tiny_file, finished_sweep, tmp_path, command):
-    """A folder below a file can be written by nobody, the superuser included."""
+    """A folder below a file cannot be written, not even by the superuser."""
     (tmp_path / "file").write_text("no folder")
     root = finished_sweep if command[0] == "table" else tmp_path / "file"
     target = [str(tmp_path / "file" / "t.csv") if word == "TARGET" else word for word in command[1:]]

@@ -13,6 +13,7 @@ import pytest
 from studies.base import interrupts
 from studies.base.errors import StudyError
 from studies.cli import app as cli
+from studies.geometry.mesher import jobs
 from studies.store.paths import record_files
 from studies.store.record import Status, peek
 from studies.sweep.run_studies import perform, run_studies
@@ -89,8 +90,62 @@ def test_a_process_that_starts_meanwhile_waits_until_it_is_ready(ready, code):
     assert (done.returncode, done.stderr) == (code, b"")
 
 
+PARENT = """
+import multiprocessing, os, time
+from concurrent.futures import ProcessPoolExecutor
+
+from studies.base.interrupts import die_quietly
+
+if __name__ == "__main__":
+    pool = ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"), initializer=die_quietly)
+    busy, number = pool.submit(time.sleep, 600), pool.submit(os.getpid)
+    number.result()
+    print(*[worker.pid for worker in multiprocessing.active_children()], flush=True)
+    busy.result()
+"""
+MESHER = "import os, time; from studies import interrupts; interrupts.end_after(lambda: os.read(0, 1)); time.sleep(600)"
+
+
+def alive(number):
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def ended(numbers, seconds=30):
+    until = time.monotonic() + seconds
+    while any(map(alive, numbers)) and time.monotonic() < until:
+        time.sleep(0.05)
+    return not any(map(alive, numbers))
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no list of processes in /proc")
+def test_workers_end_when_the_main_process_is_killed(tmp_path):
+    """kill -9, as by a system out of memory: one worker computes, the other waits for work."""
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    environment = os.environ | {"PYTHONPATH": str(REPOSITORY)}
+    main = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=environment)
+    assert main.stdout is not None
+    workers = [int(word) for word in main.stdout.readline().split()]
+    assert len(workers) == 2 and all(map(alive, workers))
+    main.kill()
+    main.wait()
+    assert ended(workers)
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no list of processes in /proc")
+def test_a_process_whose_parent_is_gone_before_it_listens_ends_too():
+    """The mesher's way: a pipe that only the parent holds open, closed here before the process has begun."""
+    with jobs.pipe_to_here() as reading:
+        worker = subprocess.Popen([sys.executable, "-c", MESHER], cwd=REPOSITORY, stdin=reading)
+        assert worker.poll() is None
+    assert worker.wait(timeout=60) == 1
+
+
 class Swallowing:
-    """An exception inside a destructor is told and forgotten by Python."""
+    """Python prints an exception inside a destructor and goes on."""
 
     def __del__(self):
         press()
@@ -120,14 +175,35 @@ def test_once_pressed_nothing_else_is_told(end, organbench, monkeypatch):
         end()
 
     monkeypatch.setattr(cli, "app", app)
-    before = signal.getsignal(signal.SIGINT)
+    before = {number: signal.getsignal(number) for number in interrupts.SIGNALS}
     try:
         with interrupts.listening():
             code, out, err = organbench("run")
             assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     assert (code, out, err.strip()) == (130, "", SAID)
+
+
+def test_sigterm_is_a_sentence_and_its_own_code(organbench, monkeypatch):
+    monkeypatch.setattr(cli, "app", lambda: os.kill(os.getpid(), signal.SIGTERM))
+    before = {number: signal.getsignal(number) for number in interrupts.SIGNALS}
+    try:
+        with interrupts.listening():
+            code, out, err = organbench("run")
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert (code, out) == (143, "")
+    assert err.strip() == SAID.replace("interrupted", "ended by SIGTERM")
+
+
+def test_the_entry_point_is_ready_before_anything_large_is_read():
+    """Ctrl-C after its first lines; what these need is part of the interpreter, or loaded before any program."""
+    program = "import studies.__main__, os, signal; os.kill(os.getpid(), signal.SIGINT)"
+    done = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "organbench: interrupted before anything was begun\n")
 
 
 def test_without_it_all_stays_as_it_was(organbench, monkeypatch):

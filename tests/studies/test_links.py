@@ -7,13 +7,14 @@ from rich.console import Console
 
 from studies.base.errors import StudyError
 from studies.cli.commands.show import describe
+from studies.store import links
 from studies.store.links import link_study
 from studies.store.paths import index_path, key_hash, readable, record_files, record_path, timing_files, timing_path
 from studies.store.record import SCHEMA, Field, Record, Status, read_record, write_record
 
 
 def store(root, name, key, status=Status.OK, message=""):
-    record = Record(SCHEMA, "run", key, name, status, message, "c0de" * 16, "01234567", {"worst": 1.25e-4})
+    record = Record(SCHEMA, "made up", key, name, status, message, "c0de" * 16, "01234567", {"worst": 1.25e-4})
     record.fields["volume"] = Field(np.array([1.0, 0.5, np.nan]), "m^3", "enclosed volume")
     path = record_path(root, "volume_loss", name, key)
     write_record(path, record)
@@ -131,3 +132,13 @@ def test_an_index_is_no_record(tmp_path):
     link_study(tmp_path, "volume_loss")
     with pytest.raises(StudyError, match="is the index of a study"):
         read_record(index_path(tmp_path, "volume_loss"))
+
+
+def test_an_index_that_says_the_same_is_left_as_it_is(tmp_path, monkeypatch):
+    """So that results which may only be looked at can be looked at by `run` too."""
+    store(tmp_path, "ball/free", '{"a": 1}')
+    link_study(tmp_path, "volume_loss")
+    before = index_path(tmp_path, "volume_loss").stat().st_mtime_ns
+    monkeypatch.setattr(links, "write_whole", lambda *_: pytest.fail("nothing has changed"))
+    link_study(tmp_path, "volume_loss")
+    assert index_path(tmp_path, "volume_loss").stat().st_mtime_ns == before

@@ -86,7 +86,7 @@ def test_findings_and_their_exit_code(organbench, tmp_path):
 
 
 def refusals(folder):
-    """Words and what is told."""
+    """Arguments and the message expected."""
     egg = stored(folder / "egg.ply", POINTS, FACES)
     nan = POINTS.copy()
     nan[2] = np.nan

@@ -24,6 +24,15 @@ def test_rest_distance_sees_no_rigid_motion_but_a_mirror_image():
     assert of("rest_distance", final=skew * [1, 1, -1], values={"rest": skew}) > 10
 
 
+def test_rest_distance_counts_a_node_by_its_mass():
+    """A node without mass may be anywhere; with mass it cannot."""
+    mass, final = np.ones(len(POINTS)), POINTS.copy()
+    final[0] += SHIFT
+    assert of("rest_distance", final=final, values={"mass": mass}) > 1
+    mass[0] = 0
+    assert of("rest_distance", final=final, values={"mass": mass}) == pytest.approx(0.0, abs=1e-10)
+
+
 def test_the_truth_has_no_error():
     for name in ("force_error", "force_end", "surface_error", "interior_error", "mean_error", "silhouette_error"):
         # Differences of numbers near 0.1 m and 2 N: rounding alone.
@@ -54,6 +63,18 @@ def test_mean_error_is_over_the_largest_displacement():
     assert weights.sum() == pytest.approx(6 * EDGE**2, rel=1e-12)
     share = float(weights @ np.abs(POINTS[:, 2])) / weights.sum() / (EDGE / 2)
     assert of("mean_error", final=final, reference=stretch) == pytest.approx(10 * share, rel=1e-12)
+
+
+@pytest.mark.parametrize("corner", [0, 4, 13, 26])
+def test_mean_error_counts_a_node_by_its_share_of_the_area(corner):
+    """One node off by a tenth of the largest displacement: 1 % times a third of its triangles over all of them."""
+    even = reference(lambda x: np.tile(SHIFT, (len(x), 1)))
+    final = POINTS + SHIFT
+    final[corner] += 0.1 * SHIFT
+    share = (corner == TRIANGLES).sum() / (3 * len(TRIANGLES))  # all triangles of the cube have the same area
+    found = of("mean_error", final=final, reference=even)
+    assert found == pytest.approx(10 * share, rel=1e-9, abs=1e-10)
+    assert found != pytest.approx(10 / len(POINTS), rel=0.05)  # what the plain mean would be
 
 
 def test_weights_are_the_masses_inside_and_the_areas_outside():
@@ -103,6 +124,24 @@ def test_the_spread_of_j_is_that_of_the_bulk_of_the_volume():
     assert of("j_spread", final=stretched) == pytest.approx(100.0, rel=1e-12)
 
 
+def stretched_cells(volumes, ratios):
+    """Separate tetrahedra of these rest volumes, stretched so that J of each is its ratio: the spread of J [%]."""
+    corner = np.vstack([np.zeros(3), np.eye(3)])
+    rest = np.concatenate([np.cbrt(6 * volume) * corner for volume in volumes])
+    final = np.concatenate([np.cbrt(6 * v) * corner * [1, 1, j] for v, j in zip(volumes, ratios, strict=True)])
+    cells = np.arange(len(rest)).reshape(-1, 4)
+    return of("j_spread", values={"rest": rest, "snapshots": final[None], "tetrahedra": cells})
+
+
+def test_the_spread_of_j_leaves_out_a_twentieth_of_the_volume_at_either_end():
+    """50 tetrahedra of 2 % of the volume, J = 1.00, 1.01, …: the third is reached at 5 %, the 48th at 95 %."""
+    rising = 1 + 0.01 * np.arange(50)
+    assert stretched_cells(np.full(50, 1e-6), rising) == pytest.approx(45.0, rel=1e-9)
+    # The first holds a tenth of the volume, the last a twenty-fifth: 5 % lie in the first, 95 % in the one before it.
+    volumes = np.array([0.10, *np.full(43, 0.02), 0.04]) * 1e-4
+    assert stretched_cells(volumes, rising[:45]) == pytest.approx(43.0, rel=1e-9)
+
+
 def test_local_volume():
     assert of("min_j") == 0.6
     assert of("inverted_share") == 0.0
@@ -121,3 +160,21 @@ def test_times():
     assert of("frame_time_p99", timing=timing) == pytest.approx(99.01, rel=1e-12)
     assert of("real_time", timing=timing) == pytest.approx(1 / 0.0505, rel=1e-12)
     assert np.isnan([of(name) for name in ("frame_time", "step_time", "frame_time_p99", "real_time")]).all()
+
+
+def test_of_several_volumes_the_farthest_off_counts():
+    """Of three frames the second volume is the one that is off, in the last frame the first is, the other way."""
+    ratios = np.array([[1.0, 1.0], [1.0, 0.98], [1.01, 0.95], [1.03, 0.99]])
+    target = EDGE**3 * np.array([[1.0, 3.0]] * 4)
+    values = {"volume": ratios * target, "volume_target": target}
+    assert of("volume_worst", values=values) == pytest.approx(5.0, rel=1e-12)
+    assert of("volume_end", values=values) == pytest.approx(3.0, rel=1e-12)
+
+
+def test_pressure_of_the_tissue_is_weighted_by_volume_and_leaves_the_lumen_out():
+    """Volumes 1 and 3 at 40 and 20 Pa: 25 Pa, where the truth is 20 Pa. A lumen of any size between them is none."""
+    target, pressure = EDGE**3 * np.array([[1.0, 3.0]] * 4), np.array([[40.0, 20.0]] * 4)
+    tissue = {"volume_target": target, "pressure": pressure}
+    assert of("pressure_error", values=tissue) == pytest.approx(25.0, rel=1e-12)
+    values = {"volume_target": np.insert(target, 1, EDGE**3, axis=1), "pressure": np.insert(pressure, 1, 30.0, axis=1)}
+    assert of("pressure_error", values=values, attributes={"lumen_column": 1}) == pytest.approx(25.0, rel=1e-12)

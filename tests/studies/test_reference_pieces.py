@@ -138,6 +138,18 @@ def test_steps_of_other_code_are_not_gone_on_from(tmp_path, monkeypatch):
     assert asked == [None, None]
 
 
+def test_steps_that_have_changed_are_not_gone_on_from(tmp_path):
+    """A bit among their numbers would be in every later step."""
+    record = tmp_path / "a.h5"
+    checkpoints.keep(record, "this code", Checkpoint([], None))
+    assert checkpoints.kept(record, "this code") is not None
+    file = checkpoints.steps_path(record)
+    whole = file.read_bytes()
+    for place in range(0, len(whole), 5):
+        file.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        assert checkpoints.kept(record, "this code") is None
+
+
 def broken(problem, times, settings, **_):
     raise ReferenceProblem("no equilibrium found between t = 1 s and t = 4 s: the mesh folds; refine it", converged=[])
 

@@ -4,24 +4,20 @@ import json
 import math
 import os
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from studies.base.errors import StudyError
 from studies.catalog import Chart
-from studies.report.results import BEGIN, DOUBT_MARK, END, draw_charts, refresh, report, summary_of, write_readme
+from studies.report.results import DOUBT_MARK, draw_charts, refresh, report, summary_of
 from studies.runs.current import case_path
 from studies.store.csv_table import write_table
 from studies.store.machine import machine_id
 from studies.store.record import Status
 from studies.sweep.load import load_runs
 from tests.studies.tiny import tiny_case, tiny_study
-
-REPOSITORY = Path(__file__).parents[2]
 
 
 def headline(runs) -> list[list[str]]:
@@ -106,30 +102,6 @@ def test_a_case_that_failed_is_not_left_out(finished_sweep):
     assert headline([replace(runs[0], record=failed)])[0][3:] == ["–"] * 6
 
 
-def test_readme_takes_the_summary_between_its_marks(tmp_path):
-    readme = tmp_path / "README.md"
-    readme.write_text(f"# Title\n{BEGIN}\nold\n{END}\ntail\n")
-    write_readme(readme, "\n| new |\n")
-    assert readme.read_text() == f"# Title\n{BEGIN}\n| new |\n{END}\ntail\n"
-    write_readme(readme, "| new |")
-    assert readme.read_text().count("new") == 1
-
-
-def test_readme_without_marks_or_missing_is_left_alone(tmp_path):
-    readme = tmp_path / "README.md"
-    with pytest.raises(StudyError, match="there is no file"):
-        write_readme(readme, "| new |")
-    readme.write_text("# Title\n")
-    with pytest.raises(StudyError, match="has no lines"):
-        write_readme(readme, "| new |")
-    assert readme.read_text() == "# Title\n"
-
-
-def test_the_readme_of_the_project_has_the_marks():
-    text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
-    assert text.index(BEGIN) < text.index(END)
-
-
 def test_what_is_shown_already_is_not_drawn_again(results):
     """The skip of the second `make study`: nothing is drawn until a result, or a picture, is no longer the same."""
     drawn = []
@@ -155,3 +127,14 @@ def test_the_headline_study_writes_the_summary_too(results):
     paths, remarks = refresh(results, replace(tiny_study(), name="volume_loss"))
     assert paths[-1] == results / "summary.md" and paths[-1].is_file()
     assert len(remarks) == 3, "none of its cases has run under this name"
+
+
+@pytest.mark.parametrize("text", ['{"inp', "[]", "{}", '{"inputs": 1, "remarks": []}', "\udcff"])
+def test_a_stamp_that_is_damaged_is_drawn_again(results, text):
+    study = tiny_study(charts=(Chart("one.png", lambda runs, path: path.write_bytes(b"picture")),))
+    refresh(results, study)
+    stamp = results / "cache" / f"{study.name}.drawn.json"
+    whole = stamp.read_bytes()
+    stamp.write_bytes(text.encode(errors="surrogateescape"))
+    refresh(results, study)
+    assert stamp.read_bytes() == whole

@@ -11,7 +11,7 @@ from studies.base.errors import StudyError
 from studies.runs import current
 from studies.runs import run as module
 from studies.runs.case import BodyRecipe, Case
-from studies.runs.current import case_is_current, case_path
+from studies.runs.current import case_path, why_case_is_stale
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames, judge, measure, replay, run_case
 from studies.scenes.stress import STRESS_SCENES
@@ -111,10 +111,10 @@ def test_newton_s_third_law_between_the_planes(ran):
 def test_it_is_current_until_case_or_code_change(ran, monkeypatch):
     root, path = ran
     assert path == case_path(root, "tiny", tiny_case())
-    assert case_is_current(root, "tiny", tiny_case())
-    assert not case_is_current(root, "tiny", tiny_case(dt_fraction=0.4))
+    assert why_case_is_stale(root, "tiny", tiny_case()) is None
+    assert why_case_is_stale(root, "tiny", tiny_case(dt_fraction=0.4))
     monkeypatch.setattr(current, "run_fingerprint", lambda: "edited")
-    assert not case_is_current(root, "tiny", tiny_case())
+    assert why_case_is_stale(root, "tiny", tiny_case())
 
 
 def test_progress_is_told_frame_by_frame():
@@ -203,18 +203,18 @@ def test_replay_tells_a_changed_value(ran, tmp_path, name):
 def test_replay_tells_another_shape_a_lost_field_and_another_end(ran, tmp_path):
     path = tmp_path / "copy.h5"
     path.write_bytes(ran[1].read_bytes())
-    spoil(path, "t", lambda v: v[:-1])
-    assert "'t' has another shape" in replay(path)[2]
+    spoil(path, "tetrahedra", lambda v: v[:-1])
+    assert "'tetrahedra' has another shape" in replay(path)[2]
     record = read_record(ran[1])
-    write_record(path, replace(record, fields={k: v for k, v in record.fields.items() if k != "t"}))
-    assert "'t' is not stored" in replay(path)[2]
+    write_record(path, replace(record, fields=record.fields | {"kinetic": replace(record.fields["min_j"], unit="J")}))
+    assert "'kinetic' is no longer computed" in replay(path)[2]
     write_record(path, replace(record, status=Status.DIVERGED, message="gone"))
     assert "it was diverged, now it is ok" in replay(path)[2]
 
 
 def test_only_runs_are_replayed(ran, tmp_path):
     record = read_record(ran[1])
-    write_record(tmp_path / "a.h5", replace(record, kind="timing"))
+    write_record(tmp_path / "a.h5", replace(record, kind="made up"))
     with pytest.raises(StudyError, match="only a run can be replayed"):
         replay(tmp_path / "a.h5")
 

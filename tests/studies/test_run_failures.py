@@ -9,7 +9,7 @@ import pytest
 from massspring import Capsule, Path, Sphere
 from studies.geometry import HalfSpace
 from studies.runs.case import BodyRecipe
-from studies.runs.current import case_is_current
+from studies.runs.current import why_case_is_stale
 from studies.runs.run import measure, run_case
 from studies.scene.meshing import mesh_for
 from studies.scenes import Held
@@ -149,4 +149,4 @@ def test_failures_are_stored_like_successes(tmp_path):
     case = tiny_case(body=BodyRecipe(nodes=NODES, stiffness=-1.0))
     record = read_record(run_case(tmp_path, "tiny", case))
     assert record.status == Status.FAILED
-    assert case_is_current(tmp_path, "tiny", case)
+    assert why_case_is_stale(tmp_path, "tiny", case) is None

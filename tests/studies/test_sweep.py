@@ -5,6 +5,7 @@ import signal
 from dataclasses import replace
 from operator import methodcaller
 
+import h5py
 import pytest
 
 from studies.base.errors import StudyError
@@ -12,6 +13,7 @@ from studies.runs.current import case_path
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status, read_record, write_record
+from studies.store.staleness import OTHER_VERSION
 from studies.sweep import run_studies as module
 from studies.sweep.load import load_runs
 from studies.sweep.run_studies import perform, run_studies
@@ -72,15 +74,20 @@ def test_older_code_is_stale_and_runs_again(results):
     assert content(results / "tiny").keys() == fresh.keys()
 
 
-def test_a_damaged_file_is_stale_and_runs_again(results):
+@pytest.mark.parametrize("number", [False, True], ids=["cut off", "another number"])
+def test_a_damaged_file_is_stale_and_runs_again(results, number):
     study = tiny_study()
     path = case_path(results, "tiny", diverging_case())
-    path.write_bytes(path.read_bytes()[:1000])
+    if number:
+        with h5py.File(path, "r+") as file:
+            file["mass"][0] *= 1.5
+    else:
+        path.write_bytes(path.read_bytes()[:1000])
     assert [s.message for s in standings(results, study) if s.status == "stale"] == ["its file is damaged"]
     runs, remarks = load_runs(results, study)
     assert len(runs) == 2
     assert len(remarks) == 1
-    assert "damaged" in remarks[0] or "cut off" in remarks[0]
+    assert path.name in remarks[0] and ("'mass' has changed" if number else "cut off") in remarks[0]
     assert warnings_of(results, study) == []
     assert not failed(Task(results, "tiny", diverging_case()))
     assert run_studies(results, [study], 1, Silent()) == 1
@@ -143,3 +150,15 @@ def test_the_number_of_threads_is_given_back(monkeypatch, tmp_path):
     perform([Task(tmp_path, "tiny", tiny_case(body=replace(tiny_case().body, stiffness=-1.0)))], 1, Silent())
     assert os.environ["OMP_NUM_THREADS"] == "7"
     assert "MKL_NUM_THREADS" not in os.environ
+
+
+def test_files_of_the_former_layout_run_again_and_are_told_of_once(results):
+    study = tiny_study()
+    for case in study.cases:
+        with h5py.File(case_path(results, "tiny", case), "w") as file:
+            file.attrs.update({"schema": 1, "kind": "run", "key": case.key, "name": case.name, "status": "ok"})
+    runs, remarks = load_runs(results, study)
+    assert (runs, len(remarks)) == ([], 1)
+    assert "of an earlier version of organbench" in remarks[0] and remarks[0].endswith("(and 2 more files)")
+    assert {s.message for s in standings(results, study)} == {OTHER_VERSION}
+    assert all(task.why_stale() == OTHER_VERSION for task in tasks_of(results, [study]))

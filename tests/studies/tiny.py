@@ -24,11 +24,11 @@ def draw(runs, path):
 
 STUDY = tiny_study(charts=(Chart("picture.txt", draw),))
 """
-"""A study file as somebody would write it."""
+"""A study file as a user would write it."""
 
 
 class Silent:
-    """Progress that no one watches; remembers what was told."""
+    """Progress without a display; remembers the messages."""
 
     def __init__(self):
         self.begun: list[tuple[str, int]] = []

@@ -6,7 +6,6 @@ import numpy as np
 
 from massspring.kernels.arrays.spring_layout import Membrane, Slices
 from massspring.kernels.jit.stage_clock import Ticks
-from massspring.kernels.jit.thread_team import Team
 
 
 class Network(NamedTuple):
@@ -44,8 +43,8 @@ class Network(NamedTuple):
     slices: Slices
 
 
-class Motion(NamedTuple):
-    """What changes at every step, with the scratch arrays of the loop: nothing is allocated inside it."""
+class Nodes(NamedTuple):
+    """Where the n nodes are and what moves them; changes at every step."""
 
     x: np.ndarray
     """Positions [m], (n, 3)."""
@@ -56,19 +55,24 @@ class Motion(NamedTuple):
     force: np.ndarray
     """Spring forces [N], (n, 3)."""
     gradient: np.ndarray
-    """G = dV/dx [m²], (n, 3)."""
+    """G = dV/dx of the one volume that is kept [m²], (n, 3); 0 where none is, or several."""
+
+
+class Contacts(NamedTuple):
+    """Which nodes obstacles touch in this step, and what that takes from their motion."""
+
     touched: np.ndarray
     """0 for a free node, else 1 + the obstacle it lies on, (n,) uint32."""
     second: np.ndarray
-    """1 + the other obstacle of a node in a wedge, (n,) uint32."""
-    locked: np.ndarray
-    """Directions that obstacles take from a node: 0, 1 (slides on one), 2 (in a wedge) or 3 (sticks), (n,) uint8."""
+    """1 + the other obstacle of a node in an edge between two, (n,) uint32."""
+    mode: np.ndarray
+    """Directions that obstacles take from a node (kernels.contact.modes), (n,) uint8."""
     normal: np.ndarray
     """Unit normal of the touched obstacle, towards the body, (n, 3)."""
     second_normal: np.ndarray
     """Of the second obstacle, (n, 3)."""
     direction: np.ndarray
-    """The normal of a node that slides, the edge of one in a wedge, (n, 3)."""
+    """The normal of a node that slides, the edge of one between two obstacles, (n, 3)."""
     goal: np.ndarray
     """Velocity that ends the step on the obstacles, in the directions taken, less what friction takes [m/s], (n, 3)."""
     touching: np.ndarray
@@ -79,16 +83,33 @@ class Motion(NamedTuple):
     """Scratch: nodes that would enter an obstacle, (n,) uint32."""
     clearance: np.ndarray
     """Distance to the nearest obstacle at the end of the predicted step [m], inf for touched nodes, (n,)."""
+
+
+class Workspace(NamedTuple):
+    """Scratch of the pass over all springs: nothing is allocated inside a frame."""
+
     places: np.ndarray
-    """Scratch: positions [m] and a zero, (n, 4)."""
+    """Positions [m] and a zero, (n, 4)."""
     tile: np.ndarray
-    """Scratch of `kernels.slices`, one row a thread."""
+    """Of `kernels.fused`, one row a thread."""
     pulled: np.ndarray
-    """Scratch: forces and 6 G of the slices of pieces, (pieces, 384)."""
+    """Forces and 6 G of the slices of pieces, (pieces, 384)."""
     sums: np.ndarray
-    """Scratch: shares of the slices in 18 V, G·v* and G·W·G, (S + 1, 3) float64; last those of nodes in pieces."""
-    team: Team | None = None
-    """Threads that share the longest loops; None for one thread: nothing is compiled for them then."""
+    """Shares of the slices in 18 V, G·v* and G·W·G, (S + 1, 3) float64; last those of nodes in pieces."""
+
+
+class Push(NamedTuple):
+    """The force that keeps volumes on every node, f_i = factor · direction_i [N].
+
+    One volume: lam G_i; several: (Jᵀ lam)_i, summed before, with a factor of 1. Kernels see the product alone. It stays
+    one because G is known a step's work before lam: a field of forces would be one more pass over all nodes whenever
+    lam changes, and dt w (lam G) is rounded otherwise than (dt lam w) G.
+    """
+
+    direction: np.ndarray
+    """G [m²] or Jᵀ lam [N], (n, 3)."""
+    factor: float
+    """lam [Pa] or 1."""
 
 
 class Tips(NamedTuple):
@@ -155,4 +176,4 @@ class Tally(NamedTuple):
     iterations: np.ndarray
     """Iterations for the multipliers: their sum, and the most in one step, (2,) int64; 0 where they are direct."""
     ticks: Ticks | None = None
-    """Where the time goes; None where nobody asks."""
+    """Where the time goes; None where it is not measured."""

@@ -52,6 +52,8 @@ class VolumeRows(NamedTuple):
     """V_r [m³], (m,)."""
     lam: np.ndarray
     """Multipliers, on the way in those of the last step [Pa], (m,)."""
+    push: np.ndarray
+    """Jᵀ lam, the force of all volumes on each node [N], (n, 3)."""
     right: np.ndarray
     """What the multipliers of the moment leave of the right-hand side [m³/s²], (m,)."""
     free_diagonal: np.ndarray

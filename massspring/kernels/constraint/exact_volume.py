@@ -24,10 +24,10 @@ class Line(NamedTuple):
 
 
 @compiled
-def line_into(motion, inverse_mass, dt, line):
+def line_into(nodes, contacts, inverse_mass, dt, line):
     """y = x + dt ṽ [m], d = dt² W̃ G [m/Pa], (n, 3) each: the step ends at y + lam d (eq. 9, 10, 101)."""
-    unpushed_into(motion, dt, line.y)
-    pushed_by_into(motion, inverse_mass, dt * dt, motion.gradient, line.d)
+    unpushed_into(nodes, contacts, dt, line.y)
+    pushed_by_into(contacts, inverse_mass, dt * dt, nodes.gradient, line.d)
 
 
 @inlined

@@ -2,11 +2,12 @@
 
 import math
 
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import compiled, lean
 from massspring.kernels.jit.row_sums import copy_scaled, sum_of_areas, sum_of_products, sum_of_scaled, sums_from_origin
 
-NEGLIGIBLE = 1e-12
+NEGLIGIBLE_DIAGONAL = 1e-12
 """A diagonal or pivot this much smaller than what it was summed from is round-off."""
 
 
@@ -71,40 +72,40 @@ def transposed_rows_times_into(rows, p, out):
 
 
 @compiled
-def pushed_velocity_into(motion, inverse_mass, dt, u):
-    """u = ṽ + dt W̃ F [m/s], (n, 3), with F = Jᵀ lam in `motion.gradient` [N] (eq. 9, 10)."""
+def pushed_velocity_into(nodes, contacts, inverse_mass, force, dt, u):
+    """u = ṽ + dt W̃ F [m/s], (n, 3), with a force F [N] on every node (eq. 9, 10)."""
     for i in range(u.shape[0]):
-        push = dt * inverse_mass[i]
-        u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
-        u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
-        u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
-        if motion.locked[i] > 0:
-            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-            u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
-            u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
+        w = dt * inverse_mass[i]
+        u0 = nodes.v_star[i, 0] + w * force[i, 0]
+        u1 = nodes.v_star[i, 1] + w * force[i, 1]
+        u2 = nodes.v_star[i, 2] + w * force[i, 2]
+        if contacts.mode[i] > FREE:
+            d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
+            u0, u1, u2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
+            u0, u1, u2 = u0 + contacts.goal[i, 0], u1 + contacts.goal[i, 1], u2 + contacts.goal[i, 2]
         u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
 
 
 @lean
-def mobilised_into(rows, motion, inverse_mass, p, u):
+def mobilised_into(rows, contacts, inverse_mass, p, u):
     """u = W̃ Jᵀ p, (n, 4): no motion of a held node, none into an obstacle (eq. 9)."""
-    start, row, value, locked, direction = (
+    start, row, value, mode, direction = (
         rows.node_start,
         rows.node_row,
         rows.node_value,
-        motion.locked,
-        motion.direction,
+        contacts.mode,
+        contacts.direction,
     )
     for i in range(u.shape[0]):
         sum_of_scaled(start[i], start[i + 1], row, value, p, inverse_mass[i], u, i)
     for i in range(u.shape[0]):
-        if locked[i] > 0:
+        if mode[i] > FREE:
             d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
-            u[i, 0], u[i, 1], u[i, 2] = allowed_part(locked[i], d0, d1, d2, u[i, 0], u[i, 1], u[i, 2])
+            u[i, 0], u[i, 1], u[i, 2] = allowed_part(mode[i], d0, d1, d2, u[i, 0], u[i, 1], u[i, 2])
 
 
 @compiled
-def diagonal_into(rows, motion, inverse_mass, diagonal):
+def diagonal_into(rows, contacts, inverse_mass, diagonal):
     """S_rr = Σ_j J_rj · W̃_j J_rj [m⁴/kg], (m,), from what it is without contact (eq. 9).
 
     0 where contact and held nodes leave nothing but round-off.
@@ -112,15 +113,15 @@ def diagonal_into(rows, motion, inverse_mass, diagonal):
     for r in range(diagonal.shape[0]):
         diagonal[r] = rows.free_diagonal[r]
     for j in range(inverse_mass.shape[0]):
-        if motion.locked[j] > 0:
-            d0, d1, d2 = motion.direction[j, 0], motion.direction[j, 1], motion.direction[j, 2]
+        if contacts.mode[j] > FREE:
+            d0, d1, d2 = contacts.direction[j, 0], contacts.direction[j, 1], contacts.direction[j, 2]
             for k in range(rows.node_start[j], rows.node_start[j + 1]):
                 g0, g1, g2 = rows.node_value[k, 0], rows.node_value[k, 1], rows.node_value[k, 2]
-                p0, p1, p2 = allowed_part(motion.locked[j], d0, d1, d2, g0, g1, g2)
+                p0, p1, p2 = allowed_part(contacts.mode[j], d0, d1, d2, g0, g1, g2)
                 taken = g0 * (g0 - p0) + g1 * (g1 - p1) + g2 * (g2 - p2)
                 diagonal[rows.node_row[k]] -= inverse_mass[j] * taken
     for r in range(diagonal.shape[0]):
-        if not diagonal[r] > NEGLIGIBLE * rows.free_diagonal[r]:
+        if not diagonal[r] > NEGLIGIBLE_DIAGONAL * rows.free_diagonal[r]:
             diagonal[r] = 0.0
 
 

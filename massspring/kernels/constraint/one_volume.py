@@ -2,15 +2,16 @@
 
 import math
 
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part, taken_share
 from massspring.kernels.jit.decorators import inlined, lean
 
-NEGLIGIBLE = 1e-12
+NEGLIGIBLE_MOBILITY = 1e-12
 """A mobility this much smaller than what it was taken from is round-off."""
 
 
 @lean
-def volume_multiplier(motion, inverse_mass, volume_error, dt):
+def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
     """lam = [(V0 − V) − dt G·ṽ] / (dt² G·W̃·G) [Pa]: one division (eq. 8). Returns (lam, G·W̃·G).
 
     ṽ, W̃: velocity and inverse mass of a touched node act only along its obstacle (eq. 9). `volume_error` is V0 − V.
@@ -19,19 +20,19 @@ def volume_multiplier(motion, inverse_mass, volume_error, dt):
     flow = 0.0
     mobility = 0.0
     for i in range(inverse_mass.shape[0]):
-        g0, g1, g2 = motion.gradient[i, 0], motion.gradient[i, 1], motion.gradient[i, 2]
-        v0, v1, v2 = motion.v_star[i, 0], motion.v_star[i, 1], motion.v_star[i, 2]
+        g0, g1, g2 = nodes.gradient[i, 0], nodes.gradient[i, 1], nodes.gradient[i, 2]
+        v0, v1, v2 = nodes.v_star[i, 0], nodes.v_star[i, 1], nodes.v_star[i, 2]
         flow += g0 * v0 + g1 * v1 + g2 * v2
         square = g0 * g0 + g1 * g1 + g2 * g2
-        if motion.locked[i] > 0:
-            locked = motion.locked[i]
-            d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-            p0, p1, p2 = allowed_part(locked, d0, d1, d2, g0, g1, g2)
+        if contacts.mode[i] > FREE:
+            mode = contacts.mode[i]
+            d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
+            p0, p1, p2 = allowed_part(mode, d0, d1, d2, g0, g1, g2)
             square = g0 * p0 + g1 * p1 + g2 * p2
-            p0, p1, p2 = allowed_part(locked, d0, d1, d2, v0, v1, v2)
-            flow += g0 * (p0 + motion.goal[i, 0] - v0)
-            flow += g1 * (p1 + motion.goal[i, 1] - v1)
-            flow += g2 * (p2 + motion.goal[i, 2] - v2)
+            p0, p1, p2 = allowed_part(mode, d0, d1, d2, v0, v1, v2)
+            flow += g0 * (p0 + contacts.goal[i, 0] - v0)
+            flow += g1 * (p1 + contacts.goal[i, 1] - v1)
+            flow += g2 * (p2 + contacts.goal[i, 2] - v2)
         mobility += inverse_mass[i] * square
     if not mobility > 0.0:
         return 0.0, mobility
@@ -39,26 +40,26 @@ def volume_multiplier(motion, inverse_mass, volume_error, dt):
 
 
 @inlined
-def multiplier_of_sums(motion, inverse_mass, volume_error, dt, flow, mobility):
+def multiplier_of_sums(nodes, contacts, inverse_mass, volume_error, dt, flow, mobility):
     """The same from G·v* and G·W·G of all nodes, less what obstacles take of the few they touch (eq. 8, 9)."""
-    locked, direction, goal, gradient, v_star = (
-        motion.locked,
-        motion.direction,
-        motion.goal,
-        motion.gradient,
-        motion.v_star,
+    mode, direction, goal, gradient, v_star = (
+        contacts.mode,
+        contacts.direction,
+        contacts.goal,
+        nodes.gradient,
+        nodes.v_star,
     )
     free = mobility
-    for k in range(motion.touching_count[0]):
-        i = motion.touching[k]
-        if locked[i] > 0:
+    for k in range(contacts.touching_count[0]):
+        i = contacts.touching[k]
+        if mode[i] > FREE:
             g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
             v0, v1, v2 = v_star[i, 0], v_star[i, 1], v_star[i, 2]
             d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
-            mobility -= inverse_mass[i] * taken_share(locked[i], d0, d1, d2, g0, g1, g2, g0, g1, g2)
-            flow -= taken_share(locked[i], d0, d1, d2, g0, g1, g2, v0, v1, v2)
+            mobility -= inverse_mass[i] * taken_share(mode[i], d0, d1, d2, g0, g1, g2, g0, g1, g2)
+            flow -= taken_share(mode[i], d0, d1, d2, g0, g1, g2, v0, v1, v2)
             flow += g0 * goal[i, 0] + g1 * goal[i, 1] + g2 * goal[i, 2]
-    if mobility <= NEGLIGIBLE * free:
+    if mobility <= NEGLIGIBLE_MOBILITY * free:
         return 0.0, 0.0
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
 

@@ -3,13 +3,14 @@
 import math
 
 from massspring.kernels.constraint.block_jacobi import precondition_into, scale_into
-from massspring.kernels.constraint.jacobian import NEGLIGIBLE, mobilised_into, padded_rows_times_into
+from massspring.kernels.constraint.jacobian import NEGLIGIBLE_DIAGONAL, mobilised_into, padded_rows_times_into
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import compiled, inlined, lean, summing
 
 
 @compiled
-def dense_into(rows, motion, inverse_mass, matrix):
+def dense_into(rows, contacts, inverse_mass, matrix):
     """S_rs = Σ_j J_rj · W̃_j J_sj [m⁴/kg], its lower triangle, (m, m) (eq. 33)."""
     matrix[:] = 0.0
     for j in range(inverse_mass.shape[0]):
@@ -19,9 +20,9 @@ def dense_into(rows, motion, inverse_mass, matrix):
         for k in range(rows.node_start[j], rows.node_start[j + 1]):
             e, r = rows.node_entry[k], rows.node_row[k]
             g0, g1, g2 = rows.value[e, 0], rows.value[e, 1], rows.value[e, 2]
-            if motion.locked[j] > 0:
-                d0, d1, d2 = motion.direction[j, 0], motion.direction[j, 1], motion.direction[j, 2]
-                g0, g1, g2 = allowed_part(motion.locked[j], d0, d1, d2, g0, g1, g2)
+            if contacts.mode[j] > FREE:
+                d0, d1, d2 = contacts.direction[j, 0], contacts.direction[j, 1], contacts.direction[j, 2]
+                g0, g1, g2 = allowed_part(contacts.mode[j], d0, d1, d2, g0, g1, g2)
             g0, g1, g2 = w * g0, w * g1, w * g2
             # The volumes around a node come in ascending order.
             for q in range(rows.node_start[j], k + 1):
@@ -48,7 +49,7 @@ def factor_dense(matrix):
         pivot = diagonal
         for q in range(k):
             pivot -= matrix[k, q] * matrix[k, q]
-        if pivot > NEGLIGIBLE * diagonal:
+        if pivot > NEGLIGIBLE_DIAGONAL * diagonal:
             root = math.sqrt(pivot)
             matrix[k, k] = root
             for i in range(k + 1, m):
@@ -79,9 +80,9 @@ def substitute(factor, right, change):
 
 
 @lean
-def apply_schur(rows, motion, inverse_mass, p, product):
+def apply_schur(rows, contacts, inverse_mass, p, product):
     """S p = J (W̃ (Jᵀ p)), (m,) (eq. 33)."""
-    mobilised_into(rows, motion, inverse_mass, p, rows.node_vector)
+    mobilised_into(rows, contacts, inverse_mass, p, rows.node_vector)
     padded_rows_times_into(rows, rows.node_vector, product)
 
 
@@ -112,7 +113,7 @@ def along(search, image, alpha, lam, residual):
 
 
 @lean
-def solve_iteratively(rows, motion, inverse_mass, lam, allowed, most):
+def solve_iteratively(rows, contacts, inverse_mass, lam, allowed, most):
     """lam += S⁻¹ rhs by conjugate gradients with clusters of S at rest as preconditioner (eq. 34, 169).
 
     Ends when |rhs − S Δlam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number. A volume
@@ -131,7 +132,7 @@ def solve_iteratively(rows, motion, inverse_mass, lam, allowed, most):
         keep = rho / before
         for r in range(search.shape[0]):
             search[r] = image[r] + keep * search[r]
-        apply_schur(rows, motion, inverse_mass, search, image)
+        apply_schur(rows, contacts, inverse_mass, search, image)
         curvature = dot(search, image)
         if not curvature > 0.0:
             break

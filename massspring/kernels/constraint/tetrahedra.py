@@ -1,6 +1,7 @@
 """The volumes of all tetrahedra solved for at the end of a step: together, or one after the other (eq. 166, 167)."""
 
 from massspring.kernels.contact.constrained_motion import pushed_by_into, unpushed_into
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.forces.tetrahedron_volumes import add_four, cell_slopes, mean_pressure
 from massspring.kernels.forces.volume import volume_gradient_into
@@ -52,38 +53,38 @@ def cell_changes_into(cells, u, out):
 
 
 @inlined
-def moved_by(inverse_mass, locked, direction, i, g0, g1, g2):
+def moved_by(inverse_mass, mode, direction, i, g0, g1, g2):
     """W̃ g at node i (eq. 9)."""
     w = inverse_mass[i]
     d0, d1, d2 = w * g0, w * g1, w * g2
-    if locked[i] > 0:
-        d0, d1, d2 = allowed_part(locked[i], direction[i, 0], direction[i, 1], direction[i, 2], d0, d1, d2)
+    if mode[i] > FREE:
+        d0, d1, d2 = allowed_part(mode[i], direction[i, 0], direction[i, 1], direction[i, 2], d0, d1, d2)
     return d0, d1, d2
 
 
 @compiled
-def cell_diagonal_into(motion, inverse_mass, cells, scale, compliance):
+def cell_diagonal_into(contacts, inverse_mass, cells, scale, compliance):
     """dt² S_tt + C V_t0 [m³/Pa], (k,), the diagonal of eq. 166; `scale` is dt²."""
     s, tetrahedra = cells.slope, cells.tetrahedra
-    locked, direction = motion.locked, motion.direction
+    mode, direction = contacts.mode, contacts.direction
     for t in range(tetrahedra.shape[0]):
         total = 0.0
         a0, a1, a2 = 0.0, 0.0, 0.0
         for corner in range(3):
             g0, g1, g2 = s[t, corner, 0], s[t, corner, 1], s[t, corner, 2]
             a0, a1, a2 = a0 - g0, a1 - g1, a2 - g2
-            d0, d1, d2 = moved_by(inverse_mass, locked, direction, tetrahedra[t, corner + 1], g0, g1, g2)
+            d0, d1, d2 = moved_by(inverse_mass, mode, direction, tetrahedra[t, corner + 1], g0, g1, g2)
             total += g0 * d0 + g1 * d1 + g2 * d2
-        d0, d1, d2 = moved_by(inverse_mass, locked, direction, tetrahedra[t, 0], a0, a1, a2)
+        d0, d1, d2 = moved_by(inverse_mass, mode, direction, tetrahedra[t, 0], a0, a1, a2)
         total += a0 * d0 + a1 * d1 + a2 * d2
         cells.diagonal[t] = scale * total + compliance * cells.rest_volume[t]
 
 
 @compiled
-def apply_cells(motion, inverse_mass, cells, p, scale, compliance, out):
+def apply_cells(contacts, inverse_mass, cells, p, scale, compliance, out):
     """(dt² J W̃ Jᵀ + C V0) p [m³], (k,) (eq. 166); `scale` is dt²."""
     cell_forces_into(cells, p, cells.gradient)
-    pushed_by_into(motion, inverse_mass, scale, cells.gradient, cells.y)
+    pushed_by_into(contacts, inverse_mass, scale, cells.gradient, cells.y)
     cell_changes_into(cells, cells.y, out)
     for t in range(p.shape[0]):
         out[t] += compliance * cells.rest_volume[t] * p[t]
@@ -100,23 +101,23 @@ def any_idle(cells, compliance, tolerance):
 
 
 @compiled
-def solve_cells(motion, inverse_mass, cells, dt, compliance, accuracy):
+def solve_cells(nodes, contacts, inverse_mass, cells, dt, compliance, accuracy):
     """(dt² J W̃ Jᵀ + C V0) p = V0 − V − dt J ṽ by conjugate gradients from the last p (eq. 166); their number.
 
     Ends when |residual|_t ≤ tolerance · V_t0 for every tetrahedron. J at x. `cells.right` comes in as V.
     """
     scale = dt * dt
-    unpushed_into(motion, dt, cells.y)
+    unpushed_into(nodes, contacts, dt, cells.y)
     for i in range(cells.y.shape[0]):
         for axis in range(3):
-            cells.y[i, axis] -= motion.x[i, axis]
+            cells.y[i, axis] -= nodes.x[i, axis]
     cell_changes_into(cells, cells.y, cells.image)
     residual, search, image = cells.right, cells.search, cells.image
     for t in range(residual.shape[0]):
         residual[t] = cells.filling[0] * cells.rest_volume[t] - residual[t] - image[t]
         search[t] = 0.0
-    apply_cells(motion, inverse_mass, cells, cells.pressure, scale, compliance, image)
-    cell_diagonal_into(motion, inverse_mass, cells, scale, compliance)
+    apply_cells(contacts, inverse_mass, cells, cells.pressure, scale, compliance, image)
+    cell_diagonal_into(contacts, inverse_mass, cells, scale, compliance)
     worst, before = 0.0, 0.0
     for t in range(residual.shape[0]):
         residual[t] -= image[t]
@@ -132,7 +133,7 @@ def solve_cells(motion, inverse_mass, cells, dt, compliance, accuracy):
         for t in range(residual.shape[0]):
             if cells.diagonal[t] > 0.0:
                 search[t] = residual[t] / cells.diagonal[t] + keep * search[t]
-        apply_cells(motion, inverse_mass, cells, search, scale, compliance, image)
+        apply_cells(contacts, inverse_mass, cells, search, scale, compliance, image)
         curvature = 0.0
         for t in range(residual.shape[0]):
             curvature += search[t] * image[t]
@@ -148,23 +149,23 @@ def solve_cells(motion, inverse_mass, cells, dt, compliance, accuracy):
 
 
 @compiled
-def relax_cells(motion, inverse_mass, cells, scale, compliance, force):
+def relax_cells(contacts, inverse_mass, cells, scale, compliance):
     """One sweep of XPBD: Δp = (V0 − V − C V0 p)/(dt² ∇V·W̃∇V + C V0), cell after cell, at y (eq. 167).
 
-    `cells.y` moves by dt² W̃ ∇V Δp and `force` [N] collects ∇V Δp; `scale` is dt². Returns whether a wrong volume had
-    nothing to push on.
+    `cells.y` moves by dt² W̃ ∇V Δp and `cells.push` [N] collects ∇V Δp; `scale` is dt².
+    Returns whether a wrong volume had nothing to push on.
     """
     idle = False
     y, tetrahedra, pressure, rest_volume = cells.y, cells.tetrahedra, cells.pressure, cells.rest_volume
-    locked, direction = motion.locked, motion.direction
+    mode, direction, force = contacts.mode, contacts.direction, cells.push
     for t in range(tetrahedra.shape[0]):
         a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
         volume, p0, p1, p2, q0, q1, q2, r0, r1, r2 = cell_slopes(y, a, b, c, d)
         o0, o1, o2 = -p0 - q0 - r0, -p1 - q1 - r1, -p2 - q2 - r2
-        a0, a1, a2 = moved_by(inverse_mass, locked, direction, a, o0, o1, o2)
-        b0, b1, b2 = moved_by(inverse_mass, locked, direction, b, p0, p1, p2)
-        c0, c1, c2 = moved_by(inverse_mass, locked, direction, c, q0, q1, q2)
-        d0, d1, d2 = moved_by(inverse_mass, locked, direction, d, r0, r1, r2)
+        a0, a1, a2 = moved_by(inverse_mass, mode, direction, a, o0, o1, o2)
+        b0, b1, b2 = moved_by(inverse_mass, mode, direction, b, p0, p1, p2)
+        c0, c1, c2 = moved_by(inverse_mass, mode, direction, c, q0, q1, q2)
+        d0, d1, d2 = moved_by(inverse_mass, mode, direction, d, r0, r1, r2)
         mobility = o0 * a0 + o1 * a1 + o2 * a2 + p0 * b0 + p1 * b1 + p2 * b2
         mobility += q0 * c0 + q1 * c1 + q2 * c2 + r0 * d0 + r1 * d1 + r2 * d2
         soft = compliance * rest_volume[t]
@@ -185,16 +186,16 @@ def relax_cells(motion, inverse_mass, cells, scale, compliance, force):
 
 
 @compiled
-def relax_whole(network, motion, cells, target, scale, compliance, lam, force):
+def relax_whole(network, contacts, cells, target, scale, compliance, lam):
     """The same for the one volume of the whole: returns its pressure [Pa] as well, first (eq. 167)."""
-    y, gradient, inverse_mass = cells.y, cells.gradient, network.inverse_mass
-    locked, direction = motion.locked, motion.direction
+    y, gradient, force, inverse_mass = cells.y, cells.gradient, cells.push, network.inverse_mass
+    mode, direction = contacts.mode, contacts.direction
     volume = volume_gradient_into(y, network.triangles, gradient)
     soft = compliance * cells.rest_whole
     stiff = soft
     for i in range(y.shape[0]):
         g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
-        d0, d1, d2 = moved_by(inverse_mass, locked, direction, i, g0, g1, g2)
+        d0, d1, d2 = moved_by(inverse_mass, mode, direction, i, g0, g1, g2)
         stiff += scale * (g0 * d0 + g1 * d1 + g2 * d2)
     idle = not stiff > soft and abs(target - volume) > WRONG * target
     if not stiff > 0.0:
@@ -203,7 +204,7 @@ def relax_whole(network, motion, cells, target, scale, compliance, lam, force):
     move = scale * change
     for i in range(y.shape[0]):
         g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
-        d0, d1, d2 = moved_by(inverse_mass, locked, direction, i, g0, g1, g2)
+        d0, d1, d2 = moved_by(inverse_mass, mode, direction, i, g0, g1, g2)
         y[i, 0], y[i, 1], y[i, 2] = y[i, 0] + move * d0, y[i, 1] + move * d1, y[i, 2] + move * d2
         force[i, 0], force[i, 1] = force[i, 0] + change * g0, force[i, 1] + change * g1
         force[i, 2] += change * g2
@@ -211,12 +212,12 @@ def relax_whole(network, motion, cells, target, scale, compliance, lam, force):
 
 
 @compiled
-def relax_sum(network, motion, cells, target, scale, compliance, force):
+def relax_sum(network, contacts, cells, target, scale, compliance):
     """All pressures of cells by as much as mends the sum of their volumes (eq. 170).
 
     Returns whether a wrong sum had nothing to push on."""
     mean = mean_pressure(cells)
-    lam, idle = relax_whole(network, motion, cells, target, scale, compliance, mean, force)
+    lam, idle = relax_whole(network, contacts, cells, target, scale, compliance, mean)
     for t in range(cells.pressure.shape[0]):
         cells.pressure[t] += lam - mean
     return idle

@@ -1,6 +1,7 @@
 """Velocities that obstacles leave to touched nodes, and the impulses of the obstacles."""
 
 from massspring.kernels.contact.friction import shares
+from massspring.kernels.contact.modes import FREE, ON_EDGE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import inlined, lean
 
@@ -17,34 +18,34 @@ def book(contact_impulse, o, other, k0, k1, k2):
 
 
 @inlined
-def settled(motion, i, u0, u1, u2):
+def settled(contacts, i, u0, u1, u2):
     """What obstacles make of the velocity of a node they touch [m/s], P u + goal (eq. 10)."""
-    d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-    p0, p1, p2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
-    return p0 + motion.goal[i, 0], p1 + motion.goal[i, 1], p2 + motion.goal[i, 2]
+    d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
+    p0, p1, p2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
+    return p0 + contacts.goal[i, 0], p1 + contacts.goal[i, 1], p2 + contacts.goal[i, 2]
 
 
 @inlined
-def book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse):
+def book_contacts(network, nodes, contacts, push, dt, contact_impulse):
     """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 10); u is what a node would do without them."""
-    v_star, gradient, locked = motion.v_star, motion.gradient, motion.locked
-    real = motion.x.dtype.type
-    impulse = real(dt * lam)
-    for k in range(motion.touching_count[0]):
-        i = motion.touching[k]
-        if locked[i] == 0:
+    v_star, direction, mode = nodes.v_star, push.direction, contacts.mode
+    real = nodes.x.dtype.type
+    impulse = real(dt * push.factor)
+    for k in range(contacts.touching_count[0]):
+        i = contacts.touching[k]
+        if mode[i] == FREE:
             continue
-        push = impulse * real(inverse_mass[i])
-        u0, u1 = v_star[i, 0] + push * gradient[i, 0], v_star[i, 1] + push * gradient[i, 1]
-        u2 = v_star[i, 2] + push * gradient[i, 2]
-        w0, w1, w2 = settled(motion, i, u0, u1, u2)
-        o, m = motion.touched[i] - 1, mass[i]
+        w = impulse * real(network.inverse_mass[i])
+        u0, u1 = v_star[i, 0] + w * direction[i, 0], v_star[i, 1] + w * direction[i, 1]
+        u2 = v_star[i, 2] + w * direction[i, 2]
+        w0, w1, w2 = settled(contacts, i, u0, u1, u2)
+        o, m = contacts.touched[i] - 1, network.mass[i]
         k0, k1, k2 = m * (w0 - u0), m * (w1 - u1), m * (w2 - u2)
         contact_impulse[o, 0] += k0
         contact_impulse[o, 1] += k1
         contact_impulse[o, 2] += k2
-        if locked[i] == 2:
-            m0, m1, m2 = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
-            n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
+        if mode[i] == ON_EDGE:
+            m0, m1, m2 = contacts.second_normal[i, 0], contacts.second_normal[i, 1], contacts.second_normal[i, 2]
+            n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
             _, beta = shares((k0, k1, k2), (n0, n1, n2), (m0, m1, m2))
-            book(contact_impulse, o, motion.second[i] - 1, beta * m0, beta * m1, beta * m2)
+            book(contact_impulse, o, contacts.second[i] - 1, beta * m0, beta * m1, beta * m2)

@@ -3,6 +3,7 @@
 import math
 
 from massspring.kernels.contact.gaps import gap_and_normal, pushed_velocity
+from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import inlined, lean
 
@@ -13,74 +14,78 @@ PARALLEL = 1e-4
 
 
 @lean
-def rub(network, motion, drive, step, lam):
+def rub(network, nodes, contacts, drive, step, push):
     """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 36)."""
-    for k in range(motion.touching_count[0]):
-        i = motion.touching[k]
-        if motion.locked[i] != 1 or not drive.friction[motion.touched[i] - 1] > 0.0:
+    for k in range(contacts.touching_count[0]):
+        i = contacts.touching[k]
+        if contacts.mode[i] != SLIDES or not drive.friction[contacts.touched[i] - 1] > 0.0:
             continue
-        o = motion.touched[i] - 1
-        n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
-        g0, g1, g2 = motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2]
+        o = contacts.touched[i] - 1
+        n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
+        u0, u1, u2 = pushed_velocity(network, nodes, drive, push, i)
+        g0, g1, g2 = contacts.goal[i, 0], contacts.goal[i, 1], contacts.goal[i, 2]
         pressed = drive.friction[o] * ((g0 - u0) * n0 + (g1 - u1) * n1 + (g2 - u2) * n2)
         w0, w1, w2 = drive.velocity[step, o, 0], drive.velocity[step, o, 1], drive.velocity[step, o, 2]
-        s0, s1, s2 = allowed_part(1, n0, n1, n2, u0 - w0, u1 - w1, u2 - w2)
+        s0, s1, s2 = allowed_part(SLIDES, n0, n1, n2, u0 - w0, u1 - w1, u2 - w2)
         slip = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
         if slip <= pressed:
-            w0, w1, w2 = allowed_part(1, n0, n1, n2, w0, w1, w2)
-            motion.locked[i] = 3
-            motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = g0 + w0, g1 + w1, g2 + w2
+            w0, w1, w2 = allowed_part(SLIDES, n0, n1, n2, w0, w1, w2)
+            contacts.mode[i] = STICKS
+            contacts.goal[i, 0], contacts.goal[i, 1], contacts.goal[i, 2] = g0 + w0, g1 + w1, g2 + w2
         else:
             lost = pressed / slip
-            motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = g0 - lost * s0, g1 - lost * s1, g2 - lost * s2
+            contacts.goal[i, 0], contacts.goal[i, 1], contacts.goal[i, 2] = (
+                g0 - lost * s0,
+                g1 - lost * s1,
+                g2 - lost * s2,
+            )
 
 
 @lean
-def release_slipping(network, motion, drive, lam):
+def release_slipping(network, nodes, contacts, drive, push):
     """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 36)."""
     changes = 0
-    for k in range(motion.touching_count[0]):
-        i = motion.touching[k]
-        if motion.locked[i] != 3:
+    for k in range(contacts.touching_count[0]):
+        i = contacts.touching[k]
+        if contacts.mode[i] != STICKS:
             continue
-        push = drive.dt * lam * network.inverse_mass[i]
-        n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        k0 = motion.goal[i, 0] - motion.v_star[i, 0] - push * motion.gradient[i, 0]
-        k1 = motion.goal[i, 1] - motion.v_star[i, 1] - push * motion.gradient[i, 1]
-        k2 = motion.goal[i, 2] - motion.v_star[i, 2] - push * motion.gradient[i, 2]
+        w, direction = drive.dt * push.factor * network.inverse_mass[i], push.direction
+        n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
+        k0 = contacts.goal[i, 0] - nodes.v_star[i, 0] - w * direction[i, 0]
+        k1 = contacts.goal[i, 1] - nodes.v_star[i, 1] - w * direction[i, 1]
+        k2 = contacts.goal[i, 2] - nodes.v_star[i, 2] - w * direction[i, 2]
         along = k0 * n0 + k1 * n1 + k2 * n2
-        s0, s1, s2 = allowed_part(1, n0, n1, n2, k0, k1, k2)
-        needed, most = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2), drive.friction[motion.touched[i] - 1] * along
+        s0, s1, s2 = allowed_part(SLIDES, n0, n1, n2, k0, k1, k2)
+        needed, most = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2), drive.friction[contacts.touched[i] - 1] * along
         if along > 0.0 and needed > SLIPS * most:
-            a = motion.goal[i, 0] * n0 + motion.goal[i, 1] * n1 + motion.goal[i, 2] * n2
+            a = contacts.goal[i, 0] * n0 + contacts.goal[i, 1] * n1 + contacts.goal[i, 2] * n2
             g0, g1, g2 = a * n0 + most / needed * s0, a * n1 + most / needed * s1, a * n2 + most / needed * s2
-            motion.locked[i] = 1
-            motion.goal[i, 0], motion.goal[i, 1], motion.goal[i, 2] = g0, g1, g2
+            contacts.mode[i] = SLIDES
+            contacts.goal[i, 0], contacts.goal[i, 1], contacts.goal[i, 2] = g0, g1, g2
             changes += 1
     return changes
 
 
 @lean
-def wedge(network, motion, drive, step, lam):
+def wedge(network, nodes, contacts, drive, step, push):
     """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 37); how many.
 
     Obstacles that face each other have no edge: the deeper one wins, and the other's penetration is recorded.
     """
     changes = 0
     dt = drive.dt
-    for k in range(motion.touching_count[0]):
-        i = motion.touching[k]
-        if motion.locked[i] != 1:
+    for k in range(contacts.touching_count[0]):
+        i = contacts.touching[k]
+        if contacts.mode[i] != SLIDES:
             continue
-        n0, n1, n2 = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
-        u0, u1, u2 = allowed_part(1, n0, n1, n2, u0, u1, u2)
-        u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
-        y0, y1, y2 = motion.x[i, 0] + dt * u0, motion.x[i, 1] + dt * u1, motion.x[i, 2] + dt * u2
+        n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
+        u0, u1, u2 = pushed_velocity(network, nodes, drive, push, i)
+        u0, u1, u2 = allowed_part(SLIDES, n0, n1, n2, u0, u1, u2)
+        u0, u1, u2 = u0 + contacts.goal[i, 0], u1 + contacts.goal[i, 1], u2 + contacts.goal[i, 2]
+        y0, y1, y2 = nodes.x[i, 0] + dt * u0, nodes.x[i, 1] + dt * u1, nodes.x[i, 2] + dt * u2
         deepest = 0.0
         for o in range(drive.radius.shape[0]):
-            if o + 1 == motion.touched[i]:
+            if o + 1 == contacts.touched[i]:
                 continue
             p0, p1, p2 = drive.position[step, o, 0], drive.position[step, o, 1], drive.position[step, o, 2]
             gap, m0, m1, m2 = gap_and_normal(drive, o, y0 - p0, y1 - p1, y2 - p2)
@@ -92,14 +97,18 @@ def wedge(network, motion, drive, step, lam):
                 a, b = n0 * u0 + n1 * u1 + n2 * u2, m0 * u0 + m1 * u1 + m2 * u2 - gap / dt
                 cosine, root = n0 * m0 + n1 * m1 + n2 * m2, math.sqrt(square)
                 alpha, beta = (a - cosine * b) / square, (b - cosine * a) / square
-                motion.second[i] = o + 1
-                motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2] = m0, m1, m2
-                motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2] = e0 / root, e1 / root, e2 / root
-                motion.goal[i, 0] = alpha * n0 + beta * m0
-                motion.goal[i, 1] = alpha * n1 + beta * m1
-                motion.goal[i, 2] = alpha * n2 + beta * m2
+                contacts.second[i] = o + 1
+                contacts.second_normal[i, 0], contacts.second_normal[i, 1], contacts.second_normal[i, 2] = m0, m1, m2
+                contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2] = (
+                    e0 / root,
+                    e1 / root,
+                    e2 / root,
+                )
+                contacts.goal[i, 0] = alpha * n0 + beta * m0
+                contacts.goal[i, 1] = alpha * n1 + beta * m1
+                contacts.goal[i, 2] = alpha * n2 + beta * m2
         if deepest < 0.0:
-            motion.locked[i] = 2
+            contacts.mode[i] = ON_EDGE
             changes += 1
     return changes
 
@@ -119,19 +128,19 @@ def shares(k, n, m):
 
 
 @lean
-def release_wedged(network, motion, drive, lam):
+def release_wedged(network, nodes, contacts, drive, push):
     """Frees nodes in a wedge that one of their obstacles would pull; the next search finds the other (eq. 37)."""
     changes = 0
-    for k in range(motion.touching_count[0]):
-        i = motion.touching[k]
-        if motion.locked[i] != 2:
+    for k in range(contacts.touching_count[0]):
+        i = contacts.touching[k]
+        if contacts.mode[i] != ON_EDGE:
             continue
-        u0, u1, u2 = pushed_velocity(network, motion, drive, lam, i)
+        u0, u1, u2 = pushed_velocity(network, nodes, drive, push, i)
         # What the edge leaves free is at right angles to both normals and takes no share.
-        n = motion.normal[i, 0], motion.normal[i, 1], motion.normal[i, 2]
-        m = motion.second_normal[i, 0], motion.second_normal[i, 1], motion.second_normal[i, 2]
-        alpha, beta = shares((motion.goal[i, 0] - u0, motion.goal[i, 1] - u1, motion.goal[i, 2] - u2), n, m)
+        n = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
+        m = contacts.second_normal[i, 0], contacts.second_normal[i, 1], contacts.second_normal[i, 2]
+        alpha, beta = shares((contacts.goal[i, 0] - u0, contacts.goal[i, 1] - u1, contacts.goal[i, 2] - u2), n, m)
         if alpha < 0.0 or beta < 0.0:
-            motion.touched[i], motion.locked[i], motion.clearance[i] = 0, 0, 0.0
+            contacts.touched[i], contacts.mode[i], contacts.clearance[i] = 0, FREE, 0.0
             changes += 1
     return changes

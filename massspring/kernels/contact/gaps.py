@@ -12,16 +12,17 @@ from massspring.kernels.jit.flat import flat
 
 
 @inlined
-def clearances_into(network, motion, drive, step, lam, first, last):
-    """clearance_i = min over obstacles of the distance of y = x + dt (v* + dt lam W G) [m] (eq. 12).
+def clearances_into(network, nodes, contacts, drive, step, push, part):
+    """clearance_i = min over obstacles of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 12).
 
-    Of the nodes from `first` to `last`, those that nothing can touch among them.
+    Of the nodes first ≤ i < last in `part`, those that nothing can touch among them.
     """
-    real = motion.x.dtype.type
-    x, v_star = flat(motion.x, first, last), flat(motion.v_star, first, last)
-    gradient, inverse_mass = flat(motion.gradient, first, last), flat(network.inverse_mass, first, last)
-    course = x, v_star, gradient, inverse_mass, real(drive.dt), real(drive.dt * lam)
-    clearance = flat(motion.clearance, first, last)
+    first, last = part
+    real = nodes.x.dtype.type
+    x, v_star = flat(nodes.x, first, last), flat(nodes.v_star, first, last)
+    direction, inverse_mass = flat(push.direction, first, last), flat(network.inverse_mass, first, last)
+    course = x, v_star, direction, inverse_mass, real(drive.dt), real(drive.dt * push.factor)
+    clearance = flat(contacts.clearance, first, last)
     for i in range(clearance.shape[0]):
         clearance[i] = math.inf
     for o in range(drive.radius.shape[0]):
@@ -38,12 +39,12 @@ def clearances_into(network, motion, drive, step, lam, first, last):
 
 @inlined
 def way_from(p0, p1, p2, course, i):
-    """y − p [m] of a node, y = x + dt (v* + dt lam W G)."""
-    x, v_star, gradient, inverse_mass, dt, push = course
-    w = push * inverse_mass[i]
-    r0 = x[3 * i] + dt * (v_star[3 * i] + w * gradient[3 * i]) - p0
-    r1 = x[3 * i + 1] + dt * (v_star[3 * i + 1] + w * gradient[3 * i + 1]) - p1
-    r2 = x[3 * i + 2] + dt * (v_star[3 * i + 2] + w * gradient[3 * i + 2]) - p2
+    """y − p [m] of a node, y = x + dt (v* + dt W f)."""
+    x, v_star, direction, inverse_mass, dt, impulse = course
+    w = impulse * inverse_mass[i]
+    r0 = x[3 * i] + dt * (v_star[3 * i] + w * direction[3 * i]) - p0
+    r1 = x[3 * i + 1] + dt * (v_star[3 * i + 1] + w * direction[3 * i + 1]) - p1
+    r2 = x[3 * i + 2] + dt * (v_star[3 * i + 2] + w * direction[3 * i + 2]) - p2
     return r0, r1, r2
 
 
@@ -72,12 +73,12 @@ def capsule_clearance(course, clearance, p0, p1, p2, a0, a1, a2, radius):
 
 
 @inlined
-def pushed_velocity(network, motion, drive, lam, i):
-    """u = v* + dt lam W G of node i when the pressure acts as a force [m/s] (eq. 12)."""
-    push = drive.dt * lam * network.inverse_mass[i]
-    u0 = motion.v_star[i, 0] + push * motion.gradient[i, 0]
-    u1 = motion.v_star[i, 1] + push * motion.gradient[i, 1]
-    u2 = motion.v_star[i, 2] + push * motion.gradient[i, 2]
+def pushed_velocity(network, nodes, drive, push, i):
+    """u = v* + dt W f of node i when what keeps volumes acts as a force f [m/s] (eq. 12)."""
+    w, direction = drive.dt * push.factor * network.inverse_mass[i], push.direction
+    u0 = nodes.v_star[i, 0] + w * direction[i, 0]
+    u1 = nodes.v_star[i, 1] + w * direction[i, 1]
+    u2 = nodes.v_star[i, 2] + w * direction[i, 2]
     return u0, u1, u2
 
 

@@ -1,25 +1,26 @@
 """Contact for methods whose steps are long and solved as a whole."""
 
 from massspring.kernels.contact.active_set import admit, enters, forget_released, seat
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.jit.decorators import compiled
 
 
 @compiled
-def seat_entering(network, motion, drive, step):
-    """Puts free surface nodes that `v_star` carries into an obstacle onto it (eq. 12) and lists them; how many.
+def seat_entering(network, nodes, contacts, drive, step, push):
+    """Puts free surface nodes that would enter an obstacle onto it (eq. 12) and lists them; how many.
 
     Those that have been released since the last search leave the list.
     """
-    forget_released(motion)
+    forget_released(contacts)
     count = 0
     for c in range(network.surface_nodes.shape[0]):
         i = network.surface_nodes[c]
-        if network.inverse_mass[i] == 0.0 or motion.locked[i] > 0:
+        if network.inverse_mass[i] == 0.0 or contacts.mode[i] > FREE:
             continue
-        if enters(network, motion, drive, step, 0.0, i):
-            motion.entering[count] = i
+        if enters(network, nodes, drive, step, push, i):
+            contacts.entering[count] = i
             count += 1
     if count > 0:
-        seat(network, motion, drive, step, 0.0, count)
-        admit(motion, count)
+        seat(network, nodes, contacts, drive, step, push, count)
+        admit(contacts, count)
     return count

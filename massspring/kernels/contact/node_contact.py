@@ -6,28 +6,29 @@ in either precision.
 
 import math
 
+from massspring.kernels.contact.modes import ON_EDGE, SLIDES
 from massspring.kernels.jit.decorators import lean
 
 
 @lean
-def allowed_part(locked, d0, d1, d2, g0, g1, g2):
+def allowed_part(mode, d0, d1, d2, g0, g1, g2):
     """P g, what obstacles leave of a vector: P = I − n nᵀ on one, e eᵀ on two, 0 where a node sticks (eq. 9)."""
     along = g0 * d0 + g1 * d1 + g2 * d2
-    if locked == 1:
+    if mode == SLIDES:
         return g0 - along * d0, g1 - along * d1, g2 - along * d2
-    if locked == 2:
+    if mode == ON_EDGE:
         return along * d0, along * d1, along * d2
     return 0.0, 0.0, 0.0
 
 
 @lean
-def taken_share(locked, d0, d1, d2, g0, g1, g2, v0, v1, v2):
+def taken_share(mode, d0, d1, d2, g0, g1, g2, v0, v1, v2):
     """g·(I − P) v, what obstacles take of a product (eq. 9)."""
     along = (g0 * d0 + g1 * d1 + g2 * d2) * (v0 * d0 + v1 * d1 + v2 * d2)
-    if locked == 1:
+    if mode == SLIDES:
         return along
     whole = g0 * v0 + g1 * v1 + g2 * v2
-    return whole - along if locked == 2 else whole
+    return whole - along if mode == ON_EDGE else whole
 
 
 @lean

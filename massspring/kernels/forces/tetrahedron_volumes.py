@@ -24,6 +24,8 @@ class Cells(NamedTuple):
     """What every cell should have of its rest volume [1], (1,)."""
     pressure: np.ndarray
     """p_t [Pa], (k,)."""
+    push: np.ndarray
+    """Σ_t p_t dV_t/dx, the force of all cells on each node [N], (n, 3)."""
     slope: np.ndarray
     """dV_t/dx of the second, third and fourth node [m²], (k, 3, 3); the first has minus their sum."""
     right: np.ndarray
@@ -54,7 +56,7 @@ def cell_slopes(x, a, b, c, d):
 
 @inlined
 def add_four(out, nodes, f, p, q, r):
-    """Adds f p, f q, f r to the last three of four nodes and minus their sum to the first: nobody is pushed about."""
+    """Adds f p, f q, f r to the last three of four nodes and minus their sum to the first: net force 0."""
     a, b, c, d = nodes
     p0, p1, p2 = f * p[0], f * p[1], f * p[2]
     q0, q1, q2 = f * q[0], f * q[1], f * q[2]

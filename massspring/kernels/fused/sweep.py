@@ -29,7 +29,7 @@ from massspring.kernels.fused.chunk import (
 from massspring.kernels.fused.long_rows import add_walls, join_pieces
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.jit.decorators import inlined, lean
-from massspring.kernels.jit.thread_team import SPRINGS, SPRINGS_AND_VOLUME, call, join
+from massspring.kernels.jit.thread_team import JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, call, join
 
 
 @inlined
@@ -86,10 +86,10 @@ def walk_rings(places, slices, first, last, shortest, tile):
 
 
 @inlined
-def predict_slice(motion, slices, s, dt, keep, a0, a1, a2, tile):
+def predict_slice(nodes, slices, s, dt, keep, a0, a1, a2, tile):
     """v* (eq. 6) and G of the nodes of a slice in place of x and 6 G, and their shares of G·v* and G·W·G."""
-    v, node, inverse_mass = motion.v, slices.node, slices.inverse_mass
-    sixth = motion.x.dtype.type(1.0 / 6.0)
+    v, node, inverse_mass = nodes.v, slices.node, slices.inverse_mass
+    sixth = nodes.x.dtype.type(1.0 / 6.0)
     if slices.first[s] >= 0:
         take(v, slices.first[s], 3, tile)
     else:
@@ -120,22 +120,25 @@ def keep_held(slices, s, force, tile):
 
 
 @inlined
-def pass_slices(motion, drive, slices, first, last, keeps, tile):
-    """v* and G of some slices, with their shares of 18 V, G·v* and G·W·G in `sums`; of pieces f and 6 G alone."""
-    real = motion.x.dtype.type
+def pass_slices(nodes, work, drive, slices, part, keeps, tile):
+    """v* and G of the slices first ≤ s < last in `part`, with their shares of 18 V, G·v* and G·W·G in `sums`.
+
+    Of pieces f and 6 G alone.
+    """
+    real = nodes.x.dtype.type
     dt, keep = real(drive.dt), real(1.0 - drive.damping * drive.dt)
     a0, a1, a2 = real(drive.dt * drive.gravity[0]), real(drive.dt * drive.gravity[1]), real(drive.dt * drive.gravity[2])
-    places, pulled, sums, v_star, gradient = motion.places, motion.pulled, motion.sums, motion.v_star, motion.gradient
+    places, pulled, sums, v_star, gradient = work.places, work.pulled, work.sums, nodes.v_star, nodes.gradient
     shortest = real(SHORTEST)
     o0, o1, o2 = places[slices.origin, 0], places[slices.origin, 1], places[slices.origin, 2]
-    for s in range(first, last):
+    for s in range(part[0], part[1]):
         sums[s, 0] = gather(places, slices, s, keeps, shortest, o0, o1, o2, tile)
         if s < slices.pieces:
             for entry in range(RESULT):
                 pulled[s, entry] = tile[entry]
             continue
-        keep_held(slices, s, motion.force, tile)
-        predict_slice(motion, slices, s, dt, keep, a0, a1, a2, tile)
+        keep_held(slices, s, nodes.force, tile)
+        predict_slice(nodes, slices, s, dt, keep, a0, a1, a2, tile)
         put(tile, HERE, slices, s, v_star)
         # Empty lanes have springs of no stiffness and no ring: they add zeros.
         if keeps:
@@ -144,18 +147,18 @@ def pass_slices(motion, drive, slices, first, last, keeps, tile):
 
 
 @inlined
-def pass_all(motion, drive, slices, keeps, team):
+def pass_all(nodes, work, drive, slices, keeps, team):
     """`pass_slices` of all slices, by as many threads as there are."""
     if team is None:
-        pass_slices(motion, drive, slices, 0, slices.lanes.shape[0], keeps, motion.tile[0])
+        pass_slices(nodes, work, drive, slices, (0, slices.lanes.shape[0]), keeps, work.tile[0])
     else:
-        call(team, SPRINGS_AND_VOLUME if keeps else SPRINGS, 0, 0.0)
-        pass_slices(motion, drive, slices, team.slices[0], team.slices[1], keeps, motion.tile[0])
+        call(team, JOB_SPRINGS_AND_VOLUME if keeps else JOB_SPRINGS, 0, 0.0)
+        pass_slices(nodes, work, drive, slices, (team.slices[0], team.slices[1]), keeps, work.tile[0])
         join(team)
 
 
 @inlined
-def predict_from_places(network, motion, drive, keeps):
+def predict_from_places(network, nodes, work, drive, keeps, team):
     """v* of eq. 6 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
 
     `places` holds the positions. Of the forces only those of held nodes are written out.
@@ -163,20 +166,20 @@ def predict_from_places(network, motion, drive, keeps):
     slices = network.slices
     walls = network.membrane.triangles.shape[0] > 0
     if walls:
-        motion.force[:] = 0
-    pass_all(motion, drive, slices, keeps, motion.team)
-    join_pieces(network, motion, drive, keeps)
-    volume, flow, mobility = add_up(motion.sums, slices.pieces)
+        nodes.force[:] = 0
+    pass_all(nodes, work, drive, slices, keeps, team)
+    join_pieces(network, nodes, work, drive, keeps)
+    volume, flow, mobility = add_up(work.sums, slices.pieces)
     if walls:
-        flow += add_walls(network, motion, drive.dt)
+        flow += add_walls(network, nodes, drive.dt)
     return volume, flow, mobility
 
 
 @lean
-def gather_and_predict(network, motion, drive, keeps):
+def gather_and_predict(network, nodes, work, drive, keeps):
     """The same from `x`; leaves the positions in `places`, where `advance` looks for them."""
-    places_into(motion, 0, motion.x.shape[0])
-    return predict_from_places(network, motion, drive, keeps)
+    places_into(nodes, work, 0, nodes.x.shape[0])
+    return predict_from_places(network, nodes, work, drive, keeps, None)
 
 
 @inlined

@@ -7,14 +7,14 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-LANES = 4
+SIMD_WIDTH = 4
 NEXT = (1, 2, 0, 3)
 """Lanes in another order: (y, z, x, 0) of (x, y, z, 0)."""
 
 
 def _address(builder: Any, kind: Any, array: Any, row: Any) -> Any:
     """Of the first number in `row`, rows of one or of four numbers."""
-    width = LANES if kind.ndim == 2 else 1
+    width = SIMD_WIDTH if kind.ndim == 2 else 1
     return builder.gep(array.data, [builder.mul(row, ir.Constant(row.type, width))])
 
 
@@ -45,7 +45,7 @@ class Row:
             if isinstance(kind, types.Array)
         }
         self.real = real
-        self.vector = ir.VectorType(context.get_value_type(real), LANES)
+        self.vector = ir.VectorType(context.get_value_type(real), SIMD_WIDTH)
 
     def _where(self, at: int, row: Any) -> Any:
         return _address(self.builder, self.kinds[at], self.arrays[at], row)
@@ -53,7 +53,7 @@ class Row:
     def _pointer(self, at: int, row: Any) -> tuple[Any, int]:
         """To four numbers of the array, and what they are aligned to: one number."""
         address = self._where(at, row)
-        four = ir.VectorType(address.type.pointee, LANES).as_pointer()
+        four = ir.VectorType(address.type.pointee, SIMD_WIDTH).as_pointer()
         return self.builder.bitcast(address, four), self.kinds[at].dtype.bitwidth // 8
 
     def number(self, at: int, row: Any) -> Any:
@@ -86,7 +86,7 @@ class Row:
 
     def turned(self, four: Any, order: tuple[int, ...]) -> Any:
         """The lanes in another order."""
-        chosen = ir.Constant(ir.VectorType(ir.IntType(32), LANES), list(order))
+        chosen = ir.Constant(ir.VectorType(ir.IntType(32), SIMD_WIDTH), list(order))
         return self.builder.shuffle_vector(four, ir.Constant(four.type, ir.Undefined), chosen)
 
     def spread(self, number: Any) -> Any:
@@ -100,7 +100,7 @@ class Row:
     def sums(self, count: int, step: Callable[[Any, list[Any]], list[Any]]) -> list[Any]:
         """`count` totals over the entries start ≤ e < stop, the first two arguments: `step` adds one entry to them."""
         builder, (start, stop) = self.builder, self.args[:2]
-        zero = ir.Constant(self.vector, [0.0] * LANES)
+        zero = ir.Constant(self.vector, [0.0] * SIMD_WIDTH)
         totals = [cgutils.alloca_once_value(builder, zero) for _ in range(count)]
         with cgutils.for_range_slice(builder, start, stop, ir.Constant(start.type, 1)) as (e, _):
             for total, after in zip(totals, step(e, [builder.load(total) for total in totals]), strict=True):
@@ -110,7 +110,7 @@ class Row:
     def sums_by_twos(self, count: int, step: Callable[[Any, list[Any]], list[Any]]) -> list[Any]:
         """`sums` for rows of many entries, two entries at a time: half as many turns, none waits for the last sum."""
         builder, (start, stop) = self.builder, self.args[:2]
-        zero, one = ir.Constant(self.vector, [0.0] * LANES), ir.Constant(start.type, 1)
+        zero, one = ir.Constant(self.vector, [0.0] * SIMD_WIDTH), ir.Constant(start.type, 1)
         even = [cgutils.alloca_once_value(builder, zero) for _ in range(count)]
         odd = [cgutils.alloca_once_value(builder, zero) for _ in range(count)]
         left = builder.and_(builder.sub(stop, start), one)
@@ -127,5 +127,7 @@ class Row:
 
     def across(self, four: Any) -> Any:
         """The sum of four lanes."""
-        a, b, c, d = (self.builder.extract_element(four, ir.Constant(ir.IntType(32), lane)) for lane in range(LANES))
+        a, b, c, d = (
+            self.builder.extract_element(four, ir.Constant(ir.IntType(32), lane)) for lane in range(SIMD_WIDTH)
+        )
         return self.builder.fadd(self.builder.fadd(a, b), self.builder.fadd(c, d))

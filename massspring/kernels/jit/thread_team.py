@@ -18,8 +18,8 @@ from massspring.kernels.jit.decorators import inlined
 LINE = 8
 """Numbers of a line of the cache: counters in one line would slow each other down."""
 ROUND, DONE, JOB, STEP, READY = (LINE * line for line in range(5))
-REST, SPRINGS, SPRINGS_AND_VOLUME, SEARCH, MOVE = range(5)
-"""Jobs; REST ends the frame."""
+JOB_END, JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, JOB_SEARCH, JOB_MOVE = range(5)
+"""JOB_END ends the frame."""
 PATIENCE = 20_000
 """Looks at a counter before the thread offers its core to others: 5 to 10 µs."""
 
@@ -31,8 +31,8 @@ class Team(NamedTuple):
 
     signal: np.ndarray
     """Round number, parts done, job, step, whether all is compiled; one line of the cache each, int64."""
-    pressure: np.ndarray
-    """lam of the job [Pa], (1,) float64."""
+    factor: np.ndarray
+    """Of the push in this job, (1,) float64."""
     slices: np.ndarray
     """First slice of each thread, (T + 1,) int64."""
     nodes: np.ndarray
@@ -118,10 +118,10 @@ def wait_until_other_than(signal, at, value):
 
 
 @inlined
-def call(team, job, step, lam):
+def call(team, job, step, factor):
     """Gives every other thread its part of a job."""
     team.signal[JOB], team.signal[STEP], team.signal[DONE] = job, step, 0
-    team.pressure[0] = lam
+    team.factor[0] = factor
     raise_by_one(team.signal, ROUND)
 
 

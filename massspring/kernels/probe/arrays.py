@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import Motion, Network, Tally, Tips
+from massspring.kernels.arrays.layout import Contacts, Network, Nodes, Tally, Tips
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.probe.continuous import Pair
 
@@ -21,7 +21,7 @@ COUNTS = (
     "nodes carried",
 )
 """What `Probing.counts` counts."""
-IN_CONTACT, ROUNDS, CARRYING, LEFT_BEHIND, COMPARED, TESTED, CARRIED = range(len(COUNTS))
+IN_CONTACT, SEARCH_ROUNDS, CARRYING, LEFT_BEHIND, COMPARED, TESTED, CARRIED = range(len(COUNTS))
 
 
 class Rows(NamedTuple):
@@ -111,7 +111,8 @@ class Stage(NamedTuple):
     """One step as the functions of this stage see it."""
 
     network: Network
-    motion: Motion
+    nodes: Nodes
+    contacts: Contacts
     tips: Tips
     probes: Probing
     volumes: VolumeRows | None

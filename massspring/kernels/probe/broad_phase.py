@@ -3,6 +3,7 @@
 import math
 
 from massspring.kernels.contact.bookkeeping import settled
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.jit.decorators import comparing, lean
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.probe.arrays import COMPARED
@@ -16,31 +17,31 @@ SAFE = 1.0 + 1e-6
 
 
 @comparing
-def fastest_free(v_star, gradient, inverse_mass, push):
-    """max_i |v*_i + push w_i G_i|² [m²/s²] of flat tables, as if no node were held (eq. 10)."""
+def fastest_free(v_star, direction, inverse_mass, impulse):
+    """max_i |v*_i + impulse w_i d_i|² [m²/s²] of flat tables, as if no node were held (eq. 10)."""
     fastest = v_star.dtype.type(0)
     for i in range(inverse_mass.shape[0]):
-        w = push * inverse_mass[i]
-        u0 = v_star[3 * i] + w * gradient[3 * i]
-        u1 = v_star[3 * i + 1] + w * gradient[3 * i + 1]
-        u2 = v_star[3 * i + 2] + w * gradient[3 * i + 2]
+        w = impulse * inverse_mass[i]
+        u0 = v_star[3 * i] + w * direction[3 * i]
+        u1 = v_star[3 * i + 1] + w * direction[3 * i + 1]
+        u2 = v_star[3 * i + 2] + w * direction[3 * i + 2]
         fastest = max(fastest, u0 * u0 + u1 * u1 + u2 * u2)
     return fastest
 
 
 @lean
-def fastest_node(network, motion, lam, dt):
+def fastest_node(network, nodes, contacts, push, dt):
     """At least |v⁺_i| [m/s] of every node in the step as it stands, without thin probes (eq. 10)."""
-    n, locked, real = network.inverse_mass.shape[0], motion.locked, motion.x.dtype.type
-    v_star, gradient = flat(motion.v_star, 0, n), flat(motion.gradient, 0, n)
+    n, mode, real = network.inverse_mass.shape[0], contacts.mode, nodes.x.dtype.type
+    v_star, direction = flat(nodes.v_star, 0, n), flat(push.direction, 0, n)
     weight = flat(network.inverse_mass, 0, n)
-    fastest = float(fastest_free(v_star, gradient, weight, real(dt * lam)))
-    for k in range(motion.touching_count[0]):
-        i = motion.touching[k]
-        if locked[i] > 0:
-            w = dt * lam * weight[i]
-            u0, u1 = v_star[3 * i] + w * gradient[3 * i], v_star[3 * i + 1] + w * gradient[3 * i + 1]
-            u0, u1, u2 = settled(motion, i, u0, u1, v_star[3 * i + 2] + w * gradient[3 * i + 2])
+    fastest = float(fastest_free(v_star, direction, weight, real(dt * push.factor)))
+    for k in range(contacts.touching_count[0]):
+        i = contacts.touching[k]
+        if mode[i] > FREE:
+            w = dt * push.factor * weight[i]
+            u0, u1 = v_star[3 * i] + w * direction[3 * i], v_star[3 * i + 1] + w * direction[3 * i + 1]
+            u0, u1, u2 = settled(contacts, i, u0, u1, v_star[3 * i + 2] + w * direction[3 * i + 2])
             fastest = max(fastest, u0 * u0 + u1 * u1 + u2 * u2)
     return math.sqrt(fastest)
 
@@ -56,7 +57,7 @@ def box_gap(x, triangles, f, p0, p1, p2):
 
 
 @lean
-def find_near(motion, tips, step, probes, reach):
+def find_near(nodes, tips, step, probes, reach):
     """Fills `near` with the triangles whose box may come within the radius of a tip in `reach` [m] of motion (eq. 145).
 
     A block whose nearest triangle is g away sleeps until the travel has grown by g: none of its boxes is looked at.
@@ -71,7 +72,7 @@ def find_near(motion, tips, step, probes, reach):
             begin, end = TRIANGLE_BLOCK * block, min(TRIANGLE_BLOCK * (block + 1), surface.shape[0])
             nearest = math.inf
             for f in range(begin, end):
-                gap = box_gap(motion.x, surface, f, p0, p1, p2) - probes.radius[p]
+                gap = box_gap(nodes.x, surface, f, p0, p1, p2) - probes.radius[p]
                 nearest = min(nearest, gap)
                 if not probes.skipping or gap <= reach:
                     probes.near[p, count] = f

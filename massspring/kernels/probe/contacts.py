@@ -9,6 +9,7 @@ Eliminating the change of pressure δ leaves A c ≥ right with A_kl = Σ_i b_ki
 """
 
 from massspring.kernels.constraint.schur import solve_dense
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.probe.pressure import answer_into, change_of_rows, flow_into
@@ -54,7 +55,7 @@ def aim_rows(stage):
 
     right_k = [radius − n·(Σ b x − tip⁺)]/dt − n·Σ b u [m/s].
     """
-    rows, motion, probes = stage.probes.rows, stage.motion, stage.probes
+    rows, nodes, contacts, probes = stage.probes.rows, stage.nodes, stage.contacts, stage.probes
     for k in range(rows.count[0]):
         p = rows.probe[k]
         d0, d1, d2 = rows.direction[k, 0], rows.direction[k, 1], rows.direction[k, 2]
@@ -64,11 +65,11 @@ def aim_rows(stage):
         for q in range(3):
             i, b = rows.node[k, q], rows.weight[k, q]
             approach += b * (d0 * probes.base[i, 0] + d1 * probes.base[i, 1] + d2 * probes.base[i, 2])
-            gap += b * (d0 * motion.x[i, 0] + d1 * motion.x[i, 1] + d2 * motion.x[i, 2])
+            gap += b * (d0 * nodes.x[i, 0] + d1 * nodes.x[i, 1] + d2 * nodes.x[i, 2])
             w, m0, m1, m2 = stage.network.inverse_mass[i], d0, d1, d2
-            if motion.locked[i] > 0:
-                e0, e1, e2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-                m0, m1, m2 = allowed_part(motion.locked[i], e0, e1, e2, m0, m1, m2)
+            if contacts.mode[i] > FREE:
+                e0, e1, e2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
+                m0, m1, m2 = allowed_part(contacts.mode[i], e0, e1, e2, m0, m1, m2)
             rows.moves[k, q, 0], rows.moves[k, q, 1], rows.moves[k, q, 2] = w * m0, w * m1, w * m2
         rows.right[k] = (probes.radius[p] - gap) / stage.dt - approach
 

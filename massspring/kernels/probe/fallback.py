@@ -2,11 +2,13 @@
 
 Seen from the tip a triangle of carried nodes rests, so it is not passed. One that is held at a corner still turns:
 its carried corners then go ahead of the tip, until the point that was passed rests too. With all three corners held
-there is nothing to move: the tip goes through, and the run says so.
+there is nothing to move: the tip goes through, and the run records it.
 """
 
 import math
 
+from massspring.kernels.arrays.layout import Push
+from massspring.kernels.contact.modes import FREE, STICKS
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND
 from massspring.kernels.probe.broad_phase import ROOM, find_near
@@ -15,29 +17,27 @@ from massspring.kernels.probe.motion import carried_speed, gather, move
 from massspring.kernels.probe.pressure import answer_into, faster_by, prepare, pressed_on
 from massspring.kernels.probe.search import look
 
-ROUNDS = 400
+CARRY_ROUNDS = 400
 """Of taking more nodes along, or of sending them farther ahead."""
 LEFT = 1e-9
 """Share of G·W̃·G that nodes that are not carried must have for the volume to be left to them."""
 FREE_SHARE = 0.02
 """Weight of the carried corners where a tip hits a triangle, below which its held ones stop it: to stay ahead, a free
 corner would have to go fifty times as far as the tip."""
-STUCK = 3
-"""Of `Motion.locked`: moves in no direction of its own."""
 
 
 @lean
 def take(stage, p, i):
     """Carries node i with the tip of probe p: it takes no share in any volume from then on."""
-    probes, motion = stage.probes, stage.motion
+    probes, contacts = stage.probes, stage.contacts
     probes.carried[i] = p + 1
     probes.taken[probes.taken_count[0]] = i
     probes.taken_count[0] += 1
     probes.counts[CARRIED] += 1
-    motion.locked[i] = STUCK
+    contacts.mode[i] = STICKS
     for axis in range(3):
         # What the node would do; `gather` has no more use for it.
-        motion.goal[i, axis] = probes.base[i, axis]
+        contacts.goal[i, axis] = probes.base[i, axis]
 
 
 @lean
@@ -81,7 +81,7 @@ def lead(stage, p, n):
 @lean
 def take_along(stage, p):
     """Carries the free corners of all triangles that the tip of probe p passes, or sends those ahead; whether any."""
-    probes, network, motion = stage.probes, stage.network, stage.motion
+    probes, network, contacts = stage.probes, stage.network, stage.contacts
     more = False
     look(stage, p)
     for n in range(probes.near_count[p]):
@@ -90,7 +90,7 @@ def take_along(stage, p):
         fresh = False
         for k in range(3):
             i = probes.surface[probes.near[p, n], k]
-            if network.inverse_mass[i] > 0.0 and motion.locked[i] == 0:
+            if network.inverse_mass[i] > 0.0 and contacts.mode[i] == FREE:
                 take(stage, p, i)
                 fresh = True
         more |= fresh or lead(stage, p, n)
@@ -103,7 +103,7 @@ def give_way(stage, volumes):
 
     Returns how much faster it makes a node at most [m/s].
     """
-    probes, motion, network = stage.probes, stage.motion, stage.network
+    probes, network, nodes, contacts = stage.probes, stage.network, stage.nodes, stage.contacts
     flow, answer, change = probes.rows.flow[0], probes.rows.answer[0], probes.change
     for r in range(change.shape[0]):
         flow[r], answer[r], change[r] = 0.0, 0.0, 0.0
@@ -111,9 +111,9 @@ def give_way(stage, volumes):
     for k in range(probes.taken_count[0]):
         i = probes.taken[k]
         s0, s1, s2 = carried_speed(stage, i)
-        s0, s1, s2 = s0 - motion.goal[i, 0], s1 - motion.goal[i, 1], s2 - motion.goal[i, 2]
+        s0, s1, s2 = s0 - contacts.goal[i, 0], s1 - contacts.goal[i, 1], s2 - contacts.goal[i, 2]
         if volumes is None:
-            g = motion.gradient
+            g = nodes.gradient
             flow[0] -= g[i, 0] * s0 + g[i, 1] * s1 + g[i, 2] * s2
             taken += network.inverse_mass[i] * (g[i, 0] ** 2 + g[i, 1] ** 2 + g[i, 2] ** 2)
         else:
@@ -134,17 +134,17 @@ def give_way(stage, volumes):
 
 
 @lean
-def carry(stage, volumes, lam, plain, horizon):
+def carry(stage, volumes, push, plain, horizon):
     """Nodes of triangles that a tip would pass move with the tip or ahead of it, so that nothing passes it (eq. 147).
 
-    Returns the pressure of the one volume [Pa] and what any node moves at most [m].
+    Returns the factor of the push beside it and what any node moves at most [m].
     """
     probes = stage.probes
     clear_push(probes.rows, probes.push)
     probes.rows.count[0] = 0
     probes.change[:] = 0.0
     reach = plain
-    for _ in range(ROUNDS):
+    for _ in range(CARRY_ROUNDS):
         move(stage, volumes)
         more = False
         for p in range(probes.radius.shape[0]):
@@ -158,13 +158,13 @@ def carry(stage, volumes, lam, plain, horizon):
         reach = plain + stage.dt * (fastest + give_way(stage, volumes))
         if reach > horizon:
             horizon = ROOM * reach
-            find_near(stage.motion, stage.tips, stage.step, probes, horizon)
-            gather(stage, lam)
+            find_near(stage.nodes, stage.tips, stage.step, probes, horizon)
+            gather(stage, push)
     probes.counts[CARRYING] += 1
     note_passed(stage)
-    lam = pressed_on(stage, volumes, lam)
-    settle_carried(stage, lam)
-    return lam, reach
+    factor = pressed_on(stage, volumes, push)
+    settle_carried(stage, Push(push.direction, factor))
+    return factor, reach
 
 
 @lean
@@ -183,19 +183,20 @@ def note_passed(stage):
 
 
 @lean
-def settle_carried(stage, lam):
+def settle_carried(stage, push):
     """Carried nodes end the step where they were carried: v* takes the difference, the tip's impulse [N s]."""
-    probes, network, motion, tally = stage.probes, stage.network, stage.motion, stage.probes.tally
-    first = tally.contact_impulse.shape[0] - probes.radius.shape[0]
+    probes, network, nodes, contacts = stage.probes, stage.network, stage.nodes, stage.contacts
+    impulse = probes.tally.contact_impulse
+    first = impulse.shape[0] - probes.radius.shape[0]
     for k in range(probes.taken_count[0]):
         i = probes.taken[k]
         p = probes.carried[i] - 1
         speed = carried_speed(stage, i)
-        push = stage.dt * lam * network.inverse_mass[i]
+        w = stage.dt * push.factor * network.inverse_mass[i]
         for axis in range(3):
-            gain = speed[axis] - push * motion.gradient[i, axis] - motion.v_star[i, axis]
-            motion.v_star[i, axis] += gain
-            tally.contact_impulse[first + p, axis] += network.mass[i] * gain
+            gain = speed[axis] - w * push.direction[i, axis] - nodes.v_star[i, axis]
+            nodes.v_star[i, axis] += gain
+            impulse[first + p, axis] += network.mass[i] * gain
             probes.push[i, axis] = 0.0
-        probes.carried[i], motion.locked[i] = 0, 0
+        probes.carried[i], contacts.mode[i] = 0, FREE
     probes.taken_count[0] = 0

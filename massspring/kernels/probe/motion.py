@@ -2,26 +2,28 @@
 
 import math
 
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.probe.pressure import swelling
 
 
 @lean
-def gather(stage, lam):
+def gather(stage, push):
     """u_i of the corners of all near triangles (eq. 9, 10), and v⁺ = u."""
-    motion, probes, triangles, weight = stage.motion, stage.probes, stage.probes.surface, stage.network.inverse_mass
-    v, g, base, velocity = motion.v_star, motion.gradient, probes.base, probes.velocity
+    nodes, contacts, probes = stage.nodes, stage.contacts, stage.probes
+    triangles, weight = probes.surface, stage.network.inverse_mass
+    v, f, base, velocity = nodes.v_star, push.direction, probes.base, probes.velocity
     for p in range(probes.radius.shape[0]):
         for n in range(probes.near_count[p]):
             for k in range(3):
                 i = triangles[probes.near[p, n], k]
-                push = stage.dt * lam * weight[i]
-                u0, u1, u2 = v[i, 0] + push * g[i, 0], v[i, 1] + push * g[i, 1], v[i, 2] + push * g[i, 2]
-                if motion.locked[i] > 0:
-                    d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-                    u0, u1, u2 = allowed_part(motion.locked[i], d0, d1, d2, u0, u1, u2)
-                    u0, u1, u2 = u0 + motion.goal[i, 0], u1 + motion.goal[i, 1], u2 + motion.goal[i, 2]
+                w = stage.dt * push.factor * weight[i]
+                u0, u1, u2 = v[i, 0] + w * f[i, 0], v[i, 1] + w * f[i, 1], v[i, 2] + w * f[i, 2]
+                if contacts.mode[i] > FREE:
+                    d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
+                    u0, u1, u2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
+                    u0, u1, u2 = u0 + contacts.goal[i, 0], u1 + contacts.goal[i, 1], u2 + contacts.goal[i, 2]
                 base[i, 0], base[i, 1], base[i, 2] = u0, u1, u2
                 velocity[i, 0], velocity[i, 1], velocity[i, 2] = u0, u1, u2
 
@@ -69,7 +71,7 @@ def settle(stage):
         for q in range(3):
             i = rows.node[k, q]
             for axis in range(3):
-                stage.motion.v_star[i, axis] += probes.push[i, axis]
+                stage.nodes.v_star[i, axis] += probes.push[i, axis]
                 probes.push[i, axis] = 0.0
             if network.inverse_mass[i] == 0.0:
                 for h in range(network.held_nodes.shape[0]):

@@ -7,6 +7,7 @@ import math
 
 from massspring.kernels.constraint.jacobian import diagonal_into, transposed_rows_times_into
 from massspring.kernels.constraint.schur import dense_into, factor_dense, solve_iteratively, substitute
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import lean
 
@@ -19,9 +20,9 @@ MOST_ITERATIONS = 400
 def prepare(stage, volumes):
     """S for what can move now; factored where it is dense (eq. 33)."""
     if volumes is not None:
-        diagonal_into(volumes, stage.motion, stage.network.inverse_mass, volumes.diagonal)
+        diagonal_into(volumes, stage.contacts, stage.network.inverse_mass, volumes.diagonal)
         if volumes.matrix.shape[0] > 0:
-            dense_into(volumes, stage.motion, stage.network.inverse_mass, volumes.matrix)
+            dense_into(volumes, stage.contacts, stage.network.inverse_mass, volumes.matrix)
             factor_dense(volumes.matrix)
 
 
@@ -34,7 +35,7 @@ def flow_into(stage, volumes, k):
     for q in range(3):
         i, b, m = rows.node[k, q], rows.weight[k, q], rows.moves
         if volumes is None:
-            g = stage.motion.gradient
+            g = stage.nodes.gradient
             if stage.mobility > 0.0:
                 rows.flow[k, 0] += b * (g[i, 0] * m[k, q, 0] + g[i, 1] * m[k, q, 1] + g[i, 2] * m[k, q, 2])
         else:
@@ -58,7 +59,7 @@ def answer_into(stage, volumes, flow, answer):
             largest = max(largest, abs(flow[r]))
         for r in range(flow.shape[0]):
             volumes.right[r], volumes.allowed[r], answer[r] = flow[r], ACCURATE * largest, 0.0
-        solve_iteratively(volumes, stage.motion, stage.network.inverse_mass, answer, volumes.allowed, MOST_ITERATIONS)
+        solve_iteratively(volumes, stage.contacts, stage.network.inverse_mass, answer, volumes.allowed, MOST_ITERATIONS)
 
 
 @lean
@@ -85,10 +86,10 @@ def faster_by(stage, felt):
 @lean
 def swelling(stage, volumes, i):
     """dt W̃_i (Jᵀ δ)_i [m/s], what the change of pressures does to a node (eq. 146)."""
-    motion, change = stage.motion, stage.probes.change
+    nodes, contacts, change = stage.nodes, stage.contacts, stage.probes.change
     s0, s1, s2 = 0.0, 0.0, 0.0
     if volumes is None:
-        g, p = motion.gradient, change[0]
+        g, p = nodes.gradient, change[0]
         s0, s1, s2 = p * g[i, 0], p * g[i, 1], p * g[i, 2]
     else:
         for t in range(volumes.node_start[i], volumes.node_start[i + 1]):
@@ -98,18 +99,18 @@ def swelling(stage, volumes, i):
             s2 += p * volumes.value[e, 2]
     push = stage.dt * stage.network.inverse_mass[i]
     s0, s1, s2 = push * s0, push * s1, push * s2
-    if motion.locked[i] > 0:
-        d0, d1, d2 = motion.direction[i, 0], motion.direction[i, 1], motion.direction[i, 2]
-        s0, s1, s2 = allowed_part(motion.locked[i], d0, d1, d2, s0, s1, s2)
+    if contacts.mode[i] > FREE:
+        d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
+        s0, s1, s2 = allowed_part(contacts.mode[i], d0, d1, d2, s0, s1, s2)
     return s0, s1, s2
 
 
 @lean
-def pressed_on(stage, volumes, lam):
-    """The pressure of one volume with its change [Pa]; several have theirs in `lam`, and their force in `gradient`."""
+def pressed_on(stage, volumes, push):
+    """The factor of the push with the change of pressures; of several volumes the push itself changes."""
     if volumes is None:
-        return lam + stage.probes.change[0]
+        return push.factor + stage.probes.change[0]
     for r in range(volumes.lam.shape[0]):
         volumes.lam[r] += stage.probes.change[r]
-    transposed_rows_times_into(volumes, volumes.lam, stage.motion.gradient)
-    return lam
+    transposed_rows_times_into(volumes, volumes.lam, volumes.push)
+    return push.factor

@@ -25,7 +25,7 @@ def pair_into(pair, x, velocity, triangles, f, dt):
 @lean
 def look(stage, p):
     """When and where the tip passes through each near triangle in the step as it stands; the first time, or NEVER."""
-    probes, x, triangles, pair = stage.probes, stage.motion.x, stage.probes.surface, stage.probes.pair
+    probes, x, triangles, pair = stage.probes, stage.nodes.x, stage.probes.surface, stage.probes.pair
     for axis in range(3):
         pair.tip[0, axis] = stage.tips.start[stage.step, p, axis]
         pair.tip[1, axis] = stage.tips.end[stage.step, p, axis]
@@ -66,7 +66,7 @@ def add_touches(stage, p):
     room, probes, pair, triangles = 0, stage.probes, stage.probes.pair, stage.probes.surface
     for n in range(probes.near_count[p]):
         f = probes.near[p, n]
-        pair_into(pair, stage.motion.x, probes.velocity, triangles, f, stage.dt)
+        pair_into(pair, stage.nodes.x, probes.velocity, triangles, f, stage.dt)
         if stays_off(pair.end, probes.radius[p]):
             continue
         distance = nearest_into(pair.end, pair.weight)

@@ -7,7 +7,7 @@ contact, and the search begins again until nothing crosses (docs/theory.md, sect
 import math
 
 from massspring.kernels.jit.decorators import lean
-from massspring.kernels.probe.arrays import IN_CONTACT, ROUNDS, Stage
+from massspring.kernels.probe.arrays import IN_CONTACT, SEARCH_ROUNDS
 from massspring.kernels.probe.broad_phase import ROOM, SAFE, fastest_node, find_near
 from massspring.kernels.probe.contacts import solve_rows
 from massspring.kernels.probe.fallback import carry
@@ -20,20 +20,20 @@ PASSES = 24
 
 
 @lean
-def meet_probes(network, motion, drive, step, probes, lam, mobility, volumes):
+def meet_probes(stage, volumes, push):
     """Contact with thin probes, once pressures and the other contacts of the step are known (eq. 141–147).
 
-    One volume: its pressure `lam` [Pa] and `mobility` G·W̃·G [m⁴/kg]; returns the pressure beside the contacts. Several:
-    `volumes`, with their force in `motion.gradient` and lam 1; changed in place. None: lam and mobility 0.
+    Returns the factor of the push beside the contacts. One volume: the factor is its pressure [Pa]. Several:
+    `volumes`, whose lam and push are changed in place. A push that contacts do not change: `stage.mobility` is 0.
     """
-    dt = drive.dt
-    stage = Stage(network, motion, drive.tips, probes, volumes, mobility, step, dt)
-    plain = dt * fastest_node(network, motion, lam, dt) + longest_way(drive.tips, step)
+    nodes, tips, probes, step, dt = stage.nodes, stage.tips, stage.probes, stage.step, stage.dt
+    factor = push.factor
+    plain = dt * fastest_node(stage.network, nodes, stage.contacts, push, dt) + longest_way(tips, step)
     if not plain < math.inf:
-        return lam
+        return factor
     reach, horizon, crosses = plain, ROOM * plain, False
-    find_near(motion, drive.tips, step, probes, horizon)
-    gather(stage, lam)
+    find_near(nodes, tips, step, probes, horizon)
+    gather(stage, push)
     probes.rows.count[0] = 0
     for sweep in range(PASSES):
         found, crosses = search(stage)
@@ -42,17 +42,17 @@ def meet_probes(network, motion, drive, step, probes, lam, mobility, volumes):
         if sweep == 0:
             prepare(stage, volumes)
         reach = plain + dt * solve_rows(stage, volumes)
-        probes.counts[ROUNDS] += 1
+        probes.counts[SEARCH_ROUNDS] += 1
         if reach > horizon:
             horizon = ROOM * reach
-            find_near(motion, drive.tips, step, probes, horizon)
-            gather(stage, lam)
+            find_near(nodes, tips, step, probes, horizon)
+            gather(stage, push)
         move(stage, volumes)
     probes.counts[IN_CONTACT] += probes.rows.count[0] > 0
     if crosses:
-        lam, reach = carry(stage, volumes, lam, plain, horizon)
+        factor, reach = carry(stage, volumes, push, plain, horizon)
     elif probes.rows.count[0] > 0:
         settle(stage)
-        lam = pressed_on(stage, volumes, lam)
+        factor = pressed_on(stage, volumes, push)
     probes.travel[0] += SAFE * reach
-    return lam
+    return factor

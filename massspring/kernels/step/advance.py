@@ -1,66 +1,66 @@
-"""Time stepping: symplectic Euler, prescribed nodes, and the multiplier of one volume."""
+"""The end of a step: symplectic Euler for all nodes, and what obstacles gave."""
 
 from massspring.kernels.contact.bookkeeping import book_contacts, settled
+from massspring.kernels.contact.modes import FREE
 from massspring.kernels.fused.padded import places_into
-from massspring.kernels.jit.decorators import inlined, lean
+from massspring.kernels.jit.decorators import inlined
 from massspring.kernels.jit.flat import flat
-from massspring.kernels.jit.thread_team import MOVE, call, join
+from massspring.kernels.jit.thread_team import JOB_MOVE, call, join
 
 NEAR = 4096
 """Nodes of which a step's end fits the second cache."""
 
 
 @inlined
-def advance_nodes(motion, inverse_mass, lam, dt, first, last):
-    """v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺ (eq. 10) of some nodes; `places` holds the x of the step's start."""
-    flat_x, flat_v = flat(motion.x, first, last), flat(motion.v, first, last)
-    flat_v_star, flat_gradient = flat(motion.v_star, first, last), flat(motion.gradient, first, last)
-    weights, locked, real = flat(inverse_mass, first, last), motion.locked, motion.x.dtype.type
-    step, impulse = real(dt), real(dt * lam)
+def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
+    """v⁺ = ṽ + dt W̃ f, x⁺ = x + dt v⁺ (eq. 10) of the nodes first ≤ i < last in `part`.
+
+    `places` holds the x of the step's start.
+    """
+    first, last = part
+    flat_x, flat_v = flat(nodes.x, first, last), flat(nodes.v, first, last)
+    flat_v_star, direction = flat(nodes.v_star, first, last), flat(push.direction, first, last)
+    weights, mode, real = flat(inverse_mass, first, last), contacts.mode, nodes.x.dtype.type
+    step, impulse = real(dt), real(dt * push.factor)
     for i in range(weights.shape[0]):
-        push = impulse * real(weights[i])
+        w = impulse * real(weights[i])
         for axis in range(3):
-            u = flat_v_star[3 * i + axis] + push * flat_gradient[3 * i + axis]
+            u = flat_v_star[3 * i + axis] + w * direction[3 * i + axis]
             flat_v[3 * i + axis] = u
             flat_x[3 * i + axis] += step * u
-    x, v, places = motion.x, motion.v, motion.places
-    for k in range(motion.touching_count[0]):
-        i = motion.touching[k]
-        if first <= i < last and locked[i] > 0:
-            v[i, 0], v[i, 1], v[i, 2] = settled(motion, i, v[i, 0], v[i, 1], v[i, 2])
+    x, v, places = nodes.x, nodes.v, work.places
+    for k in range(contacts.touching_count[0]):
+        i = contacts.touching[k]
+        if first <= i < last and mode[i] > FREE:
+            v[i, 0], v[i, 1], v[i, 2] = settled(contacts, i, v[i, 0], v[i, 1], v[i, 2])
             for axis in range(3):
                 x[i, axis] = places[i, axis] + step * v[i, axis]
 
 
-@lean
-def advance(motion, mass, inverse_mass, lam, dt, contact_impulse):
-    """The end of a step of all nodes (eq. 10); adds the impulse of each obstacle to `contact_impulse`."""
-    book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse)
-    advance_nodes(motion, inverse_mass, lam, dt, 0, motion.x.shape[0])
+@inlined
+def advance(frame, push):
+    """The end of a step of all nodes (eq. 10); books the impulse of each obstacle, pads the new positions."""
+    network, nodes, contacts, dt = frame.network, frame.nodes, frame.contacts, frame.drive.dt
+    book_contacts(network, nodes, contacts, push, dt, frame.tally.contact_impulse)
+    move_all(frame, push, frame.team)
 
 
 @inlined
-def advance_to_places(motion, mass, inverse_mass, lam, dt, contact_impulse):
-    """The same, by as many threads as there are; `places` holds the new positions too."""
-    book_contacts(motion, mass, inverse_mass, lam, dt, contact_impulse)
-    move_all(motion, inverse_mass, lam, dt, motion.team)
-
-
-@inlined
-def move_all(motion, inverse_mass, lam, dt, team):
-    """`advance_nodes` and `places_into` of all nodes, by as many threads as there are."""
+def move_all(frame, push, team):
+    """`move` of all nodes, by as many threads as there are."""
     if team is None:
-        move(motion, inverse_mass, lam, dt, 0, motion.x.shape[0])
+        move(frame, push, 0, frame.nodes.x.shape[0])
     else:
-        call(team, MOVE, 0, lam)
-        move(motion, inverse_mass, lam, dt, team.nodes[0], team.nodes[1])
+        call(team, JOB_MOVE, 0, push.factor)
+        move(frame, push, team.nodes[0], team.nodes[1])
         join(team)
 
 
 @inlined
-def move(motion, inverse_mass, lam, dt, first, last):
+def move(frame, push, first, last):
     """`advance_nodes` and `places_into` of some nodes; `NEAR` at a time, so that new positions are still at hand."""
+    nodes, work, weights = frame.nodes, frame.work, frame.network.inverse_mass
     for begin in range(first, last, NEAR):
         end = min(begin + NEAR, last)
-        advance_nodes(motion, inverse_mass, lam, dt, begin, end)
-        places_into(motion, begin, end)
+        advance_nodes(nodes, frame.contacts, work, weights, push, frame.drive.dt, (begin, end))
+        places_into(nodes, work, begin, end)

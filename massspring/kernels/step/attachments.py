@@ -14,13 +14,13 @@ def prescribe_velocity_into(x, held_nodes, held_group, held_rest, displacement, 
 
 
 @inlined
-def prescribe(network, motion, displacement, dt):
+def prescribe(network, nodes, displacement, dt):
     """v* of held nodes (eq. 7); returns what that changes of G·v* [m³/s]."""
-    nodes, groups, rest = network.held_nodes, network.held_group, network.held_rest
-    x, v_star, gradient = motion.x, motion.v_star, motion.gradient
+    held_nodes, groups, rest = network.held_nodes, network.held_group, network.held_rest
+    x, v_star, gradient = nodes.x, nodes.v_star, nodes.gradient
     flow, per_step = 0.0, 1.0 / dt
-    for h in range(nodes.shape[0]):
-        i, g = nodes[h], groups[h]
+    for h in range(held_nodes.shape[0]):
+        i, g = held_nodes[h], groups[h]
         for axis in range(3):
             held = per_step * (rest[h, axis] + displacement[g, axis] - x[i, axis])
             flow += gradient[i, axis] * (held - v_star[i, axis])
@@ -29,19 +29,19 @@ def prescribe(network, motion, displacement, dt):
 
 
 @inlined
-def add_held_impulse(network, motion, lam, dt, gravity, held_impulse):
-    """I_g = −dt Σ_i∈g (f_i + lam G_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 11)."""
-    nodes, groups, mass = network.held_nodes, network.held_group, network.mass
-    force, gradient = motion.force, motion.gradient
-    h, count = 0, nodes.shape[0]
+def add_held_impulse(network, nodes, push, dt, gravity, held_impulse):
+    """I_g = −dt Σ_i∈g (f_i + push_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 11)."""
+    held_nodes, groups, mass = network.held_nodes, network.held_group, network.mass
+    force, direction, factor = nodes.force, push.direction, push.factor
+    h, count = 0, held_nodes.shape[0]
     while h < count:
         g = groups[h]
         k0, k1, k2, carried = 0.0, 0.0, 0.0, 0.0
         while h < count and groups[h] == g:
-            i = nodes[h]
-            k0 += force[i, 0] + lam * gradient[i, 0]
-            k1 += force[i, 1] + lam * gradient[i, 1]
-            k2 += force[i, 2] + lam * gradient[i, 2]
+            i = held_nodes[h]
+            k0 += force[i, 0] + factor * direction[i, 0]
+            k1 += force[i, 1] + factor * direction[i, 1]
+            k2 += force[i, 2] + factor * direction[i, 2]
             carried += mass[i]
             h += 1
         held_impulse[g, 0] -= dt * (k0 + carried * gravity[0])

@@ -1,5 +1,6 @@
-"""What the other threads of a team do during a frame (kernels.team)."""
+"""What the other threads of a team do during a frame (kernels.jit.thread_team)."""
 
+from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.gaps import clearances_into
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.fused.sweep import pass_slices
@@ -7,11 +8,11 @@ from massspring.kernels.jit.decorators import lean
 from massspring.kernels.jit.thread_team import (
     DONE,
     JOB,
-    REST,
+    JOB_END,
+    JOB_SEARCH,
+    JOB_SPRINGS,
+    JOB_SPRINGS_AND_VOLUME,
     ROUND,
-    SEARCH,
-    SPRINGS,
-    SPRINGS_AND_VOLUME,
     STEP,
     call,
     raise_by_one,
@@ -21,30 +22,31 @@ from massspring.kernels.step.advance import advance_nodes
 
 
 @lean
-def serve(network, motion, drive, rank):
-    """Does part number `rank` of every job of a frame, until it is told to rest."""
-    team = motion.team
-    first, last = team.slices[rank], team.slices[rank + 1]
-    begin, end = team.nodes[rank], team.nodes[rank + 1]
+def serve(frame, team, direction, rank):
+    """Does part number `rank` of every job of a frame up to its end; `direction` is that of its pushes."""
+    network, nodes, contacts, work, drive = frame.network, frame.nodes, frame.contacts, frame.work, frame.drive
+    slices = team.slices[rank], team.slices[rank + 1]
+    part = team.nodes[rank], team.nodes[rank + 1]
     known = 0
     while True:
         known = wait_until_other_than(team.signal, ROUND, known)
-        job, step, lam = team.signal[JOB], team.signal[STEP], team.pressure[0]
-        if job == REST:
+        job, step = team.signal[JOB], team.signal[STEP]
+        push = Push(direction, team.factor[0])
+        if job == JOB_END:
             return
-        if job == SPRINGS:
-            pass_slices(motion, drive, network.slices, first, last, False, motion.tile[rank])
-        elif job == SPRINGS_AND_VOLUME:
-            pass_slices(motion, drive, network.slices, first, last, True, motion.tile[rank])
-        elif job == SEARCH:
-            clearances_into(network, motion, drive, step, lam, begin, end)
+        if job == JOB_SPRINGS:
+            pass_slices(nodes, work, drive, network.slices, slices, False, work.tile[rank])
+        elif job == JOB_SPRINGS_AND_VOLUME:
+            pass_slices(nodes, work, drive, network.slices, slices, True, work.tile[rank])
+        elif job == JOB_SEARCH:
+            clearances_into(network, nodes, contacts, drive, step, push, part)
         else:
-            advance_nodes(motion, network.inverse_mass, lam, drive.dt, begin, end)
-            places_into(motion, begin, end)
+            advance_nodes(nodes, contacts, work, network.inverse_mass, push, drive.dt, part)
+            places_into(nodes, work, part[0], part[1])
         raise_by_one(team.signal, DONE)
 
 
 @lean
 def dismiss(team):
     """Ends the frame for the other threads."""
-    call(team, REST, 0, 0.0)
+    call(team, JOB_END, 0, 0.0)

@@ -13,15 +13,12 @@ from scipy.sparse import csr_array
 
 from massspring.body.body import Body
 from massspring.errors import MassSpringError
-from massspring.kernels.arrays.layout import Drive
-from massspring.kernels.contact.active_set import find_contacts
+from massspring.kernels.arrays.layout import Drive, Push
 from massspring.kernels.forces.volume import pyramid_volume, volume_gradient_into
-from massspring.kernels.jit.decorators import compiled
-from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, OUTSIDE, PROBES, SEARCH, SPRINGS, VOLUME, mark
-from massspring.kernels.probe.stage import meet_probes
-from massspring.kernels.step.advance import advance
-from massspring.kernels.step.attachments import add_held_impulse
-from massspring.kernels.step.predict import predict
+from massspring.kernels.jit.decorators import compiled, lean
+from massspring.kernels.jit.stage_clock import VOLUME, mark
+from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
+from massspring.kernels.step.end import end_step
 from massspring.layout.state import State
 from massspring.methods.method import begin_frame
 
@@ -29,45 +26,39 @@ PENALTY, GAS, PYRAMIDS = 0, 1, 2
 
 
 @compiled
-def known_pressure(network, motion, bulk_modulus, law, volume, target):
+def known_pressure(network, nodes, bulk_modulus, law, volume, target):
     """lam [Pa] of the volume now (eq. 161, 163)."""
     if law == GAS:
         return bulk_modulus * (target / volume - 1.0) if volume > 0.0 else np.inf
     if law == PYRAMIDS:
-        volume = pyramid_volume(motion.x, network.mass, network.triangles)
+        volume = pyramid_volume(nodes.x, network.mass, network.triangles)
     return bulk_modulus * (target - volume) / target
 
 
-@compiled
-def pressure_frame(network, motion, drive, tally, bulk_modulus, law, probing):
+@lean
+def pressure_frame(frame, bulk_modulus, law):
     """One frame of symplectic Euler with a known pressure (eq. 6, 7, 10, 12, 161); returns the last one [Pa]."""
-    lam, dt = 0.0, drive.dt
-    mark(tally.ticks, OUTSIDE)
+    network, nodes, drive, tally = frame.network, frame.nodes, frame.drive, frame.tally
+    lam = 0.0
+    open_frame(frame)
     for step in range(drive.position.shape[0]):
-        volume, mobility = predict(network, motion, drive, step, True)
-        mark(tally.ticks, SPRINGS)
-        lam = known_pressure(network, motion, bulk_modulus, law, volume, drive.volume_target[step, 0])
+        volume, mobility = begin_step(frame, step, True)
+        lam = known_pressure(network, nodes, bulk_modulus, law, volume, drive.volume_target[step, 0])
         if not mobility > 0.0:
             lam = 0.0
             tally.skipped[0] += 1
         mark(tally.ticks, VOLUME)
-        if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, lam)
-            mark(tally.ticks, SEARCH)
-        if probing is not None:  # the pressure is a force that no contact changes: no mobility
-            meet_probes(network, motion, drive, step, probing, lam, 0.0, None)
-            mark(tally.ticks, PROBES)
-        add_held_impulse(network, motion, lam, dt, drive.gravity, tally.held_impulse)
-        mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, lam, dt, tally.contact_impulse)
-        mark(tally.ticks, INTEGRATION)
+        pressed = Push(nodes.gradient, lam)
+        search_contacts(frame, step, pressed)
+        # The pressure is a force that no contact changes: no mobility.
+        end_step(frame, step, pressed, 0.0, None)
     return lam
 
 
 def push(state: State, drive: Drive, bulk_modulus: float, law: int) -> State:
     """One frame by the pressure `law`."""
     after = begin_frame(state, drive)
-    lam = pressure_frame(after.network, after.motion, drive, after.tally, bulk_modulus, law, after.probing)
+    lam = pressure_frame(after.frame(drive), bulk_modulus, law)
     return replace(after, lam=np.array([lam]))
 
 

@@ -1,13 +1,12 @@
-"""What methods on tetrahedra share: their arrays, which bodies they apply to, and the loop of known pressures."""
+"""What methods on tetrahedra share: their arrays, and the loop of known pressures."""
 
 from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from massspring.body.body import SAME_VOLUME, Body
-from massspring.kernels.arrays.layout import Drive
-from massspring.kernels.contact.active_set import find_contacts
+from massspring.body.body import Body
+from massspring.kernels.arrays.layout import Drive, Push
 from massspring.kernels.forces.tetrahedron_volumes import (
     Cells,
     add_barycentre_forces,
@@ -15,13 +14,13 @@ from massspring.kernels.forces.tetrahedron_volumes import (
     fill,
     mean_pressure,
 )
-from massspring.kernels.jit.decorators import compiled
-from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, OUTSIDE, SEARCH, SPRINGS, VOLUME, mark
-from massspring.kernels.step.advance import advance
-from massspring.kernels.step.attachments import add_held_impulse
-from massspring.kernels.step.predict import add_to_prediction, predict
+from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.stage_clock import VOLUME, mark
+from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
+from massspring.kernels.step.end import end_step
+from massspring.kernels.step.predict import add_to_prediction
 from massspring.layout.state import State
-from massspring.methods.method import begin_frame, one_whole
+from massspring.methods.method import begin_frame
 
 
 def cells_of(body: Body) -> Cells:
@@ -37,18 +36,8 @@ def cells_of(body: Body) -> Cells:
         rest_reach=reach,
         slope=np.zeros((k, 3, 3)),
         **{name: np.zeros(k) for name in ("pressure", "right", "diagonal", "search", "image")},
-        **{name: np.zeros((n, 3)) for name in ("y", "gradient")},
+        **{name: np.zeros((n, 3)) for name in ("y", "gradient", "push")},
     )
-
-
-def one_filled(body: Body) -> str | None:
-    """Why a method that keeps every tetrahedron does not apply; None when it does."""
-    if not len(body.tetrahedra):
-        return "it keeps the volume of every tetrahedron, the body has none; fill its mesh"
-    reason = one_whole(body)
-    if reason is None and abs(body.rest_volumes[0] / body.tetrahedron_volumes.sum() - 1.0) > SAME_VOLUME:
-        return "it keeps the volume of every tetrahedron, the body keeps a lumen too; take implicit_volume"
-    return reason
 
 
 def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_array:
@@ -60,29 +49,24 @@ def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_ar
     return coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * body.node_count, k)).tocsr()
 
 
-@compiled
-def cells_frame(network, cells, motion, drive, tally, bulk_modulus, barycentric):
+@lean
+def cells_frame(frame, cells, bulk_modulus, barycentric):
     """One frame of symplectic Euler with a known pressure in every cell (eq. 6, 7, 10, 12, 164, 165)."""
-    dt = drive.dt
-    mark(tally.ticks, OUTSIDE)
+    nodes, drive, tally = frame.nodes, frame.drive, frame.tally
+    nothing = Push(nodes.gradient, 0.0)
+    open_frame(frame)
     for step in range(drive.position.shape[0]):
         fill(cells, drive, step)
-        predict(network, motion, drive, step, False)
-        mark(tally.ticks, SPRINGS)
-        cells.gradient[:] = 0.0
+        begin_step(frame, step, False)
+        cells.push[:] = 0.0
         if barycentric:
-            add_barycentre_forces(motion.x, cells, bulk_modulus, cells.gradient)
+            add_barycentre_forces(nodes.x, cells, bulk_modulus, cells.push)
         else:
-            tally.skipped[0] += add_volume_forces(motion.x, cells, bulk_modulus, cells.gradient)
-        add_to_prediction(network, motion, cells.gradient, dt)
+            tally.skipped[0] += add_volume_forces(nodes.x, cells, bulk_modulus, cells.push)
+        add_to_prediction(frame.network, nodes, cells.push, drive.dt)
         mark(tally.ticks, VOLUME)
-        if drive.radius.shape[0] > 0:
-            find_contacts(network, motion, drive, step, 0.0)
-            mark(tally.ticks, SEARCH)
-        add_held_impulse(network, motion, 0.0, dt, drive.gravity, tally.held_impulse)
-        mark(tally.ticks, HELD)
-        advance(motion, network.mass, network.inverse_mass, 0.0, dt, tally.contact_impulse)
-        mark(tally.ticks, INTEGRATION)
+        search_contacts(frame, step, nothing)
+        end_step(frame, step, nothing, 0.0, None)
     return mean_pressure(cells)
 
 
@@ -95,5 +79,5 @@ def push_cells(state: State, drive: Drive, bulk_modulus: float, barycentric: boo
     """One frame of `cells_frame`."""
     after = begin_frame(state, drive)
     cells = own_cells(state)
-    lam = cells_frame(after.network, cells, after.motion, drive, after.tally, bulk_modulus, barycentric)
+    lam = cells_frame(after.frame(drive), cells, bulk_modulus, barycentric)
     return replace(after, lam=np.array([lam]), memory=cells)

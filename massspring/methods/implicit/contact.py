@@ -3,16 +3,15 @@
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from massspring.kernels.arrays.layout import Drive, Motion, Network
+from massspring.kernels.arrays.layout import Contacts, Drive, Network, Nodes, Push
 from massspring.kernels.contact.active_set import let_go
 from massspring.kernels.contact.friction import wedge
 from massspring.kernels.contact.implicit_contact import seat_entering
+from massspring.kernels.contact.modes import FREE, HIDDEN, ON_EDGE, SLIDES, STICKS
 from massspring.methods.implicit.factor import Factor
 
 FACTORED, SOLVED = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
-SLIDES, WEDGED, STICKS, AWAY = 1, 2, 3, 4
-"""Values of `motion.locked`; AWAY hides a node from the search."""
-STILL = 1e-11
+SLIP_RESOLUTION = 1e-11
 """Over the longest correction, 0.3 of an edge: a node that slides less than that in a step does not slide. Solves leave
 1e-15 to 1e-14 of it where a node sticks (measured), and friction would take its direction from that."""
 
@@ -20,18 +19,18 @@ STILL = 1e-11
 class Touching:
     """The directions that obstacles take in a step, as rows C of unit vectors at nodes, and their Schur complement."""
 
-    def __init__(self, factor: Factor, motion: Motion, surface_nodes: np.ndarray, dt: float) -> None:
-        locked = motion.locked[surface_nodes]
-        slides, wedged, sticks = (surface_nodes[locked == kind].astype(np.int64) for kind in (SLIDES, WEDGED, STICKS))
+    def __init__(self, factor: Factor, nodes: Nodes, contacts: Contacts, surface_nodes: np.ndarray, dt: float) -> None:
+        mode = contacts.mode[surface_nodes]
+        slides, wedged, sticks = (surface_nodes[mode == kind].astype(np.int64) for kind in (SLIDES, ON_EDGE, STICKS))
         axes = np.tile(np.eye(3), (len(sticks), 1))
         self.nodes = np.concatenate([slides, wedged, wedged, np.repeat(sticks, 3)])
         self.direction = np.concatenate(
-            [motion.normal[slides], motion.normal[wedged], motion.second_normal[wedged], axes]
+            [contacts.normal[slides], contacts.normal[wedged], contacts.second_normal[wedged], axes]
         )
-        self.obstacle = motion.touched[self.nodes].astype(np.int64) - 1
+        self.obstacle = contacts.touched[self.nodes].astype(np.int64) - 1
         second = len(slides) + len(wedged) + np.arange(len(wedged))
-        self.obstacle[second] = motion.second[wedged].astype(np.int64) - 1
-        self.place = np.einsum("ci,ci->c", self.direction, motion.x[self.nodes] + dt * motion.goal[self.nodes])
+        self.obstacle[second] = contacts.second[wedged].astype(np.int64) - 1
+        self.place = np.einsum("ci,ci->c", self.direction, nodes.x[self.nodes] + dt * contacts.goal[self.nodes])
         """Where each row ends the step, along its direction [m], (c,)."""
         if len(self.nodes):
             self._columns = factor.columns(self.nodes)
@@ -62,56 +61,57 @@ class Touching:
 class Contact:
     """The touched nodes of one step on their way to an active set."""
 
-    def __init__(self, network: Network, motion: Motion, drive: Drive, step: int) -> None:
-        self.network, self.motion, self.drive, self.step = network, motion, drive, step
-        self.rubbed = np.zeros_like(motion.x)
+    def __init__(self, network: Network, nodes: Nodes, contacts: Contacts, drive: Drive, step: int) -> None:
+        self.network, self.nodes, self.contacts = network, nodes, contacts
+        self.drive, self.step = drive, step
+        self.rubbed = np.zeros_like(nodes.x)
         """Friction of the nodes that slip, times dt² [kg m], (n, 3)."""
-        let_go(motion)
-        self._seat(np.empty(0, dtype=np.int64), motion.v)
+        let_go(contacts)
+        self._seat(np.empty(0, dtype=np.int64), nodes.v)
 
     def revise(self, end: np.ndarray, touching: Touching, impulses: np.ndarray) -> bool:
         """Releases nodes that an obstacle would pull, seats those that would enter one, and lets slip those that would
         stick too hard; whether any was (eq. 13, 94)."""
-        motion, nodes = self.motion, touching.nodes
+        contacts, nodes = self.contacts, touching.nodes
         pushes = np.zeros_like(end)
         np.add.at(pushes, nodes, impulses[:, None] * touching.direction)
-        sticks = motion.locked[nodes] == STICKS
-        inward = np.where(sticks, np.einsum("ci,ci->c", motion.normal[nodes], pushes[nodes]), impulses)
+        sticks = contacts.mode[nodes] == STICKS
+        inward = np.where(sticks, np.einsum("ci,ci->c", contacts.normal[nodes], pushes[nodes]), impulses)
         leaving = np.unique(nodes[inward < 0.0])
-        motion.locked[leaving], motion.touched[leaving] = 0, 0
+        contacts.mode[leaving], contacts.touched[leaving] = FREE, 0
         self.rubbed[leaving] = 0.0
         slipped = self._let_slip(pushes) if self.drive.rough else 0
-        entered = self._seat(leaving, (end - motion.x) / self.drive.dt)
+        entered = self._seat(leaving, (end - self.nodes.x) / self.drive.dt)
         return bool(len(leaving) or slipped or entered)
 
     def _let_slip(self, pushes: np.ndarray) -> int:
         """Nodes that stick although that asks for more than mu times their normal part slip from now on (eq. 94)."""
-        motion = self.motion
-        nodes = np.flatnonzero(motion.locked == STICKS)
-        friction = self.drive.friction[motion.touched[nodes].astype(np.int64) - 1]
+        contacts = self.contacts
+        nodes = np.flatnonzero(contacts.mode == STICKS)
+        friction = self.drive.friction[contacts.touched[nodes].astype(np.int64) - 1]
         nodes, friction = nodes[np.isfinite(friction)], friction[np.isfinite(friction)]
-        normal, push = motion.normal[nodes], pushes[nodes]
+        normal, push = contacts.normal[nodes], pushes[nodes]
         pressed = np.einsum("ci,ci->c", normal, push)
         aside = push - pressed[:, None] * normal
         asked = np.linalg.norm(aside, axis=1)
         slips = asked > friction * pressed
         nodes, normal = nodes[slips], normal[slips]
         self.rubbed[nodes] = (friction * pressed)[slips, None] * aside[slips] / asked[slips, None]
-        motion.locked[nodes] = SLIDES
-        motion.goal[nodes] = np.einsum("ci,ci->c", normal, motion.goal[nodes])[:, None] * normal
+        contacts.mode[nodes] = SLIDES
+        contacts.goal[nodes] = np.einsum("ci,ci->c", normal, contacts.goal[nodes])[:, None] * normal
         return len(nodes)
 
     def rub(self, end: np.ndarray, touching: Touching, impulses: np.ndarray) -> bool:
         """Friction against the slip of the last pass; a node that it would drive sticks: whether one does (eq. 94)."""
-        motion, drive = self.motion, self.drive
+        contacts, drive = self.contacts, self.drive
         if not drive.rough:
             return False
-        slides = (motion.locked[touching.nodes] == SLIDES) & (drive.friction[touching.obstacle] > 0.0)
+        slides = (contacts.mode[touching.nodes] == SLIDES) & (drive.friction[touching.obstacle] > 0.0)
         nodes, obstacle = touching.nodes[slides], touching.obstacle[slides]
-        normal, carried = motion.normal[nodes], drive.velocity[self.step][obstacle]
-        slip = _aside((end[nodes] - motion.x[nodes]) / drive.dt - carried, normal)
+        normal, carried = contacts.normal[nodes], drive.velocity[self.step][obstacle]
+        slip = _aside((end[nodes] - self.nodes.x[nodes]) / drive.dt - carried, normal)
         speed = np.linalg.norm(slip, axis=1)
-        still = speed * drive.dt <= STILL * self.network.longest_correction
+        still = speed * drive.dt <= SLIP_RESOLUTION * self.network.longest_correction
         driven = still | (np.einsum("ci,ci->c", slip, self.rubbed[nodes]) > 0.0)
         most = drive.friction[obstacle] * np.maximum(impulses[slides], 0.0)
         self.rubbed[nodes[~driven]] = -(most[~driven] / speed[~driven])[:, None] * slip[~driven]
@@ -120,28 +120,29 @@ class Contact:
 
     def _stick(self, nodes: np.ndarray, carried: np.ndarray) -> None:
         """Nodes move along with what they touch, `carried` [m/s]."""
-        motion = self.motion
-        motion.locked[nodes] = STICKS
-        motion.goal[nodes] += _aside(carried, motion.normal[nodes])
+        contacts = self.contacts
+        contacts.mode[nodes] = STICKS
+        contacts.goal[nodes] += _aside(carried, contacts.normal[nodes])
         self.rubbed[nodes] = 0.0
 
     def _seat(self, leaving: np.ndarray, velocity: np.ndarray) -> int:
         """Seats nodes that `velocity` carries into an obstacle, but for those just let go; how many."""
-        motion, drive = self.motion, self.drive
+        contacts, drive = self.contacts, self.drive
         if not len(drive.radius):
             return 0
-        motion.v_star[:] = velocity
-        motion.locked[leaving] = AWAY
-        count = seat_entering(self.network, motion, drive, self.step)
-        motion.locked[leaving] = 0
+        self.nodes.v_star[:] = velocity
+        contacts.mode[leaving] = HIDDEN
+        unpushed = Push(self.nodes.gradient, 0.0)
+        count = seat_entering(self.network, self.nodes, contacts, drive, self.step, unpushed)
+        contacts.mode[leaving] = FREE
         if drive.rough:
-            new = motion.entering[:count].astype(np.int64)
-            obstacle = motion.touched[new].astype(np.int64) - 1
+            new = contacts.entering[:count].astype(np.int64)
+            obstacle = contacts.touched[new].astype(np.int64) - 1
             rough = drive.friction[obstacle] > 0.0
             self._stick(new[rough], drive.velocity[self.step][obstacle[rough]])
         if len(drive.radius) > 1:
-            count += wedge(self.network, motion, drive, self.step, 0.0)
-            self.rubbed[motion.locked == WEDGED] = 0.0
+            count += wedge(self.network, self.nodes, contacts, drive, self.step, unpushed)
+            self.rubbed[contacts.mode == ON_EDGE] = 0.0
         return count
 
 

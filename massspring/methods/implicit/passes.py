@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import Accuracy, Drive
+from massspring.kernels.arrays.layout import Accuracy, Drive, Push
 from massspring.kernels.constraint.jacobian import rows_into, rows_times_into, transposed_rows_times_into
 from massspring.kernels.forces.springs import spring_forces_into
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, REVISION, SEARCH, SPRINGS, VOLUME, mark
@@ -18,7 +18,7 @@ from massspring.methods.implicit.factor import Factor
 CONTACT_REVISIONS, LAST_REVISIONS = 3, 12
 """Of the touched set in one pass, and in the last one, after which no other pass finds a node that enters or is pulled.
 The last solution always belongs to the set that is applied."""
-NEGLIGIBLE = 1e-12
+NEGLIGIBLE_RESPONSE = 1e-12
 """Contact and held nodes that leave a volume this little of its response leave nothing but round-off."""
 
 SOFTNESS = 1e-10
@@ -32,9 +32,10 @@ class Step:
     def __init__(self, state: State, drive: Drive, step: int, factor: Factor, accuracy: Accuracy) -> None:
         assert state.rows is not None  # start() made them
         self.drive, self.step, self.factor, self.accuracy = drive, step, factor, accuracy
-        self.network, self.motion, self.rows, self.tally = state.network, state.motion, state.rows, state.tally
+        self.network, self.nodes, self.contacts = state.network, state.nodes, state.contacts
+        self.rows, self.tally = state.rows, state.tally
         # Without gravity: passes that start from balance must stay there, or a sum of few would be biased.
-        self.p = self.motion.x + drive.dt * self.motion.v
+        self.p = self.nodes.x + drive.dt * self.nodes.v
         held = self.network.held_nodes
         self.p[held] = self.network.held_rest + drive.held_displacement[step][self.network.held_group]
         self.few = len(self.rows.lam) <= DENSE_UP_TO
@@ -44,7 +45,7 @@ class Step:
         """Whether a volume is so far off that only a part of it is made up for."""
         self.idle = False
         """Whether a volume has had nothing to push on."""
-        self.contact = Contact(self.network, self.motion, drive, step)
+        self.contact = Contact(self.network, self.nodes, self.contacts, drive, step)
         self.answers: np.ndarray | None = None
 
     def times(self, field: np.ndarray) -> np.ndarray:
@@ -60,13 +61,13 @@ class Step:
         return force
 
     def mark(self, stage: int) -> None:
-        """Books the time since the last mark, where somebody asks."""
+        """Adds the time since the last mark to this stage, if stages are timed."""
         if self.tally.ticks is not None:
             mark(self.tally.ticks, stage)
 
     def take(self, passes: int) -> None:
         """So many passes; then v⁺ = (x⁺ − x)/dt."""
-        rows_into(self.motion.x, self.network.inverse_mass, self.rows)
+        rows_into(self.nodes.x, self.network.inverse_mass, self.rows)
         begun = self.rows.volume.copy()
         touching, impulses = self.touch(), np.zeros(0)
         obstacles = len(self.drive.radius) > 0
@@ -103,13 +104,13 @@ class Step:
         self.tally.skipped[0] += self.idle
         self.book(touching, impulses)
         self.mark(HELD)
-        self.motion.v[:] = (self.p - self.motion.x) / self.drive.dt
-        self.motion.x[:] = self.p
+        self.nodes.v[:] = (self.p - self.nodes.x) / self.drive.dt
+        self.nodes.x[:] = self.p
         self.mark(INTEGRATION)
 
     def touch(self) -> Touching:
         """The touched nodes of the moment, and how volumes answer their pressures past them."""
-        touching = Touching(self.factor, self.motion, self.network.surface_nodes, self.drive.dt)
+        touching = Touching(self.factor, self.nodes, self.contacts, self.network.surface_nodes, self.drive.dt)
         if self.answers is not None:
             self.reach(touching)
             self.answer()
@@ -142,7 +143,7 @@ class Step:
     def imbalance(self) -> np.ndarray:
         """J, V at p, and the right-hand side for the pressures of the moment [kg m], (n, 3) (eq. 92)."""
         out = np.empty_like(self.p)
-        imbalance_into(self.network, self.motion, self.rows, self.p, self.drive, out)
+        imbalance_into(self.network, self.nodes, self.rows, self.p, self.drive, out)
         return out
 
     def solve(self, free: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
@@ -159,7 +160,7 @@ class Step:
     def directly(self, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(Δlam, dt² A⁻¹ Jᵀ Δlam) of few volumes by a dense solve (eq. 93)."""
         assert self.answers is not None
-        able = np.diag(self.schur) > NEGLIGIBLE * self.drive.dt**2 * self.factor.alone(self.rows)[0]
+        able = np.diag(self.schur) > NEGLIGIBLE_RESPONSE * self.drive.dt**2 * self.factor.alone(self.rows)[0]
         pressure = np.zeros(len(error))
         if able.any():
             inner = self.schur[np.ix_(able, able)]
@@ -200,12 +201,12 @@ class Step:
 
     def book(self, touching: Touching, impulses: np.ndarray) -> None:
         """Impulses of obstacles and attachments [N s] (eq. 11)."""
-        motion, net, dt = self.motion, self.network, self.drive.dt
+        nodes, contacts, net, dt = self.nodes, self.contacts, self.network, self.drive.dt
         given = self.tally.contact_impulse
         np.add.at(given, touching.obstacle, impulses[:, None] / dt * touching.direction)
         if self.drive.rough:
             rubbed = np.flatnonzero(self.contact.rubbed.any(axis=1))
-            np.add.at(given, motion.touched[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
-        spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, motion.force)
-        motion.gradient[:] = self.pushed(self.rows.lam)
-        add_held_impulse(net, motion, 1.0, dt, self.drive.gravity, self.tally.held_impulse)
+            np.add.at(given, contacts.touched[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
+        spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, nodes.force)
+        push = Push(self.pushed(self.rows.lam), 1.0)
+        add_held_impulse(net, nodes, push, dt, self.drive.gravity, self.tally.held_impulse)

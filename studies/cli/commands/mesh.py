@@ -151,7 +151,7 @@ def rows_of(m: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def ask_before_large(path: Path, yes: bool) -> None:
-    """Warn of a large file before anything is read of it: go on when told to, else raise StudyError."""
+    """Warn of a large file before reading it: go on when --yes or an answer allows it, else raise StudyError."""
     sentence = size_warning(path) if path.is_file() else None
     if sentence is None:
         return
@@ -162,7 +162,7 @@ def ask_before_large(path: Path, yes: bool) -> None:
 
 
 def asked_unit(path: Path) -> str | None:
-    """The unit that a person at the terminal says; None where nobody has to, or nobody can."""
+    """The unit asked for at the terminal; None where it is not needed, or there is no terminal."""
     if not sys.stdin.isatty() or not path.is_file():
         return None
     side = longest_side(path)

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from studies.cli.find import find_study
 from studies.cli.terminal import Results, StudyName, say, warn
 from studies.metrics.table import check_columns
 from studies.report.results import refresh
+from studies.sweep.find_study import find_study
 
 
 def plot(study: StudyName, results: Results = Path("results")) -> None:

@@ -13,14 +13,11 @@ from studies.report import results as reports
 def report(
     results: Results = Path("results"),
     figures: Annotated[bool, typer.Option(help="also the pictures of organs and of the squeezed ball")] = False,
-    readme: Annotated[bool, typer.Option(help="also put the summary into README.md")] = False,
 ) -> None:
     """All charts and tables, and the summary; names what it wrote."""
     written, remarks = reports.report(results, STUDIES)
     if figures:
         written += reports.draw_figures(results)
-    if readme:
-        reports.write_readme(Path("README.md"), (results / "summary.md").read_text(encoding="utf-8"))
     warn(remarks)
     for path in written:
         say(path)

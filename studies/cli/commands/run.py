@@ -6,15 +6,19 @@ from typing import Annotated
 
 import typer
 
+from studies.base.atomic import sweep_parts
 from studies.base.lookup import choose
 from studies.catalog.study import Study
-from studies.cli.find import find_study
 from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import Results, console, say, warn
+from studies.geometry.mesher.jobs import cache_folder
 from studies.metrics.table import check_columns
+from studies.reference.pieces import STUDY as REFERENCES
 from studies.report.results import refresh
 from studies.store.links import link_study
 from studies.store.paths import study_folder
+from studies.store.staleness import MISSING
+from studies.sweep.find_study import find_study
 from studies.sweep.plan import plan
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, warnings_of
@@ -46,6 +50,8 @@ def run(
 def _bring_up_to_date(root: Path, study: Study, jobs: int, wanted: Wanted) -> None:
     with TerminalProgress(console, plan(root, study, wanted), jobs) as progress:
         count = run_studies(root, [study], jobs, progress, wanted, progress.compiling)
+    for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
+        sweep_parts(folder)
     warn(link_study(root, study.name))
     told = warnings_of(root, study) if count else []
     if told:
@@ -66,7 +72,7 @@ def _filter(only: str) -> Wanted:
         return None
     rules: dict[str, Callable[[Task], bool]] = {
         "failed": failed,
-        "stale": lambda task: task.path().exists() and not task.is_current(),
+        "stale": lambda task: task.why_stale() not in (None, MISSING),
     }
     chosen = [choose(word.strip(), rules, "filter") for word in only.split(",")]
     return lambda task: any(rule(task) for rule in chosen)

@@ -12,7 +12,7 @@ def safe_dt(
     found = safe_step(chosen_case(scene, method, body, nodes))
     limit = found.limit
     console.print(f"largest frequency  {limit.frequency:.4g} 1/s")
-    whose = "stability limit" if found.limited else "of explicit ones"
+    whose = "stability limit" if found.conditionally_stable else "of explicit ones"
     console.print(f"{whose:<18} {1e3 * limit.damped:.4g} ms  (without damping {1e3 * limit.undamped:.4g} ms)")
     console.print(f"dt = auto          {1e3 * found.auto:.4g} ms  (margin {found.margin:.3g})")
     for dt, outcome in found.tried:

@@ -13,7 +13,8 @@ from rich.tree import Tree
 
 from studies.base.errors import StudyError
 from studies.cli.terminal import console
-from studies.store.record import INDEX_KIND, Field, Record, Status, open_results, peek, read_record
+from studies.store.opening import open_results
+from studies.store.record import INDEX_KIND, Field, Record, Status, peek, read_record
 
 WIDE, NARROW = 120, 70
 """Columns of a terminal from which descriptions stand beside the numbers, and below which shape and unit go."""
@@ -33,7 +34,7 @@ def describe(path: Path, width: int = WIDE, every: bool = True) -> Tree:
 
     Raises StudyError as read_record does."""
     path = Path(path)
-    with open_results(path) as file:
+    with open_results(path) as (file, _):
         links = _links(file) if file.attrs.get("kind") == INDEX_KIND else None
     return _index(path, links) if links is not None else _record(path, read_record(path), width, every)
 

@@ -9,10 +9,10 @@ import typer
 from rich.table import Table
 
 from studies.catalog import STUDIES
-from studies.cli.find import find_study
 from studies.cli.terminal import Results, console, say
 from studies.reference.pieces import PieceStanding, pieces, standing_of
 from studies.scene.scene import Scene
+from studies.sweep.find_study import find_study
 from studies.sweep.standings import Standing, standings
 
 SHOWN = 8

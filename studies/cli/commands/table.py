@@ -7,13 +7,13 @@ from typing import Annotated, Any
 import typer
 
 from studies.base.lookup import choose
-from studies.cli.find import find_study
 from studies.cli.terminal import Results, StudyName, console, say, warn
 from studies.metrics.cells import DOUBT_MARK, MISSING, plain, value_cell
 from studies.metrics.metrics import METRICS, Metric
 from studies.metrics.table import DOUBTFUL, study_table
 from studies.scene.quantities import ALWAYS
 from studies.store.csv_table import write_table
+from studies.sweep.find_study import find_study
 from studies.sweep.load import load_runs
 
 Row = Mapping[Any, Any]

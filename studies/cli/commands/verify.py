@@ -8,6 +8,7 @@ import typer
 
 from reference_fem import crosscheck
 from studies.cli.terminal import console
+from studies.store.stamps import set_stamp
 from studies.verify.verification import FOLDER, Verdict, run_pack, tolerance, write_kappa, write_verdicts
 
 FAST = "smoke"
@@ -26,6 +27,7 @@ def verify(
     written = write_verdicts(root / FOLDER, verdicts)
     if not fast:
         written += write_kappa(root / FOLDER)
+        set_stamp(root, FOLDER)
     for path in written:
         console.print(str(path), markup=False, highlight=False)
     if not crosscheck.available():

@@ -16,6 +16,7 @@ from studies.geometry.mesh.second_order import CurvedMesh, make_curved
 from studies.geometry.mesher.jobs import TIME_LIMIT, cached, mesh_from, patches_of
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.shape.regions import Region, region_to_dict
+from studies.geometry.surface.node_count import FEWEST, MOST
 
 
 def organ(
@@ -34,6 +35,8 @@ def organ(
     """
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
+    if not FEWEST <= nodes <= MOST:  # checked here, before the mesher is loaded
+        raise StudyError(f"{name}: {nodes} surface nodes asked for, but the mesher offers {FEWEST} to {MOST}")
     shape = make_shape(name, parameters or {})
     own = shape.regions if regions is None else regions
     recipe = {

@@ -1,4 +1,4 @@
-"""What the mesh doctor says: for each finding a sentence a student understands and the option that mends it."""
+"""The findings of the mesh doctor: for each one a plain sentence and the option that mends it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

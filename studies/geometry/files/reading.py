@@ -32,8 +32,8 @@ def read_mesh(path: str | Path, unit: str | None = None, flip: bool = False) -> 
 
     unit: of the file's coordinates, "m" (default), "cm" or "mm". flip: turn an inside-out surface or negative
     tetrahedra round instead of refusing them. Duplicate points are welded and points that nothing uses are left out;
-    where a body has tetrahedra, triangles stored beside them are left out too. Warns when the size says that the unit
-    is not what was said. Raises StudyError for a file that cannot be read or whose mesh is not usable.
+    where a body has tetrahedra, triangles stored beside them are left out too. Warns when the size does not
+    fit the unit. Raises StudyError for a file that cannot be read or whose mesh is not usable.
     """
     path = Path(path)
     if unit is not None:

@@ -29,7 +29,7 @@ def unit_question(name: str, side: float) -> str:
 
 
 def settled_unit(name: str, side: float, unit: str | None) -> str:
-    """`unit` when it is given, "m" when only metres fit an organ; raises StudyError when somebody has to say it."""
+    """`unit` when it is given, "m" when only metres fit an organ; raises StudyError when it must be given."""
     if unit is not None:
         check_unit(unit)
         return unit

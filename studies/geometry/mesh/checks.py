@@ -1,4 +1,4 @@
-"""What a mesh must be before anybody computes with it. Each fault found is one StudyError of one sentence."""
+"""What a mesh must fulfil before a computation. Each fault found is one StudyError of one sentence."""
 
 import numpy as np
 from scipy.sparse import coo_array

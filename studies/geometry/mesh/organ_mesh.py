@@ -1,4 +1,4 @@
-"""The mesh of an organ, and the few numbers that everybody asks of it."""
+"""The mesh of an organ, and its basic measures."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -8,7 +8,8 @@ import sys
 import tempfile
 import warnings
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
@@ -110,7 +111,7 @@ def maker(kind: str) -> str:
 
 
 def read_cached(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | None:
-    """The stored arrays, or None when there are none or the file is damaged (said in a warning)."""
+    """The stored arrays, or None when there are none or the file is damaged (a warning names it)."""
     if not path.exists():
         return None
     try:
@@ -135,6 +136,17 @@ def write_cached(path: Path, arrays: dict[str, np.ndarray]) -> None:
         ) from error
 
 
+@contextmanager
+def pipe_to_here() -> Iterator[int]:
+    """Standard input for a process that is to end with this one: nothing comes, and it closes when this one ends."""
+    reading, writing = os.pipe()
+    try:
+        yield reading
+    finally:
+        os.close(reading)
+        os.close(writing)
+
+
 def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: float) -> dict[str, np.ndarray]:
     """Run the worker on a job and read what it made; raises StudyError for its sentence, a crash or a time-out."""
     with tempfile.TemporaryDirectory() as folder:
@@ -149,7 +161,10 @@ def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: flo
         }
         command = [sys.executable, "-m", maker(recipe["kind"]), str(job), str(out)]
         try:
-            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit, check=False)
+            with pipe_to_here() as alive:
+                done = subprocess.run(
+                    command, env=environment, stdin=alive, capture_output=True, text=True, timeout=limit, check=False
+                )
         except subprocess.TimeoutExpired as error:
             raise StudyError(
                 f"{recipe['name']}: the mesher did not finish within {limit:g} s and was stopped; "

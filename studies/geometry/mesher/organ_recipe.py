@@ -82,7 +82,7 @@ def snap_if_it_fits(shape: Shape, points: np.ndarray, triangles: np.ndarray, reg
     try:
         surface = snap_all(shape, points, triangles, regions)
     except StudyError:
-        # Not lost: the finer surface that follows either fits or says the same.
+        # Not lost: the finer surface that follows either fits or gives the same message.
         return None
     return surface if all(is_met(region, *surface) for region in regions) else None
 

@@ -5,18 +5,24 @@ own kind because their compiled distances take half a second to import, which ot
 """
 
 import json
+import os
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from studies.base.errors import StudyError
+from studies.base.interrupts import end_after
 
 Arrays = dict[str, np.ndarray]
 
 
 def work(build: Callable[[dict[str, Any], Arrays], Arrays], job_path: str, out_path: str) -> int:
-    """Reads the job, writes the mesh of `build` or the sentence of its StudyError; the exit code, 0 or 2."""
+    """Reads the job, writes the mesh of `build` or the sentence of its StudyError; the exit code, 0 or 2.
+
+    Standard input is a pipe that the caller holds open: the process ends with it.
+    """
+    end_after(lambda: os.read(0, 1))
     with np.load(job_path, allow_pickle=False) as job:
         arrays = {key: job[key] for key in job.files if key != "recipe"}
         recipe = json.loads(str(job["recipe"]))

@@ -37,7 +37,7 @@ class Shape:
     regions: the attachments it has by default
     wall: thickness of the wall of a hollow organ, whose lumen is f = -wall [m]; None for a solid one
     literature: the volume that the default parameters are held to
-    probe, press: where an instrument palpates, and the unit vector along which a plane presses; None when not said
+    probe, press: where an instrument palpates, and the unit vector along which a plane presses; None when not given
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Where an organ is attached, said by geometry: the same place on a mesh of any size.
+"""Where an organ is attached, defined by geometry: the same place on a mesh of any size.
 
 A region is a part of space with a signed level, negative inside. The patch of a surface that lies in it is bounded
 by the curve level = 0, onto which the mesher moves nodes (snap.py), so the patch does not depend on the mesh.

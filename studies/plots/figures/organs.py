@@ -1,4 +1,4 @@
-"""The organs: smooth, with their meshes, cut open; attachments coloured, sizes and volumes said."""
+"""The organs: smooth, with their meshes, cut open; attachments coloured, sizes and volumes written below."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -29,9 +29,9 @@ OTHER_SIDES = {
     "spleen": ("from the stomach", Camera(azimuth=-140.0, elevation=-14.0)),
     "bladder": ("from the right", Camera(azimuth=176.0, elevation=8.0)),
 }
-"""Where one sees what the front hides: hila, grooves, bare areas; from behind unless said here."""
+"""Views of what the front hides: hila, grooves, bare areas; from behind unless listed here."""
 FIRST_SIDES = {"spleen": Camera(azimuth=-12.0, elevation=22.0)}
-"""Of the smooth picture; from the front unless said here: a spleen shows its ribs' side and its notched border."""
+"""Of the smooth picture; from the front unless listed here: a spleen shows its ribs' side and its notched border."""
 TISSUE, CUT = "#D9B3A6", "#B5655A"
 PATCH_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY)
 WIDTH, HEIGHT = 3.1, 8.6

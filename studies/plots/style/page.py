@@ -13,18 +13,7 @@ from matplotlib.ticker import FuncFormatter
 
 from studies.metrics.cells import DOUBT_MARK
 from studies.metrics.metrics import Metric, Run
-from studies.plots.style.style import (
-    BLACK,
-    BODY_LINES,
-    BODY_MARKERS,
-    GREY,
-    SMALL,
-    heading,
-    method_colour,
-    readable,
-    remark,
-    styled,
-)
+from studies.plots.style.style import BLACK, GREY, SMALL, heading, readable, remark, styled
 
 ROW, LINE, MARGIN = 0.25, 0.19, 0.12
 """Heights of a legend row, of a line of notes, and of the space around them [inch]."""
@@ -160,20 +149,6 @@ def has_frames(run: Run) -> bool:
 def good_frames(run: Run) -> int:
     """Number of frames before the run broke off."""
     return int(run.record.attributes.get("good_frames", len(run.field("t"))))
-
-
-def body_method_handles(runs: Sequence[Run], markers: bool = False) -> list[Artist]:
-    """Legend entries for every method and body that occurs, and for both together: colour is method, line is body."""
-    series = dict.fromkeys((run.case.body.series, run.case.method.name) for run in runs)
-    return [series_handle(kind, method, markers) for kind, method in series]
-
-
-def series_handle(kind: str, method: str, markers: bool = False) -> Line2D:
-    """The legend entry of one body with one method."""
-    look = (
-        {"marker": BODY_MARKERS[kind], "linestyle": "", "markersize": 7} if markers else {"linestyle": BODY_LINES[kind]}
-    )
-    return Line2D([], [], color=method_colour(method), label=f"{kind}, {readable(method)}", **look)
 
 
 def reference_handle(label: str = "reference (finite elements)", **look: object) -> Line2D:

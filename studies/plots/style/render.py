@@ -50,7 +50,7 @@ def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def shade(normals: np.ndarray, colours: np.ndarray) -> np.ndarray:
     """Lit colours (t, 3) of faces with unit normals (t, 3) in the camera's frame and own colours (t, 3)."""
     facing = normals @ (LIGHT / np.linalg.norm(LIGHT))
-    # Light that reaches round the body (half-Lambert) keeps the colour, which says what is shown, on the dark side.
+    # Light that reaches round the body (half-Lambert) keeps the colour, which carries meaning, on the dark side.
     brightness = DARKEST + RANGE * (0.5 + 0.5 * facing) ** WRAP
     gloss = GLOSS * np.clip(facing, 0.0, None) ** SHARPNESS
     return np.clip(colours * brightness[:, None] + gloss[:, None], 0.0, 1.0)

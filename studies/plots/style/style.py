@@ -1,7 +1,8 @@
-"""One look for all charts: colours that everybody can tell apart, type that survives half size, one way to save."""
+"""One look for all charts: colours for colour-blind readers too, type that survives half size, one way to save."""
 
 import functools
 import io
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import ParamSpec, TypeVar
@@ -10,6 +11,7 @@ import matplotlib.style
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.typing import LineStyleType
 
 from massspring import METHODS
 from studies.base.atomic import write_whole
@@ -32,21 +34,27 @@ METHOD_COLOURS = {"free": VERMILLION, "implicit_volume": BLUE}
 # Then the muted scheme of P. Tol, "Colour schemes", 2021.
 MUTED = ("#332288", "#999933", "#882255", "#44AA99", "#DDCC77", "#AA4499", "#117733", "#661100", "#88CCEE", "#CC6677")
 OTHER_METHODS = (GREEN, PURPLE, ORANGE, SKY, *MUTED)
-BODY_LINES = {
-    "tetrahedral": "-",
-    "surface": (0, (4, 1.6)),
-    "tetrahedral, one volume": (0, (1, 1.2)),
-    "tetrahedral, nodal volumes": (0, (6, 1.5, 1, 1.5)),
-    "membrane": (0, (2.5, 1)),
+BODY_LOOKS: dict[str, tuple[LineStyleType, str]] = {
+    "tetrahedral": ("-", "o"),
+    "surface": ((0, (4, 1.6)), "s"),
+    "tetrahedral, one volume": ((0, (1, 1.2)), "D"),
+    "tetrahedral, nodal volumes": ((0, (6, 1.5, 1, 1.5)), "^"),
+    "membrane": ((0, (2.5, 1)), "v"),
 }
-BODY_MARKERS = {
-    "tetrahedral": "o",
-    "surface": "s",
-    "tetrahedral, one volume": "D",
-    "tetrahedral, nodal volumes": "^",
-    "membrane": "v",
-}
-"""Of the bodies that charts tell apart, by BodyRecipe.series."""
+"""Line and marker of the bodies that look the same in every chart, by BodyRecipe.series."""
+SPARE_LOOKS: tuple[tuple[LineStyleType, str], ...] = (
+    ((0, (4, 1, 1, 1, 1, 1)), "P"),
+    ((0, (9, 1.5)), "<"),
+    ((0, (3, 1, 3, 1, 1, 1)), "*"),
+    ((0, (1, 3)), "p"),
+    ((0, (3, 1, 1, 1, 1, 1, 1, 1)), ">"),
+    ((0, (1, 1, 1, 3)), "h"),
+    ((0, (3, 3.5)), "X"),
+    ((0, (6, 1, 2, 1)), "d"),
+    ((0, (2, 1, 2, 3)), "H"),
+    ((0, (7, 1, 1, 1, 1, 1)), "8"),
+)
+"""Of any other body, in the order of its appearance; each dash pattern fits into the line of a legend entry."""
 STATUS_LOOKS: dict[Status, tuple[str, str]] = {
     Status.OK: (GREEN, "o"),
     Status.INVERTED: (PURPLE, "v"),
@@ -114,7 +122,10 @@ def method_colour(name: str) -> str:
     if name in METHOD_COLOURS:
         return METHOD_COLOURS[name]
     others = [method.name for method in METHODS if method.name not in METHOD_COLOURS]
-    return OTHER_METHODS[others.index(name) % len(OTHER_METHODS)]
+    if name in others:
+        return OTHER_METHODS[others.index(name) % len(OTHER_METHODS)]
+    spare = OTHER_METHODS[len(others) :] or OTHER_METHODS  # a method that is not in METHODS
+    return spare[zlib.crc32(name.encode()) % len(spare)]
 
 
 def readable(name: str) -> str:

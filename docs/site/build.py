@@ -1,0 +1,103 @@
+"""Builds the documentation site: `python docs/site/build.py`, then open site/index.html (no network needed).
+
+Pages: README, CONTRIBUTING, CHANGELOG and docs/*.md as they stand, and one for every folder of the three packages with
+the docstrings of its modules, which are read from the sources, not imported. A broken link ends with exit code 1.
+"""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+SITE = ROOT / "docs" / "site"
+STAGE = ROOT / "build" / "docs"
+PACKAGES = ("massspring", "reference_fem", "studies")
+FIRST = ("how-a-run-works", "theory", "notation", "methods", "results", "meshes", "paper")
+"""Pages of docs/ in the order of the menu; further ones follow."""
+LINK = re.compile(r"\]\((?:\.\./)?(results/[^)#\s]+)\)")
+"""A link or picture in results/."""
+FOREIGN = re.compile(r"""(?:<(?:script|img|iframe)\b[^>]*\bsrc|<link\b[^>]*\bhref)=["']?((?:https?:)?//[^"'\s>]+)""")
+"""A script, picture, style sheet or font of another host."""
+
+
+def title(page: Path) -> str:
+    """The first heading of a page."""
+    return next(line for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("# "))[2:]
+
+
+def copy_pages() -> list:
+    """Copies all pages and what they show of results/, with the paths that they have here; returns the menu."""
+    shutil.rmtree(STAGE, ignore_errors=True)
+    shutil.copytree(ROOT / "docs", STAGE / "docs", ignore=shutil.ignore_patterns("site"))
+    shutil.copytree(SITE / "assets", STAGE / "assets")
+    for file in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"):
+        shutil.copy(ROOT / file, STAGE / file)
+    for page in STAGE.rglob("*.md"):
+        for shown in LINK.findall(page.read_text(encoding="utf-8")):
+            if (ROOT / shown).is_file():
+                (STAGE / shown).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(ROOT / shown, STAGE / shown)
+    names = sorted((page.stem for page in STAGE.glob("docs/*.md")), key=lambda name: (*FIRST, name).index(name))
+    pages = [STAGE / "docs" / f"{name}.md" for name in names] + [STAGE / "CONTRIBUTING.md", STAGE / "CHANGELOG.md"]
+    return [{"organbench": "README.md"}] + [{title(page): str(page.relative_to(STAGE))} for page in pages]
+
+
+def section(module: str, **options: bool) -> str:
+    """The docstrings of a module, for mkdocstrings."""
+    return f"::: {module}\n    options: {json.dumps(options)}\n"
+
+
+def api_page(folder: Path) -> dict:
+    """Writes the page of a folder: its own docstring, then its modules one by one; returns its entry in the menu.
+
+    The page of a package also has the names that a user imports from it, and the modules that lie beside its folders.
+    """
+    top, name = folder.parent == ROOT, dotted(folder)
+    files = sorted(folder.glob("*.py") if top else folder.rglob("*.py"))
+    modules = [dotted(file.with_suffix("")) for file in files if not file.stem.startswith("__")]
+    parts = [section(name, members=top, show_submodules=False), *(section(module) for module in modules)]
+    (STAGE / "api").mkdir(exist_ok=True)
+    (STAGE / "api" / f"{name}.md").write_text("\n".join([f"# {name}\n", *parts]), encoding="utf-8")
+    return {name: f"api/{name}.md"}
+
+
+def dotted(path: Path) -> str:
+    """The name by which Python imports a file or folder."""
+    return ".".join(path.relative_to(ROOT).parts)
+
+
+def api_pages() -> list:
+    """A page for every package and every folder in it; their part of the menu."""
+    folders = {name: sorted(file.parent for file in ROOT.glob(f"{name}/*/__init__.py")) for name in PACKAGES}
+    return [{name: [api_page(folder) for folder in (ROOT / name, *found)]} for name, found in folders.items()]
+
+
+def foreign(site: Path) -> list[str]:
+    """What pages would load from other hosts: a reader needs no network."""
+    pages = {page: FOREIGN.findall(page.read_text(encoding="utf-8")) for page in site.rglob("*.html")}
+    return [f"{page.relative_to(site)} loads {address}" for page, found in pages.items() for address in found]
+
+
+def main() -> int:
+    """Copies, writes, builds and checks; the exit code."""
+    config = {
+        "INHERIT": str(SITE / "config.yml"),
+        "docs_dir": str(STAGE),
+        "site_dir": str(ROOT / "site"),
+        "nav": [*copy_pages(), {"API": api_pages()}],
+        "plugins": {"mkdocstrings": {"custom_templates": str(SITE / "templates")}},
+    }
+    file = ROOT / "build" / "mkdocs.yml"
+    file.write_text(json.dumps(config), encoding="utf-8")  # JSON is YAML
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", str(file)]
+    code = subprocess.run(command, cwd=ROOT, check=False).returncode
+    loads = foreign(ROOT / "site")
+    print(*loads, sep="\n", end="\n" if loads else "")
+    return code or int(bool(loads))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,74 @@
+"""How every step begins: all that is known before the volumes are solved for, and which nodes touch obstacles."""
+
+from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, revise_contacts
+from massspring.kernels.fused.padded import places_into
+from massspring.kernels.fused.sweep import predict_from_places
+from massspring.kernels.jit.decorators import inlined
+from massspring.kernels.jit.stage_clock import HELD, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, mark
+from massspring.kernels.step.attachments import prescribe, prescribe_velocity_into
+
+
+@inlined
+def open_frame(frame):
+    """Books the time between two frames, and pads the positions for the first step."""
+    mark(frame.tally.ticks, OUTSIDE)
+    places_into(frame.nodes, frame.work, 0, frame.nodes.x.shape[0])
+
+
+@inlined
+def begin_step(frame, step, keeps):
+    """v* of springs, damping, gravity and held nodes (eq. 1, 6, 7) and, where one volume is kept, G.
+
+    Returns V [m³] and G·W·G [m⁴/kg].
+    """
+    network, nodes, drive = frame.network, frame.nodes, frame.drive
+    volume, _, mobility = predict_from_places(network, nodes, frame.work, drive, keeps, frame.team)
+    mark(frame.tally.ticks, SPRINGS)
+    held = drive.held_displacement[step]
+    prescribe_velocity_into(
+        nodes.x, network.held_nodes, network.held_group, network.held_rest, held, drive.dt, nodes.v_star
+    )
+    mark(frame.tally.ticks, HELD)
+    return volume, mobility
+
+
+@inlined
+def begin_summed_step(frame, step):
+    """The same with G and with G·v* [m³/s] of all nodes, so that no other pass sums it: (V, G·v*, G·W·G)."""
+    network, nodes, drive = frame.network, frame.nodes, frame.drive
+    volume, flow, mobility = predict_from_places(network, nodes, frame.work, drive, True, frame.team)
+    mark(frame.tally.ticks, SPRINGS)
+    flow += prescribe(network, nodes, drive.held_displacement[step], drive.dt)
+    mark(frame.tally.ticks, HELD)
+    return volume, flow, mobility
+
+
+@inlined
+def search_contacts(frame, step, push):
+    """Finds the nodes that touch while the last known push acts (eq. 12); how many passes the active set may take."""
+    if frame.drive.radius.shape[0] == 0:
+        return 1
+    find_contacts(frame.network, frame.nodes, frame.contacts, frame.drive, step, push, frame.team)
+    mark(frame.tally.ticks, SEARCH)
+    return CONTACT_PASSES
+
+
+@inlined
+def multiplier_stands(frame, step, push, reach, last):
+    """Whether the push just solved for leaves the touched nodes as they are (eq. 13), or this was the last pass.
+
+    `reach` [m]: how far the new push can have moved a node; where contacts change, the multiplier is solved for again.
+    """
+    mark(frame.tally.ticks, MULTIPLIER)
+    if last:
+        return True
+    changes = revise_contacts(frame.network, frame.nodes, frame.contacts, frame.drive, step, push, reach)
+    mark(frame.tally.ticks, REVISION)
+    return changes == 0
+
+
+@inlined
+def count_iterations(tally, count):
+    """Books the iterations of one solve for multipliers."""
+    tally.iterations[0] += count
+    tally.iterations[1] = max(tally.iterations[1], count)

@@ -1,0 +1,38 @@
+"""How every step ends: thin probes, what attachments and obstacles gave, and the motion of all nodes."""
+
+from massspring.kernels.arrays.layout import Push
+from massspring.kernels.jit.decorators import inlined
+from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, PROBES, mark
+from massspring.kernels.probe.arrays import Stage
+from massspring.kernels.probe.stage import meet_probes
+from massspring.kernels.step.advance import advance
+from massspring.kernels.step.attachments import add_held_impulse
+
+
+@inlined
+def end_step(frame, step, push, mobility, volumes):
+    """Contact with thin probes, bookings, v⁺ and x⁺ (eq. 10, 11, 141–147).
+
+    `mobility` is G·W̃·G [m⁴/kg] where one volume is solved for, else 0; `volumes` are several that are solved for, or
+    None. Returns the factor of the push beside the contacts of probes: of one volume its pressure [Pa].
+    """
+    factor = probed(frame, step, push, mobility, volumes, frame.probing)
+    push = Push(push.direction, factor)
+    network, nodes, drive, tally = frame.network, frame.nodes, frame.drive, frame.tally
+    add_held_impulse(network, nodes, push, drive.dt, drive.gravity, tally.held_impulse)
+    mark(tally.ticks, HELD)
+    advance(frame, push)
+    mark(tally.ticks, INTEGRATION)
+    return factor
+
+
+@inlined
+def probed(frame, step, push, mobility, volumes, probing):
+    """The stage of thin probes where there are any; the factor of the push beside it."""
+    if probing is None:
+        return push.factor
+    drive = frame.drive
+    stage = Stage(frame.network, frame.nodes, frame.contacts, drive.tips, probing, volumes, mobility, step, drive.dt)
+    factor = meet_probes(stage, volumes, push)
+    mark(frame.tally.ticks, PROBES)
+    return factor

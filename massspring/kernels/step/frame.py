@@ -1,0 +1,22 @@
+"""What a frame loop is given, as one tuple: kernels take the parts of it that they use."""
+
+from typing import NamedTuple
+
+from massspring.kernels.arrays.layout import Contacts, Drive, Network, Nodes, Tally, Workspace
+from massspring.kernels.jit.thread_team import Team
+from massspring.kernels.probe.arrays import Probing
+
+
+class Frame(NamedTuple):
+    """A body, its surroundings during a frame, and what the frame measures of itself."""
+
+    network: Network
+    nodes: Nodes
+    contacts: Contacts
+    work: Workspace
+    drive: Drive
+    tally: Tally
+    probing: Probing | None = None
+    """Thin probes; None where there are none: the loop is then compiled without their stage."""
+    team: Team | None = None
+    """Threads that share the longest loops; None for one thread. Only loops are compiled anew for it."""

@@ -1,0 +1,87 @@
+"""What a method supports, in one table: refusals, the rows of the tests and docs/methods.md are derived from it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from massspring.body.body import SAME_VOLUME, Body
+
+Kept = Literal["none", "whole", "several", "tetrahedra"]
+"""Volumes that a method keeps: none; the one inside the body's surface; one or several of any kind; the tissue,
+tetrahedron by tetrahedron."""
+
+Correction = Literal["limited", "full", "penalty", "unbounded"]
+"""How a step corrects a wrong volume. "limited": each volume moves a node by `longest_correction` at most (eq. 35), the
+rest is left to later steps; "full": the whole error is corrected in the step; "penalty": by a force whose size only the
+length of a stable step bounds; "unbounded": by a force that grows without bound as the volume goes to 0, so that a
+crushed body bursts and the run diverges."""
+
+
+@dataclass(frozen=True)
+class No:
+    """Not supported."""
+
+    because: str
+
+    def __bool__(self) -> bool:
+        return False
+
+
+Support = Literal[True] | No
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """Abilities of a method with given settings. What it promises of its results (order, volume) are its claims."""
+
+    keeps: Kept
+    correction: Correction | None = None
+    """None where no volume is corrected. Otherwise steps in which a volume has no gradient are counted."""
+    conditionally_stable: bool = True
+    """Whether steps beyond the stability limit diverge; where not, accuracy alone limits the step."""
+    triangle_springs: Support = True
+    """Bodies with triangle springs (membranes)."""
+    prestress: Support = No("it starts without the pressures that balance them at rest")
+    """Springs without rest length, balanced at rest by the pressure of the kept volumes."""
+    thin_probes: Support = No("its steps have no stage for them")
+    """Thin probes, met in continuous time."""
+    threads: Support = No("its steps are not divided among threads")
+    float32: Support = No("its claims are measured in float64")
+    """A state in single precision."""
+
+    @property
+    def targets(self) -> Support:
+        """Whether a volume follows a target that changes."""
+        return No("it keeps no volume") if self.keeps == "none" else True
+
+    def why_not(self, body: Body) -> str | None:
+        """Why `body` cannot be advanced; None when it can."""
+        if len(body.membrane.triangles) and isinstance(self.triangle_springs, No):
+            return f"it supports no triangle springs, {self.triangle_springs.because}; take implicit_volume"
+        if body.rest_pressure and isinstance(self.prestress, No):
+            return (
+                f"it supports no springs without length (law '{body.law}'), {self.prestress.because}; "
+                "take implicit_volume, or another law"
+            )
+        if self.keeps == "tetrahedra":
+            return _why_not_each_tetrahedron(body)
+        return _why_not_one_volume(body) if self.keeps == "whole" else None
+
+
+def _why_not_one_volume(body: Body) -> str | None:
+    kept = body.kept
+    if kept.count > 1:
+        return f"it keeps one volume, the body keeps {kept.count}; keep the whole, or take implicit_volume"
+    if not (np.abs(kept.share.data) == 1.0).all():
+        return "it keeps what one closed surface encloses, the body keeps a share of it; take implicit_volume"
+    return None
+
+
+def _why_not_each_tetrahedron(body: Body) -> str | None:
+    if not len(body.tetrahedra):
+        return "it keeps the volume of every tetrahedron, the body has none; fill its mesh"
+    reason = _why_not_one_volume(body)
+    if reason is None and abs(body.rest_volumes[0] / body.tetrahedron_volumes.sum() - 1.0) > SAME_VOLUME:
+        return "it keeps the volume of every tetrahedron, the body keeps a lumen too; take implicit_volume"
+    return reason

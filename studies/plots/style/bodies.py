@@ -1,0 +1,75 @@
+"""What tells the bodies of one chart apart: a name, a line and a marker for every body recipe that occurs in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import cycle
+
+from matplotlib.artist import Artist
+from matplotlib.lines import Line2D
+from matplotlib.typing import LineStyleType
+
+from studies.metrics.metrics import Run
+from studies.plots.style.page import by_scene
+from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, readable
+from studies.runs.case import BodyRecipe
+
+OPTIONS = ("law", "axis", "weights", "stiffness", "nodes")
+"""Fields of a BodyRecipe that its `series` leaves out."""
+
+
+@dataclass(frozen=True)
+class BodyLook:
+    """How a body is called and drawn in one chart."""
+
+    name: str
+    line: LineStyleType
+    marker: str
+
+
+def body_looks(runs: Sequence[Run], ignored: Sequence[str] = ()) -> dict[BodyRecipe, BodyLook]:
+    """The look of every body recipe of `runs`. Different names have different lines and markers as long as no more
+    than len(SPARE_LOOKS) of them are not in BODY_LOOKS; from there on the spare looks repeat.
+
+    A name is the recipe's `series`, followed by the options in which bodies of this series differ within a scene.
+    `ignored`: options that the chart shows in another way.
+    """
+    groups = [list(dict.fromkeys(run.case.body for run in group)) for group in by_scene(runs).values()]
+    names = {body: _name(body, groups, ignored) for group in groups for body in group}
+    spare, free, looks = cycle(SPARE_LOOKS), dict(BODY_LOOKS), {}
+    for body, name in names.items():
+        if name not in looks:
+            line, marker = free.pop(body.series) if body.series in free else next(spare)
+            looks[name] = BodyLook(name, line, marker)
+    return {body: looks[name] for body, name in names.items()}
+
+
+def _name(body: BodyRecipe, groups: Sequence[Sequence[BodyRecipe]], ignored: Sequence[str]) -> str:
+    same = [[other for other in group if other.series == body.series] for group in groups]
+    differing = [o for o in OPTIONS if any(len({getattr(other, o) for other in group}) > 1 for group in same)]
+    return ", ".join([body.series, *(_words(body, option) for option in differing if option not in ignored)])
+
+
+def _words(body: BodyRecipe, option: str) -> str:
+    """An option as words: "cotangent", "150 nodes", "stiffness 2", "weights 1:1:1:1"."""
+    value = getattr(body, option)
+    if option == "nodes":
+        return f"{value:,} nodes"
+    if option == "weights":
+        return "default weights" if value is None else "weights " + ":".join(f"{weight:g}" for weight in value)
+    return f"stiffness {value:g}" if option == "stiffness" else readable(value)
+
+
+def body_method_handles(runs: Sequence[Run], looks: dict[BodyRecipe, BodyLook], markers: bool = False) -> list[Artist]:
+    """Legend entries for every body and method that occur together: colour is method, line or marker is body."""
+    pairs = dict.fromkeys((looks[run.case.body], run.case.method.name) for run in runs)
+    return [body_handle(look, method, markers) for look, method in pairs]
+
+
+def body_handle(look: BodyLook, method: str, markers: bool = False) -> Line2D:
+    """The legend entry of one body with one method."""
+    entry = Line2D([], [], color=method_colour(method), label=f"{look.name}, {readable(method)}")
+    if markers:
+        entry.set(marker=look.marker, linestyle="", markersize=7)
+    else:
+        entry.set_linestyle(look.line)
+    return entry

@@ -1,0 +1,104 @@
+"""docs/methods.md: what every method claims and supports. `python -m studies.report.methods_page` writes it."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+from massspring import METHODS, Method
+from massspring.methods import VARIANTS
+from massspring.methods.capabilities import No
+from studies.base.atomic import write_whole
+
+PAGE = Path("docs/methods.md")
+HEAD = """# Methods
+
+What each method claims and supports. `python -m studies.report.methods_page` writes this page from the classes in
+massspring/methods, and a test holds it to them. Equations and sources stand in the docstring of each method and in
+[theory.md](theory.md).
+"""
+CLAIMS = """
+## Claims
+
+The contract test, tests/massspring/test_methods.py, measures every claim. *Order*: the error of a trajectory falls with
+this power of the time step. *Volume*: |V/V0 − 1| after a quiet step at half the stability limit. *Angular momentum*:
+conserved to round-off in free flight.
+"""
+CAPABILITIES = """
+## Capabilities
+
+*Keeps*: no volume; the **whole**, one volume inside the body's surface; **several** volumes of any kind; or every
+volume of the **tetrahedra**. *Correction* of a wrong volume: **limited**, a volume moves a node by a limited length in
+each step; **full**, the whole error in one step; **penalty**, by a force that the stable step bounds; **unbounded**, by
+a force that nothing bounds. *Stable*: below the stability limit, or at any step. What a method does not support it
+refuses with one sentence. Every method supports planes, spheres and capsules with friction, attachments, gravity and
+damping.
+"""
+REASONS = """
+## Why not
+"""
+OPTIONS: Mapping[str, str] = {
+    "targets": "targets of volumes that change",
+    "triangle_springs": "triangle springs (membranes)",
+    "prestress": "springs without length",
+    "thin_probes": "thin probes",
+    "threads": "several threads",
+    "float32": "float32",
+}
+"""Name in `Capabilities` -> words of the page."""
+
+
+def words(method: Method) -> str:
+    """Name, and the settings that are not the default ones."""
+    settings = {field.name: field.default for field in fields(method) if field.default is not MISSING}  # pyright: ignore[reportArgumentType]
+    changed = [
+        f"{name} = {getattr(method, name)}" for name, usual in settings.items() if getattr(method, name) != usual
+    ]
+    return ", ".join([method.name, *changed])
+
+
+def claims_of(method: Method) -> list[str]:
+    """One row of the first table."""
+    tolerance = "–" if method.volume_tol is None else f"{method.volume_tol:.0e}"
+    turning = "yes" if method.conserves_angular_momentum else "no"
+    told = (method.__doc__ or "").strip().split("\n")[0]
+    return [words(method), str(method.order), tolerance, turning, told]
+
+
+def capabilities_of(method: Method) -> list[str]:
+    """One row of the second table."""
+    own = method.capabilities
+    stable = "below the limit" if own.conditionally_stable else "any step"
+    answers = ["yes" if getattr(own, name) else "no" for name in OPTIONS]
+    return [words(method), own.keeps, own.correction or "–", stable, *answers]
+
+
+def reasons(methods: Iterable[Method]) -> list[list[str]]:
+    """Rows of the last table: for each option the reasons why not, and which methods give them."""
+    rows = []
+    for name, title in OPTIONS.items():
+        found: dict[str, list[str]] = {}
+        for method in methods:
+            answer = getattr(method.capabilities, name)
+            if isinstance(answer, No):
+                found.setdefault(answer.because, []).append(words(method))
+        rows += [[title, "; ".join(who), because] for because, who in found.items()]
+    return rows
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Markdown."""
+    return "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows))
+
+
+def methods_page() -> str:
+    """The page as Markdown."""
+    methods = [*(kind() for kind in METHODS), *VARIANTS]
+    claims = table(("method", "order", "volume", "angular momentum", "what it does"), map(claims_of, methods))
+    head = ("method", "keeps", "correction", "stable", *OPTIONS.values())
+    supported = table(head, map(capabilities_of, methods))
+    why = table(("not supported", "by", "because"), reasons(methods))
+    return "\n".join([HEAD + CLAIMS, claims, CAPABILITIES, supported, REASONS, why, ""])
+
+
+if __name__ == "__main__":
+    write_whole(PAGE, methods_page().encode())

@@ -1,0 +1,36 @@
+"""What the settings of a case may be, beyond what their scene, mesh and body say later."""
+
+import math
+from dataclasses import is_dataclass
+from typing import Any
+
+from massspring import MassSpringError
+from massspring.run.history import EXTRA
+from massspring.run.precision import check_precision
+from studies.base.errors import StudyError
+
+
+def check_settings(case: Any) -> None:
+    """Raises StudyError for the first setting of a `studies.runs.case.Case` that is none."""
+    if isinstance(case.method, type) or not is_dataclass(case.method):
+        name = getattr(case.method, "__name__", repr(case.method))
+        raise StudyError(f"the method is {name}; give an object, such as Free()")
+    if case.dt != "auto" and not _positive(case.dt):
+        raise StudyError(f"dt is {case.dt!r} s; it must be positive, or 'auto' for a fraction of the stability limit")
+    if not _positive(case.dt_fraction):
+        raise StudyError(f"dt_fraction is {case.dt_fraction!r}; it must be positive, 1 is the stability limit itself")
+    if case.frames is not None and (type(case.frames) is not int or case.frames < 1):
+        raise StudyError(f"frames is {case.frames!r}; give a whole number from 1 on, or None for the scene's own")
+    try:
+        check_precision(case.precision, case.method)  # pyright: ignore[reportArgumentType]
+    except MassSpringError as error:
+        raise StudyError(str(error)) from error
+    if not isinstance(case.recorded, tuple):
+        raise StudyError(f"recorded is {case.recorded!r}; give a tuple, such as ({EXTRA[0]!r},)")
+    unknown = sorted(set(case.recorded) - set(EXTRA))
+    if unknown:
+        raise StudyError(f"no extra field is called '{unknown[0]}'; there are {', '.join(EXTRA)}")
+
+
+def _positive(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0 < value < math.inf

@@ -1,0 +1,69 @@
+"""A study by name: of the catalogue, or of a Python file of the user."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+from studies.base import interrupts
+from studies.base.errors import StudyError
+from studies.base.lookup import choose
+from studies.base.study_file import MODULE, what_failed
+from studies.catalog import STUDIES, Study
+from studies.runs.case import Case, case_from_json, case_to_dict
+
+
+def find_study(name: str) -> Study:
+    """A study of the catalogue, or STUDY of a Python file. Raises StudyError, for whatever is wrong with the file."""
+    if not name.endswith(".py"):
+        return choose(name, {study.name: study for study in STUDIES}, "study")
+    if not Path(name).is_file():
+        raise StudyError(f"there is no study file {name}; give a Python file that defines STUDY")
+    study = _load(Path(name).resolve())
+    if not isinstance(study, Study):
+        raise StudyError(f"{name} defines no STUDY of type studies.catalog.Study; see CONTRIBUTING.md")
+    for case in study.cases:
+        _check_stored(name, case)
+    return study
+
+
+def _check_stored(name: str, case: Case) -> None:
+    """Raises StudyError for a case that would not come back from its record as it is, with the first odd setting."""
+    try:
+        back = case_from_json(case.key)
+        odd = _difference(case_to_dict(case.replaced(timed=False)), case_to_dict(back))
+    except StudyError:
+        raise
+    except Exception as error:  # a setting of a user may be anything
+        raise StudyError(f"{name}: a case cannot be stored ({error}); use the project's own types") from error
+    if odd is not None or back != case.replaced(timed=False):
+        what = f" {odd}" if odd else ""
+        raise StudyError(f"{name}: case {case.name}{what} cannot be stored and read back; use the project's own types")
+    if not case.name.isprintable():
+        raise StudyError(f"{name}: case {case.name!r} has a name with characters that cannot be printed; rename it")
+
+
+def _difference(given: Any, back: Any, where: str = "") -> str | None:
+    """The first setting that is another after it was stored, as text "body.nodes = '100'"; None when none is."""
+    if isinstance(given, dict) and isinstance(back, dict):
+        pairs = [(f"{where}.{key}" if where else key, value, back.get(key)) for key, value in given.items()]
+    elif isinstance(given, list | tuple) and isinstance(back, list | tuple) and len(given) == len(back):
+        pairs = [(f"{where}[{k}]", a, b) for k, (a, b) in enumerate(zip(given, back, strict=True))]
+    else:
+        return None if type(given) is type(back) and given == back else f"{where} = {given!r}"
+    return next((odd for odd in (_difference(a, b, path) for path, a, b in pairs) if odd), None)
+
+
+def _load(path: Path) -> object:
+    spec = importlib.util.spec_from_file_location(MODULE, path)
+    assert spec is not None  # the name ends in .py
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[MODULE] = module  # its own dataclasses look themselves up there
+    try:
+        spec.loader.exec_module(module)
+    except BaseException as error:  # the file of a user may fail in any way, and may leave by sys.exit
+        if isinstance(error, KeyboardInterrupt) and (interrupts.pressed() or not interrupts.are_heard()):
+            raise
+        raise StudyError(f"{path.name} cannot be loaded: {what_failed(path, error)}; mend it and run again") from error
+    return getattr(module, "STUDY", None)

@@ -1,0 +1,137 @@
+"""Any body recipe that a study may name has a name, a line and a marker of its own in a chart."""
+
+import itertools
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.lines import Line2D
+
+from massspring import METHODS, Free, ImplicitVolume
+from studies.plots import force_path, laws, methods, recovery, stability, volume_history
+from studies.plots import work_precision as work
+from studies.plots.style.bodies import body_looks
+from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, styled
+from studies.scenes.stomach_press import STOMACH_PRESS
+from tests.plots.made_up import run
+from tests.plots.reading import words
+
+RECIPES = [
+    {"kind": kind, "recipe": {"volumes": volumes, "regions": regions}}
+    for kind in ("tetrahedral", "surface", "membrane")
+    for volumes, regions in (("scene", 32), ("whole", 32), ("nodal", 32), ("regions", 32), ("regions", 8))
+]
+
+
+def named(runs, **options):
+    """Name of each run's body."""
+    looks = body_looks(runs, **options)
+    return [looks[each.case.body].name for each in runs]
+
+
+def test_every_kind_with_every_choice_of_volumes_looks_different():
+    runs = [run(**chosen) for chosen in RECIPES]
+    looks = list(body_looks(runs).values())
+    assert [look.name for look in looks] == [each.case.body.series for each in runs]
+    assert len({look.line for look in looks}) == len({look.marker for look in looks}) == len(RECIPES)
+    assert len(RECIPES) == len(BODY_LOOKS) + len(SPARE_LOOKS)
+
+
+def test_a_known_body_looks_the_same_in_every_chart():
+    alone = body_looks([run(kind="surface")])
+    beside = body_looks([run(**chosen) for chosen in reversed(RECIPES)])
+    for body, look in alone.items():
+        assert beside[body] == look
+        assert (look.line, look.marker) == BODY_LOOKS["surface"]
+
+
+def test_dash_patterns_fit_into_a_legend_entry():
+    """A pattern repeats within the handle: 2.4 times 10 pt long, with lines 1.9 pt wide."""
+    patterns = [line for line, _ in (*BODY_LOOKS.values(), *SPARE_LOOKS) if line != "-"]
+    assert all(1.9 * sum(dashes) <= 24 for _, dashes in patterns)
+    assert len(set(patterns)) == len(patterns)
+
+
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        ([{"law": "uniform"}, {"law": "lloyd"}], ["tetrahedral, uniform", "tetrahedral, lloyd"]),
+        ([{"axis": "centre_line"}, {}], ["surface, centre line", "surface, straight"]),
+        ([{}, {"weights": (1, 0.5, 2, 1)}], ["surface, default weights", "surface, weights 1:0.5:2:1"]),
+    ],
+)
+def test_bodies_of_one_series_are_told_apart_by_what_differs(options, names):
+    kind = names[0].split(",")[0]
+    runs = [run(kind=kind, recipe=chosen) for chosen in options]
+    assert named(runs) == names
+    assert len({look.line for look in body_looks(runs).values()}) == 2
+
+
+def test_what_differs_between_scenes_alone_needs_no_words():
+    runs = [run(kind="surface"), run(STOMACH_PRESS, kind="surface", recipe={"axis": "centre_line"})]
+    assert named(runs) == ["surface", "surface"]
+
+
+def test_an_option_shown_in_another_way_is_left_out():
+    runs = [run(nodes=nodes) for nodes in (150, 1550)]
+    assert named(runs) == ["tetrahedral, 150 nodes", "tetrahedral, 1,550 nodes"]
+    assert named(runs, ignored=("nodes",)) == ["tetrahedral", "tetrahedral"]
+
+
+@pytest.mark.parametrize("chart", [volume_history, force_path, recovery])
+def test_the_legend_shows_the_lines_that_are_drawn(chart):
+    runs = [
+        run(kind="tetrahedral", method=method, recipe=recipe)
+        for method, recipe in itertools.product(
+            (Free(), ImplicitVolume()), ({"volumes": "regions"}, {"volumes": "whole"}, {"law": "uniform"}, {})
+        )
+    ]
+    figure = styled(chart.figure)(runs)
+    told = {
+        handle.get_label(): pattern(handle) for handle in figure.legends[0].legend_handles if isinstance(handle, Line2D)
+    }
+    drawn = [pattern(line) for line in figure.axes[0].get_lines()]
+    for name, looks in told.items():
+        if name.startswith("tetrahedral"):
+            assert drawn.count(looks) == 1, name
+    assert "tetrahedral, 32 volumes, free" in told
+    assert "tetrahedral, uniform, implicit volume" in told
+    assert "tetrahedral, van gelder, implicit volume" in told
+
+
+def pattern(line: Line2D):
+    """Dashes in multiples of the width, and colour, of a line."""
+    dashes = line._unscaled_dash_pattern[1]  # pyright: ignore[reportAttributeAccessIssue]
+    return (tuple(np.round(dashes, 6)) if dashes else "-", to_hex(line.get_color()))
+
+
+def test_meshes_of_different_bodies_are_not_joined():
+    runs = [
+        run(nodes=nodes, frame_ms=1.0, recipe=recipe) for nodes in (150, 550) for recipe in ({}, {"volumes": "nodal"})
+    ]
+    figure = work.figure(runs)
+    joined = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 2 and line.get_marker() == "None"]
+    assert [list(line.get_ydata()) for line in joined[:2]]
+    assert len(joined) == 2
+    assert {"tetrahedral", "tetrahedral, nodal volumes"} <= {t.get_text() for t in figure.legends[0].get_texts()}
+
+
+def test_regions_of_different_number_have_lines_of_their_own_among_the_laws():
+    runs = [run(recipe={"volumes": "regions", "regions": number}) for number in (8, 32)]
+    told = words(laws.figure(runs).legends[0])
+    assert "tetrahedral, 8 volumes" in told and "tetrahedral, 32 volumes" in told
+
+
+def test_rows_and_panels_carry_the_body():
+    runs = [run(recipe={"volumes": "regions"}), run(kind="surface", recipe={"volumes": "whole"})]
+    assert list(methods.row_names(runs).values()) == [
+        "implicit volume, tetrahedral, 32 volumes",
+        "implicit volume, surface, one volume",
+    ]
+    assert list(methods.row_names(runs[:1]).values()) == ["implicit volume, 32 volumes"]
+    titles = [axes.get_title().replace("\n", " ") for axes in stability.figure(runs).axes]
+    assert "Ball squeeze, surface, one volume, implicit volume" in titles
+
+
+def test_a_method_of_the_user_has_a_colour_that_no_other_method_has():
+    assert method_colour("a_method_of_mine") not in {method_colour(method.name) for method in METHODS}
