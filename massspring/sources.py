@@ -62,9 +62,14 @@ def source_fingerprint(*modules: str, within: tuple[str, ...] = OWN) -> str:
 
 def own_file(module: str) -> Path | None:
     """The file of an own module or package; None where there is none."""
+    return _file_below(ROOT, module)
+
+
+@cache
+def _file_below(root: Path, module: str) -> Path | None:
     if module.split(".")[0] not in OWN:
         return None
-    path = ROOT.joinpath(*module.split("."))
+    path = root.joinpath(*module.split("."))
     candidates = (path.with_suffix(".py"), path / "__init__.py")
     return next((file for file in candidates if file.is_file()), None)
 
