@@ -17,6 +17,7 @@ from reference_fem.crosscheck.bench import iteration_ratio
 from reference_fem.exact import BALL_BETWEEN_PLANES
 from studies.bench import meshes as geometry_bench
 from studies.bench.line import Line
+from studies.bench.plain import plain_lines
 from studies.bench.slide import slide_lines
 from studies.bench.solver import growth_lines, large_lines, step_lines, threads_lines, volumes_lines
 from studies.reference.problem import reference_problem, whole_forces
@@ -111,6 +112,7 @@ def main() -> None:
     """Measures everything; the table says for each number whether it is met."""
     stages: tuple[Callable[[], list[Line]], ...] = (
         step_lines,
+        plain_lines,
         large_lines,
         threads_lines,
         slide_lines,

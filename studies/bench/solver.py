@@ -40,10 +40,10 @@ LARGE, SMALL, HUGE = 19_500, 2_000, 200_000
 """Surface nodes: the paper's refined stomach, and the two between which growth is asked for."""
 
 
-def squeezed_setup(method: Method) -> Setup:
-    """The paper's 550-node surface body, held below and pressed by one plane from above; frames of 20 steps."""
-    body = _surface(550)
-    clock = Clock(STEPS * 0.5 * step_limit(body).undamped, FRAMES, STEPS)
+def squeezed_setup(method: Method, nodes: int = 550, frames: int = FRAMES) -> Setup:
+    """The paper's surface body, held below and pressed by one plane from above; frames of 20 steps."""
+    body = _surface(nodes)
+    clock = Clock(STEPS * 0.5 * step_limit(body).undamped, frames, STEPS)
     press = Motion((0.0, 0.5 * clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.3 * RADIUS)))
     plane = Plane((0.0, 0.0, RADIUS), (0.0, 0.0, -1.0), press)
     return Setup(body, method, clock, (plane,), (_bottom(body),), damping=40.0)

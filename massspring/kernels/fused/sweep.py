@@ -4,85 +4,99 @@ Each spring is computed at both of its ends: nothing is scattered, and all lanes
 """
 
 from massspring.kernels.forces.springs import SHORTEST
-from massspring.kernels.fused.chunk import (
-    AREA,
-    EVEN,
-    FIRST,
-    FORCE,
-    HERE,
-    LANES,
-    ODD,
-    RESULT,
-    SHARE,
-    SPEED,
-    SUMS,
-    begin,
-    close_rings,
-    fetch,
-    put,
-    store,
-    stretch,
-    sweep_pair,
-    take,
-    total,
-)
+from massspring.kernels.fused.chunk import AREA, FORCE, HERE, LANES, RESULT, SHARE, SPEED, SUMS, put, take, total
 from massspring.kernels.fused.long_rows import add_walls, join_pieces
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.jit.decorators import inlined, lean
 from massspring.kernels.jit.thread_team import JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, call, join
+from massspring.kernels.jit.vectors import at_least, gather, lanes_of, load, root, save, spread
 
 
 @inlined
-def gather(places, slices, s, keeps, shortest, o0, o1, o2, tile):
+def gather_slice(places, slices, s, keeps, shortest, o0, o1, o2, tile):
     """f_i [N] (eq. 1) and, where a volume is kept, 6 G_i = Σ_k d_k × d_k+1 [m²] (eq. 108) of a slice; its share of V.
 
-    d_k = x_k − x_i goes round the ring of neighbours of node i, then on to its other springs. The share is the slice's
-    in 18 V = Σ 6 G·(x − o); o is a node of the surface, so that no digits are lost far from the origin.
+    The share is the slice's in 18 V = Σ 6 G·(x − o); o is a node of the surface, so that no digits are lost far from
+    the origin.
     """
-    neighbour, rest_length = slices.neighbour, slices.rest_length
-    stiffness, stiffness_row = slices.stiffness, slices.stiffness_row
-    begin(places, slices, s, tile)
     first, last = slices.start[s], slices.start[s + 1]
     ring_end = first + (slices.rings[s] if keeps else 0)
-    share = 0.0
-    if ring_end > first:
-        walk_rings(places, slices, first, ring_end, shortest, tile)
-        close_rings(tile, (ring_end - first) % 2, o0, o1, o2)
-        share = total(tile, SHARE)
-    for row in range(ring_end, last):
-        fetch(places, neighbour, row, tile)
-        k = stiffness_row[row]
-        for lane in range(LANES):
-            stretch(tile, lane, stiffness[k, lane], rest_length[row, lane], shortest)
-    return share
+    none = spread(0, places)
+    origin = spread(o0, places), spread(o1, places), spread(o2, places)
+    for lane in range(0, LANES, lanes_of(places)):
+        here = gather(places, slices.node, s, lane)
+        force, area = (none, none, none), (none, none, none)
+        if ring_end > first:
+            force, area = walk_rings(places, slices, first, ring_end, lane, spread(shortest, places), here)
+            save(dot(area, minus(here, origin)), tile, SHARE + lane)
+        for row in range(ring_end, last):
+            d = minus(gather(places, slices.neighbour, row, lane), here)
+            force = pulled_by(force, slices, row, lane, spread(shortest, places), d)
+        save_three(force, tile, FORCE + lane)
+        save_three(area, tile, AREA + lane)
+    return total(tile, SHARE) if ring_end > first else 0.0
 
 
 @inlined
-def walk_rings(places, slices, first, last, shortest, tile):
-    """The springs to the rings of a slice and, of 6 G, what lies between the first and the last entry.
+def walk_rings(places, slices, first, last, lane, shortest, here):
+    """f_i of the springs to the rings of some lanes, and 6 G_i.
 
-    Entries 1 and 2, 3 and 4, … give theirs together; of an even number the last is left for `close_rings`.
+    d_k = x_k − x_i goes round the ring of neighbours of node i. Two products with a common factor are one:
+    d_k−1 × (d_k − d_k−2).
     """
-    neighbour, rest_length = slices.neighbour, slices.rest_length
-    stiffness, stiffness_row = slices.stiffness, slices.stiffness_row
-    fetch(places, neighbour, first, tile)
-    k = stiffness_row[first]
-    for lane in range(LANES):
-        d0, d1, d2 = stretch(tile, lane, stiffness[k, lane], rest_length[first, lane], shortest)
-        store(tile, EVEN, lane, d0, d1, d2)
-        store(tile, FIRST, lane, d0, d1, d2)
-    for row in range(first + 1, last):
-        fetch(places, neighbour, row, tile)
-        k = stiffness_row[row]
-        if (row - first) % 2:
-            for lane in range(LANES):
-                d0, d1, d2 = stretch(tile, lane, stiffness[k, lane], rest_length[row, lane], shortest)
-                store(tile, ODD, lane, d0, d1, d2)
-        else:
-            for lane in range(LANES):
-                d0, d1, d2 = stretch(tile, lane, stiffness[k, lane], rest_length[row, lane], shortest)
-                sweep_pair(tile, lane, d0, d1, d2)
-                store(tile, EVEN, lane, d0, d1, d2)
+    none = spread(0, places)
+    start = minus(gather(places, slices.neighbour, first, lane), here)
+    force = pulled_by((none, none, none), slices, first, lane, shortest, start)
+    area, even = (none, none, none), start
+    for row in range(first + 1, last - 1, 2):
+        odd = minus(gather(places, slices.neighbour, row, lane), here)
+        force = pulled_by(force, slices, row, lane, shortest, odd)
+        after = minus(gather(places, slices.neighbour, row + 1, lane), here)
+        force = pulled_by(force, slices, row + 1, lane, shortest, after)
+        area = plus(area, cross(odd, minus(after, even)))
+        even = after
+    if (last - first) % 2:
+        return force, plus(area, cross(even, start))
+    odd = minus(gather(places, slices.neighbour, last - 1, lane), here)
+    force = pulled_by(force, slices, last - 1, lane, shortest, odd)
+    return force, plus(area, cross(odd, minus(start, even)))
+
+
+@inlined
+def pulled_by(force, slices, row, lane, shortest, d):
+    """f_i + (k − k L/|d|) d [N] (eq. 1); exactly f_i at rest length."""
+    stiffness = load(slices.stiffness, slices.stiffness_row[row], lane)
+    length = at_least(root(dot(d, d)), shortest)
+    c = stiffness - stiffness * (load(slices.rest_length, row, lane) / length)
+    return force[0] + c * d[0], force[1] + c * d[1], force[2] + c * d[2]
+
+
+@inlined
+def minus(a, b):
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inlined
+def plus(a, b):
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inlined
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inlined
+def save_three(vector, tile, at):
+    """The components into blocks of the tile that follow each other."""
+    save(vector[0], tile, at)
+    save(vector[1], tile, at + LANES)
+    save(vector[2], tile, at + 2 * LANES)
 
 
 @inlined
@@ -91,7 +105,7 @@ def predict_slice(nodes, slices, s, dt, keep, a0, a1, a2, tile):
     v, node, inverse_mass = nodes.v, slices.node, slices.inverse_mass
     sixth = nodes.x.dtype.type(1.0 / 6.0)
     if slices.first[s] >= 0:
-        take(v, slices.first[s], 3, tile)
+        take(v, slices.first[s], tile)
     else:
         for lane in range(LANES):
             i, at = node[s, lane], SPEED + 3 * lane
@@ -132,7 +146,7 @@ def pass_slices(nodes, work, drive, slices, part, keeps, tile):
     shortest = real(SHORTEST)
     o0, o1, o2 = places[slices.origin, 0], places[slices.origin, 1], places[slices.origin, 2]
     for s in range(part[0], part[1]):
-        sums[s, 0] = gather(places, slices, s, keeps, shortest, o0, o1, o2, tile)
+        sums[s, 0] = gather_slice(places, slices, s, keeps, shortest, o0, o1, o2, tile)
         if s < slices.pieces:
             for entry in range(RESULT):
                 pulled[s, entry] = tile[entry]

@@ -1,0 +1,249 @@
+# pyright: reportCallIssue=false, reportOptionalCall=false
+"""Vector registers as values: the components of several nodes side by side, with +, −, ×, ÷ lane by lane.
+
+The compiler makes vectors of loops over arrays in memory, not of sums that stay in registers over a loop. The plain
+functions say what is meant, with NumPy's arrays for vectors, and serve where nothing is compiled.
+"""
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import binding, ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import lower_builtin, models, register_model, type_callable
+
+BYTES = 64 if binding.get_host_cpu_features().get("avx512f") else 32
+"""Of a register; results do not depend on it."""
+
+
+def lanes_of(table: np.ndarray) -> int:
+    """How many numbers of a table a register holds."""
+    return BYTES // table.itemsize
+
+
+def spread(number: Any, table: np.ndarray) -> Any:
+    """One number, as real as `table`, in all lanes."""
+    return np.full(lanes_of(table), number, dtype=table.dtype)
+
+
+def load(table: np.ndarray, row: int, column: int) -> Any:
+    """As many numbers of a row as a register holds, from `column` on."""
+    return table[row, column : column + lanes_of(table)].copy()
+
+
+def save(vector: Any, table: np.ndarray, at: int) -> None:
+    """The lanes into a flat table from `at` on."""
+    table[at : at + len(vector)] = vector
+
+
+def gather(places: np.ndarray, nodes: np.ndarray, row: int, column: int) -> tuple[Any, Any, Any]:
+    """x, y and z of the nodes of as many lanes as a register holds; `places` (n, 4), four numbers in one move."""
+    x, y, z, _ = places[nodes[row, column : column + lanes_of(places)]].T
+    return x, y, z
+
+
+def root(vector: Any) -> Any:
+    """√ of each lane."""
+    return np.sqrt(vector)
+
+
+def at_least(vector: Any, least: Any) -> Any:
+    """The larger of two lanes; what is not a number stays so."""
+    return np.where(vector < least, least, vector)
+
+
+class Vector(types.Type):
+    """The numbers of one register."""
+
+    def __init__(self, real: Any) -> None:
+        self.real, self.count = real, 8 * BYTES // real.bitwidth
+        super().__init__(name=f"vector({real} x {self.count})")
+
+
+@register_model(Vector)
+class _VectorModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, ir.VectorType(manager.lookup(kind.real).get_value_type(), kind.count))
+
+
+def _operation(function: Callable[..., Any], instruction: str) -> None:
+    """+, −, × or ÷ of two vectors."""
+
+    class Typed(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            if len(args) == 2 and isinstance(args[0], Vector) and args[0] == args[1]:
+                return signature(args[0], *args)
+            return None
+
+    infer_global(function)(Typed)
+
+    @lower_builtin(function, Vector, Vector)
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return getattr(builder, instruction)(*args)
+
+
+for _function, _instruction in (
+    (operator.add, "fadd"),
+    (operator.sub, "fsub"),
+    (operator.mul, "fmul"),
+    (operator.truediv, "fdiv"),
+):
+    _operation(_function, _instruction)
+
+
+@type_callable(lanes_of)
+def _type_of_lanes(context: Any) -> Any:
+    return lambda table: types.intp
+
+
+@lower_builtin(lanes_of, types.Array)
+def _lanes(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    return context.get_constant(types.intp, 8 * BYTES // signature.args[0].dtype.bitwidth)
+
+
+@type_callable(spread)
+def _type_of_spread(context: Any) -> Any:
+    return lambda number, table: Vector(table.dtype)
+
+
+@lower_builtin(spread, types.Number, types.Array)
+def _spread(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    kind = signature.return_type
+    number = context.cast(builder, args[0], signature.args[0], kind.real)
+    none = ir.Constant(context.get_value_type(kind), ir.Undefined)
+    single = builder.insert_element(none, number, ir.Constant(ir.IntType(32), 0))
+    return _shuffled(builder, single, none, [0] * kind.count)
+
+
+def _shuffled(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
+    """Lanes of a, then of b, in any order."""
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), len(order)), order))
+
+
+def _address(context: Any, builder: Any, kind: Any, array: Any, indices: list[tuple[Any, Any]]) -> Any:
+    """Where a number of a contiguous table is."""
+    made = context.make_array(kind)(context, builder, array)
+    at = [context.cast(builder, value, of, types.intp) for value, of in indices]
+    if len(at) == 1:
+        return builder.gep(made.data, at)
+    width = cgutils.unpack_tuple(builder, made.shape)[1]
+    return builder.gep(made.data, [builder.add(builder.mul(at[0], width), at[1])])
+
+
+def _bytes(kind: Any) -> int:
+    return kind.dtype.bitwidth // 8
+
+
+@type_callable(load)
+def _type_of_load(context: Any) -> Any:
+    return lambda table, row, column: Vector(table.dtype)
+
+
+@lower_builtin(load, types.Array, types.Integer, types.Integer)
+def _load(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    kinds = signature.args
+    pointer = _address(context, builder, kinds[0], args[0], [(args[1], kinds[1]), (args[2], kinds[2])])
+    vector = context.get_value_type(signature.return_type)
+    return builder.load(builder.bitcast(pointer, vector.as_pointer()), align=_bytes(kinds[0]))
+
+
+@type_callable(save)
+def _type_of_save(context: Any) -> Any:
+    return lambda vector, table, at: types.void
+
+
+@lower_builtin(save, Vector, types.Array, types.Integer)
+def _save(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    kinds = signature.args
+    pointer = _address(context, builder, kinds[1], args[1], [(args[2], kinds[2])])
+    builder.store(args[0], builder.bitcast(pointer, args[0].type.as_pointer()), align=_bytes(kinds[1]))
+    return context.get_dummy_value()
+
+
+@type_callable(gather)
+def _type_of_gather(context: Any) -> Any:
+    return lambda places, nodes, row, column: types.UniTuple(Vector(places.dtype), 3)
+
+
+@lower_builtin(gather, types.Array, types.Array, types.Integer, types.Integer)
+def _gather(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    places, nodes, row_kind, column_kind = signature.args
+    first = _address(context, builder, nodes, args[1], [(args[2], row_kind), (args[3], column_kind)])
+    base = context.make_array(places)(context, builder, args[0]).data
+    four, word = ir.VectorType(base.type.pointee, 4), context.get_value_type(types.intp)
+    rows = []
+    for lane in range(signature.return_type.dtype.count):
+        node = builder.zext(builder.load(builder.gep(first, [word(lane)])), word)
+        pointer = builder.gep(base, [builder.mul(node, word(4))])
+        rows.append(builder.load(builder.bitcast(pointer, four.as_pointer()), align=_bytes(places)))
+    turned = _turned_double if places.dtype.bitwidth == 64 else _turned_single
+    return context.make_tuple(builder, signature.return_type, turned(builder, rows))
+
+
+def _joined(builder: Any, parts: list[Any]) -> Any:
+    """Short vectors one after the other in a long one."""
+    while len(parts) > 1:
+        length = 2 * parts[0].type.count
+        parts = [_shuffled(builder, a, b, list(range(length))) for a, b in zip(parts[::2], parts[1::2], strict=True)]
+    return parts[0]
+
+
+def _turned_double(builder: Any, rows: list[Any]) -> list[Any]:
+    """x, y and z of rows (x, y, z, 0): pairs within 128 bits first, then whole pairs, one instruction each."""
+    half, width = len(rows) // 2, len(rows)
+    quarters = [_joined(builder, rows[begin : begin + half : 2]) for begin in (0, 1, half, half + 1)]
+    fours = range(0, width, 4)
+
+    def pairs(a: Any, b: Any, component: int) -> Any:
+        order = [k + at for k in fours for pair in (0, 2) for at in (pair + component, width + pair + component)]
+        return _shuffled(builder, a, b, order)
+
+    even, odd = ([pairs(*two, component) for two in (quarters[:2], quarters[2:])] for component in (0, 1))
+    low = [begin + k + at for begin in (0, width) for k in fours for at in (0, 1)]
+    return [
+        _shuffled(builder, *even, low),
+        _shuffled(builder, *odd, low),
+        _shuffled(builder, *even, [at + 2 for at in low]),
+    ]
+
+
+def _turned_single(builder: Any, rows: list[Any]) -> list[Any]:
+    """The same of single numbers: four rows fill 128 bits each and are turned within them."""
+    width = len(rows)
+    quarters = [_joined(builder, rows[begin::4]) for begin in range(4)]
+
+    def picked(a: Any, b: Any, first: int, second: int) -> Any:
+        fours = range(0, width, 4)
+        return _shuffled(
+            builder, a, b, [k + at for k in fours for at in (first, second, width + first, width + second)]
+        )
+
+    even, odd = ([picked(*two, begin, begin + 2) for two in (quarters[:2], quarters[2:])] for begin in (0, 1))
+    return [picked(*even, 0, 2), picked(*odd, 0, 2), picked(*even, 1, 3)]
+
+
+@type_callable(root)
+def _type_of_root(context: Any) -> Any:
+    return lambda vector: vector
+
+
+@lower_builtin(root, Vector)
+def _root(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    vector = args[0].type
+    name = f"llvm.sqrt.v{vector.count}{vector.element.intrinsic_name}"
+    function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(vector, [vector]), name)
+    return builder.call(function, args)
+
+
+@type_callable(at_least)
+def _type_of_at_least(context: Any) -> Any:
+    return lambda vector, least: vector
+
+
+@lower_builtin(at_least, Vector, Vector)
+def _at_least(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    return builder.select(builder.fcmp_ordered("<", *args), args[1], args[0])
