@@ -12,6 +12,7 @@ from studies.base.compile_watch import watching
 from studies.cli.progress import QUIET_SECONDS, TerminalProgress, compiling, words
 from studies.runs.current import case_path
 from studies.store.record import peek, read_record, write_record
+from studies.store.staleness import CODE_CHANGED, MISSING
 from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, plan
 from studies.sweep.run_studies import perform, run_studies, told_by_workers
 from studies.sweep.standings import failed
@@ -29,7 +30,7 @@ def test_from_nothing_everything_is_planned_without_an_estimate(tmp_path):
     found = plan(tmp_path, tiny_study())
     assert sorted(p.kind for p in found) == ["case"] * 3 + ["timing"] * 3
     assert {p.seconds for p in found} == {None}
-    assert {p.why for p in found if p.kind == "case"} == {"missing"}
+    assert {p.why for p in found} == {MISSING}
     assert expected(found, 2) is None
 
 
@@ -38,8 +39,8 @@ def test_what_is_planned_is_what_runs(results):
     timing_file(results, "tiny", tiny_study().cases[1]).unlink()
     found = plan(results, tiny_study())
     assert [(p.stage, p.label, p.why) for p in found] == [
-        (PHYSICS, tiny_case().name, "the code changed"),
-        (TIMING, tiny_study().cases[1].name, "missing"),
+        (PHYSICS, tiny_case().name, CODE_CHANGED),
+        (TIMING, tiny_study().cases[1].name, MISSING),
     ]
     assert found[0].seconds == peek(path).attributes["seconds"] > 0
     assert found[1].seconds is None
@@ -83,7 +84,7 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
     assert "no estimate: of some kind nothing has run yet" in out
     stale(results, tiny_case(timed=True))
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--results", results)
-    assert re.search(r"  1 case \(the code changed\): about \d+ s of computing\n", out)
+    assert re.search(r"  1 case \(the code has changed since\): about \d+ s of computing\n", out)
     assert "with 2 processes, from earlier runs of 1 of the 1 pieces; compiling comes on top" in out
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--only", "failed", "--results", results)
     assert out.strip() == "tiny: nothing would run, all is current"
