@@ -34,7 +34,7 @@ METHODS: tuple[type[Method], ...] = (
 )
 
 VARIANTS: tuple[Method, ...] = (Element(hard=True), Xpbd(volumes="whole"))
-"""Settings with which a method supports something else than by default."""
+"""Settings with which a method solves other equations than by default; the contract test covers them too."""
 
 __all__ = [
     "METHODS",
