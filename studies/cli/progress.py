@@ -134,4 +134,4 @@ def dry_run(console: Console, study: str, planned: list[Planned], jobs: int) -> 
     if total is not None:
         say(f"  about {words(total)} with {jobs} processes, {basis}")
     else:
-        say("  no estimate: of some kind nothing has run yet")
+        say("  no estimate: nothing of it has run yet")
