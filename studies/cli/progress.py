@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from studies.base.interrupts import stop_if_pressed
+from studies.store.staleness import MISSING
 from studies.sweep.plan import TIMING, Planned, expected
 
 QUIET_SECONDS = 10.0
@@ -122,7 +123,7 @@ def dry_run(console: Console, study: str, planned: list[Planned], jobs: int) -> 
     say(f"{study}: {len(planned)} pieces would run")
     groups: dict[tuple[str, str], list[Planned]] = {}
     for piece in planned:
-        groups.setdefault((piece.kind, piece.why), []).append(piece)
+        groups.setdefault((piece.kind, "missing" if piece.why == MISSING else piece.why), []).append(piece)
     for (kind, why), found in groups.items():
         seconds = expected(found, 1)
         cost = "no estimate" if seconds is None else f"about {words(seconds)} of computing"
@@ -133,4 +134,4 @@ def dry_run(console: Console, study: str, planned: list[Planned], jobs: int) -> 
     if total is not None:
         say(f"  about {words(total)} with {jobs} processes, {basis}")
     else:
-        say("  no estimate: of some kind nothing has run yet")
+        say("  no estimate: nothing of it has run yet")

@@ -59,13 +59,13 @@ def _seconds(path: Path) -> float | None:
 
 
 def expected(found: Sequence[Planned], jobs: int) -> float | None:
-    """Seconds that `found` takes in `jobs` processes, timing alone; pieces that never ran count as the mean of their
-    kind. None where of some kind nothing ever ran."""
-    total = 0.0
+    """Seconds that `found` takes in `jobs` processes, timing alone. A piece that never ran counts as the mean of its
+    kind, or not at all where none of its kind ran; None where none of any kind did."""
+    total, known = 0.0, False
     for kind in {piece.kind for piece in found}:
         pieces = [piece for piece in found if piece.kind == kind]
-        known = [piece.seconds for piece in pieces if piece.seconds is not None]
-        if not known:
-            return None
-        total += sum(known) / len(known) * len(pieces) / (1 if pieces[0].stage == TIMING else jobs)
-    return total
+        seconds = [piece.seconds for piece in pieces if piece.seconds is not None]
+        if seconds:
+            known = True
+            total += sum(seconds) / len(seconds) * len(pieces) / (1 if pieces[0].stage == TIMING else jobs)
+    return total if known else None

@@ -84,7 +84,7 @@ def test_held_back_it_waits_and_is_not_lost():
 
 @pytest.mark.parametrize(("ready", "code"), [("", 0), ("interrupts.die_quietly(); ", -signal.SIGINT)])
 def test_a_process_that_starts_meanwhile_waits_until_it_is_ready(ready, code):
-    program = f"import os, signal; from studies import interrupts; os.kill(os.getpid(), signal.SIGINT); {ready}"
+    program = f"import os, signal; from studies.base import interrupts; os.kill(os.getpid(), signal.SIGINT); {ready}"
     with interrupts.held_back():
         done = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (code, b"")
@@ -103,7 +103,9 @@ if __name__ == "__main__":
     print(*[worker.pid for worker in multiprocessing.active_children()], flush=True)
     busy.result()
 """
-MESHER = "import os, time; from studies import interrupts; interrupts.end_after(lambda: os.read(0, 1)); time.sleep(600)"
+MESHER = (
+    "import os, time; from studies.base import interrupts; interrupts.end_after(lambda: os.read(0, 1)); time.sleep(600)"
+)
 
 
 def alive(number):

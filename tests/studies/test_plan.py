@@ -12,6 +12,7 @@ from studies.base.compile_watch import watching
 from studies.cli.progress import QUIET_SECONDS, TerminalProgress, compiling, words
 from studies.runs.current import case_path
 from studies.store.record import peek, read_record, write_record
+from studies.store.staleness import CODE_CHANGED, MISSING
 from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, plan
 from studies.sweep.run_studies import perform, run_studies, told_by_workers
 from studies.sweep.standings import failed
@@ -29,7 +30,7 @@ def test_from_nothing_everything_is_planned_without_an_estimate(tmp_path):
     found = plan(tmp_path, tiny_study())
     assert sorted(p.kind for p in found) == ["case"] * 3 + ["timing"] * 3
     assert {p.seconds for p in found} == {None}
-    assert {p.why for p in found if p.kind == "case"} == {"missing"}
+    assert {p.why for p in found} == {MISSING}
     assert expected(found, 2) is None
 
 
@@ -38,8 +39,8 @@ def test_what_is_planned_is_what_runs(results):
     timing_file(results, "tiny", tiny_study().cases[1]).unlink()
     found = plan(results, tiny_study())
     assert [(p.stage, p.label, p.why) for p in found] == [
-        (PHYSICS, tiny_case().name, "the code changed"),
-        (TIMING, tiny_study().cases[1].name, "missing"),
+        (PHYSICS, tiny_case().name, CODE_CHANGED),
+        (TIMING, tiny_study().cases[1].name, MISSING),
     ]
     assert found[0].seconds == peek(path).attributes["seconds"] > 0
     assert found[1].seconds is None
@@ -65,8 +66,8 @@ def test_the_estimate_shares_the_physics_and_not_the_timing():
     assert expected(known, 1) == pytest.approx(11.0)
     assert expected(known, 2) == pytest.approx(8.0)
     assert expected([*known, piece(PHYSICS, "case", None)], 1) == pytest.approx(14.0)  # as long as the mean
-    assert expected([*known, piece(PHYSICS, "reference", None)], 1) is None
-    assert expected([], 2) == 0
+    assert expected([*known, piece(PHYSICS, "reference", None)], 1) == pytest.approx(11.0)  # nothing to go by
+    assert expected([piece(PHYSICS, "reference", None)], 1) is None
 
 
 @pytest.mark.parametrize(("seconds", "said"), [(0.2, "1 s"), (80, "80 s"), (200, "3 min"), (6000, "1 h 40 min")])
@@ -80,10 +81,10 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
     assert not (tmp_path / "empty").exists()
     assert "tiny: 6 pieces would run" in out
     assert "  3 cases (missing): no estimate" in out
-    assert "no estimate: of some kind nothing has run yet" in out
+    assert "no estimate: nothing of it has run yet" in out
     stale(results, tiny_case(timed=True))
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--results", results)
-    assert re.search(r"  1 case \(the code changed\): about \d+ s of computing\n", out)
+    assert re.search(r"  1 case \(the code has changed since\): about \d+ s of computing\n", out)
     assert "with 2 processes, from earlier runs of 1 of the 1 pieces; compiling comes on top" in out
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--only", "failed", "--results", results)
     assert out.strip() == "tiny: nothing would run, all is current"

@@ -9,10 +9,10 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Chart
-from studies.cli import app as cli
-from studies.cli import publish as command
+from studies.cli.commands import publish as command
+from studies.cli.commands import report as report_command
 from studies.report.publish import BEGIN, END, EXTRAS, PUBLISHED, publish, write_readme
-from studies.runs import run
+from studies.runs import current as runs
 from studies.runs.current import case_path
 from studies.store.stamps import is_stamped, set_stamp
 from studies.timing.cases import timing_file
@@ -79,7 +79,7 @@ def miss_a_timing(root, monkeypatch):
 
 
 def change_the_code(root, monkeypatch):
-    monkeypatch.setattr(run, "run_fingerprint", lambda: "another code")
+    monkeypatch.setattr(runs, "run_fingerprint", lambda: "another code")
 
 
 def leave_an_old_bench(root, monkeypatch):
@@ -126,7 +126,7 @@ def test_the_command_publishes_where_it_stands_or_says_one_sentence(current, hom
 def test_report_leaves_readme_and_what_is_published_alone(current, home, organbench, monkeypatch):
     monkeypatch.chdir(home)
     before = shown(home)
-    monkeypatch.setattr(cli, "STUDIES", (HEADLINE,))
+    monkeypatch.setattr(report_command, "STUDIES", (HEADLINE,))
     assert organbench("report", "--results", current)[0] == 0
     assert (current / "summary.md").is_file() and shown(home) == before
 
