@@ -61,11 +61,14 @@ def check_targets(targets: Mapping[str, Ramp], body: Body, method: Method) -> No
             raise MassSpringError(f"target '{name}' falls to {min(ramp.values):g} of its rest volume; keep it positive")
 
 
-def check_prestress(body: Body) -> None:
-    """Springs without length need a volume at every node: one for many nodes would let some shrink as others grow.
+def check_body(body: Body, method: Method) -> None:
+    """Raises MassSpringError for a body that the method cannot advance.
 
-    Raises MassSpringError.
+    Springs without length need a volume at every node: one for many nodes would let some shrink as others grow.
     """
+    reason = method.why_not(body)
+    if reason is not None:
+        raise MassSpringError(f"method '{method.name}' does not apply to this body: {reason}")
     if body.rest_pressure and body.kept.count < body.node_count:
         raise MassSpringError(
             f"springs of law '{body.law}' pull every part of the body together, and it keeps {body.kept.count} "

@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 
 from massspring.body.body import Body
-from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import Drive, Tips
 from massspring.layout.probe_arrays import new_probing
 from massspring.layout.state import State
 from massspring.layout.threads import shared
 from massspring.methods.method import Method
 from massspring.run.checks import (
+    check_body,
     check_nodal,
-    check_prestress,
     check_probe,
     check_solid,
     check_surroundings,
@@ -64,9 +63,7 @@ class Setup:
     """That share a step; the result is the same to the last bit. Pays for bodies of some thousand nodes."""
 
     def __post_init__(self) -> None:
-        reason = self.method.why_not(self.body)
-        if reason is not None:
-            raise MassSpringError(f"method '{self.method.name}' does not apply to this body: {reason}")
+        check_body(self.body, self.method)
         check_precision(self.precision, self.method)
         check_threads(self.threads, self.method)
         limited = self.method.capabilities.conditionally_stable
@@ -79,7 +76,6 @@ class Setup:
                 check_probe(number, obstacle, self.method, self.body, x)
             else:
                 check_solid(number, obstacle, self.body, x)
-        check_prestress(self.body)
         check_targets(self.targets, self.body, self.method)
         rate = fastest_filling(self.body)
         for name in self.ramped:

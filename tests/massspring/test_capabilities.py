@@ -2,6 +2,7 @@
 sentence; and docs/methods.md says the same."""
 
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path as File
 
 import numpy as np
@@ -25,7 +26,7 @@ from massspring import (
 from massspring.methods.capabilities import Capabilities, No
 from studies.report.methods_page import OPTIONS, methods_page
 from tests.massspring.conftest import SOFT, block, body_of, hollow_block, icosphere
-from tests.massspring.rows import CONTESTANTS, KINDS, SUPPORTED
+from tests.massspring.rows import CONTESTANTS, KINDS, SUPPORTED, by_pairs, kinds_of
 from tests.massspring.test_methods import clock_for
 
 EACH = pytest.mark.parametrize("method", CONTESTANTS.values(), ids=CONTESTANTS.keys())
@@ -120,6 +121,23 @@ def test_every_method_supports_friction(method, block_body):
     setup = Setup(block_body, method, clock, (Plane((0, 0, top), (0, 0, -1), way, friction=0.5),))
     drag = simulate(setup).contact_force.sum(axis=0)[0]
     assert drag[2] < 0 and 0.05 * -drag[2] < drag[0] <= 0.5 * -drag[2] * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(("options", "exclude"), [(("",), ()), ((10.0, 1e6), ()), ("abc", [("nodal", "c")])])
+def test_every_pair_meets(options, exclude):
+    """Against the product of all that goes together, pair by pair; far fewer rows where there are options."""
+    product = {
+        (name, kind, precision, option)
+        for name, method in CONTESTANTS.items()
+        for kind in kinds_of(method)
+        for precision in (("float64", "float32") if method.capabilities.float32 else ("float64",))
+        for option in options
+        if (kind, option) not in exclude
+    }
+    met = set(by_pairs(options, exclude))
+    assert met <= product and len(met) <= (1.0 if len(options) == 1 else 0.85) * len(product)
+    for a, b in combinations(range(4), 2):
+        assert {(row[a], row[b]) for row in product} == {(row[a], row[b]) for row in met}
 
 
 def test_every_capability_is_asked_for_here():
