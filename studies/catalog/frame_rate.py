@@ -24,4 +24,5 @@ FRAME_RATE = Study(
     ),
     charts=(Chart("frame_time.png", frame_time.draw), Chart("cost_ratio.png", cost_ratio.draw)),
     columns=("step_time", "frame_time", "frame_time_p99", "real_time", "volume_worst"),
+    main=True,
 )

@@ -30,4 +30,5 @@ STABILITY_MAP = Study(
     ),
     charts=(Chart("stability.png", stability.draw),),
     columns=("volume_worst", "min_j"),
+    main=True,
 )

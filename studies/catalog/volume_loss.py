@@ -40,4 +40,5 @@ VOLUME_LOSS = Study(
         "pressure_error",
         "min_j",
     ),
+    main=True,
 )

@@ -23,4 +23,5 @@ WORK_PRECISION = Study(
     ),
     charts=(Chart("work_precision.png", work_precision.draw),),
     columns=("real_time", "step_time", "force_error", "interior_error", "silhouette_error", "volume_worst"),
+    main=True,
 )

@@ -32,11 +32,11 @@ from studies.reference.solve import STUDY as REFERENCES
 from studies.report import results as reports
 from studies.report.references import reference_listing
 from studies.runs.run import replay as replay_run
-from studies.scenes import SCENES, UNJUDGED
+from studies.scenes import SCENES
 from studies.store.links import link_study
 from studies.store.paths import study_folder
 from studies.store.staleness import MISSING
-from studies.sweep.find_study import find_study
+from studies.sweep.find_study import find_studies, find_study
 from studies.sweep.run_studies import failed, load_runs, run_studies, standings, warnings_of
 
 app = typer.Typer(
@@ -49,6 +49,7 @@ console = Console(soft_wrap=True)
 Results = Annotated[Path, typer.Option("--results", envvar="ORGANBENCH_RESULTS", help="folder of the results")]
 StudyName = Annotated[str, typer.Argument(help="a study (see `organbench list`), or a FILE.py that defines STUDY")]
 SMOKE = "smoke"
+MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 
 
 def main() -> None:
@@ -86,7 +87,7 @@ def list_all() -> None:
     """Studies, scenes, organs, methods and metrics, a line each."""
     groups = {
         "studies": [(s.name, s.question.strip().split("\n")[0]) for s in STUDIES],
-        "scenes": [(s.name, s.title) for s in (*SCENES, *UNJUDGED)],
+        "scenes": [(s.name, s.title) for s in SCENES],
         "organs": [(name, (make.__doc__ or "").strip().split("\n")[0]) for name, make in SHAPES.items()],
         "methods": [(m.name, (m.__doc__ or "").strip().split("\n")[0]) for m in METHODS],
         "metrics": [(m.name, m.description) for m in METRICS],
@@ -100,7 +101,9 @@ def list_all() -> None:
 
 @app.command()
 def run(
-    studies: Annotated[list[str], typer.Argument(help="studies of the catalogue, or a FILE.py that defines STUDY")],
+    studies: Annotated[
+        list[str] | None, typer.Argument(help=f"studies or a FILE.py that defines STUDY; without: {MAIN_STUDIES}")
+    ] = None,
     results: Results = Path("results"),
     smoke: Annotated[bool, typer.Option(help="small meshes, few frames; kept apart in results/smoke")] = False,
     only: Annotated[str, typer.Option(help="failed, stale, or both with a comma: nothing else runs")] = "",
@@ -109,7 +112,7 @@ def run(
     """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
     wanted = _filter(only)
     root = results / SMOKE if smoke else results
-    for found in [find_study(name) for name in studies]:
+    for found in find_studies(studies or []):
         study = found.smoke() if smoke else found
         with TerminalProgress(console) as progress:
             count = run_studies(root, [study], jobs, progress, wanted)

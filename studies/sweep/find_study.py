@@ -3,6 +3,7 @@
 import importlib.util
 import sys
 import traceback
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from studies.metrics.table import metric
 from studies.runs.case import Case, case_from_json, case_to_dict
 
 MODULE = "organbench_user_study"
+MAIN = "main"
+"""Stands for the main studies of the catalogue; no study has this name."""
 
 
 def find_study(name: str) -> Study:
@@ -31,6 +34,12 @@ def find_study(name: str) -> Study:
     for case in study.cases:
         _check_stored(name, case)
     return study
+
+
+def find_studies(names: Sequence[str]) -> list[Study]:
+    """The studies of so many names; the main ones of the catalogue for none, and for the name "main"."""
+    found = [[s for s in STUDIES if s.main] if name == MAIN else [find_study(name)] for name in names or [MAIN]]
+    return [study for group in found for study in group]
 
 
 def fault_of_study_file(error: BaseException) -> str | None:
