@@ -14,6 +14,7 @@ from studies.base.lookup import choose
 from studies.catalog import STUDIES, Study
 from studies.metrics.table import metric
 from studies.runs.case import Case, case_from_json, case_to_dict
+from studies.sweep.old_imports import advice
 
 MODULE = "organbench_user_study"
 MAIN = "main"
@@ -105,6 +106,10 @@ def _what_failed(path: Path, error: BaseException) -> str:
     if isinstance(error, SyntaxError) and error.filename == str(path):
         return f"SyntaxError in line {error.lineno}: {error.msg}"
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    if isinstance(error, ImportError) and lines and lines[-1]:
+        renamed = advice(path.read_bytes(), lines[-1])
+        if renamed:
+            return f"in line {lines[-1]}, {renamed}"
     kind = "" if isinstance(error, StudyError | MassSpringError) else f"{type(error).__name__} "
     said = str(error).split("\n")[0]
     return f"{kind}in line {lines[-1] if lines else '?'}" + (f": {said}" if said else "")
