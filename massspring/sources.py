@@ -62,9 +62,14 @@ def source_fingerprint(*modules: str, within: tuple[str, ...] = OWN) -> str:
 
 def own_file(module: str) -> Path | None:
     """The file of an own module or package; None where there is none."""
+    return _file_below(ROOT, module)
+
+
+@cache
+def _file_below(root: Path, module: str) -> Path | None:
     if module.split(".")[0] not in OWN:
         return None
-    path = ROOT.joinpath(*module.split("."))
+    path = root.joinpath(*module.split("."))
     candidates = (path.with_suffix(".py"), path / "__init__.py")
     return next((file for file in candidates if file.is_file()), None)
 
@@ -83,7 +88,8 @@ def _followed(source: Source) -> Iterator[str]:
 def _origin(module: str, name: str) -> str:
     if name and own_file(f"{module}.{name}") is not None:
         return f"{module}.{name}"
-    passed_on = _source(module).exports.get(name)
+    exports = _source(module).exports
+    passed_on = exports.get(name, exports.get("*") if name else None)
     return module if passed_on is None or own_file(passed_on) is None else _origin(passed_on, name)
 
 

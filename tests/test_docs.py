@@ -13,7 +13,8 @@ from studies.report.publish import BEGIN, END, EXTRAS, PUBLISHED
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.store.record import Status
-from studies.sweep.run_studies import load_runs, run_studies
+from studies.sweep.load import load_runs
+from studies.sweep.run_studies import run_studies
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("massspring", "reference_fem", "studies")

@@ -37,7 +37,8 @@ class Capabilities:
 
     keeps: Kept
     correction: Correction | None = None
-    """None where no volume is corrected. Otherwise steps in which a volume has no gradient are counted."""
+    """None where no volume is corrected. Otherwise steps in which a volume has no gradient are counted, but for hard
+    elements, whose compliance leaves no residual there."""
     conditionally_stable: bool = True
     """Whether steps beyond the stability limit diverge; where not, accuracy alone limits the step."""
     triangle_springs: Support = True

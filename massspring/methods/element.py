@@ -82,8 +82,6 @@ class Element(Method):
 
     def __post_init__(self) -> None:
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)
-        if self.hard:
-            object.__setattr__(self, "capabilities", replace(self.capabilities, correction="full"))
 
     def added_stiffness(self, body: Body) -> csr_array | None:
         """K/V_t0 dV_t/dx dV_t/dxᵀ of every cell; nothing where it is hard."""

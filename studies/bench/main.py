@@ -20,10 +20,10 @@ from studies.bench.line import Line
 from studies.bench.slide import slide_lines
 from studies.bench.solver import growth_lines, large_lines, step_lines, threads_lines, volumes_lines
 from studies.reference.problem import reference_problem, whole_forces
-from studies.report.results import write_table
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.scenes.ball_squeeze import BALL_SQUEEZE, PRESS_END, RADIUS
+from studies.store.csv_table import write_table
 from studies.store.stamps import set_stamp
 from studies.timing.protocol import pinned
 

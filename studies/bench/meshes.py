@@ -29,7 +29,7 @@ from studies.geometry.mesh.quality import (
 )
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.family import true_volume
-from studies.report.results import write_table
+from studies.store.csv_table import write_table
 from studies.store.stamps import set_stamp
 
 ORGANS = ("liver", "stomach", "kidney", "spleen", "bladder")

@@ -2,7 +2,6 @@
 
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.plots import cost_ratio, frame_time
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.scenes.liver_probe import LIVER_PROBE
@@ -22,7 +21,10 @@ FRAME_RATE = Study(
     cases=tuple(
         Case(scene, body, method, timed=True) for scene, body in BODIES for method in (Free(), ImplicitVolume())
     ),
-    charts=(Chart("frame_time.png", frame_time.draw), Chart("cost_ratio.png", cost_ratio.draw)),
+    charts=(
+        Chart("frame_time.png", "studies.plots.frame_time:draw"),
+        Chart("cost_ratio.png", "studies.plots.cost_ratio:draw"),
+    ),
     columns=("step_time", "frame_time", "frame_time_p99", "real_time", "volume_worst"),
     main=True,
 )

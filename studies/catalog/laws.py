@@ -3,7 +3,6 @@
 from massspring import ImplicitVolume
 from massspring.body.laws import LAWS
 from studies.catalog.study import Chart, Study
-from studies.plots import laws
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 
@@ -33,6 +32,6 @@ LAWS_STUDY = Study(
             for nodes in NODES
         ),
     ),
-    charts=(Chart("laws.png", laws.draw),),
+    charts=(Chart("laws.png", "studies.plots.laws:draw"),),
     columns=("force_error", "force_end", "silhouette_error", "pressure_error", "volume_worst", "min_j"),
 )

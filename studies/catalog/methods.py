@@ -2,7 +2,6 @@
 
 from massspring import METHODS, Element, ImplicitSprings, Method, Xpbd
 from studies.catalog.study import Chart, Study
-from studies.plots import methods
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.scenes.liver_press import LIVER_PRESS
@@ -39,7 +38,7 @@ METHODS_STUDY = Study(
             for dt in LONG
         ),
     ),
-    charts=(Chart("methods.png", methods.draw),),
+    charts=(Chart("methods.png", "studies.plots.methods:draw"),),
     columns=(
         "force_error",
         "force_end",

@@ -2,7 +2,6 @@
 
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.plots import accuracy, force_path, volume_history
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes import BLADDER_FILL, KIDNEY_PROBE, SPLEEN_SAG, STOMACH_PRESS, STOMACH_PROBE, Scene
 
@@ -24,20 +23,20 @@ ORGANS = Study(
         *(Case(scene, BodyRecipe(volumes="whole"), ImplicitVolume()) for scene in HOLLOW),
     ),
     charts=(
-        Chart("volume.png", volume_history.draw),
-        Chart("force.png", force_path.draw),
-        Chart("accuracy.png", accuracy.draw),
+        Chart("volume.png", "studies.plots.volume_history:draw"),
+        Chart("force.png", "studies.plots.force_path:draw"),
+        Chart("accuracy.png", "studies.plots.accuracy:draw"),
     ),
     columns=(
         "volume_worst",
-        "force_error",
         "force_end",
-        "surface_error",
         "interior_error",
         "mean_error",
         "silhouette_error",
+        "min_j",
+        "force_error",
+        "surface_error",
         "pressure_error",
         "lumen_pressure_error",
-        "min_j",
     ),
 )

@@ -2,7 +2,6 @@
 
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.plots import stability
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 
@@ -28,7 +27,7 @@ STABILITY_MAP = Study(
         for factor in STIFFNESS
         for steps in STEPS_PER_FRAME
     ),
-    charts=(Chart("stability.png", stability.draw),),
+    charts=(Chart("stability.png", "studies.plots.stability:draw"),),
     columns=("volume_worst", "min_j"),
     main=True,
 )

@@ -2,7 +2,6 @@
 
 from massspring import Free, ImplicitVolume, Shake
 from studies.catalog.study import Chart, Study
-from studies.plots import recovery
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.stress import STRESS_SCENES
 
@@ -19,6 +18,6 @@ STRESS = Study(
         for scene in STRESS_SCENES
         for body, method in ((ONE, Free()), (ONE, ImplicitVolume()), (ONE, Shake()), (MANY, ImplicitVolume()))
     ),
-    charts=(Chart("recovery.png", recovery.draw),),
+    charts=(Chart("recovery.png", "studies.plots.recovery:draw"),),
     columns=("inverted_share", "rest_distance", "volume_end", "min_j"),
 )

@@ -2,13 +2,20 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from studies.base.errors import StudyError
-from studies.metrics.metrics import Run
 from studies.runs.case import Case
-from studies.scenes import Scene
+from studies.scene.scene import Scene
 from studies.store.paths import readable
+
+if TYPE_CHECKING:
+    from studies.metrics.run import Run
+
+Drawing = Callable[[Sequence["Run"], Path], None]
+"""Draws runs into a file."""
 
 SMOKE_NODES, SMOKE_NODES_HOLLOW = 150, 400
 """A wall folds on a coarser surface."""
@@ -22,15 +29,32 @@ class Chart:
     """A picture of a study's runs."""
 
     file: str
-    draw: Callable[[Sequence[Run], Path], None]
+    drawing: Drawing | str
+    """A function, or where one is, as "package.module:function": its module is loaded when the chart is drawn."""
+
+    @property
+    def draw(self) -> Drawing:
+        """The function. Raises StudyError where there is none."""
+        if callable(self.drawing):
+            return self.drawing
+        module, _, function = self.drawing.partition(":")
+        try:
+            return getattr(import_module(module), function)
+        except (ImportError, AttributeError, ValueError) as error:
+            raise StudyError(
+                f"chart {self.file}: there is no function {self.drawing!r} ({error}); give 'package.module:function'"
+            ) from error
 
     def __post_init__(self) -> None:
         if readable(self.file) != self.file:
             raise StudyError(
                 f"a chart cannot be called {self.file!r}; use letters, digits, '.', '_' and '-', no folder"
             )
-        if not callable(self.draw):
-            raise StudyError(f"chart '{self.file}' is drawn by {self.draw!r}; give a function of the runs and a path")
+        if not callable(self.drawing) and ":" not in str(self.drawing):
+            raise StudyError(
+                f"chart '{self.file}' is drawn by {self.drawing!r}; give a function of the runs and a path, "
+                "or 'package.module:function'"
+            )
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.plots import accuracy, force_path, squeeze, volume_history
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE
 
@@ -23,22 +22,22 @@ VOLUME_LOSS = Study(
         *(Case(BALL_SQUEEZE, body, ImplicitVolume(), dt_fraction=FINE_STEP) for body in (TETRAHEDRAL, SURFACE)),
     ),
     charts=(
-        Chart("volume.png", volume_history.draw),
-        Chart("force.png", force_path.draw),
-        Chart("accuracy.png", accuracy.draw),
-        Chart("squeeze.png", squeeze.draw),
+        Chart("volume.png", "studies.plots.volume_history:draw"),
+        Chart("force.png", "studies.plots.force_path:draw"),
+        Chart("accuracy.png", "studies.plots.accuracy:draw"),
+        Chart("squeeze.png", "studies.plots.squeeze:draw"),
     ),
     columns=(
         "volume_worst",
-        "volume_end",
-        "force_error",
         "force_end",
-        "surface_error",
         "interior_error",
         "mean_error",
         "silhouette_error",
-        "pressure_error",
         "min_j",
+        "force_error",
+        "surface_error",
+        "pressure_error",
+        "volume_end",
     ),
     main=True,
 )

@@ -2,7 +2,6 @@
 
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.plots import work_precision
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.liver_press import LIVER_PRESS
@@ -21,7 +20,7 @@ WORK_PRECISION = Study(
         for fraction in FRACTIONS
         for method in (Free(), ImplicitVolume())
     ),
-    charts=(Chart("work_precision.png", work_precision.draw),),
+    charts=(Chart("work_precision.png", "studies.plots.work_precision:draw"),),
     columns=("real_time", "step_time", "force_error", "interior_error", "silhouette_error", "volume_worst"),
     main=True,
 )

@@ -4,14 +4,11 @@ import errno
 import os
 import sys
 
-from rich.console import Console
-
-from massspring import MassSpringError
-from reference_fem import ReferenceProblem
+from massspring.errors import MassSpringError
+from reference_fem.errors import ReferenceProblem
 from studies.base.errors import StudyError
-from studies.sweep.find_study import fault_of_study_file
-
-errors = Console(stderr=True, soft_wrap=True)
+from studies.base.study_file import fault_of_study_file
+from studies.cli.terminal import errors
 
 
 def told(error: Exception) -> str:
@@ -32,7 +29,7 @@ def unwritten(error: OSError) -> str:
     return f"the output could not be written ({error.strerror}); what was stored before is kept"
 
 
-def say(sentence: str) -> None:
+def complain(sentence: str) -> None:
     """To standard error, where that can be written to."""
     try:
         errors.print(sentence, markup=False, highlight=False)
@@ -51,6 +48,6 @@ def flushed(code: str | int | None) -> str | int | None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), output.fileno())
         if code or isinstance(error, BrokenPipeError):  # it was printed before, or the reader has closed the pipe
             return code
-        say(f"organbench: {unwritten(error)}")
+        complain(f"organbench: {unwritten(error)}")
         return 2
     return code

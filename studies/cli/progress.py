@@ -1,27 +1,45 @@
 """Progress on the terminal: a bar for what takes longer than a moment, plain lines where there is no terminal."""
 
 import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext
 from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from studies.base.interrupts import stop_if_pressed
+from studies.sweep.plan import TIMING, Planned, expected
 
 QUIET_SECONDS = 10.0
 """Without a terminal (a log file), a line at most this often."""
 
 
-class TerminalProgress:
-    """Shows the stages of a sweep; a context manager, because a bar must be taken off the screen again."""
+def words(seconds: float) -> str:
+    """A time as people say it: "8 s", "3 min", "1 h 20 min"."""
+    if seconds < 90:
+        return f"{max(1, round(seconds))} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
 
-    def __init__(self, console: Console) -> None:
-        columns = (TextColumn("{task.description:>10}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+
+class TerminalProgress:
+    """Shows the stages of a sweep; a context manager, because a bar must be taken off the screen again.
+
+    planned: what is to come, for the time that is left; jobs: processes for the physics
+    """
+
+    def __init__(self, console: Console, planned: Iterable[Planned] = (), jobs: int = 1) -> None:
+        columns = (TextColumn("{task.description:>7}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
         self.console = console
         self.bars = Progress(*columns, TextColumn("{task.fields[note]}"), console=console, transient=True)
         self.tasks: dict[str, TaskID] = {}
         self.totals: dict[str, list[int]] = {}
+        self.pending = {(piece.stage, piece.label): piece for piece in planned}
+        self.jobs = jobs
+        self.compiled: set[str] = set()
         self.told = time.monotonic()
+        self.compiling_told = 0.0
 
     def __enter__(self) -> "TerminalProgress":
         if self.console.is_terminal:
@@ -36,17 +54,83 @@ class TerminalProgress:
         """A stage of `total` pieces begins."""
         self.totals[what] = [0, total]
         if what in self.tasks:
-            self.bars.reset(self.tasks[what], total=total, note="")
+            self.bars.reset(self.tasks[what], total=total, note=self.left())
         else:
-            self.tasks[what] = self.bars.add_task(what, total=total, note="")
+            self.tasks[what] = self.bars.add_task(what, total=total, note=self.left())
 
     def advance(self, what: str, note: str) -> None:
         """One piece is done; a Ctrl-C that was lost on the way counts here."""
         stop_if_pressed()
-        self.bars.update(self.tasks[what], advance=1, note=note)
+        self.pending.pop((what, note), None)
+        left = self.left()
+        self.bars.update(self.tasks[what], advance=1, note=left or note)
         self.totals[what][0] += 1
         done, total = self.totals[what]
         due = time.monotonic() - self.told > QUIET_SECONDS or done == total
         if not self.console.is_terminal and due:
             self.told = time.monotonic()
-            self.console.print(f"{what} {done}/{total}: {note}", markup=False, highlight=False)
+            self._line(f"{what} {done}/{total}: {note}" + (f", {left}" if left else ""))
+
+    def left(self) -> str:
+        """The time that is left, from the seconds of earlier runs; nothing where they say nothing."""
+        seconds = expected(list(self.pending.values()), self.jobs) if self.pending else None
+        return "" if seconds is None else f"about {words(seconds)} left"
+
+    def compiling(self, name: str) -> None:
+        """A function is being compiled, here or in another process; from any thread."""
+        if name in self.compiled:
+            return
+        self.compiled.add(name)
+        if self.console.is_terminal:
+            for task in self.tasks.values():
+                self.bars.update(task, note=f"compiling {name} …")
+        elif time.monotonic() - self.compiling_told > QUIET_SECONDS:
+            self.compiling_told = time.monotonic()
+            self._line(f"compiling {name} (kept for the next time)")
+
+    def _line(self, text: str) -> None:
+        self.console.print(text, markup=False, highlight=False)
+
+
+@contextmanager
+def compiling(console: Console, doing: str) -> Iterator[Callable[[str], None]]:
+    """Inside, what is given names is told as being compiled: on a terminal in a line that moves, beside what is being
+    done; in a log once, and then at most every QUIET_SECONDS."""
+    told = -QUIET_SECONDS
+    with console.status(f"{doing} …") if console.is_terminal else nullcontext() as status:
+
+        def tell(name: str) -> None:
+            nonlocal told
+            if status is not None:
+                status.update(f"{doing}: compiling {name} (kept for the next time) …")
+            elif time.monotonic() - told > QUIET_SECONDS:
+                told = time.monotonic()
+                console.print(f"compiling {name} (kept for the next time)", markup=False, highlight=False)
+
+        yield tell
+
+
+def dry_run(console: Console, study: str, planned: list[Planned], jobs: int) -> None:
+    """Says what would run: how much of what, why, and how long."""
+
+    def say(text: str) -> None:
+        console.print(text, markup=False, highlight=False)
+
+    if not planned:
+        say(f"{study}: nothing would run, all is current")
+        return
+    say(f"{study}: {len(planned)} pieces would run")
+    groups: dict[tuple[str, str], list[Planned]] = {}
+    for piece in planned:
+        groups.setdefault((piece.kind, piece.why), []).append(piece)
+    for (kind, why), found in groups.items():
+        seconds = expected(found, 1)
+        cost = "no estimate" if seconds is None else f"about {words(seconds)} of computing"
+        say(f"  {len(found)} {kind}{'s' if len(found) > 1 and kind != TIMING else ''} ({why}): {cost}")
+    known = sum(piece.seconds is not None for piece in planned)
+    total = expected(planned, jobs)
+    basis = f"from earlier runs of {known} of the {len(planned)} pieces; compiling comes on top"
+    if total is not None:
+        say(f"  about {words(total)} with {jobs} processes, {basis}")
+    else:
+        say("  no estimate: of some kind nothing has run yet")

@@ -1,11 +1,9 @@
 """One row per case: what it was, how it ended, and the study's metrics beside the floor of their reference."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import pandas as pd
 
-from studies.base.atomic import write_whole
 from studies.base.lookup import choose
 from studies.metrics.metrics import METRICS, Metric, Run
 
@@ -16,6 +14,12 @@ DOUBTFUL = "doubtful"
 def metric(name: str) -> Metric:
     """The metric called `name`. Raises StudyError with the nearest match."""
     return choose(name, {m.name: m for m in METRICS}, "metric")
+
+
+def check_columns(names: Sequence[str]) -> None:
+    """Raises StudyError for a name that is no metric, before minutes are spent on a table without it."""
+    for name in names:
+        metric(name)
 
 
 def study_table(runs: Sequence[Run], columns: Sequence[str]) -> pd.DataFrame:
@@ -44,9 +48,3 @@ def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
         row[f"{entry.name} floor [{entry.unit}]"] = entry.floor(run)
     row[DOUBTFUL] = " ".join(entry.name for entry in metrics if entry.doubtful(run))
     return row
-
-
-def write_table(path: Path, table: pd.DataFrame) -> Path:
-    """A table as CSV with six significant digits; whole or not at all."""
-    write_whole(path, table.to_csv(index=False, float_format="%.6g").encode())
-    return path

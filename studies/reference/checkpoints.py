@@ -3,12 +3,18 @@
 import hashlib
 import pickle
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from reference_fem import Checkpoint
 from studies.base.atomic import is_there, write_whole
+
+if TYPE_CHECKING:
+    from reference_fem import Checkpoint
 
 DIGEST = 64
 """Bytes at the head of the file: SHA-256 of the rest, as text."""
+
+if TYPE_CHECKING:
+    from reference_fem import Checkpoint
 
 
 def steps_path(record: Path) -> Path:
@@ -16,13 +22,13 @@ def steps_path(record: Path) -> Path:
     return record.with_suffix(".steps")
 
 
-def keep(record: Path, stamp: str, checkpoint: Checkpoint) -> None:
+def keep(record: Path, stamp: str, checkpoint: "Checkpoint") -> None:
     """Stores how far the path is, whole or not at all; `stamp` says what problem and what code it belongs to."""
     content = pickle.dumps((stamp, checkpoint))
     write_whole(steps_path(record), hashlib.sha256(content).hexdigest().encode() + content)
 
 
-def kept(record: Path, stamp: str) -> Checkpoint | None:
+def kept(record: Path, stamp: str) -> "Checkpoint | None":
     """Where the path of this very problem and code stopped; None when it did not begin, is of another, or its file is
     not as it was written: then the path begins again."""
     file = steps_path(record)

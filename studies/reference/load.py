@@ -5,8 +5,8 @@ from functools import cached_property
 from pathlib import Path
 
 from studies.base.errors import StudyError
+from studies.reference.pieces import Piece, pieces
 from studies.reference.solution import Solution
-from studies.reference.solve import Piece, pieces
 from studies.reference.uncertainty import Uncertainty, uncertainties
 from studies.scene.scene import Scene
 from studies.store.record import Record, Status, read_record

@@ -1,9 +1,8 @@
-"""One solution of a scene's reference: what it depends on, where it lies, how it is solved and stored."""
+"""One solution of a scene's reference: how it is solved and stored."""
 
-import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from reference_fem import (
@@ -20,121 +19,13 @@ from reference_fem import (
 from studies.base.errors import StudyError
 from studies.reference.checkpoints import drop, keep, kept
 from studies.reference.fields import fields_of
+from studies.reference.pieces import Piece, reference_fingerprint
 from studies.reference.problem import reference_problem
-from studies.scene.as_json import scene_to_json
-from studies.scene.scene import Scene
-from studies.store.fingerprint import source_fingerprint
 from studies.store.new_record import new_record
-from studies.store.paths import record_path
-from studies.store.record import Status, peek, write_record
-from studies.store.staleness import CASE_CHANGED, CODE_CHANGED, MISSING, is_current, why_stale
+from studies.store.record import Status, write_record
 
-STUDY = "reference"
 PENALTY_FACTOR, KAPPA_FACTOR, STEP_FACTOR = 3.0, 10.0, 2.0
 """How much better a setting is made: stiffer contact with as much less penetration, bulk modulus, load steps."""
-
-
-@dataclass(frozen=True)
-class Piece:
-    """A mesh of the scene's family, or that mesh with one setting made better."""
-
-    scene: Scene
-    level: float
-    variant: str = ""
-    """"" or a name of VARIANTS."""
-
-    @property
-    def name(self) -> str:
-        """For people and file names."""
-        return f"{self.scene.name}-{self.level:g}" + (f"-{self.variant}" if self.variant else "")
-
-    @property
-    def key(self) -> str:
-        """What the solution depends on, besides the code: not the frames or the other meshes; without motion not the
-        damping or the start."""
-        scene, plan = self.scene, self.scene.reference
-        assert plan is not None  # a piece belongs to a plan
-        plain = replace(
-            scene,
-            title="",
-            duration=0.0,
-            frames=0,
-            reference=replace(plan, levels=(self.level, self.level), variants=()),
-            quantities=(),
-            not_for=(),
-        )
-        if plan.dt is None:
-            plain = replace(plain, damping=0.0, start=None)
-        data = {"scene": json.loads(scene_to_json(plain)), "level": self.level, "variant": self.variant}
-        return json.dumps(data, sort_keys=True, ensure_ascii=False)
-
-    @property
-    def moves(self) -> bool:
-        """Whether it is a motion in time; a load path builds no mass."""
-        return self.scene.reference is not None and self.scene.reference.dt is not None
-
-    def path(self, root: Path) -> Path:
-        """Where it lies."""
-        return record_path(root, STUDY, self.name, self.key)
-
-    def is_current(self, root: Path) -> bool:
-        """Whether it is there, from this code, as it was written."""
-        return is_current(self.path(root), self.key, reference_fingerprint())
-
-    def why_stale(self, root: Path) -> str | None:
-        """Why it must be solved (again) (studies.store.staleness); None when it need not."""
-        return why_stale(self.path(root), self.key, reference_fingerprint())
-
-    @property
-    def stamp(self) -> str:
-        """Problem and code in one text."""
-        return f"{reference_fingerprint()} {self.key}"
-
-    def state(self, root: Path) -> str:
-        """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""
-        if kept(self.path(root), self.stamp) is not None:
-            return "half-way"
-        why = self.why_stale(root)
-        if why is None:
-            return str(peek(self.path(root)).status)
-        return "missing" if why == MISSING else "stale" if why in (CASE_CHANGED, CODE_CHANGED) else "unreadable"
-
-    @property
-    def weight(self) -> float:
-        """What it costs, roughly: unknowns."""
-        return self.level if self.level > 1 else self.level**-3
-
-
-def pieces(scene: Scene) -> list[Piece]:
-    """All that the reference of a scene is made of: every mesh, and each setting made better on the coarsest."""
-    if scene.reference is None:
-        return []
-    family = [Piece(scene, level) for level in scene.reference.levels]
-    return [*family, *(replace(family[0], variant=name) for name in variants(scene))]
-
-
-def variants(scene: Scene) -> list[str]:
-    """The settings that matter in a scene: nothing touches, nothing sinks in."""
-    assert scene.reference is not None
-    return [name for name in scene.reference.variants if name != "contact" or scene.obstacles]
-
-
-JUDGES = ("bench.py", "crosscheck", "exact.py", "modes.py", "oracles/", "uncertainty.py")
-"""Beginnings of the solver's files that no reference is computed with: they judge it."""
-
-
-def reference_fingerprint() -> str:
-    """Hash of all code that a reference depends on."""
-    return source_fingerprint(
-        "reference_fem",
-        "studies.geometry",
-        "studies.runs.prepare",
-        "studies.reference.problem",
-        "studies.reference.fields",
-        "studies.reference.mesh",
-        "studies.reference.solve",
-        without=JUDGES,
-    )
 
 
 Set = tuple[Problem, tuple[float, ...], NewtonSettings]

@@ -8,7 +8,7 @@ from studies.base.errors import StudyError
 from studies.catalog import Study
 from studies.report.results import FIGURES, report
 from studies.store.stamps import is_stamped
-from studies.sweep.run_studies import standings
+from studies.sweep.standings import standings
 from studies.timing.cases import timing_is_current
 from studies.verify.verification import FOLDER as VERIFY
 

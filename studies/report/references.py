@@ -8,15 +8,14 @@ import pandas as pd
 
 from studies.base.atomic import is_there, write_whole
 from studies.base.errors import StudyError
-from studies.metrics.table import write_table
 from studies.plots.uncertainty import draw
-from studies.reference.checkpoints import kept
 from studies.reference.load import Reference, load_reference
-from studies.reference.solve import STUDY, VARIANTS, pieces
+from studies.reference.pieces import STUDY, pieces
+from studies.reference.solve import VARIANTS
 from studies.scene.scene import Scene
+from studies.store.csv_table import write_table
 from studies.store.fingerprint import source_fingerprint
 from studies.store.paths import study_folder
-from studies.store.record import peek
 
 TABLE, CHART = "uncertainty.csv", "uncertainty.png"
 
@@ -51,42 +50,6 @@ def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
                     "extrapolated shift [%]": 100 * known.shift,
                     "levels": " ".join(f"{level:g}" for level in levels),
                     "unknowns": reference.record.attributes["unknowns"],
-                }
-            )
-    return pd.DataFrame(rows)
-
-
-def reference_listing(root: Path, scenes: Iterable[Scene]) -> pd.DataFrame:
-    """A row per piece of the references: mesh, unknowns, load steps done, seconds and state.
-
-    The uncertainty of the probed force stands in the row of the finest mesh.
-    """
-    references = known_references(root, scenes)
-    rows = []
-    for scene in scenes:
-        plan = scene.reference
-        for piece in pieces(scene):
-            path, state = piece.path(root), piece.state(root)
-            known = peek(path).attributes if state not in ("missing", "half-way", "unreadable") else {}
-            if state == "half-way":
-                begun = kept(path, piece.stamp)
-                known = {"steps_done": len([e for e in begun.path if e.t in scene.checkpoints]) if begun else 0}
-            finest = plan is not None and not piece.variant and piece.level == plan.levels[-1]
-            floor = (
-                references[scene.name].floor.get("force", float("nan"))
-                if finest and scene.name in references
-                else float("nan")
-            )
-            rows.append(
-                {
-                    "scene": scene.name,
-                    "level": f"{piece.level:g}",
-                    "variant": piece.variant,
-                    "unknowns": known.get("unknowns", ""),
-                    "steps": f"{known.get('steps_done', 0)}/{len(scene.checkpoints)}",
-                    "seconds": round(float(known.get("seconds", float("nan"))), 1),
-                    "force uncertainty [%]": 100 * floor,
-                    "state": state,
                 }
             )
     return pd.DataFrame(rows)

@@ -1,30 +1,31 @@
 """What people look at: charts, tables as CSV, the summary of results that README shows."""
 
 import json
-import math
 from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from studies.base.atomic import is_there, write_whole
 from studies.base.errors import StudyError
-from studies.catalog import Study
+from studies.base.study_file import fault_of_study_file, is_of_study_file
+from studies.catalog.study import Study
 from studies.geometry import SHAPES, organ
-from studies.metrics.metrics import Run
-from studies.metrics.table import DOUBTFUL, study_table, write_table
+from studies.metrics.cells import DOUBT_MARK, value_cell
+from studies.metrics.run import Run
+from studies.metrics.table import DOUBTFUL, study_table
 from studies.plots.figures import paper_ball, paper_slide
 from studies.plots.figures.organ_springs import draw_organ_springs
 from studies.plots.figures.organs import draw_organs
-from studies.reference.solve import pieces
+from studies.reference.pieces import pieces
 from studies.report.kept_volume import kept_volumes
 from studies.report.references import refresh_uncertainty, state_of
+from studies.runs.current import case_path
 from studies.runs.paper import play, slide_case, squeezed_balls
-from studies.runs.run import case_path
+from studies.store.csv_table import write_table
 from studies.store.machine import write_machine
 from studies.store.paths import study_folder
 from studies.store.stamps import set_stamp
-from studies.sweep.find_study import fault_of_study_file, is_of_study_file
-from studies.sweep.run_studies import load_runs
+from studies.sweep.load import load_runs
 from studies.timing.cases import timing_file
 
 FIGURES = "figures"
@@ -167,7 +168,6 @@ def summary_of(runs_of: dict[str, list[Run]]) -> str:
     return "\n".join(lines)
 
 
-DOUBT_MARK = "†"
 SUMMARY_METRICS = ("volume_worst", "force_end", "interior_error", "mean_error", "silhouette_error", "min_j")
 SUMMARY_COLUMNS = (
     "volume_worst [%]",
@@ -197,9 +197,5 @@ def _cell(row: Mapping[Hashable, Any], column: str) -> str:
     if column.startswith("volume"):
         return f"{value:.2g}"
     floor = float(row.get(column.replace(" [", " floor ["), float("nan")))
-    sign = "+" if column.startswith("force") else ""
-    if not floor > 0:
-        return f"{value:{sign}.3g}"
-    digits = max(0, -math.floor(math.log10(floor)))  # as many as the uncertainty has
-    mark = f" {DOUBT_MARK}" if column.split(" [")[0] in str(row.get(DOUBTFUL, "")).split() else ""
-    return f"{value:{sign}.{digits}f} ± {floor:.{digits}f}{mark}".replace("-", "−")
+    doubtful = column.split(" [")[0] in str(row.get(DOUBTFUL, "")).split()
+    return value_cell(value, floor, signed=column.startswith("force"), doubtful=doubtful)

@@ -30,8 +30,8 @@ class BodyRecipe:
     nodes: int = 550
     """Surface nodes."""
     law: str = "van_gelder"
-    """Stiffness law of a tetrahedral body (LAWS) or a membrane (MEMBRANE_LAWS); "lloyd" as published, the others match the tissue's shear
-    modulus. "cotangent", springs without length, needs nodal volumes; a membrane takes "delingette" or "lloyd"."""
+    """Stiffness law: of a tetrahedral body one of LAWS, where "cotangent", springs without length, needs nodal volumes;
+    of a membrane "delingette" or "lloyd"."""
     stiffness: float = 1.0
     """Factor on every spring; 1 matches the tissue's shear modulus."""
     volumes: Literal["scene", "whole", "regions", "nodal"] = "scene"

@@ -1,46 +1,38 @@
 """One case: prepared, simulated, judged, stored. Whatever happens is a result; only a full disk is not."""
 
+import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from massspring import History, MassSpringError, simulate
+from studies.base.compile_watch import watching
 from studies.base.errors import DoesNotApply, StudyError
 from studies.runs.case import Case, case_from_json
+from studies.runs.current import case_path, run_fingerprint
 from studies.runs.limits import TIME_LIMIT
 from studies.runs.prepare import LUMEN, Prepared, prepare
-from studies.store.fingerprint import source_fingerprint
 from studies.store.new_record import new_fields, new_record
-from studies.store.paths import record_path
 from studies.store.record import Field, Record, Status, read_record, write_record
 from studies.store.schema import RUN_FIELDS
-from studies.store.staleness import why_stale
 
 DRIFT = 0.01
 """A method that keeps the volume and is this far from it has drifted: thirty times what the worst claims allow."""
 
 
-def run_fingerprint() -> str:
-    """Hash of all code that a run depends on; the scene itself is part of the case."""
-    return source_fingerprint("massspring", "studies.geometry", "studies.runs.prepare", "studies.runs.run")
-
-
-def case_path(root: Path, study: str, case: Case) -> Path:
-    """Where the record of a case lies."""
-    return record_path(root, study, case.name, case.key)
-
-
-def why_case_is_stale(root: Path, study: str, case: Case) -> str | None:
-    """Why it must run (again) (studies.store.staleness); None when it need not."""
-    return why_stale(case_path(root, study, case), case.key, run_fingerprint())
-
-
 def run_case(root: Path, study: str, case: Case, on_frame: Callable[[int], object] | None = None) -> Path:
-    """Runs a case and stores what came of it, a failure too. Raises StudyError only when it cannot be stored."""
+    """Runs a case and stores what came of it, a failure too, with the seconds that it took without compiling.
+
+    Raises StudyError only when it cannot be stored."""
     path = case_path(root, study, case)
-    write_record(path, measure(case, on_frame))
+    started = time.perf_counter()
+    with watching(lambda name: None) as watch:
+        record = measure(case, on_frame)
+    seconds = time.perf_counter() - started - watch.seconds
+    write_record(path, replace(record, attributes={**record.attributes, "seconds": seconds}))
     return path
 
 

@@ -102,7 +102,8 @@ RUN_FIELDS: dict[str, FieldSpec] = {
 }
 """Of a run. Entries after an early end are NaN; the energies are there where the case asks (`recorded`)."""
 
-RUN_ATTRIBUTES: dict[str, AttributeSpec] = {
+SECONDS = {"seconds": AttributeSpec(NUMBER, "s", "wall time without compiling, for estimates", optional=True)}
+RUN_ATTRIBUTES: dict[str, AttributeSpec] = SECONDS | {
     "rest_volume": AttributeSpec(NUMBER, "m^3", "volume of the body at rest"),
     "dt": AttributeSpec(NUMBER, "s", "time step"),
     "dt_limit": AttributeSpec(NUMBER, "s", "stability limit of the time step"),
@@ -155,7 +156,7 @@ TIMING_FIELDS: dict[str, FieldSpec] = {
     "stage_ns": FieldSpec("q F", NUMBER, "ns", "time of each stage in each frame, (stage, frame)", optional=True),
     "stages": FieldSpec("q", TEXT, "", "names of the stages", optional=True),
 }
-TIMING_ATTRIBUTES: dict[str, AttributeSpec] = {
+TIMING_ATTRIBUTES: dict[str, AttributeSpec] = SECONDS | {
     "core": AttributeSpec(INDEX, "1", "core that the process was pinned to; none where it cannot be", optional=True),
     "threads": AttributeSpec(INDEX, "1", "threads that compiled code was allowed"),
     "repeats": AttributeSpec(INDEX, "1", "repeats", length="r"),
@@ -240,11 +241,7 @@ def tables() -> str:
         parts += ["", "| attribute | unit | |", "|---|---|---|"]
         parts += [f"| {name} | {spec.unit or 'text'} | {spec.description} |" for name, spec in attributes.items()]
         parts.append("")
-    parts += [
-        "| letter | number of |",
-        "|---|---|",
-        *(f"| {letter} | {what} |" for letter, what in LENGTHS.items()),
-        "",
-    ]
+    parts += ["| letter | number of |", "|---|---|"]
+    parts += [*(f"| {letter} | {what} |" for letter, what in LENGTHS.items()), ""]
     parts += ["| status | |", "|---|---|", *(f"| `{status}` | {what} |" for status, what in STATUSES.items())]
     return "\n".join(parts)

@@ -2,21 +2,17 @@
 
 import importlib.util
 import sys
-import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from massspring import MassSpringError
 from studies.base import interrupts
 from studies.base.errors import StudyError
 from studies.base.lookup import choose
+from studies.base.study_file import MODULE, what_failed
 from studies.catalog import STUDIES, Study
-from studies.metrics.table import metric
 from studies.runs.case import Case, case_from_json, case_to_dict
-from studies.sweep.old_imports import advice
 
-MODULE = "organbench_user_study"
 MAIN = "main"
 """Stands for the main studies of the catalogue; no study has this name."""
 
@@ -30,8 +26,6 @@ def find_study(name: str) -> Study:
     study = _load(Path(name).resolve())
     if not isinstance(study, Study):
         raise StudyError(f"{name} defines no STUDY of type studies.catalog.Study; see CONTRIBUTING.md")
-    for column in study.columns:
-        metric(column)
     for case in study.cases:
         _check_stored(name, case)
     return study
@@ -41,22 +35,6 @@ def find_studies(names: Sequence[str]) -> list[Study]:
     """The studies of so many names; the main ones of the catalogue for none, and for the name "main"."""
     found = [[s for s in STUDIES if s.main] if name == MAIN else [find_study(name)] for name in names or [MAIN]]
     return [study for group in found for study in group]
-
-
-def fault_of_study_file(error: BaseException) -> str | None:
-    """The sentence for an error that passed through the study file that was loaded; None for another."""
-    module = sys.modules.get(MODULE)
-    if module is None or module.__file__ is None:
-        return None
-    path = Path(module.__file__)
-    if str(path) not in [frame.filename for frame in traceback.extract_tb(error.__traceback__)]:
-        return None
-    return f"{path.name} fails: {_what_failed(path, error)}; mend it and run again"
-
-
-def is_of_study_file(thing: object) -> bool:
-    """Whether a function or class was written there."""
-    return getattr(thing, "__module__", None) == MODULE
 
 
 def _check_stored(name: str, case: Case) -> None:
@@ -97,19 +75,5 @@ def _load(path: Path) -> object:
     except BaseException as error:  # the file of a user may fail in any way, and may leave by sys.exit
         if isinstance(error, KeyboardInterrupt) and (interrupts.pressed() or not interrupts.are_heard()):
             raise
-        raise StudyError(f"{path.name} cannot be loaded: {_what_failed(path, error)}; mend it and run again") from error
+        raise StudyError(f"{path.name} cannot be loaded: {what_failed(path, error)}; mend it and run again") from error
     return getattr(module, "STUDY", None)
-
-
-def _what_failed(path: Path, error: BaseException) -> str:
-    """Kind, first line and place of an error in a user's file."""
-    if isinstance(error, SyntaxError) and error.filename == str(path):
-        return f"SyntaxError in line {error.lineno}: {error.msg}"
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-    if isinstance(error, ImportError) and lines and lines[-1]:
-        renamed = advice(path.read_bytes(), lines[-1])
-        if renamed:
-            return f"in line {lines[-1]}, {renamed}"
-    kind = "" if isinstance(error, StudyError | MassSpringError) else f"{type(error).__name__} "
-    said = str(error).split("\n")[0]
-    return f"{kind}in line {lines[-1] if lines else '?'}" + (f": {said}" if said else "")

@@ -1,14 +1,16 @@
 """Frame times of stored cases in files of their own: re-timing never touches physics (studies.timing.protocol)."""
 
+import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from massspring import Free, simulate
 from studies.base.atomic import is_there
+from studies.base.compile_watch import watching
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.runs.case import Case
+from studies.runs.current import case_path, run_fingerprint
 from studies.runs.prepare import prepare
-from studies.runs.run import case_path, run_fingerprint
 from studies.store.machine import machine_id
 from studies.store.new_record import new_record
 from studies.store.paths import timing_path
@@ -67,17 +69,21 @@ def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[
         groups.setdefault(case.replaced(method=Free()).key, []).append(case)
     with pinned(threads=1) as core:
         for group in groups.values():
-            setups = {case.key: prepare(case).setup for case in group}
-            contestants = {key: (lambda s=setup: simulate(s).frame_ns) for key, setup in setups.items()}
-            measured = interleave(contestants, REPEATS)
+            started = time.perf_counter()
+            with watching(lambda name: None) as watch:
+                setups = {case.key: prepare(case).setup for case in group}
+                contestants = {key: (lambda s=setup: simulate(s).frame_ns) for key, setup in setups.items()}
+                measured = interleave(contestants, REPEATS)
+                stages = {case.key: stage_times(setups[case.key]) for case in group}
+            seconds = (time.perf_counter() - started - watch.seconds) / len(group)
             for case in group:
-                stage_ns = stage_times(setups[case.key])
-                write_timing(root, study, case, FrameTiming(measured[case.key], core, stage_ns=stage_ns, stages=ROWS))
+                timing = FrameTiming(measured[case.key], core, stage_ns=stages[case.key], stages=ROWS)
+                write_timing(root, study, case, timing, seconds)
                 on_case(case.name)
 
 
-def write_timing(root: Path, study: str, case: Case, timing: FrameTiming) -> None:
-    """Stores frame times beside the record of their case."""
+def write_timing(root: Path, study: str, case: Case, timing: FrameTiming, seconds: float | None = None) -> None:
+    """Stores frame times beside the record of their case, and the seconds that measuring them took."""
     if not (timing.frame_ns > 0).all():
         raise StudyError(f"case {case.name} broke off while it was timed; run it again")
     record = new_record(
@@ -87,7 +93,7 @@ def write_timing(root: Path, study: str, case: Case, timing: FrameTiming) -> Non
         status=Status.OK,
         message="",
         fingerprint=run_fingerprint(),
-        attributes=timing.attributes(),
+        attributes={**timing.attributes(), "seconds": seconds},
         fields=timing.fields(),
     )
     write_record(timing_file(root, study, case), record)

@@ -8,11 +8,11 @@ from dataclasses import replace
 from functools import partial
 from time import perf_counter_ns
 
-import numba
 import numpy as np
 import pandas as pd
 
 from massspring import MassSpringError, Setup, State
+from massspring.kernels.jit.decorators import compiled
 from massspring.kernels.jit.stage_clock import INTEGRATION, OUTSIDE, STAGES, Ticks, mark, new_ticks
 from massspring.run.history import EXTRA, Recorder
 from massspring.run.simulation import trouble
@@ -22,6 +22,8 @@ from studies.timing.protocol import pinned
 from studies.timing.skips import SKIPS
 
 FRAMES, REPEATS = 100, 5
+BUDGET = 4.0
+"""Time for the repeats [s]: the next turn is left out when it would take longer than that; the first never is."""
 DEAR = 5.0
 """Times the run as it is, from where one with a stage is run once only: that is far from the noise."""
 MARKS = 100_000
@@ -69,7 +71,7 @@ def stage_times(setup: Setup) -> np.ndarray:
     return run_frames(setup, setup.start(), new_ticks())[1]
 
 
-@numba.njit
+@compiled
 def _marks(ticks, count):
     for _ in range(count):
         mark(ticks, INTEGRATION)
@@ -84,9 +86,10 @@ def mark_ns() -> float:
     return (perf_counter_ns() - begin) / MARKS
 
 
-def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS) -> pd.DataFrame:
+def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget: float = BUDGET) -> pd.DataFrame:
     """Rows of stages, rest and the whole step [µs per step], skipped stages with what they would cost and how much of
-    them was skipped, and what Python does once per frame, over as many steps.
+    them was skipped, and what Python does once per frame, over as many steps. Times are the shortest of up to `repeats`
+    turns, as many as `budget` [s] allows: attrs["turns"] says how many.
 
     Raises StudyError or MassSpringError for a case that cannot run."""
     setup = prepare(case.replaced(frames=min(frames, case.frames or case.scene.frames))).setup
@@ -94,7 +97,7 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS) -> pd.D
     runs = {PLAIN: partial(run_frames, setup, setup.start()), TICKED: partial(_ticked, setup)}
     runs |= {skip.name: partial(run_frames, *skip.included(setup, setup.start())) for skip in skipped}
     with pinned(threads=1):
-        found = _in_turns(runs, repeats)
+        found = _in_turns(runs, repeats, budget)
         outside = _per_frame(setup)
     to_step = 1e-3 / setup.clock.steps
     whole = {name: to_step * float(np.min([r[0] for r in results], axis=0).mean()) for name, results in found.items()}
@@ -106,6 +109,7 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS) -> pd.D
     rows += [(SKIPPED, skip.name, whole[skip.name] - step, skip.told(setup, end)) for skip in skipped]
     rows += [(SKIPPED if name == ENERGIES else FRAME, name, to_step * ns, "") for name, ns in outside.items()]
     table = pd.DataFrame(rows, columns=["kind", "what", "µs per step", "how much"])
+    table.attrs["turns"] = len(found[PLAIN])
     table.insert(3, "share of the step", table["µs per step"] / step)
     return table
 
@@ -114,19 +118,25 @@ def _ticked(setup: Setup, frames: int | None = None) -> Run:
     return run_frames(setup, setup.start(), new_ticks(), frames)
 
 
-def _in_turns(runs: dict[str, partial[Run]], repeats: int) -> dict[str, list[Run]]:
-    """Every run `repeats` times, in turns, compiled before; one that is `DEAR`, once."""
+def _in_turns(runs: dict[str, partial[Run]], repeats: int, budget: float) -> dict[str, list[Run]]:
+    """Every run up to `repeats` times, in turns, compiled before; one that is `DEAR`, once. No turn begins that would
+    end after `budget` [s], but the first."""
     for run in runs.values():
         run(frames=1)
     found: dict[str, list[Run]] = {name: [] for name in runs}
     shortest = dict.fromkeys(runs, 0.0)
+    began, longest = perf_counter_ns(), 0
     for turn in range(repeats):
+        start = perf_counter_ns()
+        if turn and start - began + longest > 1e9 * budget:
+            break
         for name, run in runs.items():
             if shortest[name] > DEAR * shortest[PLAIN]:
                 continue
             found[name].append(run())
             took = float(found[name][-1][0].sum())
             shortest[name] = min(took, shortest[name]) if turn else took
+        longest = perf_counter_ns() - start  # later turns leave out what is dear, so they take no longer
     return found
 
 

@@ -59,7 +59,7 @@ def touched_and_held(body: Body, dt: float):
     nodes.v_star[held] = [0.02, 0.0, -0.01]
     approach = seat(contacts, touched, random)
     edge, wedged, stuck = np.linalg.qr(random.normal(size=(3, 3)))[0], 31, 40
-    contacts.touched[[wedged, stuck]] = 1
+    contacts.touched[[wedged, stuck]], contacts.second[wedged] = 1, 2
     contacts.mode[[wedged, stuck]] = ON_EDGE, STICKS
     list_touched(contacts)
     contacts.direction[wedged] = edge[0]

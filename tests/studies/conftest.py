@@ -8,7 +8,8 @@ import pytest
 
 from studies.cli import app as cli
 from studies.reference.load import load_reference
-from studies.reference.solve import pieces, solve
+from studies.reference.pieces import pieces
+from studies.reference.solve import solve
 from studies.sweep.run_studies import run_studies
 from tests.studies.octant import SCENE
 from tests.studies.tiny import TINY, Silent, tiny_study

@@ -14,8 +14,8 @@ import h5py
 import numpy as np
 import pytest
 
-from studies.cli import app as cli
-from studies.runs.run import case_path
+from studies.cli.commands import table
+from studies.runs.current import case_path
 from studies.store.paths import record_files
 from studies.store.record import Status, read_record, write_record
 from studies.timing.cases import timing_file
@@ -134,7 +134,7 @@ CHARTS = {
 def test_unknown_words_get_the_nearest_match(refused, tmp_path, monkeypatch, words, told):
     monkeypatch.setenv("ORGANBENCH_RESULTS", str(tmp_path))
     if words[0] == "table":
-        monkeypatch.setattr(cli, "load_runs", lambda root, study: ([], []))
+        monkeypatch.setattr(table, "load_runs", lambda root, study: ([], []))
     assert told in refused(*words)
     assert list(tmp_path.iterdir()) == []
 

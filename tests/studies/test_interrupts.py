@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from operator import methodcaller
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,8 @@ from studies.cli import app as cli
 from studies.geometry.mesher import jobs
 from studies.store.paths import record_files
 from studies.store.record import Status, peek
-from studies.sweep.run_studies import perform, run_studies, standings
+from studies.sweep.run_studies import perform, run_studies
+from studies.sweep.standings import standings
 from tests.studies.tiny import Silent, tiny_case, tiny_study
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and process groups")
@@ -69,7 +71,7 @@ class PressedInWorker:
 
 def test_a_worker_that_dies_of_it_first_is_an_interruption():
     with pytest.raises(KeyboardInterrupt):
-        perform([PressedInWorker()], 1, Silent())
+        perform([PressedInWorker()], 1, Silent(), do=methodcaller("perform"))
 
 
 def test_held_back_it_waits_and_is_not_lost():

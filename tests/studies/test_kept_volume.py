@@ -8,7 +8,8 @@ import pytest
 from massspring import Capsule, Free, ImplicitVolume, Path, Plane, Sphere
 from studies.report.kept_volume import PROMISED, kept_volumes, promised, worst_volume
 from studies.runs.case import BodyRecipe, Case
-from studies.runs.run import case_path, measure
+from studies.runs.current import case_path
+from studies.runs.run import measure
 from studies.scenes import BALL_CLAMPED, JUDGED
 from studies.store.record import Status, read_record, write_record
 from tests.studies.tiny import NODES, SQUEEZE, diverging_case, tiny_case, tiny_study

@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 import pytest
 
-from studies.cli import mesh as commands
+from studies.cli.commands import mesh as commands
 from studies.geometry import read_mesh
 from studies.geometry.mesh.organ_mesh import signed_volume
 from tests.geometry.boxes import box, split, together

@@ -13,9 +13,10 @@ from studies.base.errors import StudyError
 from studies.metrics.metrics import METRICS, frequency_error
 from studies.metrics.run import Run
 from studies.reference.load import load_reference
+from studies.reference.pieces import Piece, pieces
 from studies.reference.problem import rigid
 from studies.reference.ringing import fitted_frequency
-from studies.reference.solve import Piece, pieces, solve
+from studies.reference.solve import solve
 from studies.reference.uncertainty import Places, View
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare

@@ -5,8 +5,8 @@ from importlib.util import find_spec
 
 import pytest
 
-from studies.sweep.moved import MODULES, NAMES
-from studies.sweep.old_imports import advice
+from studies.base.moved import MODULES, NAMES
+from studies.base.old_imports import advice
 
 LEARNED = {
     "from studies.case import Case": (

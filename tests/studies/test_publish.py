@@ -13,7 +13,7 @@ from studies.cli import app as cli
 from studies.cli import publish as command
 from studies.report.publish import BEGIN, END, EXTRAS, PUBLISHED, publish, write_readme
 from studies.runs import run
-from studies.runs.run import case_path
+from studies.runs.current import case_path
 from studies.store.stamps import is_stamped, set_stamp
 from studies.timing.cases import timing_file
 from tests.studies.tiny import tiny_case, tiny_study

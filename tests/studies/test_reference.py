@@ -9,8 +9,9 @@ from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.surface.distance import hausdorff
 from studies.reference.load import load_reference
+from studies.reference.pieces import pieces
 from studies.reference.problem import whole_forces
-from studies.reference.solve import pieces, solve
+from studies.reference.solve import solve
 from studies.reference.uncertainty import QUANTITIES
 from studies.scenes import ReferencePlan
 from tests.studies.octant import SCENE

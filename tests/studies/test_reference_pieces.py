@@ -10,14 +10,16 @@ import pytest
 from reference_fem import Checkpoint, ReferenceProblem
 from studies.base.errors import StudyError
 from studies.reference import checkpoints
+from studies.reference import pieces as known
 from studies.reference import solve as module
 from studies.reference.load import load_reference
-from studies.reference.solve import Piece, pieces, solve
-from studies.report.references import reference_listing, refresh_uncertainty
+from studies.reference.pieces import Piece, pieces, standing_of
+from studies.reference.solve import solve
+from studies.report.references import refresh_uncertainty
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.store.record import Status, read_record
-from studies.sweep.run_studies import load_runs
+from studies.sweep.load import load_runs
 from tests.studies.octant import LEVELS, SCENE
 from tests.studies.tiny import tiny_case, tiny_study
 
@@ -31,7 +33,7 @@ def test_current_until_the_load_or_the_code_changes(solved, monkeypatch):
     assert Piece(replace(SCENE, gravity=(0.0, 0.0, -9.81)), 0.5).key != piece.key
     assert Piece(SCENE, 0.5, "kappa").key != piece.key
     assert not Piece(replace(SCENE, checkpoints=(1.0, 3.9)), LEVELS[0]).is_current(solved)
-    monkeypatch.setattr(module, "reference_fingerprint", lambda: "other")
+    monkeypatch.setattr(known, "reference_fingerprint", lambda: "other")
     assert not piece.is_current(solved)
 
 
@@ -43,23 +45,28 @@ def test_settings_are_varied_only_where_they_matter():
     assert pieces(replace(SCENE, reference=None)) == []
 
 
+def listed(root):
+    return [standing_of(root, piece) for piece in pieces(SCENE)]
+
+
+def states(root):
+    return [row.state for row in listed(root)]
+
+
 def test_listing_says_how_every_piece_stands(solved, tmp_path, monkeypatch):
     root = shutil.copytree(solved, tmp_path / "results")
     Piece(SCENE, LEVELS[1]).path(root).unlink()
     damaged = Piece(SCENE, LEVELS[0], "kappa").path(root)
     damaged.write_bytes(damaged.read_bytes()[:500])
-    whole, spoilt = reference_listing(solved, [SCENE]), reference_listing(root, [SCENE])
-    assert whole["state"].tolist() == ["ok"] * 6
-    assert whole["steps"].tolist() == ["2/2"] * 6
-    assert (whole["seconds"] > 0).all()
-    assert whole["unknowns"][:3].is_monotonic_increasing
-    assert spoilt["state"].tolist() == ["ok", "missing", "ok", "ok", "ok", "unreadable"]
-    bars = whole["force uncertainty [%]"]
-    assert bars[2] > 0
-    assert bars.drop(2).isna().all()
-    assert spoilt["force uncertainty [%]"].isna().all()
-    monkeypatch.setattr(module, "reference_fingerprint", lambda: "other")
-    assert reference_listing(solved, [SCENE])["state"].tolist() == ["stale"] * 6
+    whole = listed(solved)
+    assert states(solved) == ["ok"] * 6
+    assert [row.steps for row in whole] == [2] * 6
+    assert all(row.seconds > 0 for row in whole)
+    assert sorted(unknowns := [row.unknowns for row in whole[:3]]) == unknowns
+    assert states(root) == ["ok", "missing", "ok", "ok", "ok", "unreadable"]
+    assert [row.unknowns for row in listed(root) if row.state in ("missing", "unreadable")] == [None, None]
+    monkeypatch.setattr(known, "reference_fingerprint", lambda: "other")
+    assert states(solved) == ["stale"] * 6
 
 
 def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, tmp_path, found):
@@ -102,9 +109,8 @@ def test_a_crash_half_way_costs_no_finished_step(solved, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "equilibrium_path", dies)
     with pytest.raises(Killed):
         solve(tmp_path, piece)
-    listing = reference_listing(tmp_path, [SCENE])
-    assert listing["state"].tolist() == ["half-way", *["missing"] * 5]
-    assert listing["steps"][0] == "1/2"
+    assert states(tmp_path) == ["half-way", *["missing"] * 5]
+    assert listed(tmp_path)[0].steps == 1
     monkeypatch.setattr(module, "equilibrium_path", watched)
     again, whole = read_record(solve(tmp_path, piece)), read_record(piece.path(solved))
     assert starts == [1]
@@ -113,7 +119,7 @@ def test_a_crash_half_way_costs_no_finished_step(solved, tmp_path, monkeypatch):
         known = whole.fields[name].values
         # The factorisation may order its sums by the first matrix it sees: rounding, not Newton's tolerance of 1e-6.
         np.testing.assert_allclose(again.fields[name].values, known, rtol=0, atol=1e-9 * np.abs(known).max())
-    assert reference_listing(tmp_path, [SCENE])["state"][0] == "ok"
+    assert states(tmp_path)[0] == "ok"
     assert not list(tmp_path.rglob("*.steps"))
 
 

@@ -11,11 +11,12 @@ import pandas as pd
 import pytest
 
 from studies.catalog import Chart
-from studies.report.results import DOUBT_MARK, draw_charts, refresh, report, summary_of, write_table
-from studies.runs.run import case_path
+from studies.report.results import DOUBT_MARK, draw_charts, refresh, report, summary_of
+from studies.runs.current import case_path
+from studies.store.csv_table import write_table
 from studies.store.machine import machine_id
 from studies.store.record import Status
-from studies.sweep.run_studies import load_runs
+from studies.sweep.load import load_runs
 from tests.studies.tiny import tiny_case, tiny_study
 
 

@@ -8,10 +8,12 @@ import pytest
 from massspring import Element, Free, Xpbd, simulate
 from massspring.run.history import EXTRA
 from studies.base.errors import StudyError
+from studies.runs import current
 from studies.runs import run as module
 from studies.runs.case import BodyRecipe, Case
+from studies.runs.current import case_path, why_case_is_stale
 from studies.runs.prepare import prepare
-from studies.runs.run import case_path, checkpoint_frames, judge, measure, replay, run_case, why_case_is_stale
+from studies.runs.run import checkpoint_frames, judge, measure, replay, run_case
 from studies.scenes.stress import STRESS_SCENES
 from studies.store.record import Field, Status, read_record, write_record
 from tests.studies.tiny import FRAMES, NODES, diverging_case, tiny_case
@@ -111,7 +113,7 @@ def test_it_is_current_until_case_or_code_change(ran, monkeypatch):
     assert path == case_path(root, "tiny", tiny_case())
     assert why_case_is_stale(root, "tiny", tiny_case()) is None
     assert why_case_is_stale(root, "tiny", tiny_case(dt_fraction=0.4))
-    monkeypatch.setattr(module, "run_fingerprint", lambda: "edited")
+    monkeypatch.setattr(current, "run_fingerprint", lambda: "edited")
     assert why_case_is_stale(root, "tiny", tiny_case())
 
 

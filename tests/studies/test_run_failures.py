@@ -9,7 +9,8 @@ import pytest
 from massspring import Capsule, Path, Sphere
 from studies.geometry import HalfSpace
 from studies.runs.case import BodyRecipe
-from studies.runs.run import measure, run_case, why_case_is_stale
+from studies.runs.current import why_case_is_stale
+from studies.runs.run import measure, run_case
 from studies.scene.meshing import mesh_for
 from studies.scenes import Held
 from studies.store.record import Status, read_record

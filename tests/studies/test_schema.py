@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from studies.base.errors import StudyError
-from studies.runs.run import case_path
+from studies.runs.current import case_path
 from studies.store.new_record import new_fields
 from studies.store.record import read_record
 from studies.store.schema import LAYOUTS, LENGTHS, REFERENCE_FIELDS, RUN_FIELDS, STATUSES, Status, fault, tables

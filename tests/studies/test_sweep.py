@@ -3,18 +3,22 @@
 import os
 import signal
 from dataclasses import replace
+from operator import methodcaller
 
 import h5py
 import pytest
 
 from studies.base.errors import StudyError
-from studies.runs.run import case_path
+from studies.runs.current import case_path
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status, read_record, write_record
 from studies.store.staleness import OTHER_VERSION
 from studies.sweep import run_studies as module
-from studies.sweep.run_studies import Task, failed, load_runs, perform, run_studies, standings, tasks_of
+from studies.sweep.load import load_runs
+from studies.sweep.run_studies import perform, run_studies
+from studies.sweep.standings import failed, standings, warnings_of
+from studies.sweep.tasks import Task, tasks_of
 from studies.timing import cases as timed
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
 
@@ -84,7 +88,7 @@ def test_a_damaged_file_is_stale_and_runs_again(results, number):
     assert len(runs) == 2
     assert len(remarks) == 1
     assert path.name in remarks[0] and ("'mass' has changed" if number else "cut off") in remarks[0]
-    assert module.warnings_of(results, study) == []
+    assert warnings_of(results, study) == []
     assert not failed(Task(results, "tiny", diverging_case()))
     assert run_studies(results, [study], 1, Silent()) == 1
     assert load_runs(results, study)[1] == []
@@ -137,7 +141,7 @@ class Doomed:
 
 def test_a_process_that_dies_is_one_sentence(tmp_path):
     with pytest.raises(StudyError, match=r"process died .* what is finished is stored"):
-        perform([Doomed()], 1, Silent())
+        perform([Doomed()], 1, Silent(), do=methodcaller("perform"))
 
 
 def test_the_number_of_threads_is_given_back(monkeypatch, tmp_path):

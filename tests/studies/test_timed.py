@@ -9,8 +9,8 @@ from massspring import Free, simulate
 from studies.base.errors import StudyError
 from studies.metrics.metrics import Run
 from studies.metrics.table import metric
+from studies.runs.current import case_path
 from studies.runs.prepare import prepare
-from studies.runs.run import case_path
 from studies.store.machine import machine_id
 from studies.store.record import Status, read_record, write_record
 from studies.timing import cases as module

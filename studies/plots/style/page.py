@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
+from studies.metrics.cells import DOUBT_MARK
 from studies.metrics.metrics import Metric, Run
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, readable, remark, styled
 
@@ -23,7 +24,6 @@ NARROWEST = 8.0
 HANDLE = 0.62
 """Width of a legend entry besides its words [inch]."""
 MOST_NOTES = 6
-DOUBT_MARK = "†"
 SHORT = 200.0
 """A logarithmic axis from one end to the other of which values grow less than this has numbers between the decades."""
 

@@ -9,11 +9,11 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from studies.base.errors import StudyError
 from studies.base.lookup import choose
+from studies.cli.terminal import console, errors
 from studies.geometry import OrganMesh, curved, organ, scan, vary
 from studies.geometry.api.scans import longest_side
 from studies.geometry.doctor.examine import TISSUE, Findings, examine
@@ -23,8 +23,6 @@ from studies.geometry.files.writing import SURFACES, VOLUMES, check_target, hold
 from studies.geometry.mesh.quality import dihedral_angles
 from studies.geometry.organs import SHAPES
 
-console = Console(soft_wrap=True)
-errors = Console(stderr=True, soft_wrap=True)
 MM = 1e-3
 NODES = 550
 

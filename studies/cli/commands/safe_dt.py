@@ -1,11 +1,8 @@
 """`organbench safe-dt`: how long a step may be."""
 
-from rich.console import Console
-
 from studies.cli.case_options import BodyKind, MethodName, SurfaceNodes, chosen_case
+from studies.cli.terminal import console
 from studies.runs.safe_dt import safe_step
-
-console = Console(soft_wrap=True)
 
 
 def safe_dt(

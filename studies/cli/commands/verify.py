@@ -5,13 +5,12 @@ from typing import Annotated
 
 import pandas as pd
 import typer
-from rich.console import Console
 
 from reference_fem import crosscheck
+from studies.cli.terminal import console
 from studies.store.stamps import set_stamp
 from studies.verify.verification import FOLDER, Verdict, run_pack, tolerance, write_kappa, write_verdicts
 
-console = Console(soft_wrap=True)
 FAST = "smoke"
 """The fast half is kept apart: a part of the pack must not stand where the whole of it stood."""
 

@@ -1,21 +1,14 @@
 """`organbench publish`: what the repository shows becomes what is stored."""
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
-from rich.console import Console
 
 from studies.catalog import STUDIES
+from studies.cli.terminal import Results, console
 from studies.report import publish as publishing
-
-console = Console(soft_wrap=True)
 
 
 def publish(
-    results: Annotated[
-        Path, typer.Option("--results", envvar="ORGANBENCH_RESULTS", help="folder of the results")
-    ] = Path("results"),
+    results: Results = Path("results"),
 ) -> None:
     """Copies tables and charts to results/published, and the summary into README.md; refuses stale results."""
     copies, absent = publishing.publish(results, STUDIES, Path("."))

@@ -5,7 +5,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import NamedTuple
 
-from studies.sweep.moved import MODULES, NAMES
+from studies.base.moved import MODULES, NAMES
 
 
 class Moved(NamedTuple):

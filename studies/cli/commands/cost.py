@@ -5,14 +5,15 @@ from typing import Annotated
 
 import pandas as pd
 import typer
-from rich.console import Console
 from rich.table import Table
 
+from studies.base.compile_watch import watching
 from studies.cli.case_options import BodyKind, MethodName, SurfaceNodes, chosen_case
-from studies.metrics.table import write_table
+from studies.cli.progress import compiling
+from studies.cli.terminal import console, errors
+from studies.store.csv_table import write_table
 from studies.timing.stage_cost import FRAME, SKIPPED, STAGE, cost_table
 
-console = Console(soft_wrap=True)
 HEADINGS = {STAGE: "stages of a step", SKIPPED: "left out here; what it would cost", FRAME: "Python between two frames"}
 
 
@@ -26,14 +27,15 @@ def cost(
 ) -> None:
     """Microseconds per stage of a step, their share, what was skipped and what that saved; on one pinned core."""
     case = chosen_case(scene, method, body, nodes)
-    with Console(stderr=True).status("measuring (the first time most goes into compiling) ..."):
+    with compiling(errors, "measuring") as told, watching(told):
         found = cost_table(case)
     if csv is not None:
         write_table(csv, found)
     if json:
         console.print(found.to_json(orient="records", force_ascii=False), markup=False, highlight=False)
         return
-    console.print(f"{case.name}, over the whole scene", markup=False, highlight=False)
+    turns = found.attrs["turns"]
+    console.print(f"{case.name}, over the whole scene, fastest of {turns}", markup=False, highlight=False)
     console.print(_drawn(found))
     for what, told in found[["what", "how much"]].itertuples(index=False):
         if told:

@@ -1,0 +1,19 @@
+"""Lazy faces of packages (PEP 562): a name of the face loads the module it lives in, the others stay unloaded."""
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from sys import modules
+from typing import Any
+
+
+def lazy(package: str, face: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """`__getattr__` and `__dir__` of `package`, whose names live where `face` says: name -> module."""
+
+    def load(name: str) -> Any:
+        if name not in face:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        value = getattr(import_module(face[name]), name)
+        setattr(modules[package], name, value)
+        return value
+
+    return load, lambda: sorted({*vars(modules[package]), *face})

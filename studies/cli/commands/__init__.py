@@ -1,0 +1,1 @@
+"""One command per module; studies.cli.app loads the one that is called."""

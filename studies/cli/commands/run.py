@@ -1,0 +1,82 @@
+"""`organbench run`: studies brought up to date."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.base.atomic import sweep_parts
+from studies.base.lookup import choose
+from studies.catalog import STUDIES, Study
+from studies.cli.progress import TerminalProgress, dry_run
+from studies.cli.terminal import Results, console, say, warn
+from studies.geometry.mesher.jobs import cache_folder
+from studies.metrics.table import check_columns
+from studies.reference.pieces import STUDY as REFERENCES
+from studies.report.results import refresh
+from studies.store.links import link_study
+from studies.store.paths import study_folder
+from studies.store.staleness import MISSING
+from studies.sweep.find_study import find_studies
+from studies.sweep.plan import plan
+from studies.sweep.run_studies import run_studies
+from studies.sweep.standings import failed, warnings_of
+from studies.sweep.tasks import Task
+
+SMOKE = "smoke"
+MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
+Wanted = Callable[[Task], bool] | None
+
+
+def run(
+    studies: Annotated[
+        list[str] | None, typer.Argument(help=f"studies or a FILE.py that defines STUDY; without: {MAIN_STUDIES}")
+    ] = None,
+    results: Results = Path("results"),
+    smoke: Annotated[bool, typer.Option(help="small meshes, few frames; kept apart in results/smoke")] = False,
+    only: Annotated[str, typer.Option(help="failed, stale, or both with a comma: nothing else runs")] = "",
+    jobs: Annotated[int, typer.Option(min=1, help="processes for the physics; timing always runs alone")] = 2,
+    dry: Annotated[bool, typer.Option("--dry-run", help="say what would run, why and how long; run nothing")] = False,
+) -> None:
+    """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
+    wanted = _filter(only)
+    root = results / SMOKE if smoke else results
+    for found in _checked(studies or []):
+        study = found.smoke() if smoke else found
+        if dry:
+            dry_run(console, study.name, plan(root, study, wanted), jobs)
+        else:
+            _bring_up_to_date(root, study, jobs, wanted)
+
+
+def _bring_up_to_date(root: Path, study: Study, jobs: int, wanted: Wanted) -> None:
+    with TerminalProgress(console, plan(root, study, wanted), jobs) as progress:
+        count = run_studies(root, [study], jobs, progress, wanted, progress.compiling)
+    for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
+        sweep_parts(folder)
+    warn(link_study(root, study.name))
+    told = warnings_of(root, study) if count else []
+    if told:
+        more = f" (and {len(told) - 1} more cases warn; `organbench show` prints them)" if len(told) > 1 else ""
+        warn([told[0] + more])
+    warn(refresh(root, study)[1])
+    say(f"{study.name}: {count} pieces ran, charts in {study_folder(root, study.name)}")
+
+
+def _checked(names: list[str]) -> list[Study]:
+    studies = find_studies(names)
+    for study in studies:
+        check_columns(study.columns)
+    return studies
+
+
+def _filter(only: str) -> Wanted:
+    if not only:
+        return None
+    rules: dict[str, Callable[[Task], bool]] = {
+        "failed": failed,
+        "stale": lambda task: task.why_stale() not in (None, MISSING),
+    }
+    chosen = [choose(word.strip(), rules, "filter") for word in only.split(",")]
+    return lambda task: any(rule(task) for rule in chosen)

@@ -1,0 +1,99 @@
+"""`organbench status`: what is done, what is not, and why."""
+
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from studies.catalog import STUDIES
+from studies.cli.terminal import Results, console, say
+from studies.reference.pieces import PieceStanding, pieces, standing_of
+from studies.scene.scene import Scene
+from studies.sweep.find_study import find_study
+from studies.sweep.standings import Standing, standings
+
+SHOWN = 8
+"""Pieces named per reason; `--all` names the rest."""
+
+
+def status(
+    study: Annotated[str, typer.Argument(help="one study, with what is not ok; all, in numbers, without")] = "",
+    results: Results = Path("results"),
+    every: Annotated[bool, typer.Option("--all", help="name every piece that is not ok, and every mesh")] = False,
+) -> None:
+    """How many cases are ok, failed, stale or missing, and why; and how the references stand, mesh by mesh."""
+    chosen = [find_study(study)] if study else list(STUDIES)
+    for entry in chosen:
+        found = standings(results, entry)
+        say(f"{entry.name}: {counted(standing.status for standing in found)}")
+        if study:
+            show_reasons(found, every)
+    show_references(results, {scene.name: scene for entry in chosen for scene in entry.scenes}.values(), every)
+
+
+def counted(words: Iterable[str]) -> str:
+    """ "16 ok, 2 stale": ok first, then by number."""
+    counts = Counter(words)
+    return ", ".join(f"{n} {word}" for word, n in sorted(counts.items(), key=lambda c: (c[0] != "ok", -c[1], c[0])))
+
+
+def show_reasons(found: list[Standing], every: bool) -> None:
+    """What is not ok: each reason once, and under it the pieces."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for standing in found:
+        if standing.status != "ok":
+            reasons.setdefault((standing.status, standing.message), []).append(standing.task.label)
+    for (word, message), labels in reasons.items():
+        say(f"  {word}: {message}")
+        shown = labels if every or len(labels) <= SHOWN + 1 else labels[:SHOWN]
+        for label in shown:
+            say(f"    {label}")
+        if len(shown) < len(labels):
+            say(f"    and {len(labels) - len(shown)} more (--all names them)")
+
+
+def show_references(root: Path, scenes: Iterable[Scene], every: bool) -> None:
+    """How the references stand: a line per scene, or one per mesh and setting."""
+    found = {scene.name: [standing_of(root, piece) for piece in pieces(scene)] for scene in scenes}
+    found = {name: rows for name, rows in found.items() if rows}
+    if not found:
+        return
+    say("references:")
+    console.print(_meshes(found) if every else _scenes(found))
+
+
+def _scenes(found: dict[str, list[PieceStanding]]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading in ("scene", "finest mesh", "unknowns", "seconds", "pieces"):
+        table.add_column(heading, justify="left" if heading in ("scene", "pieces") else "right")
+    for name, rows in found.items():
+        finest = max(rows, key=lambda row: row.piece.weight)
+        seconds = sum(row.seconds for row in rows if row.seconds == row.seconds)
+        state = counted(_state(row) for row in rows)
+        table.add_row(name, f"{finest.piece.level:g}", _count(finest.unknowns), f"{seconds:.0f}", state)
+    return table
+
+
+def _meshes(found: dict[str, list[PieceStanding]]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading in ("scene", "mesh", "better", "unknowns", "seconds", "state"):
+        table.add_column(heading, justify="left" if heading in ("scene", "better", "state") else "right")
+    for name, rows in found.items():
+        for row in rows:
+            seconds = "-" if row.seconds != row.seconds else f"{row.seconds:.1f}"
+            cells = (f"{row.piece.level:g}", row.piece.variant, _count(row.unknowns), seconds)
+            table.add_row(name, *cells, _state(row))
+    return table
+
+
+def _state(row: PieceStanding) -> str:
+    if row.state != "half-way":
+        return row.state
+    return f"half-way ({row.steps} of {len(row.piece.scene.checkpoints)} checkpoints)"
+
+
+def _count(unknowns: int | None) -> str:
+    return "-" if unknowns is None else f"{unknowns:,}"

@@ -1,0 +1,26 @@
+"""Numbers as people read them: a value beside the uncertainty of what it is compared with."""
+
+import math
+
+MISSING = "–"
+DOUBT_MARK = "†"
+"""Of an error that the reference knows less than ten times better than the model."""
+MINUS = "−"
+
+
+def value_cell(value: float, floor: float = float("nan"), *, signed: bool = False, doubtful: bool = False) -> str:
+    """ "−50.8 ± 0.2 †": as many digits as the uncertainty `floor` has; three without one; a dash for NaN."""
+    if value != value:
+        return MISSING
+    sign = "+" if signed else ""
+    if not floor > 0:
+        return plain(value, sign)
+    digits = max(0, -math.floor(math.log10(floor)))
+    mark = f" {DOUBT_MARK}" if doubtful else ""
+    return f"{value:{sign}.{digits}f} ± {floor:.{digits}f}{mark}".replace("-", MINUS)
+
+
+def plain(value: float, sign: str = "") -> str:
+    """Three significant digits; whole numbers below a million without an exponent."""
+    text = f"{value:{sign},.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:{sign}.3g}"
+    return text.replace("-", MINUS)

@@ -1,0 +1,147 @@
+"""What the reference of a scene is made of: its solutions, what each depends on, where it lies, how it stands."""
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from studies.reference.checkpoints import kept
+from studies.scene.as_json import scene_to_json
+from studies.scene.scene import Scene
+from studies.store.fingerprint import source_fingerprint
+from studies.store.paths import record_path
+from studies.store.record import peek
+from studies.store.staleness import CASE_CHANGED, CODE_CHANGED, MISSING, why_stale
+
+STUDY = "reference"
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A mesh of the scene's family, or that mesh with one setting made better."""
+
+    scene: Scene
+    level: float
+    variant: str = ""
+    """"" or a name of VARIANTS."""
+
+    @property
+    def name(self) -> str:
+        """For people and file names."""
+        return f"{self.scene.name}-{self.level:g}" + (f"-{self.variant}" if self.variant else "")
+
+    @property
+    def key(self) -> str:
+        """What the solution depends on, besides the code: not the frames or the other meshes; without motion not the
+        damping or the start."""
+        scene, plan = self.scene, self.scene.reference
+        assert plan is not None  # a piece belongs to a plan
+        plain = replace(
+            scene,
+            title="",
+            duration=0.0,
+            frames=0,
+            reference=replace(plan, levels=(self.level, self.level), variants=()),
+            quantities=(),
+            not_for=(),
+        )
+        if plan.dt is None:
+            plain = replace(plain, damping=0.0, start=None)
+        data = {"scene": json.loads(scene_to_json(plain)), "level": self.level, "variant": self.variant}
+        return json.dumps(data, sort_keys=True, ensure_ascii=False)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is a motion in time; a load path builds no mass."""
+        return self.scene.reference is not None and self.scene.reference.dt is not None
+
+    def path(self, root: Path) -> Path:
+        """Where it lies."""
+        return record_path(root, STUDY, self.name, self.key)
+
+    def is_current(self, root: Path) -> bool:
+        """Whether it is there, from this code, as it was written."""
+        return self.why_stale(root) is None
+
+    def why_stale(self, root: Path) -> str | None:
+        """Why it must be solved (again) (studies.store.staleness); None when it need not."""
+        return why_stale(self.path(root), self.key, reference_fingerprint())
+
+    @property
+    def stamp(self) -> str:
+        """Problem and code in one text."""
+        return f"{reference_fingerprint()} {self.key}"
+
+    def state(self, root: Path) -> str:
+        """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""
+        if kept(self.path(root), self.stamp) is not None:
+            return "half-way"
+        why = self.why_stale(root)
+        if why is None:
+            return str(peek(self.path(root)).status)
+        return "missing" if why == MISSING else "stale" if why in (CASE_CHANGED, CODE_CHANGED) else "unreadable"
+
+    @property
+    def weight(self) -> float:
+        """What it costs, roughly: unknowns."""
+        return self.level if self.level > 1 else self.level**-3
+
+
+def pieces(scene: Scene) -> list[Piece]:
+    """All that the reference of a scene is made of: every mesh, and each setting made better on the coarsest."""
+    if scene.reference is None:
+        return []
+    family = [Piece(scene, level) for level in scene.reference.levels]
+    return [*family, *(replace(family[0], variant=name) for name in variants(scene))]
+
+
+def variants(scene: Scene) -> list[str]:
+    """The settings that matter in a scene: nothing touches, nothing sinks in."""
+    assert scene.reference is not None
+    return [name for name in scene.reference.variants if name != "contact" or scene.obstacles]
+
+
+JUDGES = ("bench.py", "crosscheck", "exact.py", "modes.py", "oracles/", "uncertainty.py")
+"""Beginnings of the solver's files that no reference is computed with: they judge it."""
+
+
+def reference_fingerprint() -> str:
+    """Hash of all code that a reference depends on."""
+    return source_fingerprint(
+        "reference_fem",
+        "studies.geometry",
+        "studies.runs.prepare",
+        "studies.reference.problem",
+        "studies.reference.fields",
+        "studies.reference.mesh",
+        "studies.reference.pieces",
+        "studies.reference.solve",
+        without=JUDGES,
+    )
+
+
+@dataclass(frozen=True)
+class PieceStanding:
+    """How a piece stands."""
+
+    piece: Piece
+    state: str
+    """As `Piece.state` says."""
+    unknowns: int | None
+    """None where nothing is stored."""
+    steps: int
+    """Checkpoints reached."""
+    seconds: float
+    """What solving took [s]; NaN where nothing is stored."""
+
+
+def standing_of(root: Path, piece: Piece) -> PieceStanding:
+    """Read off the header of the stored solution, or off the load path half-way to it."""
+    state = piece.state(root)
+    if state == "half-way":
+        begun = kept(piece.path(root), piece.stamp)
+        done = len([e for e in begun.path if e.t in piece.scene.checkpoints]) if begun else 0
+        return PieceStanding(piece, state, None, done, float("nan"))
+    if state in ("missing", "unreadable"):
+        return PieceStanding(piece, state, None, 0, float("nan"))
+    known = peek(piece.path(root)).attributes
+    return PieceStanding(piece, state, known["unknowns"], known["steps_done"], float(known["seconds"]))

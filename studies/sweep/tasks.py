@@ -1,0 +1,58 @@
+"""The pieces of work that studies are made of."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from studies.catalog.study import Study
+from studies.reference.pieces import Piece, pieces
+from studies.runs.case import Case
+from studies.runs.current import case_path, why_case_is_stale
+
+
+@dataclass(frozen=True)
+class Task:
+    """One piece of work that can run in any process: a piece of a reference, or a case."""
+
+    root: Path
+    study: str
+    work: Case | Piece
+
+    @property
+    def weight(self) -> float:
+        """Longest first keeps both cores busy to the end: references by mesh, then cases by size over step."""
+        if isinstance(self.work, Piece):
+            return 1e9 + self.work.weight
+        return self.work.body.nodes / self.work.dt_fraction
+
+    @property
+    def label(self) -> str:
+        """For progress and messages."""
+        return f"reference {self.work.name}" if isinstance(self.work, Piece) else self.work.name
+
+    def is_current(self) -> bool:
+        """Whether it need not run."""
+        return self.why_stale() is None
+
+    def why_stale(self) -> str | None:
+        """Why it must run (again) (studies.store.staleness); None when it need not."""
+        if isinstance(self.work, Piece):
+            return self.work.why_stale(self.root)
+        return why_case_is_stale(self.root, self.study, self.work)
+
+    def path(self) -> Path:
+        """Where its record lies."""
+        return (
+            self.work.path(self.root) if isinstance(self.work, Piece) else case_path(self.root, self.study, self.work)
+        )
+
+
+def tasks_of(root: Path, studies: Iterable[Study]) -> list[Task]:
+    """Everything the studies need, each piece once, longest first."""
+    tasks: dict[Path, Task] = {}
+    for study in studies:
+        found = [piece for scene in study.scenes for piece in pieces(scene)]
+        for work in (*found, *study.cases):
+            task = Task(root, study.name, work)
+            tasks[task.path()] = task
+    return sorted(tasks.values(), key=lambda task: -task.weight)

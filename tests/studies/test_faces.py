@@ -1,0 +1,97 @@
+"""What a package shows at its face is there, is typed, and loads nothing else."""
+
+import ast
+import os
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import massspring
+from massspring import METHODS, Method
+from studies.base.errors import StudyError
+from studies.catalog import STUDIES, Chart
+from studies.plots import volume_history
+
+REPOSITORY = Path(__file__).parents[2]
+FACES = ("massspring", "reference_fem", "studies", "studies.geometry")
+
+
+@pytest.mark.parametrize("package", FACES)
+def test_every_name_is_where_the_face_says(package):
+    module = import_module(package)
+    for name, home in module._FACE.items():
+        if name != "*":
+            assert getattr(module, name) is getattr(import_module(home), name)
+            assert name in dir(module) and name in module.__all__
+
+
+@pytest.mark.parametrize("package", FACES)
+def test_the_type_checker_sees_the_same_names(package):
+    module = import_module(package)
+    tree = ast.parse(Path(str(module.__file__)).read_bytes())
+    (block,) = (node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+    imported = {
+        alias.name: str(node.module) for node in block.body if isinstance(node, ast.ImportFrom) for alias in node.names
+    }
+    assert imported == module._FACE
+
+
+def test_every_method_is_exported():
+    """METHODS is the only list of them."""
+    for method in (*METHODS, Method):
+        assert getattr(massspring, method.__name__) is method
+        assert method.__name__ in dir(massspring) and method.__name__ in massspring.__all__
+    scope: dict = {}
+    exec("from massspring import *", scope)
+    assert {method.__name__ for method in METHODS} | {"Body", "METHODS"} <= set(scope)
+
+
+@pytest.mark.parametrize("package", FACES)
+def test_an_unknown_name_is_an_attribute_error(package):
+    with pytest.raises(AttributeError, match="has no attribute 'Bodyy'"):
+        _ = import_module(package).Bodyy
+
+
+HEAVY = ("gmsh", "h5py", "matplotlib", "meshio", "numba", "pandas", "scipy", "skfem", "skimage")
+
+
+@pytest.mark.parametrize(
+    ("words", "loaded"),
+    [
+        (["--help"], ()),
+        (["list"], ()),
+        (["status", "stress"], ("h5py", "numba", "scipy")),
+        (["show", "nothing.h5"], ("h5py",)),
+    ],
+    ids=lambda value: " ".join(value),
+)
+def test_a_command_loads_what_it_needs(words, loaded, tmp_path):
+    program = (
+        "import sys\nfrom studies.cli import app\n"
+        f"sys.argv = ['organbench', *{words!r}]\n"
+        "try:\n    app.main()\nexcept SystemExit:\n    pass\n"
+        f"print(*(name for name in {HEAVY!r} if name in sys.modules), file=sys.stderr)"
+    )
+    command = [sys.executable, "-c", program]
+    env = {**os.environ, "ORGANBENCH_RESULTS": str(tmp_path)}
+    done = subprocess.run(command, cwd=REPOSITORY, env=env, capture_output=True, text=True, check=True)
+    assert set(done.stderr.splitlines()[-1].split()) <= set(loaded)
+
+
+def test_every_chart_of_the_catalogue_is_found():
+    for study in STUDIES:
+        for chart in study.charts:
+            assert chart.draw is import_module(str(chart.drawing).split(":")[0]).draw
+
+
+@pytest.mark.parametrize("drawing", ["studies.plots.volumes:draw", "studies.plots.laws:paint", "draw", ""])
+def test_a_chart_that_names_no_function_is_one_sentence(drawing):
+    with pytest.raises(StudyError, match=r"chart a\.png: there is no function"):
+        _ = Chart("a.png", drawing).draw
+
+
+def test_a_chart_takes_a_function_too():
+    assert Chart("a.png", volume_history.draw).draw is volume_history.draw

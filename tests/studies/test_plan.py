@@ -1,0 +1,158 @@
+"""What a sweep would run is what it runs; how long it takes is read off what ran before; compiling is told."""
+
+import io
+import re
+from dataclasses import replace
+
+import numba
+import pytest
+from rich.console import Console
+
+from studies.base.compile_watch import watching
+from studies.cli.progress import QUIET_SECONDS, TerminalProgress, compiling, words
+from studies.runs.current import case_path
+from studies.store.record import peek, read_record, write_record
+from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, plan
+from studies.sweep.run_studies import perform, run_studies, told_by_workers
+from studies.sweep.standings import failed
+from studies.timing.cases import timing_file
+from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
+
+
+def stale(root, case):
+    path = case_path(root, "tiny", case)
+    write_record(path, replace(read_record(path), fingerprint="0"))
+    return path
+
+
+def test_from_nothing_everything_is_planned_without_an_estimate(tmp_path):
+    found = plan(tmp_path, tiny_study())
+    assert sorted(p.kind for p in found) == ["case"] * 3 + ["timing"] * 3
+    assert {p.seconds for p in found} == {None}
+    assert {p.why for p in found if p.kind == "case"} == {"missing"}
+    assert expected(found, 2) is None
+
+
+def test_what_is_planned_is_what_runs(results):
+    path = stale(results, tiny_case(timed=True))
+    timing_file(results, "tiny", tiny_study().cases[1]).unlink()
+    found = plan(results, tiny_study())
+    assert [(p.stage, p.label, p.why) for p in found] == [
+        (PHYSICS, tiny_case().name, "the code changed"),
+        (TIMING, tiny_study().cases[1].name, "missing"),
+    ]
+    assert found[0].seconds == peek(path).attributes["seconds"] > 0
+    assert found[1].seconds is None
+    progress = Silent()
+    assert run_studies(results, [tiny_study()], 1, progress) == 2
+    assert progress.done == [(p.stage, p.label) for p in found]
+    assert plan(results, tiny_study()) == []
+
+
+def test_a_filter_plans_what_it_lets_run(results):
+    stale(results, tiny_case(timed=True))
+    assert plan(results, tiny_study(), failed) == []
+    (piece, *_) = plan(results, tiny_study(), lambda task: task.label == diverging_case().name)
+    assert (piece.label, piece.why) == (diverging_case().name, "its result is a failure")
+
+
+def piece(stage, kind, seconds):
+    return Planned(stage, kind, f"{kind} {seconds}", "missing", seconds)
+
+
+def test_the_estimate_shares_the_physics_and_not_the_timing():
+    known = [piece(PHYSICS, "case", 4.0), piece(PHYSICS, "case", 2.0), piece(TIMING, "timing", 5.0)]
+    assert expected(known, 1) == pytest.approx(11.0)
+    assert expected(known, 2) == pytest.approx(8.0)
+    assert expected([*known, piece(PHYSICS, "case", None)], 1) == pytest.approx(14.0)  # as long as the mean
+    assert expected([*known, piece(PHYSICS, "reference", None)], 1) is None
+    assert expected([], 2) == 0
+
+
+@pytest.mark.parametrize(("seconds", "said"), [(0.2, "1 s"), (80, "80 s"), (200, "3 min"), (6000, "1 h 40 min")])
+def test_times_in_words(seconds, said):
+    assert words(seconds) == said
+
+
+def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, tmp_path):
+    code, out, err = organbench("run", tiny_file, "--dry-run", "--results", tmp_path / "empty")
+    assert (code, err) == (0, "")
+    assert not (tmp_path / "empty").exists()
+    assert "tiny: 6 pieces would run" in out
+    assert "  3 cases (missing): no estimate" in out
+    assert "no estimate: of some kind nothing has run yet" in out
+    stale(results, tiny_case(timed=True))
+    code, out, _ = organbench("run", tiny_file, "--dry-run", "--results", results)
+    assert re.search(r"  1 case \(the code changed\): about \d+ s of computing\n", out)
+    assert "with 2 processes, from earlier runs of 1 of the 1 pieces; compiling comes on top" in out
+    code, out, _ = organbench("run", tiny_file, "--dry-run", "--only", "failed", "--results", results)
+    assert out.strip() == "tiny: nothing would run, all is current"
+
+
+def log() -> Console:
+    return Console(file=io.StringIO(), width=80)
+
+
+def lines(console) -> list[str]:
+    return console.file.getvalue().splitlines()
+
+
+def test_the_time_left_shrinks_with_every_piece():
+    planned = [Planned(PHYSICS, "case", name, "missing", 60.0) for name in "abcd"]
+    with TerminalProgress(log(), planned, jobs=2) as progress:
+        progress.begin(PHYSICS, 4)
+        assert progress.left() == "about 2 min left"
+        for name in "abc":
+            progress.advance(PHYSICS, name)
+        assert progress.left() == "about 30 s left"
+        progress.advance(PHYSICS, "d")
+    assert lines(progress.console) == ["physics 4/4: d"]
+
+
+def test_a_log_has_one_line_on_compiling_and_then_rests():
+    console = log()
+    with TerminalProgress(console) as progress:
+        for name in ("free_frame", "free_frame", "other"):
+            progress.compiling(name)
+    with compiling(console, "measuring") as told:
+        told("free_frame")
+        told("other")
+    assert lines(console) == ["compiling free_frame (kept for the next time)"] * 2
+    assert QUIET_SECONDS > 1
+
+
+def test_numba_is_heard_once_for_each_function_that_is_called():
+    @numba.njit
+    def inner(x):
+        return x + 1
+
+    @numba.njit
+    def outer(x):
+        return inner(x) * 2
+
+    heard = []
+    with watching(heard.append) as watch:
+        assert outer(1) == 4
+        assert outer(2) == 6
+    assert (heard, watch.names, watch.depth) == (["outer"], ["outer"], 0)
+    assert watch.seconds > 0
+    outer(1.0)
+    assert heard == ["outer"]
+
+
+class Compiles:
+    """A task that compiles in its process."""
+
+    label = "compiles"
+
+
+def compile_something(task):
+    fresh = numba.njit(lambda x: x + 1)
+    assert fresh(1) == 2
+
+
+def test_workers_tell_what_they_compile():
+    heard = []
+    with told_by_workers(heard.append) as writer:
+        perform([Compiles()], 1, Silent(), do=compile_something, writer=writer)
+    assert heard == ["<lambda>"]

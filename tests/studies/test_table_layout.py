@@ -1,0 +1,72 @@
+"""The table on the terminal: as wide as it is, values with their uncertainty, what differs beside what is shared."""
+
+import pytest
+
+from studies.cli.commands import table
+from studies.metrics.cells import value_cell
+from studies.metrics.metrics import METRICS
+from studies.metrics.table import DOUBTFUL
+
+CHOSEN = [metric for metric in METRICS if metric.name in ("volume_worst", "force_end", "mean_error", "min_j")]
+
+
+@pytest.mark.parametrize(
+    ("value", "floor", "options", "text"),
+    [
+        (-50.84, 0.228, {"signed": True}, "−50.8 ± 0.2"),
+        (9.441, 0.4731, {}, "9.4 ± 0.5"),
+        (19.6, 1.01, {"doubtful": True}, "20 ± 1 †"),
+        (0.37164, float("nan"), {}, "0.372"),
+        (3.1e-6, 0.0, {}, "3.1e−06"),
+        (float("nan"), 0.1, {}, "–"),
+        (12345.6, float("nan"), {}, "12,346"),
+    ],
+)
+def test_a_value_has_the_digits_of_its_uncertainty(value, floor, options, text):
+    assert value_cell(value, floor, **options) == text
+
+
+def row(scene="ball", method="free", **changes):
+    settings = {"law": "van_gelder", "nodes": 550, "stiffness": 1.0, "dt/dt_c": 0.5, "status": "ok", DOUBTFUL: ""}
+    numbers = {f"{m.name} [{m.unit}]": 12.0 for m in CHOSEN} | {"force_end floor [%]": 0.2}
+    return {"scene": scene, "body": "surface", "method": method, **settings, **numbers, **changes}
+
+
+def test_what_all_share_is_said_once_and_what_differs_is_a_column(organbench, capsys):
+    table.draw([row(), row(method="implicit_volume", nodes=150)], CHOSEN, False)
+    first, *rest = capsys.readouterr().out.splitlines()
+    assert first == "law van_gelder, stiffness 1, dt = 0.5 dt_c"
+    assert rest[-2].split()[:2] == ["free", "550"]
+    assert rest[-1].split()[:2] == ["implicit_volume", "150"]
+    assert "+12.0 ± 0.2" in rest[-1]
+
+
+def test_a_setting_of_a_group_stands_in_its_heading(capsys):
+    table.draw([row(), row("liver", nodes=150)], CHOSEN, False)
+    out = capsys.readouterr().out.splitlines()
+    assert "ball, surface, 550 nodes" in out and "liver, surface, 150 nodes" in out
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 100])
+def test_lines_fit_and_say_what_is_left_out(monkeypatch, capsys, width):
+    monkeypatch.setenv("COLUMNS", str(width))
+    rows = [row(method=name) for name in ("free", "post_stabilization")]
+    metrics = [*CHOSEN, *(m for m in METRICS if m.name == "silhouette_error")] * 2
+    rows = [{**r, "silhouette_error [%]": 1.0} for r in rows]
+    table.draw(rows, metrics, False)
+    out = capsys.readouterr().out.splitlines()
+    drawn = [line for line in out if not line.startswith(("not shown", "law"))]
+    assert max(map(len, drawn)) <= width
+    shown = sum("%" in word or "1" in word for word in next(line for line in out if "[%]" in line).split())
+    (left_out,) = (line for line in out if line.startswith("not shown"))
+    assert shown + len(left_out.split(": ")[1].split(", ")) == len(metrics)
+    table.draw(rows, metrics, True)
+    out = capsys.readouterr().out.splitlines()
+    assert sum(line.strip().startswith("free") for line in out) > 1
+    assert not any(line.startswith("not shown") for line in out)
+
+
+def test_how_a_run_ended_is_told_where_one_did_not_end_well(capsys):
+    table.draw([row(), row(method="penalty", status="diverged")], CHOSEN, False)
+    out = capsys.readouterr().out.splitlines()
+    assert out[-1].split()[:2] == ["penalty", "diverged"] and out[-2].split()[:2] == ["free", "ok"]
