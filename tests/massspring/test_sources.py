@@ -70,7 +70,14 @@ EDITS = {
 
 @pytest.mark.parametrize("edit", EDITS, ids=lambda edit: f"{edit[0]}: {edit[1]!r} -> {edit[2]!r}")
 def test_an_edit_makes_stale_what_imports_it_and_nothing_else(checkout, edit):
-    modules = ["massspring.light", "massspring.heavy", "studies.ask", "studies.user", "studies.typed", "studies.starred"]
+    modules = [
+        "massspring.light",
+        "massspring.heavy",
+        "studies.ask",
+        "studies.user",
+        "studies.typed",
+        "studies.starred",
+    ]
     before = {module: fresh(module) for module in modules}
     file, old, new = edit
     text = (checkout / file).read_text()

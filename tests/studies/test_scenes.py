@@ -81,12 +81,12 @@ def test_a_start_is_a_linear_map_about_the_middle_and_always_the_same_throw():
     assert 0.1 < np.abs(thrown - rest).max() <= 1.0
 
 
-@pytest.mark.parametrize("scene", STRESS_SCENES, ids=lambda scene: scene.name)
-def test_a_stress_scene_starts_where_it_says_and_is_stored(scene):
-    assert scene_from_dict(json.loads(scene_to_json(scene))) == scene
-    prepared = prepare(small(scene))
+@pytest.mark.parametrize("start", STRESS_SCENES, ids=lambda start: start.name)
+def test_a_stress_scene_starts_where_it_says_and_is_stored(start):
+    assert scene_from_dict(json.loads(scene_to_json(start))) == start
+    prepared = prepare(small(start))
     body = prepared.setup.body
-    assert np.array_equal(prepared.setup.start().x, scene.start.positions(body.rest))
+    assert np.array_equal(prepared.setup.start().x, start.start.positions(body.rest))
     assert np.abs(prepared.setup.start().x - body.rest).max() > 0.1 * body.size
 
 
