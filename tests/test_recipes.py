@@ -99,8 +99,7 @@ def hold(module, thing: str, slow: bool = False, **given) -> int:
 @pytest.mark.parametrize("kind", LONGEST)
 def test_recipes_are_short(kind):
     page = (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    section = page.split(f"## {title(kind)}
-")[1]
+    section = page.split(f"## {title(kind)}\n")[1]
     said = [line for line in section.split("```python")[0].split("\n") if line]
     text = code("CONTRIBUTING.md", title(kind))
     imports = {
