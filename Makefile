@@ -1,6 +1,5 @@
 # `make` alone prints this list. Every target does its own set-up (.ci/setup), instant when nothing changed.
 BIN := .venv/bin
-STUDIES := volume_loss frame_rate work_precision stability_map
 # A file stays with one process: kernels that only it needs are compiled once.
 PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
@@ -11,10 +10,10 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 help: ## this list
 	@echo "make TARGET"
 	@awk -F ':.*## ' '/^[a-z%\/.-]+:.*## / {printf "  %-22s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
-	@echo "Studies: $(STUDIES)"
+	@echo "Main studies: $$(grep -l main=True studies/catalog/*.py | xargs -n 1 basename -s .py | xargs)"
 
-study: setup-run ## run every study, then the charts and tables (the main job; minutes)
-	$(BIN)/organbench run $(STUDIES)
+study: setup-run ## run the main studies, then the charts and tables (the main job; minutes)
+	$(BIN)/organbench run
 	$(BIN)/organbench report
 
 study-%: setup-run ## run one study and draw it: make study-volume_loss
@@ -25,8 +24,8 @@ verify: setup-test ## the reference against closed forms, published numbers and 
 	$(BIN)/organbench verify
 	$(PYTEST) -m campaign
 
-smoke: setup-run ## every study with its smallest settings: does it all hang together?
-	$(BIN)/organbench run --smoke $(STUDIES)
+smoke: setup-run ## the main studies with their smallest settings: does it all hang together?
+	$(BIN)/organbench run --smoke
 
 test: setup-test ## every test but the campaigns, which `make verify` runs
 	$(PYTEST) -m "not campaign"

@@ -88,7 +88,8 @@ def _followed(source: Source) -> Iterator[str]:
 def _origin(module: str, name: str) -> str:
     if name and own_file(f"{module}.{name}") is not None:
         return f"{module}.{name}"
-    passed_on = _source(module).exports.get(name)
+    exports = _source(module).exports
+    passed_on = exports.get(name, exports.get("*") if name else None)
     return module if passed_on is None or own_file(passed_on) is None else _origin(passed_on, name)
 
 

@@ -12,6 +12,9 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from studies.catalog import STUDIES
+from studies.sweep.find_study import find_studies
+
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 PINS = {
@@ -92,6 +95,14 @@ def test_tests_run_once_also_where_check_and_test_are_asked_for(goals, fast, all
     assert any("ruff check" in line for line in lines) == ("check" in goals)
     assert any("docs/site/build.py" in line for line in lines) == ("check" in goals)
     assert all("not campaign" in line for line in runs)
+
+
+def test_make_names_no_study_and_lists_those_that_say_they_are_main():
+    makefile = (ROOT / "Makefile").read_text()
+    assert [study.name for study in STUDIES if re.search(rf"run\b.* {study.name}\b", makefile)] == []
+    text = subprocess.run(["make", "-s"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    (listed,) = re.findall(r"^Main studies: (.*)$", text, re.MULTILINE)
+    assert sorted(listed.split()) == sorted(study.name for study in find_studies([])) != []
 
 
 def test_campaigns_run_in_verify():

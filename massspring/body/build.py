@@ -6,7 +6,7 @@ import numpy as np
 
 from massspring.body.axis import closest_virtual_node, virtual_nodes
 from massspring.body.body import Body, Material, check_positive
-from massspring.body.laws import TETRAHEDRAL_LAWS, WITHOUT_LENGTH, Edges
+from massspring.body.laws import Edges, laws_by_name
 from massspring.body.springs import (
     EDGES_OF_TRIANGLE,
     SpringKind,
@@ -32,26 +32,26 @@ def tetrahedral_body(
     """Springs on the edges of a tetrahedral mesh.
 
     `points` (n, 3) [m]; `triangles` (f, 3), its boundary, outward; `tetrahedra` (k, 4), positive; `law` one of
-    `TETRAHEDRAL_LAWS`. "cotangent" needs one volume per node: `body.keeping(Volumes.nodal(body))`.
+    `massspring.body.laws.LAWS`. "cotangent" needs one volume per node: `body.keeping(Volumes.nodal(body))`.
     Raises MassSpringError.
     """
     tetrahedra = np.ascontiguousarray(tetrahedra, dtype=np.uint32)
     triangles = np.ascontiguousarray(triangles, dtype=np.uint32)
     points = np.ascontiguousarray(points, dtype=np.float64)
-    if law not in TETRAHEDRAL_LAWS:
-        raise MassSpringError(f"unknown stiffness law '{law}'; known: {', '.join(TETRAHEDRAL_LAWS)}")
+    laws = laws_by_name()
+    if law not in laws:
+        raise MassSpringError(f"unknown stiffness law '{law}'; known: {', '.join(laws)}")
     edges = Edges(points, tetrahedra)
     check_positive(edges.volumes)
-    without = law in WITHOUT_LENGTH
     corner = np.repeat(edges.volumes, 4)
     mass = np.bincount(tetrahedra.ravel(), weights=corner, minlength=len(points)) * material.density / 4.0
     springs = Springs(
         np.ascontiguousarray(edges.ends, dtype=np.uint32),
-        np.zeros_like(edges.length) if without else edges.length,
-        TETRAHEDRAL_LAWS[law](edges, material.shear_modulus),
+        edges.length if laws[law].rest_length else np.zeros_like(edges.length),
+        laws[law].stiffness(edges, material.shear_modulus),
         np.full(len(edges.ends), SpringKind.SOLID, dtype=np.uint8),
     )
-    pressure = material.shear_modulus if without else 0.0
+    pressure = 0.0 if laws[law].rest_length else material.shear_modulus
     return Body(points, mass, springs, triangles, tetrahedra, law, rest_pressure=pressure)
 
 

@@ -4,7 +4,7 @@
 *published* ones are taken as their authors wrote them, with the Young's modulus such a network has, E = 2.5 mu.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -101,9 +101,32 @@ def cotangent(edges: Edges, mu: float) -> np.ndarray:
     return edges.summed(-mu * edges.volumes[:, None] * product)
 
 
-TETRAHEDRAL_LAWS: dict[str, Callable[[Edges, float], np.ndarray]] = {
-    law.__name__: law for law in (van_gelder, uniform, lloyd, lloyd_matched, cotangent)
-}
-"""Name -> law of the springs on the edges of a tetrahedral mesh."""
-WITHOUT_LENGTH = ("cotangent",)
-"""Laws whose springs have no rest length: they need a rest pressure of mu and one volume per node."""
+@dataclass(frozen=True)
+class StiffnessLaw:
+    """A law of the springs on the edges of a tetrahedral mesh."""
+
+    stiffness: Callable[[Edges, float], np.ndarray]
+    """Edges and shear modulus mu [Pa] -> k [N/m], (s,)."""
+    matched: bool = True
+    """Claim: Σ k L² = 15 V mu."""
+    rest_length: bool = True
+    """Whether the springs have one. Without, they need a rest pressure of mu and one volume per node."""
+
+    @property
+    def name(self) -> str:
+        """That of the function."""
+        return self.stiffness.__name__
+
+
+LAWS: tuple[StiffnessLaw, ...] = (
+    StiffnessLaw(van_gelder),
+    StiffnessLaw(uniform),
+    StiffnessLaw(lloyd, matched=False),
+    StiffnessLaw(lloyd_matched),
+    StiffnessLaw(cotangent, matched=False, rest_length=False),
+)
+
+
+def laws_by_name() -> Mapping[str, StiffnessLaw]:
+    """LAWS by their names."""
+    return {law.name: law for law in LAWS}

@@ -1,7 +1,5 @@
 """The methods, each in its file. Adding one: write the file, add a line to METHODS; the contract test does the rest."""
 
-from massspring.layout.allocate import start
-from massspring.layout.state import State
 from massspring.methods.barycentre import Barycentre
 from massspring.methods.baumgarte import Baumgarte
 from massspring.methods.element import Element
@@ -35,24 +33,3 @@ METHODS: tuple[type[Method], ...] = (
 
 VARIANTS: tuple[Method, ...] = (Element(hard=True), Xpbd(volumes="whole"))
 """Settings with which a method solves other equations than by default; the contract test covers them too."""
-
-__all__ = [
-    "METHODS",
-    "VARIANTS",
-    "Barycentre",
-    "Baumgarte",
-    "Element",
-    "Free",
-    "ImplicitSprings",
-    "ImplicitVolume",
-    "Method",
-    "Penalty",
-    "PostStabilization",
-    "Pressure",
-    "Projection",
-    "Pyramid",
-    "Shake",
-    "State",
-    "Xpbd",
-    "start",
-]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from massspring.errors import MassSpringError
 from studies.base.errors import StudyError
+from studies.base.old_imports import advice
 
 MODULE = "organbench_user_study"
 """The name under which it is loaded."""
@@ -32,6 +33,10 @@ def what_failed(path: Path, error: BaseException) -> str:
     if isinstance(error, SyntaxError) and error.filename == str(path):
         return f"SyntaxError in line {error.lineno}: {error.msg}"
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    if isinstance(error, ImportError) and lines and lines[-1]:
+        moved = advice(path.read_bytes(), lines[-1])
+        if moved:
+            return f"in line {lines[-1]}, {moved}"
     kind = "" if isinstance(error, StudyError | MassSpringError) else f"{type(error).__name__} "
     said = str(error).split("\n")[0]
     return f"{kind}in line {lines[-1] if lines else '?'}" + (f": {said}" if said else "")

@@ -26,4 +26,5 @@ FRAME_RATE = Study(
         Chart("cost_ratio.png", "studies.plots.cost_ratio:draw"),
     ),
     columns=("step_time", "frame_time", "frame_time_p99", "real_time", "volume_worst"),
+    main=True,
 )

@@ -29,4 +29,5 @@ STABILITY_MAP = Study(
     ),
     charts=(Chart("stability.png", "studies.plots.stability:draw"),),
     columns=("volume_worst", "min_j"),
+    main=True,
 )

@@ -19,8 +19,8 @@ Drawing = Callable[[Sequence["Run"], Path], None]
 
 SMOKE_NODES, SMOKE_NODES_HOLLOW = 150, 400
 """A wall folds on a coarser surface."""
-RESERVED = ("cache", "figures", "reference", "smoke", "verify")
-"""Folders of the results that are no study's."""
+RESERVED = ("cache", "figures", "main", "reference", "smoke", "verify")
+"""Folders of the results that are no study's, and the word for the main studies."""
 SMOKE_FRAMES = 20
 
 
@@ -67,10 +67,12 @@ class Study:
     charts: tuple[Chart, ...]
     columns: tuple[str, ...]
     """Metrics shown in its table."""
+    main: bool = False
+    """Whether it belongs to `make study`, and to `organbench run` without a name."""
 
     def __post_init__(self) -> None:
         if self.name in RESERVED:
-            raise StudyError(f"a study cannot be called '{self.name}': other files of the program lie in that folder")
+            raise StudyError(f"a study cannot be called '{self.name}': that word has another meaning for the program")
         for what, kind in (("cases", Case), ("charts", Chart), ("columns", str)):
             given = getattr(self, what)
             if not isinstance(given, tuple | list):

@@ -39,4 +39,5 @@ VOLUME_LOSS = Study(
         "pressure_error",
         "volume_end",
     ),
+    main=True,
 )

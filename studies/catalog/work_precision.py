@@ -22,4 +22,5 @@ WORK_PRECISION = Study(
     ),
     charts=(Chart("work_precision.png", "studies.plots.work_precision:draw"),),
     columns=("real_time", "step_time", "force_error", "interior_error", "silhouette_error", "volume_worst"),
+    main=True,
 )

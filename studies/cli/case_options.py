@@ -7,7 +7,7 @@ import typer
 from massspring import METHODS
 from studies.base.lookup import choose
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes import SCENES, UNJUDGED
+from studies.scenes import SCENES
 
 MethodName = Annotated[str, typer.Option(help="see `organbench list`")]
 BodyKind = Annotated[str, typer.Option(help="tetrahedral or surface")]
@@ -18,7 +18,7 @@ def chosen_case(scene: str, method: str, body: str, nodes: int) -> Case:
     """`method` on a body of so many surface nodes in a scene. Raises StudyError for a word that names none."""
     kind = choose(body, ("tetrahedral", "surface"), "body")
     return Case(
-        scene=choose(scene, {s.name: s for s in (*SCENES, *UNJUDGED)}, "scene"),
+        scene=choose(scene, {s.name: s for s in SCENES}, "scene"),
         body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
         method=choose(method, {m.name: m for m in METHODS}, "method")(),
     )

@@ -9,6 +9,8 @@ from typing import Any, Literal
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 
 from massspring import METHODS, ImplicitVolume, Method
+from massspring.body.laws import laws_by_name
+from massspring.body.membranes import MEMBRANE_LAWS
 from studies.base.errors import StudyError
 from studies.base.lookup import choose
 from studies.runs.case_checks import check_settings
@@ -27,9 +29,9 @@ class BodyRecipe:
     surface of a hollow organ as a thin wall round its content."""
     nodes: int = 550
     """Surface nodes."""
-    law: Literal["van_gelder", "uniform", "lloyd", "lloyd_matched", "cotangent", "delingette"] = "van_gelder"
-    """Stiffness law of a tetrahedral body or a membrane; "lloyd" as published, the others match the tissue's shear
-    modulus. "cotangent", springs without length, needs nodal volumes; a membrane takes "delingette" or "lloyd"."""
+    law: str = "van_gelder"
+    """Stiffness law: of a tetrahedral body one of LAWS, where "cotangent", springs without length, needs nodal volumes;
+    of a membrane "delingette" or "lloyd"."""
     stiffness: float = 1.0
     """Factor on every spring; 1 matches the tissue's shear modulus."""
     volumes: Literal["scene", "whole", "regions", "nodal"] = "scene"
@@ -41,6 +43,9 @@ class BodyRecipe:
     """Of a surface body: "centre_line" follows a bent organ."""
     weights: tuple[float, float, float, float] | None = None
     """Of a surface body: relative stiffness of structural, bending, inner and axial springs; None for 1, ½, ½, 1."""
+
+    def __post_init__(self) -> None:
+        choose(self.law, (*laws_by_name(), *MEMBRANE_LAWS), "stiffness law")
 
     @property
     def series(self) -> str:

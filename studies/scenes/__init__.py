@@ -1,4 +1,4 @@
-"""The scenes, one file each. Adding one: a file and a line in SCENES, where tests, commands and charts find it."""
+"""The scenes, one file each. Adding one: a file and a line in SCENES, from which all else follows."""
 
 from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
 from studies.scene.start import Start
@@ -26,16 +26,18 @@ SCENES: tuple[Scene, ...] = (
     STOMACH_PRESS,
     STOMACH_PROBE,
     BLADDER_FILL,
+    STOMACH_SLIDE,
 )
 
-UNJUDGED: tuple[Scene, ...] = (STOMACH_SLIDE,)
-"""Scenes of the mass-spring body alone: found by commands, without a reference, so in no study of accuracy."""
+JUDGED: tuple[Scene, ...] = tuple(scene for scene in SCENES if scene.reference is not None)
+"""Scenes with a reference: a study may ask how accurate a run of theirs is."""
 
 __all__ = [
     "BALL_CLAMPED",
     "BALL_RINGING",
     "BALL_SQUEEZE",
     "BLADDER_FILL",
+    "JUDGED",
     "KIDNEY_PROBE",
     "LIVER_PRESS",
     "LIVER_PROBE",
@@ -44,7 +46,6 @@ __all__ = [
     "STOMACH_PRESS",
     "STOMACH_PROBE",
     "STOMACH_SLIDE",
-    "UNJUDGED",
     "Held",
     "Lumen",
     "Organ",

@@ -1,6 +1,6 @@
 """The paper's Figure 4: a thin probe touches the refined stomach, presses deep, then slides along its front.
 
-A scene of the mass-spring body alone, so not among SCENES: a reference would need contact of finite elements with a
+A scene of the mass-spring body alone, without a reference: that would need contact of finite elements with a
 point, under which a continuum gives way without limit (Boussinesq); a force or a depth there depends on the mesh.
 """
 

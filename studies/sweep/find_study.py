@@ -2,6 +2,7 @@
 
 import importlib.util
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,9 @@ from studies.base.lookup import choose
 from studies.base.study_file import MODULE, what_failed
 from studies.catalog import STUDIES, Study
 from studies.runs.case import Case, case_from_json, case_to_dict
+
+MAIN = "main"
+"""Stands for the main studies of the catalogue; no study has this name."""
 
 
 def find_study(name: str) -> Study:
@@ -25,6 +29,12 @@ def find_study(name: str) -> Study:
     for case in study.cases:
         _check_stored(name, case)
     return study
+
+
+def find_studies(names: Sequence[str]) -> list[Study]:
+    """The studies of so many names; the main ones of the catalogue for none, and for the name "main"."""
+    found = [[s for s in STUDIES if s.main] if name == MAIN else [find_study(name)] for name in names or [MAIN]]
+    return [study for group in found for study in group]
 
 
 def _check_stored(name: str, case: Case) -> None:

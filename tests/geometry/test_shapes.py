@@ -107,10 +107,10 @@ def default_parameters(name):
     return {key: p.default for key, p in inspect.signature(SHAPES[name]).parameters.items()}
 
 
-@pytest.mark.parametrize("name", HOLLOW)
-def test_walls_are_even(fine, name):
-    shape = SHAPES[name]()
-    points = fine[name][0]
+@pytest.mark.parametrize("hollow", HOLLOW)
+def test_walls_are_even(fine, hollow):
+    shape = SHAPES[hollow]()
+    points = fine[hollow][0]
     inner = points - shape.wall * normals(shape, points)
     # The level of one tube is the exact distance; in the creases where two blend it grows more slowly inwards.
     miss = np.abs(shape.level(inner) + shape.wall) / shape.wall
@@ -135,7 +135,7 @@ def test_probe_is_on_the_surface_and_looks_out(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "patch", "area"),
+    ("organ", "patch", "area"),
     # [cm^2]. Bare area: a tenth of a liver's face under the diaphragm; hila 3 x 5 cm; the round ends of tubes 22 to
     # 35 mm wide: half spheres have 8 to 19.
     [
@@ -147,15 +147,15 @@ def test_probe_is_on_the_surface_and_looks_out(name):
         ("bladder", "neck", (6, 16)),
     ],
 )
-def test_attachments_have_plausible_areas(fine, name, patch, area):
-    points, triangles = fine[name]
-    inside = (SHAPES[name]().regions[patch].level(points) < 0)[triangles].mean(axis=1)
+def test_attachments_have_plausible_areas(fine, organ, patch, area):
+    points, triangles = fine[organ]
+    inside = (SHAPES[organ]().regions[patch].level(points) < 0)[triangles].mean(axis=1)
     assert area[0] < 1e4 * (inside * triangle_areas(points, triangles)).sum() < area[1]
 
 
-@pytest.mark.parametrize(("name", "axis"), [("bladder", 0), ("kidney", 2)])
-def test_what_is_symmetric_is_symmetric(name, axis):
-    shape = SHAPES[name]()
+@pytest.mark.parametrize(("organ", "axis"), [("bladder", 0), ("kidney", 2)])
+def test_what_is_symmetric_is_symmetric(organ, axis):
+    shape = SHAPES[organ]()
     x = np.random.default_rng(1).uniform(shape.low, shape.high, (500, 3))
     mirrored = x * np.where(np.arange(3) == axis, -1.0, 1.0)
     assert shape.level(x) == pytest.approx(shape.level(mirrored), abs=1e-14)

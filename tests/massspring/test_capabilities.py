@@ -56,6 +56,11 @@ def kind(request):
 @pytest.fixture
 def any_body(kind, request):
     """Every kind of body there is."""
+    return body_of_any(kind, request)
+
+
+def body_of_any(kind, request):
+    """The body of a kind of REFUSED."""
     if kind in KINDS:
         return body_of(kind, request)
     if kind == "membrane":

@@ -22,7 +22,7 @@ from massspring import (
 )
 from massspring.analysis.stiffness import spring_stiffness, stiffness_at_rest, volume_hessian
 from massspring.body.build import SURFACE_WEIGHTS
-from massspring.body.laws import TETRAHEDRAL_LAWS, WITHOUT_LENGTH
+from massspring.body.laws import LAWS
 from massspring.body.springs import SpringKind
 from massspring.kernels.forces.volume import volume_gradient_into
 from tests.massspring.conftest import SOFT, block, icosphere
@@ -31,7 +31,7 @@ from tests.massspring.test_methods import squeeze, thrown
 
 EXACT = 1e-12
 MU = SOFT.shear_modulus
-MATCHED = tuple(law for law in TETRAHEDRAL_LAWS if law not in ("lloyd", *WITHOUT_LENGTH))
+MATCHED = tuple(law.name for law in LAWS if law.matched)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def inner_distortion(cells: int) -> tuple[np.ndarray, ...]:
     return np.where(inside[:, None], points, straight), triangles, tetrahedra
 
 
-@pytest.mark.parametrize("law", TETRAHEDRAL_LAWS)
+@pytest.mark.parametrize("law", [law.name for law in LAWS])
 def test_every_law_names_itself_and_scales_with_mu(law):
     soft, hard = (tetrahedral_body(*block((2, 2, 2)), replace(SOFT, shear_modulus=f * MU), law) for f in (1.0, 3.0))
     assert soft.law == law

@@ -19,7 +19,10 @@ FILES = {
     "massspring/heavy.py": "def heavy():\n    from massspring.late import late\n    return late()\n",
     "massspring/late.py": "def late():\n    return 1\n",
     "massspring/table.py": "LIMIT = 3\n'''[1].'''\n",
-    "studies/__init__.py": "_FACE = {'ask': 'studies.ask'}\n",
+    "studies/__init__.py": "_FACE = {'ask': 'studies.ask', '*': 'studies.more'}\n",
+    "studies/more.py": "from studies.other import other\nfrom studies.ask import ask\n",
+    "studies/other.py": "def other():\n    return 5\n",
+    "studies/starred.py": "from studies import other\n",
     "studies/ask.py": "from massspring import light\n\n\ndef ask():\n    return light()\n",
     "studies/user.py": "from studies import ask\n",
     "studies/typed.py": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from massspring import heavy\n",
@@ -54,6 +57,7 @@ EDITS = {
     # (file, before, after): the modules whose number changes
     ("massspring/table.py", "3", "4"): {"massspring.light", "studies.ask", "studies.user"},
     ("massspring/late.py", "1", "2"): {"massspring.heavy"},
+    ("studies/other.py", "5", "6"): {"studies.starred"},
     ("massspring/heavy.py", "return", "yield"): {"massspring.heavy"},
     ("studies/ask.py", "ask()", "ask(x=1)"): {"studies.ask", "studies.user"},
     ("massspring/light.py", "Light", "Lighter"): set(),
@@ -66,7 +70,14 @@ EDITS = {
 
 @pytest.mark.parametrize("edit", EDITS, ids=lambda edit: f"{edit[0]}: {edit[1]!r} -> {edit[2]!r}")
 def test_an_edit_makes_stale_what_imports_it_and_nothing_else(checkout, edit):
-    modules = ["massspring.light", "massspring.heavy", "studies.ask", "studies.user", "studies.typed"]
+    modules = [
+        "massspring.light",
+        "massspring.heavy",
+        "studies.ask",
+        "studies.user",
+        "studies.typed",
+        "studies.starred",
+    ]
     before = {module: fresh(module) for module in modules}
     file, old, new = edit
     text = (checkout / file).read_text()

@@ -2,11 +2,13 @@
 
 import pytest
 
+from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.catalog.study import SMOKE_FRAMES, SMOKE_NODES, SMOKE_NODES_HOLLOW
 from studies.metrics.table import metric
 from studies.runs.prepare import prepare
 from studies.store.paths import readable
+from studies.sweep.find_study import MAIN, find_studies, find_study
 from tests.studies.tiny import tiny_case, tiny_study
 
 TIMES = {"step_time", "frame_time", "frame_time_p99", "real_time"}
@@ -21,6 +23,15 @@ def test_names_can_be_folders_and_are_unique():
     names = [study.name for study in STUDIES]
     assert len(set(names)) == len(names)
     assert [readable(name) for name in names] == names
+
+
+def test_the_main_studies_run_where_none_is_named():
+    main = [study for study in STUDIES if study.main]
+    assert find_studies([]) == find_studies([MAIN]) == main != []
+    assert find_studies(["stress", MAIN]) == [find_study("stress"), *main]
+    assert MAIN not in [study.name for study in STUDIES]
+    with pytest.raises(StudyError, match="cannot be called 'main'"):
+        tiny_study(name=MAIN)
 
 
 def test_it_asks_a_question(study):

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+import massspring
+from massspring import METHODS, Method
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Chart
 from studies.plots import volume_history
@@ -21,8 +23,9 @@ FACES = ("massspring", "reference_fem", "studies", "studies.geometry")
 def test_every_name_is_where_the_face_says(package):
     module = import_module(package)
     for name, home in module._FACE.items():
-        assert getattr(module, name) is getattr(import_module(home), name)
-        assert name in dir(module) and name in module.__all__
+        if name != "*":
+            assert getattr(module, name) is getattr(import_module(home), name)
+            assert name in dir(module) and name in module.__all__
 
 
 @pytest.mark.parametrize("package", FACES)
@@ -34,6 +37,16 @@ def test_the_type_checker_sees_the_same_names(package):
         alias.name: str(node.module) for node in block.body if isinstance(node, ast.ImportFrom) for alias in node.names
     }
     assert imported == module._FACE
+
+
+def test_every_method_is_exported():
+    """METHODS is the only list of them."""
+    for method in (*METHODS, Method):
+        assert getattr(massspring, method.__name__) is method
+        assert method.__name__ in dir(massspring) and method.__name__ in massspring.__all__
+    scope: dict = {}
+    exec("from massspring import *", scope)
+    assert {method.__name__ for method in METHODS} | {"Body", "METHODS"} <= set(scope)
 
 
 @pytest.mark.parametrize("package", FACES)

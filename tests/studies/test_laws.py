@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from massspring import Volumes
+from massspring.body.laws import LAWS
+from massspring.body.membranes import MEMBRANE_LAWS
 from reference_fem import exact
 from studies.base.errors import StudyError
 from studies.runs.case import BodyRecipe, Case
@@ -40,6 +42,16 @@ def test_the_cotangent_law_is_built_with_its_volumes_and_recorded(mesh):
     assert prepared.setup.body.rest_pressure == BALL_SQUEEZE.tissue.shear_modulus
     record = measure(case.replaced(scene=replace(BALL_SQUEEZE, reference=None)))
     assert record.attributes["law"] == "cotangent"
+
+
+def test_an_unknown_law_is_refused_with_the_nearest():
+    with pytest.raises(StudyError, match="unknown stiffness law 'van_geldr'; did you mean 'van_gelder'"):
+        BodyRecipe(law="van_geldr")
+
+
+def test_every_law_of_the_solver_can_be_asked_for():
+    for law in (*(law.name for law in LAWS), *MEMBRANE_LAWS):
+        assert BodyRecipe(law=law).law == law
 
 
 def test_without_them_the_run_fails_with_a_sentence():

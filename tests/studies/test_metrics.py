@@ -8,7 +8,8 @@ import pytest
 from studies.catalog import STUDIES
 from studies.metrics.metrics import METRICS, Metric
 from studies.metrics.table import DOUBTFUL, metric, study_table
-from studies.scenes import SCENES
+from studies.scene.quantities import ALWAYS, GAUGE_FREE
+from studies.scenes import JUDGED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status
 from studies.timing.protocol import FrameTiming
@@ -37,24 +38,27 @@ def test_names_are_unique_and_studies_use_known_ones():
         assert all(isinstance(metric(name), Metric) for name in study.columns)
 
 
-def test_every_metric_is_a_number_somewhere():
+@pytest.mark.parametrize("entry", METRICS, ids=lambda entry: entry.name)
+def test_every_metric_is_a_number_somewhere(entry):
     """A metric that no scene allows would be an empty column for ever."""
+    if entry.quantity == "frequency":  # of many checkpoints: tests/studies/test_motion.py
+        return
     timing = FrameTiming(np.full((2, 4), 1e6))
-    for entry in METRICS:
-        kept = {"attributes": {"lumen_column": 0}} if entry.quantity == "lumen" else {}
-        values = [
-            entry(run(scene=replace(scene, checkpoints=(2.0, 4.0), probed=SCENE.probed), timing=timing, **kept))
-            for scene in SCENES
-            if entry.quantity != "frequency"  # of many checkpoints: tests/studies/test_motion.py
-        ]
-        assert entry.quantity == "frequency" or np.isfinite(values).any(), entry.name
+    kept = {"attributes": {"lumen_column": 0}} if entry.quantity == "lumen" else {}
+    values = [
+        entry(run(scene=replace(scene, checkpoints=(2.0, 4.0), probed=SCENE.probed), timing=timing, **kept))
+        for scene in JUDGED
+    ]
+    assert np.isfinite(values).any()
 
 
 @pytest.mark.parametrize("entry", METRICS, ids=lambda entry: entry.name)
 def test_what_a_scene_does_not_allow_is_nan(entry):
+    """A metric of the run alone stays what it is."""
     mute = replace(SCENE, quantities=())
-    needs = entry.quantity not in (None, "volume", "pressure") or "time" in entry.name
-    assert np.isnan(entry(run(scene=mute))) == needs
+    judged = entry.quantity not in (None, *ALWAYS, *GAUGE_FREE)
+    expected = np.nan if judged else entry(run())
+    assert np.array_equal(entry(run(scene=mute)), expected, equal_nan=True)
 
 
 def test_a_free_turn_forbids_displacement_but_not_silhouette():

@@ -11,7 +11,7 @@ from studies.plots.figures import paper_ball, paper_slide
 from studies.runs.case import case_from_json
 from studies.runs.paper import ball_case, moments, play, slide_case, tip_of
 from studies.scene.as_json import scene_from_dict, scene_to_json
-from studies.scenes import SCENES, STOMACH_SLIDE, UNJUDGED
+from studies.scenes import JUDGED, SCENES, STOMACH_SLIDE
 from studies.scenes.stomach_slide import NODES
 
 SMALL = 400
@@ -38,7 +38,7 @@ def kept():
 def test_the_slide_is_stored_and_read_back(slide):
     assert scene_from_dict(json.loads(scene_to_json(STOMACH_SLIDE))) == STOMACH_SLIDE
     assert case_from_json(slide.case.key) == slide.case
-    assert STOMACH_SLIDE in UNJUDGED and STOMACH_SLIDE not in SCENES
+    assert STOMACH_SLIDE in SCENES and STOMACH_SLIDE not in JUDGED
     assert 2 * NODES - 4 == 38_996  # triangles of a closed surface: the paper's 39,000, rounded
 
 

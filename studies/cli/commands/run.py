@@ -8,7 +8,7 @@ import typer
 
 from studies.base.atomic import sweep_parts
 from studies.base.lookup import choose
-from studies.catalog.study import Study
+from studies.catalog import STUDIES, Study
 from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import Results, console, say, warn
 from studies.geometry.mesher.jobs import cache_folder
@@ -18,18 +18,21 @@ from studies.report.results import refresh
 from studies.store.links import link_study
 from studies.store.paths import study_folder
 from studies.store.staleness import MISSING
-from studies.sweep.find_study import find_study
+from studies.sweep.find_study import find_studies
 from studies.sweep.plan import plan
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, warnings_of
 from studies.sweep.tasks import Task
 
 SMOKE = "smoke"
+MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 Wanted = Callable[[Task], bool] | None
 
 
 def run(
-    studies: Annotated[list[str], typer.Argument(help="studies of the catalogue, or a FILE.py that defines STUDY")],
+    studies: Annotated[
+        list[str] | None, typer.Argument(help=f"studies or a FILE.py that defines STUDY; without: {MAIN_STUDIES}")
+    ] = None,
     results: Results = Path("results"),
     smoke: Annotated[bool, typer.Option(help="small meshes, few frames; kept apart in results/smoke")] = False,
     only: Annotated[str, typer.Option(help="failed, stale, or both with a comma: nothing else runs")] = "",
@@ -39,7 +42,7 @@ def run(
     """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
     wanted = _filter(only)
     root = results / SMOKE if smoke else results
-    for found in [_checked(name) for name in studies]:
+    for found in _checked(studies or []):
         study = found.smoke() if smoke else found
         if dry:
             dry_run(console, study.name, plan(root, study, wanted), jobs)
@@ -61,10 +64,11 @@ def _bring_up_to_date(root: Path, study: Study, jobs: int, wanted: Wanted) -> No
     say(f"{study.name}: {count} pieces ran, charts in {study_folder(root, study.name)}")
 
 
-def _checked(name: str) -> Study:
-    study = find_study(name)
-    check_columns(study.columns)
-    return study
+def _checked(names: list[str]) -> list[Study]:
+    studies = find_studies(names)
+    for study in studies:
+        check_columns(study.columns)
+    return studies
 
 
 def _filter(only: str) -> Wanted:
