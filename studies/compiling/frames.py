@@ -1,7 +1,7 @@
 """Frames of every method in every form that is compiled apart, on tiny bodies: derived from what methods support."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -30,8 +30,9 @@ class Variant:
     @property
     def name(self) -> str:
         """As it is shown."""
-        default = vars(type(self.method)())
-        changed = [f"{name}={value}" for name, value in vars(self.method).items() if value != default[name]]
+        default, settings = type(self.method)(), fields(self.method)  # pyright: ignore[reportArgumentType]
+        values = {field.name: getattr(self.method, field.name) for field in settings}
+        changed = [f"{name}={value}" for name, value in values.items() if value != getattr(default, name)]
         return ", ".join(filter(None, (self.method.name, *changed, self.kind, self.precision, self.option)))
 
 
