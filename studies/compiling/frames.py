@@ -14,8 +14,9 @@ from studies.compiling.bodies import EDGE, KINDS, tiny_body
 
 FRAMES, STEPS = 2, 2
 PLAIN, CLOCK, PROBE, THREADS = "", "stage clock", "thin probe", "threads"
-WITH_OPTIONS = ("whole", "several")
-"""Kinds of bodies that options are compiled for; the others share their types. Only threads are in single precision."""
+OWN_TYPES = ("whole", "several")
+"""Kinds of bodies whose types are not those of another. Options are compiled for them, in double precision; threads in
+single precision too."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +38,12 @@ class Variant:
 
 
 def variants() -> list[Variant]:
-    """All, the plain ones first: they compile the kernels that the others share."""
+    """All: plain ones first, they compile the kernels that the others share; last the bodies that share their types.
+
+    Two processes that do neighbours at once would otherwise both compile the same.
+    """
     found = [variant for method in (*(method() for method in METHODS), *VARIANTS) for variant in variants_of(method)]
-    return sorted(found, key=lambda variant: (variant.option != PLAIN, _rank(variant.method)))
+    return sorted(found, key=lambda one: (one.kind not in OWN_TYPES, one.option != PLAIN, _rank(one.method)))
 
 
 def variants_of(method: Method) -> Iterator[Variant]:
@@ -52,7 +56,7 @@ def variants_of(method: Method) -> Iterator[Variant]:
             continue
         for precision in precisions:
             yield Variant(method, kind, precision)
-            for option, yes in supported.items() if kind in WITH_OPTIONS else ():
+            for option, yes in supported.items() if kind in OWN_TYPES else ():
                 if yes and (precision == "float64" or option == THREADS):
                     yield Variant(method, kind, precision, option)
 

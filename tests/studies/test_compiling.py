@@ -14,7 +14,7 @@ from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.compiling import main, tasks
 from studies.compiling.bodies import EDGE, KINDS, tiny_block, tiny_body
-from studies.compiling.frames import CLOCK, PLAIN, PROBE, THREADS, Variant, advance, setup_of, variants
+from studies.compiling.frames import CLOCK, OWN_TYPES, PLAIN, PROBE, THREADS, Variant, advance, setup_of, variants
 from studies.compiling.log import Compiled, listing, logged, summary
 
 
@@ -44,6 +44,8 @@ def test_every_method_is_there_in_each_form_that_it_supports():
 
 def test_the_shared_kernels_come_first_and_the_reference_beside_them():
     names = list(tasks.tasks())
+    kinds = [variant.kind for variant in variants()]
+    assert kinds.index("nodal") > max(k for k, kind in enumerate(kinds) if kind in OWN_TYPES)
     assert names[0].startswith("implicit_volume, whole") and names[1].startswith("reference")
     assert len(set(names)) == len(names) == len(variants()) + sum(name.startswith("reference") for name in names)
 
