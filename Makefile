@@ -5,14 +5,15 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study verify smoke test check lint docs figures bench clean distclean setup-run setup-test setup-dev FORCE
+.PHONY: help study verify smoke test check lint docs figures bench clean distclean compiled compiled-essential setup-run \
+	setup-test setup-dev FORCE
 
 help: ## this list
 	@echo "make TARGET"
 	@awk -F ':.*## ' '/^[a-z%\/.-]+:.*## / {printf "  %-22s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 	@echo "Main studies: $$(grep -l main=True studies/catalog/*.py | xargs -n 1 basename -s .py | xargs)"
 
-study: setup-run ## run the main studies, then the charts and tables (the main job; minutes)
+study: compiled-essential ## run the main studies, then the charts and tables (the main job; minutes)
 	$(BIN)/organbench run
 	$(BIN)/organbench report
 
@@ -27,7 +28,7 @@ verify: setup-test ## the reference against closed forms, published numbers and 
 smoke: setup-run ## the main studies with their smallest settings: does it all hang together?
 	$(BIN)/organbench run --smoke
 
-test: setup-test ## every test but the campaigns, which `make verify` runs
+test: setup-test compiled ## every test but the campaigns, which `make verify` runs
 	$(PYTEST) -m "not campaign"
 
 # Asked for both, `make check test` leaves the fast tests to `test`.
@@ -67,6 +68,13 @@ clean: ## remove caches and unfinished files; results and .venv stay
 distclean: clean ## clean, and remove .venv and the raw results too (charts and tables stay)
 	rm -rf .venv
 	test ! -d results || find results -name '*.h5' -type f -exec rm -f {} +
+
+# Two processes that share what they compile, before two that would both compile it; says nothing when it is there.
+compiled: setup-run
+	@$(BIN)/python -m studies.compiling.main
+
+compiled-essential: setup-run
+	@$(BIN)/python -m studies.compiling.main --essential
 
 setup-run setup-test setup-dev: setup-%:
 	@.ci/setup $*

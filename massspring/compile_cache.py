@@ -17,6 +17,20 @@ from massspring.sources import cache_folder, own_file, source_fingerprint
 COMPILED = ("massspring.kernels", "massspring.methods", "reference_fem")
 """Where compiled functions and the constants in them live; a compiled function uses nothing else (tested)."""
 
+ARGUMENTS = (
+    "massspring.kernels.arrays.volume_rows",
+    "massspring.kernels.constraint.exact_volume",
+    "massspring.kernels.constraint.ldl_solve",
+    "massspring.kernels.forces.tetrahedron_volumes",
+    "massspring.kernels.step.frame",
+)
+"""Modules that define, or import, the named tuples which kernels are given.
+
+A kernel need not import the type of its argument, and numba knows a named tuple by its name and the types in it: with
+two fields of one type exchanged, code that was kept would take one for the other. The reference's functions import
+what they are given.
+"""
+
 
 def folder() -> Path:
     """NUMBA_CACHE_DIR where the user set it, else a folder of the user's cache."""
@@ -30,7 +44,8 @@ class ByMeaning(caching.UserProvidedCacheLocator):
     def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
         super().__init__(py_func, py_file)
         module = py_func.__module__
-        self._stamp = source_fingerprint(module, within=COMPILED)
+        given = ARGUMENTS if module.startswith("massspring.") else ()
+        self._stamp = source_fingerprint(module, *given, within=COMPILED)
         self._cache_path = str(folder() / f"{module}-{self._stamp[:16]}")
 
     def get_source_stamp(self) -> str:

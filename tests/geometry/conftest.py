@@ -1,4 +1,4 @@
-"""Meshes shared by the geometry tests, made from nothing in a cache of their own."""
+"""Meshes shared by the geometry tests, made from nothing in every run."""
 
 import pytest
 
@@ -12,15 +12,6 @@ CAPS = {
     "bottom": HalfSpace((0.0, 0.0, -CAP), (0.0, 0.0, 1.0)),
 }
 COUNTS = (150, 300, 550, 1100)
-
-
-@pytest.fixture(scope="session", autouse=True)
-def mesh_cache(tmp_path_factory):
-    """A fresh cache, so that every run of the tests really makes the meshes."""
-    folder = tmp_path_factory.mktemp("meshes")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ORGANBENCH_CACHE", str(folder))
-        yield folder
 
 
 @pytest.fixture(scope="session")

@@ -9,6 +9,7 @@ import numba
 import pytest
 
 from massspring import compile_cache, sources
+from massspring.compile_cache import ARGUMENTS as GIVEN
 from massspring.compile_cache import COMPILED, kept
 from massspring.errors import MassSpringError
 from massspring.sources import ROOT, own_file, read_source, source_fingerprint
@@ -186,6 +187,12 @@ def kernel(x):
 """
 
 
+@pytest.fixture(autouse=True)
+def no_arguments(monkeypatch):
+    """The kernels of the copies are given numbers."""
+    monkeypatch.setattr(compile_cache, "ARGUMENTS", ())
+
+
 def compiled_now(folder: Path):
     """The kernel of the copy, as a new process would import it, called once."""
     fresh("massspring.kernel")
@@ -211,6 +218,39 @@ def test_rewording_compiles_nothing_anew_and_an_edit_does(checkout, monkeypatch)
     assert not compiled_now(checkout).cache_misses
     (checkout / "massspring" / "table.py").write_text("LIMIT = 3.0\n")
     assert sum(compiled_now(checkout).cache_misses.values()) == 1
+
+
+def test_fields_of_an_argument_that_change_places_compile_anew(checkout, monkeypatch):
+    """The kernel does not import the named tuple, and numba sees the same name and types as before."""
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(compile_cache, "COMPILED", ("massspring",))
+    (checkout / "massspring" / "kernel.py").write_text(
+        KERNEL.replace("from massspring.table import LIMIT", "LIMIT = 3")
+    )
+    pair = checkout / "massspring" / "pair.py"
+    for given, misses in (((), 0), (("massspring.pair",), 1)):
+        monkeypatch.setattr(compile_cache, "ARGUMENTS", given)
+        pair.write_text("class Pair(NamedTuple):\n    x: float\n    v: float\n")
+        assert sum(compiled_now(checkout).cache_misses.values()) == 1
+        pair.write_text("class Pair(NamedTuple):\n    v: float\n    x: float\n")
+        assert sum(compiled_now(checkout).cache_misses.values()) == misses
+
+
+def test_every_named_tuple_of_the_kernels_is_part_of_their_stamps():
+    """An edit of any of them must change the number of what every kernel is given."""
+    own = {
+        ".".join(file.relative_to(ROOT).with_suffix("").parts)
+        for file in (ROOT / "massspring" / "kernels").rglob("*.py")
+        if "(NamedTuple)" in file.read_text()
+    }
+    assert len(own) > 5
+    waiting, covered = list(GIVEN), set()
+    while waiting:
+        module = waiting.pop()
+        if module not in covered:
+            covered.add(module)
+            waiting += [other for other in sources._followed(sources._source(module)) if other.startswith(COMPILED)]
+    assert own <= covered
 
 
 def test_numba_keeps_both_packages_in_the_folder_that_the_user_chose(tmp_path):

@@ -28,11 +28,9 @@ def octahedron(**changes):
 
 
 @pytest.fixture(scope="module")
-def hollow(tmp_path_factory):
+def hollow(mesh_cache):
     """A real hollow mesh: 50 mm ball, 10 mm wall."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ORGANBENCH_CACHE", str(tmp_path_factory.mktemp("meshes")))
-        yield organ("ball", 150, parameters={"radius": RADIUS, "wall": 0.01})
+    return organ("ball", 150, parameters={"radius": RADIUS, "wall": 0.01})
 
 
 @pytest.mark.parametrize("share", [-0.55, -0.1, 0.3, 0.7])

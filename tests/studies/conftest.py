@@ -1,4 +1,4 @@
-"""A mesh cache of its own for the whole session, one finished sweep that tests may copy, and the command line."""
+"""One finished sweep that tests may copy, a small reference, and the command line."""
 
 import shutil
 import sys
@@ -11,34 +11,26 @@ from studies.reference.load import load_reference
 from studies.reference.pieces import pieces
 from studies.reference.solve import solve
 from studies.sweep.run_studies import run_studies
+from tests.conftest import once_per_run
 from tests.studies.octant import SCENE
 from tests.studies.tiny import TINY, Silent, tiny_study
 
 
-@pytest.fixture(scope="session", autouse=True)
-def mesh_cache(tmp_path_factory):
-    """Every mesh is made once a session, also for the processes that a test starts."""
-    folder = tmp_path_factory.mktemp("meshes")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ORGANBENCH_CACHE", str(folder))
-        yield folder
-
-
 @pytest.fixture(scope="session")
-def finished_sweep(mesh_cache, tmp_path_factory):
+def finished_sweep(run_folder):
     """Results folder of the tiny study, all run and timed; to be copied, not changed."""
-    root = tmp_path_factory.mktemp("finished")
-    run_studies(root, [tiny_study()], 1, Silent())
-    return root
+    return once_per_run(run_folder, "finished", lambda root: run_studies(root, [tiny_study()], 1, Silent()))
 
 
 @pytest.fixture(scope="session")
-def solved(mesh_cache, tmp_path_factory):
-    """Results folder with the reference of the octant, piece by piece."""
-    root = tmp_path_factory.mktemp("reference")
-    for piece in pieces(SCENE):
-        solve(root, piece)
-    return root
+def solved(run_folder):
+    """Results folder with the reference of the octant, piece by piece; to be read, not changed."""
+
+    def make(root):
+        for piece in pieces(SCENE):
+            solve(root, piece)
+
+    return once_per_run(run_folder, "reference", make)
 
 
 @pytest.fixture(scope="session")

@@ -18,17 +18,13 @@ SMALL = 400
 
 
 @pytest.fixture(scope="module")
-def slide(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ORGANBENCH_CACHE", str(tmp_path_factory.mktemp("meshes")))
-        yield play(slide_case(SMALL))
+def slide(mesh_cache):
+    return play(slide_case(SMALL))
 
 
 @pytest.fixture(scope="module")
-def balls(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ORGANBENCH_CACHE", str(tmp_path_factory.mktemp("meshes")))
-        yield {name: play(ball_case(method, 150)) for name, method in (("free", Free()), ("implicit_volume", kept()))}
+def balls(mesh_cache):
+    return {name: play(ball_case(method, 150)) for name, method in (("free", Free()), ("implicit_volume", kept()))}
 
 
 def kept():

@@ -1,0 +1,99 @@
+"""What all tests share: artefacts made once per run by whichever process asks first, and a list of what compiles."""
+
+import os
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from studies.compiling.log import Compiled, log_from_now_on, summary
+
+PATIENCE = 900.0
+"""Seconds that a process waits for what another one makes; the longest takes a minute on a busy machine."""
+COMPILED = pytest.StashKey[list[Compiled]]()
+
+
+@contextmanager
+def locked(path: Path, patience: float = PATIENCE) -> Iterator[None]:
+    """Inside, no other process that asks for the same lock file. Fails when it is not given within `patience` [s]."""
+    waited_until = time.monotonic() + patience
+    while True:
+        try:
+            os.close(os.open(path, os.O_CREAT | os.O_EXCL))
+            break
+        except FileExistsError:
+            if time.monotonic() > waited_until:
+                pytest.fail(
+                    f"{path.name} was held for {patience:g} s: the process that makes it is stuck or was killed"
+                )
+            time.sleep(0.05)
+    try:
+        yield
+    finally:
+        path.unlink()
+
+
+def once_per_run(root: Path, name: str, make: Callable[[Path], object]) -> Path:
+    """Folder root/name, filled by `make`: by the process that asks first, while the others wait.
+
+    What fails leaves nothing, so that the next one fails with its own error.
+    """
+    folder, part = root / name, root / f"{name}.part"
+    with locked(root / f"{name}.lock"):
+        if not folder.exists():
+            shutil.rmtree(part, ignore_errors=True)
+            part.mkdir()
+            make(part)
+            part.rename(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of this run of the tests, the same for all its processes."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+
+@pytest.fixture(scope="session", autouse=True)
+def mesh_cache(run_folder: Path) -> Iterator[Path]:
+    """A mesh cache of this run: every mesh is really made, once, also for the processes that a test starts."""
+    folder = run_folder / "meshes"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ORGANBENCH_CACHE", str(folder))
+        yield folder
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--compiled N`: what the run still had to compile."""
+    parser.addoption("--compiled", type=int, metavar="N", help="list the N functions that took longest to compile")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Listens where that is asked for."""
+    config.stash[COMPILED] = [] if config.getoption("--compiled") is None else log_from_now_on()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node, error) -> None:
+    """A process of pytest-xdist ends: its list joins the others."""
+    sent = getattr(node, "workeroutput", {}).get("compiled", [])
+    node.config.stash[COMPILED] += [Compiled(*entry) for entry in sent]
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Sends the list to the process that prints it."""
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["compiled"] = [tuple(entry) for entry in session.config.stash[COMPILED]]
+
+
+def pytest_terminal_summary(terminalreporter, config: pytest.Config) -> None:
+    """Prints the list."""
+    most = config.getoption("--compiled")
+    if most is not None:
+        terminalreporter.section("compiled")
+        for line in summary(config.stash[COMPILED], most):
+            terminalreporter.line(line)
