@@ -74,6 +74,13 @@ def _file_below(root: Path, module: str) -> Path | None:
     return next((file for file in candidates if file.is_file()), None)
 
 
+@cache
+def own_modules() -> tuple[str, ...]:
+    """All modules of this distribution, by dotted name: for what depends on more than imports say."""
+    files = [file for package in OWN for file in sorted((ROOT / package).rglob("*.py"))]
+    return tuple(".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for file in files)
+
+
 def _is_within(module: str, within: tuple[str, ...]) -> bool:
     return any(module == part or module.startswith(part + ".") for part in within)
 

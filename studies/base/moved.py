@@ -44,7 +44,7 @@ MODULES = {
     "studies.cost": "studies.timing.stage_cost",
     "studies.distance": "studies.geometry.surface.distance",
     "studies.errors": "studies.base.errors",
-    "studies.fingerprint": "studies.store.fingerprint",
+    "studies.fingerprint": "massspring.sources",
     "studies.floors": "studies.reference.uncertainty",
     "studies.geometry.api": "studies.geometry.api.organs",
     "studies.geometry.band": "studies.geometry.scanned.band",

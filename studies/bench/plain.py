@@ -1,8 +1,9 @@
 """The opponent of `make bench`: a step of one kept volume as one would first write it in numba.
 
 Springs once per spring with scatter to both ends, volume and gradient triangle by triangle, one multiplier, symplectic
-Euler, planes by clamping afterwards (which leaves a volume error of up to 0.2 % where they press). Body, springs, volume,
-gravity, damping and held nodes are those of implicit_volume: without contact both give the same motion to round-off.
+Euler, planes by clamping afterwards (which leaves a volume error of up to 0.2 % where they press). Body, springs,
+volume, gravity, damping and held nodes are those of implicit_volume: without contact both give the same motion to
+round-off.
 """
 
 import math

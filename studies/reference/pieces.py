@@ -4,10 +4,11 @@ import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from massspring.sources import source_fingerprint
+from studies.geometry.mesher.jobs import MAKERS
 from studies.reference.checkpoints import kept
 from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
-from studies.store.fingerprint import source_fingerprint
 from studies.store.paths import record_path
 from studies.store.record import peek
 from studies.store.staleness import CASE_CHANGED, CODE_CHANGED, MISSING, why_stale
@@ -100,23 +101,9 @@ def variants(scene: Scene) -> list[str]:
     return [name for name in scene.reference.variants if name != "contact" or scene.obstacles]
 
 
-JUDGES = ("bench.py", "crosscheck", "exact.py", "modes.py", "oracles/", "uncertainty.py")
-"""Beginnings of the solver's files that no reference is computed with: they judge it."""
-
-
 def reference_fingerprint() -> str:
-    """Hash of all code that a reference depends on."""
-    return source_fingerprint(
-        "reference_fem",
-        "studies.geometry",
-        "studies.runs.prepare",
-        "studies.reference.problem",
-        "studies.reference.fields",
-        "studies.reference.mesh",
-        "studies.reference.pieces",
-        "studies.reference.solve",
-        without=JUDGES,
-    )
+    """Hash of the code that makes a reference and of all that it imports; what judges references is not among it."""
+    return source_fingerprint("studies.reference.solve", *MAKERS)
 
 
 @dataclass(frozen=True)

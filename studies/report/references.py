@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from massspring.sources import own_modules, source_fingerprint
 from studies.base.atomic import is_there, write_whole
 from studies.base.errors import StudyError
 from studies.plots.uncertainty import draw
@@ -14,7 +15,6 @@ from studies.reference.pieces import STUDY, pieces
 from studies.reference.solve import VARIANTS
 from studies.scene.scene import Scene
 from studies.store.csv_table import write_table
-from studies.store.fingerprint import source_fingerprint
 from studies.store.paths import study_folder
 
 TABLE, CHART = "uncertainty.csv", "uncertainty.png"
@@ -57,7 +57,7 @@ def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
 
 def state_of(files: Iterable[Path]) -> str:
     """Hash of all that charts and tables are made from: result files with their sizes and times, and the code."""
-    digest = hashlib.sha256(source_fingerprint("studies", "massspring", "reference_fem").encode())
+    digest = hashlib.sha256(source_fingerprint(*own_modules()).encode())
     for file in files:
         state = file.stat() if is_there(file) else None
         digest.update(f"{file.name} {state and (state.st_mtime_ns, state.st_size)}\n".encode())

@@ -2,15 +2,16 @@
 
 from pathlib import Path
 
+from massspring.sources import source_fingerprint
+from studies.geometry.mesher.jobs import MAKERS
 from studies.runs.case import Case
-from studies.store.fingerprint import source_fingerprint
 from studies.store.paths import record_path
 from studies.store.staleness import why_stale
 
 
 def run_fingerprint() -> str:
-    """Hash of all code that a run depends on; the scene itself is part of the case."""
-    return source_fingerprint("massspring", "studies.geometry", "studies.runs.prepare", "studies.runs.run")
+    """Hash of the code that makes a run and of all that it imports; the scene itself is part of the case."""
+    return source_fingerprint("studies.runs.run", *MAKERS)
 
 
 def case_path(root: Path, study: str, case: Case) -> Path:

@@ -44,7 +44,7 @@ class Record:
 
     schema: SCHEMA of the writer            kind: "run", "reference", "timing", ...
     key: the case as JSON text              name: readable, "/" makes folders in the study's index
-    status, message: how it ended and why   fingerprint: of the code (studies.store.fingerprint)
+    status, message: how it ended and why   fingerprint: of the code (massspring.sources)
     machine: id (studies.store.machine)           attributes: numbers, text, true/false, None or short lists of numbers
     fields: name -> Field; "/" in a name makes a group
     """

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from massspring.sources import own_modules, source_fingerprint
 from studies.base.atomic import write_whole
-from studies.store.fingerprint import source_fingerprint
 
 
 def set_stamp(root: Path, name: str) -> None:
@@ -22,4 +22,4 @@ def _path(root: Path, name: str) -> Path:
 
 
 def _code() -> str:
-    return source_fingerprint("studies", "massspring", "reference_fem")
+    return source_fingerprint(*own_modules())

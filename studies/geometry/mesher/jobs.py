@@ -31,6 +31,8 @@ PARTS = ("points", "triangles", "tetrahedra", "surface_count", "outer_count")
 
 MADE_ELSEWHERE = {"scan": "studies.geometry.mesher.scan_recipe", "curved": "studies.geometry.mesh.second_order"}
 """Kinds of recipes that the module of all others does not make."""
+MAKERS = ("studies.geometry.mesher.organ_recipe", *MADE_ELSEWHERE.values())
+"""Modules that make meshes, some in a process of their own: no import leads to them."""
 
 
 def mesh_from(
@@ -107,7 +109,7 @@ def code_hash(kind: str) -> str:
 
 def maker(kind: str) -> str:
     """The module that makes a kind of recipe."""
-    return MADE_ELSEWHERE.get(kind, "studies.geometry.mesher.organ_recipe")
+    return MADE_ELSEWHERE.get(kind, MAKERS[0])
 
 
 def read_cached(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | None:

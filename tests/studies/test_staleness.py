@@ -1,0 +1,57 @@
+"""Which code makes a stored result stale: all that it was computed with, and nothing that only shows it."""
+
+import pytest
+
+from massspring import sources
+from massspring.sources import own_modules, source_fingerprint
+from studies.reference.pieces import reference_fingerprint
+from studies.runs.current import run_fingerprint
+
+BOTH = {
+    "studies.scene.start",
+    "studies.geometry.surface.distance",
+    "studies.geometry.surface.snap",
+    "studies.geometry.mesh.wall_layers",
+    "studies.geometry.organs.liver",
+    "studies.geometry.mesher.gmsh_calls",
+    "massspring.world.trajectories",
+}
+RUNS = BOTH | {
+    "studies.runs.prepare",
+    "massspring.body.laws",
+    "massspring.kernels.fused.sweep",
+    "massspring.run.history",
+}
+REFERENCES = BOTH | {"studies.reference.mesh", "studies.reference.problem", "reference_fem.contact.augmented"}
+SHOWN = {"studies.metrics.metrics", "studies.plots.laws", "studies.cli.app", "studies.report.results"}
+
+
+def with_edit(monkeypatch, module: str, fingerprint) -> str:
+    """The number after an edit of one module."""
+    read = sources._source.__wrapped__
+    edited = lambda name: read(name)._replace(meaning="edited") if name == module else read(name)  # noqa: E731
+    source_fingerprint.cache_clear()
+    with monkeypatch.context() as changed:
+        changed.setattr(sources, "_source", edited)
+        found = fingerprint()
+    source_fingerprint.cache_clear()
+    return found
+
+
+@pytest.mark.parametrize(
+    ("fingerprint", "makers"), [(run_fingerprint, RUNS), (reference_fingerprint, REFERENCES)], ids=["run", "reference"]
+)
+def test_what_makes_a_result_makes_it_stale_and_what_shows_it_does_not(monkeypatch, fingerprint, makers):
+    before = fingerprint()
+    assert makers | SHOWN <= set(own_modules())
+    changed = {module for module in makers | SHOWN if with_edit(monkeypatch, module, fingerprint) != before}
+    assert changed == makers
+
+
+def test_springs_make_no_reference_stale_and_elements_no_run(monkeypatch):
+    for module, fingerprint in (
+        ("massspring.kernels.fused.sweep", reference_fingerprint),
+        ("reference_fem.system.assembly", run_fingerprint),
+        ("reference_fem.oracles.cook", reference_fingerprint),
+    ):
+        assert with_edit(monkeypatch, module, fingerprint) == fingerprint()
