@@ -23,6 +23,11 @@ def squeezed(mesh_cache):
     return cost_table(tiny_case(), repeats=2)
 
 
+def test_a_turn_begins_only_when_there_is_time_for_it(squeezed):
+    assert squeezed.attrs["turns"] == 2
+    assert cost_table(tiny_case(), repeats=5, budget=0.0).attrs["turns"] == 1
+
+
 def cost_of(table, what) -> float:
     return float(table.set_index("what")["µs per step"][what])
 
