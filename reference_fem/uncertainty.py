@@ -45,7 +45,7 @@ class MeshError:
 
 
 def cell_size(volume: float, cells: int) -> float:
-    """Representative size (V/n)^(1/3) [m] of a mesh of `cells` elements, graded or not (Celik et al., eq. 1)."""
+    """Representative size (V/n)^(1/3) [m] of a mesh of `cells` elements, graded or not (Celik et al., eq. 1.1)."""
     return float(np.cbrt(volume / cells))
 
 

@@ -14,7 +14,7 @@ SOFTNESS = 1e-10
 
 
 def volume_gradients(volumes: Volumes, x: np.ndarray) -> csr_array:
-    """J_r = ∂V_r/∂x [m²] at positions `x` (n, 3) [m], (m, 3n) (eq. 32)."""
+    """J_r = ∂V_r/∂x [m²] at positions `x` (n, 3) [m], (m, 3n) (eq. 8.2)."""
     a, b, c = (x[corner] for corner in volumes.triangles.T)
     sixth = np.cross(b - a, c - a) / 6.0
     triangles = len(sixth)
@@ -26,7 +26,7 @@ def volume_gradients(volumes: Volumes, x: np.ndarray) -> csr_array:
 
 
 def natural_frequencies(body: Body, count: int, keep: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """The `count` lowest ω [1/s], ascending, (count,), and their modes (count, n, 3) with Σ m |u|² = 1 kg m² (eq. 80).
+    """The `count` lowest ω [1/s], ascending, (count,), and their modes (count, n, 3) with Σ m |u|² = 1 kg m² (eq. 5.5).
 
     K u − Jᵀ p = ω² M u with J u = 0 for the volumes that are kept; `keep` False: springs alone. Six frequencies of a
     free body are 0. Raises MassSpringError.

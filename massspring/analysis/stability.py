@@ -16,7 +16,7 @@ LANCZOS_TOLERANCE = 1e-4
 
 
 def scaled_stiffness(body: Body, held_nodes: np.ndarray) -> csr_array:
-    """M^-½ K M^-½ [1/s²] of the free nodes at rest, (3n, 3n); rows of held nodes are zero (eq. 16)."""
+    """M^-½ K M^-½ [1/s²] of the free nodes at rest, (3n, 3n); rows of held nodes are zero (eq. 5.1)."""
     root = 1.0 / np.sqrt(body.mass)
     root[held_nodes] = 0.0
     scale = diags_array(np.repeat(root, 3))
@@ -26,7 +26,7 @@ def scaled_stiffness(body: Body, held_nodes: np.ndarray) -> csr_array:
 def largest_frequency(body: Body, held_nodes: np.ndarray | None = None, added: csr_array | None = None) -> float:
     """ω_max [1/s] of small oscillations about rest, by Lanczos iteration from a fixed start. Raises MassSpringError.
 
-    `added` B (3n, r) [√(N/m)] is what a method adds to the springs: K + B Bᵀ (eq. 16).
+    `added` B (3n, r) [√(N/m)] is what a method adds to the springs: K + B Bᵀ (eq. 5.1).
     """
     held = np.empty(0, dtype=np.int64) if held_nodes is None else held_nodes
     matrix = scaled_stiffness(body, held)
@@ -64,7 +64,7 @@ class StepLimit:
 
     @property
     def damped(self) -> float:
-        """(2/ω)(√(1 + ζ²) − ζ) [s] with ζ = c/(2ω) (eq. 17)."""
+        """(2/ω)(√(1 + ζ²) − ζ) [s] with ζ = c/(2ω) (eq. 5.2)."""
         zeta = self.damping / (2.0 * self.frequency)
         return self.undamped * (math.sqrt(1.0 + zeta * zeta) - zeta)
 

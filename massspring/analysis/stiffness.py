@@ -24,7 +24,7 @@ def edge_blocks(ends: np.ndarray, block: np.ndarray, nodes: int) -> csr_array:
 
 
 def spring_stiffness(body: Body, x: np.ndarray) -> csr_array:
-    """−∂f/∂x = Σ_e k [(1 − L/|d|) I + (L/|d|) d̂ d̂ᵀ] [N/m] at positions `x` (n, 3), (3n, 3n) (eq. 76)."""
+    """−∂f/∂x = Σ_e k [(1 − L/|d|) I + (L/|d|) d̂ d̂ᵀ] [N/m] at positions `x` (n, 3), (3n, 3n) (eq. 5.3)."""
     ends, springs = body.springs.ends, body.springs
     d = x[ends[:, 1]] - x[ends[:, 0]]
     square = np.einsum("ei,ei->e", d, d)
@@ -53,7 +53,7 @@ def volume_hessian(triangles: np.ndarray, x: np.ndarray) -> csr_array:
 
 
 def membrane_stiffness(body: Body) -> csr_array:
-    """Σ_t Σ_ab q_ab ∂Δ_a/∂x ∂Δ_b/∂x [N/m] of triangle springs at rest, (3n, 3n) (eq. 77)."""
+    """Σ_t Σ_ab q_ab ∂Δ_a/∂x ∂Δ_b/∂x [N/m] of triangle springs at rest, (3n, 3n) (eq. 4.6)."""
     membrane, n = body.membrane, body.node_count
     corners = body.rest[membrane.triangles]
     edge = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
@@ -72,7 +72,7 @@ def membrane_stiffness(body: Body) -> csr_array:
 
 
 def stiffness_at_rest(body: Body) -> csr_array:
-    """−∂f/∂x [N/m] of springs, triangle springs and rest pressure together at rest, (3n, 3n) (eq. 16, 76)."""
+    """−∂f/∂x [N/m] of springs, triangle springs and rest pressure together at rest, (3n, 3n) (eq. 5.1, 5.3)."""
     springs = csr_array(spring_stiffness(body, body.rest) + membrane_stiffness(body))
     if not body.rest_pressure:
         return springs

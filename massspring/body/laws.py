@@ -1,6 +1,6 @@
 """Stiffness laws: what a mesh and a shear modulus make of each spring (docs/theory.md, section 4).
 
-*Matched* laws are scaled so that affine homogenisation gives the tissue's shear modulus, Σ k L² = 15 V mu (eq. 14);
+*Matched* laws are scaled so that affine homogenisation gives the tissue's shear modulus, Σ k L² = 15 V mu (eq. 4.1);
 *published* ones are taken as their authors wrote them, with the Young's modulus such a network has, E = 2.5 mu.
 """
 
@@ -62,7 +62,7 @@ class Edges:
         return np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
 
     def matched(self, weight: np.ndarray, mu: float) -> np.ndarray:
-        """Relative stiffnesses `weight` (s,) scaled to Σ k L² = 15 V mu [N/m], (s,) (eq. 14)."""
+        """Relative stiffnesses `weight` (s,) scaled to Σ k L² = 15 V mu [N/m], (s,) (eq. 4.1)."""
         return weight * matched_scale(mu, float(self.volumes.sum()), weight, self.length)
 
 
@@ -72,12 +72,12 @@ def uniform(edges: Edges, mu: float) -> np.ndarray:
 
 
 def van_gelder(edges: Edges, mu: float) -> np.ndarray:
-    """k_e = E Σ_t∋e V_t/L_e² [N/m], (s,) (Van Gelder 1998; eq. 15): matched on any mesh, as it was published."""
+    """k_e = E Σ_t∋e V_t/L_e² [N/m], (s,) (Van Gelder 1998; eq. 4.2): matched on any mesh, as it was published."""
     return edges.matched(edges.summed(edges.volumes[:, None]) / edges.length**2, mu)
 
 
 def lloyd(edges: Edges, mu: float) -> np.ndarray:
-    """k_e = Σ_t∋e (2√2/25) E L_e [N/m], (s,) (Lloyd, Székely, Harders 2007; eq. 72), as published.
+    """k_e = Σ_t∋e (2√2/25) E L_e [N/m], (s,) (Lloyd, Székely, Harders 2007; eq. 4.3), as published.
 
     Of a regular tetrahedron it makes 0.96 of the shear modulus, of those of a mesh generator about 1.2 times it.
     """
@@ -90,7 +90,7 @@ def lloyd_matched(edges: Edges, mu: float) -> np.ndarray:
 
 
 def cotangent(edges: Edges, mu: float) -> np.ndarray:
-    """k_ij = −mu Σ_t V_t ∇φ_i·∇φ_j [N/m], (s,), of springs without length (eq. 73); negative at obtuse angles.
+    """k_ij = −mu Σ_t V_t ∇φ_i·∇φ_j [N/m], (s,), of springs without length (eq. 4.4); negative at obtuse angles.
 
     ½ Σ k |x_i − x_j|² is then ∫ ½ mu |F|² of linear tetrahedra: with one volume per node an incompressible
     neo-Hookean solid. The springs pull with the stress mu I at rest, and a pressure of mu balances them.

@@ -14,7 +14,7 @@ MEMBRANE_LAWS = ("delingette", "lloyd")
 def triangle_springs(
     points: np.ndarray, triangles: np.ndarray, thickness: float, shear_modulus: float, poisson: float = 0.5
 ) -> Membrane:
-    """Delingette's springs, exactly the St. Venant–Kirchhoff membrane of linear triangles (eq. 77, 78).
+    """Delingette's springs, exactly the St. Venant–Kirchhoff membrane of linear triangles (eq. 4.6, 4.7).
 
     `points` (n, 3) [m] at rest, `triangles` (t, 3); `thickness` h [m]; `shear_modulus` G [Pa]; plane stress with
     `poisson` [1]. In Delingette (2008) mu stands for 2 G and the energy for twice this one. Raises MassSpringError.
@@ -50,7 +50,7 @@ def membrane_body(
 
     `points` (n, 3) [m], `triangles` (f, 3) outward; `thickness` [m]; `content` [kg/m³] density of what fills it,
     carried by the wall. `law`: "delingette", incompressible tissue (Poisson ratio ½); "lloyd", k_e = Σ (√3/4) E h with
-    E = 3 mu, whose Poisson ratio is ⅓ (eq. 79). Raises MassSpringError.
+    E = 3 mu, whose Poisson ratio is ⅓ (eq. 4.8). Raises MassSpringError.
     """
     triangles = np.ascontiguousarray(triangles, dtype=np.uint32)
     points = np.ascontiguousarray(points, dtype=np.float64)
@@ -72,7 +72,7 @@ def membrane_body(
 
 
 def lloyd_springs(points: np.ndarray, triangles: np.ndarray, thickness: float, young: float) -> Springs:
-    """k_e = Σ_t∋e (√3/4) E h [N/m] on the edges of `triangles` (t, 3) (Lloyd, Székely, Harders 2007; eq. 79).
+    """k_e = Σ_t∋e (√3/4) E h [N/m] on the edges of `triangles` (t, 3) (Lloyd, Székely, Harders 2007; eq. 4.8).
 
     Exact for equilateral triangles of a material with Poisson ratio ⅓.
     """

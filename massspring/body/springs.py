@@ -68,7 +68,7 @@ def lengths(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
 def matched_scale(shear_modulus: float, volume: float, weight: np.ndarray, length: np.ndarray) -> float:
     """Factor that turns relative stiffnesses `weight` (s,) into [N/m] so that Σ k L² = 15 V mu.
 
-    Affine homogenisation of a network of central forces has lambda = mu = Σ k L²/(15 V) (docs/theory.md, eq. 14);
+    Affine homogenisation of a network of central forces has lambda = mu = Σ k L²/(15 V) (docs/theory.md, eq. 4.1);
     matching mu is right for tissue that a volume constraint makes incompressible.
     """
     return 15.0 * volume * shear_modulus / float(weight @ length**2)

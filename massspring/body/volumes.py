@@ -1,6 +1,6 @@
 """Which volumes a body keeps: the whole, wall and lumen, m regions, or one per node.
 
-Each is a signed sum of oriented triangles, V_r = Σ_f s_rf (1/6) x_i · (x_j × x_k) (docs/theory.md, eq. 31), so that
+Each is a signed sum of oriented triangles, V_r = Σ_f s_rf (1/6) x_i · (x_j × x_k) (docs/theory.md, eq. 8.1), so that
 one sweep over triangles serves all kinds. A region is bounded by its own faces; the volume of a node, a quarter of
 every tetrahedron around it, is a quarter of what their outer faces enclose.
 """
@@ -62,7 +62,7 @@ class Volumes:
         return self.share.shape[0]  # pyright: ignore[reportOptionalSubscript]
 
     def measure(self, x: np.ndarray) -> np.ndarray:
-        """V_r [m³] at positions `x` (n, 3) [m], seen from their mean (eq. 31), (m,)."""
+        """V_r [m³] at positions `x` (n, 3) [m], seen from their mean (eq. 8.1), (m,)."""
         corners = x[self.triangles] - x.mean(axis=0)
         return self.share @ np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
 

@@ -1,4 +1,4 @@
-"""Which volumes make a cluster, and the inverse of S at rest in each: once, before a run (eq. 169)."""
+"""Which volumes make a cluster, and the inverse of S at rest in each: once, before a run (eq. 8.7)."""
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array

@@ -21,7 +21,7 @@ def edge_chains(shares: csr_array, triangles: np.ndarray) -> tuple[csr_array, np
 
 
 def quadrangles(chains: csr_array, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Each closed chain (eq. 39) as (row of each quadrangle, ascending, its corners (q, 4), its share), (q,) each.
+    """Each closed chain (eq. 8.6) as (row of each quadrangle, ascending, its corners (q, 4), its share), (q,) each.
 
     All are fans about the lowest node of the chain, o: two edges in a row, u → v → w, are (o, u, v, w), a single one
     (o, u, v, o). Edges that meet o add nothing.

@@ -1,7 +1,7 @@
 """Every tetrahedron keeps the distances of its nodes to its barycentre.
 
 Bourguignon and Cani, Controlling anisotropy in mass-spring systems, Eurographics Workshop on Animation and Simulation
-2000: forces along r_j, from the barycentre to node j, in proportion to Σ|r_j| − Σ|r_j|_0 (docs/theory.md, eq. 165).
+2000: forces along r_j, from the barycentre to node j, in proportion to Σ|r_j| − Σ|r_j|_0 (docs/theory.md, eq. 10.12).
 
 Two changes. The factor is 9 K V_t0/(Σ|r_j|_0)², so that a cell that grows evenly resists with the bulk modulus K
 whatever its size. The mean of the four directions is taken off, which makes the force the derivative of an energy;

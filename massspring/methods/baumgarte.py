@@ -1,10 +1,10 @@
 """Baumgarte's stabilisation: the constraint as a damped oscillator.
 
 Baumgarte, Computer Methods in Applied Mechanics and Engineering 1 (1972): instead of d²V/dt² = 0, which drifts, ask for
-d²(V − V0)/dt² + 2 alpha d(V − V0)/dt + beta² (V − V0) = 0 (docs/theory.md, eq. 104).
+d²(V − V0)/dt² + 2 alpha d(V − V0)/dt + beta² (V − V0) = 0 (docs/theory.md, eq. 10.5).
 
 Limits: stable for (beta dt)² + 4 alpha dt < 4 and 0 < 2 alpha dt < 2. A wrong volume takes time to mend: the larger
-root of eq. 106 is what a step leaves of it. 2 alpha = beta = 1/dt is HCJ05 with the convective term.
+root of eq. 10.6 is what a step leaves of it. 2 alpha = beta = 1/dt is HCJ05 with the convective term.
 """
 
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class Baumgarte(Method):
 
     @property
     def stable(self) -> bool:
-        """Whether a wrong volume dies away: (beta dt)² + 4 alpha dt < 4 and 2 alpha dt < 2 (eq. 106)."""
+        """Whether a wrong volume dies away: (beta dt)² + 4 alpha dt < 4 and 2 alpha dt < 2 (eq. 10.6)."""
         return self.beta**2 + 4.0 * self.alpha < 4.0 and 2.0 * self.alpha < 2.0
 
     def advance(self, state: State, drive: Drive) -> State:

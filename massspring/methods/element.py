@@ -1,8 +1,8 @@
 """Every tetrahedron keeps its own volume: by a penalty, or hard.
 
 Penalty: Teschner, Heidelberger, Müller, Gross, A versatile and robust model for geometrically complex deformable
-solids, Computer Graphics International 2004; energy ½ K V_t0 ((V_t − V_t0)/V_t0)² (docs/theory.md, eq. 164). Hard: one
-multiplier per tetrahedron, all solved for together at the end of the step with the compliance 1/K (eq. 166), the
+solids, Computer Graphics International 2004; energy ½ K V_t0 ((V_t − V_t0)/V_t0)² (docs/theory.md, eq. 10.11). Hard:
+one multiplier per tetrahedron, all solved for together at the end of the step with the compliance 1/K (eq. 10.13), the
 constraint of HCJ05 with as many volumes as there are cells.
 
 Limits: a mesh has about five tetrahedra for each node and three coordinates: with all volumes kept it cannot deform as
@@ -35,7 +35,7 @@ from massspring.world.obstacles import Attachment
 
 @lean
 def hard_frame(frame, cells, compliance, accuracy):
-    """One frame, all cells and contact inside the solve (eq. 6–13, 166); the mean pressure [Pa]."""
+    """One frame, all cells and contact inside the solve (eq. 3.1–3.8, 10.13); the mean pressure [Pa]."""
     nodes, contacts, drive, tally = frame.nodes, frame.contacts, frame.drive, frame.tally
     push = Push(cells.push, 1.0)
     open_frame(frame)

@@ -14,7 +14,7 @@ from massspring.methods.method import Method, crewed_frame
 
 @lean
 def free_frame(frame):
-    """One frame of symplectic Euler with contact (eq. 6, 7, 10, 12)."""
+    """One frame of symplectic Euler with contact (eq. 3.1, 3.2, 3.5, 3.7)."""
     nothing = Push(frame.nodes.gradient, 0.0)
     open_frame(frame)
     for step in range(frame.drive.position.shape[0]):

@@ -51,7 +51,7 @@ from massspring.world.obstacles import Attachment
 
 @lean
 def implicit_volume_frame(frame, lam):
-    """One frame of HCJ05 with contact inside the multiplier (eq. 6–13); returns the last lam [Pa]."""
+    """One frame of HCJ05 with contact inside the multiplier (eq. 3.1–3.8); returns the last lam [Pa]."""
     network, nodes, drive, tally = frame.network, frame.nodes, frame.drive, frame.tally
     gradient, dt = nodes.gradient, drive.dt
     open_frame(frame)
@@ -76,7 +76,8 @@ def implicit_volume_frame(frame, lam):
 
 @inlined
 def limited_multiplier(network, nodes, contacts, error, dt, flow, mobility):
-    """lam [Pa] of the sums over all nodes (eq. 8), G·W̃·G, and whether only a part of the error is made up for (35)."""
+    """lam [Pa] of the sums over all nodes (eq. 3.3), G·W̃·G, and whether only a part of the error is made up for
+    (35)."""
     weights, longest = network.inverse_mass, network.longest_correction
     lam, left = multiplier_of_sums(nodes, contacts, weights, error, dt, flow, mobility)
     if not left > 0.0 or surely_short(error, left, network.largest_inverse_mass, longest):
@@ -89,7 +90,7 @@ def limited_multiplier(network, nodes, contacts, error, dt, flow, mobility):
 
 @compiled
 def set_right_side(network, rows, nodes, contacts, target, dt, tolerance):
-    """rhs_r = (V0_r − V_r)/dt² − (J u)_r/dt [m³/s²] with capped errors (eq. 33, 35), u = ṽ + dt W̃ Jᵀ lam.
+    """rhs_r = (V0_r − V_r)/dt² − (J u)_r/dt [m³/s²] with capped errors (eq. 8.3, 8.5), u = ṽ + dt W̃ Jᵀ lam.
 
     Returns whether a volume was capped, and whether a wrong one had nothing to push on.
     """
@@ -114,7 +115,7 @@ def set_right_side(network, rows, nodes, contacts, target, dt, tolerance):
 
 @compiled
 def solve_multipliers(network, rows, contacts, tally, accuracy):
-    """lam += S⁻¹ rhs for the contacts of the moment (eq. 33, 34); then Jᵀ lam [N] into `rows.push`."""
+    """lam += S⁻¹ rhs for the contacts of the moment (eq. 8.3, 8.4); then Jᵀ lam [N] into `rows.push`."""
     if rows.matrix.shape[0] > 0:
         dense_into(rows, contacts, network.inverse_mass, rows.matrix)
         solve_dense(rows.matrix, rows.right, rows.search)
@@ -132,7 +133,7 @@ def solve_multipliers(network, rows, contacts, tally, accuracy):
 
 @lean
 def implicit_volumes_frame(frame, rows, accuracy):
-    """One frame of HCJ05 with several volumes (eq. 6–13, 32–35); `rows.lam` [Pa] comes in and goes out."""
+    """One frame of HCJ05 with several volumes (eq. 3.1–3.8, 8.2–8.5); `rows.lam` [Pa] comes in and goes out."""
     network, nodes, contacts, drive, tally = frame.network, frame.nodes, frame.contacts, frame.drive, frame.tally
     push, capped, idle = Push(rows.push, 1.0), False, False
     open_frame(frame)

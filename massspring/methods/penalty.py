@@ -1,10 +1,10 @@
 """A penalty on the volume of the whole: a pressure in proportion to what is missing, lam = K (V0 − V)/V0.
 
 The oldest way; as a constraint on volumes of deformable bodies: Platt and Barr, SIGGRAPH 1988; Hong et al. 2005 compare
-themselves with it (docs/theory.md, eq. 161).
+themselves with it (docs/theory.md, eq. 10.8).
 
 Limits: what pressure lam there is costs lam/K of the volume, so the residual is ∝ 1/K; a large K shortens the step,
-omega² grows by K G·W·G/V0 (eq. 162).
+omega² grows by K G·W·G/V0 (eq. 10.9).
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """A constraint on the velocities, and a correction of the positions after every step.
 
 Cline and Pai, IEEE International Conference on Robotics and Automation (2003). First dV/dt = 0 at the end of the step,
-then x += W̃ G (V0 − V)/(G·W̃·G) at the new positions, velocities untouched (docs/theory.md, eq. 103, 105).
+then x += W̃ G (V0 − V)/(G·W̃·G) at the new positions, velocities untouched (docs/theory.md, eq. 10.3, 10.7).
 
 Limits: the correction does not see the dynamics, it moves nodes that have no such velocity: small kicks in the springs,
 and no exact spin. A target that moves is followed by the positions alone.

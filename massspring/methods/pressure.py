@@ -1,7 +1,7 @@
 """An ideal gas inside the surface at constant temperature, in an ambient pressure: lam = p0 (V0/V − 1).
 
 Matyka and Ollila, Pressure model of soft body simulation, SIGRAD 2003, with p = nRT/V; nRT = p0 V0 makes the rest shape
-rest (docs/theory.md, eq. 161).
+rest (docs/theory.md, eq. 10.8).
 
 Limits: the volume is not kept, lam/p0 of it is missing as with a penalty; the pressure has no bound as V goes to 0,
 so that a crushed body bursts.

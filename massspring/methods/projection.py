@@ -2,10 +2,10 @@
 
 Promayon, Baconnier, Puech, Computer Graphics Forum 15 (1996) and CVRMed-MRCAS (1997; "PBP97"): move all nodes along
 the volume gradient of the *predicted* shape until the volume is right; velocities follow. The step length is the root
-of the cubic (docs/theory.md, eq. 101–103).
+of the cubic (docs/theory.md, eq. 10.1–10.3).
 
 Limits: the pressure acts along a gradient that is a step ahead of the positions, so that under sustained pressure and
-without damping the body gains energy at the rate of eq. 107, and spin where it turns. HCJ05 and SHAKE do neither.
+without damping the body gains energy at the rate of eq. 10.4, and spin where it turns. HCJ05 and SHAKE do neither.
 """
 
 from dataclasses import dataclass

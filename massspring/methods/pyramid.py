@@ -1,7 +1,7 @@
 """A penalty on the volume summed over pyramids from the centre of mass to each triangle, pushing along normals.
 
 Zordan, Celly, Chiu, DiLorenzo, Breathe easy, Symposium on Computer Animation 2004: force k (V0 − V) along the normal of
-each triangle, here in proportion to its area (docs/theory.md, eq. 161, 163).
+each triangle, here in proportion to its area (docs/theory.md, eq. 10.8, 10.10).
 
 Limits: on a closed surface the pyramids add up to the enclosed volume wherever their apex is, so that it *is* the
 penalty, at the price of one more sweep. Forces that are not in proportion to area would push the body about.

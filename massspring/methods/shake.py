@@ -1,8 +1,8 @@
 """SHAKE for one enclosed volume: the direction of HCJ05, the step along it to the exact volume.
 
 Ryckaert, Ciccotti, Berendsen, Journal of Computational Physics 23 (1977), for bond lengths; here the constraint is a
-cubic along the line, so its root has a closed form and needs no iteration (docs/theory.md, eq. 101, 102). HCJ05 is one
-Newton step of it.
+cubic along the line, so its root has a closed form and needs no iteration (docs/theory.md, eq. 10.1, 10.2). HCJ05 is
+one Newton step of it.
 """
 
 from dataclasses import dataclass

@@ -3,12 +3,13 @@
 Macklin, Müller, Chentanez, XPBD: position-based simulation of compliant constrained dynamics, Motion in Games 2016.
 From the predicted positions y the constraints are mended one after the other, a sweep over all of them being an
 iteration: Δp = (V0 − V(y) − C V0 p)/(dt² ∇V·W̃∇V + C V0), in the units of pressures, p = lam/dt² (docs/theory.md,
-eq. 167). p is kept over the iterations of a step: without it the answer is hard whatever the compliance C, a mistake in
-public implementations. As iterations go on, it is the compliant volume solved for at the end of the step.
+eq. 10.14). p is kept over the iterations of a step: without it the answer is hard whatever the compliance C, a mistake
+in public implementations. As iterations go on, it is the compliant volume solved for at the end of the step.
 
 Not in the publication: a sweep over tetrahedra ends with one constraint more, the sum of their volumes, as the same
-pressure on all (eq. 170). The final pressures stay the same, but corrections of one cell after the other need hundreds
-of sweeps to mend what all cells lack: five leave 2e-4 of the whole without it and 2e-8 with it (ball of 200 nodes).
+pressure on all (eq. 10.15). The final pressures stay the same, but corrections of one cell after the other need
+hundreds of sweeps to mend what all cells lack: five leave 2e-4 of the whole without it and 2e-8 with it (ball of 200
+nodes).
 
 Limits: what the iterations have not reached depends on their number and on dt. The gradients are those of positions
 under way, so that spin is not kept. Per tetrahedron it locks as `element` does.
@@ -38,7 +39,7 @@ from massspring.world.obstacles import Attachment
 
 @lean
 def xpbd_frame(frame, cells, compliance, iterations, whole):
-    """One frame (eq. 6–13, 167); returns the last pressure, of cells their mean [Pa]."""
+    """One frame (eq. 3.1–3.8, 10.14); returns the last pressure, of cells their mean [Pa]."""
     nodes, contacts, drive, tally = frame.nodes, frame.contacts, frame.drive, frame.tally
     lam, idle, push = 0.0, False, Push(cells.push, 1.0)
     open_frame(frame)
@@ -62,8 +63,8 @@ def xpbd_frame(frame, cells, compliance, iterations, whole):
 
 @lean
 def mend(frame, cells, target, compliance, iterations, whole):
-    """So many sweeps over the volumes (eq. 167, 170); the pressure of the whole [Pa], and whether a wrong volume had
-    nothing to push on in the last of them."""
+    """So many sweeps over the volumes (eq. 10.14, 10.15); the pressure of the whole [Pa], and whether a wrong volume
+    had nothing to push on in the last of them."""
     network, contacts, scale = frame.network, frame.contacts, frame.drive.dt * frame.drive.dt
     lam, idle = 0.0, False
     for _ in range(iterations):

@@ -13,7 +13,7 @@ from massspring.world.trajectories import Ramp
 
 
 def fastest_filling(body: Body) -> float:
-    """r = c/D [1/s], c² = mu/rho = Σ k L²/(15 Σ m): relative rate at which a target is followed at most (eq. 38).
+    """r = c/D [1/s], c² = mu/rho = Σ k L²/(15 Σ m): relative rate at which a target is followed at most (eq. 5.4).
 
     The surface then moves at c/6 at most, a sixth of the speed of a shear wave. Infinite for a body without stiffness.
     """

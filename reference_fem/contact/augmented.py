@@ -68,7 +68,7 @@ def touch(rows, shift, multiplier, penalty, grip=NO_GRIP, guess=NO_GUESS) -> Tou
 
 @compiled()
 def add_contact(x, surface, touch, values, residual, tangent):
-    """residual -= w (t n + T) N and, if tangent, values += w d²(potential) N N; fills touch (eq. 19, 43).
+    """residual -= w (t n + T) N and, if tangent, values += w d²(potential) N N; fills touch (eq. 6.2, 6.4).
 
     Normal part: eps n⊗n - t curvature (1 - n⊗n - a⊗a); part of a stuck point: eps (1 - n0⊗n0), n0 at its anchor.
     """

@@ -3,7 +3,7 @@
 Arnold and Brüls, Convergence of the generalized-alpha scheme for constrained mechanical systems, Multibody System
 Dynamics 18, 2007, with the parameters of Chung and Hulbert, Journal of Applied Mechanics 60, 1993. The momentum
 balance M a + c M v + f(u, p) = load, the pressure's constraint and contact all hold exactly at the end of the step;
-only the auxiliary acceleration that feeds Newmark's formulas is averaged (docs/theory.md, eqs. 52 and 53). Averaging
+only the auxiliary acceleration that feeds Newmark's formulas is averaged (docs/theory.md, eqs. 6.9 and 6.10). Averaging
 the pressure as well would carry its error from step to step, for a multiplier has no memory to damp it with.
 """
 
@@ -60,7 +60,7 @@ class TimeStep:
     held_a: np.ndarray
 
     def at(self, u):
-        """(v, a, memory) for u (3 N2,): Newmark's formulas and (1 - am) m1 + am m0 = (1 - af) a1 + af a0 (eq. 53)."""
+        """(v, a, memory) for u (3 N2,): Newmark's formulas and (1 - am) m1 + am m0 = (1 - af) a1 + af a0 (eq. 6.10)."""
         alpha_m, alpha_f, beta, gamma = self.scheme
         old, dt = self.old, self.dt
         moved = u - old.state.x[: len(u)] - dt * old.v

@@ -1,6 +1,6 @@
 """Step by step through time: steps that fail are halved and grow again; the energy is accounted for.
 
-docs/theory.md, eq. 55.
+docs/theory.md, eq. 6.12.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""The consistent mass of the displacement, for frequencies and motion (docs/theory.md, eqs. 51 and 52)."""
+"""The consistent mass of the displacement, for frequencies and motion (docs/theory.md, eqs. 6.8 and 6.9)."""
 
 from typing import NamedTuple
 

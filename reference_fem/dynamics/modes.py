@@ -1,4 +1,4 @@
-"""Natural frequencies and modes of a body about its rest shape (docs/theory.md, eq. 51)."""
+"""Natural frequencies and modes of a body about its rest shape (docs/theory.md, eq. 6.8)."""
 
 from dataclasses import dataclass, replace
 

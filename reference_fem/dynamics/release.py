@@ -1,4 +1,4 @@
-"""The start of a motion: the accelerations that go with a displacement and a velocity (docs/theory.md, eq. 54)."""
+"""The start of a motion: the accelerations that go with a displacement and a velocity (docs/theory.md, eq. 6.11)."""
 
 from dataclasses import replace
 

@@ -2,7 +2,7 @@
 
 The lumen's pressure p_c is a Lagrange multiplier: Pi_c = -p_c (V - V_target). V is a cubic in the positions, and its
 second derivative is the follower load's stiffness, symmetric because the surface is closed (Bufler, Pressure loaded
-structures under large deformations, ZAMM 64, 1984). docs/theory.md, eq. 41.
+structures under large deformations, ZAMM 64, 1984). docs/theory.md, eq. 6.6.
 """
 
 import itertools
@@ -97,7 +97,7 @@ def facet_shares(element):
 
 @compiled()
 def add_wall(x, wall, pressure, gradient, values, tangent):
-    """gradient += dV/dx [m²] and, if tangent, values -= pressure d²V/dx²; returns the enclosed V [m³] (eq. 41).
+    """gradient += dV/dx [m²] and, if tangent, values -= pressure d²V/dx²; returns the enclosed V [m³] (eq. 6.6).
 
     det(a, b, c) = a·(b × c): d/da = b × c, and d²/da_i db_j = e_ijk c_k.
     """

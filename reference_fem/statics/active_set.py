@@ -3,7 +3,7 @@
 With the body and the obstacles' surfaces linearised, the pressures are still t = max(0, m - eps (g + n·d)). Newton's
 tangent takes the points that touch as known; where others touch, its step ends out of balance and points flicker from
 step to step. Each point that changes is a rank-one change eps w b bᵀ of the tangent, b = n N, so that the factors serve
-for any set of points (Sherman, Morrison and Woodbury; Hager, SIAM Review 31, 1989; docs/theory.md, eq. 148), and a
+for any set of points (Sherman, Morrison and Woodbury; Hager, SIAM Review 31, 1989; docs/theory.md, eq. 6.5), and a
 semismooth Newton iteration finds the set (Hintermüller, Ito and Kunisch, SIAM J. Optim. 13, 2003).
 """
 
@@ -148,7 +148,7 @@ def changed(points: Points, gap):
 def pushes(points: Points, chosen, moves, gap):
     """Forces [N] at the points that change, (k,): +w t of those that touch, -w t of those that the tangent holds.
 
-    From t = m - eps (gap + moves·push) (eq. 148); moves (k, k): among themselves.
+    From t = m - eps (gap + moves·push) (eq. 6.5); moves (k, k): among themselves.
     """
     sign = np.where(points.touching[chosen], -1.0, 1.0)
     eps = points.penalty[chosen]

@@ -9,7 +9,7 @@ class Tangent:
     """Factors of a tangent, with its cavities as a border. Raises ReferenceProblem when it is singular.
 
     With K b = dV/dx, the fields move by d + b dp, and dV/dx·(d + b dp) = -misfit gives dp: one more solve for each
-    cavity, no dense row in the pattern (docs/theory.md, eq. 42).
+    cavity, no dense row in the pattern (docs/theory.md, eq. 6.7).
     """
 
     def __init__(self, system: System, found: Evaluation):

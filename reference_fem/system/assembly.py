@@ -62,7 +62,7 @@ def deformation_into(ue, G, functions, F):
 
 @compiled()
 def mean_pressure(ue, gradients, weights, functions, parameters):
-    """kappa (sum w J / sum w - 1): the pressure [Pa] that solves an element's own volume equation (eq. 61)."""
+    """kappa (sum w J / sum w - 1): the pressure [Pa] that solves an element's own volume equation (eq. 6.14)."""
     F, cof, change, volume = np.empty((3, 3)), np.empty((3, 3)), 0.0, 0.0
     for q in range(weights.shape[0]):
         deformation_into(ue, gradients[q], functions, F)

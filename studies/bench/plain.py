@@ -41,7 +41,7 @@ class Plain(NamedTuple):
 
 @numba.njit(**SETTINGS)
 def add_springs(ends, rest_length, stiffness, x, force):
-    """f_i += (k − k L/|d|) d, f_j −= the same (eq. 1) [N]."""
+    """f_i += (k − k L/|d|) d, f_j −= the same (eq. 1.1) [N]."""
     for s in range(ends.shape[0]):
         i, j = ends[s, 0], ends[s, 1]
         d0, d1, d2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
@@ -53,7 +53,7 @@ def add_springs(ends, rest_length, stiffness, x, force):
 
 @numba.njit(**SETTINGS)
 def add_triangles(triangles, x, gradient):
-    """6 G (eq. 4) [m²], (n, 3); returns V [m³] (eq. 3), seen from a node of the surface."""
+    """6 G (eq. 2.2) [m²], (n, 3); returns V [m³] (eq. 2.1), seen from a node of the surface."""
     o, volume = triangles[0, 0], 0.0
     o0, o1, o2 = x[o, 0], x[o, 1], x[o, 2]
     for t in range(triangles.shape[0]):

@@ -28,7 +28,7 @@ class Reference(Solution):
 
     @cached_property
     def floor(self) -> dict[str, float]:
-        """Uncertainty of each quantity [1], relative to its size (docs, eq. 20)."""
+        """Uncertainty of each quantity [1], relative to its size (docs, eq. 6.3)."""
         return {name: found.total for name, found in self.uncertainty.items()}
 
 

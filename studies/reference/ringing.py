@@ -26,7 +26,7 @@ def ringing_frequency(scene: Scene, t: np.ndarray, rest: np.ndarray, moved: np.n
 
 
 def fitted_frequency(t: np.ndarray, swing: np.ndarray, damping: float) -> float:
-    """f [Hz] of a + e^{-ct/2} (b cos 2πft + d sin 2πft) (eq. 168) fitted to (K,) values at t [s]; c = damping [1/s].
+    """f [Hz] of a + e^{-ct/2} (b cos 2πft + d sin 2πft) (eq. 6.13) fitted to (K,) values at t [s]; c = damping [1/s].
 
     Least squares in a, b and d for every f (variable projection: Golub and Pereyra 1973), from half a period in the
     whole time up to four values a period. Raises StudyError for fewer than FEWEST values.

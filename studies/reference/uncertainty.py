@@ -39,7 +39,7 @@ class Uncertainty:
 
     @property
     def total(self) -> float:
-        """The one number: root of the sum of the squares of the shares (docs, eq. 20)."""
+        """The one number: root of the sum of the squares of the shares (docs, eq. 6.3)."""
         return combined(self.shares)
 
 

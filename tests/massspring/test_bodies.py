@@ -18,7 +18,7 @@ def test_the_mass_is_density_times_volume(body):
 
 
 def test_the_stiffness_matches_the_shear_modulus(body):
-    """Σ k L² = 15 V mu: affine homogenisation of central forces (eq. 14)."""
+    """Σ k L² = 15 V mu: affine homogenisation of central forces (eq. 4.1)."""
     k, length = body.springs.stiffness, body.springs.rest_length
     assert float(k @ length**2) / (15 * body.volume) == pytest.approx(SOFT.shear_modulus, rel=EXACT)
 

@@ -114,7 +114,7 @@ def volume_errors(body, method, steps, scale=1 + 1e-9):
 
 @pytest.mark.parametrize(("alpha", "beta"), [(0.5, 0.5), (0.3, 0.1), (0.05, 0.4)])
 def test_baumgarte_lets_the_volume_follow_its_oscillator(ball_body, alpha, beta):
-    """e⁺ = e + r, r⁺ = (1 − 2 alpha) r − beta² e exactly (eq. 106), from an error so small that all is linear."""
+    """e⁺ = e + r, r⁺ = (1 − 2 alpha) r − beta² e exactly (eq. 10.6), from an error so small that all is linear."""
     errors = volume_errors(ball_body, Baumgarte(alpha, beta), 30)
     start = 3e-9
     e, r, expected = start, 0.0, []

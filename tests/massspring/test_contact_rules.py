@@ -1,4 +1,5 @@
-"""The rules of contact node by node, against the geometry of obstacles and dense 3 × 3 solves (eq. 12, 13, 36, 37)."""
+"""The rules of contact node by node, against the geometry of obstacles and dense 3 × 3 solves (eq. 3.7, 3.8, 9.1,
+9.2)."""
 
 from typing import Any
 
@@ -67,7 +68,7 @@ class Scene:
         return self.state.nodes.v_star + DT * lam * self.network.inverse_mass[:, None] * self.state.nodes.gradient
 
     def velocity(self, lam: float) -> np.ndarray:
-        """v⁺ = P u + goal (n, 3) [m/s] (eq. 9, 10)."""
+        """v⁺ = P u + goal (n, 3) [m/s] (eq. 3.4, 3.5)."""
         contacts, u = self.contacts, self.free_velocity(lam)
         kept = {
             FREE: u,
@@ -191,7 +192,7 @@ def _shape(obstacle) -> tuple:
 
 
 def test_what_sticks_too_hard_at_the_new_pressure_slips(shell):
-    """k = v⁺ − u is what sticking takes; of its part along the obstacle mu times the other is left (eq. 36)."""
+    """k = v⁺ − u is what sticking takes; of its part along the obstacle mu times the other is left (eq. 9.1)."""
     mu, lam = 1.2, 0.4 * LAM
     scene = Scene(shell, (Plane((0, 0, -0.0501), (0, 0, 1), ALONG, mu),)).find()
     sticks = np.flatnonzero(scene.contacts.mode == STICKS)

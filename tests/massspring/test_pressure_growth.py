@@ -53,7 +53,7 @@ def kinetic_growth(body, method, seconds):
 
 
 def fastest_mode(body):
-    """dt lam max φᵀHφ [1/s] over the modes φ, φᵀMφ = 1, of springs and pressure that keep the volume (eq. 107)."""
+    """dt lam max φᵀHφ [1/s] over the modes φ, φᵀMφ = 1, of springs and pressure that keep the volume (eq. 10.4)."""
     state = come_to_rest(body, Shake())
     x, size = state.x, body.rest.size
     stiffness, hessian = (m.toarray() for m in (spring_stiffness(body, x), volume_hessian(body.triangles, x)))

@@ -1,4 +1,4 @@
-"""Obstacles only push: no node is held to one, or to one side of a wedge, by a pull (eq. 13, 37)."""
+"""Obstacles only push: no node is held to one, or to one side of a wedge, by a pull (eq. 3.8, 9.2)."""
 
 import numpy as np
 import pytest

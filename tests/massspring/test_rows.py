@@ -37,7 +37,7 @@ def dense(rows: VolumeRows, nodes: int) -> np.ndarray:
 
 
 def defined(volumes: Volumes, x: np.ndarray) -> np.ndarray:
-    """J as eq. 32 says it, triangle by triangle, (m, n, 3)."""
+    """J as eq. 8.2 says it, triangle by triangle, (m, n, 3)."""
     jacobian = np.zeros((volumes.count, len(x), 3))
     share = volumes.share.toarray()
     for f, triangle in enumerate(volumes.triangles.astype(np.int64)):

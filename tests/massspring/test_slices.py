@@ -34,7 +34,7 @@ def gathered(body: Body, x: np.ndarray, keeps: bool = True, held: tuple[int, ...
 
 
 def predicted(net, v: np.ndarray, force: np.ndarray, drive) -> np.ndarray:
-    """v* of eq. 6, in numpy."""
+    """v* of eq. 3.1, in numpy."""
     return (1 - drive.damping * drive.dt) * v + drive.dt * (net.inverse_mass[:, None] * force + drive.gravity)
 
 

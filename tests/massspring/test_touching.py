@@ -1,4 +1,4 @@
-"""Friction of long steps, node by node: who slides, who sticks, and what rubs it (eq. 94)."""
+"""Friction of long steps, node by node: who slides, who sticks, and what rubs it (eq. 12.4)."""
 
 import numpy as np
 import pytest

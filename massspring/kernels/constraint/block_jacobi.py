@@ -1,4 +1,4 @@
-"""A preconditioner for many multipliers: S⁻¹ within clusters of volumes, as if nothing lay between them (eq. 169)."""
+"""A preconditioner for many multipliers: S⁻¹ within clusters of volumes, as if nothing lay between them (eq. 8.7)."""
 
 import math
 from typing import Any
@@ -56,7 +56,7 @@ def _compiled_answer(inverse, first, part):
 
 @inlined
 def precondition_into(clusters, residual, product):
-    """z ≈ S⁻¹ residual, cluster by cluster (eq. 169), 0 for what nothing can push; returns residual · z."""
+    """z ≈ S⁻¹ residual, cluster by cluster (eq. 8.7), 0 for what nothing can push; returns residual · z."""
     order, scale, part = clusters.order, clusters.scale, clusters.part
     rho = 0.0
     for first in range(0, order.shape[0], SIZE):

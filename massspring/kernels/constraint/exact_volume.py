@@ -25,7 +25,7 @@ class Line(NamedTuple):
 
 @compiled
 def line_into(nodes, contacts, inverse_mass, dt, line):
-    """y = x + dt ṽ [m], d = dt² W̃ G [m/Pa], (n, 3) each: the step ends at y + lam d (eq. 9, 10, 101)."""
+    """y = x + dt ṽ [m], d = dt² W̃ G [m/Pa], (n, 3) each: the step ends at y + lam d (eq. 3.4, 3.5, 10.1)."""
     unpushed_into(nodes, contacts, dt, line.y)
     pushed_by_into(contacts, inverse_mass, dt * dt, nodes.gradient, line.d)
 
@@ -38,7 +38,7 @@ def triple(a, b, c):
 
 @compiled
 def volume_cubic(y, d, triangles):
-    """V(y + a d) = V + a G(y)·d + a² Σ y·g(d) + a³ V[d]: the four coefficients, on a closed surface (eq. 101).
+    """V(y + a d) = V + a G(y)·d + a² Σ y·g(d) + a³ V[d]: the four coefficients, on a closed surface (eq. 10.1).
 
     y is seen from a node of the surface, so that no digits are lost far from the origin.
     """
@@ -83,7 +83,7 @@ def largest_root(b, c, e):
 
 @compiled
 def nearest_root(k0, k1, k2, k3):
-    """The real a nearest to 0 with k0 + k1 a + k2 a² + k3 a³ = 0; NaN where there is none (eq. 102).
+    """The real a nearest to 0 with k0 + k1 a + k2 a² + k3 a³ = 0; NaN where there is none (eq. 10.2).
 
     In t = s/a with s = −k0/k1, the linear step, it is the largest root of t³ − t² + …: never of lower degree.
     """

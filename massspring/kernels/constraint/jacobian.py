@@ -13,7 +13,8 @@ NEGLIGIBLE_DIAGONAL = 1e-12
 
 @compiled
 def rows_into(x, inverse_mass, rows):
-    """J_rj [m²], the non-zero entries (e, 4), padded with 0, V_r [m³] (eq. 32, 39) and S_rr without contact [m⁴/kg]."""
+    """J_rj [m²], the non-zero entries (e, 4), padded with 0, V_r [m³] (eq. 8.2, 8.6) and S_rr without contact
+    [m⁴/kg]."""
     places = rows.node_vector
     for i in range(x.shape[0]):
         places[i, 0], places[i, 1], places[i, 2] = x[i, 0], x[i, 1], x[i, 2]
@@ -28,7 +29,7 @@ def rows_into(x, inverse_mass, rows):
 
 @lean
 def areas_into(rows, places):
-    """J_rj = Σ_q c_q (x_2 − x_0) × (x_3 − x_1) [m²], the area of the ring of node j in volume r (eq. 39).
+    """J_rj = Σ_q c_q (x_2 − x_0) × (x_3 − x_1) [m²], the area of the ring of node j in volume r (eq. 8.6).
 
     Σ_j J_rj = 0. Where J_jr = −J_rj always, one of the two is summed.
     """
@@ -73,7 +74,7 @@ def transposed_rows_times_into(rows, p, out):
 
 @compiled
 def pushed_velocity_into(nodes, contacts, inverse_mass, force, dt, u):
-    """u = ṽ + dt W̃ F [m/s], (n, 3), with a force F [N] on every node (eq. 9, 10)."""
+    """u = ṽ + dt W̃ F [m/s], (n, 3), with a force F [N] on every node (eq. 3.4, 3.5)."""
     for i in range(u.shape[0]):
         w = dt * inverse_mass[i]
         u0 = nodes.v_star[i, 0] + w * force[i, 0]
@@ -88,7 +89,7 @@ def pushed_velocity_into(nodes, contacts, inverse_mass, force, dt, u):
 
 @lean
 def mobilised_into(rows, contacts, inverse_mass, p, u):
-    """u = W̃ Jᵀ p, (n, 4): no motion of a held node, none into an obstacle (eq. 9)."""
+    """u = W̃ Jᵀ p, (n, 4): no motion of a held node, none into an obstacle (eq. 3.4)."""
     start, row, value, mode, direction = (
         rows.node_start,
         rows.node_row,
@@ -106,7 +107,7 @@ def mobilised_into(rows, contacts, inverse_mass, p, u):
 
 @compiled
 def diagonal_into(rows, contacts, inverse_mass, diagonal):
-    """S_rr = Σ_j J_rj · W̃_j J_rj [m⁴/kg], (m,), from what it is without contact (eq. 9).
+    """S_rr = Σ_j J_rj · W̃_j J_rj [m⁴/kg], (m,), from what it is without contact (eq. 3.4).
 
     0 where contact and held nodes leave nothing but round-off.
     """

@@ -26,7 +26,7 @@ class Triangular(NamedTuple):
 
 @lean
 def respond_into(factor, force, moved):
-    """A⁻¹ F, (n, 3): forward with L, then with D and back with Lᵀ; nodes without a column do not move (eq. 91)."""
+    """A⁻¹ F, (n, 3): forward with L, then with D and back with Lᵀ; nodes without a column do not move (eq. 12.1)."""
     start, row, value, node, z = factor.start, factor.row, factor.value, factor.node, factor.scratch
     moved[:] = 0.0
     for j in range(node.shape[0]):

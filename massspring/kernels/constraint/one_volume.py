@@ -12,9 +12,9 @@ NEGLIGIBLE_MOBILITY = 1e-12
 
 @lean
 def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
-    """lam = [(V0 − V) − dt G·ṽ] / (dt² G·W̃·G) [Pa]: one division (eq. 8). Returns (lam, G·W̃·G).
+    """lam = [(V0 − V) − dt G·ṽ] / (dt² G·W̃·G) [Pa]: one division (eq. 3.3). Returns (lam, G·W̃·G).
 
-    ṽ, W̃: velocity and inverse mass of a touched node act only along its obstacle (eq. 9). `volume_error` is V0 − V.
+    ṽ, W̃: velocity and inverse mass of a touched node act only along its obstacle (eq. 3.4). `volume_error` is V0 − V.
     Limit: with no gradient there is nothing to push on; the caller skips when G·W̃·G is not positive.
     """
     flow = 0.0
@@ -41,7 +41,7 @@ def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
 
 @inlined
 def multiplier_of_sums(nodes, contacts, inverse_mass, volume_error, dt, flow, mobility):
-    """The same from G·v* and G·W·G of all nodes, less what obstacles take of the few they touch (eq. 8, 9)."""
+    """The same from G·v* and G·W·G of all nodes, less what obstacles take of the few they touch (eq. 3.3, 3.4)."""
     mode, direction, goal, gradient, v_star = (
         contacts.mode,
         contacts.direction,
@@ -85,6 +85,6 @@ def surely_short(volume_error, mobility, lightest, longest):
 
 @inlined
 def capped_error(volume_error, mobility, steepest, longest):
-    """V0 − V, at most `longest` · G·W̃·G / max w|G| [m³]: then no node moves farther than `longest` [m] (eq. 35)."""
+    """V0 − V, at most `longest` · G·W̃·G / max w|G| [m³]: then no node moves farther than `longest` [m] (eq. 8.5)."""
     most = longest * mobility / steepest if steepest > 0.0 else 0.0
     return min(max(volume_error, -most), most)

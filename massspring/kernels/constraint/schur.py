@@ -1,4 +1,4 @@
-"""The multipliers of m volumes: S lam = rhs with S = J W̃ Jᵀ, dense for few, iterative for many (eq. 33, 34)."""
+"""The multipliers of m volumes: S lam = rhs with S = J W̃ Jᵀ, dense for few, iterative for many (eq. 8.3, 8.4)."""
 
 import math
 
@@ -11,7 +11,7 @@ from massspring.kernels.jit.decorators import compiled, inlined, lean, summing
 
 @compiled
 def dense_into(rows, contacts, inverse_mass, matrix):
-    """S_rs = Σ_j J_rj · W̃_j J_sj [m⁴/kg], its lower triangle, (m, m) (eq. 33)."""
+    """S_rs = Σ_j J_rj · W̃_j J_sj [m⁴/kg], its lower triangle, (m, m) (eq. 8.3)."""
     matrix[:] = 0.0
     for j in range(inverse_mass.shape[0]):
         w = inverse_mass[j]
@@ -32,14 +32,14 @@ def dense_into(rows, contacts, inverse_mass, matrix):
 
 @compiled
 def solve_dense(matrix, right, change):
-    """S Δlam = rhs by Cholesky, L over S in place (eq. 33)."""
+    """S Δlam = rhs by Cholesky, L over S in place (eq. 8.3)."""
     factor_dense(matrix)
     substitute(matrix, right, change)
 
 
 @compiled
 def factor_dense(matrix):
-    """S = L Lᵀ, L over the lower triangle of S (eq. 33).
+    """S = L Lᵀ, L over the lower triangle of S (eq. 8.3).
 
     A volume that is held by its nodes, or depends on those before it, has a pivot of round-off: its column is 0.
     """
@@ -65,7 +65,7 @@ def factor_dense(matrix):
 
 @compiled
 def substitute(factor, right, change):
-    """L Lᵀ Δlam = rhs; Δlam_r = 0 where a pivot was round-off (eq. 33)."""
+    """L Lᵀ Δlam = rhs; Δlam_r = 0 where a pivot was round-off (eq. 8.3)."""
     m = right.shape[0]
     for k in range(m):
         total = right[k]
@@ -81,7 +81,7 @@ def substitute(factor, right, change):
 
 @lean
 def apply_schur(rows, contacts, inverse_mass, p, product):
-    """S p = J (W̃ (Jᵀ p)), (m,) (eq. 33)."""
+    """S p = J (W̃ (Jᵀ p)), (m,) (eq. 8.3)."""
     mobilised_into(rows, contacts, inverse_mass, p, rows.node_vector)
     padded_rows_times_into(rows, rows.node_vector, product)
 
@@ -114,7 +114,7 @@ def along(search, image, alpha, lam, residual):
 
 @lean
 def solve_iteratively(rows, contacts, inverse_mass, lam, allowed, most):
-    """lam += S⁻¹ rhs by conjugate gradients with clusters of S at rest as preconditioner (eq. 34, 169).
+    """lam += S⁻¹ rhs by conjugate gradients with clusters of S at rest as preconditioner (eq. 8.4, 8.7).
 
     Ends when |rhs − S Δlam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number. A volume
     without a diagonal has nothing to push on and is left out.

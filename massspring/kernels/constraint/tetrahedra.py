@@ -1,4 +1,5 @@
-"""The volumes of all tetrahedra solved for at the end of a step: together, or one after the other (eq. 166, 167)."""
+"""The volumes of all tetrahedra solved for at the end of a step: together, or one after the other (eq. 10.13,
+10.14)."""
 
 from massspring.kernels.contact.constrained_motion import pushed_by_into, unpushed_into
 from massspring.kernels.contact.modes import FREE
@@ -13,7 +14,7 @@ WRONG = 1e-6
 
 @compiled
 def cell_rows_into(x, cells, out):
-    """J = dV_t/dx into `cells.slope` [m²] and V_t into `out` [m³], (k,) (eq. 5, 164)."""
+    """J = dV_t/dx into `cells.slope` [m²] and V_t into `out` [m³], (k,) (eq. 2.3, 10.11)."""
     tetrahedra, s = cells.tetrahedra, cells.slope
     for t in range(tetrahedra.shape[0]):
         a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
@@ -54,7 +55,7 @@ def cell_changes_into(cells, u, out):
 
 @inlined
 def moved_by(inverse_mass, mode, direction, i, g0, g1, g2):
-    """W̃ g at node i (eq. 9)."""
+    """W̃ g at node i (eq. 3.4)."""
     w = inverse_mass[i]
     d0, d1, d2 = w * g0, w * g1, w * g2
     if mode[i] > FREE:
@@ -64,7 +65,7 @@ def moved_by(inverse_mass, mode, direction, i, g0, g1, g2):
 
 @compiled
 def cell_diagonal_into(contacts, inverse_mass, cells, scale, compliance):
-    """dt² S_tt + C V_t0 [m³/Pa], (k,), the diagonal of eq. 166; `scale` is dt²."""
+    """dt² S_tt + C V_t0 [m³/Pa], (k,), the diagonal of eq. 10.13; `scale` is dt²."""
     s, tetrahedra = cells.slope, cells.tetrahedra
     mode, direction = contacts.mode, contacts.direction
     for t in range(tetrahedra.shape[0]):
@@ -82,7 +83,7 @@ def cell_diagonal_into(contacts, inverse_mass, cells, scale, compliance):
 
 @compiled
 def apply_cells(contacts, inverse_mass, cells, p, scale, compliance, out):
-    """(dt² J W̃ Jᵀ + C V0) p [m³], (k,) (eq. 166); `scale` is dt²."""
+    """(dt² J W̃ Jᵀ + C V0) p [m³], (k,) (eq. 10.13); `scale` is dt²."""
     cell_forces_into(cells, p, cells.gradient)
     pushed_by_into(contacts, inverse_mass, scale, cells.gradient, cells.y)
     cell_changes_into(cells, cells.y, out)
@@ -102,7 +103,7 @@ def any_idle(cells, compliance, tolerance):
 
 @compiled
 def solve_cells(nodes, contacts, inverse_mass, cells, dt, compliance, accuracy):
-    """(dt² J W̃ Jᵀ + C V0) p = V0 − V − dt J ṽ by conjugate gradients from the last p (eq. 166); their number.
+    """(dt² J W̃ Jᵀ + C V0) p = V0 − V − dt J ṽ by conjugate gradients from the last p (eq. 10.13); their number.
 
     Ends when |residual|_t ≤ tolerance · V_t0 for every tetrahedron. J at x. `cells.right` comes in as V.
     """
@@ -150,7 +151,7 @@ def solve_cells(nodes, contacts, inverse_mass, cells, dt, compliance, accuracy):
 
 @compiled
 def relax_cells(contacts, inverse_mass, cells, scale, compliance):
-    """One sweep of XPBD: Δp = (V0 − V − C V0 p)/(dt² ∇V·W̃∇V + C V0), cell after cell, at y (eq. 167).
+    """One sweep of XPBD: Δp = (V0 − V − C V0 p)/(dt² ∇V·W̃∇V + C V0), cell after cell, at y (eq. 10.14).
 
     `cells.y` moves by dt² W̃ ∇V Δp and `cells.push` [N] collects ∇V Δp; `scale` is dt².
     Returns whether a wrong volume had nothing to push on.
@@ -187,7 +188,7 @@ def relax_cells(contacts, inverse_mass, cells, scale, compliance):
 
 @compiled
 def relax_whole(network, contacts, cells, target, scale, compliance, lam):
-    """The same for the one volume of the whole: returns its pressure [Pa] as well, first (eq. 167)."""
+    """The same for the one volume of the whole: returns its pressure [Pa] as well, first (eq. 10.14)."""
     y, gradient, force, inverse_mass = cells.y, cells.gradient, cells.push, network.inverse_mass
     mode, direction = contacts.mode, contacts.direction
     volume = volume_gradient_into(y, network.triangles, gradient)
@@ -213,7 +214,7 @@ def relax_whole(network, contacts, cells, target, scale, compliance, lam):
 
 @compiled
 def relax_sum(network, contacts, cells, target, scale, compliance):
-    """All pressures of cells by as much as mends the sum of their volumes (eq. 170).
+    """All pressures of cells by as much as mends the sum of their volumes (eq. 10.15).
 
     Returns whether a wrong sum had nothing to push on."""
     mean = mean_pressure(cells)

@@ -19,7 +19,7 @@ CONTACT_PASSES = 3
 
 @lean
 def seat(network, nodes, contacts, drive, step, push, count):
-    """Puts the first `count` nodes of `contacts.entering` on the obstacle each would enter deepest (eq. 12).
+    """Puts the first `count` nodes of `contacts.entering` on the obstacle each would enter deepest (eq. 3.7).
 
     `goal` n a, a = n·(target − x)/dt, ends the step on the obstacle. A round one pushes along n = (x − c)/|x − c| of
     the position now, not of the prediction: that would do work on a node that slides, and pump its oscillations up.
@@ -95,7 +95,7 @@ def clear_all(network, nodes, contacts, drive, step, push, team):
 
 @inlined
 def find_contacts(network, nodes, contacts, drive, step, push, team):
-    """Touched nodes of the step when the push of the last one acts on them: u = v* + dt W f (eq. 12)."""
+    """Touched nodes of the step when the push of the last one acts on them: u = v* + dt W f (eq. 3.7)."""
     let_go(contacts)
     clear_all(network, nodes, contacts, drive, step, push, team)
     enter(network, nodes, contacts, drive, step, push)
@@ -103,7 +103,7 @@ def find_contacts(network, nodes, contacts, drive, step, push, team):
 
 @inlined
 def enter(network, nodes, contacts, drive, step, push):
-    """Seats the nodes whose clearance is negative (eq. 12)."""
+    """Seats the nodes whose clearance is negative (eq. 3.7)."""
     touchable, clearance, entering = network.touchable, contacts.clearance, contacts.entering
     count = 0
     for begin in range(0, clearance.shape[0], BLOCK):
@@ -124,7 +124,7 @@ def enter(network, nodes, contacts, drive, step, push):
 
 @inlined
 def release_pulled(network, nodes, contacts, drive, push):
-    """Releases nodes that their one obstacle would pull (eq. 13); how many."""
+    """Releases nodes that their one obstacle would pull (eq. 3.8); how many."""
     changes = 0
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]
@@ -141,7 +141,7 @@ def release_pulled(network, nodes, contacts, drive, push):
 
 @inlined
 def enters(network, nodes, drive, step, push, i):
-    """Whether the free node i would end the step in an obstacle (eq. 12)."""
+    """Whether the free node i would end the step in an obstacle (eq. 3.7)."""
     dt = drive.dt
     u0, u1, u2 = pushed_velocity(network, nodes, drive, push, i)
     y0, y1, y2 = nodes.x[i, 0] + dt * u0, nodes.x[i, 1] + dt * u1, nodes.x[i, 2] + dt * u2
@@ -154,7 +154,7 @@ def enters(network, nodes, drive, step, push, i):
 
 @inlined
 def revise_contacts(network, nodes, contacts, drive, step, push, reach):
-    """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 13).
+    """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 3.8).
 
     `reach` [m] is how far the new pressure can have moved a node from where `clearance` was measured: distances to
     obstacles change by no more, so a free node farther away need not be looked at.

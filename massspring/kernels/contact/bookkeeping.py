@@ -19,7 +19,7 @@ def book(contact_impulse, o, other, k0, k1, k2):
 
 @inlined
 def settled(contacts, i, u0, u1, u2):
-    """What obstacles make of the velocity of a node they touch [m/s], P u + goal (eq. 10)."""
+    """What obstacles make of the velocity of a node they touch [m/s], P u + goal (eq. 3.5)."""
     d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
     p0, p1, p2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
     return p0 + contacts.goal[i, 0], p1 + contacts.goal[i, 1], p2 + contacts.goal[i, 2]
@@ -27,7 +27,7 @@ def settled(contacts, i, u0, u1, u2):
 
 @inlined
 def book_contacts(network, nodes, contacts, push, dt, contact_impulse):
-    """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 10); u is what a node would do without them."""
+    """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 3.5); u is what a node would do without them."""
     v_star, direction, mode = nodes.v_star, push.direction, contacts.mode
     real = nodes.x.dtype.type
     impulse = real(dt * push.factor)

@@ -7,7 +7,7 @@ from massspring.kernels.jit.decorators import compiled
 
 @compiled
 def unpushed_into(nodes, contacts, dt, y):
-    """y = x + dt ṽ [m], (n, 3): where the step ends without pressure, contact included (eq. 9, 10)."""
+    """y = x + dt ṽ [m], (n, 3): where the step ends without pressure, contact included (eq. 3.4, 3.5)."""
     for i in range(y.shape[0]):
         u0, u1, u2 = nodes.v_star[i, 0], nodes.v_star[i, 1], nodes.v_star[i, 2]
         if contacts.mode[i] > FREE:
@@ -21,7 +21,7 @@ def unpushed_into(nodes, contacts, dt, y):
 
 @compiled
 def pushed_by_into(contacts, inverse_mass, factor, force, d):
-    """d = factor · W̃ F, (n, 3): what a force on every node moves, where contact and held nodes let it (eq. 9)."""
+    """d = factor · W̃ F, (n, 3): what a force on every node moves, where contact and held nodes let it (eq. 3.4)."""
     for i in range(d.shape[0]):
         push = factor * inverse_mass[i]
         d0, d1, d2 = push * force[i, 0], push * force[i, 1], push * force[i, 2]

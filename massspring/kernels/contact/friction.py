@@ -15,7 +15,7 @@ PARALLEL = 1e-4
 
 @lean
 def rub(network, nodes, contacts, drive, step, push):
-    """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 36)."""
+    """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 9.1)."""
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]
         if contacts.mode[i] != SLIDES or not drive.friction[contacts.touched[i] - 1] > 0.0:
@@ -43,7 +43,7 @@ def rub(network, nodes, contacts, drive, step, push):
 
 @lean
 def release_slipping(network, nodes, contacts, drive, push):
-    """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 36)."""
+    """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 9.1)."""
     changes = 0
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]
@@ -68,7 +68,7 @@ def release_slipping(network, nodes, contacts, drive, push):
 
 @lean
 def wedge(network, nodes, contacts, drive, step, push):
-    """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 37); how many.
+    """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 9.2); how many.
 
     Obstacles that face each other have no edge: the deeper one wins, and the other's penetration is recorded.
     """
@@ -129,7 +129,7 @@ def shares(k, n, m):
 
 @lean
 def release_wedged(network, nodes, contacts, drive, push):
-    """Frees nodes in a wedge that one of their obstacles would pull; the next search finds the other (eq. 37)."""
+    """Frees nodes in a wedge that one of their obstacles would pull; the next search finds the other (eq. 9.2)."""
     changes = 0
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]

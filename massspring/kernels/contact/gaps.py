@@ -13,7 +13,7 @@ from massspring.kernels.jit.flat import flat
 
 @inlined
 def clearances_into(network, nodes, contacts, drive, step, push, part):
-    """clearance_i = min over obstacles of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 12).
+    """clearance_i = min over obstacles of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 3.7).
 
     Of the nodes first ≤ i < last in `part`, those that nothing can touch among them.
     """
@@ -74,7 +74,7 @@ def capsule_clearance(course, clearance, p0, p1, p2, a0, a1, a2, radius):
 
 @inlined
 def pushed_velocity(network, nodes, drive, push, i):
-    """u = v* + dt W f of node i when what keeps volumes acts as a force f [m/s] (eq. 12)."""
+    """u = v* + dt W f of node i when what keeps volumes acts as a force f [m/s] (eq. 3.7)."""
     w, direction = drive.dt * push.factor * network.inverse_mass[i], push.direction
     u0 = nodes.v_star[i, 0] + w * direction[i, 0]
     u1 = nodes.v_star[i, 1] + w * direction[i, 1]

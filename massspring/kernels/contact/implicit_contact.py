@@ -7,7 +7,7 @@ from massspring.kernels.jit.decorators import compiled
 
 @compiled
 def seat_entering(network, nodes, contacts, drive, step, push):
-    """Puts free surface nodes that would enter an obstacle onto it (eq. 12) and lists them; how many.
+    """Puts free surface nodes that would enter an obstacle onto it (eq. 3.7) and lists them; how many.
 
     Those that have been released since the last search leave the list.
     """

@@ -12,7 +12,7 @@ from massspring.kernels.jit.decorators import lean
 
 @lean
 def allowed_part(mode, d0, d1, d2, g0, g1, g2):
-    """P g, what obstacles leave of a vector: P = I − n nᵀ on one, e eᵀ on two, 0 where a node sticks (eq. 9)."""
+    """P g, what obstacles leave of a vector: P = I − n nᵀ on one, e eᵀ on two, 0 where a node sticks (eq. 3.4)."""
     along = g0 * d0 + g1 * d1 + g2 * d2
     if mode == SLIDES:
         return g0 - along * d0, g1 - along * d1, g2 - along * d2
@@ -23,7 +23,7 @@ def allowed_part(mode, d0, d1, d2, g0, g1, g2):
 
 @lean
 def taken_share(mode, d0, d1, d2, g0, g1, g2, v0, v1, v2):
-    """g·(I − P) v, what obstacles take of a product (eq. 9)."""
+    """g·(I − P) v, what obstacles take of a product (eq. 3.4)."""
     along = (g0 * d0 + g1 * d1 + g2 * d2) * (v0 * d0 + v1 * d1 + v2 * d2)
     if mode == SLIDES:
         return along
@@ -45,7 +45,7 @@ def axis_share(r0, r1, r2, s0, s1, s2):
 
 @lean
 def round_gap(r0, r1, r2, a0, a1, a2, radius):
-    """Distance [m] of r to the axis 0 … a less a radius, negative inside (eq. 12)."""
+    """Distance [m] of r to the axis 0 … a less a radius, negative inside (eq. 3.7)."""
     share = axis_share(r0, r1, r2, a0, a1, a2)
     r0, r1, r2 = r0 - share * a0, r1 - share * a1, r2 - share * a2
     return math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius
@@ -53,7 +53,7 @@ def round_gap(r0, r1, r2, a0, a1, a2, radius):
 
 @lean
 def sphere_contact(s, r, radius):
-    """(normal, lift) of a node at s now and at r after the predicted step, seen from the centre [m] (eq. 12).
+    """(normal, lift) of a node at s now and at r after the predicted step, seen from the centre [m] (eq. 3.7).
 
     n = s/|s|; the node ends the step at n·r⁺ = n·r + lift = √(R² − |r − n (n·r)|²), on the sphere, moved along n alone.
     A node that slides farther than R within a step has no such point: it ends on the tangent plane at r/|r|. Inverse

@@ -5,7 +5,7 @@ from massspring.kernels.jit.decorators import lean
 
 @lean
 def add_membrane_forces(x, membrane, force):
-    """f_b += 2 g_a (x_c − x_b), f_c −= the same [N], (n, 3), with g_a = k_a Δ_a + c_b Δ_c + c_c Δ_b (eq. 77).
+    """f_b += 2 g_a (x_c − x_b), f_c −= the same [N], (n, 3), with g_a = k_a Δ_a + c_b Δ_c + c_c Δ_b (eq. 4.6).
 
     Δ_a = |x_c − x_b|² − L_a² of the edge opposite node a. Zero at rest; internal: no sum, no moment.
     """
@@ -35,7 +35,7 @@ def add_membrane_forces(x, membrane, force):
 
 @lean
 def membrane_energy(x, membrane):
-    """U = Σ_t Σ_a ½ k_a Δ_a² + c_a Δ_b Δ_c [J] (eq. 77)."""
+    """U = Σ_t Σ_a ½ k_a Δ_a² + c_a Δ_b Δ_c [J] (eq. 4.6)."""
     energy = 0.0
     for t in range(membrane.triangles.shape[0]):
         for a in range(3):

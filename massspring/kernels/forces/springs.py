@@ -9,7 +9,7 @@ SHORTEST = 1e-30  # [m] a collapsed spring has no direction: it pulls with 0 ins
 
 @lean
 def spring_forces_into(x, ends, rest_length, stiffness, force):
-    """f_i = Σ_e k_e (1 − L_e/|d_e|) d_e [N], (n, 3); d_e = x_j − x_i (eq. 1).
+    """f_i = Σ_e k_e (1 − L_e/|d_e|) d_e [N], (n, 3); d_e = x_j − x_i (eq. 1.1).
 
     Zero at rest length; internal: the forces sum to zero and carry no moment.
     """
@@ -32,7 +32,7 @@ def spring_forces_into(x, ends, rest_length, stiffness, force):
 
 @lean
 def spring_energy(x, ends, rest_length, stiffness):
-    """U = Σ_e ½ k_e (|d_e| − L_e)² [J] (eq. 2)."""
+    """U = Σ_e ½ k_e (|d_e| − L_e)² [J] (eq. 1.2)."""
     energy = 0.0
     for s in range(ends.shape[0]):
         i = ends[s, 0]

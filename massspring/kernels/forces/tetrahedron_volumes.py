@@ -44,7 +44,7 @@ class Cells(NamedTuple):
 
 @inlined
 def cell_slopes(x, a, b, c, d):
-    """V_t [m³] and dV_t/dx of b, c, d [m²]: (1/6) (x_c − x_a) × (x_d − x_a) and its rotations (eq. 5, 164)."""
+    """V_t [m³] and dV_t/dx of b, c, d [m²]: (1/6) (x_c − x_a) × (x_d − x_a) and its rotations (eq. 2.3, 10.11)."""
     b0, b1, b2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
     c0, c1, c2 = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
     d0, d1, d2 = x[d, 0] - x[a, 0], x[d, 1] - x[a, 1], x[d, 2] - x[a, 2]
@@ -83,7 +83,7 @@ def fill(cells, drive, step):
 
 @compiled
 def add_volume_forces(x, cells, bulk_modulus, force):
-    """f_j = Σ_t p_t dV_t/dx_j, p_t = K (V_t0 − V_t)/V_t0 [N], (n, 3) (eq. 164).
+    """f_j = Σ_t p_t dV_t/dx_j, p_t = K (V_t0 − V_t)/V_t0 [N], (n, 3) (eq. 10.11).
 
     Returns whether a cell has collapsed so far that its volume has no gradient.
     """
@@ -108,7 +108,7 @@ def unit(r0, r1, r2):
 
 @compiled
 def add_barycentre_forces(x, cells, bulk_modulus, force):
-    """f_j = −k s (r_j/|r_j| − mean), s = Σ|r_j| − Σ|r_j|_0, k = 9 K V_t0/(Σ|r_j|_0)² [N], (n, 3) (eq. 165).
+    """f_j = −k s (r_j/|r_j| − mean), s = Σ|r_j| − Σ|r_j|_0, k = 9 K V_t0/(Σ|r_j|_0)² [N], (n, 3) (eq. 10.12).
 
     Without the mean, as published, a cell that is not regular would push itself about.
     """

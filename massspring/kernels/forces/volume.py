@@ -5,7 +5,7 @@ from massspring.kernels.jit.decorators import compiled
 
 @compiled
 def enclosed_volume(x, triangles):
-    """V = (1/6) Σ_f x_i · (x_j × x_k) [m³] (eq. 3).
+    """V = (1/6) Σ_f x_i · (x_j × x_k) [m³] (eq. 2.1).
 
     Seen from a node of the surface, so that no digits are lost far from the origin.
     """
@@ -22,7 +22,7 @@ def enclosed_volume(x, triangles):
 
 @compiled
 def volume_gradient_into(x, triangles, gradient):
-    """G_i = dV/dx_i = (1/6) Σ_f∋i (x_j - x_i) × (x_k - x_i) [m²], (n, 3); returns V [m³] (eq. 3, 4).
+    """G_i = dV/dx_i = (1/6) Σ_f∋i (x_j - x_i) × (x_k - x_i) [m²], (n, 3); returns V [m³] (eq. 2.1, 2.2).
 
     Around a node of a closed surface this is the sum of x_j × x_k: one area vector a triangle serves all three nodes.
     Identities: Σ G = 0, Σ x × G = 0, Σ x·G = 3 V.
@@ -52,7 +52,7 @@ def volume_gradient_into(x, triangles, gradient):
 
 @compiled
 def pyramid_volume(x, mass, triangles):
-    """V = Σ_f (1/3) A_f n_f · (x_f − c) [m³], pyramids over the centre of mass c (eq. 163); closed: eq. 3."""
+    """V = Σ_f (1/3) A_f n_f · (x_f − c) [m³], pyramids over the centre of mass c (eq. 10.10); closed: eq. 2.1."""
     m, o0, o1, o2 = 0.0, 0.0, 0.0, 0.0
     for i in range(x.shape[0]):
         m += mass[i]

@@ -14,7 +14,7 @@ from massspring.kernels.jit.vectors import at_least, gather, lanes_of, load, roo
 
 @inlined
 def gather_slice(places, slices, s, keeps, shortest, o0, o1, o2, tile):
-    """f_i [N] (eq. 1) and, where a volume is kept, 6 G_i = Σ_k d_k × d_k+1 [m²] (eq. 108) of a slice; its share of V.
+    """f_i [N] (eq. 1.1) and, where a volume is kept, 6 G_i = Σ_k d_k × d_k+1 [m²] (eq. 2.4) of a slice; its share of V.
 
     The share is the slice's in 18 V = Σ 6 G·(x − o); o is a node of the surface, so that no digits are lost far from
     the origin.
@@ -64,7 +64,7 @@ def walk_rings(places, slices, first, last, lane, shortest, here):
 
 @inlined
 def pulled_by(force, slices, row, lane, shortest, d):
-    """f_i + (k − k L/|d|) d [N] (eq. 1); exactly f_i at rest length."""
+    """f_i + (k − k L/|d|) d [N] (eq. 1.1); exactly f_i at rest length."""
     stiffness = load(slices.stiffness, slices.stiffness_row[row], lane)
     length = at_least(root(dot(d, d)), shortest)
     c = stiffness - stiffness * (load(slices.rest_length, row, lane) / length)
@@ -101,7 +101,7 @@ def save_three(vector, tile, at):
 
 @inlined
 def predict_slice(nodes, slices, s, dt, keep, a0, a1, a2, tile):
-    """v* (eq. 6) and G of the nodes of a slice in place of x and 6 G, and their shares of G·v* and G·W·G."""
+    """v* (eq. 3.1) and G of the nodes of a slice in place of x and 6 G, and their shares of G·v* and G·W·G."""
     v, node, inverse_mass = nodes.v, slices.node, slices.inverse_mass
     sixth = nodes.x.dtype.type(1.0 / 6.0)
     if slices.first[s] >= 0:
@@ -173,7 +173,7 @@ def pass_all(nodes, work, drive, slices, keeps, team):
 
 @inlined
 def predict_from_places(network, nodes, work, drive, keeps, team):
-    """v* of eq. 6 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
+    """v* of eq. 3.1 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
 
     `places` holds the positions. Of the forces only those of held nodes are written out.
     """

@@ -1,1 +1,1 @@
-"""Thin tools against triangles (docs/theory.md, eq. 141 to 147)."""
+"""Thin tools against triangles (docs/theory.md, eq. 11.1 to 11.7)."""

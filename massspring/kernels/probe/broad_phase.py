@@ -18,7 +18,7 @@ SAFE = 1.0 + 1e-6
 
 @comparing
 def fastest_free(v_star, direction, inverse_mass, impulse):
-    """max_i |v*_i + impulse w_i d_i|² [m²/s²] of flat tables, as if no node were held (eq. 10)."""
+    """max_i |v*_i + impulse w_i d_i|² [m²/s²] of flat tables, as if no node were held (eq. 3.5)."""
     fastest = v_star.dtype.type(0)
     for i in range(inverse_mass.shape[0]):
         w = impulse * inverse_mass[i]
@@ -31,7 +31,7 @@ def fastest_free(v_star, direction, inverse_mass, impulse):
 
 @lean
 def fastest_node(network, nodes, contacts, push, dt):
-    """At least |v⁺_i| [m/s] of every node in the step as it stands, without thin probes (eq. 10)."""
+    """At least |v⁺_i| [m/s] of every node in the step as it stands, without thin probes (eq. 3.5)."""
     n, mode, real = network.inverse_mass.shape[0], contacts.mode, nodes.x.dtype.type
     v_star, direction = flat(nodes.v_star, 0, n), flat(push.direction, 0, n)
     weight = flat(network.inverse_mass, 0, n)
@@ -48,7 +48,7 @@ def fastest_node(network, nodes, contacts, push, dt):
 
 @lean
 def box_gap(x, triangles, f, p0, p1, p2):
-    """Distance [m] of a point to the axis-aligned box of a triangle: never more than to the triangle (eq. 145)."""
+    """Distance [m] of a point to the axis-aligned box of a triangle: never more than to the triangle (eq. 11.5)."""
     a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
     d0 = max(min(x[a, 0], x[b, 0], x[c, 0]) - p0, p0 - max(x[a, 0], x[b, 0], x[c, 0]), 0.0)
     d1 = max(min(x[a, 1], x[b, 1], x[c, 1]) - p1, p1 - max(x[a, 1], x[b, 1], x[c, 1]), 0.0)
@@ -58,7 +58,8 @@ def box_gap(x, triangles, f, p0, p1, p2):
 
 @lean
 def find_near(nodes, tips, step, probes, reach):
-    """Fills `near` with the triangles whose box may come within the radius of a tip in `reach` [m] of motion (eq. 145).
+    """Fills `near` with the triangles whose box may come within the radius of a tip in `reach` [m] of motion
+    (eq. 11.5).
 
     A block whose nearest triangle is g away sleeps until the travel has grown by g: none of its boxes is looked at.
     """

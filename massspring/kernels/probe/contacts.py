@@ -51,7 +51,7 @@ def set_row(rows, p, f, triangles, pair):
 
 @lean
 def aim_rows(stage):
-    """W̃ n and the right side of every row (eq. 146).
+    """W̃ n and the right side of every row (eq. 11.6).
 
     right_k = [radius − n·(Σ b x − tip⁺)]/dt − n·Σ b u [m/s].
     """
@@ -76,7 +76,7 @@ def aim_rows(stage):
 
 @lean
 def matrix_into(rows):
-    """A_kj = Σ_i b_ki b_ji n_k·W̃_i n_j − g_k·S⁻¹ g_j [1/kg], both halves (eq. 146)."""
+    """A_kj = Σ_i b_ki b_ji n_k·W̃_i n_j − g_k·S⁻¹ g_j [1/kg], both halves (eq. 11.6)."""
     for k in range(rows.count[0]):
         for j in range(k + 1):
             shared = 0.0
@@ -98,7 +98,7 @@ def matrix_into(rows):
 
 @lean
 def press(rows):
-    """A_aa c_a = right_a for the rows that press, the others 0 [N s] (eq. 146)."""
+    """A_aa c_a = right_a for the rows that press, the others 0 [N s] (eq. 11.6)."""
     count, active = 0, rows.active
     for k in range(rows.count[0]):
         rows.impulse[k] = 0.0
@@ -120,7 +120,7 @@ def press(rows):
 
 @lean
 def choose_rows(rows):
-    """c ≥ 0, A c ≥ right, and one of them equal in every row: a contact that would pull is left (eq. 146)."""
+    """c ≥ 0, A c ≥ right, and one of them equal in every row: a contact that would pull is left (eq. 11.6)."""
     n = rows.count[0]
     largest = 0.0
     for k in range(n):
@@ -173,7 +173,7 @@ def clear_push(rows, push):
 @lean
 def solve_rows(stage, volumes):
     """Impulses of all rows and the change of pressures beside them; how much faster they make a node at most [m/s]
-    (eq. 146)."""
+    (eq. 11.6)."""
     rows = stage.probes.rows
     aim_rows(stage)
     for k in range(rows.count[0]):

@@ -16,7 +16,7 @@ NEVER = 2.0
 ROUND_OFF = 1e-14
 """Share of size³ below which a triple product of corners is round-off: some thirty operations."""
 ON = 1e-8
-"""Share of the size within which a point counts as on a triangle: a double root of (142) is good to the square root of
+"""Share of the size within which a point counts as on a triangle: a double root of (11.2) is good to the square root of
 round-off."""
 HALVINGS = 60
 """Of an interval that holds one root: down to the last bit."""
@@ -43,7 +43,7 @@ class Pair(NamedTuple):
 
 @lean
 def nearest_into(corner, weight):
-    """Weights (3,) of the point of a triangle (3, 3) nearest to the origin; returns its distance [m] (eq. 141).
+    """Weights (3,) of the point of a triangle (3, 3) nearest to the origin; returns its distance [m] (eq. 11.1).
 
     The best of the foot on the plane, where it lies inside, and of the three edges: right for slivers and points too.
     """
@@ -85,7 +85,7 @@ def triple(p, i, q, j, r, k):
 
 @lean
 def coplanarity(begin, move):
-    """Coefficients of (a + t a') · ((b + t b') × (c + t c')) = f0 + f1 t + f2 t² + f3 t³ [m³] (eq. 142).
+    """Coefficients of (a + t a') · ((b + t b') × (c + t c')) = f0 + f1 t + f2 t² + f3 t³ [m³] (eq. 11.2).
 
     f is six times the volume between the point and the triangle: it changes sign where the point passes the plane.
     """
@@ -112,7 +112,7 @@ def turning_points(f1, f2, f3):
 
 @lean
 def single_root(low, high, f0, f1, f2, f3):
-    """The root of f0 + f1 t + f2 t² + f3 t³ between `low` and `high`, where its sign differs: halving (eq. 142)."""
+    """The root of f0 + f1 t + f2 t² + f3 t³ between `low` and `high`, where its sign differs: halving (eq. 11.2)."""
     rising = f0 + low * (f1 + low * (f2 + low * f3)) < 0.0
     for _ in range(HALVINGS):
         t = 0.5 * (low + high)
@@ -133,7 +133,8 @@ def at_time(pair, t):
 
 @lean
 def point_along(pair, sign):
-    """Makes `direction` the triangle's unit normal times `sign`; without area or sign, against its motion (eq. 143)."""
+    """Makes `direction` the triangle's unit normal times `sign`; without area or sign, against its motion
+    (eq. 11.3)."""
     y, d = pair.corner, pair.direction
     b0, b1, b2 = y[1, 0] - y[0, 0], y[1, 1] - y[0, 1], y[1, 2] - y[0, 2]
     c0, c1, c2 = y[2, 0] - y[0, 0], y[2, 1] - y[0, 1], y[2, 2] - y[0, 2]
@@ -152,7 +153,7 @@ def point_along(pair, sign):
 
 @lean
 def touching(pair, radius):
-    """First time at which the triangle is within `radius` [m] of the point, by steps that cannot overshoot (eq. 144).
+    """First time at which the triangle is within `radius` [m] of the point, by steps that cannot overshoot (eq. 11.4).
 
     The distance shrinks no faster than the fastest corner moves. `direction` points from the point to the nearest one.
     """
@@ -186,7 +187,7 @@ def touching(pair, radius):
 
 @lean
 def passes_by(pair):
-    """Whether one coordinate of all corners keeps its sign through the step: nothing crosses then (eq. 142)."""
+    """Whether one coordinate of all corners keeps its sign through the step: nothing crosses then (eq. 11.2)."""
     apart, size = 0.0, 0.0
     for axis in range(3):
         low = min(pair.begin[0, axis], pair.begin[1, axis], pair.begin[2, axis])
@@ -210,7 +211,7 @@ def stays_off(corner, distance):
 
 @lean
 def crossing(pair):
-    """First time at which the point passes through the triangle, or NEVER: roots of (142) at which it lies inside.
+    """First time at which the point passes through the triangle, or NEVER: roots of (11.2) at which it lies inside.
 
     Edges and corners belong to the triangle, so that no path slips between two of them. A point that moves in the
     plane of its triangle has no root: it meets the rim (`touching`).

@@ -1,4 +1,4 @@
-"""The last resort where contacts alone cannot clear a step: nodes move with a tip (docs/theory.md, eq. 147).
+"""The last resort where contacts alone cannot clear a step: nodes move with a tip (docs/theory.md, eq. 11.7).
 
 Seen from the tip a triangle of carried nodes rests, so it is not passed. One that is held at a corner still turns:
 its carried corners then go ahead of the tip, until the point that was passed rests too. With all three corners held
@@ -99,7 +99,7 @@ def take_along(stage, p):
 
 @lean
 def give_way(stage, volumes):
-    """δ with dt S δ = −J (v − u) of the carried nodes: the volumes are left to the others (eq. 147).
+    """δ with dt S δ = −J (v − u) of the carried nodes: the volumes are left to the others (eq. 11.7).
 
     Returns how much faster it makes a node at most [m/s].
     """
@@ -135,7 +135,7 @@ def give_way(stage, volumes):
 
 @lean
 def carry(stage, volumes, push, plain, horizon):
-    """Nodes of triangles that a tip would pass move with the tip or ahead of it, so that nothing passes it (eq. 147).
+    """Nodes of triangles that a tip would pass move with the tip or ahead of it, so that nothing passes it (eq. 11.7).
 
     Returns the factor of the push beside it and what any node moves at most [m].
     """

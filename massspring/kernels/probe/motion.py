@@ -10,7 +10,7 @@ from massspring.kernels.probe.pressure import swelling
 
 @lean
 def gather(stage, push):
-    """u_i of the corners of all near triangles (eq. 9, 10), and v⁺ = u."""
+    """u_i of the corners of all near triangles (eq. 3.4, 3.5), and v⁺ = u."""
     nodes, contacts, probes = stage.nodes, stage.contacts, stage.probes
     triangles, weight = probes.surface, stage.network.inverse_mass
     v, f, base, velocity = nodes.v_star, push.direction, probes.base, probes.velocity
@@ -30,7 +30,7 @@ def gather(stage, push):
 
 @lean
 def carried_speed(stage, i):
-    """Of a carried node [m/s]: its tip's, and what it goes faster (eq. 147)."""
+    """Of a carried node [m/s]: its tip's, and what it goes faster (eq. 11.7)."""
     tips, push, dt, step = stage.tips, stage.probes.push, stage.dt, stage.step
     p = stage.probes.carried[i] - 1
     return (
@@ -42,7 +42,7 @@ def carried_speed(stage, i):
 
 @lean
 def move(stage, volumes):
-    """v⁺_i = u_i + push_i + dt W̃_i (Jᵀ δ)_i of the near corners, or as they are carried [m/s] (eq. 146, 147)."""
+    """v⁺_i = u_i + push_i + dt W̃_i (Jᵀ δ)_i of the near corners, or as they are carried [m/s] (eq. 11.6, 11.7)."""
     probes, triangles, base, push = stage.probes, stage.probes.surface, stage.probes.base, stage.probes.push
     for p in range(probes.radius.shape[0]):
         for n in range(probes.near_count[p]):

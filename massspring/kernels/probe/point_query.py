@@ -9,7 +9,7 @@ from massspring.kernels.probe.continuous import nearest_into
 
 @lean
 def distance_to(point, x, triangles, corner, weight):
-    """Of a point (3,) to the nearest of triangles (f, 3) [m] (eq. 141); `corner` (3, 3) and `weight` (3,) are scratch.
+    """Of a point (3,) to the nearest of triangles (f, 3) [m] (eq. 11.1); `corner` (3, 3) and `weight` (3,) are scratch.
 
     A triangle whose box is farther than the nearest so far is passed over.
     """

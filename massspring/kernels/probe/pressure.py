@@ -18,7 +18,7 @@ MOST_ITERATIONS = 400
 
 @lean
 def prepare(stage, volumes):
-    """S for what can move now; factored where it is dense (eq. 33)."""
+    """S for what can move now; factored where it is dense (eq. 8.3)."""
     if volumes is not None:
         diagonal_into(volumes, stage.contacts, stage.network.inverse_mass, volumes.diagonal)
         if volumes.matrix.shape[0] > 0:
@@ -28,7 +28,7 @@ def prepare(stage, volumes):
 
 @lean
 def flow_into(stage, volumes, k):
-    """g_k = Σ_i b_i J_i W̃_i n [m²/kg] of row k (eq. 146)."""
+    """g_k = Σ_i b_i J_i W̃_i n [m²/kg] of row k (eq. 11.6)."""
     rows = stage.probes.rows
     for r in range(rows.flow.shape[1]):
         rows.flow[k, r] = 0.0
@@ -47,7 +47,7 @@ def flow_into(stage, volumes, k):
 
 @lean
 def answer_into(stage, volumes, flow, answer):
-    """S⁻¹ g [1/m²], (m,): the division of one volume, a back-solve of few, an iteration for many (eq. 33, 34)."""
+    """S⁻¹ g [1/m²], (m,): the division of one volume, a back-solve of few, an iteration for many (eq. 8.3, 8.4)."""
     if volumes is None:
         for r in range(flow.shape[0]):
             answer[r] = flow[r] / stage.mobility if stage.mobility > 0.0 else 0.0
@@ -64,7 +64,7 @@ def answer_into(stage, volumes, flow, answer):
 
 @lean
 def change_of_rows(stage):
-    """δ = −Σ_k S⁻¹ g_k c_k/dt [Pa]; how much faster it makes a node at most, √(max w · δ·S δ) dt [m/s] (eq. 146)."""
+    """δ = −Σ_k S⁻¹ g_k c_k/dt [Pa]; how much faster it makes a node at most, √(max w · δ·S δ) dt [m/s] (eq. 11.6)."""
     rows, change = stage.probes.rows, stage.probes.change
     felt = 0.0
     for r in range(change.shape[0]):
@@ -85,7 +85,7 @@ def faster_by(stage, felt):
 
 @lean
 def swelling(stage, volumes, i):
-    """dt W̃_i (Jᵀ δ)_i [m/s], what the change of pressures does to a node (eq. 146)."""
+    """dt W̃_i (Jᵀ δ)_i [m/s], what the change of pressures does to a node (eq. 11.6)."""
     nodes, contacts, change = stage.nodes, stage.contacts, stage.probes.change
     s0, s1, s2 = 0.0, 0.0, 0.0
     if volumes is None:

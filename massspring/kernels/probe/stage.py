@@ -21,7 +21,7 @@ PASSES = 24
 
 @lean
 def meet_probes(stage, volumes, push):
-    """Contact with thin probes, once pressures and the other contacts of the step are known (eq. 141–147).
+    """Contact with thin probes, once pressures and the other contacts of the step are known (eq. 11.1–11.7).
 
     Returns the factor of the push beside the contacts. One volume: the factor is its pressure [Pa]. Several:
     `volumes`, whose lam and push are changed in place. A push that contacts do not change: `stage.mobility` is 0.

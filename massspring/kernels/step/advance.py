@@ -13,7 +13,7 @@ NEAR = 4096
 
 @inlined
 def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
-    """v⁺ = ṽ + dt W̃ f, x⁺ = x + dt v⁺ (eq. 10) of the nodes first ≤ i < last in `part`.
+    """v⁺ = ṽ + dt W̃ f, x⁺ = x + dt v⁺ (eq. 3.5) of the nodes first ≤ i < last in `part`.
 
     `places` holds the x of the step's start.
     """
@@ -39,7 +39,7 @@ def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
 
 @inlined
 def advance(frame, push):
-    """The end of a step of all nodes (eq. 10); books the impulse of each obstacle, pads the new positions."""
+    """The end of a step of all nodes (eq. 3.5); books the impulse of each obstacle, pads the new positions."""
     network, nodes, contacts, dt = frame.network, frame.nodes, frame.contacts, frame.drive.dt
     book_contacts(network, nodes, contacts, push, dt, frame.tally.contact_impulse)
     move_all(frame, push, frame.team)

@@ -5,7 +5,7 @@ from massspring.kernels.jit.decorators import inlined, lean
 
 @lean
 def prescribe_velocity_into(x, held_nodes, held_group, held_rest, displacement, dt, v_star):
-    """v*_i = (X_i + d_g − x_i)/dt [m/s] for every held node: it ends the step where its attachment is (eq. 7)."""
+    """v*_i = (X_i + d_g − x_i)/dt [m/s] for every held node: it ends the step where its attachment is (eq. 3.2)."""
     for h in range(held_nodes.shape[0]):
         i = held_nodes[h]
         g = held_group[h]
@@ -15,7 +15,7 @@ def prescribe_velocity_into(x, held_nodes, held_group, held_rest, displacement, 
 
 @inlined
 def prescribe(network, nodes, displacement, dt):
-    """v* of held nodes (eq. 7); returns what that changes of G·v* [m³/s]."""
+    """v* of held nodes (eq. 3.2); returns what that changes of G·v* [m³/s]."""
     held_nodes, groups, rest = network.held_nodes, network.held_group, network.held_rest
     x, v_star, gradient = nodes.x, nodes.v_star, nodes.gradient
     flow, per_step = 0.0, 1.0 / dt
@@ -30,7 +30,7 @@ def prescribe(network, nodes, displacement, dt):
 
 @inlined
 def add_held_impulse(network, nodes, push, dt, gravity, held_impulse):
-    """I_g = −dt Σ_i∈g (f_i + push_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 11)."""
+    """I_g = −dt Σ_i∈g (f_i + push_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 3.6)."""
     held_nodes, groups, mass = network.held_nodes, network.held_group, network.mass
     force, direction, factor = nodes.force, push.direction, push.factor
     h, count = 0, held_nodes.shape[0]

@@ -17,7 +17,7 @@ def open_frame(frame):
 
 @inlined
 def begin_step(frame, step, keeps):
-    """v* of springs, damping, gravity and held nodes (eq. 1, 6, 7) and, where one volume is kept, G.
+    """v* of springs, damping, gravity and held nodes (eq. 1.1, 3.1, 3.2) and, where one volume is kept, G.
 
     Returns V [m³] and G·W·G [m⁴/kg].
     """
@@ -45,7 +45,7 @@ def begin_summed_step(frame, step):
 
 @inlined
 def search_contacts(frame, step, push):
-    """Finds the nodes that touch while the last known push acts (eq. 12); how many passes the active set may take."""
+    """Finds the nodes that touch while the last known push acts (eq. 3.7); how many passes the active set may take."""
     if frame.drive.radius.shape[0] == 0:
         return 1
     find_contacts(frame.network, frame.nodes, frame.contacts, frame.drive, step, push, frame.team)
@@ -55,7 +55,7 @@ def search_contacts(frame, step, push):
 
 @inlined
 def multiplier_stands(frame, step, push, reach, last):
-    """Whether the push just solved for leaves the touched nodes as they are (eq. 13), or this was the last pass.
+    """Whether the push just solved for leaves the touched nodes as they are (eq. 3.8), or this was the last pass.
 
     `reach` [m]: how far the new push can have moved a node; where contacts change, the multiplier is solved for again.
     """

@@ -11,7 +11,7 @@ from massspring.kernels.step.attachments import add_held_impulse
 
 @inlined
 def end_step(frame, step, push, mobility, volumes):
-    """Contact with thin probes, bookings, v⁺ and x⁺ (eq. 10, 11, 141–147).
+    """Contact with thin probes, bookings, v⁺ and x⁺ (eq. 3.5, 3.6, 11.1–11.7).
 
     `mobility` is G·W̃·G [m⁴/kg] where one volume is solved for, else 0; `volumes` are several that are solved for, or
     None. Returns the factor of the push beside the contacts of probes: of one volume its pressure [Pa].

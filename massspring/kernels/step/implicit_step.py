@@ -7,7 +7,7 @@ from massspring.kernels.jit.decorators import compiled
 
 @compiled
 def imbalance_into(network, nodes, rows, p, drive, out):
-    """dt M v + dt² (f(p) + Jᵀ lam + m g) − (1 + c dt) M (p − x) [kg m], (n, 3) (eq. 92); J, V at p go to `rows`."""
+    """dt M v + dt² (f(p) + Jᵀ lam + m g) − (1 + c dt) M (p − x) [kg m], (n, 3) (eq. 12.2); J, V at p go to `rows`."""
     dt = drive.dt
     spring_forces_into(p, network.ends, network.rest_length, network.stiffness, nodes.force)
     rows_into(p, network.inverse_mass, rows)

@@ -3,7 +3,7 @@
 A penalty is bounded by its modulus, a gas without room is not: it bursts, and the run has diverged. Cut off like a
 correction of constraints it would come back, but steps beyond the limit would rattle under the cut and seem stable. A
 surface without gradient is not pushed at all.
-Contact and held nodes see it as `free` sees its springs: nothing is solved (docs/theory.md, eq. 161, 162).
+Contact and held nodes see it as `free` sees its springs: nothing is solved (docs/theory.md, eq. 10.8, 10.9).
 """
 
 from dataclasses import replace
@@ -27,7 +27,7 @@ PENALTY, GAS, PYRAMIDS = 0, 1, 2
 
 @compiled
 def known_pressure(network, nodes, bulk_modulus, law, volume, target):
-    """lam [Pa] of the volume now (eq. 161, 163)."""
+    """lam [Pa] of the volume now (eq. 10.8, 10.10)."""
     if law == GAS:
         return bulk_modulus * (target / volume - 1.0) if volume > 0.0 else np.inf
     if law == PYRAMIDS:
@@ -37,7 +37,7 @@ def known_pressure(network, nodes, bulk_modulus, law, volume, target):
 
 @lean
 def pressure_frame(frame, bulk_modulus, law):
-    """One frame of symplectic Euler with a known pressure (eq. 6, 7, 10, 12, 161); returns the last one [Pa]."""
+    """One frame of symplectic Euler with a known pressure (eq. 3.1, 3.2, 3.5, 3.7, 10.8); returns the last one [Pa]."""
     network, nodes, drive, tally = frame.network, frame.nodes, frame.drive, frame.tally
     lam = 0.0
     open_frame(frame)
@@ -63,7 +63,7 @@ def push(state: State, drive: Drive, bulk_modulus: float, law: int) -> State:
 
 
 def volume_stiffness(body: Body, bulk_modulus: float) -> csr_array:
-    """B = √(K/V0) G at rest [√(N/m)], (3n, 1): dlam/dV = −K/V0, so that K_added = (K/V0) G Gᵀ (eq. 162)."""
+    """B = √(K/V0) G at rest [√(N/m)], (3n, 1): dlam/dV = −K/V0, so that K_added = (K/V0) G Gᵀ (eq. 10.9)."""
     volumes = body.kept
     gradient = np.zeros_like(body.rest)
     share = volumes.share.tocoo()

@@ -1,9 +1,9 @@
 """One loop for the relatives of implicit constraint enforcement that keep one volume (docs/theory.md, section 10).
 
-With ṽ, W̃ of eq. 9 every one of them ends a step at v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺. They differ in where G is
+With ṽ, W̃ of eq. 3.4 every one of them ends a step at v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺. They differ in where G is
 taken, in how long the step along it is, and in whether a correction of the positions is felt by the velocities.
 
-A thin probe's contacts come after the multiplier and leave G·v⁺ as it is (eq. 146): what a rule asks of the rate of V
+A thin probe's contacts come after the multiplier and leave G·v⁺ as it is (eq. 11.6): what a rule asks of the rate of V
 stays true. An exact root is then true to first order in what the contacts move; the next step starts from the true V,
 so that nothing adds up. Nothing may move after that stage: a correction of the positions would not be looked at.
 """
@@ -48,7 +48,7 @@ class Rule(NamedTuple):
 
 @compiled
 def inertial_change(network, nodes, rule, dt):
-    """dt (1 − 2 alpha dt) G·v − dt² vᵀHv [m³], what a step leaves of the old change of volume (eq. 104)."""
+    """dt (1 − 2 alpha dt) G·v − dt² vᵀHv [m³], what a step leaves of the old change of volume (eq. 10.5)."""
     change = 0.0
     if rule.brake != 1.0:
         for i in range(nodes.v.shape[0]):
@@ -66,7 +66,7 @@ def inertial_change(network, nodes, rule, dt):
 def linear_multiplier(network, nodes, contacts, error, kept, dt, whole):
     """lam [Pa] and G·W̃·G of a step that makes up for `error` [m³] and stops `kept` [m³]; whether the error was cut.
 
-    It is not where the `whole` of it is wanted (eq. 8, 35, 104).
+    It is not where the `whole` of it is wanted (eq. 3.3, 8.5, 10.5).
     """
     lam, mobility = volume_multiplier(nodes, contacts, network.inverse_mass, error + kept, dt)
     lightest, longest = network.largest_inverse_mass, network.longest_correction
@@ -80,7 +80,8 @@ def linear_multiplier(network, nodes, contacts, error, kept, dt, whole):
 
 @compiled
 def exact_multiplier(network, nodes, contacts, line, target, mobility, dt):
-    """lam [Pa] with V(y + lam d) = V0, the root of smallest modulus (eq. 101, 102), and G·W̃·G; (0, 0) without one."""
+    """lam [Pa] with V(y + lam d) = V0, the root of smallest modulus (eq. 10.1, 10.2), and G·W̃·G; (0, 0) without
+    one."""
     line_into(nodes, contacts, network.inverse_mass, dt, line)
     volume, k1, k2, k3 = volume_cubic(line.y, line.d, network.triangles)
     lam = nearest_root(volume - target, k1, k2, k3)
@@ -89,7 +90,7 @@ def exact_multiplier(network, nodes, contacts, line, target, mobility, dt):
 
 @compiled
 def predicted_gradient_into(network, nodes, line, dt):
-    """G at x + dt v* [m²], (n, 3), before contact (eq. 4, 6)."""
+    """G at x + dt v* [m²], (n, 3), before contact (eq. 2.2, 3.1)."""
     for i in range(nodes.x.shape[0]):
         for axis in range(3):
             line.y[i, axis] = nodes.x[i, axis] + dt * nodes.v_star[i, axis]
@@ -98,7 +99,8 @@ def predicted_gradient_into(network, nodes, line, dt):
 
 @compiled
 def correct_positions(network, nodes, contacts, target, dt):
-    """x += W̃ G (V0 − V)/(G·W̃·G), G at x, velocities untouched (eq. 105); whether the correction was cut (eq. 35)."""
+    """x += W̃ G (V0 − V)/(G·W̃·G), G at x, velocities untouched (eq. 10.7); whether the correction was cut
+    (eq. 8.5)."""
     error = target - volume_gradient_into(nodes.x, network.triangles, nodes.gradient)
     _, mobility = volume_multiplier(nodes, contacts, network.inverse_mass, error, dt)
     if not mobility > 0.0:
@@ -118,7 +120,7 @@ def correct_positions(network, nodes, contacts, target, dt):
 
 @lean
 def constraint_frame(frame, line, lam, rule):
-    """One frame with contact inside the multiplier (eq. 6–13, 101–105); returns the last lam [Pa]."""
+    """One frame with contact inside the multiplier (eq. 3.1–3.8, 10.1–10.3, 10.5, 10.7); returns the last lam [Pa]."""
     network, nodes, contacts, drive, tally = frame.network, frame.nodes, frame.contacts, frame.drive, frame.tally
     dt, mobility = drive.dt, 0.0
     open_frame(frame)

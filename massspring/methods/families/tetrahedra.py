@@ -41,7 +41,7 @@ def cells_of(body: Body) -> Cells:
 
 
 def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_array:
-    """B = √weight_t dC_t/dx [√(N/m)], (3n, k), of energies ½ weight_t C_t², `slopes` dC_t/dx (k, 4, 3) (eq. 162)."""
+    """B = √weight_t dC_t/dx [√(N/m)], (3n, k), of energies ½ weight_t C_t², `slopes` dC_t/dx (k, 4, 3) (eq. 10.9)."""
     k = len(body.tetrahedra)
     rows = 3 * body.tetrahedra.astype(np.int64)[:, :, None] + np.arange(3)
     columns = np.broadcast_to(np.arange(k)[:, None, None], rows.shape)
@@ -51,7 +51,7 @@ def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_ar
 
 @lean
 def cells_frame(frame, cells, bulk_modulus, barycentric):
-    """One frame of symplectic Euler with a known pressure in every cell (eq. 6, 7, 10, 12, 164, 165)."""
+    """One frame of symplectic Euler with a known pressure in every cell (eq. 3.1, 3.2, 3.5, 3.7, 10.11, 10.12)."""
     nodes, drive, tally = frame.nodes, frame.drive, frame.tally
     nothing = Push(nodes.gradient, 0.0)
     open_frame(frame)

@@ -1,4 +1,4 @@
-"""Contact of long steps: which nodes obstacles hold in which directions, and what that takes (eq. 13, 93, 94)."""
+"""Contact of long steps: which nodes obstacles hold in which directions, and what that takes (eq. 3.8, 12.3, 12.4)."""
 
 import numpy as np
 from scipy.linalg import get_lapack_funcs
@@ -44,7 +44,7 @@ class Touching:
         return np.einsum("ci,ci->c", self.direction, field[self.nodes])
 
     def impulses(self, missing: np.ndarray) -> np.ndarray:
-        """γ = (C A⁻¹ Cᵀ)⁻¹ `missing` [kg m], (c,): what moves the rows by `missing` [m] (eq. 93)."""
+        """γ = (C A⁻¹ Cᵀ)⁻¹ `missing` [kg m], (c,): what moves the rows by `missing` [m] (eq. 12.3)."""
         return SOLVED(self._root, missing)[0] if len(self.nodes) else missing
 
     def moved_by(self, impulses: np.ndarray) -> np.ndarray:
@@ -71,7 +71,7 @@ class Contact:
 
     def revise(self, end: np.ndarray, touching: Touching, impulses: np.ndarray) -> bool:
         """Releases nodes that an obstacle would pull, seats those that would enter one, and lets slip those that would
-        stick too hard; whether any was (eq. 13, 94)."""
+        stick too hard; whether any was (eq. 3.8, 12.4)."""
         contacts, nodes = self.contacts, touching.nodes
         pushes = np.zeros_like(end)
         np.add.at(pushes, nodes, impulses[:, None] * touching.direction)
@@ -85,7 +85,7 @@ class Contact:
         return bool(len(leaving) or slipped or entered)
 
     def _let_slip(self, pushes: np.ndarray) -> int:
-        """Nodes that stick although that asks for more than mu times their normal part slip from now on (eq. 94)."""
+        """Nodes that stick although that asks for more than mu times their normal part slip from now on (eq. 12.4)."""
         contacts = self.contacts
         nodes = np.flatnonzero(contacts.mode == STICKS)
         friction = self.drive.friction[contacts.touched[nodes].astype(np.int64) - 1]
@@ -102,7 +102,8 @@ class Contact:
         return len(nodes)
 
     def rub(self, end: np.ndarray, touching: Touching, impulses: np.ndarray) -> bool:
-        """Friction against the slip of the last pass; a node that it would drive sticks: whether one does (eq. 94)."""
+        """Friction against the slip of the last pass; a node that it would drive sticks: whether one does
+        (eq. 12.4)."""
         contacts, drive = self.contacts, self.drive
         if not drive.rough:
             return False

@@ -1,4 +1,4 @@
-"""A constant matrix, factored once: A = (1 + c dt) M + dt² Σ_e k_e (e_i − e_j)(e_i − e_j)ᵀ, n × n (eq. 91).
+"""A constant matrix, factored once: A = (1 + c dt) M + dt² Σ_e k_e (e_i − e_j)(e_i − e_j)ᵀ, n × n (eq. 12.1).
 
 Every spring takes its full stiffness in every direction, so the three components do not couple: three right-hand
 sides. A is positive definite also where single weights of a cotangent network are negative.

@@ -1,4 +1,5 @@
-"""One step of implicit springs: passes from the prediction to where springs, volumes, obstacles agree (eq. 92–94)."""
+"""One step of implicit springs: passes from the prediction to where springs, volumes, obstacles agree
+(eq. 12.2–12.4)."""
 
 import math
 
@@ -127,7 +128,7 @@ class Step:
 
     def cap(self, begun: np.ndarray) -> None:
         """Cuts what the step makes up for of volumes that are `begun` (m,) [m³] at its start: each alone moves no node
-        farther than 0.3 L by it (eq. 35)."""
+        farther than 0.3 L by it (eq. 8.5)."""
         if self.few:
             gained, moved = np.diag(self.schur), np.linalg.norm(self.reached, axis=2).max(axis=1)
         else:
@@ -141,7 +142,7 @@ class Step:
         self.target = np.where(cut, begun + np.clip(error, -most, most), self.target)
 
     def imbalance(self) -> np.ndarray:
-        """J, V at p, and the right-hand side for the pressures of the moment [kg m], (n, 3) (eq. 92)."""
+        """J, V at p, and the right-hand side for the pressures of the moment [kg m], (n, 3) (eq. 12.2)."""
         out = np.empty_like(self.p)
         imbalance_into(self.network, self.nodes, self.rows, self.p, self.drive, out)
         return out
@@ -158,7 +159,7 @@ class Step:
         return change + reached, touching.impulses(missing - touching.along(answer))
 
     def directly(self, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(Δlam, dt² A⁻¹ Jᵀ Δlam) of few volumes by a dense solve (eq. 93)."""
+        """(Δlam, dt² A⁻¹ Jᵀ Δlam) of few volumes by a dense solve (eq. 12.3)."""
         assert self.answers is not None
         able = np.diag(self.schur) > NEGLIGIBLE_RESPONSE * self.drive.dt**2 * self.factor.alone(self.rows)[0]
         pressure = np.zeros(len(error))
@@ -178,7 +179,7 @@ class Step:
         return self.drive.dt**2 * np.stack([self.factor.respond(self.pushed(unit)) for unit in units])
 
     def iteratively(self, error: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
-        """(Δlam, dt² A⁻¹ Jᵀ Δlam) of many volumes by conjugate gradients, one back-solve an iteration (eq. 34)."""
+        """(Δlam, dt² A⁻¹ Jᵀ Δlam) of many volumes by conjugate gradients, one back-solve an iteration (eq. 8.4)."""
         diagonal = self.drive.dt**2 * self.factor.alone(self.rows)[0]
         able = diagonal > 0.0
         self.idle |= not able.all()
@@ -200,7 +201,7 @@ class Step:
         return pressure, answer
 
     def book(self, touching: Touching, impulses: np.ndarray) -> None:
-        """Impulses of obstacles and attachments [N s] (eq. 11)."""
+        """Impulses of obstacles and attachments [N s] (eq. 3.6)."""
         nodes, contacts, net, dt = self.nodes, self.contacts, self.network, self.drive.dt
         given = self.tally.contact_impulse
         np.add.at(given, touching.obstacle, impulses[:, None] / dt * touching.direction)

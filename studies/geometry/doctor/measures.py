@@ -150,7 +150,7 @@ def springs_see(
     known: dict[str, Any],
     tissue: tuple[float, float],
 ) -> dict[str, Any]:
-    """Shortest edge [m] and the largest stable time step [s] of springs on this mesh (docs/theory.md, eq. 17).
+    """Shortest edge [m] and the largest stable time step [s] of springs on this mesh (docs/theory.md, eq. 5.2).
 
     From the largest frequency of a body where one can be made and is not too large ("measured"), else as the time in
     which a wave in a Cauchy solid, E = 2.5 mu, crosses the shortest edge ("estimated").
