@@ -2,7 +2,6 @@
 
 import argparse
 import multiprocessing
-import os
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -12,7 +11,7 @@ from time import perf_counter
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
-from studies.base.interrupts import CODE, die_quietly
+from studies.base.interrupts import die_quietly, exit_code, listening
 from studies.compiling.log import listing, summary
 from studies.compiling.tasks import ESSENTIAL, Done, is_done, perform, set_done, tasks
 
@@ -74,14 +73,14 @@ def main() -> None:
     if is_done(whole) and not options.again:
         return
     try:
-        run(whole, options.table)
+        with listening():
+            run(whole, options.table)
     except StudyError as error:
         print(f"organbench: {error}", file=sys.stderr)
         sys.exit(1)
     except KeyboardInterrupt:
         print("organbench: interrupted; what is compiled is kept", file=sys.stderr)
-        sys.stderr.flush()
-        os._exit(CODE)
+        sys.exit(exit_code())
 
 
 if __name__ == "__main__":
