@@ -9,7 +9,6 @@ import pytest
 from massspring import METHODS, Free, ImplicitVolume
 from massspring.kernels.jit.stage_clock import STAGES
 from massspring.methods import VARIANTS
-from massspring.sources import ROOT
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.compiling import main, tasks
@@ -52,9 +51,7 @@ def test_the_shared_kernels_come_first_and_the_reference_beside_them():
 
 def test_what_is_essential_is_what_the_main_studies_need():
     assert set(tasks.ESSENTIAL) <= set(tasks.tasks())
-    (line,) = [line for line in (ROOT / "Makefile").read_text().splitlines() if line.startswith("STUDIES")]
-    main_studies = [study for study in STUDIES if study.name in line.split()]
-    needed = {(case.method.name, case.precision) for study in main_studies for case in study.cases}
+    needed = {(case.method.name, case.precision) for study in STUDIES if study.main for case in study.cases}
     assert needed == {("implicit_volume", "float64"), ("free", "float64")}
     assert all(f"{name}, whole, {precision}" in tasks.ESSENTIAL for name, precision in needed)
 

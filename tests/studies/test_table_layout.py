@@ -49,7 +49,7 @@ def test_a_setting_of_a_group_stands_in_its_heading(capsys):
 
 @pytest.mark.parametrize("width", [40, 60, 80, 100])
 def test_lines_fit_and_say_what_is_left_out(monkeypatch, capsys, width):
-    monkeypatch.setenv("COLUMNS", str(width))
+    monkeypatch.setattr(table.console, "_width", width)
     rows = [row(method=name) for name in ("free", "post_stabilization")]
     metrics = [*CHOSEN, *(m for m in METRICS if m.name == "silhouette_error")] * 2
     rows = [{**r, "silhouette_error [%]": 1.0} for r in rows]
