@@ -19,9 +19,9 @@ massspring/methods, and a test holds it to them. Equations and sources stand in 
 CLAIMS = """
 ## Claims
 
-The contract test, tests/massspring/test_methods.py, measures every claim. *Order*: the error of a trajectory falls with
-this power of the time step. *Volume*: |V/V0 − 1| after a quiet step at half the stability limit. *Angular momentum*:
-conserved to round-off in free flight.
+The contract test, tests/massspring/methods/test_methods.py, measures every claim. *Order*: the error of a trajectory
+falls with this power of the time step. *Volume*: |V/V0 − 1| after a quiet step at half the stability limit. *Angular
+momentum*: conserved to round-off in free flight.
 """
 CAPABILITIES = """
 ## Capabilities

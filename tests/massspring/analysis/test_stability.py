@@ -1,0 +1,147 @@
+"""The largest frequency, the limit it sets, and what a run does on either side of it."""
+
+import numpy as np
+import pytest
+
+from massspring import (
+    Body,
+    Clock,
+    Free,
+    MassSpringError,
+    Setup,
+    StepLimit,
+    make_clock,
+    simulate,
+    step_limit,
+)
+from massspring.analysis.stability import largest_frequency, scaled_stiffness
+from massspring.body.springs import Springs
+from tests.massspring.conftest import body_of
+from tests.massspring.kernels.test_kernels import forces
+from tests.massspring.methods.test_methods import thrown
+from tests.massspring.rows import CONTESTANTS, rows
+
+
+def test_the_stiffness_matrix_is_minus_the_derivative_of_the_forces(body):
+    direction = np.random.default_rng(1).uniform(-1, 1, body.rest.shape)
+    step = 1e-7 * body.size
+    change = (forces(body, body.rest + step * direction) - forces(body, body.rest - step * direction)) / (2 * step)
+    root = np.sqrt(body.mass)[:, None]
+    exact = -root * (scaled_stiffness(body, np.empty(0, int)) @ (root * direction).ravel()).reshape(-1, 3)
+    assert np.abs(change - exact).max() < 1e-6 * np.abs(exact).max()
+
+
+def test_the_largest_frequency_is_that_of_a_dense_solver(block_body):
+    dense = scaled_stiffness(block_body, np.empty(0, int)).toarray()
+    assert largest_frequency(block_body) == pytest.approx(np.sqrt(np.linalg.eigvalsh(dense)[-1]), rel=1e-4)
+
+
+def test_held_nodes_do_not_swing(block_body):
+    held = np.arange(block_body.node_count - 2)
+    assert largest_frequency(block_body, held) < largest_frequency(block_body)
+
+
+KEEPING_ALL_CELLS = ("xpbd", "element_hard")
+"""The volumes of all cells take the stiffest modes away: such methods hold above the limit of the springs too."""
+LIMITED = [name for name, method in CONTESTANTS.items() if method.capabilities.conditionally_stable]
+"""Steps of 200 limits of the others are in test_implicit_springs.py."""
+
+
+def stiffest_mode(body, method):
+    """Of springs and what the method adds, by a dense solver, (n, 3)."""
+    matrix, factor = scaled_stiffness(body, np.empty(0, int)).toarray(), method.added_stiffness(body)
+    if factor is not None:
+        scaled = np.repeat(1 / np.sqrt(body.mass), 3)[:, None] * factor.toarray()
+        matrix = matrix + scaled @ scaled.T
+    return np.linalg.eigh(matrix)[1][:, -1].reshape(-1, 3) / np.sqrt(body.mass)[:, None]
+
+
+def in_the_stiffest_mode(body, method, fraction):
+    """The history of 4,000 steps of `fraction` of the limit."""
+    dt = fraction * step_limit(body, added=method.added_stiffness(body)).undamped
+    v = 1e-6 * stiffest_mode(body, method) * np.sqrt(body.mass.min())
+    return simulate(Setup(body, method, Clock(400 * dt, 10, 400), velocity=v))
+
+
+@pytest.mark.parametrize("row", rows(LIMITED, ("block", "ball")))
+def test_runs_stay_below_the_limit(row, request):
+    """Constraints do not lower the limit (Cauchy interlacing), forces do."""
+    history = in_the_stiffest_mode(body_of(row[1], request), CONTESTANTS[row[0]], 0.97)
+    assert history.outcome == "finished" and history.kinetic[-1] < 100 * history.kinetic[0] + 1e-12
+
+
+@pytest.mark.parametrize("row", rows([name for name in LIMITED if name not in KEEPING_ALL_CELLS], ("block", "ball")))
+def test_runs_diverge_above_the_limit(row, request):
+    history = in_the_stiffest_mode(body_of(row[1], request), CONTESTANTS[row[0]], 1.05)
+    grown = history.outcome == "diverged" or history.kinetic[-1] > 1e4 * max(history.kinetic[0], 1e-20)
+    assert grown, "a run above the limit stayed quiet"
+
+
+def test_viscous_damping_lowers_the_limit_as_predicted():
+    """One oscillator, v⁺ = (1 − c dt) v − ω² dt x: bounded just below the damped limit, growing just above it."""
+    omega, c = 100.0, 60.0
+    limit = StepLimit(omega, c)
+    assert limit.damped < limit.undamped
+
+    def swing(dt: float) -> float:
+        x, v = 1.0, 0.0
+        for _ in range(4000):
+            v = (1 - c * dt) * v - omega**2 * dt * x
+            x += dt * v
+            if abs(x) > 1e6:
+                break
+        return abs(x)
+
+    assert swing(0.995 * limit.damped) < 1.0
+    assert swing(1.005 * limit.damped) > 1e5
+
+
+def test_a_body_without_stiffness_has_no_limit(block_body):
+    from dataclasses import replace
+
+    none = Springs(np.empty((0, 2), np.uint32), np.empty(0), np.empty(0), np.empty(0, np.uint8))
+    limp: Body = replace(block_body, springs=none)
+    with pytest.raises(MassSpringError, match="no stiffness"):
+        step_limit(limp)
+
+
+def test_the_clock_fills_the_duration_with_steps_no_longer_than_asked_for():
+    limit = StepLimit(1000.0, 0.0)
+    clock = make_clock(1.0, 100, 0.0003, limit)
+    assert clock.steps == 34 and clock.dt <= 0.0003 and clock.duration == pytest.approx(1.0)
+    assert make_clock(1.0, 100, "auto", limit).dt == pytest.approx(0.001)
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, float("nan"), "fast"])
+def test_a_bad_step_is_refused(dt):
+    with pytest.raises(MassSpringError, match="dt is"):
+        make_clock(1.0, 10, dt, StepLimit(1000.0, 0.0))
+
+
+def test_a_step_above_the_limit_is_refused_unless_it_is_wanted():
+    limit = StepLimit(1000.0, 0.0)
+    with pytest.raises(
+        MassSpringError, match=r"dt = 0\.005 s lies above the stability limit of 0\.002 s; take a smaller"
+    ):
+        make_clock(1.0, 10, 0.005, limit)
+    assert make_clock(1.0, 10, 0.005, limit, beyond_limit=True).dt == pytest.approx(0.005)
+    assert make_clock(1.0, 10, 0.002, limit).dt == pytest.approx(0.002)
+
+
+def test_a_run_that_diverges_ends_with_nan_tails_and_says_where(ball_body):
+    dt = 3 * step_limit(ball_body).undamped
+    history = simulate(Setup(ball_body, Free(), Clock(50 * dt, 40, 50), velocity=thrown(ball_body)))
+    assert history.outcome == "diverged" and f"frame {history.good_frames + 1}" in history.message
+    assert np.isnan(history.volume[history.good_frames :]).all()
+    assert np.isfinite(history.volume[: history.good_frames]).all()
+
+
+def test_a_run_ends_at_its_time_limit(ball_body):
+    history = simulate(Setup(ball_body, Free(), Clock(0.01, 50, 20)), time_limit=0.0)
+    assert history.outcome == "timed-out" and history.good_frames == 1
+
+
+def test_bad_damping_is_refused(ball_body):
+    for damping in (-1.0, float("nan"), 1e6):
+        with pytest.raises(MassSpringError, match="damping"):
+            Setup(ball_body, Free(), Clock(0.01, 1, 10), damping=damping)

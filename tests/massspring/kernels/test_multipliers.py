@@ -1,0 +1,155 @@
+"""The multipliers of several volumes at once: their rows, and their solves against dense ones."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import massspring.layout.jacobian_pattern as rows_module
+from massspring import (
+    Attachment,
+    Body,
+    Clock,
+    ImplicitVolume,
+    Setup,
+    Volumes,
+    simulate,
+)
+from massspring.kernels.arrays.layout import Accuracy, Push
+from massspring.kernels.constraint.jacobian import diagonal_into, rows_into, transposed_rows_times_into
+from massspring.kernels.constraint.schur import solve_iteratively
+from massspring.kernels.contact.modes import ON_EDGE, STICKS
+from massspring.kernels.step.advance import advance
+from massspring.kernels.step.begin import open_frame
+from massspring.layout.allocate import start
+from massspring.layout.jacobian_pattern import volume_rows
+from massspring.layout.state import new_tally
+from massspring.methods.implicit_volume import set_right_side, solve_multipliers
+from tests.massspring.kernels.test_kernels import ROUND_OFF, directional, moved
+from tests.massspring.methods.test_methods import clock_for, squeeze
+from tests.massspring.touched import list_touched, seat
+
+
+def test_rows_are_the_derivative_of_the_volumes(several):
+    rows = volume_rows(several.kept, several.node_count)
+    x = moved(several)
+    rows_into(x, 1.0 / several.mass, rows)
+    assert np.allclose(rows.volume, several.kept.measure(x), rtol=1e-12)
+    random = np.random.default_rng(2)
+    direction, pressure = random.uniform(-1, 1, x.shape), random.uniform(-1, 1, several.kept.count)
+    force = np.empty_like(x)
+    transposed_rows_times_into(rows, pressure, force)
+    exact = float((force * direction).sum())
+    assert directional(lambda y: float(pressure @ several.kept.measure(y)), x, direction) == pytest.approx(
+        exact, rel=1e-7
+    )
+    assert np.abs(force.sum(axis=0)).max() < ROUND_OFF * np.abs(force).sum()
+
+
+def touched_and_held(body: Body, dt: float):
+    """A state in motion, its rows filled: two nodes held, three sliding, one in a wedge, one sticking.
+
+    And what that fixes: (node, direction, velocity along it [m/s]).
+    """
+    random = np.random.default_rng(0)
+    held, touched = np.array([5, 17]), np.array([20, 21, 30])
+    state = start(body, (Attachment(held),), v=0.1 * random.normal(size=body.rest.shape))
+    nodes, contacts, rows = state.nodes, state.contacts, state.rows
+    nodes.v_star[:] = state.v
+    nodes.v_star[held] = [0.02, 0.0, -0.01]
+    approach = seat(contacts, touched, random)
+    edge, wedged, stuck = np.linalg.qr(random.normal(size=(3, 3)))[0], 31, 40
+    contacts.touched[[wedged, stuck]], contacts.second[wedged] = 1, 2
+    contacts.mode[[wedged, stuck]] = ON_EDGE, STICKS
+    list_touched(contacts)
+    contacts.direction[wedged] = edge[0]
+    contacts.goal[wedged] = 0.03 * edge[1] - 0.02 * edge[2]
+    contacts.goal[stuck] = [0.01, -0.02, 0.03]
+    fixed = [(wedged, edge[1], 0.03), (wedged, edge[2], -0.02)]
+    fixed += [(stuck, axis, float(axis @ contacts.goal[stuck])) for axis in np.eye(3)]
+    fixed += [(i, contacts.normal[i], a) for i, a in zip(touched, approach, strict=True)]
+    fixed += [(i, axis, float(axis @ nodes.v_star[i])) for i in held for axis in np.eye(3)]
+    rows_into(nodes.x, state.network.inverse_mass, rows)
+    return state, fixed
+
+
+@pytest.mark.parametrize("dense", [True, False], ids=["dense", "iterative"])
+def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monkeypatch):
+    """Outside truth: mass, volumes, held nodes and touched nodes in one dense indefinite system."""
+    if not dense:
+        monkeypatch.setattr(rows_module, "DENSE_UP_TO", 0)
+    dt = 1e-3
+    state, fixed = touched_and_held(several, dt)
+    nodes, contacts, rows, n = state.nodes, state.contacts, state.rows, several.node_count
+    target = 1.001 * several.rest_volumes
+    network = state.network._replace(longest_correction=np.inf)
+    set_right_side(network, rows, nodes, contacts, target, dt, 1e-13)
+    tally = new_tally(1, 1)
+    solve_multipliers(network, rows, contacts, tally, Accuracy(1e-13, 2000))
+    jacobian = np.zeros((several.kept.count, n, 3))
+    for r in range(several.kept.count):
+        entries = slice(rows.row_start[r], rows.row_start[r + 1])
+        jacobian[r, rows.column[entries]] = rows.value[entries, :3]
+    rectangle = np.vstack(
+        [dt * jacobian.reshape(len(jacobian), -1), *[_single_row(n, i, axis) for i, axis, _ in fixed]]
+    )
+    right = np.concatenate([target - rows.volume, [velocity for _, _, velocity in fixed]])
+    mass, empty = np.repeat(several.mass, 3), np.zeros((len(rectangle), len(rectangle)))
+    system = np.block([[np.diag(mass), -rectangle.T], [rectangle, empty]])
+    solution = np.linalg.lstsq(system, np.concatenate([mass * nodes.v_star.ravel(), right]), rcond=1e-14)[0]
+    lam = solution[3 * n : 3 * n + len(jacobian)]
+    force = np.einsum("r,rja->ja", lam, jacobian)
+    assert np.abs(rows.push - force).max() < 1e-6 * np.abs(force).max()
+    if several.kept.count < n:  # pressures of nodes may hold a part that moves nothing
+        assert np.abs(rows.lam - lam).max() < 1e-6 * np.abs(lam).max()
+    drive = Setup(several, ImplicitVolume(), Clock(dt, 1, 1)).drive(0)
+    open_frame(state.frame(drive))
+    advance(replace(state, tally=new_tally(2, 1)).frame(drive), Push(rows.push, 1.0))
+    assert np.allclose(nodes.v.ravel(), solution[: 3 * n], atol=1e-7)  # a millionth of the velocities of 0.1 m/s
+    assert (tally.iterations[1] > 0) != dense
+
+
+def test_an_iteration_ends_as_soon_as_a_residual_is_no_number(block_body, monkeypatch):
+    monkeypatch.setattr(rows_module, "DENSE_UP_TO", 0)
+    state, _ = touched_and_held(block_body.keeping(Volumes.nodal(block_body)), 1e-3)
+    rows = state.rows
+    diagonal_into(rows, state.contacts, state.network.inverse_mass, rows.diagonal)
+    rows.right[:], rows.right[7] = 1.0, np.nan
+    count = solve_iteratively(rows, state.contacts, state.network.inverse_mass, rows.lam, rows.allowed, 10**9)
+    assert count <= 1 and np.isnan(rows.right).any()
+
+
+@pytest.mark.parametrize("kind", ["hollow", "regions"])
+def test_conjugate_directions_need_no_more_iterations_than_volumes(kind, block_body, hollow_body, monkeypatch):
+    """Two for wall and lumen, seven for seven regions, and what is then left is round-off."""
+    monkeypatch.setattr(rows_module, "DENSE_UP_TO", 0)
+    body = hollow_body if kind == "hollow" else block_body.keeping(Volumes.regions(block_body, 7))
+    state, _ = touched_and_held(body, 1e-3)
+    rows = state.rows
+    diagonal_into(rows, state.contacts, state.network.inverse_mass, rows.diagonal)
+    rows.right[:] = -np.random.default_rng(1).uniform(0.5, 1.0, body.kept.count)
+    rows.allowed[:] = 1e-6  # the residuals start at 1; the preconditioner rounds directions to 6e-8
+    count = solve_iteratively(rows, state.contacts, state.network.inverse_mass, rows.lam, rows.allowed, 100)
+    assert 1 < count <= body.kept.count
+    assert np.abs(rows.right).max() <= 1e-6
+
+
+def _single_row(nodes: int, node: int, direction: np.ndarray) -> np.ndarray:
+    """direction · v of one node as a row (3 n,)."""
+    row = np.zeros((nodes, 3))
+    row[node] = direction
+    return row.ravel()
+
+
+def test_the_whole_by_rows_is_the_whole_by_a_division(block_body):
+    """A region that is everything, beside a second volume that nothing touches, has the pressure of the division."""
+    clock = clock_for(block_body, 10, 20)
+    planes = squeeze(block_body, 0.004, clock.duration)
+    one = simulate(Setup(block_body, ImplicitVolume(), clock, planes, damping=20.0))
+    setup = Setup(block_body, ImplicitVolume(), clock, planes, damping=20.0)
+    state, pressures = replace(setup.start(), rows=volume_rows(Volumes.whole(block_body), block_body.node_count)), []
+    for frame in range(clock.frames):
+        state = setup.method.advance(state, setup.drive(frame))
+        pressures.append(state.lam[0])
+    assert np.allclose(pressures, one.pressure[:, 0], rtol=1e-9)
+    assert np.abs(state.x - one.final).max() < 1e-12

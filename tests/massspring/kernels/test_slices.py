@@ -1,0 +1,193 @@
+"""The pass over 64 nodes side by side, against the plain kernels and finite differences."""
+
+import numpy as np
+import pytest
+
+from massspring import Attachment, Body, Clock, Free, ImplicitVolume, Setup, Volumes, tetrahedral_body
+from massspring.body.springs import Springs
+from massspring.kernels.constraint.one_volume import multiplier_of_sums, volume_multiplier
+from massspring.kernels.contact.modes import ON_EDGE, SLIDES, STICKS
+from massspring.kernels.forces.membrane import add_membrane_forces
+from massspring.kernels.forces.springs import spring_forces_into
+from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
+from massspring.kernels.fused.chunk import LANES
+from massspring.kernels.fused.sweep import gather_and_predict
+from massspring.kernels.step.attachments import prescribe
+from massspring.layout.allocate import start
+from massspring.layout.sell_chunks import LONGEST, rings, slices_of
+from tests.massspring.conftest import SOFT, block, icosphere
+from tests.massspring.kernels.test_kernels import DIFFERENCE, STEP, moved
+from tests.massspring.touched import list_touched
+
+ROUND_OFF = 1e-14  # relative to the largest: sums of at most some hundred doubles in another order
+
+
+def gathered(body: Body, x: np.ndarray, keeps: bool = True, held: tuple[int, ...] = ()):
+    """The state after one pass at positions `x` with some velocities, the drive, and (V, G·v*, G·W·G)."""
+    clock = Clock(0.01, 1, 10)
+    attached = (Attachment(np.array(held)),) if held else ()
+    setup = Setup(body, ImplicitVolume(), clock, attachments=attached, gravity=(0.3, 1.0, -9.81), damping=7.0)
+    state, drive = start(body, attached), setup.drive(0)
+    state.nodes.x[:] = x
+    state.nodes.v[:] = np.random.default_rng(4).normal(size=x.shape)
+    return state, drive, gather_and_predict(state.network, state.nodes, state.work, drive, keeps)
+
+
+def predicted(net, v: np.ndarray, force: np.ndarray, drive) -> np.ndarray:
+    """v* of eq. 3.1, in numpy."""
+    return (1 - drive.damping * drive.dt) * v + drive.dt * (net.inverse_mass[:, None] * force + drive.gravity)
+
+
+def far_apart(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.abs(a - b).max() / np.abs(b).max())
+
+
+def test_it_equals_the_plain_kernels(kept_body):
+    x = moved(kept_body)
+    held = tuple(range(0, kept_body.node_count, 7))
+    state, drive, (volume, flow, mobility) = gathered(kept_body, x, held=held)
+    net, nodes = state.network, state.nodes
+    force, gradient = np.zeros_like(x), np.zeros_like(x)
+    spring_forces_into(x, net.ends, net.rest_length, net.stiffness, force)
+    add_membrane_forces(x, net.membrane, force)
+    expected = volume_gradient_into(x, net.triangles, gradient)
+    v_star = predicted(net, nodes.v, force, drive)
+    assert far_apart(nodes.force[list(held)], force[list(held)]) < ROUND_OFF
+    assert far_apart(nodes.gradient, gradient) < ROUND_OFF
+    assert far_apart(nodes.v_star, v_star) < ROUND_OFF
+    assert volume == pytest.approx(expected, rel=ROUND_OFF)
+    # Flows in and out nearly cancel: relative to their size, not to their sum.
+    assert flow == pytest.approx(float((gradient * v_star).sum()), abs=ROUND_OFF * np.abs(gradient * v_star).sum())
+    assert mobility == pytest.approx(float((net.inverse_mass[:, None] * gradient**2).sum()), rel=ROUND_OFF)
+
+
+def test_its_gradient_is_the_derivative_of_its_volume(kept_body):
+    x, direction = moved(kept_body), np.random.default_rng(5).uniform(-1, 1, kept_body.rest.shape)
+    exact = float((gathered(kept_body, x)[0].nodes.gradient * direction).sum())
+    step = STEP * np.abs(x).max()
+    ahead, behind = (gathered(kept_body, x + side * step * direction)[2][0] for side in (1, -1))
+    assert (ahead - behind) / (2 * step) == pytest.approx(exact, rel=DIFFERENCE)
+
+
+def test_the_volume_keeps_its_digits_far_from_the_origin(ball_body):
+    """1,000 m away positions have lost four digits of sixteen; V about the origin would lose twelve."""
+    volume = gathered(ball_body, ball_body.rest + 1e3)[2][0]
+    assert volume == pytest.approx(ball_body.volume, rel=1e-10)
+
+
+def test_without_a_volume_the_forces_are_the_same_to_the_last_bit(ball_body):
+    """A skip: springs of a ring pull in the same order whether or not the ring is walked for its area."""
+    x = moved(ball_body)
+    with_it, without = (gathered(ball_body, x, keeps)[0].nodes for keeps in (True, False))
+    assert np.array_equal(with_it.v_star, without.v_star)
+    assert not without.gradient.any()
+
+
+def test_springs_at_rest_pull_with_nothing_at_all(body):
+    """Rest is rest to the last bit only if c = k − k L/|d| is 0 and not round-off of k."""
+    state = start(body)
+    drive = Setup(body, Free(), Clock(0.01, 1, 10)).drive(0)
+    gather_and_predict(state.network, state.nodes, state.work, drive, True)
+    # The length of a spring at rest is summed in another order here: a bit off in some.
+    unit = body.springs.stiffness.max() * body.springs.rest_length.max() / body.mass.min() * drive.dt
+    assert np.abs(state.nodes.v_star).max() < 1e-15 * unit * LONGEST
+
+
+def test_a_ring_goes_round_every_surface_node_once():
+    points, triangles = icosphere(1)
+    centre, walk, place, neighbour = rings(triangles.astype(np.uint32), len(points))
+    assert sorted(centre) == list(range(len(points)))
+    for number, node in enumerate(centre):
+        mine = walk == number
+        ring = neighbour[mine][np.argsort(place[mine])]
+        across = {tuple(sorted((a, b))) for a, b in zip(ring, np.roll(ring, -1), strict=True)}
+        around = {tuple(sorted(set(t) - {node})) for t in triangles[(triangles == node).any(axis=1)].tolist()}
+        assert across == around and len(ring) == len(set(ring))
+
+
+def touching_tetrahedra() -> Body:
+    """Two tetrahedra that share one node: its neighbourhood on the surface is two rings."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]], dtype=float)
+    cells = np.array([[0, 1, 2, 3], [0, 5, 4, 6]])
+    triangles = cells[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
+    return tetrahedral_body(points, triangles, cells, SOFT)
+
+
+def many_neighbours(count: int) -> Body:
+    """A ball whose node 0 is joined to `count` others beside its ring, and twice to one of its ring."""
+    points, faces, tetrahedra = block((4, 4, 4))
+    body = tetrahedral_body(points, faces, tetrahedra, SOFT)
+    near = set(body.springs.ends[(body.springs.ends == 0).any(axis=1)].ravel().tolist())
+    others = [j for j in range(len(points)) if j not in near][:count]
+    twice = body.springs.ends[(body.springs.ends == 0).any(axis=1)][:1]
+    ends = np.vstack([body.springs.ends, [[0, j] for j in others], twice]).astype(np.uint32)
+    length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
+    stiffness = np.linspace(1.0, 2.0, len(ends))
+    return Body(points, body.mass, Springs(ends, length, stiffness, np.zeros(len(ends), np.uint8)), faces, tetrahedra)
+
+
+@pytest.mark.parametrize("make", [touching_tetrahedra, lambda: many_neighbours(3), lambda: many_neighbours(90)])
+def test_nodes_in_pieces_equal_the_plain_kernels(make):
+    body = make()
+    test_it_equals_the_plain_kernels(body)
+
+
+def test_a_node_of_two_rings_or_many_springs_is_in_pieces():
+    for body in (touching_tetrahedra(), many_neighbours(90)):
+        slices = start(body).network.slices
+        assert slices.split_node.tolist() == [0] and slices.pieces == 1
+    assert start(many_neighbours(3)).network.slices.pieces == 0
+
+
+def test_a_volume_enclosed_by_part_of_the_surface(hollow_body):
+    """Only the lumen is kept, by triangles turned the other way than the wall's."""
+    lumen = hollow_body.kept
+    triangles = lumen.triangles[np.flatnonzero(lumen.share.tocsr()[[1]].toarray()[0])]
+    alone = hollow_body.keeping(Volumes.closed_surfaces(hollow_body, {"lumen": triangles[:, ::-1].copy()}))
+    if alone.rest_volumes[0] < 0:
+        alone = hollow_body.keeping(Volumes.closed_surfaces(hollow_body, {"lumen": triangles}))
+    test_it_equals_the_plain_kernels(alone)
+    x = moved(alone)
+    assert gathered(alone, x)[2][0] == pytest.approx(enclosed_volume(x, start(alone).network.triangles), rel=1e-13)
+
+
+def test_every_spring_is_there_twice_and_little_else(ball_body):
+    """What fills up short lists costs as much as springs do."""
+    springs = ball_body.springs
+    slices = slices_of(springs, ball_body.triangles, 1.0 / ball_body.mass, ball_body.rest)
+    stiffness = slices.stiffness[slices.stiffness_row]
+    assert int((stiffness > 0).sum()) == 2 * springs.count
+    assert stiffness.sum() == pytest.approx(2 * springs.stiffness.sum(), rel=1e-12)
+    used = LANES * len(slices.lanes) - slices.lanes.sum()
+    longest = (slices.start[1:] - slices.start[:-1]).max()
+    assert slices.neighbour.size < 2.4 * springs.count + used * longest
+
+
+def test_the_multiplier_from_sums_is_the_one_over_all_nodes(ball_body):
+    """Touched nodes of every kind and held ones: what they take is taken from the sums."""
+    held = (3, 40, 77)
+    state, drive, (volume, flow, mobility) = gathered(ball_body, moved(ball_body), held=held)
+    net, nodes, contacts, rng = state.network, state.nodes, state.contacts, np.random.default_rng(1)
+    flow += prescribe(net, nodes, np.array([[0.01, 0.0, -0.02]]), drive.dt)
+    for kind, some in ((SLIDES, [5, 6, 50]), (ON_EDGE, [9, 10]), (STICKS, [60, 61])):
+        contacts.mode[some] = kind
+        contacts.direction[some] = rng.normal(size=(len(some), 3))
+        contacts.direction[some] /= np.linalg.norm(contacts.direction[some], axis=1)[:, None]
+        contacts.goal[some] = rng.normal(size=(len(some), 3))
+    list_touched(contacts)
+    error = 0.01 * volume
+    expected = volume_multiplier(nodes, contacts, net.inverse_mass, error, drive.dt)
+    found = multiplier_of_sums(nodes, contacts, net.inverse_mass, error, drive.dt, flow, mobility)
+    assert found == pytest.approx(expected, rel=1e-12)
+    assert found[0] != pytest.approx(
+        volume_multiplier(nodes, contacts, 0.9 * net.inverse_mass, error, drive.dt)[0], rel=1e-3
+    )
+
+
+def test_a_body_that_obstacles_hold_everywhere_has_no_multiplier(ball_body):
+    """What is left of G·W·G is round-off then; dividing by it would be a pressure of any size."""
+    state, drive, (volume, flow, mobility) = gathered(ball_body, moved(ball_body))
+    state.contacts.mode[:] = STICKS
+    list_touched(state.contacts)
+    args = (state.nodes, state.contacts, state.network.inverse_mass, 0.01 * volume, drive.dt, flow, mobility)
+    assert multiplier_of_sums(*args) == (0.0, 0.0)

@@ -1,0 +1,173 @@
+"""The table of what methods support, held against `Setup`: what it allows runs, what it denies is refused with its
+sentence; and docs/methods.md says the same."""
+
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+from massspring import (
+    METHODS,
+    Clock,
+    MassSpringError,
+    Path,
+    Plane,
+    Probe,
+    Ramp,
+    Setup,
+    Volumes,
+    membrane_body,
+    simulate,
+    tetrahedral_body,
+)
+from massspring.methods.capabilities import Capabilities, No
+from studies.report.methods_page import OPTIONS, methods_page
+from tests.massspring.conftest import SOFT, block, body_of, hollow_block, icosphere
+from tests.massspring.methods.test_methods import clock_for
+from tests.massspring.rows import CONTESTANTS, KINDS, SUPPORTED, by_pairs, kinds_of
+
+EACH = pytest.mark.parametrize("method", CONTESTANTS.values(), ids=CONTESTANTS.keys())
+MANY, NO_TETRAHEDRA = "it keeps one volume, the body keeps", "the body has none; fill its mesh"
+SHARE, LUMEN = "the body keeps a share of it", "the body keeps a lumen too"
+REFUSED = {
+    "block": {},
+    "ball": {"tetrahedra": NO_TETRAHEDRA},
+    "hollow": {"whole": MANY, "tetrahedra": MANY},
+    "regions": {"whole": MANY, "tetrahedra": MANY},
+    "nodal": {"whole": MANY, "tetrahedra": MANY},
+    "lumen": {"tetrahedra": LUMEN},
+    "share": {"whole": SHARE, "tetrahedra": SHARE},
+    "membrane": {"tetrahedra": NO_TETRAHEDRA},
+    "prestressed": {"whole": "", "tetrahedra": ""},
+}
+"""Kind of body -> what a method keeps -> words of the refusal."""
+NEEDED = {"membrane": "triangle_springs", "prestressed": "prestress"}
+"""Kind of body -> the capability that it needs."""
+
+
+@pytest.fixture(params=REFUSED)
+def kind(request):
+    return request.param
+
+
+@pytest.fixture
+def any_body(kind, request):
+    """Every kind of body there is."""
+    return body_of_any(kind, request)
+
+
+def body_of_any(kind, request):
+    """The body of a kind of REFUSED."""
+    if kind in KINDS:
+        return body_of(kind, request)
+    if kind == "membrane":
+        return membrane_body(*icosphere(1), 0.003, SOFT, "delingette")
+    if kind == "prestressed":
+        taut = tetrahedral_body(*block((2, 2, 2)), SOFT, "cotangent")
+        return taut.keeping(Volumes.nodal(taut))
+    if kind == "lumen":
+        hollow = request.getfixturevalue("hollow_body")
+        inner = np.unique(hollow_block()[3])
+        outer = hollow.triangles[~np.isin(hollow.triangles, inner).any(axis=1)]
+        return hollow.keeping(Volumes.closed_surfaces(hollow, {"filled": outer}))
+    whole = request.getfixturevalue("block_body")
+    return whole.keeping(Volumes(("half",), whole.triangles, csr_array(np.full((1, len(whole.triangles)), 0.5))))
+
+
+def runs(setup) -> bool:
+    history = simulate(setup)
+    return history.outcome == "finished" and bool(np.isfinite(history.final).all())
+
+
+@EACH
+def test_a_body_runs_or_is_refused_with_the_sentence_of_the_table(method, kind, any_body):
+    supported = getattr(method.capabilities, NEEDED[kind]) if kind in NEEDED else True
+    reason = REFUSED[kind].get(method.capabilities.keeps) if supported else supported.because
+    if reason is None:
+        assert method.why_not(any_body) is None
+        assert runs(Setup(any_body, method, clock_for(any_body, 1, 2, method=method)))
+    else:
+        assert reason in method.why_not(any_body)
+        with pytest.raises(MassSpringError, match=f"method '{method.name}' does not apply to this body: .*{reason}"):
+            Setup(any_body, method, Clock(0.01, 1, 10))
+
+
+ASKED = {
+    "thin_probes": ({"obstacles": (Probe((0.0, 0.0, 1.0)),)}, "is a thin probe, which method '{}' does not meet: {};"),
+    "targets": ({"targets": {"whole": Ramp((0.0, 1e3), (1.0, 1.1))}}, "which method '{}' does not follow: {};"),
+    "threads": ({"threads": 2}, "method '{}' runs on one thread, {};"),
+    "float32": ({"precision": "float32"}, "method '{}' runs in float64 only, {};"),
+}
+"""Capability -> the options of `Setup` that ask for it, and its refusal."""
+
+
+@EACH
+@pytest.mark.parametrize("option", ASKED)
+def test_an_option_runs_or_is_refused_with_the_sentence_of_the_table(method, option, block_body, monkeypatch):
+    monkeypatch.setattr("massspring.run.checks.cores", lambda: 2)
+    asked, sentence = ASKED[option]
+    clock, supported = clock_for(block_body, 1, 2, method=method), getattr(method.capabilities, option)
+    if supported:
+        assert runs(Setup(block_body, method, clock, **asked))
+    else:
+        with pytest.raises(MassSpringError, match=sentence.format(method.name, supported.because)):
+            Setup(block_body, method, clock, **asked)
+
+
+@EACH
+def test_every_method_supports_friction(method, block_body):
+    """A rough plane that presses and slides drags the body along."""
+    clock = clock_for(block_body, 5, 10, method=method)
+    top = float(block_body.rest[:, 2].max())
+    way = Path((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.002, 0.0, -0.002)))
+    setup = Setup(block_body, method, clock, (Plane((0, 0, top), (0, 0, -1), way, friction=0.5),))
+    drag = simulate(setup).contact_force.sum(axis=0)[0]
+    assert drag[2] < 0 and 0.05 * -drag[2] < drag[0] <= 0.5 * -drag[2] * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(("options", "exclude"), [(("",), ()), ((10.0, 1e6), ()), ("abc", [("nodal", "c")])])
+def test_every_pair_meets(options, exclude):
+    """Against the product of all that goes together, pair by pair; far fewer rows where there are options."""
+    product = {
+        (name, kind, precision, option)
+        for name, method in CONTESTANTS.items()
+        for kind in kinds_of(method)
+        for precision in (("float64", "float32") if method.capabilities.float32 else ("float64",))
+        for option in options
+        if (kind, option) not in exclude
+    }
+    met = set(by_pairs(options, exclude))
+    assert met <= product and len(met) <= (1.0 if len(options) == 1 else 0.85) * len(product)
+    for a, b in combinations(range(4), 2):
+        assert {(row[a], row[b]) for row in product} == {(row[a], row[b]) for row in met}
+
+
+def test_every_capability_is_asked_for_here():
+    assert set(OPTIONS) == set(ASKED) | set(NEEDED.values())
+    assert set(KINDS) <= set(REFUSED)
+    for keeps, kinds in SUPPORTED.items():
+        assert set(kinds) == {kind for kind in KINDS if keeps not in REFUSED[kind]}
+
+
+def test_a_no_is_false_and_says_why():
+    assert not No("it has no time")
+    for method in CONTESTANTS.values():
+        for name in OPTIONS:
+            supported = getattr(method.capabilities, name)
+            assert supported is True or (isinstance(supported, No) and supported.because[-1] != ".")
+
+
+def test_settings_that_support_something_else_say_so_for_themselves_alone():
+    """The table of an instance, of its copies and never of its class."""
+    whole = CONTESTANTS["xpbd_whole"]
+    assert whole.capabilities.keeps == replace(whole, iterations=2).capabilities.keeps == "whole"
+    assert type(whole).capabilities.keeps == replace(whole, volumes="element").capabilities.keeps == "tetrahedra"
+    assert all(isinstance(method.capabilities, Capabilities) for method in METHODS)
+
+
+def test_the_page_of_the_docs_is_the_table():
+    page = File(__file__).parents[3] / "docs" / "methods.md"
+    assert page.read_text(encoding="utf-8") == methods_page(), "run python -m studies.report.methods_page"

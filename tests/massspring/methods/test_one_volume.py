@@ -1,0 +1,117 @@
+"""HCJ05 with one volume: its residual, its multiplier by another solve, and what must not change it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import (
+    Attachment,
+    Clock,
+    Free,
+    ImplicitVolume,
+    Setup,
+    Sphere,
+    simulate,
+)
+from massspring.kernels.arrays.layout import Push
+from massspring.kernels.constraint.one_volume import volume_multiplier
+from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
+from massspring.kernels.step.advance import advance
+from massspring.kernels.step.begin import open_frame
+from massspring.layout.allocate import start
+from massspring.layout.state import new_tally
+from tests.massspring.methods.test_methods import clock_for, squeeze, thrown
+from tests.massspring.touched import seat
+
+
+def test_the_one_step_residual_is_exact(body):
+    """V after a step is V0 + ½ Δxᵀ H Δx + V[Δx], that is V0 + Σ x·g(Δx) + V[Δx]: second order in this step only."""
+    setup = Setup(body, ImplicitVolume(), clock_for(body, 1, 1), velocity=thrown(body))
+    state = setup.start()
+    for _ in range(5):  # the residual of earlier steps must not appear
+        before = state.x
+        state = setup.method.advance(state, setup.drive(0))
+        step = state.x - before
+        gradient = np.empty_like(step)
+        cubic = volume_gradient_into(step, body.triangles, gradient)
+        expected = body.volume + float((before * gradient).sum()) + cubic
+        assert enclosed_volume(state.x, body.triangles) == pytest.approx(expected, rel=1e-12)
+        assert abs(expected / body.volume - 1) > 1e-9, "the residual is too small to be seen"
+
+
+def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
+    """Outside truth: [M/dt², −Gᵀ; G, 0] with held nodes and touched nodes as further constraints, solved densely."""
+    body = ball_body
+    rng = np.random.default_rng(0)
+    state = start(body, (Attachment(np.array([5, 17])),), v=0.1 * rng.normal(size=body.rest.shape))
+    net, nodes, contacts, dt = state.network, state.nodes, state.contacts, 1e-3
+    nodes.v_star[:] = state.v
+    nodes.v_star[net.held_nodes] = [0.02, 0.0, -0.01]
+    touched = np.array([40, 41, 90])
+    approach = seat(contacts, touched, rng)
+    wanted = 1.02 * body.volume
+    error = wanted - volume_gradient_into(nodes.x, net.triangles, nodes.gradient)
+    lam, _ = volume_multiplier(nodes, contacts, net.inverse_mass, error, dt)
+
+    n = 3 * body.node_count
+    rows = [dt * nodes.gradient.ravel()]
+    right = [error]
+    for i, a in zip(touched, approach, strict=True):
+        row = np.zeros((body.node_count, 3))
+        row[i] = contacts.normal[i]
+        rows.append(row.ravel())
+        right.append(a)
+    for i in net.held_nodes:
+        for axis in range(3):
+            row = np.zeros((body.node_count, 3))
+            row[i, axis] = 1.0
+            rows.append(row.ravel())
+            right.append(nodes.v_star[i, axis])
+    constraints = np.array(rows)
+    mass = np.repeat(body.mass, 3)
+    system = np.block([[np.diag(mass), -constraints.T], [constraints, np.zeros((len(rows), len(rows)))]])
+    solution = np.linalg.solve(system, np.concatenate([mass * nodes.v_star.ravel(), right]))
+    assert lam == pytest.approx(solution[n], rel=1e-9)  # the row is dt G, so its multiplier is the pressure
+
+    x = nodes.x.copy()
+    drive = Setup(body, ImplicitVolume(), Clock(dt, 1, 1)).drive(0)
+    frame = replace(state, tally=new_tally(1, 1)).frame(drive)
+    open_frame(frame)
+    advance(frame, Push(nodes.gradient, lam))
+    assert np.allclose(nodes.v.ravel(), solution[:n], atol=1e-12)
+    assert np.allclose(nodes.x, x + dt * nodes.v)
+
+
+def test_a_body_without_a_volume_gradient_is_counted_not_crashed(ball_body):
+    setup = Setup(ball_body, ImplicitVolume(), clock_for(ball_body, 1, 1))
+    state = setup.start()
+    state.nodes.x[:] = np.outer(np.linspace(0, 0.1, ball_body.node_count), [1.0, 0.0, 0.0])
+    after = setup.method.advance(state, setup.drive(0))
+    assert after.tally.skipped[0] == 1
+    assert after.lam == 0.0 and np.isfinite(after.x).all()
+
+
+def test_damping_does_not_bias_the_balance_of_springs_and_pressure(block_body):
+    """Squeezed and at rest, the pressure must not depend on the damping: damping first, forces after.
+
+    The other way round would make it smaller by c dt, here 5 and 25 %.
+    """
+    pressures = []
+    for damping in (20.0, 100.0):
+        clock = clock_for(block_body, 300, 20)
+        obstacles = squeeze(block_body, 0.004, 0.2 * clock.duration)
+        history = simulate(Setup(block_body, ImplicitVolume(), clock, obstacles, damping=damping))
+        pressures.append(history.pressure[-1, 0])
+    assert pressures[0] == pytest.approx(pressures[1], rel=1e-3)
+
+
+def test_free_is_implicit_volume_without_its_volume(ball_body):
+    """A sphere far away changes no bit: the contact stage is skipped by emptiness, not by luck."""
+    clock = clock_for(ball_body, 4, 10)
+    v = thrown(ball_body)
+    far = (Sphere((10.0, 0.0, 0.0), 0.01),)
+    for method in (Free(), ImplicitVolume()):
+        with_sphere = simulate(Setup(ball_body, method, clock, far, velocity=v))
+        without = simulate(Setup(ball_body, method, clock, velocity=v))
+        assert np.array_equal(with_sphere.final, without.final)

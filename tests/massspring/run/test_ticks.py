@@ -1,0 +1,112 @@
+"""Marks in the frame loop: they count every stage of every step, change no bit, and never book more than has passed."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from time import perf_counter_ns
+
+import numpy as np
+import pytest
+
+from massspring import METHODS, ImplicitSprings, Setup, Sphere
+from massspring.kernels.jit.stage_clock import (
+    HELD,
+    INTEGRATION,
+    OUTSIDE,
+    REVISION,
+    SEARCH,
+    SPRINGS,
+    STAGES,
+    new_ticks,
+    now,
+)
+from tests.massspring.conftest import body_of
+from tests.massspring.methods.test_methods import clock_for, squeeze
+from tests.massspring.rows import CONTESTANTS, rows
+
+STEPS, FRAMES = 10, 3
+
+
+@pytest.fixture(params=rows(method.name for method in METHODS))
+def row(request):
+    return request.param
+
+
+@pytest.fixture
+def method(row):
+    return CONTESTANTS[row[0]]
+
+
+@pytest.fixture
+def kept_body(row, request):
+    return body_of(row[1], request)
+
+
+def run(setup, ticks=None):
+    """The last state, and how long the frames took [ns]."""
+    state = setup.start()
+    state = replace(state, tally=state.tally._replace(ticks=ticks))
+    elapsed = 0
+    for frame in range(FRAMES):
+        drive = setup.drive(frame)
+        begin = perf_counter_ns()
+        state = setup.method.advance(state, drive)
+        elapsed += perf_counter_ns() - begin
+    return state, elapsed
+
+
+def pressed(body, method):
+    clock = clock_for(body, FRAMES, STEPS, method=method)
+    return Setup(body, method, clock, squeeze(body, 0.003, clock.duration), damping=20.0)
+
+
+def test_ticks_change_no_bit_and_count_every_step(kept_body, method):
+    setup, ticks = pressed(kept_body, method), new_ticks()
+    plain, _ = run(setup)
+    ticked, elapsed = run(setup, ticks)
+    assert np.array_equal(plain.x, ticked.x) and np.array_equal(plain.v, ticked.v)
+    assert np.array_equal(plain.lam, ticked.lam)
+    assert ticks.marks[OUTSIDE] == FRAMES
+    assert ticks.marks[SEARCH] == ticks.marks[INTEGRATION] == FRAMES * STEPS
+    passes = method.passes if isinstance(method, ImplicitSprings) else 1
+    assert ticks.marks[SPRINGS] == passes * FRAMES * STEPS
+    assert (ticks.spent[:OUTSIDE] >= 0).all() and 0 < ticks.spent[:OUTSIDE].sum() <= elapsed
+
+
+def test_a_stage_that_a_scene_does_not_need_is_never_entered(kept_body, method):
+    ticks = new_ticks()
+    setup = replace(pressed(kept_body, method), obstacles=())
+    bare, _ = run(setup, ticks)
+    assert ticks.marks[SEARCH] == ticks.marks[REVISION] == 0
+    # Bit for bit the same with the stage: an obstacle that nothing ever reaches.
+    far, _ = run(replace(setup, obstacles=(Sphere((100.0, 0.0, 0.0), 0.01),)), new_ticks())
+    assert np.array_equal(bare.x, far.x) and np.array_equal(bare.v, far.v)
+
+
+def test_the_compiled_clock_is_the_one_of_python():
+    import numba
+
+    compiled_now = numba.njit(lambda: now())
+    compiled_now()
+    before, between, after = perf_counter_ns(), compiled_now(), perf_counter_ns()
+    assert before <= between <= after
+
+
+def test_stages_have_names_and_outside_is_none_of_them():
+    assert len(set(STAGES)) == len(STAGES) == OUTSIDE
+    assert STAGES[HELD] == "attachments"
+
+
+@pytest.mark.slow
+def test_marks_run_without_the_compiler():
+    program = """
+from massspring.kernels.jit.stage_clock import mark, new_ticks, SPRINGS
+ticks = new_ticks()
+mark(None, SPRINGS)
+mark(ticks, SPRINGS)
+mark(ticks, SPRINGS)
+assert ticks.marks[SPRINGS] == 2 and ticks.spent[SPRINGS] > 0
+"""
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    subprocess.run([sys.executable, "-c", program], check=True, env=environment, timeout=120)

@@ -1,0 +1,178 @@
+"""The repository shows copies of current results, and nothing that a visitor computes shows up in git."""
+
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from studies.base.errors import StudyError
+from studies.catalog import STUDIES, Chart
+from studies.cli.commands import publish as command
+from studies.cli.commands import report as report_command
+from studies.report.publish import BEGIN, END, EXTRAS, PUBLISHED, publish, write_readme
+from studies.runs import current as runs
+from studies.runs.current import case_path
+from studies.store.stamps import is_stamped, set_stamp
+from studies.timing.cases import timing_file
+from tests.studies.tiny import tiny_case, tiny_study
+
+REPOSITORY = Path(__file__).parents[3]
+HEADLINE = replace(
+    tiny_study(charts=(Chart("one.png", lambda runs, path: path.write_bytes(b"a picture")),)), name="volume_loss"
+)
+
+
+@pytest.fixture
+def current(results):
+    """Results of a study that has the name of the headline study, all current."""
+    shutil.move(results / "tiny", results / "volume_loss")
+    return results
+
+
+@pytest.fixture
+def home(tmp_path):
+    """A repository's folder with a README."""
+    folder = tmp_path / "home"
+    folder.mkdir()
+    (folder / "README.md").write_text(f"# Title\n{BEGIN}\nold\n{END}\n")
+    return folder
+
+
+def shown(home):
+    """Name and content of all that is published, and README."""
+    return {path.relative_to(home).as_posix(): path.read_bytes() for path in home.rglob("*") if path.is_file()}
+
+
+def test_tables_charts_and_the_summary_are_copied(current, home):
+    copies, absent = publish(current, [HEADLINE], home)
+    names = {copy.relative_to(home / PUBLISHED).as_posix() for copy in copies}
+    wanted = {"volume_loss/one.png", "volume_loss/volume_loss.csv", "summary.md", "kept_volume.csv", "machine.json"}
+    assert names == wanted and absent == list(EXTRAS)
+    assert {copy.read_bytes() == (current / copy.relative_to(home / PUBLISHED)).read_bytes() for copy in copies} == {
+        True
+    }
+    text = (home / "README.md").read_text()
+    assert (current / "summary.md").read_text() in text and "old" not in text
+    assert not list((home / PUBLISHED).rglob("*.h5"))
+
+
+def test_what_nothing_makes_any_more_goes_and_what_was_not_made_again_stays(current, home):
+    for name in ("volume_loss/older.png", "verify/verify.csv", "bench.csv"):
+        (home / PUBLISHED / name).parent.mkdir(parents=True, exist_ok=True)
+        (home / PUBLISHED / name).write_text("old")
+    (current / "bench.csv").write_text("new")
+    set_stamp(current, "bench.csv")
+    publish(current, [HEADLINE], home)
+    assert not (home / PUBLISHED / "volume_loss/older.png").exists()
+    assert (home / PUBLISHED / "verify/verify.csv").read_text() == "old"
+    assert (home / PUBLISHED / "bench.csv").read_text() == "new"
+
+
+def miss(root, monkeypatch):
+    case_path(root, HEADLINE.name, tiny_case()).unlink()
+
+
+def miss_a_timing(root, monkeypatch):
+    timing_file(root, HEADLINE.name, tiny_case(timed=True)).unlink()
+
+
+def change_the_code(root, monkeypatch):
+    monkeypatch.setattr(runs, "run_fingerprint", lambda: "another code")
+
+
+def leave_an_old_bench(root, monkeypatch):
+    (root / "bench.csv").write_text("of unknown age")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "sentence"),
+    [
+        (miss, r"is missing; run `organbench run volume_loss` and publish again"),
+        (miss_a_timing, r"the frame time of tiny_squeeze\S+ is missing or stale; run `organbench run volume_loss`"),
+        (change_the_code, r"is stale, and 2 more are missing or stale; run `organbench run volume_loss`"),
+        (leave_an_old_bench, r"bench.csv was made by other code; run `make bench`"),
+    ],
+)
+def test_stale_or_missing_results_are_refused_before_anything_is_written(current, home, monkeypatch, spoil, sentence):
+    before = shown(home)
+    spoil(current, monkeypatch)
+    with pytest.raises(StudyError, match=sentence):
+        publish(current, [HEADLINE], home)
+    assert shown(home) == before
+
+
+def test_a_readme_without_marks_is_refused_before_anything_is_written(current, home):
+    (home / "README.md").write_text("# Title\n")
+    with pytest.raises(StudyError, match="has no lines"):
+        publish(current, [HEADLINE], home)
+    assert [*shown(home)] == ["README.md"]
+
+
+def test_the_command_publishes_where_it_stands_or_says_one_sentence(current, home, organbench, monkeypatch):
+    monkeypatch.chdir(home)
+    monkeypatch.setattr(command, "STUDIES", (HEADLINE,))
+    code, out, err = organbench("publish", "--results", current)
+    assert (code, err) == (0, "") and str(PUBLISHED / "volume_loss" / "one.png") in out
+    assert "not made again, stays as published: verify: organbench verify; figures: organbench report" in out
+    before = shown(home)
+    miss(current, monkeypatch)
+    code, out, err = organbench("publish", "--results", current)
+    assert code == 2 and err.startswith("organbench: not published: ") and err.count("\n") == 1
+    assert shown(home) == before
+
+
+def test_report_leaves_readme_and_what_is_published_alone(current, home, organbench, monkeypatch):
+    monkeypatch.chdir(home)
+    before = shown(home)
+    monkeypatch.setattr(report_command, "STUDIES", (HEADLINE,))
+    assert organbench("report", "--results", current)[0] == 0
+    assert (current / "summary.md").is_file() and shown(home) == before
+
+
+def test_a_stamp_holds_for_one_code(tmp_path, monkeypatch):
+    assert not is_stamped(tmp_path, "bench.csv")
+    set_stamp(tmp_path, "bench.csv")
+    assert is_stamped(tmp_path, "bench.csv") and not is_stamped(tmp_path, "geometry.csv")
+    monkeypatch.setattr("studies.store.stamps.source_fingerprint", lambda *sources: "another code")
+    assert not is_stamped(tmp_path, "bench.csv")
+
+
+def test_git_sees_what_is_published_and_nothing_else_below_results(tmp_path):
+    """Fresh clone, any run: `git status` stays clean."""
+    shutil.copy(REPOSITORY / ".gitignore", tmp_path)
+    subprocess.run(["git", "init", "--quiet"], cwd=tmp_path, check=True)
+    own = ["summary.md", "machine.json", "kept_volume.csv", "reference/uncertainty.csv", "reference/uncertainty.png"]
+    own += ["cache/meshes/a.npz", "cache/a.drawn.json", "smoke/verify/verify.md", "verify/kappa.png", *EXTRAS]
+    own += [f"{study.name}/{name}" for study in STUDIES for name in (f"{study.name}.csv", "a.h5", "a.timing.b.h5")]
+    own += [f"{study.name}/{chart.file}" for study in STUDIES for chart in study.charts]
+    paths = ["results/" + name for name in own] + [(PUBLISHED / name).as_posix() for name in own]
+    asked = subprocess.run(
+        ["git", "check-ignore", *paths], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    assert asked == paths[: len(own)]
+
+
+def test_readme_takes_the_summary_between_its_marks(tmp_path):
+    readme = tmp_path / "README.md"
+    readme.write_text(f"# Title\n{BEGIN}\nold\n{END}\ntail\n")
+    write_readme(readme, "\n| new |\n")
+    assert readme.read_text() == f"# Title\n{BEGIN}\n| new |\n{END}\ntail\n"
+    write_readme(readme, "| new |")
+    assert readme.read_text().count("new") == 1
+
+
+def test_readme_without_marks_or_missing_is_left_alone(tmp_path):
+    readme = tmp_path / "README.md"
+    with pytest.raises(StudyError, match="there is no file"):
+        write_readme(readme, "| new |")
+    readme.write_text("# Title\n")
+    with pytest.raises(StudyError, match="has no lines"):
+        write_readme(readme, "| new |")
+    assert readme.read_text() == "# Title\n"
+
+
+def test_the_readme_of_the_project_has_the_marks():
+    text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+    assert text.index(BEGIN) < text.index(END)
