@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from massspring.run.simulation import Setup, simulate
     from massspring.world.clock import Clock, make_clock
     from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
-    from massspring.world.trajectories import Path, Ramp
+    from massspring.world.trajectories import Ramp, Trajectory
 
 _FACE = {
     "Attachment": "massspring.world.obstacles",
@@ -27,7 +27,6 @@ _FACE = {
     "MassSpringError": "massspring.errors",
     "Material": "massspring.body.body",
     "Obstacle": "massspring.world.obstacles",
-    "Path": "massspring.world.trajectories",
     "Plane": "massspring.world.obstacles",
     "Probe": "massspring.world.obstacles",
     "Ramp": "massspring.world.trajectories",
@@ -35,6 +34,7 @@ _FACE = {
     "Sphere": "massspring.world.obstacles",
     "State": "massspring.layout.state",
     "StepLimit": "massspring.analysis.stability",
+    "Trajectory": "massspring.world.trajectories",
     "Volumes": "massspring.body.volumes",
     "make_clock": "massspring.world.clock",
     "membrane_body": "massspring.body.membranes",

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from massspring.errors import MassSpringError
-from massspring.world.trajectories import STILL, Path
+from massspring.world.trajectories import STILL, Trajectory
 
 
 def _unit(name: str, vector: tuple[float, float, float]) -> np.ndarray:
@@ -33,7 +33,7 @@ class Plane:
     """[m], at path displacement 0."""
     normal: tuple[float, float, float]
     """Towards the body; any length."""
-    path: Path = STILL
+    path: Trajectory = STILL
     friction: Friction = 0.0
 
     def __post_init__(self) -> None:
@@ -65,7 +65,7 @@ class Sphere:
     """[m], at path displacement 0."""
     radius: float
     """[m]."""
-    path: Path = STILL
+    path: Trajectory = STILL
     friction: Friction = 0.0
 
     def __post_init__(self) -> None:
@@ -95,7 +95,7 @@ class Capsule:
     """The other [m]."""
     radius: float
     """[m]."""
-    path: Path = STILL
+    path: Trajectory = STILL
     friction: Friction = 0.0
 
     def __post_init__(self) -> None:
@@ -136,7 +136,7 @@ class Probe:
     """[m], at path displacement 0."""
     radius: float = 0.0
     """[m]; the surface stays this far from the tip, and a little off a tip without thickness."""
-    path: Path = STILL
+    path: Trajectory = STILL
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.radius) and self.radius >= 0):
@@ -163,4 +163,4 @@ class Attachment:
 
     nodes: np.ndarray
     """Node indices, (h,)."""
-    path: Path = STILL
+    path: Trajectory = STILL

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Path:
+class Trajectory:
     """Displacement over time, straight between key positions and still outside them."""
 
     times: tuple[float, ...] = (0.0,)
@@ -45,7 +45,7 @@ class Path:
         return np.array(self.times), np.array(self.displacements).T.copy()
 
 
-STILL = Path()
+STILL = Trajectory()
 
 
 @dataclass(frozen=True)

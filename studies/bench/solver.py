@@ -19,13 +19,13 @@ from massspring import (
     Plane,
     Setup,
     Sphere,
+    Trajectory,
     Volumes,
     simulate,
     step_limit,
     surface_body,
     tetrahedral_body,
 )
-from massspring import Path as Motion
 from massspring.layout.threads import cores
 from studies.bench.line import Line
 from studies.geometry import ball
@@ -44,7 +44,7 @@ def squeezed_setup(method: Method, nodes: int = 550, frames: int = FRAMES) -> Se
     """The paper's surface body, held below and pressed by one plane from above; frames of 20 steps."""
     body = _surface(nodes)
     clock = Clock(STEPS * 0.5 * step_limit(body).undamped, frames, STEPS)
-    press = Motion((0.0, 0.5 * clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.3 * RADIUS)))
+    press = Trajectory((0.0, 0.5 * clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.3 * RADIUS)))
     plane = Plane((0.0, 0.0, RADIUS), (0.0, 0.0, -1.0), press)
     return Setup(body, method, clock, (plane,), (_bottom(body),), damping=40.0)
 
@@ -54,7 +54,7 @@ def probed_setup(nodes: int, method: Method | None = None) -> Setup:
     body = _surface(nodes)
     clock = Clock(LARGE_STEPS * 0.5 * step_limit(body).undamped, LARGE_FRAMES, LARGE_STEPS)
     size = 0.15 * RADIUS
-    slide = Motion((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.1 * RADIUS, 0.0, -0.06 * RADIUS)))
+    slide = Trajectory((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.1 * RADIUS, 0.0, -0.06 * RADIUS)))
     sphere = Sphere((0.0, 0.0, RADIUS + size), size, slide)
     return Setup(body, method or ImplicitVolume(), clock, (sphere,), (_bottom(body),), damping=40.0)
 
@@ -65,7 +65,7 @@ def volumes_setup(volumes: int | None) -> Setup:
     body = tetrahedral_body(mesh.points, mesh.triangles, mesh.tetrahedra, TISSUE)
     body = body.keeping(Volumes.nodal(body) if volumes is None else Volumes.regions(body, volumes))
     clock = Clock(STEPS * 0.5 * step_limit(body).undamped, 40, STEPS)
-    press = Motion((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.1 * RADIUS)))
+    press = Trajectory((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.1 * RADIUS)))
     plane = Plane((0.0, 0.0, RADIUS), (0.0, 0.0, -1.0), press)
     return Setup(body, ImplicitVolume(), clock, (plane,), (_bottom(body),), damping=40.0)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from massspring import METHODS, Attachment, Clock, Method, Path, Plane, Probe, Setup, simulate, step_limit
+from massspring import METHODS, Attachment, Clock, Method, Plane, Probe, Setup, Trajectory, simulate, step_limit
 from massspring.kernels.jit.stage_clock import new_ticks
 from massspring.layout.threads import shared
 from massspring.methods import VARIANTS
@@ -86,7 +86,7 @@ def setup_of(variant: Variant) -> Setup:
     body, method = tiny_body(variant.kind), variant.method
     dt = 0.25 * step_limit(body, added=method.added_stiffness(body)).undamped
     clock = Clock(STEPS * dt, FRAMES, STEPS)
-    down = Path((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.02 * EDGE)))
+    down = Trajectory((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.02 * EDGE)))
     plane = Plane((0.0, 0.0, EDGE), (0.0, 0.0, -1.0), down, friction=0.3)
     probes = (Probe((0.0, 0.0, 10 * EDGE)),) if variant.option == PROBE else ()
     held = Attachment(np.flatnonzero(body.rest[:, 2] < 1e-9))

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from massspring import Path as Motion
+from massspring import Trajectory
 from studies.metrics.metrics import COMPARABLE, METRICS, Run, force_end
 from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
@@ -80,7 +80,7 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
     axes.set_title(f"{heading(group[0].case.scene.name)}{mark}, {deep:.3g} mm in {motion.times[-1]:g} s")
 
 
-def _motion(scene: Scene) -> Motion:
+def _motion(scene: Scene) -> Trajectory:
     bodies = scene.obstacles if scene.probed.what == "obstacle" else scene.held
     return bodies[scene.probed.number].path
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from massspring import Obstacle, Path, Ramp
+from massspring import Obstacle, Ramp, Trajectory
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace
 from studies.scene.placing import Vector
@@ -33,7 +33,7 @@ class Held:
 
     name: str
     region: Region
-    path: Path = field(default_factory=Path)
+    path: Trajectory = field(default_factory=Trajectory)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """A ball whose two polar caps are held, the upper one pushed down: no gauge freedom, displacements are comparable."""
 
-from massspring import Path
+from massspring import Trajectory
 from studies.geometry import HalfSpace
 from studies.scene.placing import press_times
 from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
@@ -25,7 +25,7 @@ BALL_CLAMPED = Scene(
         Held(
             "top",
             HalfSpace((0.0, 0.0, CAP * RADIUS), (0.0, 0.0, -1.0)),
-            Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), (0.0, 0.0, -PUSH * RADIUS))),
+            Trajectory((0.0, PRESS_END), ((0.0, 0.0, 0.0), (0.0, 0.0, -PUSH * RADIUS))),
         ),
     ),
     probed=Probed("held", 1, (0.0, 0.0, -1.0)),

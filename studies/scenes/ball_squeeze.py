@@ -1,6 +1,6 @@
 """The paper's Figure 2: a ball squeezed by 30 % of its diameter between two frictionless planes, 800 frames."""
 
-from massspring import Path, Plane
+from massspring import Plane, Trajectory
 from studies.scene.placing import press_times
 from studies.scene.scene import Organ, Probed, ReferencePlan, Scene
 from studies.scene.tissues import LIVER
@@ -21,8 +21,8 @@ BALL_SQUEEZE = Scene(
     frames=800,
     checkpoints=press_times(0.0, PRESS_END, 6, DURATION),
     obstacles=(
-        Plane((0.0, 0.0, RADIUS), (0.0, 0.0, -1.0), Path((0.0, PRESS_END), ((0, 0, 0), (0, 0, -DEPTH * RADIUS)))),
-        Plane((0.0, 0.0, -RADIUS), (0.0, 0.0, 1.0), Path((0.0, PRESS_END), ((0, 0, 0), (0, 0, DEPTH * RADIUS)))),
+        Plane((0.0, 0.0, RADIUS), (0.0, 0.0, -1.0), Trajectory((0.0, PRESS_END), ((0, 0, 0), (0, 0, -DEPTH * RADIUS)))),
+        Plane((0.0, 0.0, -RADIUS), (0.0, 0.0, 1.0), Trajectory((0.0, PRESS_END), ((0, 0, 0), (0, 0, DEPTH * RADIUS)))),
     ),
     probed=Probed("obstacle", 0, (0.0, 0.0, -1.0)),
     damping=15.0,  # a tenth of critical in the slowest mode: what drags at 5 mm/s stays below 2 % of the force

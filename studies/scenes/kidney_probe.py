@@ -1,6 +1,6 @@
 """A kidney held around its hilum, palpated by a spherical probe on its front: a concave organ."""
 
-from massspring import Path, Sphere
+from massspring import Sphere, Trajectory
 from studies.geometry.organs.kidney import KIDNEY_REGIONS, kidney_shape
 from studies.scene.placing import along, press_times, probe_of, scaled
 from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
@@ -26,7 +26,7 @@ KIDNEY_PROBE = Scene(
         Sphere(
             along(PROBE.point, PROBE.normal, RADIUS + GAP),
             RADIUS,
-            Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(INWARD, DEPTH + GAP))),
+            Trajectory((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(INWARD, DEPTH + GAP))),
         ),
     ),
     held=(Held("hilum", KIDNEY_REGIONS["hilum"]),),

@@ -1,6 +1,6 @@
 """A liver held at its bare area and pressed from the front by a frictionless plane, as by the flat of a hand."""
 
-from massspring import Path, Plane
+from massspring import Plane, Trajectory
 from studies.geometry import LIVER_PRESS_DIRECTION, LIVER_REGIONS
 from studies.scene.placing import press_times, scaled
 from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
@@ -24,7 +24,7 @@ LIVER_PRESS = Scene(
         Plane(
             scaled(LIVER_PRESS_DIRECTION, FRONT - GAP),
             LIVER_PRESS_DIRECTION,
-            Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(LIVER_PRESS_DIRECTION, DEPTH + GAP))),
+            Trajectory((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(LIVER_PRESS_DIRECTION, DEPTH + GAP))),
         ),
     ),
     held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),

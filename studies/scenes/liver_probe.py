@@ -1,6 +1,6 @@
 """A liver held at its bare area, palpated by a spherical probe low on the front of the right lobe."""
 
-from massspring import Path, Sphere
+from massspring import Sphere, Trajectory
 from studies.geometry import LIVER_PROBE_NORMAL, LIVER_PROBE_POINT, LIVER_REGIONS
 from studies.scene.placing import along, press_times, scaled
 from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
@@ -25,7 +25,7 @@ LIVER_PROBE = Scene(
         Sphere(
             along(LIVER_PROBE_POINT, LIVER_PROBE_NORMAL, RADIUS + GAP),
             RADIUS,
-            Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(INWARD, DEPTH + GAP))),
+            Trajectory((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(INWARD, DEPTH + GAP))),
         ),
     ),
     held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),

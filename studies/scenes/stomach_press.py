@@ -1,6 +1,6 @@
 """A filled stomach between the back wall and a plane that presses from the front: wall and content are two volumes."""
 
-from massspring import Path, Plane
+from massspring import Plane, Trajectory
 from studies.geometry.organs.stomach import STOMACH_REGIONS
 from studies.scene.placing import press_times
 from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
@@ -22,7 +22,9 @@ STOMACH_PRESS = Scene(
     frames=240,
     checkpoints=press_times(0.0, PRESS_END, 5, DURATION),
     obstacles=(
-        Plane((0.0, FRONT - GAP, 0.0), INWARD, Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), (0.0, DEPTH + GAP, 0.0)))),
+        Plane(
+            (0.0, FRONT - GAP, 0.0), INWARD, Trajectory((0.0, PRESS_END), ((0.0, 0.0, 0.0), (0.0, DEPTH + GAP, 0.0)))
+        ),
         Plane((0.0, BACK, 0.0), (0.0, -1.0, 0.0)),
     ),
     held=tuple(Held(name, STOMACH_REGIONS[name]) for name in ("cardia", "pylorus")),

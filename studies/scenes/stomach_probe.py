@@ -1,6 +1,6 @@
 """A filled stomach before the back wall, palpated by a spherical probe on its front."""
 
-from massspring import Path, Plane, Sphere
+from massspring import Plane, Sphere, Trajectory
 from studies.geometry.organs.stomach import STOMACH_REGIONS, stomach_shape
 from studies.scene.placing import along, press_times, probe_of, scaled
 from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
@@ -27,7 +27,7 @@ STOMACH_PROBE = Scene(
         Sphere(
             along(PROBE.point, PROBE.normal, RADIUS + GAP),
             RADIUS,
-            Path((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(INWARD, DEPTH + GAP))),
+            Trajectory((0.0, PRESS_END), ((0.0, 0.0, 0.0), scaled(INWARD, DEPTH + GAP))),
         ),
         Plane((0.0, BACK, 0.0), (0.0, -1.0, 0.0)),
     ),

@@ -4,7 +4,7 @@ A scene of the mass-spring body alone, without a reference: that would need cont
 point, under which a continuum gives way without limit (Boussinesq); a force or a depth there depends on the mesh.
 """
 
-from massspring import Path, Probe
+from massspring import Probe, Trajectory
 from studies.geometry.organs.stomach import STOMACH_REGIONS, stomach_shape
 from studies.scene.placing import along, probe_of, scaled
 from studies.scene.scene import Held, Organ, Probed, Scene
@@ -37,7 +37,7 @@ STOMACH_SLIDE = Scene(
         Probe(
             along(PROBE.point, PROBE.normal, RADIUS + GAP),
             RADIUS,
-            Path((0.0, PRESS_END, SLIDE_END), ((0.0, 0.0, 0.0), DEEP, along(DEEP, DOWN, SLIDE))),
+            Trajectory((0.0, PRESS_END, SLIDE_END), ((0.0, 0.0, 0.0), DEEP, along(DEEP, DOWN, SLIDE))),
         ),
     ),
     held=tuple(Held(name, STOMACH_REGIONS[name]) for name in ("cardia", "pylorus")),

@@ -10,10 +10,10 @@ from massspring import (
     Free,
     ImplicitVolume,
     MassSpringError,
-    Path,
     Plane,
     Setup,
     Sphere,
+    Trajectory,
     simulate,
     step_limit,
     tetrahedral_body,
@@ -41,7 +41,7 @@ def test_no_node_is_left_inside_a_plane(ball_body, method):
 @pytest.mark.parametrize("method", [Free(), ImplicitVolume()], ids=["free", "implicit_volume"])
 def test_no_node_is_left_inside_a_sphere(ball_body, method):
     clock = clock_for(ball_body, 30, 10)
-    sphere = Sphere((0.0, 0.0, 0.0702), 0.02, Path((0.0, clock.duration), ((0, 0, 0), (0, 0, -0.015))))
+    sphere = Sphere((0.0, 0.0, 0.0702), 0.02, Trajectory((0.0, clock.duration), ((0, 0, 0), (0, 0, -0.015))))
     held = Attachment(np.flatnonzero(ball_body.rest[:, 2] < -0.04))
     setup = Setup(ball_body, method, clock, (sphere,), (held,), damping=30.0)
     history = simulate(setup, snapshots=range(1, 31))
@@ -66,7 +66,7 @@ def test_a_deep_probe_comes_to_rest(method):
     frame = 10 * step_limit(body, damping, held).damped
     clock = Clock(frame, round(1.5 / frame), 20)
     start, down = (0.031, 0.029, float(points[:, 2].max()) + 0.0081), (0.0, 0.0, -0.012)
-    probe = Sphere(start, 0.008, Path((0.0, 0.9), ((0, 0, 0), down)))
+    probe = Sphere(start, 0.008, Trajectory((0.0, 0.9), ((0, 0, 0), down)))
     history = simulate(Setup(body, method, clock, (probe,), (Attachment(held),), damping=damping))
     share = history.kinetic / np.maximum(history.elastic, history.elastic[-1] * 1e-3)
     assert np.linalg.norm(history.contact_force[-1, 0]) > 0.1 * SOFT.shear_modulus * probe.radius**2
@@ -80,7 +80,7 @@ def test_forces_balance_at_rest(block_body, method):
     """What the sphere gives, the attachment takes: contact + reaction + weight = 0 once all is still."""
     clock = clock_for(block_body, 200, 20)
     top = block_body.rest[:, 2].max()
-    press = Path((0.0, 0.2 * clock.duration), ((0, 0, 0), (0, 0, -0.02)))
+    press = Trajectory((0.0, 0.2 * clock.duration), ((0, 0, 0), (0, 0, -0.02)))
     sphere = Sphere((0.03, 0.025, top + 0.04), 0.03, press)
     held = Attachment(np.flatnonzero(block_body.rest[:, 2] < 0.005))
     gravity = (0.3, 0.0, -1.0)
@@ -111,7 +111,7 @@ def test_clamps_lose_no_volume_when_contact_is_inside_the_multiplier(block_body)
 def test_held_nodes_follow_their_path_exactly(ball_body):
     clock = clock_for(ball_body, 20, 10)
     nodes = np.flatnonzero(ball_body.rest[:, 2] > 0.04)
-    path = Path((0.0, 0.5 * clock.duration, clock.duration), ((0, 0, 0), (0.004, 0, -0.006), (0, 0.001, 0)))
+    path = Trajectory((0.0, 0.5 * clock.duration, clock.duration), ((0, 0, 0), (0.004, 0, -0.006), (0, 0.001, 0)))
     setup = Setup(ball_body, ImplicitVolume(), clock, attachments=(Attachment(nodes, path),), damping=30.0)
     history = simulate(setup, snapshots=range(1, 21))
     for frame, x in zip(history.snapshot_frames, history.snapshots, strict=True):
@@ -120,7 +120,7 @@ def test_held_nodes_follow_their_path_exactly(ball_body):
 
 def test_the_distance_to_a_capsule_is_that_to_the_nearest_of_many_spheres():
     """Outside truth: 2,001 spheres along the axis; the nearest is off by half a spacing's square over twice the gap."""
-    capsule = Capsule((0.0, 0.01, 0.0), (0.05, -0.02, 0.03), 0.004, Path((0.0, 1.0), ((0, 0, 0), (0.01, 0, 0))))
+    capsule = Capsule((0.0, 0.01, 0.0), (0.05, -0.02, 0.03), 0.004, Trajectory((0.0, 1.0), ((0, 0, 0), (0.01, 0, 0))))
     points = np.random.default_rng(0).uniform(-0.1, 0.1, (50, 3))
     axis = capsule.anchor + np.linspace(0, 1, 2001)[:, None] * capsule.span + [0.005, 0, 0]
     nearest = np.linalg.norm(points[:, None] - axis[None], axis=2).min(axis=1) - 0.004
@@ -133,7 +133,9 @@ def test_no_node_is_left_inside_a_capsule(ball_body, method, direction):
     clock = clock_for(ball_body, 30, 10)
     axis = 0.06 * np.array(direction) / np.linalg.norm(direction)
     start = np.array([0.001, 0.0, 0.0612]) - (0.5 * axis if direction[2] == 0 else 0)
-    capsule = Capsule(tuple(start), tuple(start + axis), 0.01, Path((0.0, clock.duration), ((0, 0, 0), (0, 0, -0.02))))
+    capsule = Capsule(
+        tuple(start), tuple(start + axis), 0.01, Trajectory((0.0, clock.duration), ((0, 0, 0), (0, 0, -0.02)))
+    )
     held = Attachment(np.flatnonzero(ball_body.rest[:, 2] < -0.04))
     history = simulate(Setup(ball_body, method, clock, (capsule,), (held,), damping=30.0), snapshots=range(1, 31))
     for frame, x in zip(history.snapshot_frames, history.snapshots, strict=True):
@@ -162,9 +164,15 @@ BAD = {
     "nan capsule": (lambda: (Capsule((0, 0, 1), (0, 0, np.nan), 0.1),), "give finite metres"),
     "negative friction": (lambda: (Plane((0, 0, -1), (0, 0, 1), friction=-0.1),), "friction is -0.1"),
     "unknown friction": (lambda: (Sphere((0, 0, 1), 0.1, friction="sticky"),), "friction is 'sticky'"),  # pyright: ignore
-    "nan path": (lambda: (Plane((0, 0, 1), (0, 0, -1), Path((0.0, 1.0), ((0, 0, 0), (0, 0, np.nan)))),), "not finite"),
-    "path back in time": (lambda: (Plane((0, 0, 1), (0, 0, -1), Path((1.0, 0.0), ((0, 0, 0), (0, 0, 0)))),), "ascend"),
-    "ragged path": (lambda: (Plane((0, 0, 1), (0, 0, -1), Path((0.0, 1.0), ((0, 0, 0),))),), "one each"),
+    "nan path": (
+        lambda: (Plane((0, 0, 1), (0, 0, -1), Trajectory((0.0, 1.0), ((0, 0, 0), (0, 0, np.nan)))),),
+        "not finite",
+    ),
+    "path back in time": (
+        lambda: (Plane((0, 0, 1), (0, 0, -1), Trajectory((1.0, 0.0), ((0, 0, 0), (0, 0, 0)))),),
+        "ascend",
+    ),
+    "ragged path": (lambda: (Plane((0, 0, 1), (0, 0, -1), Trajectory((0.0, 1.0), ((0, 0, 0),))),), "one each"),
 }
 
 

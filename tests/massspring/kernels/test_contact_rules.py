@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from massspring import Capsule, Clock, ImplicitVolume, Path, Plane, Setup, Sphere, surface_body
+from massspring import Capsule, Clock, ImplicitVolume, Plane, Setup, Sphere, Trajectory, surface_body
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
@@ -16,7 +16,7 @@ DT = 1e-3
 LAM = 40.0
 ROUND_OFF = 1e-12
 """m, of places of some centimetres, and m/s, of some metres per second."""
-ALONG = Path((0.0, 1.0), ((0.0, 0.0, 0.0), (1.3, -0.7, 0.4)))
+ALONG = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (1.3, -0.7, 0.4)))
 FLOOR, WALL = Plane((0.0, 0.0, -0.0501), (0.0, 0.0, 1.0)), Plane((-0.0501, 0.0, 0.0), (1.0, 0.0, 0.0))
 ABOVE = (-0.02, -0.02, -0.0500), (0.02, 0.02, -0.0475)
 OBSTACLES: dict[str, tuple[tuple, tuple]] = {

@@ -7,9 +7,9 @@ from massspring import (
     Attachment,
     Free,
     ImplicitVolume,
-    Path,
     Plane,
     Setup,
+    Trajectory,
     simulate,
     tetrahedral_body,
 )
@@ -24,7 +24,7 @@ def wedge_of(depth: float, duration: float, angle: float) -> tuple[Plane, Plane]
     planes = []
     for side in (-1, 1):
         normal = np.array([side * np.sin(angle), 0.0, np.cos(angle)])
-        path = Path((0.0, duration), ((0, 0, 0), tuple(depth * normal)))
+        path = Trajectory((0.0, duration), ((0, 0, 0), tuple(depth * normal)))
         planes.append(Plane(tuple(-0.05 * normal), tuple(normal), path))
     return planes[0], planes[1]
 
@@ -94,7 +94,7 @@ def test_a_rough_plane_takes_along_what_it_touches(ball_body):
     clock = clock_for(ball_body, 100, 20)
     low, high = ball_body.rest[:, 2].min(), ball_body.rest[:, 2].max()
     keys = (0.0, 0.2 * clock.duration, 0.4 * clock.duration)
-    down = Path(keys, ((0, 0, 0), (0, 0, -0.01), (0.004, 0, -0.01)))
+    down = Trajectory(keys, ((0, 0, 0), (0, 0, -0.01), (0.004, 0, -0.01)))
     planes = (Plane((0, 0, high), (0, 0, -1), down, "no_slip"), Plane((0, 0, low), (0, 0, 1), friction="no_slip"))
     setup = Setup(ball_body, ImplicitVolume(), clock, planes, damping=40.0)
     history = simulate(setup, snapshots=(30, 100))

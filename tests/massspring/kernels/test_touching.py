@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from massspring import Clock, ImplicitSprings, Path, Plane, Setup
+from massspring import Clock, ImplicitSprings, Plane, Setup, Trajectory
 from massspring.kernels.contact.modes import SLIDES, STICKS
 from massspring.methods.implicit.contact import SLIP_RESOLUTION, Contact, Touching
 
 DT, MU = 5e-3, 0.5
 BELOW = 1e-3
 CARRIED = np.array([0.3, -0.2, 0.0])
-ALONG = Path((0.0, 1.0), ((0.0, 0.0, 0.0), tuple(CARRIED)))
+ALONG = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), tuple(CARRIED)))
 
 
 class Sole:

@@ -3,7 +3,7 @@ sentence; and docs/methods.md says the same."""
 
 from dataclasses import replace
 from itertools import combinations
-from pathlib import Path as File
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +13,11 @@ from massspring import (
     METHODS,
     Clock,
     MassSpringError,
-    Path,
     Plane,
     Probe,
     Ramp,
     Setup,
+    Trajectory,
     Volumes,
     membrane_body,
     simulate,
@@ -122,7 +122,7 @@ def test_every_method_supports_friction(method, block_body):
     """A rough plane that presses and slides drags the body along."""
     clock = clock_for(block_body, 5, 10, method=method)
     top = float(block_body.rest[:, 2].max())
-    way = Path((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.002, 0.0, -0.002)))
+    way = Trajectory((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.002, 0.0, -0.002)))
     setup = Setup(block_body, method, clock, (Plane((0, 0, top), (0, 0, -1), way, friction=0.5),))
     drag = simulate(setup).contact_force.sum(axis=0)[0]
     assert drag[2] < 0 and 0.05 * -drag[2] < drag[0] <= 0.5 * -drag[2] * (1 + 1e-9)
@@ -169,5 +169,5 @@ def test_settings_that_support_something_else_say_so_for_themselves_alone():
 
 
 def test_the_page_of_the_docs_is_the_table():
-    page = File(__file__).parents[3] / "docs" / "methods.md"
+    page = Path(__file__).parents[3] / "docs" / "methods.md"
     assert page.read_text(encoding="utf-8") == methods_page(), "run python -m studies.report.methods_page"

@@ -9,8 +9,8 @@ from massspring import (
     Element,
     Free,
     ImplicitVolume,
-    Path,
     Setup,
+    Trajectory,
     Xpbd,
     simulate,
     tetrahedral_body,
@@ -164,7 +164,7 @@ def test_xpbd_of_the_whole_is_as_compliant_as_it_is_told(ball_body):
 def sheared(body, method):
     """Force it takes to move the upper face of a clamped block sideways by a tenth of its height [N]."""
     low, high = body.rest[:, 2] < 0.005, body.rest[:, 2] > 0.055
-    side = Path((0.0, 0.3), ((0, 0, 0), (0.006, 0.0, 0.0)))
+    side = Trajectory((0.0, 0.3), ((0, 0, 0), (0.006, 0.0, 0.0)))
     held = (Attachment(np.flatnonzero(low)), Attachment(np.flatnonzero(high), side))
     clock = Clock(0.01, 60, int(np.ceil(0.01 / clock_for(body, 1, 1, method=method).dt)))
     history = simulate(Setup(body, method, clock, attachments=held, damping=40.0))

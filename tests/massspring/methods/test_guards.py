@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from massspring import Attachment, Body, Clock, Free, Method, Path, Plane, Ramp, Setup, simulate
+from massspring import Attachment, Body, Clock, Free, Method, Plane, Ramp, Setup, Trajectory, simulate
 from massspring.methods.capabilities import Capabilities
 from massspring.methods.method import begin_frame
 from massspring.world.targets import fastest_filling
@@ -153,7 +153,7 @@ def test_steps_far_above_the_limit_end_the_run(case, option):
 
 
 @dataclass(frozen=True)
-class Broken(Path):
+class Broken(Trajectory):
     """A path that was made elsewhere and ends in NaN."""
 
     until: float = 0.0

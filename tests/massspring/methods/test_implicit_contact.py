@@ -7,10 +7,10 @@ from massspring import (
     Attachment,
     Clock,
     ImplicitSprings,
-    Path,
     Plane,
     Setup,
     Sphere,
+    Trajectory,
     Volumes,
     simulate,
     tetrahedral_body,
@@ -31,7 +31,7 @@ def test_a_block_on_the_floor_presses_with_its_weight(block_body):
 
 def test_what_touches_a_rough_plane_moves_with_it(block_body):
     low, high = block_body.rest[:, 2].min(), block_body.rest[:, 2].max()
-    carry = Path((0.0, 1.0, 3.0), ((0, 0, 0), (0, 0, -0.004), (0.01, 0, -0.004)))
+    carry = Trajectory((0.0, 1.0, 3.0), ((0, 0, 0), (0, 0, -0.004), (0.01, 0, -0.004)))
     planes = (
         Plane((0, 0, float(high)), (0, 0, -1), carry, "no_slip"),
         Plane((0, 0, float(low)), (0, 0, 1), friction="no_slip"),
@@ -65,7 +65,7 @@ def test_a_sphere_presses_and_volumes_are_many(block_body):
     body = tetrahedral_body(*block((4, 4, 3)), SOFT)
     body = body.keeping(Volumes.nodal(body))
     top = float(body.rest[:, 2].max())
-    probe = Sphere((0.04, 0.04, top + 0.031), 0.03, Path((0.0, 1.0), ((0, 0, 0), (0, 0, -0.008))))
+    probe = Sphere((0.04, 0.04, top + 0.031), 0.03, Trajectory((0.0, 1.0), ((0, 0, 0), (0, 0, -0.008))))
     floor = np.flatnonzero(body.rest[:, 2] < 0.005)
     setup = Setup(body, ImplicitSprings(), Clock(0.05, 40, 1), (probe,), (Attachment(floor),), damping=5.0)
     history = simulate(setup)

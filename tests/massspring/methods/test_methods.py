@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from massspring import Body, Clock, ImplicitVolume, Method, Path, Plane, Setup, simulate, step_limit
+from massspring import Body, Clock, ImplicitVolume, Method, Plane, Setup, Trajectory, simulate, step_limit
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.constraint.one_volume import volume_multiplier
 from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
@@ -27,8 +27,8 @@ def clock_for(body: Body, frames: int, steps: int, fraction: float = 0.5, method
 
 def squeeze(body: Body, depth: float, duration: float) -> tuple[Plane, Plane]:
     low, high = body.rest[:, 2].min(), body.rest[:, 2].max()
-    down = Path((0.0, duration), ((0, 0, 0), (0, 0, -depth)))
-    up = Path((0.0, duration), ((0, 0, 0), (0, 0, depth)))
+    down = Trajectory((0.0, duration), ((0, 0, 0), (0, 0, -depth)))
+    up = Trajectory((0.0, duration), ((0, 0, 0), (0, 0, depth)))
     return Plane((0, 0, high), (0, 0, -1), down), Plane((0, 0, low), (0, 0, 1), up)
 
 
@@ -98,7 +98,7 @@ def test_moving_and_turning_the_scene_moves_and_turns_the_answer(kept_body, meth
         Plane(
             tuple(turn @ np.array(p.point) + shift),
             tuple(turn @ np.array(p.normal)),
-            Path(p.path.times, tuple(tuple(turn @ np.array(d)) for d in p.path.displacements)),
+            Trajectory(p.path.times, tuple(tuple(turn @ np.array(d)) for d in p.path.displacements)),
         )
         for p in planes
     )

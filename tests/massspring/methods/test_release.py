@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from massspring import Attachment, Clock, ImplicitVolume, Path, Plane, Setup, surface_body
+from massspring import Attachment, Clock, ImplicitVolume, Plane, Setup, Trajectory, surface_body
 from massspring.analysis.stability import step_limit
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.friction import release_wedged
@@ -24,7 +24,7 @@ def there_and_back(plane: Plane, depth: float, duration: float) -> Plane:
     """The plane goes in by `depth` [m] in 0.3 of the time and is back at half time."""
     inwards = tuple(depth * np.array(plane.normal))
     return Plane(
-        plane.point, plane.normal, Path((0.0, 0.3 * duration, 0.5 * duration), ((0, 0, 0), inwards, (0, 0, 0)))
+        plane.point, plane.normal, Trajectory((0.0, 0.3 * duration, 0.5 * duration), ((0, 0, 0), inwards, (0, 0, 0)))
     )
 
 

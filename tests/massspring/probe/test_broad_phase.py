@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Clock, Free, ImplicitVolume, Path, Probe, Setup
+from massspring import Clock, Free, ImplicitVolume, Probe, Setup, Trajectory
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
 from massspring.kernels.probe.arrays import IN_CONTACT
@@ -115,7 +115,7 @@ def test_a_tip_from_afar_wakes_what_it_meets(way):
     `way`: of the tip in a step, in radii of the ball.
     """
     dt = pressed(Free()).clock.dt
-    down = Path((6 * dt, 6 * dt + 4.0 / way * dt), ((0, 0, 0), (0.1 * R, 0.05 * R, -4.0 * R)))
+    down = Trajectory((6 * dt, 6 * dt + 4.0 / way * dt), ((0, 0, 0), (0.1 * R, 0.05 * R, -4.0 * R)))
     velocity = np.full(BALL.rest.shape, 0.05 * R / dt) * [0.3, -0.2, 0.5]
     probe = Probe((0.1 * R, 0.2 * R, 2.5 * R), 0.1 * EDGE, down)
     setup, ends = Setup(BALL, Free(), Clock(dt, 6 + int(np.ceil(2.6 / way)), 1), (probe,), velocity=velocity), []

@@ -9,11 +9,11 @@ from massspring import (
     Free,
     ImplicitVolume,
     MassSpringError,
-    Path,
     Plane,
     Probe,
     Setup,
     Sphere,
+    Trajectory,
     Xpbd,
     simulate,
     surface_body,
@@ -39,7 +39,7 @@ def pressed(method, radius=0.0, depth=0.02, frames=60, slide=0.0, **options):
     """A probe that comes down on the ball between its nodes, and may slide then; the ball is held below."""
     clock = clock_for(BALL, frames, 20)
     keys = ((0, 0, 0), (0, 0, -depth), (slide, 0, -depth))
-    way = Path((0.0, 0.4 * clock.duration, clock.duration), keys)
+    way = Trajectory((0.0, 0.4 * clock.duration, clock.duration), keys)
     probe = Probe((0.003, 0.002, R + 0.002 + radius), radius, way)
     held = Attachment(np.flatnonzero(BALL.rest[:, 2] < -0.04))
     return Setup(BALL, method, clock, (probe,), (held,), damping=30.0, **options)
@@ -202,7 +202,7 @@ def test_a_probe_that_meets_nothing_changes_no_bit(method):
 def test_forces_come_in_the_order_of_the_obstacles():
     clock = clock_for(BALL, 40, 20)
     plane = Plane((0, 0, -R), (0, 0, 1))
-    down = Path((0.0, 0.5 * clock.duration), ((0, 0, 0), (0, 0, -0.01)))
+    down = Trajectory((0.0, 0.5 * clock.duration), ((0, 0, 0), (0, 0, -0.01)))
     probe = Probe((0.003, 0.002, R + 0.002), 0.0, down)
     history = simulate(Setup(BALL, ImplicitVolume(), clock, (probe, plane), damping=60.0))
     assert history.contact_force[-1, 0, 2] < 0 < history.contact_force[-1, 1, 2]
@@ -221,8 +221,8 @@ def test_the_history_counts_what_probes_did():
 BAD = {
     "inside": (lambda: Probe((0.001, 0.0, 0.002)), {}, "starts .* inside the body"),
     "its ball reaches in": (lambda: Probe((0.0, 0.0, R + 0.002), 0.3 * EDGE), {}, "starts .* inside the body"),
-    "path starts inside": (lambda: Probe((0, 0, 1), path=Path((0.0,), ((0, 0, -1.0),))), {}, "starts .* inside"),
-    "nan path": (lambda: Probe((0, 0, 1), path=Path((0.0, 1.0), ((0, 0, 0), (0, np.nan, 0)))), {}, "not finite"),
+    "path starts inside": (lambda: Probe((0, 0, 1), path=Trajectory((0.0,), ((0, 0, -1.0),))), {}, "starts .* inside"),
+    "nan path": (lambda: Probe((0, 0, 1), path=Trajectory((0.0, 1.0), ((0, 0, 0), (0, np.nan, 0)))), {}, "not finite"),
     "nan tip": (lambda: Probe((0, 0, np.nan)), {}, "give finite metres"),
     "negative radius": (lambda: Probe((0, 0, 1), -0.1), {}, "zero or positive"),
     "nan radius": (lambda: Probe((0, 0, 1), np.nan), {}, "zero or positive"),

@@ -11,10 +11,10 @@ from massspring import (
     Attachment,
     Clock,
     ImplicitVolume,
-    Path,
     Plane,
     Probe,
     Setup,
+    Trajectory,
     simulate,
 )
 from massspring.body.inside import is_inside, surface_distance
@@ -77,7 +77,7 @@ def crossing_setup(side, through, start, length, share, thickness, method, held=
     way = R * np.array(through) - here
     way *= length * R / np.linalg.norm(way)
     dt = clock_for(BALL, 1, 20).dt
-    path = Path((3.3 * dt, 3.3 * dt + share * 20 * dt), ((0, 0, 0), tuple(way)))
+    path = Trajectory((3.3 * dt, 3.3 * dt + share * 20 * dt), ((0, 0, 0), tuple(way)))
     probe = Probe(tuple(here), thickness * EDGE, path)
     attachments = (Attachment(held),) if len(held) else ()
     # A frame a step, so that every step is seen.
@@ -149,7 +149,7 @@ def test_attached_tissue_stops_the_run_and_nothing_else_does(**path):
 
 def test_a_blocked_run_says_which_probe_and_where():
     clock = clock_for(BALL, 30, 20)
-    down = Path((0.0, clock.duration), ((0, 0, 0), (0, 0, -0.06)))
+    down = Trajectory((0.0, clock.duration), ((0, 0, 0), (0, 0, -0.06)))
     probe = Probe((0.003, 0.002, R + 0.002), 0.0, down)
     plane = Plane((0, 0, -R), (0, 0, 1))
     held = Attachment(np.flatnonzero(BALL.rest[:, 2] > 0.03))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Clock, ImplicitVolume, Path, Probe, Setup, Volumes
+from massspring import Clock, ImplicitVolume, Probe, Setup, Trajectory, Volumes
 from massspring.body.inside import mean_edge
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.modes import FREE
@@ -45,7 +45,7 @@ def driven_through(body, way):
     """A probe above the middle of a free body at rest goes down by `way` edges within a step."""
     edge, dt, x = mean_edge(body), clock_for(body, 1, 20).dt, body.rest
     tip = np.array([*x[:, :2].mean(axis=0), x[:, 2].max()]) + edge * np.array([0.21, 0.13, 0.05])
-    down = Path((0.0, dt), ((0, 0, 0), (0.1 * edge, 0.05 * edge, -(way + 0.05) * edge)))
+    down = Trajectory((0.0, dt), ((0, 0, 0), (0.1 * edge, 0.05 * edge, -(way + 0.05) * edge)))
     return Setup(body, METHOD, Clock(dt, 4, 1), (Probe(tuple(tip), 0.0, down),))
 
 

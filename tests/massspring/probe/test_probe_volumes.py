@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Attachment, ImplicitVolume, Path, Probe, Setup, Volumes, simulate
+from massspring import Attachment, ImplicitVolume, Probe, Setup, Trajectory, Volumes, simulate
 from massspring.kernels.probe.arrays import CARRYING, IN_CONTACT, LEFT_BEHIND
 from massspring.run.simulation import pierced
 from tests.massspring.methods.test_methods import clock_for
@@ -28,7 +28,7 @@ def pressed(body, depth=0.008, frames=40, steps=20, slide=0.0, **options):
     clock = clock_for(body, frames, steps)
     top = body.rest[:, 2].max()
     keys = ((0, 0, 0), (0, 0, -depth - 0.004), (slide, 0, -depth - 0.004))
-    way = Path((0.0, 0.4 * clock.duration, clock.duration), keys)
+    way = Trajectory((0.0, 0.4 * clock.duration, clock.duration), keys)
     probe = Probe((1.4 * EDGE, 1.6 * EDGE, top + 0.004), 0.0, way)
     held = Attachment(np.flatnonzero(body.rest[:, 2] < 0.25 * EDGE))
     return Setup(body, METHOD, clock, (probe,), (held,), damping=30.0, **options)
@@ -110,7 +110,7 @@ def test_what_is_carried_takes_no_volume(parted_body):
     """Down by two edges within a step: contacts give up or not, nothing passes, and the volumes come back."""
     clock = clock_for(parted_body, 300, 1)
     top = parted_body.rest[:, 2].max()
-    path = Path((3.3 * clock.dt, 4.1 * clock.dt), ((0, 0, 0), (0.1 * EDGE, 0, -1.2 * EDGE)))
+    path = Trajectory((3.3 * clock.dt, 4.1 * clock.dt), ((0, 0, 0), (0.1 * EDGE, 0, -1.2 * EDGE)))
     probe = Probe((1.4 * EDGE, 1.6 * EDGE, top + 0.01 * EDGE), 0.0, path)
     setup = Setup(parted_body, METHOD, clock, (probe,), damping=30.0)
     state = setup.start()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from massspring import Free, ImplicitVolume, MassSpringError, Path, Plane, Ramp, Setup, Sphere, simulate
+from massspring import Free, ImplicitVolume, MassSpringError, Plane, Ramp, Setup, Sphere, Trajectory, simulate
 from tests.massspring.methods.test_methods import clock_for
 
 
@@ -29,8 +29,8 @@ def test_what_is_not_finite_at_the_start_is_refused(block_body, changes, words):
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])
 def test_paths_and_obstacles_that_are_not_finite_are_refused(wrong):
     for make in (
-        lambda: Path((0.0, 1.0), ((0, 0, 0), (0, 0, wrong))),
-        lambda: Path((0.0, wrong), ((0, 0, 0), (0, 0, 1))),
+        lambda: Trajectory((0.0, 1.0), ((0, 0, 0), (0, 0, wrong))),
+        lambda: Trajectory((0.0, wrong), ((0, 0, 0), (0, 0, 1))),
         lambda: Plane((0, 0, wrong), (0, 0, 1)),
         lambda: Plane((0, 0, 0), (0, 0, wrong)),
         lambda: Sphere((0, wrong, 0), 0.1),

@@ -14,11 +14,11 @@ from massspring import (
     MassSpringError,
     Setup,
     Sphere,
+    Trajectory,
     Volumes,
     simulate,
     surface_body,
 )
-from massspring import Path as Motion
 from massspring.analysis.stability import step_limit
 from massspring.kernels.jit.blocks import BLOCK
 from massspring.kernels.jit.thread_team import JOB, JOB_END, JOB_SPRINGS, call, join, team_of
@@ -43,7 +43,7 @@ def many_cores(monkeypatch):
 def slid(body, method, **options) -> Setup:
     """A ball into which a sphere goes by a tenth of the radius while it slides; 4 frames of 10 steps."""
     clock = Clock(10 * 0.5 * step_limit(body).undamped, 4, 10)
-    way = Motion((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.2 * RADIUS, 0.0, -0.1 * RADIUS)))
+    way = Trajectory((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.2 * RADIUS, 0.0, -0.1 * RADIUS)))
     sphere = Sphere((0.0, 0.0, 1.3 * RADIUS), 0.3 * RADIUS, way, friction=0.3)
     held = (Attachment(np.flatnonzero(body.rest[:, 2] < -0.8 * RADIUS)),)
     return Setup(body, method, clock, (sphere,), held, gravity=(0.0, 0.0, -9.81), damping=40.0, **options)

@@ -4,7 +4,7 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path as File
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,11 +14,11 @@ from massspring import (
     Clock,
     ImplicitSprings,
     ImplicitVolume,
-    Path,
     Plane,
     Probe,
     Setup,
     Sphere,
+    Trajectory,
     Volumes,
     simulate,
     surface_body,
@@ -28,7 +28,7 @@ from massspring.kernels.probe.arrays import CARRIED
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.methods.test_methods import clock_for, squeeze
 
-REPOSITORY = File(__file__).parents[3]
+REPOSITORY = Path(__file__).parents[3]
 
 
 def slices():
@@ -50,7 +50,7 @@ def implicit():
     body = body.keeping(Volumes.regions(body, 4))
     floor = Plane((0, 0, float(body.rest[:, 2].min())), (0, 0, 1), friction=5.0)
     high = float(body.rest[:, 2].max())
-    ball = Sphere((0.02, 0.02, high + 0.021), 0.02, Path((0.0, 0.05), ((0, 0, 0), (0, 0, -0.006))))
+    ball = Sphere((0.02, 0.02, high + 0.021), 0.02, Trajectory((0.0, 0.05), ((0, 0, 0), (0, 0, -0.006))))
     return Setup(body, ImplicitSprings(passes=3), Clock(0.01, 4, 1), (floor, ball), gravity=(0.0, 0.0, -9.81))
 
 
@@ -58,7 +58,7 @@ def probed():
     """A thin probe that presses beside an attached node, and then shoots through the ball: nodes are carried."""
     body = surface_body(*icosphere(1), SOFT)
     clock = clock_for(body, 4, 5)
-    way = Path((0.0, 0.8 * clock.duration, clock.duration), ((0, 0, 0), (0, 0, -0.004), (0, 0, -0.1)))
+    way = Trajectory((0.0, 0.8 * clock.duration, clock.duration), ((0, 0, 0), (0, 0, -0.004), (0, 0, -0.1)))
     probe = Probe((0.003, 0.002, 0.051), 0.0, way)
     held = Attachment(np.array([int(np.linalg.norm(body.rest - probe.tip, axis=1).argmin())]))
     return Setup(body, ImplicitVolume(), clock, (probe,), (held,), damping=5.0)

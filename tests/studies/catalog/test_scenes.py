@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import METHODS, Capsule, Path, Plane, Ramp, simulate
+from massspring import METHODS, Capsule, Plane, Ramp, Trajectory, simulate
 from reference_fem import NewtonSettings
 from reference_fem.model.problem import find_held
 from reference_fem.system.saddle_point import System
@@ -189,7 +189,7 @@ def test_both_solvers_see_the_same_load_at_the_same_time(judged):
 
 def _later(scene):
     """A mutant whose paths lag a tenth of a second behind."""
-    late = lambda path: Path(tuple(t + 0.1 for t in path.times), path.displacements)  # noqa: E731
+    late = lambda path: Trajectory(tuple(t + 0.1 for t in path.times), path.displacements)  # noqa: E731
     filling = scene.lumen.filling if scene.lumen else None
     return replace(
         scene,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import MassSpringError, Path
+from massspring import MassSpringError, Trajectory
 from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
 from studies.runs.case import BodyRecipe
@@ -76,7 +76,7 @@ def test_attachments_are_the_caps_with_their_paths(ball_mesh):
     assert (height[top.nodes] > cap * (1 - 1e-6)).all()
     assert (height[bottom.nodes] < -cap * (1 - 1e-6)).all()
     assert top.path == CLAMPED.held[1].path
-    assert bottom.path == Path()
+    assert bottom.path == Trajectory()
 
 
 def test_a_mesh_from_a_file_is_attached_where_the_region_is(tmp_path):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Capsule, Free, ImplicitVolume, Path, Plane, Sphere
+from massspring import Capsule, Free, ImplicitVolume, Plane, Sphere, Trajectory
 from studies.report.kept_volume import PROMISED, kept_volumes, promised, worst_volume
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import case_path
@@ -68,7 +68,7 @@ def test_without_a_constraint_the_promise_is_broken():
 )
 def test_contact_held_still_loses_nothing(obstacle, volumes):
     """Clamped nodes are inside the multiplier: after it they would lose 0.05 to 0.6 % of the volume."""
-    pressing = replace(obstacle, path=Path((0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.015))))
+    pressing = replace(obstacle, path=Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.015))))
     scene = replace(SQUEEZE, obstacles=(pressing,), held=(BALL_CLAMPED.held[0],), damping=40.0)
     # What an iterative solve may leave is set apart: ten times less than what is looked for.
     method = ImplicitVolume(tolerance=0.1 * STATIC)

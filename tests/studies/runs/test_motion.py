@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Capsule, Path, Plane, Probe, Sphere
+from massspring import Capsule, Plane, Probe, Sphere, Trajectory
 from reference_fem import RigidCapsule, RigidPlane, RigidSphere
 from reference_fem.dynamics import inertia
 from reference_fem.uncertainty import combined
@@ -144,7 +144,7 @@ def test_a_scene_at_rest_has_no_frequency():
 
 
 def test_obstacles_come_over_with_their_slip():
-    path = Path((0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.01)))
+    path = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.01)))
     rod = rigid(Capsule((0.0, 0.0, 0.1), (0.1, 0.0, 0.1), 0.02, path, "no_slip"))
     assert isinstance(rod, RigidCapsule)
     assert (rod.start, rod.end, rod.radius, rod.slip) == ((0.0, 0.0, 0.1), (0.1, 0.0, 0.1), 0.02, "no_slip")

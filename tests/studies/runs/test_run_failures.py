@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Capsule, Path, Sphere
+from massspring import Capsule, Sphere, Trajectory
 from studies.geometry import HalfSpace
 from studies.runs.case import BodyRecipe
 from studies.runs.current import why_case_is_stale
@@ -131,7 +131,7 @@ def test_bad_settings_fail_in_one_sentence(changes, word):
 def test_attachments_that_overlap_or_miss_fail_in_one_sentence(tmp_path):
     """A mesh from a file has no outlines: the region is looked for among its nodes."""
     path = write_obj(tmp_path / "box.obj", *box())
-    top = Held("top", HalfSpace((0.0, 0.0, 0.04), (0.0, 0.0, -1.0)), Path())
+    top = Held("top", HalfSpace((0.0, 0.0, 0.04), (0.0, 0.0, -1.0)), Trajectory())
     far = Held("far", HalfSpace((0.0, 0.0, 9.0), (0.0, 0.0, -1.0)))
     body = BodyRecipe("surface")
     assert measure(tiny_case(scene=file_scene(path, held=(top,)), body=body)).status == Status.OK

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from massspring import Clock, Free, ImplicitVolume, Path, simulate
+from massspring import Clock, Free, ImplicitVolume, Trajectory, simulate
 from studies.bench.solver import squeezed_setup, without_ns
 from studies.scenes.ball_squeeze import RADIUS
 
@@ -27,7 +27,7 @@ def test_both_begin_each_frame_where_the_run_is():
     seen.update(on=[], off=[])
     setup = squeezed_setup(Kept())
     clock = Clock(setup.clock.dt, 6, setup.clock.steps)
-    press = Path((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.05 * RADIUS)))
+    press = Trajectory((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.05 * RADIUS)))
     short = replace(setup, clock=clock, obstacles=(replace(setup.obstacles[0], path=press),))
     times = without_ns(short, Loose())
     assert times.shape == (2, 6) and (times > 0).all()
