@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from studies.metrics.table import study_table
     from studies.runs.case import BodyRecipe, Case
     from studies.runs.run import measure
-    from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
+    from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
     from studies.scene.start import Start
     from studies.scene.tissues import Tissue
     from studies.scenes import SCENES
@@ -72,6 +72,7 @@ _FACE = {
     "Case": "studies.runs.case",
     "Chart": "studies.catalog.study",
     "Element": "massspring.methods.element",
+    "ForceOutput": "studies.scene.scene",
     "Free": "massspring.methods.free",
     "Held": "studies.scene.scene",
     "ImplicitSprings": "massspring.methods.implicit_springs",
@@ -83,7 +84,6 @@ _FACE = {
     "Penalty": "massspring.methods.penalty",
     "PostStabilization": "massspring.methods.post_stabilization",
     "Pressure": "massspring.methods.pressure",
-    "Probed": "studies.scene.scene",
     "Projection": "massspring.methods.projection",
     "Pyramid": "massspring.methods.pyramid",
     "Record": "studies.store.record",

@@ -53,7 +53,7 @@ class Lumen:
 
 
 @dataclass(frozen=True)
-class Probed:
+class ForceOutput:
     """The force a scene is about: what an obstacle, or an attachment, feels of the body."""
 
     what: str
@@ -107,7 +107,7 @@ class Scene:
     frames: int
     checkpoints: tuple[float, ...]
     """Times at which the reference is known [s], ascending; the last one is the scene at its deepest, come to rest."""
-    probed: Probed
+    probed: ForceOutput
     reference: ReferencePlan | None
     obstacles: tuple[Obstacle, ...] = ()
     held: tuple[Held, ...] = ()

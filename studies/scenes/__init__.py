@@ -1,6 +1,6 @@
 """The scenes, one file each. Adding one: a file and a line in SCENES, from which all else follows."""
 
-from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
 from studies.scene.start import Start
 from studies.scene.tissues import Tissue
 from studies.scenes.ball_clamped import BALL_CLAMPED
@@ -46,10 +46,10 @@ __all__ = [
     "STOMACH_PRESS",
     "STOMACH_PROBE",
     "STOMACH_SLIDE",
+    "ForceOutput",
     "Held",
     "Lumen",
     "Organ",
-    "Probed",
     "ReferencePlan",
     "Scene",
     "Start",

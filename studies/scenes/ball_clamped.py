@@ -3,7 +3,7 @@
 from massspring import Trajectory
 from studies.geometry import HalfSpace
 from studies.scene.placing import press_times
-from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Held, Organ, ReferencePlan, Scene
 from studies.scene.tissues import LIVER
 
 RADIUS = 0.05  # m
@@ -28,7 +28,7 @@ BALL_CLAMPED = Scene(
             Trajectory((0.0, PRESS_END), ((0.0, 0.0, 0.0), (0.0, 0.0, -PUSH * RADIUS))),
         ),
     ),
-    probed=Probed("held", 1, (0.0, 0.0, -1.0)),
+    probed=ForceOutput("held", 1, (0.0, 0.0, -1.0)),
     damping=15.0,  # a tenth of critical in the slowest mode: what drags at 5 mm/s stays below 2 % of the force
     reference=ReferencePlan("solid", (300, 550, 900)),
 )

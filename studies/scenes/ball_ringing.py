@@ -1,6 +1,6 @@
 """A free ball struck so that it stretches and flattens in turn: does it ring as fast as the continuum does?"""
 
-from studies.scene.scene import Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Organ, ReferencePlan, Scene
 from studies.scene.start import Start
 from studies.scene.tissues import LIVER
 
@@ -17,7 +17,7 @@ BALL_RINGING = Scene(
     duration=FRAMES * FRAME,
     frames=FRAMES,
     checkpoints=tuple(FRAME * (k + 1) for k in range(FRAMES)),
-    probed=Probed("obstacle", 0, (0.0, 0.0, -1.0)),  # nothing touches it: its force is not among the quantities
+    probed=ForceOutput("obstacle", 0, (0.0, 0.0, -1.0)),  # nothing touches it: its force is not among the quantities
     damping=1.0,  # a hundredth of critical
     start=Start(
         speed=((-0.5 * STRETCHING, 0.0, 0.0), (0.0, -0.5 * STRETCHING, 0.0), (0.0, 0.0, STRETCHING)),

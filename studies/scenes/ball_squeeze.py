@@ -2,7 +2,7 @@
 
 from massspring import Plane, Trajectory
 from studies.scene.placing import press_times
-from studies.scene.scene import Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Organ, ReferencePlan, Scene
 from studies.scene.tissues import LIVER
 
 RADIUS = 0.05  # m
@@ -24,7 +24,7 @@ BALL_SQUEEZE = Scene(
         Plane((0.0, 0.0, RADIUS), (0.0, 0.0, -1.0), Trajectory((0.0, PRESS_END), ((0, 0, 0), (0, 0, -DEPTH * RADIUS)))),
         Plane((0.0, 0.0, -RADIUS), (0.0, 0.0, 1.0), Trajectory((0.0, PRESS_END), ((0, 0, 0), (0, 0, DEPTH * RADIUS)))),
     ),
-    probed=Probed("obstacle", 0, (0.0, 0.0, -1.0)),
+    probed=ForceOutput("obstacle", 0, (0.0, 0.0, -1.0)),
     damping=15.0,  # a tenth of critical in the slowest mode: what drags at 5 mm/s stays below 2 % of the force
     reference=ReferencePlan("octant", (0.22, 0.16, 0.12)),
     # The ball may turn about any axis at no energy: displacements of material points are not comparable.

@@ -3,7 +3,7 @@
 from massspring import Ramp
 from studies.geometry.organs.bladder import BLADDER_REGIONS
 from studies.scene.placing import press_times
-from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
 from studies.scene.tissues import BLADDER
 
 FILLING = 1.2  # of the volume at rest; from 1.23 on a wall of one kept volume snaps through at the dome
@@ -20,7 +20,7 @@ BLADDER_FILL = Scene(
     checkpoints=press_times(0.0, FILL_END, 4, DURATION),
     held=(Held("neck", BLADDER_REGIONS["neck"]),),
     lumen=Lumen(filling=Ramp((0.0, FILL_END), (1.0, FILLING))),
-    probed=Probed("held", 0, (0.0, 0.0, -1.0)),
+    probed=ForceOutput("held", 0, (0.0, 0.0, -1.0)),
     damping=15.0,
     reference=ReferencePlan("solid", (400, 550, 800)),
     quantities=("surface", "interior", "silhouette", "volume"),

@@ -3,7 +3,7 @@
 from massspring import Sphere, Trajectory
 from studies.geometry.organs.kidney import KIDNEY_REGIONS, kidney_shape
 from studies.scene.placing import along, press_times, probe_of, scaled
-from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Held, Organ, ReferencePlan, Scene
 from studies.scene.tissues import KIDNEY
 
 RADIUS = 0.015  # m, a fingertip; twice the edge of the coarsest reference mesh
@@ -30,7 +30,7 @@ KIDNEY_PROBE = Scene(
         ),
     ),
     held=(Held("hilum", KIDNEY_REGIONS["hilum"]),),
-    probed=Probed("obstacle", 0, INWARD),
+    probed=ForceOutput("obstacle", 0, INWARD),
     damping=15.0,
     reference=ReferencePlan("solid", (400, 550, 800)),
 )

@@ -3,7 +3,7 @@
 from massspring import Plane, Trajectory
 from studies.geometry import LIVER_PRESS_DIRECTION, LIVER_REGIONS
 from studies.scene.placing import press_times, scaled
-from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Held, Organ, ReferencePlan, Scene
 from studies.scene.tissues import LIVER
 
 FRONT = -0.0686  # m: where the liver begins along the press direction
@@ -28,7 +28,7 @@ LIVER_PRESS = Scene(
         ),
     ),
     held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),
-    probed=Probed("obstacle", 0, LIVER_PRESS_DIRECTION),
+    probed=ForceOutput("obstacle", 0, LIVER_PRESS_DIRECTION),
     damping=8.0,
     reference=ReferencePlan("solid", (230, 360, 550), at_outlines=3),
 )

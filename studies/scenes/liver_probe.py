@@ -3,7 +3,7 @@
 from massspring import Sphere, Trajectory
 from studies.geometry import LIVER_PROBE_NORMAL, LIVER_PROBE_POINT, LIVER_REGIONS
 from studies.scene.placing import along, press_times, scaled
-from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Held, Organ, ReferencePlan, Scene
 from studies.scene.tissues import LIVER
 
 RADIUS = 0.020  # m, a thumb; twice the edge of the coarsest reference mesh, so that the contact is resolved
@@ -29,7 +29,7 @@ LIVER_PROBE = Scene(
         ),
     ),
     held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),
-    probed=Probed("obstacle", 0, INWARD),
+    probed=ForceOutput("obstacle", 0, INWARD),
     damping=8.0,
     reference=ReferencePlan("solid", (230, 360, 550), at_outlines=3, at_contact=3),
 )

@@ -1,7 +1,7 @@
 """A spleen hanging from its hilum: gravity alone, no contact. What holds it must carry its weight: a closed form."""
 
 from studies.geometry.organs.spleen import SPLEEN_REGIONS
-from studies.scene.scene import Held, Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Held, Organ, ReferencePlan, Scene
 from studies.scene.tissues import SPLEEN
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s²: the patient stands
@@ -16,7 +16,7 @@ SPLEEN_SAG = Scene(
     frames=200,
     checkpoints=(DURATION,),
     held=(Held("hilum", SPLEEN_REGIONS["hilum"]),),
-    probed=Probed("held", 0, (0.0, 0.0, 1.0)),
+    probed=ForceOutput("held", 0, (0.0, 0.0, 1.0)),
     gravity=GRAVITY,
     damping=15.0,
     reference=ReferencePlan("solid", (300, 450, 650)),

@@ -3,7 +3,7 @@
 from massspring import Plane, Trajectory
 from studies.geometry.organs.stomach import STOMACH_REGIONS
 from studies.scene.placing import press_times
-from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
 from studies.scene.tissues import STOMACH
 
 FRONT, BACK = -0.0487, 0.0630  # m: the stomach reaches from FRONT to 0.0621, and a coarse curved mesh a little farther
@@ -29,7 +29,7 @@ STOMACH_PRESS = Scene(
     ),
     held=tuple(Held(name, STOMACH_REGIONS[name]) for name in ("cardia", "pylorus")),
     lumen=Lumen(),
-    probed=Probed("obstacle", 0, INWARD),
+    probed=ForceOutput("obstacle", 0, INWARD),
     damping=8.0,
     reference=ReferencePlan("solid", (400, 550, 800)),
 )

@@ -3,7 +3,7 @@
 from massspring import Plane, Sphere, Trajectory
 from studies.geometry.organs.stomach import STOMACH_REGIONS, stomach_shape
 from studies.scene.placing import along, press_times, probe_of, scaled
-from studies.scene.scene import Held, Lumen, Organ, Probed, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
 from studies.scene.tissues import STOMACH
 from studies.scenes.stomach_press import BACK
 
@@ -33,7 +33,7 @@ STOMACH_PROBE = Scene(
     ),
     held=tuple(Held(name, STOMACH_REGIONS[name]) for name in ("cardia", "pylorus")),
     lumen=Lumen(),
-    probed=Probed("obstacle", 0, INWARD),
+    probed=ForceOutput("obstacle", 0, INWARD),
     damping=8.0,
     reference=ReferencePlan("solid", (400, 550, 800)),
 )

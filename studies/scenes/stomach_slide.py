@@ -7,7 +7,7 @@ point, under which a continuum gives way without limit (Boussinesq); a force or 
 from massspring import Probe, Trajectory
 from studies.geometry.organs.stomach import STOMACH_REGIONS, stomach_shape
 from studies.scene.placing import along, probe_of, scaled
-from studies.scene.scene import Held, Organ, Probed, Scene
+from studies.scene.scene import ForceOutput, Held, Organ, Scene
 from studies.scene.tissues import STOMACH
 
 NODES = 19_500
@@ -41,7 +41,7 @@ STOMACH_SLIDE = Scene(
         ),
     ),
     held=tuple(Held(name, STOMACH_REGIONS[name]) for name in ("cardia", "pylorus")),
-    probed=Probed("obstacle", 0, INWARD),
+    probed=ForceOutput("obstacle", 0, INWARD),
     damping=8.0,
     reference=None,
     quantities=("force", "volume"),

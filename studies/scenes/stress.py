@@ -1,6 +1,6 @@
 """A ball started from shapes that no organ has; nothing touches it. Not among SCENES: there is no reference."""
 
-from studies.scene.scene import Organ, Probed, Scene
+from studies.scene.scene import ForceOutput, Organ, Scene
 from studies.scene.start import Start
 from studies.scene.tissues import LIVER
 
@@ -31,7 +31,7 @@ STRESS_SCENES: tuple[Scene, ...] = tuple(
         duration=DURATION,
         frames=200,
         checkpoints=(DURATION,),
-        probed=Probed("held", 0, (0.0, 0.0, 1.0)),
+        probed=ForceOutput("held", 0, (0.0, 0.0, 1.0)),
         reference=None,
         damping=20.0,  # a tenth of critical in the slowest mode
         quantities=("volume",),
