@@ -33,7 +33,7 @@ class Run:
     @cached_property
     def force(self) -> np.ndarray:
         """The probed force of every frame [N], (F,)."""
-        return self.case.scene.probe(self.field("contact_force"), self.field("held_force"))
+        return self.case.scene.output_force(self.field("contact_force"), self.field("held_force"))
 
     @cached_property
     def volume_ratio(self) -> np.ndarray:

@@ -26,7 +26,7 @@ class Solution:
     @cached_property
     def force(self) -> np.ndarray:
         """The probed force at each checkpoint [N], (K,)."""
-        return self.scene.probe(self.field("contact_force"), self.field("held_force"))
+        return self.scene.output_force(self.field("contact_force"), self.field("held_force"))
 
     @cached_property
     def mesh(self) -> MeshTet2:

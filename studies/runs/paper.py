@@ -25,7 +25,7 @@ class Played:
     @property
     def force(self) -> np.ndarray:
         """The probed force of every frame [N], (F,)."""
-        return self.case.scene.probe(self.history.contact_force, self.history.held_force)
+        return self.case.scene.output_force(self.history.contact_force, self.history.held_force)
 
 
 def play(case: Case) -> Played:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.shape.levelset import Probe, Shape
+from studies.geometry.shape.levelset import PalpationPoint, Shape
 
 Vector = tuple[float, float, float]
 
@@ -14,7 +14,7 @@ def press_times(start: float, end: float, steps: int, rest: float) -> tuple[floa
     return (*times[:-1].tolist(), rest)
 
 
-def probe_of(shape: Shape) -> Probe:
+def probe_of(shape: Shape) -> PalpationPoint:
     """Where the shape is palpated. Raises StudyError for a shape that does not say."""
     if shape.probe is None:
         raise StudyError(f"the shape '{shape.name}' names no probe point; give it one, or choose another organ")

@@ -143,7 +143,7 @@ class Scene:
         """Whether the reference is an octant, mirrored at the three coordinate planes."""
         return self.reference is not None and self.reference.mesh == "octant"
 
-    def probe(self, contact_force: np.ndarray, held_force: np.ndarray) -> np.ndarray:
+    def output_force(self, contact_force: np.ndarray, held_force: np.ndarray) -> np.ndarray:
         """The probed force [N], (…,), of forces on the body (…, o, 3) and (…, g, 3): positive for a press."""
         force = contact_force if self.probed.what == "obstacle" else held_force
         return force[..., self.probed.number, :] @ np.asarray(self.probed.direction)

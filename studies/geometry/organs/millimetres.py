@@ -6,7 +6,7 @@ import numpy as np
 
 from studies.base.errors import StudyError
 from studies.geometry.shape.blends import Sphere
-from studies.geometry.shape.levelset import Level, Probe, Shape, gradient, normals, project
+from studies.geometry.shape.levelset import Level, PalpationPoint, Shape, gradient, normals, project
 from studies.geometry.shape.regions import Vector
 
 MM = 1e-3
@@ -54,7 +54,7 @@ def box_of(*tubes: list[Sphere]) -> tuple[Vector, Vector]:
     return metres(*low), metres(*high)
 
 
-def touch(level: Callable[[np.ndarray], np.ndarray], start: Vector, direction: Vector) -> Probe:
+def touch(level: Callable[[np.ndarray], np.ndarray], start: Vector, direction: Vector) -> PalpationPoint:
     """Where a ray from `start` [mm], outside, along `direction` first meets level = 0 [mm], and the normal there.
 
     Raises StudyError when it does not within 300 mm.
@@ -70,17 +70,17 @@ def touch(level: Callable[[np.ndarray], np.ndarray], start: Vector, direction: V
         low, high = far[max(inside[0] - 1, 0)], far[inside[0]]
     point = np.asarray(start, float) + high * along
     normal = gradient(level, point[None], 1e-4)[0]
-    return Probe(metres(*point), unit(*normal))
+    return PalpationPoint(metres(*point), unit(*normal))
 
 
-def probe_near(shape: Shape, seed: Vector) -> Probe:
+def probe_near(shape: Shape, seed: Vector) -> PalpationPoint:
     """The probe at the surface point to which `seed` [m] is brought along the gradient.
 
     Raises StudyError when it lies too far off.
     """
     point = project(shape, np.array([seed]))
     normal = normals(shape, point)[0]
-    return Probe((float(point[0, 0]), float(point[0, 1]), float(point[0, 2])), unit(*normal))
+    return PalpationPoint((float(point[0, 0]), float(point[0, 1]), float(point[0, 2])), unit(*normal))
 
 
 def unit(x: float, y: float, z: float) -> Vector:

@@ -20,7 +20,7 @@ class Literature:
 
 
 @dataclass(frozen=True)
-class Probe:
+class PalpationPoint:
     """A smooth, freely reachable surface point [m] and the outward unit normal there; a probe moves against it."""
 
     point: Vector
@@ -48,7 +48,7 @@ class Shape:
     regions: Mapping[str, KnownRegion] = field(default_factory=dict)
     wall: float | None = None
     literature: Literature | None = None
-    probe: Probe | None = None
+    probe: PalpationPoint | None = None
     press: Vector | None = None
 
     @property

@@ -135,7 +135,10 @@ def test_something_is_felt(scene, kind):
     assert (np.linalg.norm(history.contact_force[last], axis=1) > 0).all()
     # Far above what rounding leaves of balanced forces: a thousandth of mu, times a square centimetre.
     if "force" in scene.quantities:
-        assert scene.probe(history.contact_force, history.held_force)[last] > 1e-3 * scene.tissue.shear_modulus * 1e-4
+        assert (
+            scene.output_force(history.contact_force, history.held_force)[last]
+            > 1e-3 * scene.tissue.shear_modulus * 1e-4
+        )
     elif scene.filled:
         assert history.pressure[last, -1] > 1e-3 * scene.tissue.shear_modulus
     else:

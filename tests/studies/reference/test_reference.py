@@ -85,7 +85,7 @@ def test_the_error_bar_covers_the_true_error_and_is_not_idle(added, levels):
 def test_a_shift_is_told_and_not_applied(found):
     """The force that is compared with is that of the finest mesh."""
     known = found.uncertainty["force_end"]
-    assert found.force[-1] == found.scene.probe(found.field("contact_force"), found.field("held_force"))[-1]
+    assert found.force[-1] == found.scene.output_force(found.field("contact_force"), found.field("held_force"))[-1]
     assert abs(known.shift) <= known.shares["mesh"]
 
 
