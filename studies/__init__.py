@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from studies.runs.case import BodyRecipe, Case
     from studies.runs.run import measure
     from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
-    from studies.scene.start import Start
+    from studies.scene.start import InitialConditions
     from studies.scene.tissues import Tissue
     from studies.scenes import SCENES
     from studies.scenes.ball_clamped import BALL_CLAMPED
@@ -77,6 +77,7 @@ _FACE = {
     "Held": "studies.scene.scene",
     "ImplicitSprings": "massspring.methods.implicit_springs",
     "ImplicitVolume": "massspring.methods.implicit_volume",
+    "InitialConditions": "studies.scene.start",
     "Lumen": "studies.scene.scene",
     "Method": "massspring.methods.method",
     "Metric": "studies.metrics.metrics",
@@ -91,7 +92,6 @@ _FACE = {
     "Run": "studies.metrics.run",
     "Scene": "studies.scene.scene",
     "Shake": "massspring.methods.shake",
-    "Start": "studies.scene.start",
     "Status": "studies.store.record",
     "Study": "studies.catalog.study",
     "StudyError": "studies.base.errors",

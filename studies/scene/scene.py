@@ -10,7 +10,7 @@ from massspring import Obstacle, Ramp, Trajectory
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace
 from studies.scene.placing import Vector
-from studies.scene.start import Start
+from studies.scene.start import InitialConditions
 from studies.scene.tissues import Tissue
 
 Region = HalfSpace | BallRegion | EllipsoidRegion
@@ -119,7 +119,7 @@ class Scene:
     """Mass-proportional [1/s]; both models have the same."""
     quantities: tuple[str, ...] = ("force", "surface", "interior", "silhouette", "volume")
     """What may be compared; a scene that leaves a rigid turn free drops "surface" and "interior" (gauge freedom)."""
-    start: Start | None = None
+    start: InitialConditions | None = None
     """None: at rest."""
     not_for: tuple[tuple[str, str], ...] = ()
     """(method, reason): combinations that make no sense."""

@@ -8,7 +8,7 @@ from studies.scene.placing import Vector
 
 
 @dataclass(frozen=True)
-class Start:
+class InitialConditions:
     """How a body starts that is not at rest. A shape is for the mass-spring solver alone, a speed for both."""
 
     matrix: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

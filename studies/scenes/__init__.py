@@ -1,7 +1,7 @@
 """The scenes, one file each. Adding one: a file and a line in SCENES, from which all else follows."""
 
 from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
-from studies.scene.start import Start
+from studies.scene.start import InitialConditions
 from studies.scene.tissues import Tissue
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_ringing import BALL_RINGING
@@ -48,10 +48,10 @@ __all__ = [
     "STOMACH_SLIDE",
     "ForceOutput",
     "Held",
+    "InitialConditions",
     "Lumen",
     "Organ",
     "ReferencePlan",
     "Scene",
-    "Start",
     "Tissue",
 ]

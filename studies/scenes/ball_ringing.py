@@ -1,7 +1,7 @@
 """A free ball struck so that it stretches and flattens in turn: does it ring as fast as the continuum does?"""
 
 from studies.scene.scene import ForceOutput, Organ, ReferencePlan, Scene
-from studies.scene.start import Start
+from studies.scene.start import InitialConditions
 from studies.scene.tissues import LIVER
 
 RADIUS = 0.05  # m
@@ -19,7 +19,7 @@ BALL_RINGING = Scene(
     checkpoints=tuple(FRAME * (k + 1) for k in range(FRAMES)),
     probed=ForceOutput("obstacle", 0, (0.0, 0.0, -1.0)),  # nothing touches it: its force is not among the quantities
     damping=1.0,  # a hundredth of critical
-    start=Start(
+    start=InitialConditions(
         speed=((-0.5 * STRETCHING, 0.0, 0.0), (0.0, -0.5 * STRETCHING, 0.0), (0.0, 0.0, STRETCHING)),
     ),
     reference=ReferencePlan("octant", (0.5, 0.36, 0.26), variants=("steps", "kappa"), dt=FRAME / 2.0),

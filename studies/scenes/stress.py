@@ -1,21 +1,21 @@
 """A ball started from shapes that no organ has; nothing touches it. Not among SCENES: there is no reference."""
 
 from studies.scene.scene import ForceOutput, Organ, Scene
-from studies.scene.start import Start
+from studies.scene.start import InitialConditions
 from studies.scene.tissues import LIVER
 
 DURATION = 4.0  # s: 3,000 steps and more of a fifth of the limit
 RADIUS = 0.05  # m
 
 
-def _scaled(x: float, y: float, z: float) -> Start:
-    return Start(((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)))
+def _scaled(x: float, y: float, z: float) -> InitialConditions:
+    return InitialConditions(((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)))
 
 
 STARTS = {
     "flattened": _scaled(1.0, 1.0, 0.0),
     "mirrored": _scaled(1.0, 1.0, -1.0),
-    "scrambled": Start(_scaled(0.0, 0.0, 0.0).matrix, scatter=1.0),
+    "scrambled": InitialConditions(_scaled(0.0, 0.0, 0.0).matrix, scatter=1.0),
     "stretched": _scaled(3.0, 1.0, 1.0),
     "shrunk": _scaled(1e-3, 1e-3, 1e-3),
     "line": _scaled(1.0, 0.0, 0.0),

@@ -17,7 +17,7 @@ from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames
 from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.meshing import mesh_for, patch_nodes
-from studies.scenes import JUDGED, SCENES, Start
+from studies.scenes import JUDGED, SCENES, InitialConditions
 from studies.scenes.stress import STRESS_SCENES
 
 SMALL, THIN = 150, 400
@@ -72,11 +72,11 @@ def test_what_is_deepest_at_the_last_checkpoint_has_stopped_before(scene):
 
 def test_a_start_is_a_linear_map_about_the_middle_and_always_the_same_throw():
     rest = np.array([[1.0, 2.0, 3.0], [3.0, 2.0, 3.0], [2.0, 2.0, 4.0]])
-    assert Start().positions(rest) == pytest.approx(rest, abs=1e-15)
-    flat = Start(((1, 0, 0), (0, 1, 0), (0, 0, 0))).positions(rest)
+    assert InitialConditions().positions(rest) == pytest.approx(rest, abs=1e-15)
+    flat = InitialConditions(((1, 0, 0), (0, 1, 0), (0, 0, 0))).positions(rest)
     assert (flat == [[1, 2, 3.5], [3, 2, 3.5], [2, 2, 3.5]]).all()
-    thrown = Start(scatter=1.0).positions(rest)
-    assert (thrown == Start(scatter=1.0).positions(rest)).all()
+    thrown = InitialConditions(scatter=1.0).positions(rest)
+    assert (thrown == InitialConditions(scatter=1.0).positions(rest)).all()
     # The longest side is 2: no node flies farther than 1 along any axis, and some fly.
     assert 0.1 < np.abs(thrown - rest).max() <= 1.0
 

@@ -22,7 +22,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.runs.run import measure
 from studies.scene.quantities import allowed
-from studies.scene.start import Start
+from studies.scene.start import InitialConditions
 from studies.scenes import Lumen, ReferencePlan
 from studies.scenes.ball_ringing import BALL_RINGING, RADIUS
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
@@ -119,7 +119,10 @@ def test_a_load_path_builds_no_mass(mesh_cache, tmp_path, monkeypatch):
 def test_what_a_piece_depends_on():
     """Damping and start with motion; the filling of a lumen always."""
     moving, still = Piece(SCENE, 0.5), Piece(BALL_SQUEEZE, 0.16)
-    for changes in ({"damping": 7.0}, {"start": Start(speed=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))}):
+    for changes in (
+        {"damping": 7.0},
+        {"start": InitialConditions(speed=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))},
+    ):
         assert Piece(replace(SCENE, **changes), 0.5).key != moving.key
         assert Piece(replace(BALL_SQUEEZE, **changes), 0.16).key == still.key
     assert Piece(replace(BALL_SQUEEZE, lumen=Lumen()), 0.16).key != still.key
@@ -127,7 +130,7 @@ def test_what_a_piece_depends_on():
 
 
 def test_a_shape_to_start_from_is_refused(mesh_cache, tmp_path):
-    flat = replace(SCENE, start=Start(matrix=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.5))))
+    flat = replace(SCENE, start=InitialConditions(matrix=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.5))))
     with pytest.raises(StudyError, match="shape of its own"):
         solve(tmp_path, Piece(flat, 0.7))
 
