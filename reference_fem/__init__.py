@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from reference_fem.elements.evaluate import Evaluator
     from reference_fem.elements.shapes import facet_nodes, nodes, surface_triangles
     from reference_fem.elements.table import ELEMENTS, Element
-    from reference_fem.errors import ReferenceProblem, SlowSolverWarning
+    from reference_fem.errors import SlowSolverWarning, SolveError
     from reference_fem.model.cavity import Cavity
     from reference_fem.model.loads import BodyForce, Traction
     from reference_fem.model.material import Material, MooneyRivlin, NeoHookean
@@ -36,11 +36,11 @@ _FACE = {
     "NeoHookean": "reference_fem.model.material",
     "NewtonSettings": "reference_fem.system.state",
     "Problem": "reference_fem.model.problem",
-    "ReferenceProblem": "reference_fem.errors",
     "RigidCapsule": "reference_fem.model.obstacles",
     "RigidPlane": "reference_fem.model.obstacles",
     "RigidSphere": "reference_fem.model.obstacles",
     "SlowSolverWarning": "reference_fem.errors",
+    "SolveError": "reference_fem.errors",
     "State": "reference_fem.system.state",
     "Traction": "reference_fem.model.loads",
     "curve": "reference_fem.elements.curve",

@@ -1,7 +1,7 @@
 """The one exception of this package, and the one warning."""
 
 
-class ReferenceProblem(ValueError):
+class SolveError(ValueError):
     """A reference problem that cannot be set up or solved; the message is one sentence for the user.
 
     `converged` holds the equilibria reached before a loading path stopped (empty for a bad set-up).

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import nnls, root_scalar
 
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 
 SAFETY, TWO_MESHES = 1.25, 3.0
 """Factors on the extrapolated error, of three meshes and of two, whose order is a guess (Roache)."""
@@ -53,7 +53,7 @@ def observed_order(sizes: Sequence[float], coarse_change: float, fine_change: fl
     """Order p of |f − f_h| ~ h^p from the sizes h1 < h2 < h3 and |f3 − f2|, |f2 − f1|, within SLOWEST to FASTEST.
 
     With r = h2/h1, R = h3/h2 the changes are in the ratio r^p (R^p − 1)/(r^p − 1), which grows with p.
-    Raises ReferenceProblem for sizes that are not three different ones.
+    Raises SolveError for sizes that are not three different ones.
     """
     r, R = _ratios(sizes)
 
@@ -72,7 +72,7 @@ def mesh_error(sizes: Sequence[float], values: Sequence) -> MeshError:
 
     sizes: h1 < h2 (< h3) [m]. Changes that go the same way: the grid convergence index SAFETY |f2 − f1|/(r^p − 1).
     Otherwise SCATTER times the spread, the largest difference of two. Two values: order SLOWEST, safety TWO_MESHES.
-    Raises ReferenceProblem for sizes that do not grow, and values that are not finite.
+    Raises SolveError for sizes that do not grow, and values that are not finite.
     """
     values = _finite(values)
     near, ratios = values[1] - values[0], _ratios(sizes)
@@ -100,7 +100,7 @@ def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray) -
     three equations for p, a², b², solved by least squares with p from SLOWEST to FASTEST and a², b² >= 0. The error is
     SAFETY √(a² + b²) h1^p; without b this is the grid convergence index. Fields that come no closer have SCATTER times
     the spread. The shift is the size of the part that could be extrapolated. Two fields: as mesh_error.
-    Raises ReferenceProblem for sizes that do not grow, and values that are not finite.
+    Raises SolveError for sizes that do not grow, and values that are not finite.
     """
     root = np.sqrt(weights)[:, None]
     scaled = [(value * root).ravel() for value in _finite(values)]
@@ -136,10 +136,10 @@ def setting_error(change: float, factor: float) -> float:
     """Error left by a setting that was made `factor` times better, of order one in it: |change|/(1 − 1/factor).
 
     Holds for what contact's penalty and the bulk modulus leave, both ~ 1/setting, and bounds what load steps leave.
-    Raises ReferenceProblem for a factor that makes nothing better.
+    Raises SolveError for a factor that makes nothing better.
     """
     if not factor > 1:
-        raise ReferenceProblem(f"a setting made {factor} times better tells nothing: the factor must be above 1")
+        raise SolveError(f"a setting made {factor} times better tells nothing: the factor must be above 1")
     return abs(change) / (1 - 1 / factor)
 
 
@@ -151,13 +151,13 @@ def combined(shares: Mapping[str, float]) -> float:
 def _finite(values: Sequence) -> list[np.ndarray]:
     arrays = [np.atleast_1d(np.asarray(value, dtype=float)) for value in values]
     if not all(np.isfinite(array).all() for array in arrays):
-        raise ReferenceProblem("the values of a family of meshes are not finite: one of its solutions broke off")
+        raise SolveError("the values of a family of meshes are not finite: one of its solutions broke off")
     return arrays
 
 
 def _ratios(sizes: Sequence[float]) -> tuple[float, ...]:
     if len(sizes) not in (2, 3) or not (sizes[0] > 0 and all(a < b for a, b in pairwise(sizes))):
-        raise ReferenceProblem(
+        raise SolveError(
             "an error bar needs two or three meshes of different size, fine to coarse; these have element sizes "
             f"{', '.join(f'{size:.3g}' for size in sizes)} m"
         )

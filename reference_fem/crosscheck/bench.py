@@ -24,7 +24,7 @@ def iteration_ratio(n=7, repeats=3) -> dict:
     """Seconds of an iteration (tangent, residual, factors, solution), of reference_fem over the faster of NGSolve's.
 
     By turns, least of the repeats after one that warms up. Keys: unknowns, own_s, ngsolve_s, ratio, inverse.
-    Raises ReferenceProblem where the extra is missing.
+    Raises SolveError where the extra is missing.
     """
     problem = clamped_ball(n)
     actions = {"own": own_iteration(problem)} | {name: ngsolve_iteration(problem, name) for name in INVERSES}

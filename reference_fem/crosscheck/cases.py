@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 from skfem import MeshTet
 
 from reference_fem.elements.shapes import facet_nodes, nodes
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 from reference_fem.model.material import NeoHookean
 from reference_fem.model.problem import Held, Problem
 from reference_fem.oracles.bodies import shell_octant, symmetry, whole_ball
@@ -26,7 +26,7 @@ def facets_where(mesh: MeshTet, inside: Callable) -> Callable:
     table, x = facet_nodes(mesh), nodes(mesh)
     whole = np.asarray(inside(x.T), dtype=bool)[table[:, :3]].all(axis=1)
     if not whole.any():
-        raise ReferenceProblem("a patch contains no whole boundary facet: choose a larger one, or a finer mesh")
+        raise SolveError("a patch contains no whole boundary facet: choose a larger one, or a finer mesh")
     tree = KDTree(x[np.unique(table[whole])])
     # far above round-off, far below an edge
     return lambda points: tree.query(points.T)[0] < 1e-9 * float(np.ptp(x))
@@ -51,7 +51,7 @@ def thick_sphere(n=6, layers=4) -> Problem:
 def pulled_organ(mesh: MeshTet, attached, grip, move) -> Problem:
     """An organ of mu = 1.8 kPa, attached at some vertices and gripped at others (numbers); move: (3,) [m]."""
     if len(np.intersect1d(attached, grip)):
-        raise ReferenceProblem("the attached and the gripped patch share vertices: take patches that lie apart")
+        raise SolveError("the attached and the gripped patch share vertices: take patches that lie apart")
 
     def patch(numbers):
         return facets_where(mesh, lambda x: np.isin(np.arange(x.shape[1]), numbers))

@@ -17,7 +17,7 @@ from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
 
 from reference_fem.elements.shapes import edge_index, nodes
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 from reference_fem.model.material import NeoHookean
 from reference_fem.model.problem import HeldNodes, Problem, find_held
 
@@ -31,9 +31,9 @@ def available() -> bool:
 
 
 def load(name: str) -> Any:
-    """A module of NGSolve; raises ReferenceProblem where the extra is missing."""
+    """A module of NGSolve; raises SolveError where the extra is missing."""
     if not available():
-        raise ReferenceProblem("NGSolve is not installed: install the extra, pip install organbench[crosscheck]")
+        raise SolveError("NGSolve is not installed: install the extra, pip install organbench[crosscheck]")
     return importlib.import_module(name)
 
 
@@ -63,9 +63,9 @@ def check(problem: Problem):
     """Refuse what this translation does not cover."""
     extras = (problem.obstacles, problem.cavities, problem.loads, np.any(problem.gravity))
     if any(extras) or problem.element != "P2/P1" or not isinstance(problem.material, NeoHookean):
-        raise ReferenceProblem("the cross-check covers neo-Hookean P2/P1 bodies with held regions and nothing else")
+        raise SolveError("the cross-check covers neo-Hookean P2/P1 bodies with held regions and nothing else")
     if problem.mesh.doflocs.shape[1] > problem.mesh.nvertices:
-        raise ReferenceProblem("the cross-check takes straight elements: give a MeshTet that is not curved")
+        raise SolveError("the cross-check takes straight elements: give a MeshTet that is not curved")
 
 
 def check_middles(mesh: MeshTet, held: list[HeldNodes]):
@@ -75,13 +75,13 @@ def check_middles(mesh: MeshTet, held: list[HeldNodes]):
         taken[np.ix_(region.nodes, region.components)] = True
     loose = taken[mesh.nvertices :] & ~taken[mesh.edges].all(axis=0)
     if loose.any():
-        raise ReferenceProblem(
+        raise SolveError(
             f"{loose.any(axis=1).sum()} mid-side nodes are held while a vertex beside them is free: hold whole facets"
         )
 
 
 class Model:
-    """A problem in NGSolve. Raises ReferenceProblem for problems that it does not cover."""
+    """A problem in NGSolve. Raises SolveError for problems that it does not cover."""
 
     def __init__(self, problem: Problem):
         check(problem)
@@ -154,10 +154,10 @@ class Model:
         return self.newton(inverse, tolerance)
 
     def newton(self, inverse, tolerance, most=20) -> int:
-        """NGSolve's own Newton from here; its iterations. Raises ReferenceProblem when it does not converge."""
+        """NGSolve's own Newton from here; its iterations. Raises SolveError when it does not converge."""
         status, iterations = self.iterate(inverse, tolerance, most)
         if status != 0:
-            raise ReferenceProblem(f"NGSolve's Newton did not converge in {most} iterations: take shorter steps")
+            raise SolveError(f"NGSolve's Newton did not converge in {most} iterations: take shorter steps")
         return iterations
 
     def iterate(self, inverse, tolerance, most):
@@ -187,7 +187,7 @@ class Model:
 
 
 def solve(problem: Problem, times) -> Solution:
-    """The state at the last of the times, reached step by step; raises ReferenceProblem."""
+    """The state at the last of the times, reached step by step; raises SolveError."""
     model = Model(problem)
     iterations = sum(model.advance(t) for t in times)
     u, p = model.fields(model.vector())

@@ -93,7 +93,7 @@ class MovingSystem(System):
     """A System with inertia and the damping force -c M v; the body may be free to move as a whole.
 
     damping: c [1/s]. `clock` gives velocity and acceleration to a displacement; without one the body is at rest.
-    Raises ReferenceProblem for a body without mass.
+    Raises SolveError for a body without mass.
     """
 
     def __init__(self, problem, settings, damping=0.0):

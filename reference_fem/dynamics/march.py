@@ -9,7 +9,7 @@ import numpy as np
 
 from reference_fem.dynamics.inertia import Instant, Motion, MovingSystem, Scheme, TimeStep
 from reference_fem.dynamics.release import held_motion, released
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 from reference_fem.statics.equilibrium import EASY
 from reference_fem.statics.newton import StepFailed, solve_step
 from reference_fem.system import assembly
@@ -125,7 +125,7 @@ class March:
         self.iterations, self.substeps = self.iterations + state.iterations, self.substeps + 1
 
     def stuck(self, t, failure, path):
-        return ReferenceProblem(
+        return SolveError(
             f"no motion found between t = {self.motion.state.t:g} s (the last that converged) and t = {t:g} s: "
             f"{failure}; refine the mesh where it folds, or ask for less",
             converged=path,

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from reference_fem.dynamics.inertia import MovingSystem
 from reference_fem.elements.shapes import at_nodes
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 from reference_fem.model.problem import Problem
 from reference_fem.system.checks import rigid_freedoms
 from reference_fem.system.state import Loads, NewtonSettings
@@ -42,14 +42,14 @@ def natural_frequencies(problem: Problem, count: int, solver="auto") -> Modes:
     K z = omega² diag(M, 0) z with the tangent K of P2/P1 at rest and the consistent mass M; the pressure has no
     inertia. Shift-invert Lanczos (Lehoucq, Sorensen, Yang, ARPACK Users' Guide, 1998) on the displacement alone: the
     pressure is eliminated by every solve. Prescribed displacements are held at zero; obstacles and loads play no part,
-    and a lumen is empty. Raises ReferenceProblem for a body without mass and for a count that the mesh cannot give.
+    and a lumen is empty. Raises SolveError for a body without mass and for a count that the mesh cannot give.
     """
     system = MovingSystem(replace(problem, obstacles=(), cavities=()), NewtonSettings(solver=solver))
     pattern, n = system.pattern, system.displacement_count
     free = pattern.free[pattern.free < n]
     rigid = rigid_freedoms(system.nodes, pattern.held).shape[1]
     if not 1 <= count < len(free) - rigid:
-        raise ReferenceProblem(f"{count} modes are asked for: give 1 to {len(free) - rigid - 1}, refine for more")
+        raise SolveError(f"{count} modes are asked for: give 1 to {len(free) - rigid - 1}, refine for more")
     try:
         values, vectors = lowest(system, free, rigid + count)
     finally:

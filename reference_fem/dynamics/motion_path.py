@@ -9,7 +9,7 @@ from skfem import ElementTetP2
 from reference_fem.dynamics.inertia import MovingSystem, scheme
 from reference_fem.dynamics.march import March, kinetic
 from reference_fem.elements.table import find_element
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 from reference_fem.model.problem import Problem
 from reference_fem.statics.equilibrium import Equilibrium, describe
 from reference_fem.system.checks import check_times
@@ -23,7 +23,7 @@ class DynamicsSettings:
     dt: largest step [s], None = the intervals between the wanted times. damping: c [1/s] of the force -c M v, as the
     mass-spring body has it. rho_inf: what a step leaves of an oscillation that it cannot resolve, 0 to 1; take 0.5 for
     an impact, where 0.9 lets the few nodes in contact chatter.
-    Raises ReferenceProblem for values out of range.
+    Raises SolveError for values out of range.
     """
 
     dt: float | None = None
@@ -33,11 +33,11 @@ class DynamicsSettings:
 
     def __post_init__(self):
         if self.dt is not None and not (np.isfinite(self.dt) and self.dt > 0.0):
-            raise ReferenceProblem(f"the largest time step is {self.dt} s: it must be positive and finite")
+            raise SolveError(f"the largest time step is {self.dt} s: it must be positive and finite")
         if not (np.isfinite(self.damping) and self.damping >= 0.0):
-            raise ReferenceProblem(f"the damping is {self.damping} 1/s: it must be zero or positive and finite")
+            raise SolveError(f"the damping is {self.damping} 1/s: it must be zero or positive and finite")
         if not 0.0 <= self.rho_inf <= 1.0:
-            raise ReferenceProblem(f"rho_inf is {self.rho_inf}: it must lie in 0 to 1 (0.9 damps little)")
+            raise SolveError(f"rho_inf is {self.rho_inf}: it must lie in 0 to 1 (0.9 damps little)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ def motion_path(
     """The motion at the given times [s], from velocity0 (3,) or (N2, 3) [m/s] or from rest; on_step sees each moment.
 
     start: an Equilibrium on the same mesh, whose displacement the body is let go from; None = undeformed. All of
-    `problem` acts from the start on, gravity too. Raises ReferenceProblem for what cannot be set up, and when a
+    `problem` acts from the start on, gravity too. Raises SolveError for what cannot be set up, and when a
     step shorter than newton.smallest_step of the ordinary one still fails: its `converged` holds what was reached.
     """
     settings = settings or DynamicsSettings()
@@ -96,7 +96,7 @@ def motion_path(
 def check_element(problem: Problem):
     """Refuse elements whose displacement is not given at the P2 nodes, where a motion starts."""
     if not isinstance(find_element(problem.element).displacement, ElementTetP2):
-        raise ReferenceProblem(f"a motion with the element {problem.element!r} is asked for: use 'P2/P1' or 'P2/P0'")
+        raise SolveError(f"a motion with the element {problem.element!r} is asked for: use 'P2/P1' or 'P2/P0'")
 
 
 def given_start(system: MovingSystem, velocity0, start):
@@ -104,16 +104,14 @@ def given_start(system: MovingSystem, velocity0, start):
     shape, state = system.nodes.shape, system.rest()
     if start is not None:
         if start.u.shape != shape:
-            raise ReferenceProblem(
+            raise SolveError(
                 f"the start has {len(start.u)} nodes but the mesh {shape[0]}: start from an equilibrium on this mesh"
             )
         given = np.concatenate((start.u.ravel(), start.p))
         state.x[: system.field_count] = given[: system.field_count]
     given = np.asarray(0.0 if velocity0 is None else velocity0, dtype=float)
     if given.shape not in ((), (3,), shape) or not np.isfinite(given).all():
-        raise ReferenceProblem(
-            f"the start velocities have shape {given.shape}: give finite values [m/s], (3,) or {shape}"
-        )
+        raise SolveError(f"the start velocities have shape {given.shape}: give finite values [m/s], (3,) or {shape}")
     return state, np.broadcast_to(given, shape).ravel().copy()
 
 

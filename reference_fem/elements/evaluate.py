@@ -5,7 +5,7 @@ from scipy.spatial import KDTree
 from skfem import ElementTetP2, MeshTet
 
 from reference_fem.elements.shapes import basis_table, element_nodes, nodes
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 
 INSIDE = -1e-9
 """Least barycentric coordinate of a point that counts as inside an element: round-off of the inverse map."""
@@ -16,7 +16,7 @@ class Evaluator:
 
     A point outside is extrapolated from the nearest element; `outside` holds the distances of the last call (M,) [m],
     zero for points inside (measured along the element's own axes: in a skew element more than the true distance).
-    Raises ReferenceProblem for a point farther out than max_outside [m] (default: 5 % of the diagonal of the box).
+    Raises SolveError for a point farther out than max_outside [m] (default: 5 % of the diagonal of the box).
     """
 
     def __init__(self, mesh: MeshTet, max_outside=None):
@@ -37,7 +37,7 @@ class Evaluator:
         """(element (M,), reference coordinates (M, 3)); fills `outside`."""
         points = np.atleast_2d(np.asarray(points, dtype=float))
         if points.shape[1:] != (3,) or not np.isfinite(points).all():
-            raise ReferenceProblem(f"points of shape {points.shape} are to be evaluated: give finite (M, 3) values [m]")
+            raise SolveError(f"points of shape {points.shape} are to be evaluated: give finite (M, 3) values [m]")
         element, local = np.zeros(len(points), dtype=np.int64), np.zeros((len(points), 3))
         self.outside, open_ = np.full(len(points), np.inf), np.arange(len(points))
         for count in (8, 32, 128):
@@ -47,7 +47,7 @@ class Evaluator:
                 return element, local
         worst = int(np.argmax(self.outside))
         if self.outside[worst] > self.max_outside:
-            raise ReferenceProblem(
+            raise SolveError(
                 f"point {worst} at {points[worst]} lies {self.outside[worst]:.3g} m outside the mesh (limit "
                 f"{self.max_outside:.3g} m): give rest positions in metres, inside the body"
             )

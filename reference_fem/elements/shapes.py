@@ -12,7 +12,7 @@ from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet, RefTri
 
 from reference_fem.elements.table import DEFAULT, ELEMENTS, Element
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 
 FACET_EDGES = ((0, 1), (1, 2), (0, 2))
 """Vertex pairs of the mid-side nodes 3, 4, 5 of a six-node triangle."""
@@ -114,7 +114,7 @@ def forces_at_nodes(mesh: MeshTet, element: Element, forces):
 
 
 def build_elements(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAULT]) -> Elements:
-    """Tables of every element; raises ReferenceProblem for folded or flat elements.
+    """Tables of every element; raises SolveError for folded or flat elements.
 
     order: degree that the quadrature integrates exactly; P2 displacements enter J as a cubic and p J as a quartic.
     """
@@ -149,7 +149,7 @@ def check_shapes(det):
     # 1e-10 of the typical size is far below what a meshing tool leaves and far above round-off
     bad = np.flatnonzero(folded | (largest < 1e-10 * np.median(largest)))
     if bad.size:
-        raise ReferenceProblem(
+        raise SolveError(
             f"element {bad[0]} is inverted or flat at rest ({bad.size} such elements; smallest volume ratio "
             f"{(det.min(axis=1) * np.sign(det.mean(axis=1)) / largest)[bad[0]]:.1e}, limit > 0): mend the mesh, "
             f"or leave its mid-side nodes straight"
@@ -169,7 +169,7 @@ def check_neighbours(mesh):
     bad = np.flatnonzero(sides[0] * sides[1] >= 0.0)
     if bad.size:
         pair = mesh.f2t[:, inner[bad[0]]]
-        raise ReferenceProblem(
+        raise SolveError(
             f"elements {pair[0]} and {pair[1]} overlap across their common face ({bad.size} such faces, limit 0): "
             f"one of them is inverted, mend the mesh"
         )
@@ -198,10 +198,10 @@ def edge_index(mesh, pairs):
 
 
 def build_facets(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAULT]) -> Facets:
-    """Quadrature on the boundary. Raises ReferenceProblem when the order has a rule with negative weights."""
+    """Quadrature on the boundary. Raises SolveError when the order has a rule with negative weights."""
     points, w = get_quadrature(RefTri, order)
     if w.min() <= 0.0:
-        raise ReferenceProblem(f"the contact order {order} has a rule with negative weights: use 4, 5, 6 or 8")
+        raise SolveError(f"the contact order {order} has a rule with negative weights: use 4, 5, 6 or 8")
     _, local = basis_table(ElementTriP2(), points)
     table = facet_nodes(mesh)
     tangents = np.einsum("fni,qJn->fqJi", nodes(mesh)[table], local)

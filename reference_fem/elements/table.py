@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import skfem
 from skfem import ElementTetMini, ElementTetP1, ElementTetP2, ElementTriP1, ElementTriP2
 
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ DEFAULT = "P2/P1"
 
 
 def find_element(name: str) -> Element:
-    """The entry called `name`; raises ReferenceProblem with the choices."""
+    """The entry called `name`; raises SolveError with the choices."""
     if name not in ELEMENTS:
-        raise ReferenceProblem(f"there is no element {name!r}: choose one of {', '.join(ELEMENTS)}")
+        raise SolveError(f"there is no element {name!r}: choose one of {', '.join(ELEMENTS)}")
     return ELEMENTS[name]

@@ -17,7 +17,7 @@ from skfem.refdom import RefTri
 from reference_fem.compiled import compiled
 from reference_fem.elements.shapes import basis_table, facet_nodes, nodes
 from reference_fem.elements.surface import scatter
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Cavity:
         value = float(1.0 if given is None else given(t))
         if not np.isfinite(value) or (self.pressure is None and value <= 0.0):
             what, unit = ("filling", "of V0, positive") if self.pressure is None else ("pressure", "Pa")
-            raise ReferenceProblem(f"the {what} of cavity {number} is {value} at t = {t:g} s: give a number {unit}")
+            raise SolveError(f"the {what} of cavity {number} is {value} at t = {t:g} s: give a number {unit}")
         return value
 
 
@@ -133,7 +133,7 @@ def add_wall(x, wall, pressure, gradient, values, tangent):
 def find_lumens(problem, pattern, element, table, held) -> list[Lumen]:
     """The cavities of a problem on its mesh; table: facet nodes of the element (nf, nn), held: HeldNodes.
 
-    Raises ReferenceProblem for a wall that finds no facet, shares one, is open, or encloses a negative volume.
+    Raises SolveError for a wall that finds no facet, shares one, is open, or encloses a negative volume.
     """
     x, lumens = nodes(problem.mesh), []
     corners = facet_nodes(problem.mesh)[:, :3]
@@ -143,7 +143,7 @@ def find_lumens(problem, pattern, element, table, held) -> list[Lumen]:
         nothing = np.zeros(len(pattern.rank))
         volume0 = add_wall(nothing, wall, 0.0, nothing.copy(), np.zeros(1), False)
         if volume0 <= 0.0:
-            raise ReferenceProblem(
+            raise SolveError(
                 f"cavity {number} encloses {volume0:.3g} m³ (limit > 0): choose the inner surface of the tissue"
             )
         lumens.append(Lumen(wall, volume0, problem.cavities[number], number))
@@ -155,15 +155,15 @@ def find_walls(cavities, centroids):
     owners, walls = np.full(centroids.shape[1], -1), []
     for number, cavity in enumerate(cavities):
         if cavity.volume is not None and cavity.pressure is not None:
-            raise ReferenceProblem(f"cavity {number} has both a volume and a pressure: give one of them")
+            raise SolveError(f"cavity {number} has both a volume and a pressure: give one of them")
         chosen = np.flatnonzero(np.asarray(cavity.where(centroids), dtype=bool))
         shared = chosen[owners[chosen] >= 0]
         if chosen.size == 0:
-            raise ReferenceProblem(
+            raise SolveError(
                 f"cavity {number} contains none of the {len(owners)} boundary facets: let `where` choose its wall"
             )
         if shared.size:
-            raise ReferenceProblem(
+            raise SolveError(
                 f"cavities {owners[shared[0]]} and {number} share {shared.size} facets: a facet bounds one lumen"
             )
         owners[chosen] = number
@@ -194,7 +194,7 @@ def wall_origin(number, corners, x, held):
                 origin[c] = x[border[inside][0, 0], c]
                 closed |= inside
     if not closed.all():
-        raise ReferenceProblem(
+        raise SolveError(
             f"the wall of cavity {number} is open along {np.sum(~closed)} edges (limit 0): choose the whole inner "
             f"surface, which may only end on coordinate planes held at zero"
         )

@@ -20,7 +20,7 @@ from reference_fem.elements.shapes import (
     facet_nodes,
     nodes,
 )
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class LoadedPoints(NamedTuple):
 
 
 def find_points(load: Traction | BodyForce, mesh: MeshTet, element: Element, order: int) -> LoadedPoints:
-    """Where a load acts on one mesh; raises ReferenceProblem for a traction that finds no facet."""
+    """Where a load acts on one mesh; raises SolveError for a traction that finds no facet."""
     x, count = nodes(mesh), len(displacement_points(mesh, element))
     if isinstance(load, BodyForce):
         points, _ = get_quadrature(RefTet, order)
@@ -70,7 +70,7 @@ def find_points(load: Traction | BodyForce, mesh: MeshTet, element: Element, ord
         facets, corners = build_facets(mesh, order, element), facet_nodes(mesh)
         chosen = np.asarray(load.where(x[corners[:, :3]].mean(axis=1).T), dtype=bool)
         if not chosen.any():
-            raise ReferenceProblem("a traction acts on no facet of the boundary: choose a region that touches it")
+            raise SolveError("a traction acts on no facet of the boundary: choose a region that touches it")
         shape, _ = basis_table(ElementTriP2(), get_quadrature(RefTri, order)[0])
         positions, weights, functions = x[corners[chosen]], facets.weights[chosen], facets.values
         table = facets.nodes[chosen]
@@ -82,7 +82,7 @@ def nodal_force(points: LoadedPoints, t):
     """Force on every displacement unknown at time t, (3 count,) [N]; refuses values that are not finite."""
     value = np.asarray(points.value(t, points.positions), dtype=float)
     if value.shape != points.positions.shape or not np.isfinite(value).all():
-        raise ReferenceProblem(
+        raise SolveError(
             f"a load gives values of shape {value.shape} at t = {t:g} s for {points.positions.shape[1]} points: "
             f"finite values of shape {points.positions.shape} are needed"
         )

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from reference_fem.compiled import compiled
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 
 
 def check_modulus(name, value):
     """Refuse a modulus that is not a positive finite number."""
     if not (np.isfinite(value) and value > 0.0):
-        raise ReferenceProblem(
+        raise SolveError(
             f"the material's {name} is {value} Pa: it must be positive and finite "
             f"(a nearly incompressible tissue has kappa of about 1000 mu)"
         )
@@ -61,7 +61,7 @@ class TwoTermLaw(ABC):
 class NeoHookean(TwoTermLaw):
     """W = mu/2 (J^-2/3 I1 - 3) + p (J - 1) - p²/(2 kappa); mu, kappa in Pa.
 
-    Raises ReferenceProblem when mu or kappa is not a positive finite number.
+    Raises SolveError when mu or kappa is not a positive finite number.
     """
 
     mu: float
@@ -81,7 +81,7 @@ class NeoHookean(TwoTermLaw):
 class MooneyRivlin(TwoTermLaw):
     """W = c1 (J^-2/3 I1 - 3) + c2 (J^-4/3 I2 - 3) + p (J - 1) - p²/(2 kappa), shear modulus 2 (c1 + c2); all in Pa.
 
-    Two-term law of Mooney (1940) and Rivlin (1948), made isochoric (docs/theory.md, eq. 6.15). Raises ReferenceProblem
+    Two-term law of Mooney (1940) and Rivlin (1948), made isochoric (docs/theory.md, eq. 6.15). Raises SolveError
     when kappa or the shear modulus is not positive and finite, or c1 or c2 is negative: then the energy is not
     polyconvex.
     """
@@ -93,7 +93,7 @@ class MooneyRivlin(TwoTermLaw):
     def __post_init__(self):
         for name, value in (("c1", self.c1), ("c2", self.c2)):
             if not value >= 0.0:
-                raise ReferenceProblem(
+                raise SolveError(
                     f"the material's {name} is {value} Pa: it must not be negative, or large strains have no solution"
                 )
         check_modulus("mu = 2 (c1 + c2)", self.mu)

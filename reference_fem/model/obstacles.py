@@ -6,24 +6,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from reference_fem.compiled import compiled
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 
 PLANE, SPHERE, CAPSULE = 0, 1, 2
 SLIP = ("frictionless", "no_slip")
 
 
 def finite_vector(value, name):
-    """Three finite numbers as an array; raises ReferenceProblem naming them."""
+    """Three finite numbers as an array; raises SolveError naming them."""
     vector = np.asarray(value, dtype=float)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ReferenceProblem(f"{name} is {value!r}: three finite numbers are needed")
+        raise SolveError(f"{name} is {value!r}: three finite numbers are needed")
     return vector
 
 
 def positive_radius(value, name):
-    """A radius [m]; raises ReferenceProblem unless it is positive and finite."""
+    """A radius [m]; raises SolveError unless it is positive and finite."""
     if not (np.isfinite(value) and value > 0.0):
-        raise ReferenceProblem(f"{name} radius is {value} m: it must be positive and finite")
+        raise SolveError(f"{name} radius is {value} m: it must be positive and finite")
     return float(value)
 
 
@@ -44,7 +44,7 @@ class RigidPlane:
         normal = finite_vector(self.normal, "a plane's normal")
         size = np.linalg.norm(normal)
         if size == 0.0:
-            raise ReferenceProblem("a plane's normal is (0, 0, 0): give a direction that points to the body's side")
+            raise SolveError("a plane's normal is (0, 0, 0): give a direction that points to the body's side")
         return np.array([PLANE, *finite_vector(self.point, "a plane's point"), *normal / size, 0.0])
 
 
@@ -77,7 +77,7 @@ class RigidCapsule:
         """(kind, start, end - start, radius) for the kernel."""
         start, end = finite_vector(self.start, "a capsule's start"), finite_vector(self.end, "a capsule's end")
         if np.array_equal(start, end):
-            raise ReferenceProblem(f"a capsule starts and ends at {start}: use a sphere, or move its end")
+            raise SolveError(f"a capsule starts and ends at {start}: use a sphere, or move its end")
         return np.array([CAPSULE, *start, *end - start, positive_radius(self.radius, "a capsule's")])
 
 
@@ -85,15 +85,15 @@ Obstacle = RigidPlane | RigidSphere | RigidCapsule
 
 
 def sticky(obstacles):
-    """Which obstacles hold what touches them, (no,) bool; raises ReferenceProblem for an unknown slip."""
+    """Which obstacles hold what touches them, (no,) bool; raises SolveError for an unknown slip."""
     for k, obstacle in enumerate(obstacles):
         if obstacle.slip not in SLIP:
-            raise ReferenceProblem(f"obstacle {k} has slip {obstacle.slip!r}: choose one of {', '.join(SLIP)}")
+            raise SolveError(f"obstacle {k} has slip {obstacle.slip!r}: choose one of {', '.join(SLIP)}")
     return np.array([obstacle.slip == "no_slip" for obstacle in obstacles], dtype=bool)
 
 
 def place(rows, obstacles, t):
-    """Rows of the obstacles moved to time t; raises ReferenceProblem when a motion is not finite."""
+    """Rows of the obstacles moved to time t; raises SolveError when a motion is not finite."""
     moved = rows.copy()
     for k, obstacle in enumerate(obstacles):
         if obstacle.motion is not None:

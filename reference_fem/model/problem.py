@@ -8,7 +8,7 @@ from skfem import MeshTet
 
 from reference_fem.elements.shapes import build_facets, displacement_points
 from reference_fem.elements.table import DEFAULT, find_element
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 from reference_fem.model.cavity import Cavity
 from reference_fem.model.loads import BodyForce, Traction
 from reference_fem.model.material import Material
@@ -79,7 +79,7 @@ class HeldNodes:
 
 
 def find_held(problem: Problem) -> list[HeldNodes]:
-    """Held regions as unknowns; raises ReferenceProblem when a region finds no node or names a wrong component."""
+    """Held regions as unknowns; raises SolveError when a region finds no node or names a wrong component."""
     element = find_element(problem.element)
     x = displacement_points(problem.mesh, element)
     boundary = np.unique(build_facets(problem.mesh, problem.contact_order, element).nodes)
@@ -87,11 +87,11 @@ def find_held(problem: Problem) -> list[HeldNodes]:
     for k, held in enumerate(problem.held):
         components = tuple(held.components)
         if not components or not set(components) <= {0, 1, 2}:
-            raise ReferenceProblem(f"held region {k} names components {components}: give some of 0, 1, 2")
+            raise SolveError(f"held region {k} names components {components}: give some of 0, 1, 2")
         chosen = boundary[np.asarray(held.where(x[boundary].T), dtype=bool)]
         if chosen.size == 0:
             low, high = x.min(axis=0), x.max(axis=0)
-            raise ReferenceProblem(
+            raise SolveError(
                 f"held region {k} contains no boundary node: the body fills {np.array2string(low, precision=4)} to "
                 f"{np.array2string(high, precision=4)} m, choose a region that touches its surface"
             )

@@ -7,7 +7,7 @@ import numpy as np
 
 from reference_fem.contact import augmented as contact
 from reference_fem.elements.shapes import at_nodes, forces_at_nodes
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 from reference_fem.model.problem import Problem
 from reference_fem.statics.newton import StepFailed, solve_step
 from reference_fem.system import assembly
@@ -86,7 +86,7 @@ def equilibrium_path(
 
     on_checkpoint gets what `resume` needs to go on from there with the same problem, times and settings: the answers
     are then those of the uninterrupted path.
-    Dead loads and cavities that start filled are switched on first, at the start. Raises ReferenceProblem for a problem
+    Dead loads and cavities that start filled are switched on first, at the start. Raises SolveError for a problem
     that cannot be set up, and when a sub-step below settings.smallest_step still fails: then its `converged` holds
     what was reached.
     """
@@ -137,7 +137,7 @@ def advance(system: System, state: State, t, load, path):
 def stuck(state: State, t, failure, path):
     """The exception for a path that cannot go on."""
     gravity = f" under {100 * state.load:.3g} % of what acts at the start" if state.load < 1.0 else ""
-    return ReferenceProblem(
+    return SolveError(
         f"no equilibrium found between t = {state.t:g} s{gravity} (the last that converged) and t = {t:g} s: "
         f"{failure}; refine the mesh where it folds, or ask for less",
         converged=path,

@@ -6,7 +6,7 @@ from reference_fem.system.saddle_point import Evaluation, System
 
 
 class Tangent:
-    """Factors of a tangent, with its cavities as a border. Raises ReferenceProblem when it is singular.
+    """Factors of a tangent, with its cavities as a border. Raises SolveError when it is singular.
 
     With K b = dV/dx, the fields move by d + b dp, and dV/dx·(d + b dp) = -misfit gives dp: one more solve for each
     cavity, no dense row in the pattern (docs/theory.md, eq. 6.7).

@@ -4,7 +4,7 @@ import numpy as np
 
 from reference_fem.elements.shapes import check_neighbours, facet_nodes, nodes
 from reference_fem.elements.surface import point_positions
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 from reference_fem.model.obstacles import gaps
 
 START_DEPTH = 1e-3
@@ -16,10 +16,10 @@ def check_mesh(mesh):
     x = nodes(mesh)
     bad = np.flatnonzero(~np.isfinite(x).all(axis=1))
     if bad.size:
-        raise ReferenceProblem(f"node {bad[0]} of the mesh is at {x[bad[0]]}: all coordinates must be finite [m]")
+        raise SolveError(f"node {bad[0]} of the mesh is at {x[bad[0]]}: all coordinates must be finite [m]")
     unused = np.setdiff1d(np.arange(mesh.nvertices), mesh.t)
     if unused.size:
-        raise ReferenceProblem(
+        raise SolveError(
             f"vertex {unused[0]} belongs to no tetrahedron ({unused.size} such vertices): remove unused vertices"
         )
     check_neighbours(mesh)
@@ -29,21 +29,21 @@ def check_loads(problem):
     """Refuse non-finite gravity, negative or missing density."""
     gravity = np.asarray(problem.gravity, dtype=float)
     if gravity.shape != (3,) or not np.isfinite(gravity).all():
-        raise ReferenceProblem(f"gravity is {problem.gravity!r}: three finite numbers [m/s²] are needed")
+        raise SolveError(f"gravity is {problem.gravity!r}: three finite numbers [m/s²] are needed")
     if not (np.isfinite(problem.density) and problem.density >= 0.0):
-        raise ReferenceProblem(f"the density is {problem.density} kg/m³: it must be zero or positive and finite")
+        raise SolveError(f"the density is {problem.density} kg/m³: it must be zero or positive and finite")
     if gravity.any() and problem.density == 0.0:
-        raise ReferenceProblem("gravity acts but the density is 0 kg/m³: give the density, or no gravity")
+        raise SolveError("gravity acts but the density is 0 kg/m³: give the density, or no gravity")
     for name in ("order", "contact_order"):
         given = getattr(problem, name)
         if given is not None and given < 4:
-            raise ReferenceProblem(f"the quadrature {name} is {given}: 4 is the least that integrates p J exactly")
+            raise SolveError(f"the quadrature {name} is {given}: 4 is the least that integrates p J exactly")
 
 
 def check_inertia(problem):
     """Refuse a body without mass where motion is asked for."""
     if problem.density == 0.0:
-        raise ReferenceProblem("the density is 0 kg/m³: a body that moves needs its mass, give the density")
+        raise SolveError("the density is 0 kg/m³: a body that moves needs its mass, give the density")
 
 
 def rigid_motions(x):
@@ -79,7 +79,7 @@ def check_held(x, held_dofs):
     fixed = np.vstack((seen, np.hstack((slides.T, np.zeros((slides.shape[1], 3)))) * 10.0))
     names += [f"turn about {direction(v[3:])}" for v in null_space(fixed).T]
     if names:
-        raise ReferenceProblem(
+        raise SolveError(
             f"the body is free to {' and '.join(names)}: hold a patch of it or use symmetry planes "
             f"(contact holds nothing before it is made, and a lumen never does)"
         )
@@ -98,7 +98,7 @@ def check_start(surface, rows, size):
     for k, row in enumerate(rows):
         depth = -float(gaps(row, y).min())
         if depth > START_DEPTH * size:
-            raise ReferenceProblem(
+            raise SolveError(
                 f"obstacle {k} starts {depth:.3g} m inside the body (limit {START_DEPTH * size:.3g} m): "
                 f"move it back, or turn its normal towards the body"
             )
@@ -108,9 +108,9 @@ def check_times(times, start):
     """Times as an array; refuse an empty, non-finite or non-increasing list, and times before the start."""
     times = np.atleast_1d(np.asarray(times, dtype=float))
     if times.size == 0 or not np.isfinite(times).all():
-        raise ReferenceProblem(f"the times are {times}: give at least one finite time [s]")
+        raise SolveError(f"the times are {times}: give at least one finite time [s]")
     if np.any(np.diff(times) <= 0.0) or times[0] < start:
-        raise ReferenceProblem(f"the times {times} s must increase and not lie before the start, {start:g} s")
+        raise SolveError(f"the times {times} s must increase and not lie before the start, {start:g} s")
     return times
 
 
@@ -119,7 +119,7 @@ def check_resumed(rest, state):
     for name in ("x", "multiplier", "pressure"):
         wanted, given = getattr(rest, name).shape, getattr(state, name).shape
         if wanted != given:
-            raise ReferenceProblem(
+            raise SolveError(
                 f"the load step to go on from has {name} of shape {given}, this problem {wanted}: it is of another "
                 f"mesh, element or set of obstacles, solve the path from its start"
             )

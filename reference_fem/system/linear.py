@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from reference_fem.errors import ReferenceProblem, SlowSolverWarning
+from reference_fem.errors import SlowSolverWarning, SolveError
 
 RESIDUAL_LIMIT = 1e-6
 """Largest relative residual of a solve (max norm) before the factors are rejected: Newton only needs a direction,
@@ -35,7 +35,7 @@ def free_bytes():
 def check_memory(needed, free, unknowns):
     """Refuse factors that do not fit, before the machine swaps; both in bytes."""
     if needed > free:
-        raise ReferenceProblem(
+        raise SolveError(
             f"factorising {unknowns} unknowns needs {needed / 1e9:.2g} GB of memory and {free / 1e9:.2g} GB are free: "
             f"use a coarser mesh (half as many unknowns need about 0.4 of it) or a larger machine"
         )
@@ -127,13 +127,13 @@ class ScipyFactors:
 class SymmetricSolver:
     """Solves K x = b for a K given by its upper triangle; checks every answer by its residual.
 
-    Raises ReferenceProblem when K is singular to working precision.
+    Raises SolveError when K is singular to working precision.
     """
 
     def __init__(self, backend="auto"):
         pypardiso = load_pardiso() if backend in ("auto", "pardiso") else None
         if backend == "pardiso" and pypardiso is None:
-            raise ReferenceProblem("the solver 'pardiso' was asked for but pypardiso is not installed: use 'auto'")
+            raise SolveError("the solver 'pardiso' was asked for but pypardiso is not installed: use 'auto'")
         self.factors = PardisoFactors(pypardiso) if pypardiso else ScipyFactors()
         self.upper = sp.csr_matrix((1, 1))
 
@@ -145,7 +145,7 @@ class SymmetricSolver:
         try:
             self.factors.factor(self.upper, afresh)
         except self.factors.failure as problem:
-            raise ReferenceProblem(
+            raise SolveError(
                 f"the tangent matrix of {len(self.upper.indptr) - 1} unknowns cannot be factorised ({problem}): "
                 f"part of the body may be free to move, hold it"
             ) from problem
@@ -161,7 +161,7 @@ class SymmetricSolver:
             x = self.factors.solve(b)
         misfit = self.misfit(x, b)
         if not misfit <= RESIDUAL_LIMIT:
-            raise ReferenceProblem(
+            raise SolveError(
                 f"the tangent matrix of {len(self.upper.indptr) - 1} unknowns is singular to working precision "
                 f"(relative residual {misfit:.1e}, limit {RESIDUAL_LIMIT:.0e}): part of the body may be free to move, "
                 f"hold it"

@@ -8,7 +8,7 @@ from reference_fem.contact import augmented as contact
 from reference_fem.elements.shapes import build_elements, build_facets, displacement_points
 from reference_fem.elements.surface import Surface
 from reference_fem.elements.table import find_element
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 from reference_fem.model import cavity, obstacles
 from reference_fem.model.loads import BodyForce, find_points, nodal_force
 from reference_fem.model.problem import Problem, find_held
@@ -42,7 +42,7 @@ class Evaluation:
 
 
 class System:
-    """Tables, pattern and solver of a problem. Raises ReferenceProblem for what cannot be solved."""
+    """Tables, pattern and solver of a problem. Raises SolveError for what cannot be solved."""
 
     def __init__(self, problem: Problem, settings: NewtonSettings):
         mesh, self.problem, self.settings = problem.mesh, problem, settings
@@ -128,7 +128,7 @@ class System:
             value, there = held.displacement(t), wanted[held.dofs]
             clash = np.abs(value - there) > 1e-9 * (np.abs(value) + np.abs(there))
             if clash.any():
-                raise ReferenceProblem(
+                raise SolveError(
                     f"held region {k} prescribes {value[clash][0]:g} m where an earlier one prescribes "
                     f"{there[clash][0]:g} m at t = {t:g} s: let them not overlap, or agree"
                 )

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from reference_fem.contact.augmented import NO_GRIP, NO_GUESS, Grip
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 
 PLAIN = ("t", "load", "x", "multiplier", "pressure", "iterations", "stiffness")
 """Fields of a State that are one number or one array."""
@@ -63,11 +63,11 @@ class State:
 
     @classmethod
     def from_arrays(cls, arrays) -> "State":
-        """The state that to_arrays stored; raises ReferenceProblem when a part is missing."""
+        """The state that to_arrays stored; raises SolveError when a part is missing."""
         parts = (*PLAIN, *(f"{name}_{part}" for name in ("grip", "hold") for part in Grip._fields))
         missing = [name for name in parts if name not in arrays]
         if missing:
-            raise ReferenceProblem(f"the stored load step lacks {', '.join(missing)}: solve the path from its start")
+            raise SolveError(f"the stored load step lacks {', '.join(missing)}: solve the path from its start")
         values: dict[str, Any] = {name: np.asarray(arrays[name])[()] for name in PLAIN}
         for name in ("grip", "hold"):
             values[name] = Grip(*(np.asarray(arrays[f"{name}_{part}"]) for part in Grip._fields))

@@ -5,7 +5,7 @@ import os
 import sys
 
 from massspring.errors import MassSpringError
-from reference_fem.errors import ReferenceProblem
+from reference_fem.errors import SolveError
 from studies.base.errors import StudyError
 from studies.base.study_file import fault_of_study_file
 from studies.cli.terminal import errors
@@ -13,7 +13,7 @@ from studies.cli.terminal import errors
 
 def told(error: Exception) -> str:
     """The sentence for an error. Raises an unforeseen error again: a fault of this program keeps its traceback."""
-    if isinstance(error, (StudyError, MassSpringError, ReferenceProblem)):
+    if isinstance(error, (StudyError, MassSpringError, SolveError)):
         return str(error)
     own = fault_of_study_file(error)
     if own is not None:

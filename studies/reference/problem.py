@@ -18,7 +18,7 @@ SAME_POINT = 1e-9
 def reference_problem(scene: Scene, level: float) -> Problem:
     """The scene on mesh `level` of its reference plan, curved second order where the true surface is known.
 
-    Raises StudyError for a mesh that cannot be made, ReferenceProblem for one that cannot be used.
+    Raises StudyError for a mesh that cannot be made, SolveError for one that cannot be used.
     """
     tissue = scene.tissue
     mesh, patches, lumen = reference_mesh(scene, level)

@@ -11,7 +11,7 @@ from reference_fem import (
     Moment,
     NewtonSettings,
     Problem,
-    ReferenceProblem,
+    SolveError,
     equilibrium_path,
     motion_path,
     nodes,
@@ -80,7 +80,7 @@ def solve(root: Path, piece: Piece) -> Path:
             path = equilibrium_path(
                 problem, times, settings, on_checkpoint=lambda c: keep(record_file, stamp, c), resume=before
             )
-    except ReferenceProblem as error:
+    except SolveError as error:
         path = error.converged
         status, message = Status.NOT_CONVERGED, str(error)
     found = [e for e in path if e.t in checkpoints]
@@ -100,7 +100,7 @@ def solve(root: Path, piece: Piece) -> Path:
 
 
 def motion(piece: Piece, problem: Problem, times: tuple[float, ...], settings: NewtonSettings) -> list[Moment]:
-    """The scene's motion from its start, with its damping. Raises ReferenceProblem; StudyError for another shape."""
+    """The scene's motion from its start, with its damping. Raises SolveError; StudyError for another shape."""
     scene, plan = piece.scene, piece.scene.reference
     assert plan is not None and plan.dt is not None  # it moves
     if scene.start is not None and scene.start.shaped:

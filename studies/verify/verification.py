@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from reference_fem import ReferenceProblem, oracles
+from reference_fem import SolveError, oracles
 from reference_fem.oracles import Check, Curve, Oracle, Outcome, kappa
 from studies.base.atomic import write_whole
 from studies.plots import verify as convergence
@@ -51,7 +51,7 @@ def measured(oracle: Oracle) -> Outcome:
     """What an oracle finds; one that cannot be solved fails by a NaN, and the others still have their say."""
     try:
         return oracle.measure()
-    except ReferenceProblem as problem:
+    except SolveError as problem:
         return Outcome((Check(f"not solved: {problem}", "1", 1.0, math.nan, 0.01, "none", 0),))
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from skfem import Basis, BilinearForm, ElementTetP2
 
-from reference_fem import Held, NeoHookean, NewtonSettings, Problem, ReferenceProblem, exact, natural_frequencies, nodes
+from reference_fem import Held, NeoHookean, NewtonSettings, Problem, SolveError, exact, natural_frequencies, nodes
 from reference_fem.dynamics.inertia import MovingSystem
 from tests.reference_fem.bodies import ball_octant, block, symmetry, whole_ball
 
@@ -118,8 +118,8 @@ def test_a_turning_cube_has_its_moment_of_inertia(skewed):
 
 def test_modes_need_mass_and_a_possible_count():
     mesh, material = block((1, 1, 1)), NeoHookean(MU, 1e3 * MU)
-    with pytest.raises(ReferenceProblem, match="density is 0"):
+    with pytest.raises(SolveError, match="density is 0"):
         natural_frequencies(Problem(mesh, material, ()), 3)
     for count in (0, 10_000):
-        with pytest.raises(ReferenceProblem, match=f"{count} modes are asked for: give 1 to "):
+        with pytest.raises(SolveError, match=f"{count} modes are asked for: give 1 to "):
             natural_frequencies(Problem(mesh, material, (), density=RHO), count)

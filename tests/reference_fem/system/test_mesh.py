@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from skfem import ElementTetP2
 
-from reference_fem import Evaluator, ReferenceProblem, nodes, surface_triangles
+from reference_fem import Evaluator, SolveError, nodes, surface_triangles
 from reference_fem.elements.shapes import basis_table, build_elements, build_facets, element_nodes, facet_nodes
 from reference_fem.system.pattern import build_pattern
 from tests.reference_fem.bodies import ball_octant, block, shell_octant
@@ -102,7 +102,7 @@ def test_evaluator_extrapolates_near_the_surface_and_says_how_far():
     "points, words", [([[3.0, 0, 0]], "outside the mesh"), ([[np.nan, 0, 0]], "finite"), ([[1, 2]], "shape")]
 )
 def test_evaluator_refuses_points_it_cannot_serve(points, words):
-    with pytest.raises(ReferenceProblem, match=words):
+    with pytest.raises(SolveError, match=words):
         Evaluator(block()).displacement(np.zeros_like(nodes(block())), points)
 
 

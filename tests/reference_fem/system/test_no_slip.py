@@ -8,10 +8,10 @@ from reference_fem import (
     NeoHookean,
     NewtonSettings,
     Problem,
-    ReferenceProblem,
     RigidCapsule,
     RigidPlane,
     RigidSphere,
+    SolveError,
     equilibrium_path,
 )
 from reference_fem.contact import augmented as contact
@@ -202,5 +202,5 @@ def test_facets_out_of_reach_change_nothing(monkeypatch):
     ],
 )
 def test_bad_obstacles(obstacle, words):
-    with pytest.raises(ReferenceProblem, match=words):
+    with pytest.raises(SolveError, match=words):
         equilibrium_path(Problem(block(), TISSUE, [BOTTOM], [obstacle]), (1.0,))

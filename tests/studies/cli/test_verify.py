@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from reference_fem import ReferenceProblem
+from reference_fem import SolveError
 from reference_fem.oracles import Check, Curve, Oracle, Outcome, kappa
 from studies.cli import app as cli
 from studies.verify import verification
@@ -67,7 +67,7 @@ def test_the_fast_half_leaves_the_whole_alone(run, tmp_path):
 
 def test_an_oracle_that_cannot_be_solved_fails_without_silencing_the_others(run, tmp_path):
     def break_off():
-        raise ReferenceProblem("no equilibrium found between t = 0 s and t = 1 s")
+        raise SolveError("no equilibrium found between t = 0 s and t = 1 s")
 
     result = run([Oracle("stuck", "Stuck", "a book", break_off), oracle("right", 2.0)])
     assert result.exit_code == 1

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from reference_fem import Checkpoint, ReferenceProblem
+from reference_fem import Checkpoint, SolveError
 from studies.base.errors import StudyError
 from studies.reference import checkpoints
 from studies.reference import pieces as known
@@ -129,7 +129,7 @@ def test_steps_of_other_code_are_not_gone_on_from(tmp_path, monkeypatch):
 
     def watched(problem, times, settings, on_checkpoint, resume):
         asked.append(resume)
-        raise ReferenceProblem("enough")
+        raise SolveError("enough")
 
     monkeypatch.setattr(module, "equilibrium_path", watched)
     solve(tmp_path, piece)
@@ -151,7 +151,7 @@ def test_steps_that_have_changed_are_not_gone_on_from(tmp_path):
 
 
 def broken(problem, times, settings, **_):
-    raise ReferenceProblem("no equilibrium found between t = 1 s and t = 4 s: the mesh folds; refine it", converged=[])
+    raise SolveError("no equilibrium found between t = 1 s and t = 4 s: the mesh folds; refine it", converged=[])
 
 
 def test_a_path_that_breaks_off_is_stored_and_not_believed(solved, tmp_path, monkeypatch):
@@ -159,7 +159,7 @@ def test_a_path_that_breaks_off_is_stored_and_not_believed(solved, tmp_path, mon
     true_path = module.equilibrium_path
 
     def half(problem, times, settings, **_):
-        raise ReferenceProblem("the mesh folds; refine it", converged=true_path(problem, times[:1], settings))
+        raise SolveError("the mesh folds; refine it", converged=true_path(problem, times[:1], settings))
 
     monkeypatch.setattr(module, "equilibrium_path", half)
     record = read_record(solve(root, Piece(SCENE, LEVELS[1])))
