@@ -1,4 +1,4 @@
-"""Where the modules and names of version 0.1 are now: what a study file of a user may hold."""
+"""Where the modules and names of version 0.1 are now, and their names: what a study file of a user may hold."""
 
 MODULES = {
     "massspring.axis": "massspring.body.axis",
@@ -149,3 +149,11 @@ NAMES = {
     "studies.store.open_results": "studies.store.opening",
 }
 """Old module and name -> the module that holds the name, where it is another one."""
+
+RENAMED = {
+    "massspring.Path": "Trajectory",
+    "reference_fem.ReferenceProblem": "SolveError",
+    "studies.Probed": "ForceOutput",
+    "studies.Start": "InitialConditions",
+}
+"""Package and old name -> the name that the thing has now."""

@@ -5,7 +5,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import NamedTuple
 
-from studies.base.moved import MODULES, NAMES
+from studies.base.moved import MODULES, NAMES, RENAMED
 
 
 class Moved(NamedTuple):
@@ -17,6 +17,8 @@ class Moved(NamedTuple):
     name: str | None
     """None for `import module`."""
     alias: str | None
+    asked: str | None = None
+    """The name that the statement asks for, where it is another one now."""
 
     @property
     def is_there(self) -> bool:
@@ -32,17 +34,20 @@ def advice(source: str | bytes, line: int) -> str | None:
     None where the line imports nothing that has moved, or from a module that is still there a name that it lacks.
     """
     asked = _asked(source, line)
-    moved = [each for each in asked if each.home != each.old]
+    moved = [each for each in asked if each.home != each.old or each.asked]
     if not moved:
         return None
     found, lost = [each for each in asked if each.is_there], [each for each in asked if not each.is_there]
     if lost and _is_module(lost[0].old):
         return None
+    first = moved[0]
     homes = " and ".join(dict.fromkeys(each.home for each in moved))
+    if first.home == first.old:
+        first, homes = first._replace(old=f"{first.old}.{first.asked}"), f"{first.home}.{first.name}"
     write = " and ".join(f"`{statement}`" for statement in _statements(found))
     gone = ", ".join(str(each.name) for each in lost)
     said = [
-        f"{moved[0].old} is now {homes}",
+        f"{first.old} is now {homes}",
         *([f"write {write}"] if write else []),
         *([f"{gone} is gone"] * bool(gone)),
     ]
@@ -65,7 +70,11 @@ def _named(module: str, name: str, alias: str | None) -> Moved:
     if full in MODULES:
         home, _, last = MODULES[full].rpartition(".")
         return Moved(full, home, last, alias or (name if last != name else None))
-    return Moved(module, NAMES.get(full, MODULES.get(module, module)), name, alias)
+    home = NAMES.get(full, MODULES.get(module, module))
+    new = RENAMED.get(f"{home.split('.')[0]}.{name}")
+    if new is None or not _is_module(home) or hasattr(import_module(home), name):
+        return Moved(module, home, name, alias)
+    return Moved(module, home, new, alias or name, name)
 
 
 def _statements(found: list[Moved]) -> list[str]:

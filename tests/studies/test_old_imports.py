@@ -5,7 +5,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from studies.base.moved import MODULES, NAMES
+from studies.base.moved import MODULES, NAMES, RENAMED
 from studies.base.old_imports import advice
 
 LEARNED = {
@@ -14,7 +14,17 @@ LEARNED = {
     ),
     "from massspring.obstacles import Path": (
         "massspring.obstacles is now massspring.world.trajectories; "
-        "write `from massspring.world.trajectories import Path`"
+        "write `from massspring.world.trajectories import Trajectory as Path`"
+    ),
+    "from massspring import Path": (
+        "massspring.Path is now massspring.Trajectory; write `from massspring import Trajectory as Path`"
+    ),
+    "from studies import Probed as Force, Scene": (
+        "studies.Probed is now studies.ForceOutput; write `from studies import ForceOutput as Force, Scene`"
+    ),
+    "from reference_fem import ReferenceProblem": (
+        "reference_fem.ReferenceProblem is now reference_fem.SolveError; "
+        "write `from reference_fem import SolveError as ReferenceProblem`"
     ),
     "from studies.scenes.base import (\n    Scene,\n    Tissue as Soft,\n)": (
         "studies.scenes.base is now studies.scene.scene and studies.scene.tissues; "
@@ -62,8 +72,12 @@ def test_other_mistakes_keep_their_own_sentence(line):
 
 def test_the_table_leads_to_what_is_there():
     assert [new for new in MODULES.values() if find_spec(new) is None] == []
-    lost = [old for old, new in NAMES.items() if not hasattr(import_module(new), old.rpartition(".")[2])]
-    assert lost == []
+    for old, new in NAMES.items():
+        name = old.rpartition(".")[2]
+        assert hasattr(import_module(new), RENAMED.get(f"{new.split('.')[0]}.{name}", name)), old
+    for old, new in RENAMED.items():
+        package, _, name = old.partition(".")
+        assert hasattr(import_module(package), new) and not hasattr(import_module(package), name), old
 
 
 def test_the_table_holds_only_what_has_moved():
