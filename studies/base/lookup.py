@@ -11,10 +11,10 @@ SHOWN = 20  # more names than this say less than the suggestion alone
 
 
 @overload
-def choose(name: str, known: Mapping[str, T], noun: str) -> T: ...
+def lookup(name: str, known: Mapping[str, T], noun: str) -> T: ...
 @overload
-def choose(name: str, known: Iterable[str], noun: str) -> str: ...
-def choose(name, known, noun):
+def lookup(name: str, known: Iterable[str], noun: str) -> str: ...
+def lookup(name, known, noun):
     """The item of `known` called `name`: its value when `known` is a mapping, the name itself otherwise.
 
     Raises StudyError: "unknown scene 'bal_squeeze'; did you mean 'ball_squeeze' (known are ball_clamped, ...)?".

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from massspring import METHODS
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes import SCENES
 
@@ -16,9 +16,9 @@ SurfaceNodes = Annotated[int, typer.Option(help="surface nodes")]
 
 def chosen_case(scene: str, method: str, body: str, nodes: int) -> Case:
     """`method` on a body of so many surface nodes in a scene. Raises StudyError for a word that names none."""
-    kind = choose(body, ("tetrahedral", "surface"), "body")
+    kind = lookup(body, ("tetrahedral", "surface"), "body")
     return Case(
-        scene=choose(scene, {s.name: s for s in SCENES}, "scene"),
+        scene=lookup(scene, {s.name: s for s in SCENES}, "scene"),
         body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
-        method=choose(method, {m.name: m for m in METHODS}, "method")(),
+        method=lookup(method, {m.name: m for m in METHODS}, "method")(),
     )

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 
 
 class Entry(NamedTuple):
@@ -35,7 +35,7 @@ def lazy_group(entries: dict[str, Entry]) -> type[TyperGroup]:
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
             """The command that the words call, with its module loaded. Raises StudyError with the nearest match."""
             name, *rest = args
-            return name, loaded(name, choose(name, entries, "command")), rest
+            return name, loaded(name, lookup(name, entries, "command")), rest
 
     return LazyGroup
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 from studies.metrics.metrics import METRICS, Metric, Run
 
 DOUBTFUL = "doubtful"
@@ -13,7 +13,7 @@ DOUBTFUL = "doubtful"
 
 def metric(name: str) -> Metric:
     """The metric called `name`. Raises StudyError with the nearest match."""
-    return choose(name, {m.name: m for m in METRICS}, "metric")
+    return lookup(name, {m.name: m for m in METRICS}, "metric")
 
 
 def check_columns(names: Sequence[str]) -> None:

@@ -9,7 +9,7 @@ from skfem import MeshTet, MeshTet2
 from massspring import Obstacle
 from reference_fem import Evaluator, curve, facet_nodes, nodes
 from reference_fem.elements.shapes import edge_index
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 from studies.geometry import OrganMesh, ball_octant, curved, project_ball
 from studies.geometry.mesh.jacobian import PAIRS
 from studies.geometry.mesh.organ_mesh import boundary_triangles
@@ -99,7 +99,7 @@ def _on_true_shape(organ_mesh: OrganMesh, body: "Body", shape: Shape, helds: tup
 
 def true_shape(organ: Organ) -> Shape | None:
     """The organ as a level function; None where only a mesh is known."""
-    return None if organ.shape == "file" else choose(organ.shape, SHAPES, "organ")(**organ.parameters)
+    return None if organ.shape == "file" else lookup(organ.shape, SHAPES, "organ")(**organ.parameters)
 
 
 @dataclass(frozen=True, eq=False)

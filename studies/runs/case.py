@@ -12,7 +12,7 @@ from massspring import METHODS, ImplicitVolume, Method
 from massspring.body.laws import laws_by_name
 from massspring.body.membranes import MEMBRANE_LAWS
 from studies.base.errors import StudyError
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 from studies.runs.case_checks import check_settings
 from studies.scene.as_json import _scene_adapter, scene_from_dict
 from studies.scene.scene import Scene
@@ -45,7 +45,7 @@ class BodyRecipe:
     """Of a surface body: relative stiffness of structural, bending, inner and axial springs; None for 1, ½, ½, 1."""
 
     def __post_init__(self) -> None:
-        choose(self.law, (*laws_by_name(), *MEMBRANE_LAWS), "stiffness law")
+        lookup(self.law, (*laws_by_name(), *MEMBRANE_LAWS), "stiffness law")
 
     @property
     def series(self) -> str:
@@ -186,7 +186,7 @@ def case_from_json(text: str) -> Case:
 
 def method_from_dict(data: Mapping[str, Any]) -> Method:
     """The method of {"name": …, "settings": {…}}; an unknown setting is an error. Raises StudyError."""
-    kind = choose(data["name"], {method.name: method for method in METHODS}, "method")
+    kind = lookup(data["name"], {method.name: method for method in METHODS}, "method")
     unknown = set(data["settings"]) - set(kind.__dataclass_fields__)  # pyright: ignore[reportAttributeAccessIssue]
     if unknown:
         raise StudyError(f"method '{kind.name}' has no setting {', '.join(sorted(unknown))}")

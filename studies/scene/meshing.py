@@ -3,7 +3,7 @@
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 from studies.geometry import OrganMesh, fill, organ, read_mesh, scan
 from studies.geometry.organs import SHAPES
 from studies.scene.scene import Scene
@@ -17,7 +17,7 @@ def mesh_for(scene: Scene, nodes: int, filled: bool = True) -> OrganMesh:
 
     A mesh file comes as it is, unless its parameters ask for a new surface: "remesh": true, or "smooth" or "wall" [m].
     """
-    if choose(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
+    if lookup(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
         return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters)
     parameters = scene.organ.parameters
     if "path" not in parameters or "unit" not in parameters:
@@ -25,7 +25,7 @@ def mesh_for(scene: Scene, nodes: int, filled: bool = True) -> OrganMesh:
             f"scene '{scene.name}': an organ from a file needs a path and a unit, it has {dict(parameters)}"
         )
     for key in parameters:
-        choose(key, FILE_PARAMETERS, "parameter of an organ from a file")
+        lookup(key, FILE_PARAMETERS, "parameter of an organ from a file")
     asked = {key: parameters[key] for key in ("smooth", "wall") if key in parameters}
     if asked or parameters.get("remesh"):
         return scan(parameters["path"], nodes, unit=parameters["unit"], fill=filled, **asked)

@@ -15,7 +15,7 @@ import numpy as np
 
 from studies.base.atomic import write_whole
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 from studies.store.checksums import BLOCK, attribute_digest, field_digest, manifest, plain, sealed
 from studies.store.opening import AGAIN, open_results
 from studies.store.schema import Status, fault
@@ -97,7 +97,7 @@ def read_record(path: Path, fields: Iterable[str] | None = None) -> Record:
     """
     with open_results(path) as (file, _):
         record, digests = _header(path, file)
-        names = digests if fields is None else [choose(name, list(digests), "field") for name in fields]
+        names = digests if fields is None else [lookup(name, list(digests), "field") for name in fields]
         record = replace(record, fields={name: _field(path, file, name, digests[name]) for name in names})
     wrong = None if fields is not None else fault(record.kind, record.status, record.attributes, record.fields)
     if wrong:
@@ -125,7 +125,7 @@ def _check(record: Record) -> None:
     if record.schema != SCHEMA:
         raise StudyError(f"record {record.name!r} has schema {record.schema!r}; this version writes {SCHEMA}")
     canonical(record.key)
-    choose(record.status, [str(status) for status in Status], "status")
+    lookup(record.status, [str(status) for status in Status], "status")
     for name, value in record.attributes.items():
         simple = value is None or isinstance(value, (str, bool, int, float, np.number, np.bool_))
         if name in (*HEADER, CHECKSUMS) or not (simple or _is_short_list(value)):
@@ -178,7 +178,7 @@ def _header(path: Path, file: h5py.File) -> tuple[Record, dict[str, str]]:
         if attribute_digest(values[name]) != digest:
             raise DamagedFile(f"{path}: the attribute {name!r} has changed since it was written: {AGAIN}")
     header = {name: values.pop(name) for name in HEADER}
-    header["status"] = Status(choose(header["status"], [str(status) for status in Status], f"status in {path}"))
+    header["status"] = Status(lookup(header["status"], [str(status) for status in Status], f"status in {path}"))
     return Record(**header, attributes=values), digests["fields"]
 
 

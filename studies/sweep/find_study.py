@@ -8,7 +8,7 @@ from typing import Any
 
 from studies.base import interrupts
 from studies.base.errors import StudyError
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 from studies.base.study_file import MODULE, what_failed
 from studies.catalog import STUDIES, Study
 from studies.runs.case import Case, case_from_json, case_to_dict
@@ -20,7 +20,7 @@ MAIN = "main"
 def find_study(name: str) -> Study:
     """A study of the catalogue, or STUDY of a Python file. Raises StudyError, for whatever is wrong with the file."""
     if not name.endswith(".py"):
-        return choose(name, {study.name: study for study in STUDIES}, "study")
+        return lookup(name, {study.name: study for study in STUDIES}, "study")
     if not Path(name).is_file():
         raise StudyError(f"there is no study file {name}; give a Python file that defines STUDY")
     study = _load(Path(name).resolve())

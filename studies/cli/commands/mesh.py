@@ -12,7 +12,7 @@ import typer
 from rich.table import Table
 
 from studies.base.errors import StudyError
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 from studies.cli.terminal import console, errors
 from studies.geometry import OrganMesh, curved, organ, scan, vary
 from studies.geometry.api.scans import longest_side
@@ -82,7 +82,7 @@ def refuse_file_options(smooth: float, close_holes: bool, unit: str | None) -> N
 
 def synthetic(name: str, nodes: int, seed: int | None, wall: float | None, filled: bool) -> OrganMesh:
     """An organ of SHAPES, varied by its seed, with a wall [mm] if it can have one."""
-    choose(name, SHAPES, "organ")
+    lookup(name, SHAPES, "organ")
     parameters: dict[str, float] = {} if seed is None else dict(vary(name, seed))
     if wall is not None:
         hollow = [known for known, make in SHAPES.items() if "wall" in make.__code__.co_varnames]

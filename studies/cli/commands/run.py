@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from studies.base.atomic import sweep_parts
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
 from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import Results, console, say, warn
@@ -78,5 +78,5 @@ def _filter(only: str) -> Wanted:
         "failed": failed,
         "stale": lambda task: task.why_stale() not in (None, MISSING),
     }
-    chosen = [choose(word.strip(), rules, "filter") for word in only.split(",")]
+    chosen = [lookup(word.strip(), rules, "filter") for word in only.split(",")]
     return lambda task: any(rule(task) for rule in chosen)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 from studies.cli.terminal import Results, StudyName, console, say, warn
 from studies.metrics.cells import DOUBT_MARK, MISSING, plain, value_cell
 from studies.metrics.metrics import METRICS, Metric
@@ -31,7 +31,7 @@ def table(
     """One row per case, with the metrics of the study; ± is the uncertainty of the reference."""
     entry = find_study(study)
     names = [name.strip() for name in metrics.split(",")] if metrics else list(entry.columns)
-    chosen = [choose(name, {m.name: m for m in METRICS}, "metric") for name in names]
+    chosen = [lookup(name, {m.name: m for m in METRICS}, "metric") for name in names]
     runs, remarks = load_runs(results, entry)
     warn(remarks)
     frame = study_table(runs, names)

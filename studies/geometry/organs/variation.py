@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.base.lookup import choose
+from studies.base.lookup import lookup
 from studies.geometry.organs import SHAPES
 
 COMMON = 0.7
@@ -22,7 +22,7 @@ def vary(name: str, seed: int, spread: float = 0.2) -> dict[str, float]:
     thins it. The same seed gives the same organ. Raises StudyError for an unknown organ, a seed that is no whole number
     from 0 on, or a spread outside 0 to WIDEST.
     """
-    shape = choose(name, SHAPES, "organ")
+    shape = lookup(name, SHAPES, "organ")
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise StudyError(f"{name}: the seed {seed!r} is no whole number from 0 on; give one such as 1")
     if not 0 <= spread <= WIDEST:
