@@ -46,12 +46,12 @@ def advice(source: str | bytes, line: int) -> str | None:
         first, homes = first._replace(old=f"{first.old}.{first.asked}"), f"{first.home}.{first.name}"
     write = " and ".join(f"`{statement}`" for statement in _statements(found))
     gone = ", ".join(str(each.name) for each in lost)
-    said = [
+    parts = [
         f"{first.old} is now {homes}",
         *([f"write {write}"] if write else []),
         *([f"{gone} is gone"] * bool(gone)),
     ]
-    return "; ".join(said)
+    return "; ".join(parts)
 
 
 def _asked(source: str | bytes, line: int) -> list[Moved]:

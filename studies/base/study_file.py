@@ -38,5 +38,5 @@ def what_failed(path: Path, error: BaseException) -> str:
         if moved:
             return f"in line {lines[-1]}, {moved}"
     kind = "" if isinstance(error, StudyError | MassSpringError) else f"{type(error).__name__} "
-    said = str(error).split("\n")[0]
-    return f"{kind}in line {lines[-1] if lines else '?'}" + (f": {said}" if said else "")
+    message = str(error).split("\n")[0]
+    return f"{kind}in line {lines[-1] if lines else '?'}" + (f": {message}" if message else "")

@@ -7,7 +7,7 @@ import warnings
 import typer
 
 from studies.base import interrupts
-from studies.cli.endings import complain, flushed, told
+from studies.cli.endings import complain, flushed, message
 from studies.cli.group import Entry, lazy_group
 
 COMMANDS = {
@@ -62,6 +62,6 @@ def _exit_code() -> str | int | None:
         code = stop.code
     except Exception as error:
         if not interrupts.pressed():
-            complain(f"organbench: {told(error)}")
+            complain(f"organbench: {message(error)}")
             code = 2
     return interrupts.exit_code() if interrupts.pressed() else code

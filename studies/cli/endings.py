@@ -11,7 +11,7 @@ from studies.base.study_file import fault_of_study_file
 from studies.cli.terminal import errors
 
 
-def told(error: Exception) -> str:
+def message(error: Exception) -> str:
     """The sentence for an error. Raises an unforeseen error again: a fault of this program keeps its traceback."""
     if isinstance(error, (StudyError, MassSpringError, SolveError)):
         return str(error)

@@ -39,7 +39,7 @@ class TerminalProgress:
         self.pending = {(piece.stage, piece.label): piece for piece in planned}
         self.jobs = jobs
         self.compiled: set[str] = set()
-        self.told = time.monotonic()
+        self.last_report = time.monotonic()
         self.compiling_told = 0.0
 
     def __enter__(self) -> "TerminalProgress":
@@ -67,9 +67,9 @@ class TerminalProgress:
         self.bars.update(self.tasks[what], advance=1, note=left or note)
         self.totals[what][0] += 1
         done, total = self.totals[what]
-        due = time.monotonic() - self.told > QUIET_SECONDS or done == total
+        due = time.monotonic() - self.last_report > QUIET_SECONDS or done == total
         if not self.console.is_terminal and due:
-            self.told = time.monotonic()
+            self.last_report = time.monotonic()
             self._line(f"{what} {done}/{total}: {note}" + (f", {left}" if left else ""))
 
     def left(self) -> str:
@@ -97,15 +97,15 @@ class TerminalProgress:
 def compiling(console: Console, doing: str) -> Iterator[Callable[[str], None]]:
     """Inside, what is given names is told as being compiled: on a terminal in a line that moves, beside what is being
     done; in a log once, and then at most every QUIET_SECONDS."""
-    told = -QUIET_SECONDS
+    last_report = -QUIET_SECONDS
     with console.status(f"{doing} …") if console.is_terminal else nullcontext() as status:
 
         def tell(name: str) -> None:
-            nonlocal told
+            nonlocal last_report
             if status is not None:
                 status.update(f"{doing}: compiling {name} (kept for the next time) …")
-            elif time.monotonic() - told > QUIET_SECONDS:
-                told = time.monotonic()
+            elif time.monotonic() - last_report > QUIET_SECONDS:
+                last_report = time.monotonic()
                 console.print(f"compiling {name} (kept for the next time)", markup=False, highlight=False)
 
         yield tell

@@ -34,11 +34,11 @@ APART = 0.12
 
 def label(method: Method) -> str:
     """Its name, and the settings that are not the defaults: "element (bulk modulus 1e+06, hard)"."""
-    said = []
+    label = []
     for name, value in chosen_settings(method).items():
         number = f" {value:g}" if not isinstance(value, (bool, str)) else f" {value}" if isinstance(value, str) else ""
-        said.append(readable(name) + number)
-    return readable(method.name) + (f" ({', '.join(said)})" if said else "")
+        label.append(readable(name) + number)
+    return readable(method.name) + (f" ({', '.join(label)})" if label else "")
 
 
 def row_names(runs: Sequence[Run]) -> dict[int, str]:
@@ -123,8 +123,8 @@ def _handles(scenes: dict[str, list[Run]], metrics: Sequence[Metric]) -> list:
     entries = []
     for number, (name, group) in enumerate(scenes.items()):
         colour, marker = SCENE_LOOKS[number % len(SCENE_LOOKS)]
-        said = heading(name) + doubt_mark(group, metrics)
-        entries.append(Line2D([], [], color=colour, marker=marker, linestyle="", markersize=7, label=said))
+        label = heading(name) + doubt_mark(group, metrics)
+        entries.append(Line2D([], [], color=colour, marker=marker, linestyle="", markersize=7, label=label))
     dotted = Line2D([], [], color=GREY, linestyle=":", label="the reference's own uncertainty")
     hollow = {"marker": "o", "linestyle": "", "markerfacecolor": "white", "color": GREY, "markersize": 7}
     return [*entries, dotted, Line2D([], [], label="hollow: the reference is not ten times better", **hollow)]

@@ -38,10 +38,10 @@ def kept(record: Path, stamp: str) -> "Checkpoint | None":
     if hashlib.sha256(whole[DIGEST:]).hexdigest().encode() != whole[:DIGEST]:
         return None
     try:
-        said, checkpoint = pickle.loads(whole[DIGEST:])
+        stored, checkpoint = pickle.loads(whole[DIGEST:])
     except (pickle.UnpicklingError, AttributeError, EOFError, ImportError, TypeError, ValueError):
         return None  # of another version of the classes
-    return checkpoint if said == stamp else None
+    return checkpoint if stored == stamp else None
 
 
 def drop(record: Path) -> None:

@@ -60,8 +60,8 @@ def claims_of(method: Method) -> list[str]:
     """One row of the first table."""
     tolerance = "–" if method.volume_tol is None else f"{method.volume_tol:.0e}"
     turning = "yes" if method.conserves_angular_momentum else "no"
-    told = (method.__doc__ or "").strip().split("\n")[0]
-    return [words(method), str(method.order), tolerance, turning, told]
+    summary = (method.__doc__ or "").strip().split("\n")[0]
+    return [words(method), str(method.order), tolerance, turning, summary]
 
 
 def capabilities_of(method: Method) -> list[str]:

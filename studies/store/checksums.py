@@ -44,8 +44,8 @@ def seal_of(path: Path) -> Seal:
     if head == _head(len(body), hashlib.sha256(body).hexdigest()):
         return Seal.WHOLE
     if head.startswith(LABEL):
-        said = head[len(LABEL) :].split(b" ")[0]
-        cut = len(head) < BLOCK or (said.isdigit() and len(body) < int(said))
+        declared = head[len(LABEL) :].split(b" ")[0]
+        cut = len(head) < BLOCK or (declared.isdigit() and len(body) < int(declared))
         return Seal.CUT if cut else Seal.CHANGED if body.startswith(SIGNATURE) else Seal.FOREIGN
     if head.startswith(SIGNATURE):
         return Seal.NONE

@@ -46,5 +46,5 @@ def _remarks(problems: list[StudyError]) -> list[str]:
     """A sentence each, but one for all files of another version: after an update these are all files."""
     others = [str(problem) for problem in problems if isinstance(problem, OtherVersion)]
     more = f" (and {len(others) - 1} more files)" if len(others) > 1 else ""
-    said = [str(problem) for problem in problems if not isinstance(problem, OtherVersion)]
-    return [*said, others[0] + more] if others else said
+    messages = [str(problem) for problem in problems if not isinstance(problem, OtherVersion)]
+    return [*messages, others[0] + more] if others else messages

@@ -14,8 +14,8 @@ from studies.sweep.tasks import Task, tasks_of
 def warnings_of(root: Path, study: Study) -> list[str]:
     """What the cases of a study warned of when they were prepared, a sentence each."""
     records = [stored(case_path(root, study.name, case)) for case in study.cases]
-    said = [record.attributes.get("warnings", "") for record in records if record is not None]
-    return [str(sentence) for sentence in said if sentence]
+    warnings = [record.attributes.get("warnings", "") for record in records if record is not None]
+    return [str(sentence) for sentence in warnings if sentence]
 
 
 def stored(path: Path) -> Record | None:

@@ -23,7 +23,7 @@ class Skip:
     """Whether a set-up leaves it out."""
     included: Callable[[Setup, State], tuple[Setup, State]]
     """The same run with the stage."""
-    told: Callable[[Setup, State], str] = lambda setup, state: ""
+    remark: Callable[[Setup, State], str] = lambda setup, state: ""
     """How much was left out, from the state after the run."""
 
 

@@ -106,7 +106,7 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget:
     rows = [(STAGE, name, cost, "") for name, cost in zip(ROWS, stages, strict=True) if cost > 0]
     rows += [(STAGE, "rest, not attributed", step - float(stages.sum()), ""), (STAGE, "whole step", step, "")]
     end = found[PLAIN][0][2]
-    rows += [(SKIPPED, skip.name, whole[skip.name] - step, skip.told(setup, end)) for skip in skipped]
+    rows += [(SKIPPED, skip.name, whole[skip.name] - step, skip.remark(setup, end)) for skip in skipped]
     rows += [(SKIPPED if name == ENERGIES else FRAME, name, to_step * ns, "") for name, ns in outside.items()]
     table = pd.DataFrame(rows, columns=["kind", "what", "µs per step", "how much"])
     table.attrs["turns"] = len(found[PLAIN])

@@ -27,7 +27,7 @@ def cost(
 ) -> None:
     """Microseconds per stage of a step, their share, what was skipped and what that saved; on one pinned core."""
     case = chosen_case(scene, method, body, nodes)
-    with compiling(errors, "measuring") as told, watching(told):
+    with compiling(errors, "measuring") as report, watching(report):
         found = cost_table(case)
     if csv is not None:
         write_table(csv, found)
@@ -37,9 +37,9 @@ def cost(
     turns = found.attrs["turns"]
     console.print(f"{case.name}, over the whole scene, fastest of {turns}", markup=False, highlight=False)
     console.print(_drawn(found))
-    for what, told in found[["what", "how much"]].itertuples(index=False):
-        if told:
-            console.print(f"{what}: {told}", markup=False, highlight=False)
+    for what, remark in found[["what", "how much"]].itertuples(index=False):
+        if remark:
+            console.print(f"{what}: {remark}", markup=False, highlight=False)
 
 
 def _drawn(found: pd.DataFrame) -> Table:

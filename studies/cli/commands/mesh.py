@@ -63,10 +63,10 @@ def mesh(
         if seed is not None:
             raise StudyError("--seed varies synthetic organs; a file comes as it is, leave it out")
         ask_before_large(source, yes)
-        said = unit if unit is not None else asked_unit(source)
+        chosen_unit = unit if unit is not None else asked_unit(source)
         options: dict[str, Any] = {"smooth": smooth * MM, "holes": close_holes, "fill": filled}
         with working(f"meshing {source.name}"):
-            made = scan(source, nodes, unit=said, wall=None if wall is None else wall * MM, **options)
+            made = scan(source, nodes, unit=chosen_unit, wall=None if wall is None else wall * MM, **options)
     with working("curving" if order == 2 else "writing"):
         write_mesh(made, output, write_unit, curved(made) if order == 2 else None)
     console.print(f"{summary(made)}; written to {output} in {NAMES[write_unit]}", markup=False, highlight=False)

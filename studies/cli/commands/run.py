@@ -56,10 +56,10 @@ def _bring_up_to_date(root: Path, study: Study, jobs: int, wanted: Wanted) -> No
     for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
         sweep_parts(folder)
     warn(link_study(root, study.name))
-    told = warnings_of(root, study) if count else []
-    if told:
-        more = f" (and {len(told) - 1} more cases warn; `organbench show` prints them)" if len(told) > 1 else ""
-        warn([told[0] + more])
+    warnings = warnings_of(root, study) if count else []
+    if warnings:
+        more = f" (and {len(warnings) - 1} more cases warn; `organbench show` prints them)" if len(warnings) > 1 else ""
+        warn([warnings[0] + more])
     warn(refresh(root, study)[1])
     say(f"{study.name}: {count} pieces ran, charts in {study_folder(root, study.name)}")
 

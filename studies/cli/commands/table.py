@@ -78,7 +78,7 @@ def block(rows: Sequence[Row], metrics: list[Metric]) -> list[str]:
     for row in rows:
         groups.setdefault(f"{row['scene']}, {row['body']}", []).append(row)
     differing = [key for key in SETTINGS if any(len(values(group, key)) > 1 for group in groups.values())]
-    told = [key for key in SETTINGS if key not in differing and len(values(rows, key)) > 1]
+    shared = [key for key in SETTINGS if key not in differing and len(values(rows, key)) > 1]
     ended = ["status"] if any(row["status"] != "ok" for row in rows) else []
     heads = [[""], *([key] for key in (*differing, *ended)), *(head(metric) for metric in metrics)]
     height, left = max(map(len, heads)), 1 + len(differing) + len(ended)
@@ -97,7 +97,7 @@ def block(rows: Sequence[Row], metrics: list[Metric]) -> list[str]:
     ]
     lines, drawn = texts[:height], dict(zip(map(id, rows), texts[height:], strict=True))
     for heading, group in groups.items():
-        lines.append(", ".join([heading, *(SETTINGS[key].format(setting(group[0], key)) for key in told)]))
+        lines.append(", ".join([heading, *(SETTINGS[key].format(setting(group[0], key)) for key in shared)]))
         lines += [drawn[id(row)] for row in group]
     return [line.rstrip() for line in lines]
 

@@ -40,7 +40,7 @@ def scan(
     unit = settled_unit(path.name, float(np.ptp(points, axis=0).max()), unit)
     points = points * UNITS[unit]
     mended = mend(*weld(points, triangles), path.name, holes)
-    for sentence in mended.said:
+    for sentence in mended.remarks:
         warnings.warn(f"{path.name}: {sentence}", stacklevel=2)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     recipe: dict[str, Any] = {

@@ -23,8 +23,8 @@ def triangle_count(path: Path) -> int:
         head = file.read(HEAD)
     if path.suffix.lower() == ".stl" and not is_ascii_stl(head):
         return int.from_bytes(head[80:84], "little") if size >= HEADER else 0
-    said = re.search(rb"element face (\d+)", head) if path.suffix.lower() == ".ply" else None
-    return int(said[1]) if said else int(size / BYTES.get(path.suffix.lower(), 50.0))
+    declared = re.search(rb"element face (\d+)", head) if path.suffix.lower() == ".ply" else None
+    return int(declared[1]) if declared else int(size / BYTES.get(path.suffix.lower(), 50.0))
 
 
 def is_ascii_stl(head: bytes) -> bool:

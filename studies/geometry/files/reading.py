@@ -77,9 +77,9 @@ def parse(path: Path) -> meshio.Mesh:
     if not path.is_file():
         raise StudyError(f"there is no mesh file {path}; check the name")
     check_whole(path)
-    said = io.StringIO()
+    output = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return meshio.read(path)
     # Foreign parsers raise whatever a broken file makes them trip over, and meshio even exits the process.

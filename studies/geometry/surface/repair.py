@@ -20,7 +20,7 @@ class Mended:
 
     points: np.ndarray
     triangles: np.ndarray
-    said: tuple[str, ...]
+    remarks: tuple[str, ...]
     """One sentence for each kind of change, for the person who gave the file."""
 
 
@@ -31,11 +31,11 @@ def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = Fal
     to agree with their neighbours and to look outward; `holes`: borders are closed by a fan over their middle.
     Raises StudyError when nothing is left, or for a surface with one side only.
     """
-    said: list[str] = []
+    remarks: list[str] = []
     whole = len(triangles)
     triangles = without_repeats(triangles)
     if len(triangles) < whole:
-        said.append(f"{whole - len(triangles)} triangles that were doubled or had no three corners are left out")
+        remarks.append(f"{whole - len(triangles)} triangles that were doubled or had no three corners are left out")
     if not len(triangles):
         raise StudyError(f"{name}: no usable triangle is left; export the surface again")
     parts = part_of(triangles)
@@ -44,19 +44,19 @@ def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = Fal
         keep = largest(points, triangles, parts)
         lost = triangle_areas(points, triangles[parts != keep]).sum() / triangle_areas(points, triangles).sum()
         triangles = triangles[parts == keep]
-        said.append(f"{count - 1} of {count} separate parts are left out ({100 * lost:.2g} % of the area)")
+        remarks.append(f"{count - 1} of {count} separate parts are left out ({100 * lost:.2g} % of the area)")
     triangles, turned = oriented(triangles, name)
     if turned:
-        said.append(f"{turned} triangles are turned to agree with their neighbours")
+        remarks.append(f"{turned} triangles are turned to agree with their neighbours")
     if holes:
         points, triangles, closed = without_holes(points, triangles)
         if closed:
-            said.append(f"{closed} holes are closed by flat fans")
+            remarks.append(f"{closed} holes are closed by flat fans")
     if signed_volume(points, triangles) < 0:
         triangles = triangles[:, ::-1].copy()
-        said.append("the surface was inside out and is turned round")
+        remarks.append("the surface was inside out and is turned round")
     used, renumbered = np.unique(triangles, return_inverse=True)
-    return Mended(points[used], renumbered.reshape(triangles.shape), tuple(said))
+    return Mended(points[used], renumbered.reshape(triangles.shape), tuple(remarks))
 
 
 def without_repeats(triangles: np.ndarray) -> np.ndarray:

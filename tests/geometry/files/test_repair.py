@@ -13,7 +13,7 @@ from tests.geometry.boxes import box, split, together
 def test_a_sound_surface_is_left_alone():
     points, faces = split(*box())
     mended = mend(points, faces, "box")
-    assert (mended.points == points).all() and (mended.triangles == faces).all() and mended.said == ()
+    assert (mended.points == points).all() and (mended.triangles == faces).all() and mended.remarks == ()
 
 
 def test_neighbours_are_made_to_agree_and_to_look_outward():
@@ -24,10 +24,10 @@ def test_neighbours_are_made_to_agree_and_to_look_outward():
     mended = mend(points, mixed, "box")
     assert signed_volume(mended.points, mended.triangles) == pytest.approx(1.0, rel=1e-12)
     check_surface(mended.points, mended.triangles)
-    assert mended.said == (f"{turn.sum()} triangles are turned to agree with their neighbours",)
+    assert mended.remarks == (f"{turn.sum()} triangles are turned to agree with their neighbours",)
     mended = mend(points, faces[:, ::-1], "box")
     assert signed_volume(mended.points, mended.triangles) == pytest.approx(1.0, rel=1e-12)
-    assert mended.said == ("the surface was inside out and is turned round",)
+    assert mended.remarks == ("the surface was inside out and is turned round",)
 
 
 def test_moebius_bands_are_refused():
@@ -53,7 +53,7 @@ def test_only_the_largest_part_stays():
     mended = mend(points, faces, "box")
     assert len(mended.points) == 8 and signed_volume(mended.points, mended.triangles) == pytest.approx(1.0)
     share = 100 * (6 * 0.01 + 6 * 0.16) / (6 + 6 * 0.01 + 6 * 0.16)
-    assert mended.said == (f"2 of 3 separate parts are left out ({share:.2g} % of the area)",)
+    assert mended.remarks == (f"2 of 3 separate parts are left out ({share:.2g} % of the area)",)
 
 
 def test_doubled_and_collapsed_triangles_go():
@@ -61,7 +61,7 @@ def test_doubled_and_collapsed_triangles_go():
     odd = np.vstack([faces, faces[3:5], faces[7:8, [0, 2, 1]], [[1, 1, 2]]])
     mended = mend(points, odd, "box")
     assert (mended.triangles == faces).all()
-    assert mended.said == ("4 triangles that were doubled or had no three corners are left out",)
+    assert mended.remarks == ("4 triangles that were doubled or had no three corners are left out",)
     with pytest.raises(StudyError, match="no usable triangle"):
         mend(points, np.array([[0, 0, 1]]), "box")
 
@@ -72,7 +72,7 @@ def test_holes_are_closed_on_request():
     torn = faces[~at_corner & ~at_side]
     assert len(border(mend(points, torn, "box").triangles)) > 0
     mended = mend(points, torn, "box", holes=True)
-    assert mended.said == ("2 holes are closed by flat fans",)
+    assert mended.remarks == ("2 holes are closed by flat fans",)
     check_surface(mended.points, mended.triangles)
     # Two corners are cut off: less than a cube of the edge of the missing triangles each.
     assert 1.0 - 2 * 0.25**3 < signed_volume(mended.points, mended.triangles) < 1.0
