@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 
 from studies.base.errors import StudyError
-from studies.reference.pieces import Piece, pieces
+from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.reference.solution import Solution
 from studies.reference.uncertainty import Uncertainty, uncertainties
 from studies.scene.scene import Scene
@@ -39,7 +39,10 @@ def load_reference(root: Path, scene: Scene) -> Reference | None:
     """
     if scene.reference is None:
         return None
-    found = {(piece.level, piece.variant): _converged(root, piece) for piece in pieces(scene)}
+    found = {
+        (reference_solve.level, reference_solve.variant): _converged(root, reference_solve)
+        for reference_solve in reference_solves(scene)
+    }
     *coarser, finest = [record for (_, variant), record in found.items() if not variant]
     return Reference(
         scene,
@@ -49,11 +52,11 @@ def load_reference(root: Path, scene: Scene) -> Reference | None:
     )
 
 
-def _converged(root: Path, piece: Piece) -> Record:
-    record = read_record(piece.path(root))
+def _converged(root: Path, reference_solve: ReferenceSolve) -> Record:
+    record = read_record(reference_solve.path(root))
     if record.status != Status.OK:
-        what = f" with other {piece.variant}" if piece.variant else ""
+        what = f" with other {reference_solve.variant}" if reference_solve.variant else ""
         raise StudyError(
-            f"the reference of '{piece.scene.name}' on mesh {piece.level:g}{what} is {record.status}: {record.message}"
+            f"the reference of '{reference_solve.scene.name}' on mesh {reference_solve.level:g}{what} is {record.status}: {record.message}"
         )
     return record

@@ -19,8 +19,8 @@ from reference_fem import (
 from studies.base.errors import StudyError
 from studies.reference.checkpoints import drop, keep, kept
 from studies.reference.fields import fields_of
-from studies.reference.pieces import Piece, reference_fingerprint
 from studies.reference.problem import reference_problem
+from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint
 from studies.store.new_record import new_record
 from studies.store.record import Status, write_record
 
@@ -62,20 +62,20 @@ VARIANTS: dict[str, tuple[Callable[[Problem, tuple[float, ...], NewtonSettings],
 """Each with the factor by which it makes a setting better."""
 
 
-def solve(root: Path, piece: Piece) -> Path:
+def solve(root: Path, reference_solve: ReferenceSolve) -> Path:
     """Solves the scene's load path and stores it; a path that breaks off is stored up to there."""
-    checkpoints = piece.scene.checkpoints
-    work: Set = (reference_problem(piece.scene, piece.level), checkpoints, NewtonSettings())
-    if piece.variant:
-        work = VARIANTS[piece.variant][0](*work)
+    checkpoints = reference_solve.scene.checkpoints
+    work: Set = (reference_problem(reference_solve.scene, reference_solve.level), checkpoints, NewtonSettings())
+    if reference_solve.variant:
+        work = VARIANTS[reference_solve.variant][0](*work)
     problem, times, settings = work
-    record_file, stamp = piece.path(root), piece.stamp
+    record_file, stamp = reference_solve.path(root), reference_solve.stamp
     before = kept(record_file, stamp)
     started = time.monotonic()
     status, message = Status.OK, ""
     try:
-        if piece.moves:
-            path = motion(piece, *work)
+        if reference_solve.moves:
+            path = motion(reference_solve, *work)
         else:
             path = equilibrium_path(
                 problem, times, settings, on_checkpoint=lambda c: keep(record_file, stamp, c), resume=before
@@ -86,38 +86,40 @@ def solve(root: Path, piece: Piece) -> Path:
     found = [e for e in path if e.t in checkpoints]
     record = new_record(
         kind="reference",
-        key=piece.key,
-        name=piece.name,
+        key=reference_solve.key,
+        name=reference_solve.name,
         status=status,
         message=message,
         fingerprint=reference_fingerprint(),
-        attributes=_attributes(piece, problem, found, time.monotonic() - started),
-        fields=fields_of(piece.scene, problem, found),
+        attributes=_attributes(reference_solve, problem, found, time.monotonic() - started),
+        fields=fields_of(reference_solve.scene, problem, found),
     )
     write_record(record_file, record)
     drop(record_file)
     return record_file
 
 
-def motion(piece: Piece, problem: Problem, times: tuple[float, ...], settings: NewtonSettings) -> list[Moment]:
+def motion(
+    reference_solve: ReferenceSolve, problem: Problem, times: tuple[float, ...], settings: NewtonSettings
+) -> list[Moment]:
     """The scene's motion from its start, with its damping. Raises SolveError; StudyError for another shape."""
-    scene, plan = piece.scene, piece.scene.reference
+    scene, plan = reference_solve.scene, reference_solve.scene.reference
     assert plan is not None and plan.dt is not None  # it moves
     if scene.start is not None and scene.start.shaped:
         raise StudyError(
             f"scene '{scene.name}' starts in a shape of its own, and the reference from rest or with a speed; "
             f"give it a speed, or no reference"
         )
-    dt = plan.dt / (STEP_FACTOR if piece.variant == "steps" else 1.0)
+    dt = plan.dt / (STEP_FACTOR if reference_solve.variant == "steps" else 1.0)
     velocity = None if scene.start is None else scene.start.velocities(nodes(problem.mesh))
     return motion_path(problem, times, DynamicsSettings(dt, scene.damping, newton=settings), velocity)
 
 
-def _attributes(piece: Piece, problem: Problem, found: list[Equilibrium], seconds: float) -> dict:
+def _attributes(reference_solve: ReferenceSolve, problem: Problem, found: list[Equilibrium], seconds: float) -> dict:
     return {
-        "scene": piece.scene.name,
-        "level": float(piece.level),
-        "variant": piece.variant,
+        "scene": reference_solve.scene.name,
+        "level": float(reference_solve.level),
+        "variant": reference_solve.variant,
         "unknowns": 3 * len(nodes(problem.mesh)) + problem.mesh.nvertices,
         "steps_done": len(found),
         "seconds": seconds,

@@ -11,7 +11,7 @@ from studies.base.atomic import is_there, write_whole
 from studies.base.errors import StudyError
 from studies.plots.uncertainty import draw
 from studies.reference.load import Reference, load_reference
-from studies.reference.pieces import STUDY, pieces
+from studies.reference.reference_solves import STUDY, reference_solves
 from studies.reference.solve import VARIANTS
 from studies.scene.scene import Scene
 from studies.store.csv_table import write_table
@@ -69,7 +69,10 @@ def refresh_uncertainty(root: Path, scenes: Iterable[Scene]) -> list[Path]:
     each = list({scene.name: scene for scene in scenes}.values())
     folder = study_folder(root, STUDY)
     paths = [folder / TABLE, folder / CHART]
-    stamp, state = root / "cache" / f"{STUDY}.drawn", state_of(p.path(root) for scene in each for p in pieces(scene))
+    stamp, state = (
+        root / "cache" / f"{STUDY}.drawn",
+        state_of(p.path(root) for scene in each for p in reference_solves(scene)),
+    )
     if all(path.exists() for path in (*paths, stamp)) and stamp.read_bytes() == state.encode():
         return paths
     references = known_references(root, each)

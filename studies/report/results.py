@@ -16,7 +16,7 @@ from studies.metrics.table import DOUBTFUL, study_table
 from studies.plots.figures import paper_ball, paper_slide
 from studies.plots.figures.organ_springs import draw_organ_springs
 from studies.plots.figures.organs import draw_organs
-from studies.reference.pieces import pieces
+from studies.reference.reference_solves import reference_solves
 from studies.report.kept_volume import kept_volumes
 from studies.report.references import refresh_uncertainty, state_of
 from studies.runs.current import case_path
@@ -128,7 +128,9 @@ def inputs_of(root: Path, study: Study) -> str:
     """Hash of all that charts and tables are made from: result files with their sizes and times, and the code."""
     files = [case_path(root, study.name, case) for case in study.cases]
     files += [timing_file(root, study.name, case) for case in study.cases if case.timed]
-    return state_of([*files, *(piece.path(root) for scene in study.scenes for piece in pieces(scene))])
+    return state_of(
+        [*files, *(reference_solve.path(root) for scene in study.scenes for reference_solve in reference_solves(scene))]
+    )
 
 
 def draw_figures(root: Path) -> list[Path]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
-from studies.reference.pieces import Piece
+from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.current import run_fingerprint
 from studies.store.record import peek
 from studies.store.staleness import why_stale
@@ -36,7 +36,7 @@ def plan(root: Path, study: Study, wanted: Callable[[Task], bool] | None = None)
     todo = [task for task in tasks_of(root, [study]) if (not task.is_current() if wanted is None else wanted(task))]
     found = []
     for task in todo:
-        kind = "reference" if isinstance(task.work, Piece) else "case"
+        kind = "reference" if isinstance(task.work, ReferenceSolve) else "case"
         found.append(
             Planned(PHYSICS, kind, task.label, task.why_stale() or "its result is a failure", _seconds(task.path()))
         )

@@ -19,7 +19,7 @@ from studies.base.compile_watch import CompileWatch, watching
 from studies.base.errors import StudyError
 from studies.base.interrupts import die_quietly, died_of_it, held_back
 from studies.catalog.study import Study
-from studies.reference.pieces import Piece
+from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.runs.current import case_path
 from studies.runs.run import run_case
@@ -44,7 +44,7 @@ class Progress(Protocol):
 
 def do(task: Task) -> Path:
     """Does a piece of work; where its record lies."""
-    if isinstance(task.work, Piece):
+    if isinstance(task.work, ReferenceSolve):
         return solve(task.root, task.work)
     return run_case(task.root, task.study, task.work)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studies.catalog.study import Study
-from studies.reference.pieces import Piece, pieces
+from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import Case
 from studies.runs.current import case_path, why_case_is_stale
 
@@ -16,19 +16,19 @@ class Task:
 
     root: Path
     study: str
-    work: Case | Piece
+    work: Case | ReferenceSolve
 
     @property
     def weight(self) -> float:
         """Longest first keeps both cores busy to the end: references by mesh, then cases by size over step."""
-        if isinstance(self.work, Piece):
+        if isinstance(self.work, ReferenceSolve):
             return 1e9 + self.work.weight
         return self.work.body.nodes / self.work.dt_fraction
 
     @property
     def label(self) -> str:
         """For progress and messages."""
-        return f"reference {self.work.name}" if isinstance(self.work, Piece) else self.work.name
+        return f"reference {self.work.name}" if isinstance(self.work, ReferenceSolve) else self.work.name
 
     def is_current(self) -> bool:
         """Whether it need not run."""
@@ -36,14 +36,16 @@ class Task:
 
     def why_stale(self) -> str | None:
         """Why it must run (again) (studies.store.staleness); None when it need not."""
-        if isinstance(self.work, Piece):
+        if isinstance(self.work, ReferenceSolve):
             return self.work.why_stale(self.root)
         return why_case_is_stale(self.root, self.study, self.work)
 
     def path(self) -> Path:
         """Where its record lies."""
         return (
-            self.work.path(self.root) if isinstance(self.work, Piece) else case_path(self.root, self.study, self.work)
+            self.work.path(self.root)
+            if isinstance(self.work, ReferenceSolve)
+            else case_path(self.root, self.study, self.work)
         )
 
 
@@ -51,7 +53,7 @@ def tasks_of(root: Path, studies: Iterable[Study]) -> list[Task]:
     """Everything the studies need, each piece once, longest first."""
     tasks: dict[Path, Task] = {}
     for study in studies:
-        found = [piece for scene in study.scenes for piece in pieces(scene)]
+        found = [reference_solve for scene in study.scenes for reference_solve in reference_solves(scene)]
         for work in (*found, *study.cases):
             task = Task(root, study.name, work)
             tasks[task.path()] = task

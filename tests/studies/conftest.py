@@ -8,7 +8,7 @@ import pytest
 
 from studies.cli import app as cli
 from studies.reference.load import load_reference
-from studies.reference.pieces import pieces
+from studies.reference.reference_solves import reference_solves
 from studies.reference.solve import solve
 from studies.sweep.run_studies import run_studies
 from tests.conftest import once_per_run
@@ -27,8 +27,8 @@ def solved(run_folder):
     """Results folder with the reference of the octant, piece by piece; to be read, not changed."""
 
     def make(root):
-        for piece in pieces(SCENE):
-            solve(root, piece)
+        for reference_solve in reference_solves(SCENE):
+            solve(root, reference_solve)
 
     return once_per_run(run_folder, "reference", make)
 

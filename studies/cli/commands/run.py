@@ -13,7 +13,7 @@ from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import Results, console, say, warn
 from studies.geometry.mesher.jobs import cache_folder
 from studies.metrics.table import check_columns
-from studies.reference.pieces import STUDY as REFERENCES
+from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.report.results import refresh
 from studies.store.links import link_study
 from studies.store.paths import study_folder

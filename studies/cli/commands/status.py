@@ -10,7 +10,7 @@ from rich.table import Table
 
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, console, say
-from studies.reference.pieces import PieceStanding, pieces, standing_of
+from studies.reference.reference_solves import SolveStanding, reference_solves, standing_of
 from studies.scene.scene import Scene
 from studies.sweep.find_study import find_study
 from studies.sweep.standings import Standing, standings
@@ -57,7 +57,10 @@ def show_reasons(found: list[Standing], every: bool) -> None:
 
 def show_references(root: Path, scenes: Iterable[Scene], every: bool) -> None:
     """How the references stand: a line per scene, or one per mesh and setting."""
-    found = {scene.name: [standing_of(root, piece) for piece in pieces(scene)] for scene in scenes}
+    found = {
+        scene.name: [standing_of(root, reference_solve) for reference_solve in reference_solves(scene)]
+        for scene in scenes
+    }
     found = {name: rows for name, rows in found.items() if rows}
     if not found:
         return
@@ -65,34 +68,34 @@ def show_references(root: Path, scenes: Iterable[Scene], every: bool) -> None:
     console.print(_meshes(found) if every else _scenes(found))
 
 
-def _scenes(found: dict[str, list[PieceStanding]]) -> Table:
+def _scenes(found: dict[str, list[SolveStanding]]) -> Table:
     table = Table(box=None, pad_edge=False)
     for heading in ("scene", "finest mesh", "unknowns", "seconds", "pieces"):
         table.add_column(heading, justify="left" if heading in ("scene", "pieces") else "right")
     for name, rows in found.items():
-        finest = max(rows, key=lambda row: row.piece.weight)
+        finest = max(rows, key=lambda row: row.reference_solve.weight)
         seconds = sum(row.seconds for row in rows if row.seconds == row.seconds)
         state = counted(_state(row) for row in rows)
-        table.add_row(name, f"{finest.piece.level:g}", _count(finest.unknowns), f"{seconds:.0f}", state)
+        table.add_row(name, f"{finest.reference_solve.level:g}", _count(finest.unknowns), f"{seconds:.0f}", state)
     return table
 
 
-def _meshes(found: dict[str, list[PieceStanding]]) -> Table:
+def _meshes(found: dict[str, list[SolveStanding]]) -> Table:
     table = Table(box=None, pad_edge=False)
     for heading in ("scene", "mesh", "better", "unknowns", "seconds", "state"):
         table.add_column(heading, justify="left" if heading in ("scene", "better", "state") else "right")
     for name, rows in found.items():
         for row in rows:
             seconds = "-" if row.seconds != row.seconds else f"{row.seconds:.1f}"
-            cells = (f"{row.piece.level:g}", row.piece.variant, _count(row.unknowns), seconds)
+            cells = (f"{row.reference_solve.level:g}", row.reference_solve.variant, _count(row.unknowns), seconds)
             table.add_row(name, *cells, _state(row))
     return table
 
 
-def _state(row: PieceStanding) -> str:
+def _state(row: SolveStanding) -> str:
     if row.state != "half-way":
         return row.state
-    return f"half-way ({row.steps} of {len(row.piece.scene.checkpoints)} checkpoints)"
+    return f"half-way ({row.steps} of {len(row.reference_solve.scene.checkpoints)} checkpoints)"
 
 
 def _count(unknowns: int | None) -> str:

@@ -15,7 +15,7 @@ from studies.cli import app as cli
 from studies.cli.commands.status import SHOWN
 from studies.geometry.organs import SHAPES
 from studies.metrics.metrics import METRICS
-from studies.reference.pieces import pieces
+from studies.reference.reference_solves import reference_solves
 from studies.runs.current import case_path
 from studies.scenes import SCENES
 from studies.store.paths import index_path
@@ -101,7 +101,7 @@ def test_status_of_everything(organbench, tmp_path):
     assert [line.split(":")[0] for line in counts.splitlines()] == [study.name for study in STUDIES]
     head, *rows = references.splitlines()
     assert head.split()[:3] == ["scene", "finest", "mesh"]
-    assert len(rows) == len({scene.name for study in STUDIES for scene in study.scenes if pieces(scene)})
+    assert len(rows) == len({scene.name for study in STUDIES for scene in study.scenes if reference_solves(scene)})
     assert all(row.split()[-1] == "missing" for row in rows)
     assert all("missing" in line for line in counts.splitlines())
 

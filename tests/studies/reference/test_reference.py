@@ -10,8 +10,8 @@ from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.surface.distance import hausdorff
 from studies.reference.load import load_reference
-from studies.reference.pieces import pieces
 from studies.reference.problem import whole_forces
+from studies.reference.reference_solves import reference_solves
 from studies.reference.solve import solve
 from studies.reference.uncertainty import QUANTITIES
 from studies.scenes import ReferencePlan
@@ -72,9 +72,9 @@ def added(solved, tmp_path_factory):
 def test_the_error_bar_covers_the_true_error_and_is_not_idle(added, levels):
     """The ball between planes is known to 1e-4 (incompressible, converged): the bar holds it, within a factor 20."""
     scene = replace(SCENE, reference=ReferencePlan("octant", levels))
-    for piece in pieces(scene):
-        if not piece.is_current(added):
-            solve(added, piece)
+    for reference_solve in reference_solves(scene):
+        if not reference_solve.is_current(added):
+            solve(added, reference_solve)
     reference = load_reference(added, scene)
     scaled = reference.force / (SHEAR * RADIUS**2)
     error = np.linalg.norm(scaled - FORCE) / np.linalg.norm(FORCE), abs(scaled[-1] / FORCE[-1] - 1)

@@ -13,8 +13,8 @@ from studies.base.errors import StudyError
 from studies.metrics.metrics import METRICS, frequency_error
 from studies.metrics.run import Run
 from studies.reference.load import load_reference
-from studies.reference.pieces import Piece, pieces
 from studies.reference.problem import rigid
+from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.reference.ringing import fitted_frequency
 from studies.reference.solve import solve
 from studies.reference.uncertainty import Places, View
@@ -38,8 +38,8 @@ TRUE = LAMB * np.sqrt(SCENE.tissue.shear_modulus / SCENE.tissue.density) / RADIU
 @pytest.fixture(scope="module")
 def found(mesh_cache, tmp_path_factory):
     root = tmp_path_factory.mktemp("motion")
-    for piece in pieces(SCENE):
-        solve(root, piece)
+    for reference_solve in reference_solves(SCENE):
+        solve(root, reference_solve)
     return load_reference(root, SCENE)
 
 
@@ -111,28 +111,28 @@ def test_a_load_path_builds_no_mass(mesh_cache, tmp_path, monkeypatch):
 
     monkeypatch.setattr(inertia, "build_mass", forbidden)
     rest = replace(BALL_SQUEEZE, reference=ReferencePlan("octant", (0.9, 0.7)), checkpoints=(0.5,))
-    solve(tmp_path, Piece(rest, 0.9))
+    solve(tmp_path, ReferenceSolve(rest, 0.9))
     with pytest.raises(AssertionError, match="mass"):
-        solve(tmp_path, Piece(SCENE, 0.7))
+        solve(tmp_path, ReferenceSolve(SCENE, 0.7))
 
 
 def test_what_a_piece_depends_on():
     """Damping and start with motion; the filling of a lumen always."""
-    moving, still = Piece(SCENE, 0.5), Piece(BALL_SQUEEZE, 0.16)
+    moving, still = ReferenceSolve(SCENE, 0.5), ReferenceSolve(BALL_SQUEEZE, 0.16)
     for changes in (
         {"damping": 7.0},
         {"start": InitialConditions(speed=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))},
     ):
-        assert Piece(replace(SCENE, **changes), 0.5).key != moving.key
-        assert Piece(replace(BALL_SQUEEZE, **changes), 0.16).key == still.key
-    assert Piece(replace(BALL_SQUEEZE, lumen=Lumen()), 0.16).key != still.key
-    assert Piece(replace(BALL_SQUEEZE, frames=3, title="other"), 0.16).key == still.key
+        assert ReferenceSolve(replace(SCENE, **changes), 0.5).key != moving.key
+        assert ReferenceSolve(replace(BALL_SQUEEZE, **changes), 0.16).key == still.key
+    assert ReferenceSolve(replace(BALL_SQUEEZE, lumen=Lumen()), 0.16).key != still.key
+    assert ReferenceSolve(replace(BALL_SQUEEZE, frames=3, title="other"), 0.16).key == still.key
 
 
 def test_a_shape_to_start_from_is_refused(mesh_cache, tmp_path):
     flat = replace(SCENE, start=InitialConditions(matrix=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.5))))
     with pytest.raises(StudyError, match="shape of its own"):
-        solve(tmp_path, Piece(flat, 0.7))
+        solve(tmp_path, ReferenceSolve(flat, 0.7))
 
 
 def test_a_plan_with_an_impossible_time_step_is_refused():

@@ -4,7 +4,7 @@ import pytest
 
 from massspring import sources
 from massspring.sources import own_modules, source_fingerprint
-from studies.reference.pieces import reference_fingerprint
+from studies.reference.reference_solves import reference_fingerprint
 from studies.runs.current import run_fingerprint
 
 BOTH = {

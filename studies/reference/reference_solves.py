@@ -17,7 +17,7 @@ STUDY = "reference"
 
 
 @dataclass(frozen=True)
-class Piece:
+class ReferenceSolve:
     """A mesh of the scene's family, or that mesh with one setting made better."""
 
     scene: Scene
@@ -35,7 +35,7 @@ class Piece:
         """What the solution depends on, besides the code: not the frames or the other meshes; without motion not the
         damping or the start."""
         scene, plan = self.scene, self.scene.reference
-        assert plan is not None  # a piece belongs to a plan
+        assert plan is not None  # a reference solve belongs to a plan
         plain = replace(
             scene,
             title="",
@@ -87,11 +87,11 @@ class Piece:
         return self.level if self.level > 1 else self.level**-3
 
 
-def pieces(scene: Scene) -> list[Piece]:
+def reference_solves(scene: Scene) -> list[ReferenceSolve]:
     """All that the reference of a scene is made of: every mesh, and each setting made better on the coarsest."""
     if scene.reference is None:
         return []
-    family = [Piece(scene, level) for level in scene.reference.levels]
+    family = [ReferenceSolve(scene, level) for level in scene.reference.levels]
     return [*family, *(replace(family[0], variant=name) for name in variants(scene))]
 
 
@@ -107,12 +107,12 @@ def reference_fingerprint() -> str:
 
 
 @dataclass(frozen=True)
-class PieceStanding:
-    """How a piece stands."""
+class SolveStanding:
+    """How a reference solve stands."""
 
-    piece: Piece
+    reference_solve: ReferenceSolve
     state: str
-    """As `Piece.state` says."""
+    """As `ReferenceSolve.state` says."""
     unknowns: int | None
     """None where nothing is stored."""
     steps: int
@@ -121,14 +121,14 @@ class PieceStanding:
     """What solving took [s]; NaN where nothing is stored."""
 
 
-def standing_of(root: Path, piece: Piece) -> PieceStanding:
+def standing_of(root: Path, reference_solve: ReferenceSolve) -> SolveStanding:
     """Read off the header of the stored solution, or off the load path half-way to it."""
-    state = piece.state(root)
+    state = reference_solve.state(root)
     if state == "half-way":
-        begun = kept(piece.path(root), piece.stamp)
-        done = len([e for e in begun.path if e.t in piece.scene.checkpoints]) if begun else 0
-        return PieceStanding(piece, state, None, done, float("nan"))
+        begun = kept(reference_solve.path(root), reference_solve.stamp)
+        done = len([e for e in begun.path if e.t in reference_solve.scene.checkpoints]) if begun else 0
+        return SolveStanding(reference_solve, state, None, done, float("nan"))
     if state in ("missing", "unreadable"):
-        return PieceStanding(piece, state, None, 0, float("nan"))
-    known = peek(piece.path(root)).attributes
-    return PieceStanding(piece, state, known["unknowns"], known["steps_done"], float(known["seconds"]))
+        return SolveStanding(reference_solve, state, None, 0, float("nan"))
+    known = peek(reference_solve.path(root)).attributes
+    return SolveStanding(reference_solve, state, known["unknowns"], known["steps_done"], float(known["seconds"]))

@@ -10,10 +10,10 @@ import pytest
 from reference_fem import Checkpoint, SolveError
 from studies.base.errors import StudyError
 from studies.reference import checkpoints
-from studies.reference import pieces as known
+from studies.reference import reference_solves as known
 from studies.reference import solve as module
 from studies.reference.load import load_reference
-from studies.reference.pieces import Piece, pieces, standing_of
+from studies.reference.reference_solves import ReferenceSolve, reference_solves, standing_of
 from studies.reference.solve import solve
 from studies.report.references import refresh_uncertainty
 from studies.scenes import ReferencePlan
@@ -25,28 +25,43 @@ from tests.studies.tiny import tiny_case, tiny_study
 
 
 def test_current_until_the_load_or_the_code_changes(solved, monkeypatch):
-    piece = Piece(SCENE, LEVELS[0])
-    assert piece.is_current(solved)
+    reference_solve = ReferenceSolve(SCENE, LEVELS[0])
+    assert reference_solve.is_current(solved)
     renamed_metric = replace(SCENE, damping=1.0, frames=7, title="another", quantities=("volume",))
     other_family = replace(renamed_metric, reference=ReferencePlan("octant", (0.5, 0.1), variants=()))
-    assert Piece(other_family, LEVELS[0]).is_current(solved)
-    assert Piece(replace(SCENE, gravity=(0.0, 0.0, -9.81)), 0.5).key != piece.key
-    assert Piece(SCENE, 0.5, "kappa").key != piece.key
-    assert not Piece(replace(SCENE, checkpoints=(1.0, 3.9)), LEVELS[0]).is_current(solved)
+    assert ReferenceSolve(other_family, LEVELS[0]).is_current(solved)
+    assert ReferenceSolve(replace(SCENE, gravity=(0.0, 0.0, -9.81)), 0.5).key != reference_solve.key
+    assert ReferenceSolve(SCENE, 0.5, "kappa").key != reference_solve.key
+    assert not ReferenceSolve(replace(SCENE, checkpoints=(1.0, 3.9)), LEVELS[0]).is_current(solved)
     monkeypatch.setattr(known, "reference_fingerprint", lambda: "other")
-    assert not piece.is_current(solved)
+    assert not reference_solve.is_current(solved)
 
 
 def test_settings_are_varied_only_where_they_matter():
-    assert [piece.variant for piece in pieces(SCENE)] == ["", "", "", "steps", "contact", "kappa"]
-    assert {piece.level for piece in pieces(SCENE) if piece.variant} == {LEVELS[0]}
+    assert [reference_solve.variant for reference_solve in reference_solves(SCENE)] == [
+        "",
+        "",
+        "",
+        "steps",
+        "contact",
+        "kappa",
+    ]
+    assert {reference_solve.level for reference_solve in reference_solves(SCENE) if reference_solve.variant} == {
+        LEVELS[0]
+    }
     untouched = replace(SCENE, obstacles=(), probed=BALL_CLAMPED.probed)
-    assert [piece.variant for piece in pieces(untouched)] == ["", "", "", "steps", "kappa"]
-    assert pieces(replace(SCENE, reference=None)) == []
+    assert [reference_solve.variant for reference_solve in reference_solves(untouched)] == [
+        "",
+        "",
+        "",
+        "steps",
+        "kappa",
+    ]
+    assert reference_solves(replace(SCENE, reference=None)) == []
 
 
 def listed(root):
-    return [standing_of(root, piece) for piece in pieces(SCENE)]
+    return [standing_of(root, reference_solve) for reference_solve in reference_solves(SCENE)]
 
 
 def states(root):
@@ -55,8 +70,8 @@ def states(root):
 
 def test_listing_says_how_every_piece_stands(solved, tmp_path, monkeypatch):
     root = shutil.copytree(solved, tmp_path / "results")
-    Piece(SCENE, LEVELS[1]).path(root).unlink()
-    damaged = Piece(SCENE, LEVELS[0], "kappa").path(root)
+    ReferenceSolve(SCENE, LEVELS[1]).path(root).unlink()
+    damaged = ReferenceSolve(SCENE, LEVELS[0], "kappa").path(root)
     damaged.write_bytes(damaged.read_bytes()[:500])
     whole = listed(solved)
     assert states(solved) == ["ok"] * 6
@@ -81,7 +96,7 @@ def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, 
     chart.write_bytes(b"old")
     refresh_uncertainty(root, [SCENE])
     assert chart.read_bytes() == b"old"
-    solve(root, Piece(SCENE, LEVELS[0]))
+    solve(root, ReferenceSolve(SCENE, LEVELS[0]))
     refresh_uncertainty(root, [SCENE])
     assert chart.read_bytes()[:4] == b"\x89PNG"
     assert refresh_uncertainty(tmp_path / "empty", [SCENE]) == []
@@ -93,7 +108,7 @@ class Killed(BaseException):
 
 def test_a_crash_half_way_costs_no_finished_step(solved, tmp_path, monkeypatch):
     """The second load step dies; the next run starts at the first one's end and finds the same."""
-    piece, true_path, starts = Piece(SCENE, LEVELS[0]), module.equilibrium_path, []
+    reference_solve, true_path, starts = ReferenceSolve(SCENE, LEVELS[0]), module.equilibrium_path, []
 
     def dies(problem, times, settings, on_checkpoint, resume):
         def then_die(checkpoint):
@@ -108,11 +123,11 @@ def test_a_crash_half_way_costs_no_finished_step(solved, tmp_path, monkeypatch):
 
     monkeypatch.setattr(module, "equilibrium_path", dies)
     with pytest.raises(Killed):
-        solve(tmp_path, piece)
+        solve(tmp_path, reference_solve)
     assert states(tmp_path) == ["half-way", *["missing"] * 5]
     assert listed(tmp_path)[0].steps == 1
     monkeypatch.setattr(module, "equilibrium_path", watched)
-    again, whole = read_record(solve(tmp_path, piece)), read_record(piece.path(solved))
+    again, whole = read_record(solve(tmp_path, reference_solve)), read_record(reference_solve.path(solved))
     assert starts == [1]
     assert again.status == Status.OK
     for name in ("displacement", "contact_force", "pressure"):
@@ -124,17 +139,17 @@ def test_a_crash_half_way_costs_no_finished_step(solved, tmp_path, monkeypatch):
 
 
 def test_steps_of_other_code_are_not_gone_on_from(tmp_path, monkeypatch):
-    piece, asked = Piece(SCENE, LEVELS[0]), []
-    checkpoints.keep(piece.path(tmp_path), "other code", Checkpoint([], None))
+    reference_solve, asked = ReferenceSolve(SCENE, LEVELS[0]), []
+    checkpoints.keep(reference_solve.path(tmp_path), "other code", Checkpoint([], None))
 
     def watched(problem, times, settings, on_checkpoint, resume):
         asked.append(resume)
         raise SolveError("enough")
 
     monkeypatch.setattr(module, "equilibrium_path", watched)
-    solve(tmp_path, piece)
-    checkpoints.steps_path(piece.path(tmp_path)).write_bytes(b"cut off")
-    solve(tmp_path, piece)
+    solve(tmp_path, reference_solve)
+    checkpoints.steps_path(reference_solve.path(tmp_path)).write_bytes(b"cut off")
+    solve(tmp_path, reference_solve)
     assert asked == [None, None]
 
 
@@ -162,7 +177,7 @@ def test_a_path_that_breaks_off_is_stored_and_not_believed(solved, tmp_path, mon
         raise SolveError("the mesh folds; refine it", converged=true_path(problem, times[:1], settings))
 
     monkeypatch.setattr(module, "equilibrium_path", half)
-    record = read_record(solve(root, Piece(SCENE, LEVELS[1])))
+    record = read_record(solve(root, ReferenceSolve(SCENE, LEVELS[1])))
     assert record.status == Status.NOT_CONVERGED
     assert "mesh folds" in record.message
     force = record.fields["contact_force"].values
@@ -182,12 +197,12 @@ def test_runs_are_loaded_without_a_reference_that_failed(solved, tmp_path, monke
     assert remarks == []
     assert runs[0].reference.force[-1] > 0
     monkeypatch.setattr(module, "equilibrium_path", broken)
-    solve(root, Piece(SCENE, LEVELS[1]))
+    solve(root, ReferenceSolve(SCENE, LEVELS[1]))
     runs, remarks = load_runs(root, study)
     assert runs[0].reference is None
     assert len(remarks) == 1
     assert "not-converged" in remarks[0]
-    Piece(SCENE, LEVELS[0]).path(root).unlink()
+    ReferenceSolve(SCENE, LEVELS[0]).path(root).unlink()
     assert "no results file" in load_runs(root, study)[1][0]
 
 
