@@ -43,7 +43,7 @@ class Uncertainty:
         return combined(self.shares)
 
 
-class Places:
+class SamplePoints:
     """Where solutions are compared: the vertices of a mesh, with their share of its rest volume and of its surface."""
 
     def __init__(self, solution: "Solution") -> None:
@@ -62,23 +62,23 @@ def _shares(corners: np.ndarray, sizes: np.ndarray, count: int) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
-    """One solution, seen at the places."""
+class Sample:
+    """One solution at the sample points."""
 
     solution: "Solution"
-    places: Places
+    at: SamplePoints
 
     @cached_property
     def u(self) -> np.ndarray:
         """Displacement at the last checkpoint [m], (m, 3)."""
-        return self.solution.displacement(self.places.points)
+        return self.solution.displacement(self.at.points)
 
     @cached_property
     def frequency(self) -> float:
         """Of the ringing [Hz]; NaN for a scene that does not start with a speed."""
-        scene, points = self.solution.scene, self.places.points
+        scene, points = self.solution.scene, self.at.points
         moved = np.array([self.solution.displacement(points, k) for k in range(len(scene.checkpoints))])
-        return ringing_frequency(scene, np.array(scene.checkpoints), points, moved, self.places.areas)
+        return ringing_frequency(scene, np.array(scene.checkpoints), points, moved, self.at.areas)
 
     @property
     def force(self) -> np.ndarray:
@@ -88,87 +88,87 @@ class View:
     @property
     def cell_size(self) -> float:
         """Representative size of an element [m]."""
-        return cell_size(float(self.places.volumes.sum()), len(self.solution.field("tetrahedra")))
+        return cell_size(float(self.at.volumes.sum()), len(self.solution.field("tetrahedra")))
 
     def series(self, name: str) -> np.ndarray:
         """A stored series of numbers, (K,)."""
         return self.solution.field(name)
 
 
-Measure = Callable[[View, View], float]
-"""Change from the first view to the second, relative to the size of the quantity in the second."""
+Measure = Callable[[Sample, Sample], float]
+"""Change from the first sample to the second, relative to the size of the quantity in the second."""
 
 
-def force(a: View, b: View) -> float:
+def force(a: Sample, b: Sample) -> float:
     """‖F_a − F_b‖/‖F_b‖ over the checkpoints."""
     return float(np.linalg.norm(a.force - b.force) / np.linalg.norm(b.force))
 
 
-def force_end(a: View, b: View) -> float:
+def force_end(a: Sample, b: Sample) -> float:
     """|F_a/F_b − 1| at the last checkpoint."""
     return float(abs(a.force[-1] / b.force[-1] - 1))
 
 
-def _relative(a: View, b: View, weights: np.ndarray) -> float:
+def _relative(a: Sample, b: Sample, weights: np.ndarray) -> float:
     change, size = ((a.u - b.u) ** 2).sum(axis=1), (b.u**2).sum(axis=1)
     return float(np.sqrt((weights @ change) / (weights @ size)))
 
 
-def surface(a: View, b: View) -> float:
+def surface(a: Sample, b: Sample) -> float:
     """Area-weighted relative L2 of the displacement of the surface."""
-    return _relative(a, b, b.places.areas)
+    return _relative(a, b, b.at.areas)
 
 
-def interior(a: View, b: View) -> float:
+def interior(a: Sample, b: Sample) -> float:
     """Volume-weighted relative L2 of the displacement."""
-    return _relative(a, b, b.places.volumes)
+    return _relative(a, b, b.at.volumes)
 
 
-def surface_mean(a: View, b: View) -> float:
+def surface_mean(a: Sample, b: Sample) -> float:
     """Area-weighted mean of |u_a − u_b| over the largest |u_b|."""
-    weights = b.places.areas
+    weights = b.at.areas
     mean = weights @ np.linalg.norm(a.u - b.u, axis=1) / weights.sum()
     return float(mean / np.linalg.norm(b.u[weights > 0], axis=1).max())
 
 
-def silhouette(a: View, b: View) -> float:
+def silhouette(a: Sample, b: Sample) -> float:
     """Hausdorff distance of the surface moved by one and by the other, over the body's size."""
-    points, triangles = b.places.points, b.places.triangles
-    return hausdorff(points + a.u, triangles, points + b.u, triangles) / b.places.size
+    points, triangles = b.at.points, b.at.triangles
+    return hausdorff(points + a.u, triangles, points + b.u, triangles) / b.at.size
 
 
-def volume(a: View, b: View) -> float:
+def volume(a: Sample, b: Sample) -> float:
     """Largest change of V/V0 over the checkpoints."""
     return float(np.abs(a.series("volume") - b.series("volume")).max())
 
 
-def pressure(a: View, b: View) -> float:
+def pressure(a: Sample, b: Sample) -> float:
     """|p_a/p_b − 1| at the last checkpoint."""
     return float(abs(a.series("pressure")[-1] / b.series("pressure")[-1] - 1))
 
 
-def frequency(a: View, b: View) -> float:
+def frequency(a: Sample, b: Sample) -> float:
     """|f_a/f_b − 1| of the ringing."""
     return abs(a.frequency / b.frequency - 1)
 
 
-def lumen(a: View, b: View) -> float:
+def lumen(a: Sample, b: Sample) -> float:
     """|p_a/p_b − 1| of the lumen at the last checkpoint."""
     return float(abs(a.series("lumen_pressure")[-1] / b.series("lumen_pressure")[-1] - 1))
 
 
-NUMBERS: dict[str, tuple[Measure, Callable[[View], np.ndarray]]] = {
-    "force": (force, lambda view: view.force),
-    "force_end": (force_end, lambda view: view.force[-1:]),
-    "volume": (volume, lambda view: view.series("volume")),
-    "pressure": (pressure, lambda view: view.series("pressure")[-1:]),
-    "frequency": (frequency, lambda view: np.array([view.frequency])),
-    "lumen": (lumen, lambda view: view.series("lumen_pressure")[-1:]),
+NUMBERS: dict[str, tuple[Measure, Callable[[Sample], np.ndarray]]] = {
+    "force": (force, lambda sample: sample.force),
+    "force_end": (force_end, lambda sample: sample.force[-1:]),
+    "volume": (volume, lambda sample: sample.series("volume")),
+    "pressure": (pressure, lambda sample: sample.series("pressure")[-1:]),
+    "frequency": (frequency, lambda sample: np.array([sample.frequency])),
+    "lumen": (lumen, lambda sample: sample.series("lumen_pressure")[-1:]),
 }
 """Numbers and series of them: how a change is measured, and the values."""
-FIELDS: dict[str, tuple[Measure, Callable[[Places], np.ndarray]]] = {
-    "surface": (surface, lambda places: places.areas),
-    "interior": (interior, lambda places: places.volumes),
+FIELDS: dict[str, tuple[Measure, Callable[[SamplePoints], np.ndarray]]] = {
+    "surface": (surface, lambda at: at.areas),
+    "interior": (interior, lambda at: at.volumes),
 }
 """The displacement, with the weights of its points."""
 ABOUT_SURFACE: dict[str, Measure] = {"surface_mean": surface_mean, "silhouette": silhouette}
@@ -187,30 +187,30 @@ def uncertainties(
     """
     if not coarser:
         raise StudyError(f"the reference of '{finest.scene.name}' has one mesh only, so no error bar; solve three")
-    places = Places(coarser[-1])
-    views = [View(solution, places) for solution in (finest, *coarser)]
-    better = {str(s.record.attributes["variant"]): View(s, places) for s in variants}
-    family = views[:FAMILY]
+    at = SamplePoints(coarser[-1])
+    samples = [Sample(solution, at) for solution in (finest, *coarser)]
+    better = {str(s.record.attributes["variant"]): Sample(s, at) for s in variants}
+    family = samples[:FAMILY]
     found = {}
     for name, measure in QUANTITIES.items():
         if not allowed(finest.scene, name):
             continue
         mesh = _of_mesh(name, family)
-        shares = {key: setting_error(measure(views[-1], view), VARIANTS[key][1]) for key, view in better.items()}
+        shares = {key: setting_error(measure(samples[-1], sample), VARIANTS[key][1]) for key, sample in better.items()}
         found[name] = Uncertainty({"mesh": mesh.uncertainty, **shares}, mesh.order, mesh.shift)
     return found
 
 
-def _of_mesh(name: str, family: Sequence[View]) -> MeshError:
+def _of_mesh(name: str, family: Sequence[Sample]) -> MeshError:
     """What the meshes leave, relative to the size of the quantity."""
-    sizes = [view.cell_size for view in family]
+    sizes = [sample.cell_size for sample in family]
     if name in NUMBERS:
-        values = [NUMBERS[name][1](view) for view in family]
+        values = [NUMBERS[name][1](sample) for sample in family]
         size = 1.0 if name == "volume" else float(np.linalg.norm(values[0]))
         error, sign = mesh_error(sizes, values), float(np.sign(values[0][0]))
         return MeshError(error.uncertainty / size, sign * error.shift / size, error.order)
-    weights = FIELDS[name if name in FIELDS else "surface"][1](family[0].places)
-    field = field_error(sizes, [view.u for view in family], weights)
+    weights = FIELDS[name if name in FIELDS else "surface"][1](family[0].at)
+    field = field_error(sizes, [sample.u for sample in family], weights)
     change = np.sqrt(weights @ ((family[1].u - family[0].u) ** 2).sum(axis=1))
     scale = QUANTITIES[name](family[1], family[0]) / change if change else 0.0
     return MeshError(scale * field.uncertainty, scale * field.shift, field.order)

@@ -17,7 +17,7 @@ from studies.reference.problem import rigid
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.reference.ringing import fitted_frequency
 from studies.reference.solve import solve
-from studies.reference.uncertainty import Places, View
+from studies.reference.uncertainty import Sample, SamplePoints
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.runs.run import measure
@@ -58,7 +58,7 @@ def test_a_frequency_needs_more_than_a_few_values():
 
 def test_the_reference_rings_like_the_continuum(found):
     """Lamb's is for small swings: one of 5 % and the linear field it starts with are 0.7 % slower on fine meshes."""
-    frequency = View(found, Places(found)).frequency
+    frequency = Sample(found, SamplePoints(found)).frequency
     assert frequency == pytest.approx(TRUE, rel=0.012)
     assert frequency < TRUE
 
