@@ -130,7 +130,7 @@ def test_an_added_metric_keeps_the_contract(recipe, add):
 
 def test_a_metric_of_a_new_quantity_has_a_floor_to_be_tested_with(recipe, add):
     add(METRICS, replace(recipe("metric").ADDED, quantity="curvature"))
-    assert "curvature" in test_metrics.run().reference.floor
+    assert "curvature" in test_metrics.run().reference.total_uncertainty
 
 
 def test_an_added_scene_keeps_the_contract(recipe, add):

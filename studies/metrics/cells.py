@@ -8,16 +8,16 @@ DOUBT_MARK = "†"
 MINUS = "−"
 
 
-def value_cell(value: float, floor: float = float("nan"), *, signed: bool = False, doubtful: bool = False) -> str:
-    """ "−50.8 ± 0.2 †": as many digits as the uncertainty `floor` has; three without one; a dash for NaN."""
+def value_cell(value: float, uncertainty: float = float("nan"), *, signed: bool = False, doubtful: bool = False) -> str:
+    """ "−50.8 ± 0.2 †": as many digits as its `uncertainty` has; three without one; a dash for NaN."""
     if value != value:
         return MISSING
     sign = "+" if signed else ""
-    if not floor > 0:
+    if not uncertainty > 0:
         return plain(value, sign)
-    digits = max(0, -math.floor(math.log10(floor)))
+    digits = max(0, -math.floor(math.log10(uncertainty)))
     mark = f" {DOUBT_MARK}" if doubtful else ""
-    return f"{value:{sign}.{digits}f} ± {floor:.{digits}f}{mark}".replace("-", MINUS)
+    return f"{value:{sign}.{digits}f} ± {uncertainty:.{digits}f}{mark}".replace("-", MINUS)
 
 
 def plain(value: float, sign: str = "") -> str:

@@ -42,16 +42,16 @@ class Metric:
             return float("nan")
         return float(self.of(run))
 
-    def floor(self, run: Run) -> float:
+    def uncertainty(self, run: Run) -> float:
         """Uncertainty of the reference in the metric's unit; NaN without one or where nothing may be compared."""
         if self.quantity is None or run.reference is None or not self._allowed(run):
             return float("nan")
-        return PERCENT * run.reference.floor[self.quantity]
+        return PERCENT * run.reference.total_uncertainty[self.quantity]
 
     def doubtful(self, run: Run) -> bool:
         """Whether the reference is not ten times better than what it judges here."""
-        floor = self.floor(run)
-        return floor == floor and self.quantity not in ALWAYS and floor > DOUBT * abs(self(run))
+        uncertainty = self.uncertainty(run)
+        return uncertainty == uncertainty and self.quantity not in ALWAYS and uncertainty > DOUBT * abs(self(run))
 
     def _allowed(self, run: Run) -> bool:
         """Whether there is something to compare with, and the scene says that it may be."""

@@ -45,6 +45,6 @@ def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
     }
     for entry in metrics:
         row[f"{entry.name} [{entry.unit}]"] = entry(run)
-        row[f"{entry.name} floor [{entry.unit}]"] = entry.floor(run)
+        row[f"{entry.name} floor [{entry.unit}]"] = entry.uncertainty(run)
     row[DOUBTFUL] = " ".join(entry.name for entry in metrics if entry.doubtful(run))
     return row

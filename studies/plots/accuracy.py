@@ -73,13 +73,13 @@ def _draw_scene(
     offsets = np.linspace(-REACH, REACH, len(series) + 2)[1:-1]
     drawn: list[float] = []
     for place, metric in enumerate(metrics):
-        floor = metric.floor(group[0])
-        if metric.quantity in group[0].case.scene.quantities and floor == floor:
-            axes.fill_between([place - REACH, place + REACH], 0, floor, color=GREY, alpha=0.3, linewidth=0)
-            drawn.append(floor)
+        uncertainty = metric.uncertainty(group[0])
+        if metric.quantity in group[0].case.scene.quantities and uncertainty == uncertainty:
+            axes.fill_between([place - REACH, place + REACH], 0, uncertainty, color=GREY, alpha=0.3, linewidth=0)
+            drawn.append(uncertainty)
         points = [(place + off, run) for off, same in zip(offsets, series, strict=True) for run in same]
         values = [(x, run, metric(run)) for x, run in points]
-        drawn += [_draw_point(axes, x, error, floor, run, looks) for x, run, error in values if error == error]
+        drawn += [_draw_point(axes, x, error, uncertainty, run, looks) for x, run, error in values if error == error]
         if group[0].reference is not None and all(error != error for _, _, error in values):
             axes.text(
                 place, 0.1, "not\ncompared", transform=axes.get_xaxis_transform(), ha="center", color=GREY, size=SMALL
@@ -93,12 +93,14 @@ def _draw_scene(
     return drawn
 
 
-def _draw_point(axes: Axes, x: float, error: float, floor: float, run: Run, looks: dict[BodyRecipe, BodyLook]) -> float:
+def _draw_point(
+    axes: Axes, x: float, error: float, uncertainty: float, run: Run, looks: dict[BodyRecipe, BodyLook]
+) -> float:
     """A filled marker where the floor is small beside the error, else a hollow one; never below the floor."""
-    height = max(error, floor)
+    height = max(error, uncertainty)
     colour = method_colour(run.case.method.name)
-    face = colour if floor <= DOUBT * error else "white"
-    marker = looks[run.case.body].marker if error > floor else "_"
+    face = colour if uncertainty <= DOUBT * error else "white"
+    marker = looks[run.case.body].marker if error > uncertainty else "_"
     axes.plot(x, height, marker=marker, color=colour, markerfacecolor=face, markersize=7.5, markeredgewidth=1.6)
     return height
 

@@ -110,7 +110,7 @@ def _draw_reference(axes: Axes, run: Run, stop: float) -> None:
     path_t = np.append(t[t < stop], (stop, max(t[-1], stop)))
     path = np.append(force[t < stop], (force[-1], force[-1]))
     # The floor is relative to the norm over all checkpoints, so one of them carries this much of it.
-    spread = run.reference.floor["force"] * np.linalg.norm(force) / np.sqrt(len(force))
+    spread = run.reference.total_uncertainty["force"] * np.linalg.norm(force) / np.sqrt(len(force))
     axes.fill_between(path_t, path - spread, path + spread, color=GREY, alpha=0.3, linewidth=0)
     axes.plot(path_t, path, color=BLACK, linewidth=1)
     axes.plot(t, force, color=BLACK, marker="o", linestyle="", markersize=5.5, markeredgecolor="white", zorder=5)

@@ -126,9 +126,9 @@ def _draw_lines(axes: Axes, group: Sequence[Run], value: Callable[[Run], float],
 
 
 def _draw_force(axes: Axes, group: Sequence[Run], metric: Metric, looks: dict[int, Look]) -> None:
-    floor = metric.floor(group[0])
-    if floor == floor:
-        axes.axhspan(-floor, floor, color=GREY, alpha=0.3, linewidth=0)
+    uncertainty = metric.uncertainty(group[0])
+    if uncertainty == uncertainty:
+        axes.axhspan(-uncertainty, uncertainty, color=GREY, alpha=0.3, linewidth=0)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     if not _draw_lines(axes, group, metric, looks):
         remark(axes, "no reference, no error" if group[0].reference is None else "not compared in this scene")

@@ -89,15 +89,17 @@ def _draw(axes: Axes, names: dict[int, str], scenes: dict[str, list[Run]], metri
     rows = list(dict.fromkeys(names.values()))
     for number, group in enumerate(scenes.values()):
         colour, marker = SCENE_LOOKS[number % len(SCENE_LOOKS)]
-        floor = metric.floor(group[0]) if metric is not None and metric.name != "volume_worst" else float("nan")
-        if floor == floor:
-            axes.axvline(floor, color=colour, linestyle=":", linewidth=1.5)
-            drawn.append(floor)
+        uncertainty = (
+            metric.uncertainty(group[0]) if metric is not None and metric.name != "volume_worst" else float("nan")
+        )
+        if uncertainty == uncertainty:
+            axes.axvline(uncertainty, color=colour, linestyle=":", linewidth=1.5)
+            drawn.append(uncertainty)
         for run in group:
             value = _value(run, metric)
             if value != value:
                 continue
-            least = max(LEAST, floor) if floor == floor else LEAST
+            least = max(LEAST, uncertainty) if uncertainty == uncertainty else LEAST
             height = rows.index(names[id(run)]) + APART * (2 * number - len(scenes) + 1)
             shape = marker if value > least else "<"
             face = "white" if metric is not None and metric.doubtful(run) else colour

@@ -52,7 +52,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     if reference:
         _draw_ball(axes[-1], some, *reference.surface(), STEEL)
         change = 100 * float(reference.field("volume")[-1] - 1)
-        spread = 100 * reference.floor["force_end"]
+        spread = 100 * reference.total_uncertainty["force_end"]
         words = [f"volume {change:+.3f} %".replace("-", "−"), f"force {reference.force[-1]:.2f} N (± {spread:.1g} %)"]
         _caption(axes[-1], "Finite-element reference", words, BLACK)
     size = _radius(some)

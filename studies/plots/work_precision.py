@@ -76,15 +76,15 @@ def _draw_panel(
     axes: Axes, group: Sequence[Run], metric: Metric, steps: Sequence[float], looks: dict[BodyRecipe, BodyLook]
 ) -> list[float]:
     """The values drawn."""
-    floor = metric.floor(group[0])
-    if floor == floor:
-        axes.axhspan(1e-12, floor, color=GREY, alpha=0.3, linewidth=0)
-    drawn: list[float] = [floor] if floor == floor else []
+    uncertainty = metric.uncertainty(group[0])
+    if uncertainty == uncertainty:
+        axes.axhspan(1e-12, uncertainty, color=GREY, alpha=0.3, linewidth=0)
+    drawn: list[float] = [uncertainty] if uncertainty == uncertainty else []
     lines = []
     for same in grouped(group, lambda run: (run.case.method.name, _step(run), looks[run.case.body])):
         line = sorted((run for run in same if metric(run) == metric(run)), key=lambda run: run.case.body.nodes)
         # Closer to the reference than it is to itself means no more than: as good as it.
-        heights = [max(metric(run), floor) if floor == floor else metric(run) for run in line]
+        heights = [max(metric(run), uncertainty) if uncertainty == uncertainty else metric(run) for run in line]
         colour = method_colour(same[0].case.method.name)
         dashes = STEP_LINES[steps.index(_step(same[0])) % len(STEP_LINES)]
         axes.plot([cost(run) for run in line], heights, color=colour, linestyle=dashes, linewidth=1.5)

@@ -27,7 +27,7 @@ class Reference(Solution):
         return uncertainties(self, self.coarser, self.variants)
 
     @cached_property
-    def floor(self) -> dict[str, float]:
+    def total_uncertainty(self) -> dict[str, float]:
         """Uncertainty of each quantity [1], relative to its size (docs, eq. 6.3)."""
         return {name: found.total for name, found in self.uncertainty.items()}
 

@@ -198,6 +198,6 @@ def _cell(row: Mapping[Hashable, Any], column: str) -> str:
         return f"{value:.2f}"
     if column.startswith("volume"):
         return f"{value:.2g}"
-    floor = float(row.get(column.replace(" [", " floor ["), float("nan")))
+    uncertainty = float(row.get(column.replace(" [", " floor ["), float("nan")))
     doubtful = column.split(" [")[0] in str(row.get(DOUBTFUL, "")).split()
-    return value_cell(value, floor, signed=column.startswith("force"), doubtful=doubtful)
+    return value_cell(value, uncertainty, signed=column.startswith("force"), doubtful=doubtful)

@@ -25,7 +25,14 @@ TRIANGLES = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1,
 CELLS = np.column_stack([TRIANGLES, np.full(len(TRIANGLES), 6)])[:, [3, 0, 1, 2]]
 VOLUME = 4 / 3 * RADIUS**3
 STRETCH = np.array([1.2, 1.2, 0.7])
-FLOOR = {"force": 0.02, "force_end": 0.02, "surface": 0.015, "interior": 0.012, "silhouette": 0.01, "volume": 1e-5}
+UNCERTAINTY = {
+    "force": 0.02,
+    "force_end": 0.02,
+    "surface": 0.015,
+    "interior": 0.012,
+    "silhouette": 0.01,
+    "volume": 1e-5,
+}
 SCENES = (BALL_SQUEEZE, BALL_CLAMPED, LIVER_PRESS)
 
 
@@ -41,7 +48,7 @@ def reference(scene):
         displacement=truth,
         surface=lambda: (POINTS[:6] * STRETCH, TRIANGLES),
         force=4.0 * t / t[-1],
-        floor=FLOOR | {"pressure": 0.05, "surface_mean": 0.01},
+        total_uncertainty=UNCERTAINTY | {"pressure": 0.05, "surface_mean": 0.01},
         field=lambda name: {"t": t, "volume": 1 - 3e-5 * t / t[-1]}[name],
     )
 

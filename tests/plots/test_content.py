@@ -12,7 +12,7 @@ from studies.reference.uncertainty import Uncertainty
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status
-from tests.plots.made_up import FLOOR, FRAMES, run, timed_grid
+from tests.plots.made_up import FRAMES, UNCERTAINTY, run, timed_grid
 from tests.plots.reading import lines, points, words
 
 
@@ -70,15 +70,15 @@ def test_force_of_the_reference_holds_when_the_press_stops():
 @pytest.mark.parametrize("error", [0.0, 1e-4, 0.011, 0.05, 0.3])
 def test_accuracy_never_below_the_floor_and_hollow_where_the_floor_matters(error):
     (axes,) = accuracy.figure([run(BALL_CLAMPED, error=error)]).axes
-    floors = [100 * FLOOR[name] for name in ("force", "surface", "interior", "silhouette")]
+    bounds = [100 * UNCERTAINTY[name] for name in ("force", "surface", "interior", "silhouette")]
     found = points(axes, BLUE)
     assert len(found) == 4
-    for (_, height, hollow), floor in zip(found, floors, strict=True):
-        assert height >= floor
-        assert hollow == (floor > 0.1 * height or height == floor)
-    assert found[0][1] == pytest.approx(max(100 * error, floors[0]))
+    for (_, height, hollow), bound in zip(found, bounds, strict=True):
+        assert height >= bound
+        assert hollow == (bound > 0.1 * height or height == bound)
+    assert found[0][1] == pytest.approx(max(100 * error, bounds[0]))
     shades = [patch.get_extents().y1 for patch in axes.collections[0].get_paths()]
-    assert shades == pytest.approx(floors[:1])
+    assert shades == pytest.approx(bounds[:1])
 
 
 def test_accuracy_leaves_out_what_a_scene_does_not_allow():
@@ -93,11 +93,11 @@ def test_work_precision_never_below_the_floor(error):
         [run(BALL_CLAMPED, error=error, frame_ms=0.5), run(BALL_CLAMPED, error=error, nodes=99, frame_ms=1)]
     )
     for axes, name in zip(figure.axes, ("force", "interior"), strict=True):
-        floor = 100 * FLOOR[name]
+        bound = 100 * UNCERTAINTY[name]
         drawn = np.concatenate([line.get_ydata() for line in lines(axes, BLUE)])
-        assert (drawn >= floor).all()
-        assert drawn == pytest.approx(max(100 * error, floor))
-        assert axes.patches[0].get_y() + axes.patches[0].get_height() == pytest.approx(floor)
+        assert (drawn >= bound).all()
+        assert drawn == pytest.approx(max(100 * error, bound))
+        assert axes.patches[0].get_y() + axes.patches[0].get_height() == pytest.approx(bound)
 
 
 def test_work_precision_costs_computing_time_per_simulated_second():

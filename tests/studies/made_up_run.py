@@ -29,7 +29,7 @@ SCENE = replace(BALL_CLAMPED, checkpoints=(2.0, 4.0), duration=4.0)
 SHIFT = np.array([0.03, 0.0, 0.0])
 
 
-FLOORS = ("force", "force_end", "surface", "interior", "silhouette", "volume", "pressure", "lumen", "frequency")
+UNCERTAINTIES = ("force", "force_end", "surface", "interior", "silhouette", "volume", "pressure", "lumen", "frequency")
 """Quantities whose floors tests know: 1 %, 2 % and so on; those that METRICS has beside them follow."""
 
 
@@ -70,7 +70,9 @@ def reference(motion=bend, force=(1.0, 2.0), pressure=(10.0, 20.0)):
         force=np.array(force),
         surface=lambda: (POINTS + motion(POINTS), TRIANGLES),
         field=lambda name: {"pressure": np.array(pressure), "lumen_pressure": np.array(pressure)}[name],
-        floor={name: 0.01 * (k + 1) for k, name in enumerate(dict.fromkeys((*FLOORS, *quantities())))},
+        total_uncertainty={
+            name: 0.01 * (k + 1) for k, name in enumerate(dict.fromkeys((*UNCERTAINTIES, *quantities())))
+        },
     )
 
 

@@ -11,7 +11,7 @@ CHOSEN = [metric for metric in METRICS if metric.name in ("volume_worst", "force
 
 
 @pytest.mark.parametrize(
-    ("value", "floor", "options", "text"),
+    ("value", "uncertainty", "options", "text"),
     [
         (-50.84, 0.228, {"signed": True}, "−50.8 ± 0.2"),
         (9.441, 0.4731, {}, "9.4 ± 0.5"),
@@ -22,8 +22,8 @@ CHOSEN = [metric for metric in METRICS if metric.name in ("volume_worst", "force
         (12345.6, float("nan"), {}, "12,346"),
     ],
 )
-def test_a_value_has_the_digits_of_its_uncertainty(value, floor, options, text):
-    assert value_cell(value, floor, **options) == text
+def test_a_value_has_the_digits_of_its_uncertainty(value, uncertainty, options, text):
+    assert value_cell(value, uncertainty, **options) == text
 
 
 def row(scene="ball", method="free", **changes):

@@ -123,8 +123,8 @@ def setting(row: Row, key: str) -> str:
 def cell(row: Row, metric: Metric) -> str:
     """A metric of a row beside its uncertainty; a volume is compared with the body's own, which is known."""
     known = metric.quantity is not None and metric.quantity not in ALWAYS
-    floor = float(row.get(f"{metric.name} floor [{metric.unit}]", "nan")) if known else float("nan")
+    uncertainty = float(row.get(f"{metric.name} floor [{metric.unit}]", "nan")) if known else float("nan")
     doubtful = metric.name in str(row[DOUBTFUL]).split()
     return value_cell(
-        float(row[f"{metric.name} [{metric.unit}]"]), floor, signed=metric.better == "-", doubtful=doubtful
+        float(row[f"{metric.name} [{metric.unit}]"]), uncertainty, signed=metric.better == "-", doubtful=doubtful
     )

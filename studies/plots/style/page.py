@@ -133,7 +133,7 @@ def doubts(runs: Sequence[Run], metrics: Sequence[Metric]) -> list[str]:
 
 def _share(metric: Metric, run: Run) -> float:
     error = abs(metric(run))
-    return metric.floor(run) / error if error else np.inf
+    return metric.uncertainty(run) / error if error else np.inf
 
 
 def doubt_mark(group: Sequence[Run], metrics: Sequence[Metric]) -> str:

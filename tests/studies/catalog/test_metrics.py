@@ -65,7 +65,7 @@ def test_a_free_turn_forbids_displacement_but_not_silhouette():
     free = replace(BALL_SQUEEZE, checkpoints=(2.0, 4.0), probed=SCENE.probed)
     for name in ("surface_error", "interior_error", "mean_error"):
         assert np.isnan(of(name, scene=free))
-        assert np.isnan(metric(name).floor(run(scene=free)))
+        assert np.isnan(metric(name).uncertainty(run(scene=free)))
     assert of("silhouette_error", scene=free) == pytest.approx(0.0, abs=1e-12)
 
 
@@ -74,7 +74,7 @@ def test_without_a_reference_only_the_own_volume_is_judged():
     assert metric("volume_worst")(alone) == pytest.approx(3.0, rel=1e-12)
     assert metric("volume_end")(alone) == pytest.approx(-2.0, rel=1e-12)
     assert np.isnan([metric(name)(alone) for name in ("force_error", "surface_error", "silhouette_error")]).all()
-    assert np.isnan(metric("volume_worst").floor(alone))
+    assert np.isnan(metric("volume_worst").uncertainty(alone))
 
 
 def test_floor_stands_beside_the_number_in_the_table():
@@ -90,7 +90,7 @@ def test_floor_stands_beside_the_number_in_the_table():
 def test_doubtful_is_what_the_reference_knows_less_than_ten_times_better():
     """The floor of the force error is 1 %, of the last force 2 %: 10 and 20 % are just good enough."""
     force = metric("force_error")
-    assert force.floor(run()) == pytest.approx(1.0, rel=1e-12)
+    assert force.uncertainty(run()) == pytest.approx(1.0, rel=1e-12)
     assert not force.doubtful(run(force=(9.0, 1.11, 9.0, 2.22)))
     assert force.doubtful(run(force=(9.0, 0.91, 9.0, 1.82)))
     assert metric("force_end").doubtful(run(force=(9.0, 9.0, 9.0, 1.62)))

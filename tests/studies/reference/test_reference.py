@@ -46,10 +46,18 @@ def test_pressure_is_the_one_that_balances_the_planes(found):
 
 def test_every_quantity_has_a_positive_floor_in_shares(found):
     # A ball has no lumen and does not ring, and this one may turn; what is not compared is not listed.
-    assert set(found.floor) == set(QUANTITIES) - {"lumen", "frequency", "surface", "surface_mean", "interior"}
+    assert set(found.total_uncertainty) == set(QUANTITIES) - {
+        "lumen",
+        "frequency",
+        "surface",
+        "surface_mean",
+        "interior",
+    }
     for name, known in found.uncertainty.items():
         assert set(known.shares) == {"mesh", "steps", "contact", "kappa"}
-        assert found.floor[name] == pytest.approx(np.sqrt(sum(share**2 for share in known.shares.values())), rel=1e-12)
+        assert found.total_uncertainty[name] == pytest.approx(
+            np.sqrt(sum(share**2 for share in known.shares.values())), rel=1e-12
+        )
         # Coarse, but neighbours: more than a fifth apart they would not describe the same thing.
         assert 0 < known.shares["mesh"] < 0.3, name
         # A path without friction or loss forgets its steps, but for how far points sink in: a thousandth is allowed.
@@ -79,7 +87,7 @@ def test_the_error_bar_covers_the_true_error_and_is_not_idle(added, levels):
     scaled = reference.force / (SHEAR * RADIUS**2)
     error = np.linalg.norm(scaled - FORCE) / np.linalg.norm(FORCE), abs(scaled[-1] / FORCE[-1] - 1)
     for name, true in zip(("force", "force_end"), error, strict=True):
-        assert true < reference.floor[name] + ORACLE < 20 * (true + ORACLE), name
+        assert true < reference.total_uncertainty[name] + ORACLE < 20 * (true + ORACLE), name
 
 
 def test_a_shift_is_told_and_not_applied(found):
@@ -91,10 +99,10 @@ def test_a_shift_is_told_and_not_applied(found):
 
 def test_two_meshes_have_a_larger_bar_and_one_has_none(found):
     pair = replace(found, coarser=found.coarser[:1])
-    assert pair.floor["force"] > 0
+    assert pair.total_uncertainty["force"] > 0
     assert pair.uncertainty["silhouette"].shares["mesh"] > found.uncertainty["silhouette"].shares["mesh"]
     with pytest.raises(StudyError, match="one mesh only"):
-        _ = replace(found, coarser=()).floor
+        _ = replace(found, coarser=()).total_uncertainty
 
 
 def test_displacement_is_mirrored(found):

@@ -88,10 +88,10 @@ def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, 
     root = shutil.copytree(solved, tmp_path / "results")
     table, chart = refresh_uncertainty(root, [SCENE, SCENE, replace(SCENE, name="bare", reference=None)])
     rows = pd.read_csv(table)
-    assert rows["quantity"].tolist() == list(found.floor)
+    assert rows["quantity"].tolist() == list(found.total_uncertainty)
     shares = rows[["mesh [%]", "steps [%]", "contact [%]", "kappa [%]"]].to_numpy()
     np.testing.assert_allclose(np.linalg.norm(shares, axis=1), rows["uncertainty [%]"], rtol=1e-5)
-    assert rows["uncertainty [%]"][0] == pytest.approx(100 * found.floor["force"], rel=1e-5)
+    assert rows["uncertainty [%]"][0] == pytest.approx(100 * found.total_uncertainty["force"], rel=1e-5)
     assert chart.read_bytes()[:4] == b"\x89PNG"
     chart.write_bytes(b"old")
     refresh_uncertainty(root, [SCENE])
