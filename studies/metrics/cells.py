@@ -3,12 +3,14 @@
 import math
 
 MISSING = "–"
-DOUBT_MARK = "†"
+UNRESOLVED_MARK = "†"
 """Of an error that the reference knows less than ten times better than the model."""
 MINUS = "−"
 
 
-def value_cell(value: float, uncertainty: float = float("nan"), *, signed: bool = False, doubtful: bool = False) -> str:
+def value_cell(
+    value: float, uncertainty: float = float("nan"), *, signed: bool = False, unresolved: bool = False
+) -> str:
     """ "−50.8 ± 0.2 †": as many digits as its `uncertainty` has; three without one; a dash for NaN."""
     if value != value:
         return MISSING
@@ -16,7 +18,7 @@ def value_cell(value: float, uncertainty: float = float("nan"), *, signed: bool 
     if not uncertainty > 0:
         return plain(value, sign)
     digits = max(0, -math.floor(math.log10(uncertainty)))
-    mark = f" {DOUBT_MARK}" if doubtful else ""
+    mark = f" {UNRESOLVED_MARK}" if unresolved else ""
     return f"{value:{sign}.{digits}f} ± {uncertainty:.{digits}f}{mark}".replace("-", MINUS)
 
 

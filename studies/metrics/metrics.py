@@ -13,7 +13,7 @@ from studies.scene.quantities import ALWAYS, allowed
 from studies.store.record import Status
 
 PERCENT = 100.0
-DOUBT = 0.1
+RESOLVED_SHARE = 0.1
 """An error with more than this share of uncertainty in it is doubtful (docs/theory.md, the reference)."""
 COMPARABLE = (Status.OK, Status.INVERTED, Status.DRIFTED)
 """A run that ended early has no last checkpoint."""
@@ -48,10 +48,12 @@ class Metric:
             return float("nan")
         return PERCENT * run.reference.total_uncertainty[self.quantity]
 
-    def doubtful(self, run: Run) -> bool:
+    def unresolved(self, run: Run) -> bool:
         """Whether the reference is not ten times better than what it judges here."""
         uncertainty = self.uncertainty(run)
-        return uncertainty == uncertainty and self.quantity not in ALWAYS and uncertainty > DOUBT * abs(self(run))
+        return (
+            uncertainty == uncertainty and self.quantity not in ALWAYS and uncertainty > RESOLVED_SHARE * abs(self(run))
+        )
 
     def _allowed(self, run: Run) -> bool:
         """Whether there is something to compare with, and the scene says that it may be."""

@@ -7,7 +7,7 @@ import pandas as pd
 from studies.base.lookup import lookup
 from studies.metrics.metrics import METRICS, Metric, Run
 
-DOUBTFUL = "doubtful"
+UNRESOLVED = "doubtful"
 """Column with the metrics of which the reference knows the truth less than ten times better than the model."""
 
 
@@ -46,5 +46,5 @@ def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
     for entry in metrics:
         row[f"{entry.name} [{entry.unit}]"] = entry(run)
         row[f"{entry.name} floor [{entry.unit}]"] = entry.uncertainty(run)
-    row[DOUBTFUL] = " ".join(entry.name for entry in metrics if entry.doubtful(run))
+    row[UNRESOLVED] = " ".join(entry.name for entry in metrics if entry.unresolved(run))
     return row

@@ -8,14 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.metrics.metrics import DOUBT, METRICS, Metric, Run
+from studies.metrics.metrics import METRICS, RESOLVED_SHARE, Metric, Run
 from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
     band_handle,
     blank,
     by_scene,
-    doubt_mark,
-    doubts,
     finish,
     grouped,
     has_frames,
@@ -23,6 +21,8 @@ from studies.plots.style.page import (
     page,
     panels,
     remarks,
+    unresolved_mark,
+    unresolved_notes,
 )
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, remark, save, styled
 from studies.runs.case import BodyRecipe
@@ -56,13 +56,15 @@ def figure(runs: Sequence[Run]) -> Figure:
         spare.set_axis_off()
     values = [0.1, 100.0]
     for panel, (name, group) in zip(axes.flat, scenes.items(), strict=False):
-        panel.set_title(heading(name) + doubt_mark(group, metrics))
+        panel.set_title(heading(name) + unresolved_mark(group, metrics))
         values += _draw_scene(panel, group, metrics, looks)
     for panel in axes[:, 0]:
         log_axis(panel.yaxis)
         panel.set_ylim(min(values) / ROOM, ROOM * max(values))
         panel.set_ylabel("relative error [%]")
-    return finish(sheet, TITLE, _handles(shown, looks), [*_notes(), *doubts(shown, metrics), *remarks(runs)], columns=3)
+    return finish(
+        sheet, TITLE, _handles(shown, looks), [*_notes(), *unresolved_notes(shown, metrics), *remarks(runs)], columns=3
+    )
 
 
 def _draw_scene(
@@ -99,7 +101,7 @@ def _draw_point(
     """A filled marker where the floor is small beside the error, else a hollow one; never below the floor."""
     height = max(error, uncertainty)
     colour = method_colour(run.case.method.name)
-    face = colour if uncertainty <= DOUBT * error else "white"
+    face = colour if uncertainty <= RESOLVED_SHARE * error else "white"
     marker = looks[run.case.body].marker if error > uncertainty else "_"
     axes.plot(x, height, marker=marker, color=colour, markerfacecolor=face, markersize=7.5, markeredgewidth=1.6)
     return height

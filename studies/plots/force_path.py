@@ -15,8 +15,6 @@ from studies.plots.style.page import (
     band_handle,
     blank,
     by_scene,
-    doubt_mark,
-    doubts,
     finish,
     good_frames,
     grouped,
@@ -26,6 +24,8 @@ from studies.plots.style.page import (
     reference_handle,
     remarks,
     spread_out,
+    unresolved_mark,
+    unresolved_notes,
 )
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, save, styled
 from studies.runs.case import BodyRecipe
@@ -57,7 +57,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     reference = reference_handle(linestyle="-", linewidth=1)
     handles = [*body_method_handles(shown, looks), reference, band_handle("± its uncertainty")]
     notes = ["At the end of each line: its error there, after all has come to rest. Dotted: the press stops."]
-    return finish(sheet, TITLE, handles, [*notes, *doubts(shown, FORCES), *remarks(runs)], columns=3)
+    return finish(sheet, TITLE, handles, [*notes, *unresolved_notes(shown, FORCES), *remarks(runs)], columns=3)
 
 
 def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> None:
@@ -76,7 +76,7 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
     axes.set(xlim=(0, 1.015 * group[0].case.scene.duration), ylim=(0, top), xlabel="time [s]", ylabel="force [N]")
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     deep = 1e3 * float(np.linalg.norm(motion.displacements[-1]))
-    mark = doubt_mark(group, FORCES)
+    mark = unresolved_mark(group, FORCES)
     axes.set_title(f"{heading(group[0].case.scene.name)}{mark}, {deep:.3g} mm in {motion.times[-1]:g} s")
 
 

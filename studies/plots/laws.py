@@ -15,14 +15,14 @@ from studies.plots.style.page import (
     band_handle,
     blank,
     by_scene,
-    doubt_mark,
-    doubts,
     finish,
     grouped,
     log_axis,
     page,
     panels,
     remarks,
+    unresolved_mark,
+    unresolved_notes,
 )
 from studies.plots.style.style import (
     BLACK,
@@ -77,7 +77,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     axes = panels(sheet, len(scenes), 2, sharex="col")
     sizes = sorted({run.case.body.nodes for run in shown})
     for row, (name, group) in zip(axes, scenes.items(), strict=True):
-        row[0].set_title(heading(name) + doubt_mark(group, [metric]))
+        row[0].set_title(heading(name) + unresolved_mark(group, [metric]))
         row[0].set_ylabel("force error, last checkpoint [%]")
         row[1].set_ylabel("step limit [ms]")
         _draw_force(row[0], group, metric, looks)
@@ -90,7 +90,9 @@ def figure(runs: Sequence[Run]) -> Figure:
     for panel in axes[-1]:
         panel.set_xlabel("surface nodes [1]")
     notes = ["The step limit is that of symplectic Euler with the scene's damping; volumes do not lower it."]
-    return finish(sheet, TITLE, _handles(looks), [*notes, *doubts(shown, [metric]), *remarks(runs)], columns=4)
+    return finish(
+        sheet, TITLE, _handles(looks), [*notes, *unresolved_notes(shown, [metric]), *remarks(runs)], columns=4
+    )
 
 
 def _looks(shown: Sequence[Run]) -> dict[int, Look]:

@@ -11,7 +11,17 @@ from matplotlib.ticker import LogLocator
 from massspring import Method
 from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run
 from studies.plots.style.bodies import body_looks
-from studies.plots.style.page import blank, by_scene, doubt_mark, doubts, finish, log_axis, page, panels, remarks
+from studies.plots.style.page import (
+    blank,
+    by_scene,
+    finish,
+    log_axis,
+    page,
+    panels,
+    remarks,
+    unresolved_mark,
+    unresolved_notes,
+)
 from studies.plots.style.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, heading, readable, save, styled
 from studies.plots.work_precision import cost
 from studies.runs.case import chosen_settings
@@ -102,7 +112,7 @@ def _draw(axes: Axes, names: dict[int, str], scenes: dict[str, list[Run]], metri
             least = max(LEAST, uncertainty) if uncertainty == uncertainty else LEAST
             height = rows.index(names[id(run)]) + APART * (2 * number - len(scenes) + 1)
             shape = marker if value > least else "<"
-            face = "white" if metric is not None and metric.doubtful(run) else colour
+            face = "white" if metric is not None and metric.unresolved(run) else colour
             axes.plot(max(value, least), height, marker=shape, color=colour, markerfacecolor=face, markersize=6)
             drawn.append(max(value, least))
     if drawn:
@@ -125,7 +135,7 @@ def _handles(scenes: dict[str, list[Run]], metrics: Sequence[Metric]) -> list:
     entries = []
     for number, (name, group) in enumerate(scenes.items()):
         colour, marker = SCENE_LOOKS[number % len(SCENE_LOOKS)]
-        label = heading(name) + doubt_mark(group, metrics)
+        label = heading(name) + unresolved_mark(group, metrics)
         entries.append(Line2D([], [], color=colour, marker=marker, linestyle="", markersize=7, label=label))
     dotted = Line2D([], [], color=GREY, linestyle=":", label="the reference's own uncertainty")
     hollow = {"marker": "o", "linestyle": "", "markerfacecolor": "white", "color": GREY, "markersize": 7}
@@ -141,7 +151,7 @@ def _notes(shown: Sequence[Run], metrics: Sequence[Metric], runs: Sequence[Run])
         f"Body: {'; '.join(bodies)}; the limit counts what a method adds to the springs. Force: over all checkpoints. "
         "Displacement: volume-weighted relative L2, not compared where a rigid turn is free. J: 5th to 95th percentile "
         "at the last checkpoint. Computing time per simulated second, one core. Arrows: less than can be drawn.",
-        *doubts(shown, metrics),
+        *unresolved_notes(shown, metrics),
         *remarks(runs),
     ]
 

@@ -14,14 +14,14 @@ from studies.plots.style.page import (
     band_handle,
     blank,
     by_scene,
-    doubt_mark,
-    doubts,
     finish,
     grouped,
     log_axis,
     page,
     panels,
     remarks,
+    unresolved_mark,
+    unresolved_notes,
 )
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, remark, save, styled
 from studies.runs.case import BodyRecipe
@@ -46,7 +46,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     steps = sorted({_step(run) for run in timed}, reverse=True)
     values = [1.0, 100.0]
     for column, (name, group) in zip(axes.T, scenes.items(), strict=True):
-        column[0].set_title(heading(name) + doubt_mark(group, metrics))
+        column[0].set_title(heading(name) + unresolved_mark(group, metrics))
         column[-1].set_xlabel("computing time per simulated second [ms/s]")
         for panel, metric in zip(column, metrics, strict=True):
             values += _draw_panel(panel, group, metric, steps, looks)
@@ -56,7 +56,11 @@ def figure(runs: Sequence[Run]) -> Figure:
         panel.set_ylabel(ROWS[metric.name])
     axes[0, 0].set_ylim(0.7 * min(values), 1.2 * max(values))
     return finish(
-        sheet, TITLE, _handles(timed, steps, looks), [_meaning(), *doubts(timed, metrics), *remarks(runs)], columns=3
+        sheet,
+        TITLE,
+        _handles(timed, steps, looks),
+        [_meaning(), *unresolved_notes(timed, metrics), *remarks(runs)],
+        columns=3,
     )
 
 

@@ -10,9 +10,9 @@ from studies.base.errors import StudyError
 from studies.base.study_file import fault_of_study_file, is_of_study_file
 from studies.catalog.study import Study
 from studies.geometry import SHAPES, organ
-from studies.metrics.cells import DOUBT_MARK, value_cell
+from studies.metrics.cells import UNRESOLVED_MARK, value_cell
 from studies.metrics.run import Run
-from studies.metrics.table import DOUBTFUL, study_table
+from studies.metrics.table import UNRESOLVED, study_table
 from studies.plots.figures import paper_ball, paper_slide
 from studies.plots.figures.organ_springs import draw_organ_springs
 from studies.plots.figures.organs import draw_organs
@@ -165,8 +165,8 @@ def summary_of(runs_of: dict[str, list[Run]]) -> str:
     for row in rows.to_dict("records"):
         cells = [_cell(row, name) for name in SUMMARY_COLUMNS]
         lines.append(f"| {row['scene']} | {row['body']} | {row['method']} | " + " | ".join(cells) + " |")
-    if any(DOUBT_MARK in line for line in lines):
-        lines += ["", f"{DOUBT_MARK} the reference is not ten times better than this error"]
+    if any(UNRESOLVED_MARK in line for line in lines):
+        lines += ["", f"{UNRESOLVED_MARK} the reference is not ten times better than this error"]
     return "\n".join(lines)
 
 
@@ -199,5 +199,5 @@ def _cell(row: Mapping[Hashable, Any], column: str) -> str:
     if column.startswith("volume"):
         return f"{value:.2g}"
     uncertainty = float(row.get(column.replace(" [", " floor ["), float("nan")))
-    doubtful = column.split(" [")[0] in str(row.get(DOUBTFUL, "")).split()
-    return value_cell(value, uncertainty, signed=column.startswith("force"), doubtful=doubtful)
+    unresolved = column.split(" [")[0] in str(row.get(UNRESOLVED, "")).split()
+    return value_cell(value, uncertainty, signed=column.startswith("force"), unresolved=unresolved)

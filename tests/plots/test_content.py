@@ -6,7 +6,7 @@ import pytest
 from massspring import Free
 from studies.plots import accuracy, force_path, uncertainty, volume_history
 from studies.plots import work_precision as work
-from studies.plots.style.page import DOUBT_MARK
+from studies.plots.style.page import UNRESOLVED_MARK
 from studies.plots.style.style import BLACK, BLUE, ORANGE, VERMILLION
 from studies.reference.uncertainty import Uncertainty
 from studies.scenes.ball_clamped import BALL_CLAMPED
@@ -127,9 +127,9 @@ def test_a_reference_that_is_not_ten_times_better_is_marked(chart):
     def said(error):
         return words(chart.figure([run(BALL_CLAMPED, error=error, frame_ms=0.5)]))
 
-    assert DOUBT_MARK not in said(3.0)
-    assert f"Ball clamped {DOUBT_MARK}" in said(0.05)
-    note = said(0.05).split(f"{DOUBT_MARK} Ball clamped: the reference's uncertainty is ")[1]
+    assert UNRESOLVED_MARK not in said(3.0)
+    assert f"Ball clamped {UNRESOLVED_MARK}" in said(0.05)
+    note = said(0.05).split(f"{UNRESOLVED_MARK} Ball clamped: the reference's uncertainty is ")[1]
     assert note.startswith(("up to", "as large as"))
     assert "force" in note
 

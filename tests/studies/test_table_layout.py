@@ -5,7 +5,7 @@ import pytest
 from studies.cli.commands import table
 from studies.metrics.cells import value_cell
 from studies.metrics.metrics import METRICS
-from studies.metrics.table import DOUBTFUL
+from studies.metrics.table import UNRESOLVED
 
 CHOSEN = [metric for metric in METRICS if metric.name in ("volume_worst", "force_end", "mean_error", "min_j")]
 
@@ -15,7 +15,7 @@ CHOSEN = [metric for metric in METRICS if metric.name in ("volume_worst", "force
     [
         (-50.84, 0.228, {"signed": True}, "−50.8 ± 0.2"),
         (9.441, 0.4731, {}, "9.4 ± 0.5"),
-        (19.6, 1.01, {"doubtful": True}, "20 ± 1 †"),
+        (19.6, 1.01, {"unresolved": True}, "20 ± 1 †"),
         (0.37164, float("nan"), {}, "0.372"),
         (3.1e-6, 0.0, {}, "3.1e−06"),
         (float("nan"), 0.1, {}, "–"),
@@ -27,7 +27,7 @@ def test_a_value_has_the_digits_of_its_uncertainty(value, uncertainty, options, 
 
 
 def row(scene="ball", method="free", **changes):
-    settings = {"law": "van_gelder", "nodes": 550, "stiffness": 1.0, "dt/dt_c": 0.5, "status": "ok", DOUBTFUL: ""}
+    settings = {"law": "van_gelder", "nodes": 550, "stiffness": 1.0, "dt/dt_c": 0.5, "status": "ok", UNRESOLVED: ""}
     numbers = {f"{m.name} [{m.unit}]": 12.0 for m in CHOSEN} | {"force_end floor [%]": 0.2}
     return {"scene": scene, "body": "surface", "method": method, **settings, **numbers, **changes}
 

@@ -8,9 +8,9 @@ import typer
 
 from studies.base.lookup import lookup
 from studies.cli.terminal import Results, StudyName, console, say, warn
-from studies.metrics.cells import DOUBT_MARK, MISSING, plain, value_cell
+from studies.metrics.cells import MISSING, UNRESOLVED_MARK, plain, value_cell
 from studies.metrics.metrics import METRICS, Metric
-from studies.metrics.table import DOUBTFUL, study_table
+from studies.metrics.table import UNRESOLVED, study_table
 from studies.scene.quantities import ALWAYS
 from studies.store.csv_table import write_table
 from studies.sweep.find_study import find_study
@@ -58,8 +58,8 @@ def draw(rows: Sequence[Row], metrics: list[Metric], every: bool) -> None:
         rest = rest[count:]
         if not every:
             break
-    if any(row[DOUBTFUL] for row in rows):
-        say(f"{DOUBT_MARK} the reference is not ten times better than this error")
+    if any(row[UNRESOLVED] for row in rows):
+        say(f"{UNRESOLVED_MARK} the reference is not ten times better than this error")
     if rest:
         say(f"not shown (--all, --csv FILE, --metrics): {', '.join(metric.name for metric in rest)}")
 
@@ -124,7 +124,7 @@ def cell(row: Row, metric: Metric) -> str:
     """A metric of a row beside its uncertainty; a volume is compared with the body's own, which is known."""
     known = metric.quantity is not None and metric.quantity not in ALWAYS
     uncertainty = float(row.get(f"{metric.name} floor [{metric.unit}]", "nan")) if known else float("nan")
-    doubtful = metric.name in str(row[DOUBTFUL]).split()
+    unresolved = metric.name in str(row[UNRESOLVED]).split()
     return value_cell(
-        float(row[f"{metric.name} [{metric.unit}]"]), uncertainty, signed=metric.better == "-", doubtful=doubtful
+        float(row[f"{metric.name} [{metric.unit}]"]), uncertainty, signed=metric.better == "-", unresolved=unresolved
     )

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
-from studies.metrics.cells import DOUBT_MARK
+from studies.metrics.cells import UNRESOLVED_MARK
 from studies.metrics.metrics import Metric, Run
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, readable, remark, styled
 
@@ -118,16 +118,18 @@ def remarks(runs: Sequence[Run]) -> list[str]:
     return [*missing, *ended]
 
 
-def doubts(runs: Sequence[Run], metrics: Sequence[Metric]) -> list[str]:
+def unresolved_notes(runs: Sequence[Run], metrics: Sequence[Metric]) -> list[str]:
     """A note for each scene whose reference is not ten times better than every error it judges, and in what."""
     notes = []
     for name, group in by_scene(runs).items():
-        weak = [metric for metric in metrics if any(metric.doubtful(run) for run in group)]
+        weak = [metric for metric in metrics if any(metric.unresolved(run) for run in group)]
         if weak:
-            worst = max(_share(metric, run) for metric in weak for run in group if metric.doubtful(run))
+            worst = max(_share(metric, run) for metric in weak for run in group if metric.unresolved(run))
             what = ", ".join(readable(metric.name) for metric in weak)
             percent = f"up to {100 * worst:.0f} % of" if worst < 1 else "as large as"
-            notes.append(f"{DOUBT_MARK} {heading(name)}: the reference's uncertainty is {percent} some {what} drawn.")
+            notes.append(
+                f"{UNRESOLVED_MARK} {heading(name)}: the reference's uncertainty is {percent} some {what} drawn."
+            )
     return notes
 
 
@@ -136,9 +138,9 @@ def _share(metric: Metric, run: Run) -> float:
     return metric.uncertainty(run) / error if error else np.inf
 
 
-def doubt_mark(group: Sequence[Run], metrics: Sequence[Metric]) -> str:
-    """Behind the name of a scene that `doubts` has a note on."""
-    return f" {DOUBT_MARK}" if any(metric.doubtful(run) for metric in metrics for run in group) else ""
+def unresolved_mark(group: Sequence[Run], metrics: Sequence[Metric]) -> str:
+    """Behind the name of a scene that `unresolved_notes` has a note on."""
+    return f" {UNRESOLVED_MARK}" if any(metric.unresolved(run) for metric in metrics for run in group) else ""
 
 
 def has_frames(run: Run) -> bool:

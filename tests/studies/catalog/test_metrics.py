@@ -7,7 +7,7 @@ import pytest
 
 from studies.catalog import STUDIES
 from studies.metrics.metrics import METRICS, Metric
-from studies.metrics.table import DOUBTFUL, metric, study_table
+from studies.metrics.table import UNRESOLVED, metric, study_table
 from studies.scene.quantities import ALWAYS, GAUGE_FREE
 from studies.scenes import JUDGED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
@@ -91,15 +91,15 @@ def test_doubtful_is_what_the_reference_knows_less_than_ten_times_better():
     """The floor of the force error is 1 %, of the last force 2 %: 10 and 20 % are just good enough."""
     force = metric("force_error")
     assert force.uncertainty(run()) == pytest.approx(1.0, rel=1e-12)
-    assert not force.doubtful(run(force=(9.0, 1.11, 9.0, 2.22)))
-    assert force.doubtful(run(force=(9.0, 0.91, 9.0, 1.82)))
-    assert metric("force_end").doubtful(run(force=(9.0, 9.0, 9.0, 1.62)))
-    assert not metric("force_end").doubtful(run(force=(9.0, 9.0, 9.0, 1.58)))
+    assert not force.unresolved(run(force=(9.0, 1.11, 9.0, 2.22)))
+    assert force.unresolved(run(force=(9.0, 0.91, 9.0, 1.82)))
+    assert metric("force_end").unresolved(run(force=(9.0, 9.0, 9.0, 1.62)))
+    assert not metric("force_end").unresolved(run(force=(9.0, 9.0, 9.0, 1.58)))
     # A volume has a truth of its own, and without a reference there is nothing to doubt.
-    assert not metric("volume_worst").doubtful(run())
-    assert not force.doubtful(run(reference=None))
+    assert not metric("volume_worst").unresolved(run())
+    assert not force.unresolved(run(reference=None))
     table = study_table([run(force=(9.0, 0.91, 9.0, 1.82)), run(reference=None)], ["force_error", "min_j"])
-    assert table[DOUBTFUL].tolist() == ["force_error", ""]
+    assert table[UNRESOLVED].tolist() == ["force_error", ""]
 
 
 def test_a_floor_stands_behind_its_metric_whichever_run_has_it():

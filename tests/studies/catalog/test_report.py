@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from studies.catalog import Chart
-from studies.report.results import DOUBT_MARK, draw_charts, refresh, report, summary_of
+from studies.report.results import UNRESOLVED_MARK, draw_charts, refresh, report, summary_of
 from studies.runs.current import case_path
 from studies.store.csv_table import write_table
 from studies.store.machine import machine_id
@@ -81,11 +81,11 @@ def test_summary_shows_numbers_or_a_dash(finished_sweep):
 
 def test_summary_marks_what_the_reference_does_not_know_well_enough(finished_sweep, monkeypatch):
     runs, _ = load_runs(finished_sweep, tiny_study())
-    assert DOUBT_MARK not in summary_of({"volume_loss": runs})
+    assert UNRESOLVED_MARK not in summary_of({"volume_loss": runs})
     uncertainty = dict.fromkeys(("force_end", "silhouette", "force", "volume", "surface_mean"), 0.02)
     truth = SimpleNamespace(total_uncertainty=uncertainty, force=np.array([1.0]), displacement=lambda x: 0 * x)
     text = summary_of({"volume_loss": [replace(runs[0], reference=truth)]})
-    assert f"± 2 {DOUBT_MARK} |" in text.replace("2.0", "2")
+    assert f"± 2 {UNRESOLVED_MARK} |" in text.replace("2.0", "2")
     assert text.endswith("the reference is not ten times better than this error")
 
 
