@@ -18,13 +18,13 @@ class Reference(Solution):
 
     coarser: tuple[Solution, ...] = ()
     """The other meshes of the family, fine to coarse."""
-    variants: tuple[Solution, ...] = ()
+    sensitivity_runs: tuple[Solution, ...] = ()
     """The coarsest mesh with one setting made better each."""
 
     @cached_property
     def uncertainty(self) -> dict[str, Uncertainty]:
         """Of each quantity, share by share."""
-        return uncertainties(self, self.coarser, self.variants)
+        return uncertainties(self, self.coarser, self.sensitivity_runs)
 
     @cached_property
     def total_uncertainty(self) -> dict[str, float]:
@@ -33,7 +33,7 @@ class Reference(Solution):
 
 
 def load_reference(root: Path, scene: Scene) -> Reference | None:
-    """The finest stored solution with its family and variants behind it; None for a scene without a plan.
+    """The finest stored solution with its family and sensitivity runs behind it; None for a scene without a plan.
 
     Raises StudyError when one is missing, or did not converge.
     """

@@ -92,10 +92,10 @@ def reference_solves(scene: Scene) -> list[ReferenceSolve]:
     if scene.reference is None:
         return []
     family = [ReferenceSolve(scene, level) for level in scene.reference.levels]
-    return [*family, *(replace(family[0], variant=name) for name in variants(scene))]
+    return [*family, *(replace(family[0], variant=name) for name in sensitivity_runs(scene))]
 
 
-def variants(scene: Scene) -> list[str]:
+def sensitivity_runs(scene: Scene) -> list[str]:
     """The settings that matter in a scene: nothing touches, nothing sinks in."""
     assert scene.reference is not None
     return [name for name in scene.reference.variants if name != "contact" or scene.obstacles]

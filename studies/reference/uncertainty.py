@@ -179,9 +179,9 @@ QUANTITIES: dict[str, Measure] = {name: m for name, (m, _) in (NUMBERS | FIELDS)
 
 
 def uncertainties(
-    finest: "Solution", coarser: Sequence["Solution"], variants: Sequence["Solution"]
+    finest: "Solution", coarser: Sequence["Solution"], sensitivity_runs: Sequence["Solution"]
 ) -> dict[str, Uncertainty]:
-    """Uncertainty of every quantity of `finest` from the next coarser meshes (fine to coarse) and the variants.
+    """Uncertainty of every quantity of `finest` from the next coarser meshes (fine to coarse) and the sensitivity_runs.
 
     Raises StudyError without a coarser mesh.
     """
@@ -189,7 +189,7 @@ def uncertainties(
         raise StudyError(f"the reference of '{finest.scene.name}' has one mesh only, so no error bar; solve three")
     at = SamplePoints(coarser[-1])
     samples = [Sample(solution, at) for solution in (finest, *coarser)]
-    better = {str(s.record.attributes["variant"]): Sample(s, at) for s in variants}
+    better = {str(s.record.attributes["variant"]): Sample(s, at) for s in sensitivity_runs}
     family = samples[:FAMILY]
     found = {}
     for name, measure in QUANTITIES.items():
