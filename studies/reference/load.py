@@ -56,7 +56,6 @@ def _converged(root: Path, reference_solve: ReferenceSolve) -> Record:
     record = read_record(reference_solve.path(root))
     if record.status != Status.OK:
         what = f" with other {reference_solve.variant}" if reference_solve.variant else ""
-        raise StudyError(
-            f"the reference of '{reference_solve.scene.name}' on mesh {reference_solve.level:g}{what} is {record.status}: {record.message}"
-        )
+        where = f"the reference of '{reference_solve.scene.name}' on mesh {reference_solve.level:g}{what}"
+        raise StudyError(f"{where} is {record.status}: {record.message}")
     return record
