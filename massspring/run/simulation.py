@@ -169,7 +169,7 @@ def _tracks(tracks: list[np.ndarray], steps: int) -> np.ndarray:
     return np.ascontiguousarray(np.array(tracks, dtype=np.float64).reshape(-1, steps, 3).transpose(1, 0, 2))
 
 
-def lost(drive: Drive) -> str | None:
+def check_loads(drive: Drive) -> str | None:
     """Which part of the outside world has no place or no size any more, or None."""
     for what, values in (
         ("obstacle", drive.position),
@@ -182,7 +182,7 @@ def lost(drive: Drive) -> str | None:
     return None
 
 
-def trouble(state: State, body: Body) -> str | None:
+def check_state(state: State, body: Body) -> str | None:
     """Why the run cannot go on, or None: values that are not finite, or nodes that have left."""
     far = float(np.abs(state.x - body.rest).max())
     if not np.isfinite(far):
@@ -192,7 +192,7 @@ def trouble(state: State, body: Body) -> str | None:
     return None if far < ESCAPED * body.size else f"a node has moved {far:.3g} m from rest"
 
 
-def pierced(state: State, obstacles: tuple[Obstacle, ...]) -> str | None:
+def check_probes(state: State, obstacles: tuple[Obstacle, ...]) -> str | None:
     """Which thin probe was driven through tissue that had nowhere to go, or None."""
     if state.probing is None or not state.probing.passed.any():
         return None
@@ -227,16 +227,16 @@ def simulate(
     begun = perf_counter_ns()
     for frame in range(setup.clock.frames):
         drive = setup.drive(frame)
-        reason = lost(drive)
+        reason = check_loads(drive)
         if reason is not None:
             return recorder.stopped(frame, "diverged", reason)
         begin = perf_counter_ns()
         state = advance(state, drive)
         elapsed = perf_counter_ns() - begin
-        reason = trouble(state, setup.body)
+        reason = check_state(state, setup.body)
         if reason is not None:
             return recorder.stopped(frame, "diverged", reason)
-        reason = pierced(state, setup.obstacles)
+        reason = check_probes(state, setup.obstacles)
         if reason is not None:
             return recorder.stopped(frame, "blocked", reason)
         recorder.record(frame, state, elapsed)

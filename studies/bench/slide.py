@@ -10,7 +10,7 @@ from time import perf_counter_ns
 import numpy as np
 
 from massspring import Clock, MassSpringError, Setup
-from massspring.run.simulation import trouble
+from massspring.run.simulation import check_state
 from studies.bench.line import Line
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
@@ -45,7 +45,7 @@ def waited_ns(setup: Setup) -> np.ndarray:
         begin = perf_counter_ns()
         state = setup.method.advance(state, setup.drive(frame))
         times[frame] = perf_counter_ns() - begin
-    reason = trouble(state, setup.body)
+    reason = check_state(state, setup.body)
     if reason is not None:
         raise MassSpringError(f"the slide broke off while it was timed: {reason}; take a smaller dt")
     return times

@@ -15,7 +15,7 @@ from massspring import MassSpringError, Setup, State
 from massspring.kernels.jit.decorators import compiled
 from massspring.kernels.jit.stage_clock import INTEGRATION, OUTSIDE, STAGES, Ticks, mark, new_ticks
 from massspring.run.history import EXTRA, Recorder
-from massspring.run.simulation import trouble
+from massspring.run.simulation import check_state
 from studies.runs.case import Case
 from studies.runs.prepare import prepare
 from studies.timing.protocol import pinned
@@ -59,7 +59,7 @@ def run_frames(setup: Setup, state: State, ticks: Ticks | None = None, frames: i
             # A stage of some nanoseconds may seem to cost less than its mark.
             stage_ns[:OUTSIDE, frame] = np.maximum(ticks.spent[:OUTSIDE] - price * ticks.marks[:OUTSIDE], 0.0)
             stage_ns[OUTSIDE, frame] = frame_ns[frame] - ticks.spent[:OUTSIDE].sum()
-        reason = trouble(state, setup.body)
+        reason = check_state(state, setup.body)
         if reason is not None:
             raise MassSpringError(f"the run broke off while its cost was measured: {reason}; take a smaller dt")
     return frame_ns, stage_ns, state

@@ -19,7 +19,7 @@ from massspring import (
 )
 from massspring.body.inside import is_inside, surface_distance
 from massspring.kernels.probe.arrays import LEFT_BEHIND
-from massspring.run.simulation import pierced
+from massspring.run.simulation import check_probes
 from tests.massspring.methods.test_methods import clock_for
 from tests.massspring.probe.test_probe import BALL, EDGE, METHODS, R, frames_of
 
@@ -92,7 +92,7 @@ def check_crossing(setup, share):
     probe, dt = setup.probes[0], setup.clock.dt
     x, tip, state = BALL.rest, probe.anchor, setup.start()
     for t, state in frames_of(setup):
-        if pierced(state, setup.obstacles) is not None:
+        if check_probes(state, setup.obstacles) is not None:
             return state, tip, probe.anchor + probe.path(t), x
         now = probe.anchor + probe.path(t)
         assert np.isfinite(state.x).all()

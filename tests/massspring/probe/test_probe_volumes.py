@@ -7,7 +7,7 @@ import pytest
 
 from massspring import Attachment, ImplicitVolume, Probe, Setup, Trajectory, Volumes, simulate
 from massspring.kernels.probe.arrays import CARRYING, IN_CONTACT, LEFT_BEHIND
-from massspring.run.simulation import pierced
+from massspring.run.simulation import check_probes
 from tests.massspring.methods.test_methods import clock_for
 
 EDGE = 0.02
@@ -116,7 +116,7 @@ def test_what_is_carried_takes_no_volume(parted_body):
     state = setup.start()
     for frame in range(clock.frames):
         state = METHOD.advance(state, setup.drive(frame))
-        assert pierced(state, setup.obstacles) is None
+        assert check_probes(state, setup.obstacles) is None
     assert state.probing.counts[LEFT_BEHIND] == 0 and state.probing.counts[IN_CONTACT] + state.probing.counts[CARRYING]
     rest = parted_body.kept.measure(parted_body.rest)
     assert np.abs(parted_body.kept.measure(state.x) / rest - 1).max() < 1e-2
