@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import Contacts, Drive, Network, Nodes, Tally, Workspace
+from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Network, Nodes, Tally, Workspace
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.jit.stage_clock import Ticks
 from massspring.kernels.jit.thread_team import Team
@@ -48,9 +48,9 @@ class State:
         """Velocities [m/s], (n, 3)."""
         return self.nodes.v if self.place is None else self.nodes.v[self.place]
 
-    def frame(self, drive: Drive) -> Frame:
+    def frame(self, boundary: BoundaryConditions) -> Frame:
         """What a frame loop is given."""
-        return Frame(self.network, self.nodes, self.contacts, self.work, drive, self.tally, self.probing, self.team)
+        return Frame(self.network, self.nodes, self.contacts, self.work, boundary, self.tally, self.probing, self.team)
 
     def moved_to(self, x: np.ndarray) -> "State":
         """The same at positions `x` (n, 3) [m]."""

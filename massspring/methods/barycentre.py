@@ -18,7 +18,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.allocate import start
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
@@ -57,6 +57,6 @@ class Barycentre(Method):
         """With the cells at rest."""
         return start(body, attachments, v, cells_of(body))
 
-    def advance(self, state: State, drive: Drive) -> State:
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        return push_cells(state, drive, self.bulk_modulus, True)
+        return push_cells(state, boundary, self.bulk_modulus, True)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from massspring.errors import MassSpringError
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
 from massspring.methods.families.one_volume import Rule, advance_by
@@ -44,6 +44,6 @@ class Baumgarte(Method):
         """Whether a wrong volume dies away: (beta dt)² + 4 alpha dt < 4 and 2 alpha dt < 2 (eq. 10.6)."""
         return self.beta**2 + 4.0 * self.alpha < 4.0 and 2.0 * self.alpha < 2.0
 
-    def advance(self, state: State, drive: Drive) -> State:
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        return advance_by(Rule(self.beta * self.beta, 2.0 * self.alpha, True), state, drive)
+        return advance_by(Rule(self.beta * self.beta, 2.0 * self.alpha, True), state, boundary)

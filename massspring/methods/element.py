@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Accuracy, Drive, Push
+from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions, Push
 from massspring.kernels.constraint.tetrahedra import any_idle, cell_forces_into, cell_rows_into, solve_cells
 from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
 from massspring.kernels.jit.decorators import lean
@@ -36,11 +36,11 @@ from massspring.world.obstacles import Attachment
 @lean
 def hard_frame(frame, cells, compliance, accuracy):
     """One frame, all cells and contact inside the solve (eq. 3.1–3.8, 10.13); the mean pressure [Pa]."""
-    nodes, contacts, drive, tally = frame.nodes, frame.contacts, frame.drive, frame.tally
+    nodes, contacts, boundary, tally = frame.nodes, frame.contacts, frame.boundary, frame.tally
     push = Push(cells.push, 1.0)
     open_frame(frame)
-    for step in range(drive.position.shape[0]):
-        fill(cells, drive, step)
+    for step in range(boundary.position.shape[0]):
+        fill(cells, boundary, step)
         begin_step(frame, step, False)
         cell_rows_into(nodes.x, cells, cells.right)
         cell_forces_into(cells, cells.pressure, cells.push)
@@ -48,7 +48,7 @@ def hard_frame(frame, cells, compliance, accuracy):
         passes = search_contacts(frame, step, push)
         for sweep in range(passes):
             cell_rows_into(nodes.x, cells, cells.right)
-            count = solve_cells(nodes, contacts, frame.network.inverse_mass, cells, drive.dt, compliance, accuracy)
+            count = solve_cells(nodes, contacts, frame.network.inverse_mass, cells, boundary.dt, compliance, accuracy)
             count_iterations(tally, count)
             cell_forces_into(cells, cells.pressure, cells.push)
             if multiplier_stands(frame, step, push, np.inf, sweep + 1 == passes):
@@ -96,11 +96,11 @@ class Element(Method):
         """With the cells at rest."""
         return start(body, attachments, v, cells_of(body))
 
-    def advance(self, state: State, drive: Drive) -> State:
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
         if not self.hard:
-            return push_cells(state, drive, self.bulk_modulus, False)
-        after, cells = begin_frame(state, drive), own_cells(state)
+            return push_cells(state, boundary, self.bulk_modulus, False)
+        after, cells = begin_frame(state, boundary), own_cells(state)
         accuracy = Accuracy(self.tolerance, self.most_iterations)
-        lam = hard_frame(after.frame(drive), cells, 1.0 / self.bulk_modulus, accuracy)
+        lam = hard_frame(after.frame(boundary), cells, 1.0 / self.bulk_modulus, accuracy)
         return replace(after, lam=np.array([lam]), memory=cells)

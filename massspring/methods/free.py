@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.kernels.arrays.layout import Drive, Push
+from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
@@ -17,7 +17,7 @@ def free_frame(frame):
     """One frame of symplectic Euler with contact (eq. 3.1, 3.2, 3.5, 3.7)."""
     nothing = Push(frame.nodes.gradient, 0.0)
     open_frame(frame)
-    for step in range(frame.drive.position.shape[0]):
+    for step in range(frame.boundary.position.shape[0]):
         begin_step(frame, step, False)
         search_contacts(frame, step, nothing)
         end_step(frame, step, nothing, 0.0, None)
@@ -32,8 +32,8 @@ class Free(Method):
     volume_tol: ClassVar[float | None] = None
     capabilities: ClassVar[Capabilities] = Capabilities("none", thin_probes=True, threads=True, float32=True)
 
-    def advance(self, state: State, drive: Drive) -> State:
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        with crewed_frame(state, drive) as after:
-            free_frame(after.frame(drive))
+        with crewed_frame(state, boundary) as after:
+            free_frame(after.frame(boundary))
         return after

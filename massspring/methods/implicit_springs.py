@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Accuracy, Drive
+from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions
 from massspring.kernels.jit.stage_clock import OUTSIDE, mark
 from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
@@ -59,15 +59,15 @@ class ImplicitSprings(Method):
         rows = volume_rows(body.kept, body.node_count) if state.rows is None else state.rows
         return replace(state, rows=rows, memory=Factors())
 
-    def advance(self, state: State, drive: Drive) -> State:
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        after = begin_frame(state, drive)
+        after = begin_frame(state, boundary)
         assert after.rows is not None  # start() made them
         after.rows.lam[:] = after.lam + after.network.rest_lam
-        factor = after.memory.at(after.network, drive.dt, drive.damping)
+        factor = after.memory.at(after.network, boundary.dt, boundary.damping)
         if after.tally.ticks is not None:
             mark(after.tally.ticks, OUTSIDE)
         accuracy = Accuracy(self.tolerance, self.most_iterations)
-        for step in range(len(drive.position)):
-            Step(after, drive, step, factor, accuracy).take(self.passes)
+        for step in range(len(boundary.position)):
+            Step(after, boundary, step, factor, accuracy).take(self.passes)
         return replace(after, lam=after.rows.lam - after.network.rest_lam)

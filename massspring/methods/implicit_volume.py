@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Accuracy, Drive, Push
+from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions, Push
 from massspring.kernels.constraint.jacobian import (
     diagonal_into,
     padded_rows_times_into,
@@ -52,17 +52,17 @@ from massspring.world.obstacles import Attachment
 @lean
 def implicit_volume_frame(frame, lam):
     """One frame of HCJ05 with contact inside the multiplier (eq. 3.1–3.8); returns the last lam [Pa]."""
-    network, nodes, drive, tally = frame.network, frame.nodes, frame.drive, frame.tally
-    gradient, dt = nodes.gradient, drive.dt
+    network, nodes, boundary, tally = frame.network, frame.nodes, frame.boundary, frame.tally
+    gradient, dt = nodes.gradient, boundary.dt
     open_frame(frame)
-    for step in range(drive.position.shape[0]):
+    for step in range(boundary.position.shape[0]):
         volume, flow, mobility = begin_summed_step(frame, step)
-        error = drive.volume_target[step, 0] - volume
+        error = boundary.volume_target[step, 0] - volume
         predicted, left = lam, 0.0
         passes = search_contacts(frame, step, Push(gradient, predicted))
         for sweep in range(passes):
             lam, left, capped = limited_multiplier(
-                network, frame.nodes, frame.contacts, error, drive.dt, flow, mobility
+                network, frame.nodes, frame.contacts, error, boundary.dt, flow, mobility
             )
             tally.capped[0] += capped and sweep == 0
             reach = pressure_reach(lam - predicted, left, network.largest_inverse_mass, dt)
@@ -134,17 +134,17 @@ def solve_multipliers(network, rows, contacts, tally, accuracy):
 @lean
 def implicit_volumes_frame(frame, rows, accuracy):
     """One frame of HCJ05 with several volumes (eq. 3.1–3.8, 8.2–8.5); `rows.lam` [Pa] comes in and goes out."""
-    network, nodes, contacts, drive, tally = frame.network, frame.nodes, frame.contacts, frame.drive, frame.tally
+    network, nodes, contacts, boundary, tally = frame.network, frame.nodes, frame.contacts, frame.boundary, frame.tally
     push, capped, idle = Push(rows.push, 1.0), False, False
     open_frame(frame)
-    for step in range(drive.position.shape[0]):
+    for step in range(boundary.position.shape[0]):
         begin_step(frame, step, False)
         rows_into(nodes.x, network.inverse_mass, rows)
         transposed_rows_times_into(rows, rows.lam, rows.push)
         mark(tally.ticks, VOLUME)
-        target, passes = drive.volume_target[step], search_contacts(frame, step, push)
+        target, passes = boundary.volume_target[step], search_contacts(frame, step, push)
         for sweep in range(passes):
-            capped, idle = set_right_side(network, rows, nodes, contacts, target, drive.dt, accuracy.tolerance)
+            capped, idle = set_right_side(network, rows, nodes, contacts, target, boundary.dt, accuracy.tolerance)
             solve_multipliers(network, rows, contacts, tally, accuracy)
             if multiplier_stands(frame, step, push, math.inf, sweep + 1 == passes):
                 break
@@ -177,13 +177,13 @@ class ImplicitVolume(Method):
         clusters = clusters_at_rest(rows, state.nodes.x, state.network.inverse_mass)
         return replace(state, rows=rows._replace(clusters=clusters))
 
-    def advance(self, state: State, drive: Drive) -> State:
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        with crewed_frame(state, drive) as after:
+        with crewed_frame(state, boundary) as after:
             if after.rows is None:
-                lam = implicit_volume_frame(after.frame(drive), float(after.lam[0]))
+                lam = implicit_volume_frame(after.frame(boundary), float(after.lam[0]))
                 return replace(after, lam=np.array([lam]))
             after.rows.lam[:] = after.lam + after.network.rest_lam
             accuracy = Accuracy(self.tolerance, self.most_iterations)
-            implicit_volumes_frame(after.frame(drive), after.rows, accuracy)
+            implicit_volumes_frame(after.frame(boundary), after.rows, accuracy)
             return replace(after, lam=after.rows.lam - after.network.rest_lam)

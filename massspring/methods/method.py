@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.allocate import start
 from massspring.layout.probe_arrays import fresh
 from massspring.layout.state import State, new_tally
@@ -44,24 +44,24 @@ class Method(Protocol):
         """The body at rest, or with velocities `v` (n, 3) [m/s]. Raises MassSpringError."""
         return start(body, attachments, v)
 
-    def advance(self, state: State, drive: Drive) -> State:
-        """One frame: as many steps as `drive.position` has rows."""
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
+        """One frame: as many steps as `boundary.position` has rows."""
         ...
 
 
-def begin_frame(state: State, drive: Drive) -> State:
+def begin_frame(state: State, boundary: BoundaryConditions) -> State:
     """A copy to advance in place, so that the caller's state stays what it was."""
     nodes = state.nodes._replace(x=state.nodes.x.copy(), v=state.nodes.v.copy())
-    obstacles = len(drive.radius) + drive.tips.end.shape[1]
-    tally = new_tally(obstacles, drive.held_displacement.shape[1], state.tally.ticks)
+    obstacles = len(boundary.radius) + boundary.tips.end.shape[1]
+    tally = new_tally(obstacles, boundary.held_displacement.shape[1], state.tally.ticks)
     probing = None if state.probing is None else fresh(state.probing, tally)
     return replace(state, nodes=nodes, tally=tally, probing=probing)
 
 
 @contextmanager
-def crewed_frame(state: State, drive: Drive) -> Iterator[State]:
+def crewed_frame(state: State, boundary: BoundaryConditions) -> Iterator[State]:
     """A copy to advance in place; inside, all threads of the state are there."""
-    after = begin_frame(state, drive)
+    after = begin_frame(state, boundary)
     direction = after.nodes.gradient if after.rows is None else after.rows.push
-    with crew(after.frame(drive), direction):
+    with crew(after.frame(boundary), direction):
         yield after

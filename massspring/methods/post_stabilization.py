@@ -10,7 +10,7 @@ and no exact spin. A target that moves is followed by the positions alone.
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.families.one_volume import Rule, advance_by
@@ -31,6 +31,6 @@ class PostStabilization(Method):
         thin_probes=No("it moves nodes once more after the step, where no probe is looked for"),
     )
 
-    def advance(self, state: State, drive: Drive) -> State:
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        return advance_by(Rule(pull=0.0, stabilised=True), state, drive)
+        return advance_by(Rule(pull=0.0, stabilised=True), state, boundary)

@@ -11,7 +11,7 @@ without damping the body gains energy at the rate of eq. 10.4, and spin where it
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
 from massspring.methods.families.one_volume import Rule, advance_by
@@ -28,6 +28,6 @@ class Projection(Method):
     conserves_angular_momentum: ClassVar[bool] = False
     capabilities: ClassVar[Capabilities] = Capabilities("whole", "full", thin_probes=True)
 
-    def advance(self, state: State, drive: Drive) -> State:
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        return advance_by(Rule(exact=True, at_prediction=True), state, drive)
+        return advance_by(Rule(exact=True, at_prediction=True), state, boundary)

@@ -13,7 +13,7 @@ from typing import ClassVar
 from scipy.sparse import csr_array
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
 from massspring.methods.families.known_pressure import PYRAMIDS, check_modulus, push, volume_stiffness
@@ -39,6 +39,6 @@ class Pyramid(Method):
         """(K/V0) G Gᵀ, of rank one."""
         return volume_stiffness(body, self.bulk_modulus)
 
-    def advance(self, state: State, drive: Drive) -> State:
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        return push(state, drive, self.bulk_modulus, PYRAMIDS)
+        return push(state, boundary, self.bulk_modulus, PYRAMIDS)

@@ -8,7 +8,7 @@ one Newton step of it.
 from dataclasses import dataclass
 from typing import ClassVar
 
-from massspring.kernels.arrays.layout import Drive
+from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
 from massspring.methods.families.one_volume import Rule, advance_by
@@ -24,6 +24,6 @@ class Shake(Method):
     volume_tol: ClassVar[float | None] = 1e-12
     capabilities: ClassVar[Capabilities] = Capabilities("whole", "full", thin_probes=True)
 
-    def advance(self, state: State, drive: Drive) -> State:
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        return advance_by(Rule(exact=True), state, drive)
+        return advance_by(Rule(exact=True), state, boundary)

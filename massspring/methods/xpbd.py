@@ -22,7 +22,7 @@ import numpy as np
 
 from massspring.body.body import Body
 from massspring.errors import MassSpringError
-from massspring.kernels.arrays.layout import Drive, Push
+from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.constraint.tetrahedra import relax_cells, relax_sum, relax_whole
 from massspring.kernels.contact.constrained_motion import unpushed_into
 from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
@@ -40,18 +40,18 @@ from massspring.world.obstacles import Attachment
 @lean
 def xpbd_frame(frame, cells, compliance, iterations, whole):
     """One frame (eq. 3.1–3.8, 10.14); returns the last pressure, of cells their mean [Pa]."""
-    nodes, contacts, drive, tally = frame.nodes, frame.contacts, frame.drive, frame.tally
+    nodes, contacts, boundary, tally = frame.nodes, frame.contacts, frame.boundary, frame.tally
     lam, idle, push = 0.0, False, Push(cells.push, 1.0)
     open_frame(frame)
-    for step in range(drive.position.shape[0]):
-        fill(cells, drive, step)
+    for step in range(boundary.position.shape[0]):
+        fill(cells, boundary, step)
         begin_step(frame, step, False)
         passes = search_contacts(frame, step, push)
         for sweep in range(passes):
-            unpushed_into(nodes, contacts, drive.dt, cells.y)
+            unpushed_into(nodes, contacts, boundary.dt, cells.y)
             cells.push[:] = 0.0
             cells.pressure[:] = 0.0
-            lam, idle = mend(frame, cells, drive.volume_target[step, 0], compliance, iterations, whole)
+            lam, idle = mend(frame, cells, boundary.volume_target[step, 0], compliance, iterations, whole)
             if multiplier_stands(frame, step, push, np.inf, sweep + 1 == passes):
                 break
         tally.skipped[0] += idle
@@ -65,7 +65,7 @@ def xpbd_frame(frame, cells, compliance, iterations, whole):
 def mend(frame, cells, target, compliance, iterations, whole):
     """So many sweeps over the volumes (eq. 10.14, 10.15); the pressure of the whole [Pa], and whether a wrong volume
     had nothing to push on in the last of them."""
-    network, contacts, scale = frame.network, frame.contacts, frame.drive.dt * frame.drive.dt
+    network, contacts, scale = frame.network, frame.contacts, frame.boundary.dt * frame.boundary.dt
     lam, idle = 0.0, False
     for _ in range(iterations):
         if whole:
@@ -112,11 +112,11 @@ class Xpbd(Method):
         """With the cells at rest."""
         return start(body, attachments, v, cells_of(body))
 
-    def advance(self, state: State, drive: Drive) -> State:
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        after, cells = begin_frame(state, drive), own_cells(state)
+        after, cells = begin_frame(state, boundary), own_cells(state)
         # The last forces tell where contact will be; the old state keeps its own.
         cells = cells._replace(push=cells.push.copy())
         whole = self.volumes == "whole"
-        lam = xpbd_frame(after.frame(drive), cells, self.compliance, self.iterations, whole)
+        lam = xpbd_frame(after.frame(boundary), cells, self.compliance, self.iterations, whole)
         return replace(after, lam=np.array([lam]), memory=cells)

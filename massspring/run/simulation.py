@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Drive, Tips
+from massspring.kernels.arrays.layout import BoundaryConditions, Tips
 from massspring.layout.probe_arrays import new_probing
 from massspring.layout.state import State
 from massspring.layout.threads import shared
@@ -140,12 +140,12 @@ class Setup:
             "rough": any(o.friction != 0 for o in solids),
         }
 
-    def drive(self, frame: int) -> Drive:
+    def boundary(self, frame: int) -> BoundaryConditions:
         """The outside world during frame number `frame` (0, 1, …): positions at the end of each of its steps."""
         dt = self.clock.dt
         t = frame * self.clock.frame + dt * np.arange(1, self.clock.steps + 1)
         solids, probes = self.solids, self.probes
-        return Drive(
+        return BoundaryConditions(
             **self._unmoved,
             position=_tracks([o.anchor + o.path(t) for o in solids], len(t)),
             velocity=_tracks([(o.path(t) - o.path(t - dt)) / dt for o in solids], len(t)),
@@ -169,12 +169,12 @@ def _tracks(tracks: list[np.ndarray], steps: int) -> np.ndarray:
     return np.ascontiguousarray(np.array(tracks, dtype=np.float64).reshape(-1, steps, 3).transpose(1, 0, 2))
 
 
-def check_loads(drive: Drive) -> str | None:
+def check_loads(boundary: BoundaryConditions) -> str | None:
     """Which part of the outside world has no place or no size any more, or None."""
     for what, values in (
-        ("obstacle", drive.position),
-        ("attachment", drive.held_displacement),
-        ("target of kept volume", drive.volume_target[:, :, None]),
+        ("obstacle", boundary.position),
+        ("attachment", boundary.held_displacement),
+        ("target of kept volume", boundary.volume_target[:, :, None]),
     ):
         bad = np.flatnonzero(~np.isfinite(values).all(axis=(0, 2)))
         if len(bad):
@@ -226,12 +226,12 @@ def simulate(
     advance = setup.method.advance
     begun = perf_counter_ns()
     for frame in range(setup.clock.frames):
-        drive = setup.drive(frame)
-        reason = check_loads(drive)
+        boundary = setup.boundary(frame)
+        reason = check_loads(boundary)
         if reason is not None:
             return recorder.stopped(frame, "diverged", reason)
         begin = perf_counter_ns()
-        state = advance(state, drive)
+        state = advance(state, boundary)
         elapsed = perf_counter_ns() - begin
         reason = check_state(state, setup.body)
         if reason is not None:

@@ -130,11 +130,11 @@ def plain_run(setup: Setup) -> tuple[np.ndarray, np.ndarray]:
     plain = Plain(*body, x, state.nodes.v, np.zeros_like(x), np.zeros_like(x))
     times = np.zeros(setup.clock.frames)
     for frame in range(setup.clock.frames):
-        drive = setup.drive(frame)
-        targets, points, normals = drive.volume_target[:, 0].copy(), drive.position, drive.plane_normal
-        fall = real(drive.dt) * drive.gravity.astype(real)
+        boundary = setup.boundary(frame)
+        targets, points, normals = boundary.volume_target[:, 0].copy(), boundary.position, boundary.plane_normal
+        fall = real(boundary.dt) * boundary.gravity.astype(real)
         begin = perf_counter_ns()
-        plain_frame(plain, targets, points.astype(real), normals.astype(real), drive.dt, drive.damping, fall)
+        plain_frame(plain, targets, points.astype(real), normals.astype(real), boundary.dt, boundary.damping, fall)
         times[frame] = perf_counter_ns() - begin
     return times, x if state.place is None else x[state.place]
 

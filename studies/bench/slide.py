@@ -43,7 +43,7 @@ def waited_ns(setup: Setup) -> np.ndarray:
     state, times = setup.start(), np.zeros(setup.clock.frames)
     for frame in range(setup.clock.frames):
         begin = perf_counter_ns()
-        state = setup.method.advance(state, setup.drive(frame))
+        state = setup.method.advance(state, setup.boundary(frame))
         times[frame] = perf_counter_ns() - begin
     reason = check_state(state, setup.body)
     if reason is not None:

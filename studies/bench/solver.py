@@ -97,11 +97,11 @@ def without_ns(setup: Setup, method: Method) -> np.ndarray:
     """
     state, times = setup.start(), np.zeros((2, setup.clock.frames))
     for frame in range(setup.clock.frames):
-        drive, before = setup.drive(frame), state
+        boundary, before = setup.boundary(frame), state
         for which in (0, 1) if frame % 2 else (1, 0):
             advance = (setup.method, method)[which].advance
             begin = perf_counter_ns()
-            after = advance(before, drive)
+            after = advance(before, boundary)
             times[which, frame] = perf_counter_ns() - begin
             if which == 0:
                 state = after

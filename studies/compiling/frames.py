@@ -78,7 +78,7 @@ def advance(variant: Variant) -> None:
     else:
         state = shared(state, 2)  # asked for by name, whatever the number of cores
     for frame in range(FRAMES):
-        state = setup.method.advance(state, setup.drive(frame))
+        state = setup.method.advance(state, setup.boundary(frame))
 
 
 def setup_of(variant: Variant) -> Setup:

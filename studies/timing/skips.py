@@ -73,7 +73,7 @@ SKIPS: tuple[Skip, ...] = (
     Skip("contact of nodes: no plane, sphere or capsule", lambda s: not s.solids, _with_far),
     Skip("thin probe: none", lambda s: not s.probes and bool(s.method.capabilities.thin_probes), _with_probe),
     Skip("gravity: none in this scene", lambda s: not any(s.gravity), _with_gravity),
-    Skip("friction: no obstacle has any", lambda s: bool(s.solids) and not s.drive(0).rough, _with_friction),
+    Skip("friction: no obstacle has any", lambda s: bool(s.solids) and not s.boundary(0).rough, _with_friction),
     Skip("linear solve: one volume is a division", _is_division, _with_rows),
     Skip("pairs of tips and triangles out of reach", lambda s: bool(s.probes), _awake, _pairs),
 )

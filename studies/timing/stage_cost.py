@@ -49,11 +49,11 @@ def run_frames(setup: Setup, state: State, ticks: Ticks | None = None, frames: i
     frame_ns, stage_ns = np.zeros(frames), np.zeros((len(ROWS), frames))
     price = mark_ns() if ticks is not None else 0.0
     for frame in range(frames):
-        drive = setup.drive(frame)
+        boundary = setup.boundary(frame)
         if ticks is not None:
             ticks.spent[:], ticks.marks[:] = 0, 0
         begin = perf_counter_ns()
-        state = setup.method.advance(state, drive)
+        state = setup.method.advance(state, boundary)
         frame_ns[frame] = perf_counter_ns() - begin
         if ticks is not None:
             # A stage of some nanoseconds may seem to cost less than its mark.
@@ -152,11 +152,11 @@ def _per_frame(setup: Setup) -> dict[str, float]:
     clock = setup.clock
     recorded = (setup.body, clock, setup.obstacles, len(setup.attachments), frozenset[int]())
     bare, full = Recorder(*recorded, ()), Recorder(*recorded, EXTRA)
-    state = setup.method.advance(setup.start(), setup.drive(0))
+    state = setup.method.advance(setup.start(), setup.boundary(0))
     times = np.zeros((3, clock.frames))
     for frame in range(clock.frames):
         records = [partial(recorder.record, frame, state, 0) for recorder in (bare, full)]
-        for row, work in enumerate([partial(setup.drive, frame), *records]):
+        for row, work in enumerate([partial(setup.boundary, frame), *records]):
             begin = perf_counter_ns()
             work()
             times[row, frame] = perf_counter_ns() - begin

@@ -121,7 +121,7 @@ class Tips(NamedTuple):
     """At the end of each step [m], (q, p, 3)."""
 
 
-class Drive(NamedTuple):
+class BoundaryConditions(NamedTuple):
     """One frame's outside world, q steps, o obstacles, g attachments."""
 
     dt: float

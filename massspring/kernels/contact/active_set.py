@@ -18,28 +18,28 @@ CONTACT_PASSES = 3
 
 
 @lean
-def seat(network, nodes, contacts, drive, step, push, count):
+def seat(network, nodes, contacts, boundary, step, push, count):
     """Puts the first `count` nodes of `contacts.entering` on the obstacle each would enter deepest (eq. 3.7).
 
     `goal` n a, a = n·(target − x)/dt, ends the step on the obstacle. A round one pushes along n = (x − c)/|x − c| of
     the position now, not of the prediction: that would do work on a node that slides, and pump its oscillations up.
     """
-    dt = drive.dt
+    dt = boundary.dt
     for k in range(count):
         i = contacts.entering[k]
-        u0, u1, u2 = pushed_velocity(network, nodes, drive, push, i)
+        u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
         deepest = 0.0
-        for o in range(drive.radius.shape[0]):
-            s0 = nodes.x[i, 0] - drive.position[step, o, 0]
-            s1 = nodes.x[i, 1] - drive.position[step, o, 1]
-            s2 = nodes.x[i, 2] - drive.position[step, o, 2]
+        for o in range(boundary.radius.shape[0]):
+            s0 = nodes.x[i, 0] - boundary.position[step, o, 0]
+            s1 = nodes.x[i, 1] - boundary.position[step, o, 1]
+            s2 = nodes.x[i, 2] - boundary.position[step, o, 2]
             r0, r1, r2 = s0 + dt * u0, s1 + dt * u1, s2 + dt * u2
-            depth, n0, n1, n2 = gap_and_normal(drive, o, r0, r1, r2)
+            depth, n0, n1, n2 = gap_and_normal(boundary, o, r0, r1, r2)
             if depth < deepest:
                 deepest, lift = depth, -depth
-                if not drive.is_plane[o]:
-                    axis = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
-                    n0, n1, n2, lift = round_contact((s0, s1, s2), (r0, r1, r2), axis, drive.radius[o])
+                if not boundary.is_plane[o]:
+                    axis = boundary.span[o, 0], boundary.span[o, 1], boundary.span[o, 2]
+                    n0, n1, n2, lift = round_contact((s0, s1, s2), (r0, r1, r2), axis, boundary.radius[o])
                 a = n0 * u0 + n1 * u1 + n2 * u2 + lift / dt
                 contacts.touched[i], contacts.mode[i] = o + 1, SLIDES
                 contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2] = n0, n1, n2
@@ -83,26 +83,26 @@ def forget_released(contacts):
 
 
 @inlined
-def clear_all(network, nodes, contacts, drive, step, push, team):
+def clear_all(network, nodes, contacts, boundary, step, push, team):
     """`clearances_into` of all nodes, by as many threads as there are."""
     if team is None:
-        clearances_into(network, nodes, contacts, drive, step, push, (0, nodes.x.shape[0]))
+        clearances_into(network, nodes, contacts, boundary, step, push, (0, nodes.x.shape[0]))
     else:
         call(team, JOB_SEARCH, step, push.factor)
-        clearances_into(network, nodes, contacts, drive, step, push, (team.nodes[0], team.nodes[1]))
+        clearances_into(network, nodes, contacts, boundary, step, push, (team.nodes[0], team.nodes[1]))
         join(team)
 
 
 @inlined
-def find_contacts(network, nodes, contacts, drive, step, push, team):
+def find_contacts(network, nodes, contacts, boundary, step, push, team):
     """Touched nodes of the step when the push of the last one acts on them: u = v* + dt W f (eq. 3.7)."""
     let_go(contacts)
-    clear_all(network, nodes, contacts, drive, step, push, team)
-    enter(network, nodes, contacts, drive, step, push)
+    clear_all(network, nodes, contacts, boundary, step, push, team)
+    enter(network, nodes, contacts, boundary, step, push)
 
 
 @inlined
-def enter(network, nodes, contacts, drive, step, push):
+def enter(network, nodes, contacts, boundary, step, push):
     """Seats the nodes whose clearance is negative (eq. 3.7)."""
     touchable, clearance, entering = network.touchable, contacts.clearance, contacts.entering
     count = 0
@@ -114,16 +114,16 @@ def enter(network, nodes, contacts, drive, step, push):
                 entering[count] = i
                 count += 1
     if count > 0:
-        seat(network, nodes, contacts, drive, step, push, count)
+        seat(network, nodes, contacts, boundary, step, push, count)
         admit(contacts, count)
-    if drive.rough:
-        rub(network, nodes, contacts, drive, step, push)
-    if drive.radius.shape[0] > 1:
-        wedge(network, nodes, contacts, drive, step, push)
+    if boundary.rough:
+        rub(network, nodes, contacts, boundary, step, push)
+    if boundary.radius.shape[0] > 1:
+        wedge(network, nodes, contacts, boundary, step, push)
 
 
 @inlined
-def release_pulled(network, nodes, contacts, drive, push):
+def release_pulled(network, nodes, contacts, boundary, push):
     """Releases nodes that their one obstacle would pull (eq. 3.8); how many."""
     changes = 0
     for k in range(contacts.touching_count[0]):
@@ -131,7 +131,7 @@ def release_pulled(network, nodes, contacts, drive, push):
         if contacts.mode[i] == FREE or contacts.mode[i] == ON_EDGE:
             continue
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(network, nodes, drive, push, i)
+        u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
         if contacts.goal[i, 0] * n0 + contacts.goal[i, 1] * n1 + contacts.goal[i, 2] * n2 < u0 * n0 + u1 * n1 + u2 * n2:
             # A released node is looked at again in the next pass, whatever the pressure becomes.
             contacts.touched[i], contacts.mode[i], contacts.clearance[i] = 0, FREE, 0.0
@@ -140,20 +140,20 @@ def release_pulled(network, nodes, contacts, drive, push):
 
 
 @inlined
-def enters(network, nodes, drive, step, push, i):
+def enters(network, nodes, boundary, step, push, i):
     """Whether the free node i would end the step in an obstacle (eq. 3.7)."""
-    dt = drive.dt
-    u0, u1, u2 = pushed_velocity(network, nodes, drive, push, i)
+    dt = boundary.dt
+    u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
     y0, y1, y2 = nodes.x[i, 0] + dt * u0, nodes.x[i, 1] + dt * u1, nodes.x[i, 2] + dt * u2
-    for o in range(drive.radius.shape[0]):
-        p0, p1, p2 = drive.position[step, o, 0], drive.position[step, o, 1], drive.position[step, o, 2]
-        if gap_and_normal(drive, o, y0 - p0, y1 - p1, y2 - p2)[0] < 0.0:
+    for o in range(boundary.radius.shape[0]):
+        p0, p1, p2 = boundary.position[step, o, 0], boundary.position[step, o, 1], boundary.position[step, o, 2]
+        if gap_and_normal(boundary, o, y0 - p0, y1 - p1, y2 - p2)[0] < 0.0:
             return True
     return False
 
 
 @inlined
-def revise_contacts(network, nodes, contacts, drive, step, push, reach):
+def revise_contacts(network, nodes, contacts, boundary, step, push, reach):
     """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 3.8).
 
     `reach` [m] is how far the new pressure can have moved a node from where `clearance` was measured: distances to
@@ -161,11 +161,11 @@ def revise_contacts(network, nodes, contacts, drive, step, push, reach):
     """
     touchable, clearance, entering = network.touchable, contacts.clearance, contacts.entering
     count, changes = 0, 0
-    if drive.rough:
-        changes += release_slipping(network, nodes, contacts, drive, push)
-    if drive.radius.shape[0] > 1:
-        changes += release_wedged(network, nodes, contacts, drive, push) + wedge(
-            network, nodes, contacts, drive, step, push
+    if boundary.rough:
+        changes += release_slipping(network, nodes, contacts, boundary, push)
+    if boundary.radius.shape[0] > 1:
+        changes += release_wedged(network, nodes, contacts, boundary, push) + wedge(
+            network, nodes, contacts, boundary, step, push
         )
     for begin in range(0, clearance.shape[0], BLOCK):
         if not any_within(clearance, begin, reach):
@@ -173,14 +173,14 @@ def revise_contacts(network, nodes, contacts, drive, step, push, reach):
         for i in range(begin, min(begin + BLOCK, clearance.shape[0])):
             if clearance[i] > reach or contacts.mode[i] > FREE or touchable[i] == 0:
                 continue
-            if enters(network, nodes, drive, step, push, i):
+            if enters(network, nodes, boundary, step, push, i):
                 entering[count] = i
                 count += 1
-    changes += release_pulled(network, nodes, contacts, drive, push)
+    changes += release_pulled(network, nodes, contacts, boundary, push)
     if changes > 0:
         forget_released(contacts)
     if count > 0:
-        seat(network, nodes, contacts, drive, step, push, count)
+        seat(network, nodes, contacts, boundary, step, push, count)
         admit(contacts, count)
     return changes + count
 

@@ -14,18 +14,18 @@ PARALLEL = 1e-4
 
 
 @lean
-def rub(network, nodes, contacts, drive, step, push):
+def rub(network, nodes, contacts, boundary, step, push):
     """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 9.1)."""
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]
-        if contacts.mode[i] != SLIDES or not drive.friction[contacts.touched[i] - 1] > 0.0:
+        if contacts.mode[i] != SLIDES or not boundary.friction[contacts.touched[i] - 1] > 0.0:
             continue
         o = contacts.touched[i] - 1
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(network, nodes, drive, push, i)
+        u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
         g0, g1, g2 = contacts.goal[i, 0], contacts.goal[i, 1], contacts.goal[i, 2]
-        pressed = drive.friction[o] * ((g0 - u0) * n0 + (g1 - u1) * n1 + (g2 - u2) * n2)
-        w0, w1, w2 = drive.velocity[step, o, 0], drive.velocity[step, o, 1], drive.velocity[step, o, 2]
+        pressed = boundary.friction[o] * ((g0 - u0) * n0 + (g1 - u1) * n1 + (g2 - u2) * n2)
+        w0, w1, w2 = boundary.velocity[step, o, 0], boundary.velocity[step, o, 1], boundary.velocity[step, o, 2]
         s0, s1, s2 = allowed_part(SLIDES, n0, n1, n2, u0 - w0, u1 - w1, u2 - w2)
         slip = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
         if slip <= pressed:
@@ -42,21 +42,21 @@ def rub(network, nodes, contacts, drive, step, push):
 
 
 @lean
-def release_slipping(network, nodes, contacts, drive, push):
+def release_slipping(network, nodes, contacts, boundary, push):
     """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 9.1)."""
     changes = 0
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]
         if contacts.mode[i] != STICKS:
             continue
-        w, direction = drive.dt * push.factor * network.inverse_mass[i], push.direction
+        w, direction = boundary.dt * push.factor * network.inverse_mass[i], push.direction
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
         k0 = contacts.goal[i, 0] - nodes.v_star[i, 0] - w * direction[i, 0]
         k1 = contacts.goal[i, 1] - nodes.v_star[i, 1] - w * direction[i, 1]
         k2 = contacts.goal[i, 2] - nodes.v_star[i, 2] - w * direction[i, 2]
         along = k0 * n0 + k1 * n1 + k2 * n2
         s0, s1, s2 = allowed_part(SLIDES, n0, n1, n2, k0, k1, k2)
-        needed, most = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2), drive.friction[contacts.touched[i] - 1] * along
+        needed, most = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2), boundary.friction[contacts.touched[i] - 1] * along
         if along > 0.0 and needed > SLIPS * most:
             a = contacts.goal[i, 0] * n0 + contacts.goal[i, 1] * n1 + contacts.goal[i, 2] * n2
             g0, g1, g2 = a * n0 + most / needed * s0, a * n1 + most / needed * s1, a * n2 + most / needed * s2
@@ -67,28 +67,28 @@ def release_slipping(network, nodes, contacts, drive, push):
 
 
 @lean
-def wedge(network, nodes, contacts, drive, step, push):
+def wedge(network, nodes, contacts, boundary, step, push):
     """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 9.2); how many.
 
     Obstacles that face each other have no edge: the deeper one wins, and the other's penetration is recorded.
     """
     changes = 0
-    dt = drive.dt
+    dt = boundary.dt
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]
         if contacts.mode[i] != SLIDES:
             continue
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(network, nodes, drive, push, i)
+        u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
         u0, u1, u2 = allowed_part(SLIDES, n0, n1, n2, u0, u1, u2)
         u0, u1, u2 = u0 + contacts.goal[i, 0], u1 + contacts.goal[i, 1], u2 + contacts.goal[i, 2]
         y0, y1, y2 = nodes.x[i, 0] + dt * u0, nodes.x[i, 1] + dt * u1, nodes.x[i, 2] + dt * u2
         deepest = 0.0
-        for o in range(drive.radius.shape[0]):
+        for o in range(boundary.radius.shape[0]):
             if o + 1 == contacts.touched[i]:
                 continue
-            p0, p1, p2 = drive.position[step, o, 0], drive.position[step, o, 1], drive.position[step, o, 2]
-            gap, m0, m1, m2 = gap_and_normal(drive, o, y0 - p0, y1 - p1, y2 - p2)
+            p0, p1, p2 = boundary.position[step, o, 0], boundary.position[step, o, 1], boundary.position[step, o, 2]
+            gap, m0, m1, m2 = gap_and_normal(boundary, o, y0 - p0, y1 - p1, y2 - p2)
             e0, e1, e2 = n1 * m2 - n2 * m1, n2 * m0 - n0 * m2, n0 * m1 - n1 * m0
             square = e0 * e0 + e1 * e1 + e2 * e2
             if gap < deepest and square > PARALLEL:
@@ -128,14 +128,14 @@ def shares(k, n, m):
 
 
 @lean
-def release_wedged(network, nodes, contacts, drive, push):
+def release_wedged(network, nodes, contacts, boundary, push):
     """Frees nodes in a wedge that one of their obstacles would pull; the next search finds the other (eq. 9.2)."""
     changes = 0
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]
         if contacts.mode[i] != ON_EDGE:
             continue
-        u0, u1, u2 = pushed_velocity(network, nodes, drive, push, i)
+        u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
         # What the edge leaves free is at right angles to both normals and takes no share.
         n = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
         m = contacts.second_normal[i, 0], contacts.second_normal[i, 1], contacts.second_normal[i, 2]

@@ -12,7 +12,7 @@ from massspring.kernels.jit.flat import flat
 
 
 @inlined
-def clearances_into(network, nodes, contacts, drive, step, push, part):
+def clearances_into(network, nodes, contacts, boundary, step, push, part):
     """clearance_i = min over obstacles of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 3.7).
 
     Of the nodes first ≤ i < last in `part`, those that nothing can touch among them.
@@ -21,15 +21,15 @@ def clearances_into(network, nodes, contacts, drive, step, push, part):
     real = nodes.x.dtype.type
     x, v_star = flat(nodes.x, first, last), flat(nodes.v_star, first, last)
     direction, inverse_mass = flat(push.direction, first, last), flat(network.inverse_mass, first, last)
-    course = x, v_star, direction, inverse_mass, real(drive.dt), real(drive.dt * push.factor)
+    course = x, v_star, direction, inverse_mass, real(boundary.dt), real(boundary.dt * push.factor)
     clearance = flat(contacts.clearance, first, last)
     for i in range(clearance.shape[0]):
         clearance[i] = math.inf
-    for o in range(drive.radius.shape[0]):
-        place, span, radius = drive.position[step, o], drive.span[o], real(drive.radius[o])
+    for o in range(boundary.radius.shape[0]):
+        place, span, radius = boundary.position[step, o], boundary.span[o], real(boundary.radius[o])
         p0, p1, p2 = real(place[0]), real(place[1]), real(place[2])
-        if drive.is_plane[o]:
-            normal = drive.plane_normal[o]
+        if boundary.is_plane[o]:
+            normal = boundary.plane_normal[o]
             plane_clearance(course, clearance, p0, p1, p2, real(normal[0]), real(normal[1]), real(normal[2]))
         elif span[0] == 0.0 and span[1] == 0.0 and span[2] == 0.0:
             sphere_clearance(course, clearance, p0, p1, p2, radius)
@@ -73,9 +73,9 @@ def capsule_clearance(course, clearance, p0, p1, p2, a0, a1, a2, radius):
 
 
 @inlined
-def pushed_velocity(network, nodes, drive, push, i):
+def pushed_velocity(network, nodes, boundary, push, i):
     """u = v* + dt W f of node i when what keeps volumes acts as a force f [m/s] (eq. 3.7)."""
-    w, direction = drive.dt * push.factor * network.inverse_mass[i], push.direction
+    w, direction = boundary.dt * push.factor * network.inverse_mass[i], push.direction
     u0 = nodes.v_star[i, 0] + w * direction[i, 0]
     u1 = nodes.v_star[i, 1] + w * direction[i, 1]
     u2 = nodes.v_star[i, 2] + w * direction[i, 2]
@@ -83,16 +83,16 @@ def pushed_velocity(network, nodes, drive, push, i):
 
 
 @inlined
-def gap_and_normal(drive, o, r0, r1, r2):
+def gap_and_normal(boundary, o, r0, r1, r2):
     """Distance [m] of r to obstacle o, negative inside, and its normal there; r is seen from the obstacle's position.
 
     On the axis of a round one the normal is not a number.
     """
-    if drive.is_plane[o]:
-        n0, n1, n2 = drive.plane_normal[o, 0], drive.plane_normal[o, 1], drive.plane_normal[o, 2]
+    if boundary.is_plane[o]:
+        n0, n1, n2 = boundary.plane_normal[o, 0], boundary.plane_normal[o, 1], boundary.plane_normal[o, 2]
         return n0 * r0 + n1 * r1 + n2 * r2, n0, n1, n2
-    a0, a1, a2 = drive.span[o, 0], drive.span[o, 1], drive.span[o, 2]
+    a0, a1, a2 = boundary.span[o, 0], boundary.span[o, 1], boundary.span[o, 2]
     share = axis_share(r0, r1, r2, a0, a1, a2)
     r0, r1, r2 = r0 - share * a0, r1 - share * a1, r2 - share * a2
     distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
-    return distance - drive.radius[o], r0 / distance, r1 / distance, r2 / distance
+    return distance - boundary.radius[o], r0 / distance, r1 / distance, r2 / distance

@@ -6,7 +6,7 @@ from massspring.kernels.jit.decorators import compiled
 
 
 @compiled
-def seat_entering(network, nodes, contacts, drive, step, push):
+def seat_entering(network, nodes, contacts, boundary, step, push):
     """Puts free surface nodes that would enter an obstacle onto it (eq. 3.7) and lists them; how many.
 
     Those that have been released since the last search leave the list.
@@ -17,10 +17,10 @@ def seat_entering(network, nodes, contacts, drive, step, push):
         i = network.surface_nodes[c]
         if network.inverse_mass[i] == 0.0 or contacts.mode[i] > FREE:
             continue
-        if enters(network, nodes, drive, step, push, i):
+        if enters(network, nodes, boundary, step, push, i):
             contacts.entering[count] = i
             count += 1
     if count > 0:
-        seat(network, nodes, contacts, drive, step, push, count)
+        seat(network, nodes, contacts, boundary, step, push, count)
         admit(contacts, count)
     return count

@@ -76,9 +76,9 @@ def add_four(out, nodes, f, p, q, r):
 
 
 @compiled
-def fill(cells, drive, step):
+def fill(cells, boundary, step):
     """The target of the whole in this step, as what every cell should have of its rest volume."""
-    cells.filling[0] = drive.volume_target[step, 0] / cells.rest_whole
+    cells.filling[0] = boundary.volume_target[step, 0] / cells.rest_whole
 
 
 @compiled

@@ -6,10 +6,10 @@ from massspring.kernels.jit.decorators import lean
 
 
 @lean
-def join_pieces(network, nodes, work, drive, keeps):
+def join_pieces(network, nodes, work, boundary, keeps):
     """v* and G of the nodes in pieces, and their shares of G·v* and G·W·G in the last of `sums`."""
     slices = network.slices
-    keep = 1.0 - drive.damping * drive.dt
+    keep = 1.0 - boundary.damping * boundary.dt
     flow, mobility = 0.0, 0.0
     for k in range(slices.split_node.shape[0]):
         i = slices.split_node[k]
@@ -21,7 +21,7 @@ def join_pieces(network, nodes, work, drive, keeps):
                 force += work.pulled[s, FORCE + axis * LANES + lane]
                 area += work.pulled[s, AREA + axis * LANES + lane]
             g = area / 6.0
-            v = keep * nodes.v[i, axis] + drive.dt * (w * force + drive.gravity[axis])
+            v = keep * nodes.v[i, axis] + boundary.dt * (w * force + boundary.gravity[axis])
             nodes.v_star[i, axis] = v
             if w == 0.0:
                 nodes.force[i, axis] = force

@@ -134,14 +134,18 @@ def keep_held(slices, s, force, tile):
 
 
 @inlined
-def pass_slices(nodes, work, drive, slices, part, keeps, tile):
+def pass_slices(nodes, work, boundary, slices, part, keeps, tile):
     """v* and G of the slices first ≤ s < last in `part`, with their shares of 18 V, G·v* and G·W·G in `sums`.
 
     Of pieces f and 6 G alone.
     """
     real = nodes.x.dtype.type
-    dt, keep = real(drive.dt), real(1.0 - drive.damping * drive.dt)
-    a0, a1, a2 = real(drive.dt * drive.gravity[0]), real(drive.dt * drive.gravity[1]), real(drive.dt * drive.gravity[2])
+    dt, keep = real(boundary.dt), real(1.0 - boundary.damping * boundary.dt)
+    a0, a1, a2 = (
+        real(boundary.dt * boundary.gravity[0]),
+        real(boundary.dt * boundary.gravity[1]),
+        real(boundary.dt * boundary.gravity[2]),
+    )
     places, pulled, sums, v_star, gradient = work.places, work.pulled, work.sums, nodes.v_star, nodes.gradient
     shortest = real(SHORTEST)
     o0, o1, o2 = places[slices.origin, 0], places[slices.origin, 1], places[slices.origin, 2]
@@ -161,18 +165,18 @@ def pass_slices(nodes, work, drive, slices, part, keeps, tile):
 
 
 @inlined
-def pass_all(nodes, work, drive, slices, keeps, team):
+def pass_all(nodes, work, boundary, slices, keeps, team):
     """`pass_slices` of all slices, by as many threads as there are."""
     if team is None:
-        pass_slices(nodes, work, drive, slices, (0, slices.lanes.shape[0]), keeps, work.tile[0])
+        pass_slices(nodes, work, boundary, slices, (0, slices.lanes.shape[0]), keeps, work.tile[0])
     else:
         call(team, JOB_SPRINGS_AND_VOLUME if keeps else JOB_SPRINGS, 0, 0.0)
-        pass_slices(nodes, work, drive, slices, (team.slices[0], team.slices[1]), keeps, work.tile[0])
+        pass_slices(nodes, work, boundary, slices, (team.slices[0], team.slices[1]), keeps, work.tile[0])
         join(team)
 
 
 @inlined
-def predict_from_places(network, nodes, work, drive, keeps, team):
+def predict_from_places(network, nodes, work, boundary, keeps, team):
     """v* of eq. 3.1 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
 
     `places` holds the positions. Of the forces only those of held nodes are written out.
@@ -181,19 +185,19 @@ def predict_from_places(network, nodes, work, drive, keeps, team):
     walls = network.membrane.triangles.shape[0] > 0
     if walls:
         nodes.force[:] = 0
-    pass_all(nodes, work, drive, slices, keeps, team)
-    join_pieces(network, nodes, work, drive, keeps)
+    pass_all(nodes, work, boundary, slices, keeps, team)
+    join_pieces(network, nodes, work, boundary, keeps)
     volume, flow, mobility = add_up(work.sums, slices.pieces)
     if walls:
-        flow += add_walls(network, nodes, drive.dt)
+        flow += add_walls(network, nodes, boundary.dt)
     return volume, flow, mobility
 
 
 @lean
-def gather_and_predict(network, nodes, work, drive, keeps):
+def gather_and_predict(network, nodes, work, boundary, keeps):
     """The same from `x`; leaves the positions in `places`, where `advance` looks for them."""
     places_into(nodes, work, 0, nodes.x.shape[0])
-    return predict_from_places(network, nodes, work, drive, keeps, None)
+    return predict_from_places(network, nodes, work, boundary, keeps, None)
 
 
 @inlined

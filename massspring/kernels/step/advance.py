@@ -40,7 +40,7 @@ def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
 @inlined
 def advance(frame, push):
     """The end of a step of all nodes (eq. 3.5); books the impulse of each obstacle, pads the new positions."""
-    network, nodes, contacts, dt = frame.network, frame.nodes, frame.contacts, frame.drive.dt
+    network, nodes, contacts, dt = frame.network, frame.nodes, frame.contacts, frame.boundary.dt
     book_contacts(network, nodes, contacts, push, dt, frame.tally.contact_impulse)
     move_all(frame, push, frame.team)
 
@@ -62,5 +62,5 @@ def move(frame, push, first, last):
     nodes, work, weights = frame.nodes, frame.work, frame.network.inverse_mass
     for begin in range(first, last, NEAR):
         end = min(begin + NEAR, last)
-        advance_nodes(nodes, frame.contacts, work, weights, push, frame.drive.dt, (begin, end))
+        advance_nodes(nodes, frame.contacts, work, weights, push, frame.boundary.dt, (begin, end))
         places_into(nodes, work, begin, end)

@@ -21,12 +21,12 @@ def begin_step(frame, step, keeps):
 
     Returns V [m³] and G·W·G [m⁴/kg].
     """
-    network, nodes, drive = frame.network, frame.nodes, frame.drive
-    volume, _, mobility = predict_from_places(network, nodes, frame.work, drive, keeps, frame.team)
+    network, nodes, boundary = frame.network, frame.nodes, frame.boundary
+    volume, _, mobility = predict_from_places(network, nodes, frame.work, boundary, keeps, frame.team)
     mark(frame.tally.ticks, SPRINGS)
-    held = drive.held_displacement[step]
+    held = boundary.held_displacement[step]
     prescribe_velocity_into(
-        nodes.x, network.held_nodes, network.held_group, network.held_rest, held, drive.dt, nodes.v_star
+        nodes.x, network.held_nodes, network.held_group, network.held_rest, held, boundary.dt, nodes.v_star
     )
     mark(frame.tally.ticks, HELD)
     return volume, mobility
@@ -35,10 +35,10 @@ def begin_step(frame, step, keeps):
 @inlined
 def begin_summed_step(frame, step):
     """The same with G and with G·v* [m³/s] of all nodes, so that no other pass sums it: (V, G·v*, G·W·G)."""
-    network, nodes, drive = frame.network, frame.nodes, frame.drive
-    volume, flow, mobility = predict_from_places(network, nodes, frame.work, drive, True, frame.team)
+    network, nodes, boundary = frame.network, frame.nodes, frame.boundary
+    volume, flow, mobility = predict_from_places(network, nodes, frame.work, boundary, True, frame.team)
     mark(frame.tally.ticks, SPRINGS)
-    flow += prescribe(network, nodes, drive.held_displacement[step], drive.dt)
+    flow += prescribe(network, nodes, boundary.held_displacement[step], boundary.dt)
     mark(frame.tally.ticks, HELD)
     return volume, flow, mobility
 
@@ -46,9 +46,9 @@ def begin_summed_step(frame, step):
 @inlined
 def search_contacts(frame, step, push):
     """Finds the nodes that touch while the last known push acts (eq. 3.7); how many passes the active set may take."""
-    if frame.drive.radius.shape[0] == 0:
+    if frame.boundary.radius.shape[0] == 0:
         return 1
-    find_contacts(frame.network, frame.nodes, frame.contacts, frame.drive, step, push, frame.team)
+    find_contacts(frame.network, frame.nodes, frame.contacts, frame.boundary, step, push, frame.team)
     mark(frame.tally.ticks, SEARCH)
     return CONTACT_PASSES
 
@@ -62,7 +62,7 @@ def multiplier_stands(frame, step, push, reach, last):
     mark(frame.tally.ticks, MULTIPLIER)
     if last:
         return True
-    changes = revise_contacts(frame.network, frame.nodes, frame.contacts, frame.drive, step, push, reach)
+    changes = revise_contacts(frame.network, frame.nodes, frame.contacts, frame.boundary, step, push, reach)
     mark(frame.tally.ticks, REVISION)
     return changes == 0
 

@@ -18,8 +18,8 @@ def end_step(frame, step, push, mobility, volumes):
     """
     factor = probed(frame, step, push, mobility, volumes, frame.probing)
     push = Push(push.direction, factor)
-    network, nodes, drive, tally = frame.network, frame.nodes, frame.drive, frame.tally
-    add_held_impulse(network, nodes, push, drive.dt, drive.gravity, tally.held_impulse)
+    network, nodes, boundary, tally = frame.network, frame.nodes, frame.boundary, frame.tally
+    add_held_impulse(network, nodes, push, boundary.dt, boundary.gravity, tally.held_impulse)
     mark(tally.ticks, HELD)
     advance(frame, push)
     mark(tally.ticks, INTEGRATION)
@@ -31,8 +31,10 @@ def probed(frame, step, push, mobility, volumes, probing):
     """The stage of thin probes where there are any; the factor of the push beside it."""
     if probing is None:
         return push.factor
-    drive = frame.drive
-    stage = Stage(frame.network, frame.nodes, frame.contacts, drive.tips, probing, volumes, mobility, step, drive.dt)
+    boundary = frame.boundary
+    stage = Stage(
+        frame.network, frame.nodes, frame.contacts, boundary.tips, probing, volumes, mobility, step, boundary.dt
+    )
     factor = meet_probes(stage, volumes, push)
     mark(frame.tally.ticks, PROBES)
     return factor

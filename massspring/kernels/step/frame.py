@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from massspring.kernels.arrays.layout import Contacts, Drive, Network, Nodes, Tally, Workspace
+from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Network, Nodes, Tally, Workspace
 from massspring.kernels.jit.thread_team import Team
 from massspring.kernels.probe.arrays import Probing
 
@@ -14,7 +14,7 @@ class Frame(NamedTuple):
     nodes: Nodes
     contacts: Contacts
     work: Workspace
-    drive: Drive
+    boundary: BoundaryConditions
     tally: Tally
     probing: Probing | None = None
     """Thin probes; None where there are none: the loop is then compiled without their stage."""

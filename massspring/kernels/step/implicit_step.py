@@ -6,15 +6,15 @@ from massspring.kernels.jit.decorators import compiled
 
 
 @compiled
-def imbalance_into(network, nodes, rows, p, drive, out):
+def imbalance_into(network, nodes, rows, p, boundary, out):
     """dt M v + dt² (f(p) + Jᵀ lam + m g) − (1 + c dt) M (p − x) [kg m], (n, 3) (eq. 12.2); J, V at p go to `rows`."""
-    dt = drive.dt
+    dt = boundary.dt
     spring_forces_into(p, network.ends, network.rest_length, network.stiffness, nodes.force)
     rows_into(p, network.inverse_mass, rows)
     transposed_rows_times_into(rows, rows.lam, out)
     for i in range(p.shape[0]):
         m = network.mass[i]
         for axis in range(3):
-            known = dt * dt * (nodes.force[i, axis] + out[i, axis] + m * drive.gravity[axis])
-            moved = (1.0 + drive.damping * dt) * (p[i, axis] - nodes.x[i, axis])
+            known = dt * dt * (nodes.force[i, axis] + out[i, axis] + m * boundary.gravity[axis])
+            moved = (1.0 + boundary.damping * dt) * (p[i, axis] - nodes.x[i, axis])
             out[i, axis] = m * (dt * nodes.v[i, axis] - moved) + known

@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 
 from massspring.body.body import Body
 from massspring.errors import MassSpringError
-from massspring.kernels.arrays.layout import Drive, Push
+from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.forces.volume import pyramid_volume, volume_gradient_into
 from massspring.kernels.jit.decorators import compiled, lean
 from massspring.kernels.jit.stage_clock import VOLUME, mark
@@ -38,12 +38,12 @@ def known_pressure(network, nodes, bulk_modulus, law, volume, target):
 @lean
 def pressure_frame(frame, bulk_modulus, law):
     """One frame of symplectic Euler with a known pressure (eq. 3.1, 3.2, 3.5, 3.7, 10.8); returns the last one [Pa]."""
-    network, nodes, drive, tally = frame.network, frame.nodes, frame.drive, frame.tally
+    network, nodes, boundary, tally = frame.network, frame.nodes, frame.boundary, frame.tally
     lam = 0.0
     open_frame(frame)
-    for step in range(drive.position.shape[0]):
+    for step in range(boundary.position.shape[0]):
         volume, mobility = begin_step(frame, step, True)
-        lam = known_pressure(network, nodes, bulk_modulus, law, volume, drive.volume_target[step, 0])
+        lam = known_pressure(network, nodes, bulk_modulus, law, volume, boundary.volume_target[step, 0])
         if not mobility > 0.0:
             lam = 0.0
             tally.skipped[0] += 1
@@ -55,10 +55,10 @@ def pressure_frame(frame, bulk_modulus, law):
     return lam
 
 
-def push(state: State, drive: Drive, bulk_modulus: float, law: int) -> State:
+def push(state: State, boundary: BoundaryConditions, bulk_modulus: float, law: int) -> State:
     """One frame by the pressure `law`."""
-    after = begin_frame(state, drive)
-    lam = pressure_frame(after.frame(drive), bulk_modulus, law)
+    after = begin_frame(state, boundary)
+    lam = pressure_frame(after.frame(boundary), bulk_modulus, law)
     return replace(after, lam=np.array([lam]))
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import Drive, Push
+from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.constraint.exact_volume import Line, line_into, nearest_root, volume_cubic
 from massspring.kernels.constraint.one_volume import capped_error, steepest, surely_short, volume_multiplier
 from massspring.kernels.contact.active_set import pressure_reach
@@ -121,11 +121,11 @@ def correct_positions(network, nodes, contacts, target, dt):
 @lean
 def constraint_frame(frame, line, lam, rule):
     """One frame with contact inside the multiplier (eq. 3.1–3.8, 10.1–10.3, 10.5, 10.7); returns the last lam [Pa]."""
-    network, nodes, contacts, drive, tally = frame.network, frame.nodes, frame.contacts, frame.drive, frame.tally
-    dt, mobility = drive.dt, 0.0
+    network, nodes, contacts, boundary, tally = frame.network, frame.nodes, frame.contacts, frame.boundary, frame.tally
+    dt, mobility = boundary.dt, 0.0
     open_frame(frame)
-    for step in range(drive.position.shape[0]):
-        target = drive.volume_target[step, 0]
+    for step in range(boundary.position.shape[0]):
+        target = boundary.volume_target[step, 0]
         volume, _ = begin_step(frame, step, True)
         error = rule.pull * (target - volume)
         kept = inertial_change(network, nodes, rule, dt)
@@ -152,10 +152,10 @@ def constraint_frame(frame, line, lam, rule):
     return lam
 
 
-def advance_by(rule: Rule, state: State, drive: Drive) -> State:
+def advance_by(rule: Rule, state: State, boundary: BoundaryConditions) -> State:
     """One frame by `rule`."""
-    after = begin_frame(state, drive)
+    after = begin_frame(state, boundary)
     line = Line(np.empty_like(after.x), np.empty_like(after.x))
     start = float(after.lam[0])
-    lam = constraint_frame(after.frame(drive), line, start, rule)
+    lam = constraint_frame(after.frame(boundary), line, start, rule)
     return replace(after, lam=np.array([lam]))

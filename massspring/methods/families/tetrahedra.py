@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from massspring.body.body import Body
-from massspring.kernels.arrays.layout import Drive, Push
+from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.forces.tetrahedron_volumes import (
     Cells,
     add_barycentre_forces,
@@ -52,18 +52,18 @@ def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_ar
 @lean
 def cells_frame(frame, cells, bulk_modulus, barycentric):
     """One frame of symplectic Euler with a known pressure in every cell (eq. 3.1, 3.2, 3.5, 3.7, 10.11, 10.12)."""
-    nodes, drive, tally = frame.nodes, frame.drive, frame.tally
+    nodes, boundary, tally = frame.nodes, frame.boundary, frame.tally
     nothing = Push(nodes.gradient, 0.0)
     open_frame(frame)
-    for step in range(drive.position.shape[0]):
-        fill(cells, drive, step)
+    for step in range(boundary.position.shape[0]):
+        fill(cells, boundary, step)
         begin_step(frame, step, False)
         cells.push[:] = 0.0
         if barycentric:
             add_barycentre_forces(nodes.x, cells, bulk_modulus, cells.push)
         else:
             tally.skipped[0] += add_volume_forces(nodes.x, cells, bulk_modulus, cells.push)
-        add_to_prediction(frame.network, nodes, cells.push, drive.dt)
+        add_to_prediction(frame.network, nodes, cells.push, boundary.dt)
         mark(tally.ticks, VOLUME)
         search_contacts(frame, step, nothing)
         end_step(frame, step, nothing, 0.0, None)
@@ -75,9 +75,9 @@ def own_cells(state: State) -> Cells:
     return state.memory._replace(pressure=state.memory.pressure.copy(), filling=state.memory.filling.copy())
 
 
-def push_cells(state: State, drive: Drive, bulk_modulus: float, barycentric: bool) -> State:
+def push_cells(state: State, boundary: BoundaryConditions, bulk_modulus: float, barycentric: bool) -> State:
     """One frame of `cells_frame`."""
-    after = begin_frame(state, drive)
+    after = begin_frame(state, boundary)
     cells = own_cells(state)
-    lam = cells_frame(after.frame(drive), cells, bulk_modulus, barycentric)
+    lam = cells_frame(after.frame(boundary), cells, bulk_modulus, barycentric)
     return replace(after, lam=np.array([lam]), memory=cells)

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from massspring.kernels.arrays.layout import Contacts, Drive, Network, Nodes, Push
+from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Network, Nodes, Push
 from massspring.kernels.contact.active_set import let_go
 from massspring.kernels.contact.friction import wedge
 from massspring.kernels.contact.implicit_contact import seat_entering
@@ -61,9 +61,11 @@ class Touching:
 class Contact:
     """The touched nodes of one step on their way to an active set."""
 
-    def __init__(self, network: Network, nodes: Nodes, contacts: Contacts, drive: Drive, step: int) -> None:
+    def __init__(
+        self, network: Network, nodes: Nodes, contacts: Contacts, boundary: BoundaryConditions, step: int
+    ) -> None:
         self.network, self.nodes, self.contacts = network, nodes, contacts
-        self.drive, self.step = drive, step
+        self.boundary, self.step = boundary, step
         self.rubbed = np.zeros_like(nodes.x)
         """Friction of the nodes that slip, times dt² [kg m], (n, 3)."""
         let_go(contacts)
@@ -80,15 +82,15 @@ class Contact:
         leaving = np.unique(nodes[inward < 0.0])
         contacts.mode[leaving], contacts.touched[leaving] = FREE, 0
         self.rubbed[leaving] = 0.0
-        slipped = self._let_slip(pushes) if self.drive.rough else 0
-        entered = self._seat(leaving, (end - self.nodes.x) / self.drive.dt)
+        slipped = self._let_slip(pushes) if self.boundary.rough else 0
+        entered = self._seat(leaving, (end - self.nodes.x) / self.boundary.dt)
         return bool(len(leaving) or slipped or entered)
 
     def _let_slip(self, pushes: np.ndarray) -> int:
         """Nodes that stick although that asks for more than mu times their normal part slip from now on (eq. 12.4)."""
         contacts = self.contacts
         nodes = np.flatnonzero(contacts.mode == STICKS)
-        friction = self.drive.friction[contacts.touched[nodes].astype(np.int64) - 1]
+        friction = self.boundary.friction[contacts.touched[nodes].astype(np.int64) - 1]
         nodes, friction = nodes[np.isfinite(friction)], friction[np.isfinite(friction)]
         normal, push = contacts.normal[nodes], pushes[nodes]
         pressed = np.einsum("ci,ci->c", normal, push)
@@ -104,17 +106,17 @@ class Contact:
     def rub(self, end: np.ndarray, touching: Touching, impulses: np.ndarray) -> bool:
         """Friction against the slip of the last pass; a node that it would drive sticks: whether one does
         (eq. 12.4)."""
-        contacts, drive = self.contacts, self.drive
-        if not drive.rough:
+        contacts, boundary = self.contacts, self.boundary
+        if not boundary.rough:
             return False
-        slides = (contacts.mode[touching.nodes] == SLIDES) & (drive.friction[touching.obstacle] > 0.0)
+        slides = (contacts.mode[touching.nodes] == SLIDES) & (boundary.friction[touching.obstacle] > 0.0)
         nodes, obstacle = touching.nodes[slides], touching.obstacle[slides]
-        normal, carried = contacts.normal[nodes], drive.velocity[self.step][obstacle]
-        slip = _aside((end[nodes] - self.nodes.x[nodes]) / drive.dt - carried, normal)
+        normal, carried = contacts.normal[nodes], boundary.velocity[self.step][obstacle]
+        slip = _aside((end[nodes] - self.nodes.x[nodes]) / boundary.dt - carried, normal)
         speed = np.linalg.norm(slip, axis=1)
-        still = speed * drive.dt <= SLIP_RESOLUTION * self.network.longest_correction
+        still = speed * boundary.dt <= SLIP_RESOLUTION * self.network.longest_correction
         driven = still | (np.einsum("ci,ci->c", slip, self.rubbed[nodes]) > 0.0)
-        most = drive.friction[obstacle] * np.maximum(impulses[slides], 0.0)
+        most = boundary.friction[obstacle] * np.maximum(impulses[slides], 0.0)
         self.rubbed[nodes[~driven]] = -(most[~driven] / speed[~driven])[:, None] * slip[~driven]
         self._stick(nodes[driven], carried[driven])
         return bool(driven.any())
@@ -128,21 +130,21 @@ class Contact:
 
     def _seat(self, leaving: np.ndarray, velocity: np.ndarray) -> int:
         """Seats nodes that `velocity` carries into an obstacle, but for those just let go; how many."""
-        contacts, drive = self.contacts, self.drive
-        if not len(drive.radius):
+        contacts, boundary = self.contacts, self.boundary
+        if not len(boundary.radius):
             return 0
         self.nodes.v_star[:] = velocity
         contacts.mode[leaving] = HIDDEN
         unpushed = Push(self.nodes.gradient, 0.0)
-        count = seat_entering(self.network, self.nodes, contacts, drive, self.step, unpushed)
+        count = seat_entering(self.network, self.nodes, contacts, boundary, self.step, unpushed)
         contacts.mode[leaving] = FREE
-        if drive.rough:
+        if boundary.rough:
             new = contacts.entering[:count].astype(np.int64)
             obstacle = contacts.touched[new].astype(np.int64) - 1
-            rough = drive.friction[obstacle] > 0.0
-            self._stick(new[rough], drive.velocity[self.step][obstacle[rough]])
-        if len(drive.radius) > 1:
-            count += wedge(self.network, self.nodes, contacts, drive, self.step, unpushed)
+            rough = boundary.friction[obstacle] > 0.0
+            self._stick(new[rough], boundary.velocity[self.step][obstacle[rough]])
+        if len(boundary.radius) > 1:
+            count += wedge(self.network, self.nodes, contacts, boundary, self.step, unpushed)
             self.rubbed[contacts.mode == ON_EDGE] = 0.0
         return count
 

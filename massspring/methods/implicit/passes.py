@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import Accuracy, Drive, Push
+from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions, Push
 from massspring.kernels.constraint.jacobian import rows_into, rows_times_into, transposed_rows_times_into
 from massspring.kernels.forces.springs import spring_forces_into
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, REVISION, SEARCH, SPRINGS, VOLUME, mark
@@ -30,23 +30,25 @@ pass sees what it leaves."""
 class Step:
     """One step in the making; arrays of the state are its scratch."""
 
-    def __init__(self, state: State, drive: Drive, step: int, factor: Factor, accuracy: Accuracy) -> None:
+    def __init__(
+        self, state: State, boundary: BoundaryConditions, step: int, factor: Factor, accuracy: Accuracy
+    ) -> None:
         assert state.rows is not None  # start() made them
-        self.drive, self.step, self.factor, self.accuracy = drive, step, factor, accuracy
+        self.boundary, self.step, self.factor, self.accuracy = boundary, step, factor, accuracy
         self.network, self.nodes, self.contacts = state.network, state.nodes, state.contacts
         self.rows, self.tally = state.rows, state.tally
         # Without gravity: passes that start from balance must stay there, or a sum of few would be biased.
-        self.p = self.nodes.x + drive.dt * self.nodes.v
+        self.p = self.nodes.x + boundary.dt * self.nodes.v
         held = self.network.held_nodes
-        self.p[held] = self.network.held_rest + drive.held_displacement[step][self.network.held_group]
+        self.p[held] = self.network.held_rest + boundary.held_displacement[step][self.network.held_group]
         self.few = len(self.rows.lam) <= DENSE_UP_TO
-        self.target = drive.volume_target[step]
+        self.target = boundary.volume_target[step]
         """What the volumes are to be at the end of the step [m³], (m,); nearer to what they are where that is far."""
         self.far_off = False
         """Whether a volume is so far off that only a part of it is made up for."""
         self.idle = False
         """Whether a volume has had nothing to push on."""
-        self.contact = Contact(self.network, self.nodes, self.contacts, drive, step)
+        self.contact = Contact(self.network, self.nodes, self.contacts, boundary, step)
         self.answers: np.ndarray | None = None
 
     def times(self, field: np.ndarray) -> np.ndarray:
@@ -71,7 +73,7 @@ class Step:
         rows_into(self.nodes.x, self.network.inverse_mass, self.rows)
         begun = self.rows.volume.copy()
         touching, impulses = self.touch(), np.zeros(0)
-        obstacles = len(self.drive.radius) > 0
+        obstacles = len(self.boundary.radius) > 0
         if obstacles:
             self.mark(SEARCH)
         for number in range(passes):
@@ -105,13 +107,13 @@ class Step:
         self.tally.skipped[0] += self.idle
         self.book(touching, impulses)
         self.mark(HELD)
-        self.nodes.v[:] = (self.p - self.nodes.x) / self.drive.dt
+        self.nodes.v[:] = (self.p - self.nodes.x) / self.boundary.dt
         self.nodes.x[:] = self.p
         self.mark(INTEGRATION)
 
     def touch(self) -> Touching:
         """The touched nodes of the moment, and how volumes answer their pressures past them."""
-        touching = Touching(self.factor, self.nodes, self.contacts, self.network.surface_nodes, self.drive.dt)
+        touching = Touching(self.factor, self.nodes, self.contacts, self.network.surface_nodes, self.boundary.dt)
         if self.answers is not None:
             self.reach(touching)
             self.answer()
@@ -144,12 +146,12 @@ class Step:
     def imbalance(self) -> np.ndarray:
         """J, V at p, and the right-hand side for the pressures of the moment [kg m], (n, 3) (eq. 12.2)."""
         out = np.empty_like(self.p)
-        imbalance_into(self.network, self.nodes, self.rows, self.p, self.drive, out)
+        imbalance_into(self.network, self.nodes, self.rows, self.p, self.boundary, out)
         return out
 
     def solve(self, free: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
         """(δ [m], contact impulses γ [kg m]) that end the pass at V0 and on the obstacles; `rows.search` is Δlam."""
-        if self.drive.rough:
+        if self.boundary.rough:
             free = free + self.factor.respond(self.contact.rubbed)
         missing = touching.place - touching.along(self.p + free)
         change = free + touching.moved_by(touching.impulses(missing)) if len(missing) else free
@@ -161,7 +163,7 @@ class Step:
     def directly(self, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(Δlam, dt² A⁻¹ Jᵀ Δlam) of few volumes by a dense solve (eq. 12.3)."""
         assert self.answers is not None
-        able = np.diag(self.schur) > NEGLIGIBLE_RESPONSE * self.drive.dt**2 * self.factor.alone(self.rows)[0]
+        able = np.diag(self.schur) > NEGLIGIBLE_RESPONSE * self.boundary.dt**2 * self.factor.alone(self.rows)[0]
         pressure = np.zeros(len(error))
         if able.any():
             inner = self.schur[np.ix_(able, able)]
@@ -176,22 +178,22 @@ class Step:
         Once a step, with J where the passes start: what Jᵀ turns by after that, the next pass makes up for.
         """
         units = np.eye(len(self.rows.lam))
-        return self.drive.dt**2 * np.stack([self.factor.respond(self.pushed(unit)) for unit in units])
+        return self.boundary.dt**2 * np.stack([self.factor.respond(self.pushed(unit)) for unit in units])
 
     def iteratively(self, error: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
         """(Δlam, dt² A⁻¹ Jᵀ Δlam) of many volumes by conjugate gradients, one back-solve an iteration (eq. 8.4)."""
-        diagonal = self.drive.dt**2 * self.factor.alone(self.rows)[0]
+        diagonal = self.boundary.dt**2 * self.factor.alone(self.rows)[0]
         able = diagonal > 0.0
         self.idle |= not able.all()
         diagonal = np.where(able, diagonal, np.inf)
-        allowed = np.where(able, self.accuracy.tolerance * self.drive.volume_target[self.step], np.inf)
+        allowed = np.where(able, self.accuracy.tolerance * self.boundary.volume_target[self.step], np.inf)
         pressure, answer, residual = np.zeros_like(error), np.zeros_like(self.p), error.copy()
         search, before, count = np.zeros_like(error), math.inf, 0
         while (np.abs(residual) > allowed).any() and count < self.accuracy.most_iterations:
             scaled = residual / diagonal
             rho = float(residual @ scaled)
             search = scaled + (rho / before if count else 0.0) * search
-            response = self.drive.dt**2 * self.factor.respond(self.pushed(search))
+            response = self.boundary.dt**2 * self.factor.respond(self.pushed(search))
             image = self.times(touching.without(response))
             step = rho / float(search @ image)
             pressure, answer, residual = pressure + step * search, answer + step * response, residual - step * image
@@ -202,12 +204,12 @@ class Step:
 
     def book(self, touching: Touching, impulses: np.ndarray) -> None:
         """Impulses of obstacles and attachments [N s] (eq. 3.6)."""
-        nodes, contacts, net, dt = self.nodes, self.contacts, self.network, self.drive.dt
+        nodes, contacts, net, dt = self.nodes, self.contacts, self.network, self.boundary.dt
         given = self.tally.contact_impulse
         np.add.at(given, touching.obstacle, impulses[:, None] / dt * touching.direction)
-        if self.drive.rough:
+        if self.boundary.rough:
             rubbed = np.flatnonzero(self.contact.rubbed.any(axis=1))
             np.add.at(given, contacts.touched[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
         spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, nodes.force)
         push = Push(self.pushed(self.rows.lam), 1.0)
-        add_held_impulse(net, nodes, push, dt, self.drive.gravity, self.tally.held_impulse)
+        add_held_impulse(net, nodes, push, dt, self.boundary.gravity, self.tally.held_impulse)

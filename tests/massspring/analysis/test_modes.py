@@ -47,7 +47,7 @@ def test_a_mode_swings_at_its_frequency(kept_body):
     setup = Setup(kept_body, ImplicitVolume(), Clock(dt, 1, 1), velocity=1e-4 * shape / np.abs(shape).max())
     state, speed = setup.start(), []
     for _ in range(int(0.5 * np.pi / (swing * dt)) + 10):
-        state = setup.method.advance(state, setup.drive(0))
+        state = setup.method.advance(state, setup.boundary(0))
         speed.append(float(kept_body.mass @ (state.v * shape).sum(axis=1)))
     after = int(np.argmax(np.array(speed) < 0))
     crossed = dt * (after + speed[after - 1] / (speed[after - 1] - speed[after]))

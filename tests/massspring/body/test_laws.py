@@ -119,7 +119,7 @@ def test_in_free_flight_it_keeps_momentum_spin_and_volumes(taut):
     dt = 0.5 * step_limit(taut).undamped
     setup = Setup(taut, ImplicitVolume(), Clock(40 * dt, 1, 40), velocity=thrown(taut))
     before = setup.start()
-    after = setup.method.advance(before, setup.drive(0))
+    after = setup.method.advance(before, setup.boundary(0))
     mass = taut.mass[:, None]
     scale = np.abs(mass * before.v).sum()
     assert np.abs((mass * (after.v - before.v)).sum(axis=0)).max() < 1e-12 * scale
@@ -141,7 +141,7 @@ def test_squeezed_it_presses_and_comes_back(taut):
     state.nodes.x[:] = pressed.final
     free = Setup(taut, ImplicitVolume(), clock, damping=60.0)
     for frame in range(clock.frames):
-        state = free.method.advance(state, free.drive(frame))
+        state = free.method.advance(state, free.boundary(frame))
     i, j = taut.springs.ends.T
     there, here = (np.linalg.norm(p[j] - p[i], axis=1) for p in (state.x, taut.rest))
     assert np.abs(there / here - 1).max() < 1e-6  # damping at 60/s leaves less after eleven seconds

@@ -159,7 +159,7 @@ def test_every_loop_feels_them(balloon, method):
         setup = Setup(body, method, Clock(dt, 1, 1))
         state = setup.start()
         state.nodes.x[:] = shaken(balloon.rest)
-        ends.append(method.advance(state, setup.drive(0)))
+        ends.append(method.advance(state, setup.boundary(0)))
     felt = balloon.mass[:, None] * (ends[0].v - ends[1].v)
     wall = dt * force(shaken(balloon.rest), balloon.membrane)
     if isinstance(method, Free):
@@ -173,7 +173,7 @@ def test_a_thrown_balloon_keeps_momentum_spin_and_nearly_its_energy(balloon, met
     dt = 0.05 * step_limit(balloon).undamped
     setup = Setup(balloon, method, Clock(40 * dt, 1, 40), velocity=thrown(balloon))
     before = setup.start()
-    after = method.advance(before, setup.drive(0))
+    after = method.advance(before, setup.boundary(0))
     mass = balloon.mass[:, None]
     scale = np.abs(mass * before.v).sum()
     assert np.abs((mass * (after.v - before.v)).sum(axis=0)).max() < 1e-12 * scale

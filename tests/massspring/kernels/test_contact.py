@@ -201,19 +201,19 @@ def test_looking_only_at_near_nodes_changes_no_bit(ball_body):
     setup = Setup(ball_body, ImplicitVolume(), clock, planes, damping=30.0)
     state, changes, skipped = setup.start(), 0, 0
     for frame in range(30):
-        state = setup.method.advance(state, setup.drive(frame))
-        drive, net, dt = setup.drive(frame), state.network, clock.dt
+        state = setup.method.advance(state, setup.boundary(frame))
+        boundary, net, dt = setup.boundary(frame), state.network, clock.dt
         lightest = net.inverse_mass.max()
         for factor in (-3.0, 0.5, 1.0, 5.0):
             nodes, push = state.nodes, Push(state.nodes.gradient, state.lam[0])
             near, far = (_copied(state.contacts) for _ in range(2))
             for contacts in (near, far):
-                find_contacts(net, nodes, contacts, drive, 0, push, None)
+                find_contacts(net, nodes, contacts, boundary, 0, push, None)
             lam = factor * state.lam[0]
             mobility = float((net.inverse_mass[:, None] * nodes.gradient**2).sum())
             reach = pressure_reach(lam - state.lam[0], mobility, lightest, dt)
-            changed = revise_contacts(net, nodes, near, drive, 0, Push(nodes.gradient, lam), reach)
-            assert changed == revise_contacts(net, nodes, far, drive, 0, Push(nodes.gradient, lam), np.inf)
+            changed = revise_contacts(net, nodes, near, boundary, 0, Push(nodes.gradient, lam), reach)
+            assert changed == revise_contacts(net, nodes, far, boundary, 0, Push(nodes.gradient, lam), np.inf)
             for name in ("touched", "mode", "normal", "goal"):
                 assert np.array_equal(getattr(near, name), getattr(far, name))
             changes += changed

@@ -50,7 +50,7 @@ class Scene:
     def __init__(self, shell, obstacles, box=ABOVE) -> None:
         self.obstacles = obstacles
         setup = Setup(shell, ImplicitVolume(), Clock(DT, 1, 1), obstacles)
-        state, self.drive = setup.start(), setup.drive(0)
+        state, self.boundary = setup.start(), setup.boundary(0)
         self.state, self.network, random = state, state.network, np.random.default_rng(4)
         self.contacts = state.contacts
         self.nodes = self.network.surface_nodes.astype(np.int64)
@@ -86,7 +86,7 @@ class Scene:
 
     def find(self, lam: float = LAM) -> "Scene":
         push = Push(self.state.nodes.gradient, lam)
-        find_contacts(self.network, self.state.nodes, self.contacts, self.drive, 0, push, None)
+        find_contacts(self.network, self.state.nodes, self.contacts, self.boundary, 0, push, None)
         return self
 
     def revise(self, lam: float, found_at: float = LAM) -> int:
@@ -94,7 +94,7 @@ class Scene:
         mobility = float(self.network.inverse_mass @ square)
         reach = pressure_reach(lam - found_at, mobility, self.network.largest_inverse_mass, DT)
         push = Push(self.state.nodes.gradient, lam)
-        return revise_contacts(self.network, self.state.nodes, self.contacts, self.drive, 0, push, reach)
+        return revise_contacts(self.network, self.state.nodes, self.contacts, self.boundary, 0, push, reach)
 
 
 def slopes(obstacle: Any, y: np.ndarray) -> np.ndarray:
@@ -143,7 +143,7 @@ def test_the_next_step_knows_nothing_of_the_last(shell):
     """Obstacles gone: no clearance, no touch is left of them."""
     scene = Scene(shell, *OBSTACLES["two spheres"]).find()
     assert scene.contacts.touched.any()
-    scene.drive.position[:] -= 1.0
+    scene.boundary.position[:] -= 1.0
     scene.find()
     assert not scene.contacts.touched.any() and not scene.contacts.mode.any()
     assert scene.contacts.clearance.min() > 0.9

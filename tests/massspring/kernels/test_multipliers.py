@@ -102,9 +102,9 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
     assert np.abs(rows.push - force).max() < 1e-6 * np.abs(force).max()
     if several.kept.count < n:  # pressures of nodes may hold a part that moves nothing
         assert np.abs(rows.lam - lam).max() < 1e-6 * np.abs(lam).max()
-    drive = Setup(several, ImplicitVolume(), Clock(dt, 1, 1)).drive(0)
-    open_frame(state.frame(drive))
-    advance(replace(state, tally=new_tally(2, 1)).frame(drive), Push(rows.push, 1.0))
+    boundary = Setup(several, ImplicitVolume(), Clock(dt, 1, 1)).boundary(0)
+    open_frame(state.frame(boundary))
+    advance(replace(state, tally=new_tally(2, 1)).frame(boundary), Push(rows.push, 1.0))
     assert np.allclose(nodes.v.ravel(), solution[: 3 * n], atol=1e-7)  # a millionth of the velocities of 0.1 m/s
     assert (tally.iterations[1] > 0) != dense
 
@@ -149,7 +149,7 @@ def test_the_whole_by_rows_is_the_whole_by_a_division(block_body):
     setup = Setup(block_body, ImplicitVolume(), clock, planes, damping=20.0)
     state, pressures = replace(setup.start(), rows=volume_rows(Volumes.whole(block_body), block_body.node_count)), []
     for frame in range(clock.frames):
-        state = setup.method.advance(state, setup.drive(frame))
+        state = setup.method.advance(state, setup.boundary(frame))
         pressures.append(state.lam[0])
     assert np.allclose(pressures, one.pressure[:, 0], rtol=1e-9)
     assert np.abs(state.x - one.final).max() < 1e-12

@@ -37,7 +37,7 @@ def test_a_body_in_a_wedge_enters_neither_side_and_keeps_its_volume(ball_body):
     setup = Setup(ball_body, ImplicitVolume(), clock, planes, (held,), damping=40.0)
     state, wedged = setup.start(), 0
     for frame in range(clock.frames):
-        state = setup.method.advance(state, setup.drive(frame))
+        state = setup.method.advance(state, setup.boundary(frame))
         wedged = max(wedged, int((state.contacts.mode == ON_EDGE).sum()))
     assert wedged > 0, "no node came between the planes"
     history = simulate(setup)

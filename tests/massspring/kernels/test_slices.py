@@ -27,15 +27,17 @@ def gathered(body: Body, x: np.ndarray, keeps: bool = True, held: tuple[int, ...
     clock = Clock(0.01, 1, 10)
     attached = (Attachment(np.array(held)),) if held else ()
     setup = Setup(body, ImplicitVolume(), clock, attachments=attached, gravity=(0.3, 1.0, -9.81), damping=7.0)
-    state, drive = start(body, attached), setup.drive(0)
+    state, boundary = start(body, attached), setup.boundary(0)
     state.nodes.x[:] = x
     state.nodes.v[:] = np.random.default_rng(4).normal(size=x.shape)
-    return state, drive, gather_and_predict(state.network, state.nodes, state.work, drive, keeps)
+    return state, boundary, gather_and_predict(state.network, state.nodes, state.work, boundary, keeps)
 
 
-def predicted(net, v: np.ndarray, force: np.ndarray, drive) -> np.ndarray:
+def predicted(net, v: np.ndarray, force: np.ndarray, boundary) -> np.ndarray:
     """v* of eq. 3.1, in numpy."""
-    return (1 - drive.damping * drive.dt) * v + drive.dt * (net.inverse_mass[:, None] * force + drive.gravity)
+    return (1 - boundary.damping * boundary.dt) * v + boundary.dt * (
+        net.inverse_mass[:, None] * force + boundary.gravity
+    )
 
 
 def far_apart(a: np.ndarray, b: np.ndarray) -> float:
@@ -45,13 +47,13 @@ def far_apart(a: np.ndarray, b: np.ndarray) -> float:
 def test_it_equals_the_plain_kernels(kept_body):
     x = moved(kept_body)
     held = tuple(range(0, kept_body.node_count, 7))
-    state, drive, (volume, flow, mobility) = gathered(kept_body, x, held=held)
+    state, boundary, (volume, flow, mobility) = gathered(kept_body, x, held=held)
     net, nodes = state.network, state.nodes
     force, gradient = np.zeros_like(x), np.zeros_like(x)
     spring_forces_into(x, net.ends, net.rest_length, net.stiffness, force)
     add_membrane_forces(x, net.membrane, force)
     expected = volume_gradient_into(x, net.triangles, gradient)
-    v_star = predicted(net, nodes.v, force, drive)
+    v_star = predicted(net, nodes.v, force, boundary)
     assert far_apart(nodes.force[list(held)], force[list(held)]) < ROUND_OFF
     assert far_apart(nodes.gradient, gradient) < ROUND_OFF
     assert far_apart(nodes.v_star, v_star) < ROUND_OFF
@@ -86,10 +88,10 @@ def test_without_a_volume_the_forces_are_the_same_to_the_last_bit(ball_body):
 def test_springs_at_rest_pull_with_nothing_at_all(body):
     """Rest is rest to the last bit only if c = k − k L/|d| is 0 and not round-off of k."""
     state = start(body)
-    drive = Setup(body, Free(), Clock(0.01, 1, 10)).drive(0)
-    gather_and_predict(state.network, state.nodes, state.work, drive, True)
+    boundary = Setup(body, Free(), Clock(0.01, 1, 10)).boundary(0)
+    gather_and_predict(state.network, state.nodes, state.work, boundary, True)
     # The length of a spring at rest is summed in another order here: a bit off in some.
-    unit = body.springs.stiffness.max() * body.springs.rest_length.max() / body.mass.min() * drive.dt
+    unit = body.springs.stiffness.max() * body.springs.rest_length.max() / body.mass.min() * boundary.dt
     assert np.abs(state.nodes.v_star).max() < 1e-15 * unit * LONGEST
 
 
@@ -166,9 +168,9 @@ def test_every_spring_is_there_twice_and_little_else(ball_body):
 def test_the_multiplier_from_sums_is_the_one_over_all_nodes(ball_body):
     """Touched nodes of every kind and held ones: what they take is taken from the sums."""
     held = (3, 40, 77)
-    state, drive, (volume, flow, mobility) = gathered(ball_body, moved(ball_body), held=held)
+    state, boundary, (volume, flow, mobility) = gathered(ball_body, moved(ball_body), held=held)
     net, nodes, contacts, rng = state.network, state.nodes, state.contacts, np.random.default_rng(1)
-    flow += prescribe(net, nodes, np.array([[0.01, 0.0, -0.02]]), drive.dt)
+    flow += prescribe(net, nodes, np.array([[0.01, 0.0, -0.02]]), boundary.dt)
     for kind, some in ((SLIDES, [5, 6, 50]), (ON_EDGE, [9, 10]), (STICKS, [60, 61])):
         contacts.mode[some] = kind
         contacts.direction[some] = rng.normal(size=(len(some), 3))
@@ -176,18 +178,18 @@ def test_the_multiplier_from_sums_is_the_one_over_all_nodes(ball_body):
         contacts.goal[some] = rng.normal(size=(len(some), 3))
     list_touched(contacts)
     error = 0.01 * volume
-    expected = volume_multiplier(nodes, contacts, net.inverse_mass, error, drive.dt)
-    found = multiplier_of_sums(nodes, contacts, net.inverse_mass, error, drive.dt, flow, mobility)
+    expected = volume_multiplier(nodes, contacts, net.inverse_mass, error, boundary.dt)
+    found = multiplier_of_sums(nodes, contacts, net.inverse_mass, error, boundary.dt, flow, mobility)
     assert found == pytest.approx(expected, rel=1e-12)
     assert found[0] != pytest.approx(
-        volume_multiplier(nodes, contacts, 0.9 * net.inverse_mass, error, drive.dt)[0], rel=1e-3
+        volume_multiplier(nodes, contacts, 0.9 * net.inverse_mass, error, boundary.dt)[0], rel=1e-3
     )
 
 
 def test_a_body_that_obstacles_hold_everywhere_has_no_multiplier(ball_body):
     """What is left of G·W·G is round-off then; dividing by it would be a pressure of any size."""
-    state, drive, (volume, flow, mobility) = gathered(ball_body, moved(ball_body))
+    state, boundary, (volume, flow, mobility) = gathered(ball_body, moved(ball_body))
     state.contacts.mode[:] = STICKS
     list_touched(state.contacts)
-    args = (state.nodes, state.contacts, state.network.inverse_mass, 0.01 * volume, drive.dt, flow, mobility)
+    args = (state.nodes, state.contacts, state.network.inverse_mass, 0.01 * volume, boundary.dt, flow, mobility)
     assert multiplier_of_sums(*args) == (0.0, 0.0)

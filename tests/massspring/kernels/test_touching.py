@@ -20,10 +20,10 @@ class Sole:
         floor = Plane((0, 0, float(body.rest[:, 2].min()) - BELOW), (0, 0, 1), ALONG, MU)
         fall = np.tile([0.0, 0.0, -1.0], (body.node_count, 1))
         setup = Setup(body, ImplicitSprings(), Clock(DT, 1, 1), (floor,), velocity=fall)
-        state, self.drive = setup.start(), setup.drive(0)
+        state, self.boundary = setup.start(), setup.boundary(0)
         self.state, self.network, self.contacts = state, state.network, state.contacts
         self.factor = state.memory.at(self.network, DT, 0.0)
-        self.contact = Contact(self.network, state.nodes, self.contacts, self.drive, 0)
+        self.contact = Contact(self.network, state.nodes, self.contacts, self.boundary, 0)
         self.nodes = np.flatnonzero(self.contacts.mode == STICKS)
         self.place = (floor.point[2] - self.state.nodes.x[self.nodes, 2]) / DT
         """Speed [m/s] that ends the step on the floor."""
@@ -96,7 +96,7 @@ def test_a_slip_that_is_round_off_is_none(sole, way, sticks):
     sole.slide()
     slip = np.array([0.6, -0.8, 0.0]) * way * SLIP_RESOLUTION * sole.network.longest_correction / DT
     sole.state.nodes.x[sole.nodes] = 0.0  # so that the way is known as closely as it is asked
-    carried = sole.drive.velocity[0, 0]
+    carried = sole.boundary.velocity[0, 0]
     carried[:] = 0.0
     end = sole.state.nodes.x.copy()
     end[sole.nodes] = DT * slip

@@ -88,7 +88,7 @@ def one_step(body, method, dt=1e-3):
     setup = Setup(body, method, Clock(dt, 1, 1), velocity=0.1 * thrown(body))
     state = setup.start()
     state.nodes.x[:] = 0.99 * body.rest
-    return method.advance(state, setup.drive(0))
+    return method.advance(state, setup.boundary(0))
 
 
 def test_xpbd_tends_to_the_volume_solved_for_at_the_end_of_the_step(block_body):
@@ -112,15 +112,15 @@ def test_xpbd_that_forgets_its_multipliers_is_hard_whatever_its_compliance(block
     method = Xpbd(iterations=200, compliance=1e-4)
     kept = one_step(block_body, method)
     setup = Setup(block_body, method, Clock(1e-3, 1, 1), velocity=0.1 * thrown(block_body))
-    state, drive = setup.start(), setup.drive(0)
+    state, boundary = setup.start(), setup.boundary(0)
     state.nodes.x[:] = 0.99 * block_body.rest
     net, nodes, contacts, cells = state.network, state.nodes, state.contacts, state.memory
-    open_frame(state.frame(drive))
-    begin_step(state.frame(drive), 0, False)
-    unpushed_into(nodes, contacts, drive.dt, cells.y)
+    open_frame(state.frame(boundary))
+    begin_step(state.frame(boundary), 0, False)
+    unpushed_into(nodes, contacts, boundary.dt, cells.y)
     for _ in range(method.iterations):
         cells.pressure[:] = 0.0
-        relax_cells(contacts, net.inverse_mass, cells, drive.dt**2, method.compliance)
+        relax_cells(contacts, net.inverse_mass, cells, boundary.dt**2, method.compliance)
     short = [np.abs(1 - cell_volumes(block_body, x) / block_body.tetrahedron_volumes).max() for x in (kept.x, cells.y)]
     assert short[1] < 0.1 * short[0]
 
@@ -138,8 +138,8 @@ def test_the_sum_of_cells_asks_for_nothing_that_the_cells_do_not(block_body, com
     """Every cell has its compliant volume in the end, to round-off, where a target asks for 2 % more than at rest."""
     method, asked = Xpbd(iterations=200, compliance=compliance), 1.02
     setup = Setup(block_body, method, Clock(1e-3, 1, 1))
-    drive = setup.drive(0)._replace(volume_target=np.array([[asked * block_body.volume]]))
-    after = method.advance(setup.start(), drive)
+    boundary = setup.boundary(0)._replace(volume_target=np.array([[asked * block_body.volume]]))
+    after = method.advance(setup.start(), boundary)
     missing = asked - cell_volumes(block_body, after.x) / block_body.tetrahedron_volumes
     assert np.abs(missing - compliance * after.memory.pressure).max() < 1e-11
     assert missing.min() > 1e-3

@@ -171,7 +171,7 @@ def rest_forces(method, body, x):
     for setup in (still, without):
         state = setup.start()
         state.nodes.x[:] = x
-        speeds.append(setup.method.advance(state, setup.drive(0)).v)
+        speeds.append(setup.method.advance(state, setup.boundary(0)).v)
     return (speeds[0] - speeds[1]) * body.mass[:, None] / 1e-7
 
 

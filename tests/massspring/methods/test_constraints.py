@@ -51,7 +51,10 @@ def test_hcj05_is_one_rule_of_the_family(body):
     mine.nodes.x[:] *= 0.8  # so that the guard cuts
     other.nodes.x[:] = mine.x
     for frame in range(10):
-        mine, other = advance_by(Rule(), mine, setup.drive(frame)), setup.method.advance(other, setup.drive(frame))
+        mine, other = (
+            advance_by(Rule(), mine, setup.boundary(frame)),
+            setup.method.advance(other, setup.boundary(frame)),
+        )
         assert np.abs(mine.x - other.x).max() < 1e-11 * body.size
         assert mine.lam == pytest.approx(other.lam, rel=1e-8)
         for name in ("contact_impulse", "held_impulse"):
@@ -69,7 +72,7 @@ def test_hcj05_is_the_first_newton_step_of_shake(body):
         pressures = []
         for method in (Shake(), ImplicitVolume()):
             setup = Setup(body, method, clock, velocity=thrown(body), damping=20.0)
-            pressures.append(setup.method.advance(setup.start(), setup.drive(0)).lam[0])
+            pressures.append(setup.method.advance(setup.start(), setup.boundary(0)).lam[0])
         gaps.append(abs(pressures[0] - pressures[1]))
     assert gaps[0] > 1e-6
     # vᵀHv stays as dt goes to 0; what is left beside it goes down with dt.
@@ -90,7 +93,7 @@ def test_baumgarte_at_hcj05_s_rates_differs_by_the_convective_term(body):
         setup = Setup(body, method, clock, velocity=v)
         state = setup.start()
         state.nodes.x[:] *= 1.0001
-        pressures.append(method.advance(state, setup.drive(0)).lam[0])
+        pressures.append(method.advance(state, setup.boundary(0)).lam[0])
     moved = replace(body, rest=1.0001 * body.rest)
     _, slope = gradient(moved.rest, body.triangles)
     mobility = float(((slope**2).sum(axis=1) / body.mass).sum())
@@ -107,7 +110,7 @@ def volume_errors(body, method, steps, scale=1 + 1e-9):
     state.nodes.x[:] *= scale
     errors = []
     for frame in range(steps):
-        state = method.advance(state, setup.drive(frame))
+        state = method.advance(state, setup.boundary(frame))
         errors.append(enclosed_volume(state.x, body.triangles) / body.volume - 1)
     return np.array(errors)
 
@@ -156,14 +159,14 @@ def test_post_stabilization_moves_nodes_and_no_velocity(body):
     state = setup.start()
     left = []
     for scale in (1.002, 1.001):
-        moved = begin_frame(state, setup.drive(0))
+        moved = begin_frame(state, setup.boundary(0))
         moved.nodes.x[:] = scale * body.rest
         v = moved.v.copy()
         correct_positions(moved.network, moved.nodes, moved.contacts, body.volume, setup.clock.dt)
         assert np.array_equal(moved.v, v)
         left.append(enclosed_volume(moved.x, body.triangles) / body.volume - 1)
     assert left[0] / left[1] == pytest.approx(4.0, rel=0.02)
-    after = setup.method.advance(state, setup.drive(0))
+    after = setup.method.advance(state, setup.boundary(0))
     _, slope = gradient(body.rest, body.triangles)
     assert abs((slope * after.v).sum()) < 1e-12 * (np.abs(slope) * np.abs(after.v)).sum(), "the rate of V is not 0"
 
@@ -173,9 +176,9 @@ def test_a_body_crushed_to_a_thousandth_comes_back_in_one_step_of_shake(body):
     setup = Setup(body, Shake(), clock_for(body, 400, 10), damping=30.0)
     state = setup.start()
     state.nodes.x[:] = 1e-3 * body.rest
-    state = setup.method.advance(state, setup.drive(0))
+    state = setup.method.advance(state, setup.boundary(0))
     for frame in range(1, 400):
-        state = setup.method.advance(state, setup.drive(frame))
+        state = setup.method.advance(state, setup.boundary(frame))
         assert abs(enclosed_volume(state.x, body.triangles) / body.volume - 1) < 1e-11
     edges = body.springs.ends.astype(int)
     lengths = np.linalg.norm(state.x[edges[:, 1]] - state.x[edges[:, 0]], axis=1)
@@ -183,7 +186,7 @@ def test_a_body_crushed_to_a_thousandth_comes_back_in_one_step_of_shake(body):
     wild = setup.start()
     wild = replace(wild, network=wild.network._replace(longest_correction=np.inf))
     wild.nodes.x[:] = 1e-3 * body.rest
-    wild = advance_by(Rule(), wild, setup.drive(0))
+    wild = advance_by(Rule(), wild, setup.boundary(0))
     assert not np.abs(wild.x).max() < 1e3 * body.size
 
 
@@ -193,7 +196,7 @@ def test_contact_and_held_nodes_are_inside_shake_s_multiplier(ball_body):
     setup = pressed(ball_body, Shake(), clock)
     state = setup.start()
     for frame in range(60):
-        before, state = state, setup.method.advance(state, setup.drive(frame))
+        before, state = state, setup.method.advance(state, setup.boundary(frame))
     free = (state.network.inverse_mass > 0) & (state.contacts.mode == FREE)
     touched = state.contacts.mode == SLIDES
     assert touched.sum() > 3

@@ -80,10 +80,10 @@ def corrected(case: Case, matrix, clock: Clock) -> tuple[float, int]:
     Against the same step with the volume there is for its target, so that springs and momentum do not count.
     """
     setup = case.setup(clock, positions=start_of(case.body, matrix))
-    drive, ends = setup.drive(0), []
+    boundary, ends = setup.boundary(0), []
     volume = case.body.kept.measure(setup.start().x.astype(np.float64))
     for target in (case.body.rest_volumes, volume):
-        after = case.method.advance(setup.start(), drive._replace(volume_target=target[None, :].copy()))
+        after = case.method.advance(setup.start(), boundary._replace(volume_target=target[None, :].copy()))
         ends.append((after.x.astype(np.float64), int(after.tally.capped[0])))
     far = np.linalg.norm(ends[0][0] - ends[1][0], axis=1).max()
     return far / setup.start().network.longest_correction, ends[0][1]
@@ -205,9 +205,9 @@ def test_numbers_that_overflow_stop_the_run(case, option):
 def test_nan_in_one_node_ends_every_solve(case):
     """Whatever iterates must end on NaN: an iteration that waits for a small residual would wait for ever."""
     setup = case.setup(clock_for(case.body, 1, 3))
-    state = begin_frame(setup.start(), setup.drive(0))
+    state = begin_frame(setup.start(), setup.boundary(0))
     state.nodes.x[4] = np.nan
-    assert not np.isfinite(case.method.advance(state, setup.drive(0)).x).all()
+    assert not np.isfinite(case.method.advance(state, setup.boundary(0)).x).all()
 
 
 @dataclass(frozen=True)
@@ -222,15 +222,15 @@ class Poisoned(Method):
     volume_tol: ClassVar[float | None] = None
     capabilities: ClassVar[Capabilities] = Free.capabilities
 
-    def advance(self, state, drive):
+    def advance(self, state, boundary):
         self.frames.append(1)
-        after = Free().advance(state, drive)
+        after = Free().advance(state, boundary)
         if len(self.frames) < 4:
             return after
         if self.what == "pressure":
             return replace(after, lam=np.full_like(after.lam, np.nan))
         poisoned = after.nodes._replace(v=np.full_like(after.v, np.nan))
-        return Free().advance(replace(after, nodes=poisoned), drive)
+        return Free().advance(replace(after, nodes=poisoned), boundary)
 
 
 @pytest.mark.parametrize(("what", "reason"), [("force", "positions are no longer"), ("pressure", "pressures are no")])

@@ -116,7 +116,7 @@ def test_what_slips_stops_when_the_slope_is_gone():
     setup = Setup(body, ImplicitSprings(), Clock(dt, 60, 1), (plane,), gravity=(0.0, 0.0, -9.81), velocity=v)
     state, mean = setup.start(), []
     for frame in range(60):
-        state = setup.method.advance(state, setup.drive(frame))
+        state = setup.method.advance(state, setup.boundary(frame))
         mean.append(float(body.mass @ state.v[:, 0] / body.mass.sum()))
     # The weight comes to bear as the block squashes: a tenth less friction in the first four steps.
     assert mean[3] == pytest.approx(speed - 4 * dt * mu * 9.81, rel=0.1)

@@ -140,7 +140,7 @@ def test_no_step_and_no_stiffness_is_too_long(ball_body, factor):
 def test_momentum_is_kept_at_long_steps_too(kept_body):
     v = 0.1 * thrown(kept_body)
     setup = Setup(kept_body, ImplicitSprings(), Clock(LONG * limit(kept_body), 1, 1), velocity=v)
-    after = setup.method.advance(setup.start(), setup.drive(0))
+    after = setup.method.advance(setup.start(), setup.boundary(0))
     mass = kept_body.mass[:, None]
     assert np.abs((mass * (after.v - v)).sum(axis=0)).max() < 1e-12 * np.abs(mass * v).sum()
 
@@ -175,7 +175,7 @@ def test_the_step_may_be_longer_than_the_time_in_which_damping_acts(ball_body):
     """Damping is implicit too: a body at 5 m/s loses 1 + c dt of its speed in each step, whatever c dt is."""
     v = np.tile([5.0, 0.0, 0.0], (ball_body.node_count, 1))
     setup = Setup(ball_body, ImplicitSprings(), Clock(0.1, 1, 1), damping=30.0, velocity=v)
-    after = setup.method.advance(setup.start(), setup.drive(0))
+    after = setup.method.advance(setup.start(), setup.boundary(0))
     assert np.allclose(after.v, v / 4.0, rtol=0, atol=1e-9)
 
 
@@ -189,7 +189,7 @@ def test_a_collapsed_body_has_nothing_to_push_on(ball_body):
     setup = Setup(ball_body, ImplicitSprings(passes=1), Clock(1e-3, 1, 1))
     state = setup.start()
     state.nodes.x[:] = np.outer(np.linspace(0, 0.1, ball_body.node_count), [1.0, 0.0, 0.0])
-    after = setup.method.advance(state, setup.drive(0))
+    after = setup.method.advance(state, setup.boundary(0))
     assert after.tally.skipped[0] == 1 and np.isfinite(after.x).all()
 
 
@@ -197,6 +197,6 @@ def test_a_state_can_be_advanced_twice(block_body):
     """The cache of responses that a state carries changes no answer."""
     setup = Setup(block_body, ImplicitSprings(), Clock(0.01, 1, 2), squeeze(block_body, 0.004, 0.01))
     state = setup.start()
-    first, second = (setup.method.advance(state, setup.drive(0)) for _ in range(2))
+    first, second = (setup.method.advance(state, setup.boundary(0)) for _ in range(2))
     assert np.array_equal(first.x, second.x)
     assert np.array_equal(replace(state).x, block_body.rest)

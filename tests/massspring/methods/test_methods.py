@@ -68,7 +68,7 @@ def test_free_flight_keeps_momentum_and_spin(kept_body, method):
     setup = Setup(kept_body, method, clock_for(kept_body, 2, 20, method=method), velocity=v)
     state = setup.start()
     before = momentum(kept_body.mass, state.x, state.v)
-    state = method.advance(state, setup.drive(0))
+    state = method.advance(state, setup.boundary(0))
     after = momentum(kept_body.mass, state.x, state.v)
     scale = np.abs(kept_body.mass[:, None] * v).sum()
     assert np.abs(after[0] - before[0]).max() < MOMENTUM_TOL * scale
@@ -116,7 +116,7 @@ def test_two_runs_are_bitwise_equal_and_leave_their_input_alone(kept_body, metho
     rest, mass = kept_body.rest.copy(), kept_body.mass.copy()
     state = setup.start()
     x = state.x.copy()
-    method.advance(state, setup.drive(0))
+    method.advance(state, setup.boundary(0))
     assert np.array_equal(state.x, x)
     first, second = simulate(setup), simulate(setup)
     for name in ("volume", "pressure", "contact_force", "final", "kinetic"):
@@ -165,7 +165,7 @@ def volume_claim_holds(method, body) -> bool:
     state.nodes.x[:] = 1.003 * body.rest - 0.003 * body.rest.mean(axis=0)
     worst = 0.0
     for frame in range(20):
-        state = method.advance(state, setup.drive(frame))
+        state = method.advance(state, setup.boundary(frame))
         worst = max(worst, np.abs(body.kept.measure(state.x) / body.rest_volumes - 1).max())
     return worst <= method.volume_tol
 
@@ -190,15 +190,15 @@ class SixfoldGradient(Method):
     volume_tol: ClassVar[float | None] = ImplicitVolume.volume_tol
     capabilities: ClassVar[Capabilities] = Capabilities("whole")
 
-    def advance(self, state: State, drive) -> State:
-        after = begin_frame(state, drive)
-        net, nodes, contacts, frame = after.network, after.nodes, after.contacts, after.frame(drive)
+    def advance(self, state: State, boundary) -> State:
+        after = begin_frame(state, boundary)
+        net, nodes, contacts, frame = after.network, after.nodes, after.contacts, after.frame(boundary)
         open_frame(frame)
-        for step in range(len(drive.position)):
-            error = drive.volume_target[step, 0] - begin_step(frame, step, True)[0]
+        for step in range(len(boundary.position)):
+            error = boundary.volume_target[step, 0] - begin_step(frame, step, True)[0]
             nodes.gradient[:] *= 6
             search_contacts(frame, step, Push(nodes.gradient, 0.0))
-            lam, _ = volume_multiplier(nodes, contacts, net.inverse_mass, error, drive.dt)
+            lam, _ = volume_multiplier(nodes, contacts, net.inverse_mass, error, boundary.dt)
             end_step(frame, step, Push(nodes.gradient, lam), 0.0, None)
         return after
 

@@ -31,7 +31,7 @@ def test_the_one_step_residual_is_exact(body):
     state = setup.start()
     for _ in range(5):  # the residual of earlier steps must not appear
         before = state.x
-        state = setup.method.advance(state, setup.drive(0))
+        state = setup.method.advance(state, setup.boundary(0))
         step = state.x - before
         gradient = np.empty_like(step)
         cubic = volume_gradient_into(step, body.triangles, gradient)
@@ -75,8 +75,8 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     assert lam == pytest.approx(solution[n], rel=1e-9)  # the row is dt G, so its multiplier is the pressure
 
     x = nodes.x.copy()
-    drive = Setup(body, ImplicitVolume(), Clock(dt, 1, 1)).drive(0)
-    frame = replace(state, tally=new_tally(1, 1)).frame(drive)
+    boundary = Setup(body, ImplicitVolume(), Clock(dt, 1, 1)).boundary(0)
+    frame = replace(state, tally=new_tally(1, 1)).frame(boundary)
     open_frame(frame)
     advance(frame, Push(nodes.gradient, lam))
     assert np.allclose(nodes.v.ravel(), solution[:n], atol=1e-12)
@@ -87,7 +87,7 @@ def test_a_body_without_a_volume_gradient_is_counted_not_crashed(ball_body):
     setup = Setup(ball_body, ImplicitVolume(), clock_for(ball_body, 1, 1))
     state = setup.start()
     state.nodes.x[:] = np.outer(np.linspace(0, 0.1, ball_body.node_count), [1.0, 0.0, 0.0])
-    after = setup.method.advance(state, setup.drive(0))
+    after = setup.method.advance(state, setup.boundary(0))
     assert after.tally.skipped[0] == 1
     assert after.lam == 0.0 and np.isfinite(after.x).all()
 

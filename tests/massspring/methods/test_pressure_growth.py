@@ -34,7 +34,7 @@ def come_to_rest(body, method):
     setup = filled(body, method, damping=40.0)
     state = setup.start()
     for number in range(CALM_FRAMES):
-        state = method.advance(state, setup.drive(number))
+        state = method.advance(state, setup.boundary(number))
     return state
 
 
@@ -46,7 +46,7 @@ def kinetic_growth(body, method, seconds):
     frames = round(seconds / setup.clock.frame)
     energy = []
     for number in range(frames):
-        state = method.advance(state, setup.drive(CALM_FRAMES + number))
+        state = method.advance(state, setup.boundary(CALM_FRAMES + number))
         energy.append(0.5 * float(body.mass @ (state.v**2).sum(axis=1)))
     late = np.arange(frames // 2, frames)
     return np.polyfit(late * setup.clock.frame, np.log(energy)[late], 1)[0]

@@ -55,7 +55,7 @@ def test_a_jump_of_the_target_is_made_up_over_some_steps(hollow_body):
     cap = state.network.longest_correction
     for frame in range(60):
         before = state.x
-        state = setup.method.advance(state, setup.drive(frame)._replace(volume_target=jump))
+        state = setup.method.advance(state, setup.boundary(frame)._replace(volume_target=jump))
         longest = max(longest, float(np.linalg.norm(state.x - before, axis=1).max()))
         capped += int(state.tally.capped[0])
     assert capped > 1 and longest < 1.5 * cap
@@ -71,7 +71,7 @@ def test_a_crushed_body_comes_back(kept_body):
     state.nodes.x[:] = 1e-3 * body.rest
     capped = 0
     for frame in range(400):
-        state = setup.method.advance(state, setup.drive(frame))
+        state = setup.method.advance(state, setup.boundary(frame))
         capped += int(state.tally.capped[0])
     assert capped > 0
     assert np.abs(body.kept.measure(state.x) / body.rest_volumes - 1).max() < 1e-3

@@ -104,7 +104,7 @@ def test_a_probe_in_contact_compares_few_boxes_and_solves_few_pairs():
     setup = pressed(Free(), 0.3 * EDGE, frames=20)
     state = setup.start()
     for frame in range(setup.clock.frames):
-        state = setup.method.advance(state, setup.drive(frame))
+        state = setup.method.advance(state, setup.boundary(frame))
     assert 0 < state.probing.near_count[0] < 0.1 * len(BALL.triangles)
 
 
@@ -123,7 +123,7 @@ def test_a_tip_from_afar_wakes_what_it_meets(way):
         state = setup.start()
         state = replace(state, probing=state.probing._replace(skipping=skipping))
         for frame in range(setup.clock.frames):
-            state = setup.method.advance(state, setup.drive(frame))
+            state = setup.method.advance(state, setup.boundary(frame))
         ends.append((state.x, state.v, state.tally.contact_impulse))
         assert state.probing.counts[IN_CONTACT] > 0
     assert all(np.array_equal(a, b) for a, b in zip(*ends, strict=True))

@@ -48,7 +48,7 @@ def pressed(method, radius=0.0, depth=0.02, frames=60, slide=0.0, **options):
 def frames_of(setup):
     state = setup.start()
     for frame in range(setup.clock.frames):
-        state = setup.method.advance(state, setup.drive(frame))
+        state = setup.method.advance(state, setup.boundary(frame))
         yield (frame + 1) * setup.clock.frame, state
 
 
@@ -121,8 +121,8 @@ def disturbed_contact():
     for _, state in frames_of(setup):
         if state.probing.rows.count[0] > 3:
             break
-    drive = setup.drive(59)
-    after = begin_frame(state, drive)
+    boundary = setup.boundary(59)
+    after = begin_frame(state, boundary)
     nodes, contacts, net = after.nodes, after.contacts, after.network
     rows, rng = after.probing.rows, np.random.default_rng(4)
     nodes.v_star[:] = 0.02 * rng.normal(size=nodes.v_star.shape)
@@ -134,7 +134,7 @@ def disturbed_contact():
     rows.direction[:count] /= np.linalg.norm(rows.direction[:count], axis=1)[:, None]
     mobility = float((net.inverse_mass[:, None] * nodes.gradient**2).sum())
     after.probing.near[0], after.probing.near_count[0] = np.arange(len(net.triangles)), len(net.triangles)
-    return Stage(net, nodes, contacts, drive.tips, after.probing, None, mobility, 0, drive.dt)
+    return Stage(net, nodes, contacts, boundary.tips, after.probing, None, mobility, 0, boundary.dt)
 
 
 def test_contacts_and_volume_equal_the_full_saddle_point_solve():
@@ -180,7 +180,7 @@ def test_sleeping_pairs_and_boxes_change_no_bit(method, radius):
         state = setup.start()
         state = state.__class__(**{**vars(state), "probing": state.probing._replace(skipping=skipping)})
         for frame in range(setup.clock.frames):
-            state = setup.method.advance(state, setup.drive(frame))
+            state = setup.method.advance(state, setup.boundary(frame))
         assert state.probing.counts[IN_CONTACT] > 100, "the probe hardly ever touched"
         boxes.append(state.probing.counts[COMPARED] / (20 * setup.clock.frames))
         ends.append((state.x, state.v, state.lam, state.tally.contact_impulse))

@@ -54,11 +54,11 @@ def test_a_step_that_carries_nodes_keeps_volumes_and_books_what_the_tip_gives(an
     """Outside truth: Newton's law for the whole body, J by differences, and Δtip/dt."""
     setup = driven_through(any_body, way)
     before = with_one_row(setup.start())
-    drive = setup.drive(0)
-    after = METHOD.advance(before, drive)
+    boundary = setup.boundary(0)
+    after = METHOD.advance(before, boundary)
     counts, v = after.probing.counts, after.v
     assert counts[CARRYING] == 1 and counts[LEFT_BEHIND] == 0
-    tip = (drive.tips.end[0, 0] - drive.tips.start[0, 0]) / drive.dt
+    tip = (boundary.tips.end[0, 0] - boundary.tips.start[0, 0]) / boundary.dt
     carried = np.abs(v - tip).max(axis=1) < 1e-9 * np.linalg.norm(tip)
     assert carried.sum() == counts[CARRIED] >= 3
     given = (before.network.mass[:, None] * v).sum(axis=0)
@@ -103,12 +103,12 @@ def taken_from(contacts):
 def random_step(seed, lam):
     """A step with contacts beside obstacles and attachments, velocities at random; what is left to each node."""
     setup, rng = pressed(METHOD), np.random.default_rng(seed)
-    after, drive = begin_frame(setup.start(), setup.drive(0)), setup.drive(0)
+    after, boundary = begin_frame(setup.start(), setup.boundary(0)), setup.boundary(0)
     probing, nodes, contacts, net = after.probing, after.nodes, after.contacts, after.network
     nodes.v_star[:], nodes.gradient[:] = 0.02 * rng.normal(size=(2, *nodes.x.shape))
     nodes.v_star[net.held_nodes] = 0.0
     nodes.gradient[:] *= 0.01
-    stage = Stage(net, nodes, contacts, drive.tips, probing, None, 0.0, 0, drive.dt)
+    stage = Stage(net, nodes, contacts, boundary.tips, probing, None, 0.0, 0, boundary.dt)
     some_rows(stage, rng)
     contacts.mode[net.held_nodes] = FREE
     kept, g = np.eye(3) - taken_from(contacts), nodes.gradient
@@ -157,14 +157,14 @@ def test_contacts_beside_obstacles_equal_the_full_saddle_point(seed):
 def led(weight, held, radius=0.0):
     """A triangle of which all but the corner `held` are carried and sent ahead of a tip: (stage, corners, answer)."""
     setup, rng = pressed(METHOD), np.random.default_rng(3)
-    after, drive = begin_frame(setup.start(), setup.drive(0)), setup.drive(0)
+    after, boundary = begin_frame(setup.start(), setup.boundary(0)), setup.boundary(0)
     probing = after.probing
     corners = probing.surface[0].astype(int)
     probing.near[0, 0], probing.found[0, :3], probing.radius[0] = 0, weight, radius
     probing.velocity[corners] = 0.1 * rng.normal(size=(3, 3))
     probing.pair.tip[:] = 1e-3 * rng.normal(size=(2, 3))
     probing.carried[np.delete(corners, held)] = 1
-    stage = Stage(after.network, after.nodes, after.contacts, drive.tips, probing, None, 0.0, 0, drive.dt)
+    stage = Stage(after.network, after.nodes, after.contacts, boundary.tips, probing, None, 0.0, 0, boundary.dt)
     return stage, corners, lead(stage, 0, 0)
 
 

@@ -38,7 +38,7 @@ def in_contact(setup):
     """The state before the last frame, and the number of that frame."""
     state = setup.start()
     for frame in range(setup.clock.frames - 1):
-        state = METHOD.advance(state, setup.drive(frame))
+        state = METHOD.advance(state, setup.boundary(frame))
     assert state.probing.counts[IN_CONTACT] > 20
     return state, setup.clock.frames - 1
 
@@ -58,9 +58,9 @@ def test_contact_and_volumes_equal_the_saddle_point(parted_body):
     """Outside truth: what the probe adds to one step is W (Cᵀ c + dt Jᵀ δ) with J·(v⁺ − u) = 0, J by differences."""
     setup = pressed(parted_body, frames=400, steps=1)
     before, frame = in_contact(setup)
-    drive = setup.drive(frame)
-    touched = METHOD.advance(before, drive)
-    alone = METHOD.advance(replace(before, probing=None), drive)
+    boundary = setup.boundary(frame)
+    touched = METHOD.advance(before, boundary)
+    alone = METHOD.advance(replace(before, probing=None), boundary)
     rows = touched.probing.rows
     impulse = rows.impulse[: rows.count[0]]
     assert (impulse >= 0).all() and impulse.max() > 0
@@ -101,7 +101,7 @@ def test_sleeping_pairs_change_no_bit(parted_body):
         state = setup.start()
         state = replace(state, probing=state.probing._replace(skipping=skipping))
         for frame in range(setup.clock.frames):
-            state = METHOD.advance(state, setup.drive(frame))
+            state = METHOD.advance(state, setup.boundary(frame))
         ends.append((state.x, state.v, state.lam))
     assert all(np.array_equal(a, b) for a, b in zip(*ends, strict=True))
 
@@ -115,7 +115,7 @@ def test_what_is_carried_takes_no_volume(parted_body):
     setup = Setup(parted_body, METHOD, clock, (probe,), damping=30.0)
     state = setup.start()
     for frame in range(clock.frames):
-        state = METHOD.advance(state, setup.drive(frame))
+        state = METHOD.advance(state, setup.boundary(frame))
         assert check_probes(state, setup.obstacles) is None
     assert state.probing.counts[LEFT_BEHIND] == 0 and state.probing.counts[IN_CONTACT] + state.probing.counts[CARRYING]
     rest = parted_body.kept.measure(parted_body.rest)

@@ -61,8 +61,8 @@ def test_float32_keeps_its_digits_a_metre_from_the_origin(ball_body):
     """Seen from the origin V would be a difference of numbers 1e4 times as large: 1e-3 of it would be left."""
     far = replace(ball_body, rest=ball_body.rest + 1.0)
     state = in_precision(start(far), "float32")
-    drive = Setup(far, ImplicitVolume(), clock_for(far, 1, 1)).drive(0)
-    volume = gather_and_predict(state.network, state.nodes, state.work, drive, True)[0]
+    boundary = Setup(far, ImplicitVolume(), clock_for(far, 1, 1)).boundary(0)
+    volume = gather_and_predict(state.network, state.nodes, state.work, boundary, True)[0]
     assert volume == pytest.approx(far.volume, rel=2 * SINGLE * 1.0 / 0.01)  # positions round by 1e-7 m of 0.05 m
 
 
@@ -101,9 +101,9 @@ def test_no_memory_is_allocated_for_a_step(kept_body, method):
     counts = []
     for steps in (2, 200):
         setup = replace(pressed(kept_body, method, frames=2), clock=clock_for(kept_body, 2, steps))
-        state, drive = setup.start(), setup.drive(0)
-        state = method.advance(state, drive)  # compiles
+        state, boundary = setup.start(), setup.boundary(0)
+        state = method.advance(state, boundary)  # compiles
         before = rtsys.get_allocation_stats().alloc
-        method.advance(state, drive)
+        method.advance(state, boundary)
         counts.append(rtsys.get_allocation_stats().alloc - before)
     assert counts[0] == counts[1]

@@ -65,7 +65,7 @@ def test_a_correction_within_one_step_leaves_the_energy_of_the_formula(ball_body
         dt = fraction * step_limit(ball_body).undamped
         setup = Setup(ball_body, ImplicitVolume(), Clock(dt, 1, 1))
         target = np.array([[1.001 * volume]])
-        after = setup.method.advance(setup.start(), setup.drive(0)._replace(volume_target=target))
+        after = setup.method.advance(setup.start(), setup.boundary(0)._replace(volume_target=target))
         kinetic = 0.5 * float(ball_body.mass @ (after.v**2).sum(axis=1))
         assert kinetic == pytest.approx(0.5 * (0.001 * volume / dt) ** 2 / mobility, rel=1e-9)
 

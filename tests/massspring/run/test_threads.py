@@ -67,7 +67,7 @@ def test_threads_search_all_nodes_where_obstacles_are_in_that_step(ball):
     found = []
     for threads in (1, 2, 3):
         setup = slid(ball, Free(), threads=threads)
-        found.append(setup.method.advance(setup.start(), setup.drive(0)).contacts.clearance)
+        found.append(setup.method.advance(setup.start(), setup.boundary(0)).contacts.clearance)
     assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
 
 
@@ -76,7 +76,7 @@ def test_each_thread_writes_on_scratch_of_its_own(ball):
     state = setup.start()
     work, team, untouched = state.work, state.team, -7.0
     work.tile[:] = untouched
-    with crew(state.frame(setup.drive(0)), state.nodes.gradient):
+    with crew(state.frame(setup.boundary(0)), state.nodes.gradient):
         call(team, JOB_SPRINGS, 0, 0.0)
         join(team)
     assert (work.tile[0] == untouched).all() and not (work.tile[1] == untouched).all()
@@ -108,8 +108,8 @@ def test_the_load_is_even():
 
 def test_a_frame_that_fails_sends_the_threads_home(ball):
     setup = slid(ball, ImplicitVolume(), threads=2)
-    state, drive = setup.start(), setup.drive(0)
-    with pytest.raises(RuntimeError, match="halfway"), crew(state.frame(drive), state.nodes.gradient):
+    state, boundary = setup.start(), setup.boundary(0)
+    with pytest.raises(RuntimeError, match="halfway"), crew(state.frame(boundary), state.nodes.gradient):
         raise RuntimeError("halfway")
     assert state.team is not None and state.team.signal[JOB] == JOB_END
     before = time.thread_time_ns(), time.process_time_ns()
@@ -117,8 +117,8 @@ def test_a_frame_that_fails_sends_the_threads_home(ball):
     spent = time.process_time_ns() - before[1] - (time.thread_time_ns() - before[0])
     assert spent < 0.1e9, "a thread still looks for work"
     # And the next frame finds them again.
-    after = setup.method.advance(state, drive)
-    assert np.array_equal(after.x, setup.method.advance(slid(ball, ImplicitVolume()).start(), drive).x)
+    after = setup.method.advance(state, boundary)
+    assert np.array_equal(after.x, setup.method.advance(slid(ball, ImplicitVolume()).start(), boundary).x)
 
 
 def test_without_threads_none_is_made(ball):

@@ -49,9 +49,9 @@ def run(setup, ticks=None):
     state = replace(state, tally=state.tally._replace(ticks=ticks))
     elapsed = 0
     for frame in range(FRAMES):
-        drive = setup.drive(frame)
+        boundary = setup.boundary(frame)
         begin = perf_counter_ns()
-        state = setup.method.advance(state, drive)
+        state = setup.method.advance(state, boundary)
         elapsed += perf_counter_ns() - begin
     return state, elapsed
 

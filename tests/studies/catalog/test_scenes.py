@@ -163,16 +163,16 @@ def load_gap(drive_scene, problem_scene) -> float:
     kept = [drive_scene.obstacles.index(o) for o in kept_obstacles(drive_scene)]
     gaps = []
     for frame in range(setup.clock.frames):
-        drive, t = setup.drive(frame), (frame + 1) * setup.clock.frame
+        boundary, t = setup.boundary(frame), (frame + 1) * setup.clock.frame
         for number, rigid in zip(kept, problem.obstacles, strict=True):
             start = rigid.point if hasattr(rigid, "normal") else rigid.center
-            gaps.append(drive.position[-1, number] - (np.asarray(start) + rigid.motion(t)))
+            gaps.append(boundary.position[-1, number] - (np.asarray(start) + rigid.motion(t)))
         if not drive_scene.symmetric:
             for number, held in enumerate(problem.held):
-                gaps.append(drive.held_displacement[-1, number] - held.motion(t))
+                gaps.append(boundary.held_displacement[-1, number] - held.motion(t))
         for cavity in problem.cavities:
             lumen = setup.body.kept.names.index("lumen")
-            factor = drive.volume_target[-1, lumen] / setup.body.rest_volumes[lumen]
+            factor = boundary.volume_target[-1, lumen] / setup.body.rest_volumes[lumen]
             gaps.append(np.full(3, factor - cavity.volume(t)) * np.cbrt(setup.body.rest_volumes[lumen]))
     return float(np.abs(gaps).max(initial=0.0))
 

@@ -72,7 +72,7 @@ def rung(body: Body, periods: int = 8) -> float:
     setup = Setup(body, ImplicitVolume(), Clock(dt, 1, 1), velocity=1e-2 * UNIT * shape)
     state, signal = setup.start(), []
     for _ in range(steps):
-        state = setup.method.advance(state, setup.drive(0))
+        state = setup.method.advance(state, setup.boundary(0))
         signal.append(float(body.mass @ ((state.x - body.rest) * shape).sum(axis=1)))
     t = dt * np.arange(1, steps + 1)
     window = np.hanning(steps) * signal

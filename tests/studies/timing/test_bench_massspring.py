@@ -12,15 +12,15 @@ seen: dict[str, list[np.ndarray]] = {}
 
 
 class Kept(ImplicitVolume):
-    def advance(self, state, drive):
+    def advance(self, state, boundary):
         seen["on"].append(state.x.copy())
-        return super().advance(state, drive)
+        return super().advance(state, boundary)
 
 
 class Loose(Free):
-    def advance(self, state, drive):
+    def advance(self, state, boundary):
         seen["off"].append(state.x.copy())
-        return super().advance(state, drive)
+        return super().advance(state, boundary)
 
 
 def test_both_begin_each_frame_where_the_run_is():
