@@ -4,7 +4,7 @@ import numpy as np
 
 from massspring.body.body import Body
 from massspring.body.inside import is_inside, mean_edge, new_pair, surface_distance
-from massspring.kernels.arrays.layout import Tally
+from massspring.kernels.arrays.layout import FrameDiagnostics
 from massspring.kernels.probe.arrays import COUNTS, Probing, Rows
 from massspring.kernels.probe.broad_phase import TRIANGLE_BLOCK
 from massspring.layout.morton import along_curve
@@ -21,7 +21,7 @@ def kept_radius(probe: Probe, body: Body) -> float:
     return max(probe.radius, SKIN * mean_edge(body))
 
 
-def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tally: Tally) -> Probing:
+def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], diagnostics: FrameDiagnostics) -> Probing:
     """Everything awake, nothing in contact, for probes on the triangles `surface` (f, 3)."""
     count, triangles, nodes = len(probes), len(surface), body.node_count
     number = np.argsort(along_curve(body.rest[surface].mean(axis=1)))
@@ -57,15 +57,15 @@ def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], tall
         taken_count=np.zeros(1, dtype=np.int64),
         passed=np.zeros(count, dtype=np.int64),
         pair=new_pair(),
-        tally=tally,
+        diagnostics=diagnostics,
         counts=np.zeros(len(COUNTS), dtype=np.int64),
     )
 
 
-def fresh(probing: Probing, tally: Tally) -> Probing:
+def fresh(probing: Probing, diagnostics: FrameDiagnostics) -> Probing:
     """What a frame may change without changing the state it starts from."""
     kept = {name: getattr(probing, name).copy() for name in ("travel", "wake", "passed", "counts")}
-    return probing._replace(tally=tally, **kept)
+    return probing._replace(diagnostics=diagnostics, **kept)
 
 
 def tip_depth(probe: Probe, x: np.ndarray, triangles: np.ndarray, t: float) -> float:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Network, Nodes, Tally, Workspace
+from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Network, Nodes, Workspace
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.jit.stage_clock import Ticks
 from massspring.kernels.jit.thread_team import Team
@@ -26,7 +26,7 @@ class State:
     methods that keep none."""
     rows: VolumeRows | None = None
     """None where one closed surface is kept: a division needs no rows."""
-    tally: Tally = field(default_factory=lambda: new_tally(0, 0))
+    diagnostics: FrameDiagnostics = field(default_factory=lambda: new_diagnostics(0, 0))
     """What the last frame measured of itself."""
     memory: Any = None
     """Arrays that only the method knows, made by its `start`."""
@@ -50,7 +50,9 @@ class State:
 
     def frame(self, boundary: BoundaryConditions) -> Frame:
         """What a frame loop is given."""
-        return Frame(self.network, self.nodes, self.contacts, self.work, boundary, self.tally, self.probing, self.team)
+        return Frame(
+            self.network, self.nodes, self.contacts, self.work, boundary, self.diagnostics, self.probing, self.team
+        )
 
     def moved_to(self, x: np.ndarray) -> "State":
         """The same at positions `x` (n, 3) [m]."""
@@ -59,7 +61,7 @@ class State:
         return replace(self, nodes=nodes)
 
 
-def new_tally(obstacles: int, attachments: int, ticks: Ticks | None = None) -> Tally:
+def new_diagnostics(obstacles: int, attachments: int, ticks: Ticks | None = None) -> FrameDiagnostics:
     """A tally at zero; the ticks go on."""
     skipped, capped, iterations = (np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
-    return Tally(np.zeros((obstacles, 3)), np.zeros((attachments, 3)), skipped, capped, iterations, ticks)
+    return FrameDiagnostics(np.zeros((obstacles, 3)), np.zeros((attachments, 3)), skipped, capped, iterations, ticks)

@@ -36,7 +36,7 @@ from massspring.world.obstacles import Attachment
 @lean
 def hard_frame(frame, cells, compliance, accuracy):
     """One frame, all cells and contact inside the solve (eq. 3.1–3.8, 10.13); the mean pressure [Pa]."""
-    nodes, contacts, boundary, tally = frame.nodes, frame.contacts, frame.boundary, frame.tally
+    nodes, contacts, boundary, diagnostics = frame.nodes, frame.contacts, frame.boundary, frame.diagnostics
     push = Push(cells.push, 1.0)
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
@@ -44,16 +44,16 @@ def hard_frame(frame, cells, compliance, accuracy):
         begin_step(frame, step, False)
         cell_rows_into(nodes.x, cells, cells.right)
         cell_forces_into(cells, cells.pressure, cells.push)
-        mark(tally.ticks, VOLUME)
+        mark(diagnostics.ticks, VOLUME)
         passes = search_contacts(frame, step, push)
         for sweep in range(passes):
             cell_rows_into(nodes.x, cells, cells.right)
             count = solve_cells(nodes, contacts, frame.network.inverse_mass, cells, boundary.dt, compliance, accuracy)
-            count_iterations(tally, count)
+            count_iterations(diagnostics, count)
             cell_forces_into(cells, cells.pressure, cells.push)
             if multiplier_stands(frame, step, push, np.inf, sweep + 1 == passes):
                 break
-        tally.skipped[0] += any_idle(cells, compliance, accuracy.tolerance)
+        diagnostics.skipped[0] += any_idle(cells, compliance, accuracy.tolerance)
         end_step(frame, step, push, 0.0, None)
     return mean_pressure(cells)
 

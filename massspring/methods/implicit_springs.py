@@ -65,8 +65,8 @@ class ImplicitSprings(Method):
         assert after.rows is not None  # start() made them
         after.rows.lam[:] = after.lam + after.network.rest_lam
         factor = after.memory.at(after.network, boundary.dt, boundary.damping)
-        if after.tally.ticks is not None:
-            mark(after.tally.ticks, OUTSIDE)
+        if after.diagnostics.ticks is not None:
+            mark(after.diagnostics.ticks, OUTSIDE)
         accuracy = Accuracy(self.tolerance, self.most_iterations)
         for step in range(len(boundary.position)):
             Step(after, boundary, step, factor, accuracy).take(self.passes)

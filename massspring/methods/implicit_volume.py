@@ -52,7 +52,7 @@ from massspring.world.obstacles import Attachment
 @lean
 def implicit_volume_frame(frame, lam):
     """One frame of HCJ05 with contact inside the multiplier (eq. 3.1–3.8); returns the last lam [Pa]."""
-    network, nodes, boundary, tally = frame.network, frame.nodes, frame.boundary, frame.tally
+    network, nodes, boundary, diagnostics = frame.network, frame.nodes, frame.boundary, frame.diagnostics
     gradient, dt = nodes.gradient, boundary.dt
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
@@ -64,12 +64,12 @@ def implicit_volume_frame(frame, lam):
             lam, left, capped = limited_multiplier(
                 network, frame.nodes, frame.contacts, error, boundary.dt, flow, mobility
             )
-            tally.capped[0] += capped and sweep == 0
+            diagnostics.capped[0] += capped and sweep == 0
             reach = pressure_reach(lam - predicted, left, network.largest_inverse_mass, dt)
             if multiplier_stands(frame, step, Push(gradient, lam), reach, sweep + 1 == passes):
                 break
         if not left > 0.0:
-            tally.skipped[0] += 1
+            diagnostics.skipped[0] += 1
         lam = end_step(frame, step, Push(gradient, lam), left, None)
     return lam
 
@@ -114,7 +114,7 @@ def set_right_side(network, rows, nodes, contacts, target, dt, tolerance):
 
 
 @compiled
-def solve_multipliers(network, rows, contacts, tally, accuracy):
+def solve_multipliers(network, rows, contacts, diagnostics, accuracy):
     """lam += S⁻¹ rhs for the contacts of the moment (eq. 8.3, 8.4); then Jᵀ lam [N] into `rows.push`."""
     if rows.matrix.shape[0] > 0:
         dense_into(rows, contacts, network.inverse_mass, rows.matrix)
@@ -125,7 +125,7 @@ def solve_multipliers(network, rows, contacts, tally, accuracy):
         count = solve_iteratively(
             rows, contacts, network.inverse_mass, rows.lam, rows.allowed, accuracy.most_iterations
         )
-        count_iterations(tally, count)
+        count_iterations(diagnostics, count)
         if count == 0:
             return
     transposed_rows_times_into(rows, rows.lam, rows.push)
@@ -134,22 +134,28 @@ def solve_multipliers(network, rows, contacts, tally, accuracy):
 @lean
 def implicit_volumes_frame(frame, rows, accuracy):
     """One frame of HCJ05 with several volumes (eq. 3.1–3.8, 8.2–8.5); `rows.lam` [Pa] comes in and goes out."""
-    network, nodes, contacts, boundary, tally = frame.network, frame.nodes, frame.contacts, frame.boundary, frame.tally
+    network, nodes, contacts, boundary, diagnostics = (
+        frame.network,
+        frame.nodes,
+        frame.contacts,
+        frame.boundary,
+        frame.diagnostics,
+    )
     push, capped, idle = Push(rows.push, 1.0), False, False
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
         begin_step(frame, step, False)
         rows_into(nodes.x, network.inverse_mass, rows)
         transposed_rows_times_into(rows, rows.lam, rows.push)
-        mark(tally.ticks, VOLUME)
+        mark(diagnostics.ticks, VOLUME)
         target, passes = boundary.volume_target[step], search_contacts(frame, step, push)
         for sweep in range(passes):
             capped, idle = set_right_side(network, rows, nodes, contacts, target, boundary.dt, accuracy.tolerance)
-            solve_multipliers(network, rows, contacts, tally, accuracy)
+            solve_multipliers(network, rows, contacts, diagnostics, accuracy)
             if multiplier_stands(frame, step, push, math.inf, sweep + 1 == passes):
                 break
-        tally.capped[0] += capped
-        tally.skipped[0] += idle
+        diagnostics.capped[0] += capped
+        diagnostics.skipped[0] += idle
         end_step(frame, step, push, 0.0, rows)
 
 

@@ -12,7 +12,7 @@ from massspring.body.body import Body
 from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.allocate import start
 from massspring.layout.probe_arrays import fresh
-from massspring.layout.state import State, new_tally
+from massspring.layout.state import State, new_diagnostics
 from massspring.layout.threads import crew
 from massspring.methods.capabilities import Capabilities
 from massspring.world.obstacles import Attachment
@@ -53,9 +53,9 @@ def begin_frame(state: State, boundary: BoundaryConditions) -> State:
     """A copy to advance in place, so that the caller's state stays what it was."""
     nodes = state.nodes._replace(x=state.nodes.x.copy(), v=state.nodes.v.copy())
     obstacles = len(boundary.radius) + boundary.tips.end.shape[1]
-    tally = new_tally(obstacles, boundary.held_displacement.shape[1], state.tally.ticks)
-    probing = None if state.probing is None else fresh(state.probing, tally)
-    return replace(state, nodes=nodes, tally=tally, probing=probing)
+    diagnostics = new_diagnostics(obstacles, boundary.held_displacement.shape[1], state.diagnostics.ticks)
+    probing = None if state.probing is None else fresh(state.probing, diagnostics)
+    return replace(state, nodes=nodes, diagnostics=diagnostics, probing=probing)
 
 
 @contextmanager

@@ -40,7 +40,7 @@ from massspring.world.obstacles import Attachment
 @lean
 def xpbd_frame(frame, cells, compliance, iterations, whole):
     """One frame (eq. 3.1–3.8, 10.14); returns the last pressure, of cells their mean [Pa]."""
-    nodes, contacts, boundary, tally = frame.nodes, frame.contacts, frame.boundary, frame.tally
+    nodes, contacts, boundary, diagnostics = frame.nodes, frame.contacts, frame.boundary, frame.diagnostics
     lam, idle, push = 0.0, False, Push(cells.push, 1.0)
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
@@ -54,9 +54,9 @@ def xpbd_frame(frame, cells, compliance, iterations, whole):
             lam, idle = mend(frame, cells, boundary.volume_target[step, 0], compliance, iterations, whole)
             if multiplier_stands(frame, step, push, np.inf, sweep + 1 == passes):
                 break
-        tally.skipped[0] += idle
-        tally.iterations[0] += iterations
-        tally.iterations[1] = iterations
+        diagnostics.skipped[0] += idle
+        diagnostics.iterations[0] += iterations
+        diagnostics.iterations[1] = iterations
         end_step(frame, step, push, 0.0, None)
     return lam if whole else mean_pressure(cells)
 

@@ -130,7 +130,7 @@ class Recorder:
         if len(self.rest_volumes):
             tetrahedron_volumes_into(x, self.body.tetrahedra, self.cell_volumes)
             self.scalars["min_j"][frame] = smallest_ratio(self.cell_volumes, self.rest_volumes)
-        self.contact_force[frame, self.rank] = state.tally.contact_impulse / self.clock.frame
+        self.contact_force[frame, self.rank] = state.diagnostics.contact_impulse / self.clock.frame
         for o, obstacle in enumerate(self.obstacles):
             t = float(self.t[frame])
             if isinstance(obstacle, Probe):
@@ -138,11 +138,11 @@ class Recorder:
             else:
                 depth = -obstacle.gap(x[self.surface_nodes], t).min()
             self.penetration[frame, o] = max(0.0, depth)
-        self.held_force[frame] = state.tally.held_impulse / self.clock.frame
+        self.held_force[frame] = state.diagnostics.held_impulse / self.clock.frame
         self.frame_ns[frame] = elapsed_ns
-        self.skipped += int(state.tally.skipped[0])
-        self.capped += int(state.tally.capped[0])
-        self.iterations[frame] = state.tally.iterations
+        self.skipped += int(state.diagnostics.skipped[0])
+        self.capped += int(state.diagnostics.capped[0])
+        self.iterations[frame] = state.diagnostics.iterations
         if state.probing is not None:
             self.probe_counts[frame] = state.probing.counts - self.probe_counts[:frame].sum(axis=0)
         self.final = x

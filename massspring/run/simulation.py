@@ -115,7 +115,7 @@ class Setup:
         """The state at t = 0."""
         state = self.inside.start(self.method, self.attachments, self.velocity)
         if self.probes:
-            probing = new_probing(self.inside.body, state.network.triangles, self.probes, state.tally)
+            probing = new_probing(self.inside.body, state.network.triangles, self.probes, state.diagnostics)
             state = replace(state, probing=probing)
         if self.positions is not None:
             state = state.moved_to(self.positions)

@@ -74,7 +74,7 @@ def advance(variant: Variant) -> None:
         return
     state = setup.start()
     if variant.option == CLOCK:
-        state = replace(state, tally=state.tally._replace(ticks=new_ticks()))
+        state = replace(state, diagnostics=state.diagnostics._replace(ticks=new_ticks()))
     else:
         state = shared(state, 2)  # asked for by name, whatever the number of cores
     for frame in range(FRAMES):

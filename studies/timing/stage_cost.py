@@ -44,7 +44,7 @@ Run = tuple[np.ndarray, np.ndarray, State]
 
 def run_frames(setup: Setup, state: State, ticks: Ticks | None = None, frames: int | None = None) -> Run:
     """Runs the first `frames` of a set-up, or all. Raises MassSpringError for a run that breaks off."""
-    state = replace(state, tally=state.tally._replace(ticks=ticks))
+    state = replace(state, diagnostics=state.diagnostics._replace(ticks=ticks))
     frames = setup.clock.frames if frames is None else frames
     frame_ns, stage_ns = np.zeros(frames), np.zeros((len(ROWS), frames))
     price = mark_ns() if ticks is not None else 0.0

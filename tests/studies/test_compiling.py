@@ -71,7 +71,7 @@ def test_a_variant_advances_a_body_that_is_pressed(option):
     setup = setup_of(variant)
     assert len(setup.probes) == (option == PROBE)
     after = setup.method.advance(setup.start(), setup.boundary(0))
-    assert np.abs(after.tally.contact_impulse[0]).max() > 0
+    assert np.abs(after.diagnostics.contact_impulse[0]).max() > 0
     with logged() as first:
         advance(variant)
     assert all(entry.seconds > 0 for entry in first)

@@ -162,7 +162,7 @@ class Accuracy(NamedTuple):
     most_iterations: int
 
 
-class Tally(NamedTuple):
+class FrameDiagnostics(NamedTuple):
     """What a frame measures of itself; the loop adds, the caller starts it at zero."""
 
     contact_impulse: np.ndarray

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import Contacts, Network, Nodes, Tally, Tips
+from massspring.kernels.arrays.layout import Contacts, FrameDiagnostics, Network, Nodes, Tips
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.probe.continuous import Pair
 
@@ -101,7 +101,7 @@ class Probing(NamedTuple):
     passed: np.ndarray
     """1 + the body's number of the first triangle that a tip was driven through, 0 for none, (p,) int64."""
     pair: Pair
-    tally: Tally
+    diagnostics: FrameDiagnostics
     """Of the frame."""
     counts: np.ndarray
     """COUNTS since the start, (7,) int64."""

@@ -186,7 +186,7 @@ def note_passed(stage):
 def settle_carried(stage, push):
     """Carried nodes end the step where they were carried: v* takes the difference, the tip's impulse [N s]."""
     probes, network, nodes, contacts = stage.probes, stage.network, stage.nodes, stage.contacts
-    impulse = probes.tally.contact_impulse
+    impulse = probes.diagnostics.contact_impulse
     first = impulse.shape[0] - probes.radius.shape[0]
     for k in range(probes.taken_count[0]):
         i = probes.taken[k]

@@ -63,11 +63,11 @@ def move(stage, volumes):
 @lean
 def settle(stage):
     """Hands the contacts on to the step: v* takes their pushes; books them for probes and attachments [N s]."""
-    probes, network, rows, tally = stage.probes, stage.network, stage.probes.rows, stage.probes.tally
-    first = tally.contact_impulse.shape[0] - probes.radius.shape[0]
+    probes, network, rows, diagnostics = stage.probes, stage.network, stage.probes.rows, stage.probes.diagnostics
+    first = diagnostics.contact_impulse.shape[0] - probes.radius.shape[0]
     for k in range(rows.count[0]):
         for axis in range(3):
-            tally.contact_impulse[first + rows.probe[k], axis] += rows.impulse[k] * rows.direction[k, axis]
+            diagnostics.contact_impulse[first + rows.probe[k], axis] += rows.impulse[k] * rows.direction[k, axis]
         for q in range(3):
             i = rows.node[k, q]
             for axis in range(3):
@@ -78,7 +78,7 @@ def settle(stage):
                     if network.held_nodes[h] == i:
                         for axis in range(3):
                             share = rows.weight[k, q] * rows.impulse[k] * rows.direction[k, axis]
-                            tally.held_impulse[network.held_group[h], axis] -= share
+                            diagnostics.held_impulse[network.held_group[h], axis] -= share
 
 
 @lean

@@ -41,7 +41,7 @@ def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
 def advance(frame, push):
     """The end of a step of all nodes (eq. 3.5); books the impulse of each obstacle, pads the new positions."""
     network, nodes, contacts, dt = frame.network, frame.nodes, frame.contacts, frame.boundary.dt
-    book_contacts(network, nodes, contacts, push, dt, frame.tally.contact_impulse)
+    book_contacts(network, nodes, contacts, push, dt, frame.diagnostics.contact_impulse)
     move_all(frame, push, frame.team)
 
 

@@ -11,7 +11,7 @@ from massspring.kernels.step.attachments import prescribe, prescribe_velocity_in
 @inlined
 def open_frame(frame):
     """Books the time between two frames, and pads the positions for the first step."""
-    mark(frame.tally.ticks, OUTSIDE)
+    mark(frame.diagnostics.ticks, OUTSIDE)
     places_into(frame.nodes, frame.work, 0, frame.nodes.x.shape[0])
 
 
@@ -23,12 +23,12 @@ def begin_step(frame, step, keeps):
     """
     network, nodes, boundary = frame.network, frame.nodes, frame.boundary
     volume, _, mobility = predict_from_places(network, nodes, frame.work, boundary, keeps, frame.team)
-    mark(frame.tally.ticks, SPRINGS)
+    mark(frame.diagnostics.ticks, SPRINGS)
     held = boundary.held_displacement[step]
     prescribe_velocity_into(
         nodes.x, network.held_nodes, network.held_group, network.held_rest, held, boundary.dt, nodes.v_star
     )
-    mark(frame.tally.ticks, HELD)
+    mark(frame.diagnostics.ticks, HELD)
     return volume, mobility
 
 
@@ -37,9 +37,9 @@ def begin_summed_step(frame, step):
     """The same with G and with G·v* [m³/s] of all nodes, so that no other pass sums it: (V, G·v*, G·W·G)."""
     network, nodes, boundary = frame.network, frame.nodes, frame.boundary
     volume, flow, mobility = predict_from_places(network, nodes, frame.work, boundary, True, frame.team)
-    mark(frame.tally.ticks, SPRINGS)
+    mark(frame.diagnostics.ticks, SPRINGS)
     flow += prescribe(network, nodes, boundary.held_displacement[step], boundary.dt)
-    mark(frame.tally.ticks, HELD)
+    mark(frame.diagnostics.ticks, HELD)
     return volume, flow, mobility
 
 
@@ -49,7 +49,7 @@ def search_contacts(frame, step, push):
     if frame.boundary.radius.shape[0] == 0:
         return 1
     find_contacts(frame.network, frame.nodes, frame.contacts, frame.boundary, step, push, frame.team)
-    mark(frame.tally.ticks, SEARCH)
+    mark(frame.diagnostics.ticks, SEARCH)
     return CONTACT_PASSES
 
 
@@ -59,16 +59,16 @@ def multiplier_stands(frame, step, push, reach, last):
 
     `reach` [m]: how far the new push can have moved a node; where contacts change, the multiplier is solved for again.
     """
-    mark(frame.tally.ticks, MULTIPLIER)
+    mark(frame.diagnostics.ticks, MULTIPLIER)
     if last:
         return True
     changes = revise_contacts(frame.network, frame.nodes, frame.contacts, frame.boundary, step, push, reach)
-    mark(frame.tally.ticks, REVISION)
+    mark(frame.diagnostics.ticks, REVISION)
     return changes == 0
 
 
 @inlined
-def count_iterations(tally, count):
+def count_iterations(diagnostics, count):
     """Books the iterations of one solve for multipliers."""
-    tally.iterations[0] += count
-    tally.iterations[1] = max(tally.iterations[1], count)
+    diagnostics.iterations[0] += count
+    diagnostics.iterations[1] = max(diagnostics.iterations[1], count)

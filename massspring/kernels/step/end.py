@@ -18,11 +18,11 @@ def end_step(frame, step, push, mobility, volumes):
     """
     factor = probed(frame, step, push, mobility, volumes, frame.probing)
     push = Push(push.direction, factor)
-    network, nodes, boundary, tally = frame.network, frame.nodes, frame.boundary, frame.tally
-    add_held_impulse(network, nodes, push, boundary.dt, boundary.gravity, tally.held_impulse)
-    mark(tally.ticks, HELD)
+    network, nodes, boundary, diagnostics = frame.network, frame.nodes, frame.boundary, frame.diagnostics
+    add_held_impulse(network, nodes, push, boundary.dt, boundary.gravity, diagnostics.held_impulse)
+    mark(diagnostics.ticks, HELD)
     advance(frame, push)
-    mark(tally.ticks, INTEGRATION)
+    mark(diagnostics.ticks, INTEGRATION)
     return factor
 
 
@@ -36,5 +36,5 @@ def probed(frame, step, push, mobility, volumes, probing):
         frame.network, frame.nodes, frame.contacts, boundary.tips, probing, volumes, mobility, step, boundary.dt
     )
     factor = meet_probes(stage, volumes, push)
-    mark(frame.tally.ticks, PROBES)
+    mark(frame.diagnostics.ticks, PROBES)
     return factor

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Network, Nodes, Tally, Workspace
+from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Network, Nodes, Workspace
 from massspring.kernels.jit.thread_team import Team
 from massspring.kernels.probe.arrays import Probing
 
@@ -15,7 +15,7 @@ class Frame(NamedTuple):
     contacts: Contacts
     work: Workspace
     boundary: BoundaryConditions
-    tally: Tally
+    diagnostics: FrameDiagnostics
     probing: Probing | None = None
     """Thin probes; None where there are none: the loop is then compiled without their stage."""
     team: Team | None = None

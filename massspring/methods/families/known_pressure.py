@@ -38,7 +38,7 @@ def known_pressure(network, nodes, bulk_modulus, law, volume, target):
 @lean
 def pressure_frame(frame, bulk_modulus, law):
     """One frame of symplectic Euler with a known pressure (eq. 3.1, 3.2, 3.5, 3.7, 10.8); returns the last one [Pa]."""
-    network, nodes, boundary, tally = frame.network, frame.nodes, frame.boundary, frame.tally
+    network, nodes, boundary, diagnostics = frame.network, frame.nodes, frame.boundary, frame.diagnostics
     lam = 0.0
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
@@ -46,8 +46,8 @@ def pressure_frame(frame, bulk_modulus, law):
         lam = known_pressure(network, nodes, bulk_modulus, law, volume, boundary.volume_target[step, 0])
         if not mobility > 0.0:
             lam = 0.0
-            tally.skipped[0] += 1
-        mark(tally.ticks, VOLUME)
+            diagnostics.skipped[0] += 1
+        mark(diagnostics.ticks, VOLUME)
         pressed = Push(nodes.gradient, lam)
         search_contacts(frame, step, pressed)
         # The pressure is a force that no contact changes: no mobility.

@@ -121,7 +121,13 @@ def correct_positions(network, nodes, contacts, target, dt):
 @lean
 def constraint_frame(frame, line, lam, rule):
     """One frame with contact inside the multiplier (eq. 3.1–3.8, 10.1–10.3, 10.5, 10.7); returns the last lam [Pa]."""
-    network, nodes, contacts, boundary, tally = frame.network, frame.nodes, frame.contacts, frame.boundary, frame.tally
+    network, nodes, contacts, boundary, diagnostics = (
+        frame.network,
+        frame.nodes,
+        frame.contacts,
+        frame.boundary,
+        frame.diagnostics,
+    )
     dt, mobility = boundary.dt, 0.0
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
@@ -131,24 +137,24 @@ def constraint_frame(frame, line, lam, rule):
         kept = inertial_change(network, nodes, rule, dt)
         if rule.at_prediction:
             predicted_gradient_into(network, nodes, line, dt)
-        mark(tally.ticks, VOLUME)
+        mark(diagnostics.ticks, VOLUME)
         predicted = lam
         passes = search_contacts(frame, step, Push(nodes.gradient, predicted))
         for sweep in range(passes):
             lam, mobility, capped = linear_multiplier(network, nodes, contacts, error, kept, dt, rule.exact)
             if rule.exact and mobility > 0.0:
                 lam, mobility = exact_multiplier(network, nodes, contacts, line, target, mobility, dt)
-            tally.capped[0] += capped and sweep == 0
+            diagnostics.capped[0] += capped and sweep == 0
             reach = pressure_reach(lam - predicted, mobility, network.largest_inverse_mass, dt)
             if multiplier_stands(frame, step, Push(nodes.gradient, lam), reach, sweep + 1 == passes):
                 break
         if not mobility > 0.0:
-            tally.skipped[0] += 1
+            diagnostics.skipped[0] += 1
         lam = end_step(frame, step, Push(nodes.gradient, lam), mobility, None)
         if rule.stabilised:
-            tally.capped[0] += correct_positions(network, nodes, contacts, target, dt)
+            diagnostics.capped[0] += correct_positions(network, nodes, contacts, target, dt)
             places_into(nodes, frame.work, 0, nodes.x.shape[0])
-            mark(tally.ticks, MULTIPLIER)
+            mark(diagnostics.ticks, MULTIPLIER)
     return lam
 
 

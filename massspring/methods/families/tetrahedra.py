@@ -52,7 +52,7 @@ def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_ar
 @lean
 def cells_frame(frame, cells, bulk_modulus, barycentric):
     """One frame of symplectic Euler with a known pressure in every cell (eq. 3.1, 3.2, 3.5, 3.7, 10.11, 10.12)."""
-    nodes, boundary, tally = frame.nodes, frame.boundary, frame.tally
+    nodes, boundary, diagnostics = frame.nodes, frame.boundary, frame.diagnostics
     nothing = Push(nodes.gradient, 0.0)
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
@@ -62,9 +62,9 @@ def cells_frame(frame, cells, bulk_modulus, barycentric):
         if barycentric:
             add_barycentre_forces(nodes.x, cells, bulk_modulus, cells.push)
         else:
-            tally.skipped[0] += add_volume_forces(nodes.x, cells, bulk_modulus, cells.push)
+            diagnostics.skipped[0] += add_volume_forces(nodes.x, cells, bulk_modulus, cells.push)
         add_to_prediction(frame.network, nodes, cells.push, boundary.dt)
-        mark(tally.ticks, VOLUME)
+        mark(diagnostics.ticks, VOLUME)
         search_contacts(frame, step, nothing)
         end_step(frame, step, nothing, 0.0, None)
     return mean_pressure(cells)

@@ -36,7 +36,7 @@ class Step:
         assert state.rows is not None  # start() made them
         self.boundary, self.step, self.factor, self.accuracy = boundary, step, factor, accuracy
         self.network, self.nodes, self.contacts = state.network, state.nodes, state.contacts
-        self.rows, self.tally = state.rows, state.tally
+        self.rows, self.diagnostics = state.rows, state.diagnostics
         # Without gravity: passes that start from balance must stay there, or a sum of few would be biased.
         self.p = self.nodes.x + boundary.dt * self.nodes.v
         held = self.network.held_nodes
@@ -65,8 +65,8 @@ class Step:
 
     def mark(self, stage: int) -> None:
         """Adds the time since the last mark to this stage, if stages are timed."""
-        if self.tally.ticks is not None:
-            mark(self.tally.ticks, stage)
+        if self.diagnostics.ticks is not None:
+            mark(self.diagnostics.ticks, stage)
 
     def take(self, passes: int) -> None:
         """So many passes; then v⁺ = (x⁺ − x)/dt."""
@@ -104,7 +104,7 @@ class Step:
             self.rows.lam[:] += self.rows.search
             if self.far_off:
                 break  # the pressure of one linear step along J where it began says nothing about J where it ended
-        self.tally.skipped[0] += self.idle
+        self.diagnostics.skipped[0] += self.idle
         self.book(touching, impulses)
         self.mark(HELD)
         self.nodes.v[:] = (self.p - self.nodes.x) / self.boundary.dt
@@ -140,7 +140,7 @@ class Step:
         error = self.target - begun
         cut = (np.abs(error) > most) & (most > 0.0)
         self.far_off = bool(cut.any())
-        self.tally.capped[0] += self.far_off
+        self.diagnostics.capped[0] += self.far_off
         self.target = np.where(cut, begun + np.clip(error, -most, most), self.target)
 
     def imbalance(self) -> np.ndarray:
@@ -198,18 +198,18 @@ class Step:
             step = rho / float(search @ image)
             pressure, answer, residual = pressure + step * search, answer + step * response, residual - step * image
             before, count = rho, count + 1
-        self.tally.iterations[0] += count
-        self.tally.iterations[1] = max(int(self.tally.iterations[1]), count)
+        self.diagnostics.iterations[0] += count
+        self.diagnostics.iterations[1] = max(int(self.diagnostics.iterations[1]), count)
         return pressure, answer
 
     def book(self, touching: Touching, impulses: np.ndarray) -> None:
         """Impulses of obstacles and attachments [N s] (eq. 3.6)."""
         nodes, contacts, net, dt = self.nodes, self.contacts, self.network, self.boundary.dt
-        given = self.tally.contact_impulse
+        given = self.diagnostics.contact_impulse
         np.add.at(given, touching.obstacle, impulses[:, None] / dt * touching.direction)
         if self.boundary.rough:
             rubbed = np.flatnonzero(self.contact.rubbed.any(axis=1))
             np.add.at(given, contacts.touched[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
         spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, nodes.force)
         push = Push(self.pushed(self.rows.lam), 1.0)
-        add_held_impulse(net, nodes, push, dt, self.boundary.gravity, self.tally.held_impulse)
+        add_held_impulse(net, nodes, push, dt, self.boundary.gravity, self.diagnostics.held_impulse)

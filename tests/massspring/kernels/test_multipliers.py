@@ -23,7 +23,7 @@ from massspring.kernels.step.advance import advance
 from massspring.kernels.step.begin import open_frame
 from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
-from massspring.layout.state import new_tally
+from massspring.layout.state import new_diagnostics
 from massspring.methods.implicit_volume import set_right_side, solve_multipliers
 from tests.massspring.kernels.test_kernels import ROUND_OFF, directional, moved
 from tests.massspring.methods.test_methods import clock_for, squeeze
@@ -84,8 +84,8 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
     target = 1.001 * several.rest_volumes
     network = state.network._replace(longest_correction=np.inf)
     set_right_side(network, rows, nodes, contacts, target, dt, 1e-13)
-    tally = new_tally(1, 1)
-    solve_multipliers(network, rows, contacts, tally, Accuracy(1e-13, 2000))
+    diagnostics = new_diagnostics(1, 1)
+    solve_multipliers(network, rows, contacts, diagnostics, Accuracy(1e-13, 2000))
     jacobian = np.zeros((several.kept.count, n, 3))
     for r in range(several.kept.count):
         entries = slice(rows.row_start[r], rows.row_start[r + 1])
@@ -104,9 +104,9 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
         assert np.abs(rows.lam - lam).max() < 1e-6 * np.abs(lam).max()
     boundary = Setup(several, ImplicitVolume(), Clock(dt, 1, 1)).boundary(0)
     open_frame(state.frame(boundary))
-    advance(replace(state, tally=new_tally(2, 1)).frame(boundary), Push(rows.push, 1.0))
+    advance(replace(state, diagnostics=new_diagnostics(2, 1)).frame(boundary), Push(rows.push, 1.0))
     assert np.allclose(nodes.v.ravel(), solution[: 3 * n], atol=1e-7)  # a millionth of the velocities of 0.1 m/s
-    assert (tally.iterations[1] > 0) != dense
+    assert (diagnostics.iterations[1] > 0) != dense
 
 
 def test_an_iteration_ends_as_soon_as_a_residual_is_no_number(block_body, monkeypatch):

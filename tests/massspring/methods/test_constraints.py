@@ -58,10 +58,10 @@ def test_hcj05_is_one_rule_of_the_family(body):
         assert np.abs(mine.x - other.x).max() < 1e-11 * body.size
         assert mine.lam == pytest.approx(other.lam, rel=1e-8)
         for name in ("contact_impulse", "held_impulse"):
-            expected = getattr(other.tally, name)
-            assert np.allclose(getattr(mine.tally, name), expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+            expected = getattr(other.diagnostics, name)
+            assert np.allclose(getattr(mine.diagnostics, name), expected, rtol=0, atol=1e-8 * np.abs(expected).max())
         for name in ("capped", "skipped"):
-            assert np.array_equal(getattr(mine.tally, name), getattr(other.tally, name))
+            assert np.array_equal(getattr(mine.diagnostics, name), getattr(other.diagnostics, name))
 
 
 def test_hcj05_is_the_first_newton_step_of_shake(body):

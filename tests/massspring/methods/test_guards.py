@@ -84,7 +84,7 @@ def corrected(case: Case, matrix, clock: Clock) -> tuple[float, int]:
     volume = case.body.kept.measure(setup.start().x.astype(np.float64))
     for target in (case.body.rest_volumes, volume):
         after = case.method.advance(setup.start(), boundary._replace(volume_target=target[None, :].copy()))
-        ends.append((after.x.astype(np.float64), int(after.tally.capped[0])))
+        ends.append((after.x.astype(np.float64), int(after.diagnostics.capped[0])))
     far = np.linalg.norm(ends[0][0] - ends[1][0], axis=1).max()
     return far / setup.start().network.longest_correction, ends[0][1]
 

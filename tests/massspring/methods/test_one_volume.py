@@ -20,7 +20,7 @@ from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_in
 from massspring.kernels.step.advance import advance
 from massspring.kernels.step.begin import open_frame
 from massspring.layout.allocate import start
-from massspring.layout.state import new_tally
+from massspring.layout.state import new_diagnostics
 from tests.massspring.methods.test_methods import clock_for, squeeze, thrown
 from tests.massspring.touched import seat
 
@@ -76,7 +76,7 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
 
     x = nodes.x.copy()
     boundary = Setup(body, ImplicitVolume(), Clock(dt, 1, 1)).boundary(0)
-    frame = replace(state, tally=new_tally(1, 1)).frame(boundary)
+    frame = replace(state, diagnostics=new_diagnostics(1, 1)).frame(boundary)
     open_frame(frame)
     advance(frame, Push(nodes.gradient, lam))
     assert np.allclose(nodes.v.ravel(), solution[:n], atol=1e-12)
@@ -88,7 +88,7 @@ def test_a_body_without_a_volume_gradient_is_counted_not_crashed(ball_body):
     state = setup.start()
     state.nodes.x[:] = np.outer(np.linspace(0, 0.1, ball_body.node_count), [1.0, 0.0, 0.0])
     after = setup.method.advance(state, setup.boundary(0))
-    assert after.tally.skipped[0] == 1
+    assert after.diagnostics.skipped[0] == 1
     assert after.lam == 0.0 and np.isfinite(after.x).all()
 
 

@@ -57,7 +57,7 @@ def test_a_jump_of_the_target_is_made_up_over_some_steps(hollow_body):
         before = state.x
         state = setup.method.advance(state, setup.boundary(frame)._replace(volume_target=jump))
         longest = max(longest, float(np.linalg.norm(state.x - before, axis=1).max()))
-        capped += int(state.tally.capped[0])
+        capped += int(state.diagnostics.capped[0])
     assert capped > 1 and longest < 1.5 * cap
     factor = hollow_body.kept.measure(state.x) / hollow_body.rest_volumes
     assert np.abs(factor - [1.0, 2.5]).max() < 1e-3
@@ -72,7 +72,7 @@ def test_a_crushed_body_comes_back(kept_body):
     capped = 0
     for frame in range(400):
         state = setup.method.advance(state, setup.boundary(frame))
-        capped += int(state.tally.capped[0])
+        capped += int(state.diagnostics.capped[0])
     assert capped > 0
     assert np.abs(body.kept.measure(state.x) / body.rest_volumes - 1).max() < 1e-3
 

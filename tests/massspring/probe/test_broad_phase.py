@@ -124,6 +124,6 @@ def test_a_tip_from_afar_wakes_what_it_meets(way):
         state = replace(state, probing=state.probing._replace(skipping=skipping))
         for frame in range(setup.clock.frames):
             state = setup.method.advance(state, setup.boundary(frame))
-        ends.append((state.x, state.v, state.tally.contact_impulse))
+        ends.append((state.x, state.v, state.diagnostics.contact_impulse))
         assert state.probing.counts[IN_CONTACT] > 0
     assert all(np.array_equal(a, b) for a, b in zip(*ends, strict=True))

@@ -183,7 +183,7 @@ def test_sleeping_pairs_and_boxes_change_no_bit(method, radius):
             state = setup.method.advance(state, setup.boundary(frame))
         assert state.probing.counts[IN_CONTACT] > 100, "the probe hardly ever touched"
         boxes.append(state.probing.counts[COMPARED] / (20 * setup.clock.frames))
-        ends.append((state.x, state.v, state.lam, state.tally.contact_impulse))
+        ends.append((state.x, state.v, state.lam, state.diagnostics.contact_impulse))
     assert all(np.array_equal(a, b) for a, b in zip(*ends, strict=True))
     assert boxes[1] >= len(BALL.triangles)
     assert boxes[0] < 0.3 * boxes[1]

@@ -48,7 +48,7 @@ def test_sleeping_pairs_and_boxes_change_no_bit(method):
         for frame in range(setup.clock.frames):
             state = method.advance(state, setup.boundary(frame))
         assert state.probing.counts[IN_CONTACT] > 100, "the probe hardly ever touched"
-        ends.append((state.x, state.v, state.lam, state.tally.contact_impulse, state.probing.counts[COMPARED]))
+        ends.append((state.x, state.v, state.lam, state.diagnostics.contact_impulse, state.probing.counts[COMPARED]))
     assert all(np.array_equal(a, b) for a, b in zip(ends[0][:-1], ends[1][:-1], strict=True))
     assert ends[0][-1] < 0.3 * ends[1][-1]
 

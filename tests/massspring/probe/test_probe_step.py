@@ -62,7 +62,7 @@ def test_a_step_that_carries_nodes_keeps_volumes_and_books_what_the_tip_gives(an
     carried = np.abs(v - tip).max(axis=1) < 1e-9 * np.linalg.norm(tip)
     assert carried.sum() == counts[CARRIED] >= 3
     given = (before.network.mass[:, None] * v).sum(axis=0)
-    assert np.abs(after.tally.contact_impulse[0] - given).max() < 1e-9 * np.abs(given).max()
+    assert np.abs(after.diagnostics.contact_impulse[0] - given).max() < 1e-9 * np.abs(given).max()
     # From rest, with volumes as they should be, the rates of all volumes stay zero: others make room.
     jacobian = gradients(any_body, before.x)
     assert np.abs(jacobian @ v.ravel()).max() < 1e-6 * (np.abs(jacobian) @ np.abs(v.ravel())).max()

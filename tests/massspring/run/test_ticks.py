@@ -46,7 +46,7 @@ def kept_body(row, request):
 def run(setup, ticks=None):
     """The last state, and how long the frames took [ns]."""
     state = setup.start()
-    state = replace(state, tally=state.tally._replace(ticks=ticks))
+    state = replace(state, diagnostics=state.diagnostics._replace(ticks=ticks))
     elapsed = 0
     for frame in range(FRAMES):
         boundary = setup.boundary(frame)
