@@ -7,7 +7,7 @@ import numpy as np
 
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Network, Nodes, Workspace
 from massspring.kernels.arrays.volume_rows import VolumeRows
-from massspring.kernels.jit.stage_clock import Ticks
+from massspring.kernels.jit.stage_clock import StageTimes
 from massspring.kernels.jit.thread_team import Team
 from massspring.kernels.probe.arrays import Probing
 from massspring.kernels.step.frame import Frame
@@ -61,7 +61,9 @@ class State:
         return replace(self, nodes=nodes)
 
 
-def new_diagnostics(obstacles: int, attachments: int, ticks: Ticks | None = None) -> FrameDiagnostics:
-    """A tally at zero; the ticks go on."""
+def new_diagnostics(obstacles: int, attachments: int, stage_times: StageTimes | None = None) -> FrameDiagnostics:
+    """Diagnostics at zero; the stage times go on."""
     skipped, capped, iterations = (np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
-    return FrameDiagnostics(np.zeros((obstacles, 3)), np.zeros((attachments, 3)), skipped, capped, iterations, ticks)
+    return FrameDiagnostics(
+        np.zeros((obstacles, 3)), np.zeros((attachments, 3)), skipped, capped, iterations, stage_times
+    )

@@ -21,7 +21,7 @@ from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions, Push
 from massspring.kernels.constraint.tetrahedra import any_idle, cell_forces_into, cell_rows_into, solve_cells
 from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
 from massspring.kernels.jit.decorators import lean
-from massspring.kernels.jit.stage_clock import VOLUME, mark
+from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.step.begin import begin_step, count_iterations, multiplier_stands, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
 from massspring.layout.allocate import start
@@ -44,7 +44,7 @@ def hard_frame(frame, cells, compliance, accuracy):
         begin_step(frame, step, False)
         cell_rows_into(nodes.x, cells, cells.right)
         cell_forces_into(cells, cells.pressure, cells.push)
-        mark(diagnostics.ticks, VOLUME)
+        end_stage(diagnostics.stage_times, VOLUME)
         passes = search_contacts(frame, step, push)
         for sweep in range(passes):
             cell_rows_into(nodes.x, cells, cells.right)

@@ -19,7 +19,7 @@ import numpy as np
 
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions
-from massspring.kernels.jit.stage_clock import OUTSIDE, mark
+from massspring.kernels.jit.stage_clock import BETWEEN_FRAMES, end_stage
 from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.state import State
@@ -65,8 +65,8 @@ class ImplicitSprings(Method):
         assert after.rows is not None  # start() made them
         after.rows.lam[:] = after.lam + after.network.rest_lam
         factor = after.memory.at(after.network, boundary.dt, boundary.damping)
-        if after.diagnostics.ticks is not None:
-            mark(after.diagnostics.ticks, OUTSIDE)
+        if after.diagnostics.stage_times is not None:
+            end_stage(after.diagnostics.stage_times, BETWEEN_FRAMES)
         accuracy = Accuracy(self.tolerance, self.most_iterations)
         for step in range(len(boundary.position)):
             Step(after, boundary, step, factor, accuracy).take(self.passes)

@@ -31,7 +31,7 @@ from massspring.kernels.constraint.one_volume import capped_error, multiplier_of
 from massspring.kernels.constraint.schur import dense_into, solve_dense, solve_iteratively
 from massspring.kernels.contact.active_set import pressure_reach
 from massspring.kernels.jit.decorators import compiled, inlined, lean
-from massspring.kernels.jit.stage_clock import VOLUME, mark
+from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.step.begin import (
     begin_step,
     begin_summed_step,
@@ -147,7 +147,7 @@ def implicit_volumes_frame(frame, rows, accuracy):
         begin_step(frame, step, False)
         rows_into(nodes.x, network.inverse_mass, rows)
         transposed_rows_times_into(rows, rows.lam, rows.push)
-        mark(diagnostics.ticks, VOLUME)
+        end_stage(diagnostics.stage_times, VOLUME)
         target, passes = boundary.volume_target[step], search_contacts(frame, step, push)
         for sweep in range(passes):
             capped, idle = set_right_side(network, rows, nodes, contacts, target, boundary.dt, accuracy.tolerance)

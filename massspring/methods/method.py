@@ -53,7 +53,7 @@ def begin_frame(state: State, boundary: BoundaryConditions) -> State:
     """A copy to advance in place, so that the caller's state stays what it was."""
     nodes = state.nodes._replace(x=state.nodes.x.copy(), v=state.nodes.v.copy())
     obstacles = len(boundary.radius) + boundary.tips.end.shape[1]
-    diagnostics = new_diagnostics(obstacles, boundary.held_displacement.shape[1], state.diagnostics.ticks)
+    diagnostics = new_diagnostics(obstacles, boundary.held_displacement.shape[1], state.diagnostics.stage_times)
     probing = None if state.probing is None else fresh(state.probing, diagnostics)
     return replace(state, nodes=nodes, diagnostics=diagnostics, probing=probing)
 

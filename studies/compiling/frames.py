@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from massspring import METHODS, Attachment, Clock, Method, Plane, Probe, Setup, Trajectory, simulate, step_limit
-from massspring.kernels.jit.stage_clock import new_ticks
+from massspring.kernels.jit.stage_clock import new_stage_times
 from massspring.layout.threads import shared
 from massspring.methods import VARIANTS
 from massspring.run.precision import Precision
@@ -74,7 +74,7 @@ def advance(variant: Variant) -> None:
         return
     state = setup.start()
     if variant.option == CLOCK:
-        state = replace(state, diagnostics=state.diagnostics._replace(ticks=new_ticks()))
+        state = replace(state, diagnostics=state.diagnostics._replace(stage_times=new_stage_times()))
     else:
         state = shared(state, 2)  # asked for by name, whatever the number of cores
     for frame in range(FRAMES):

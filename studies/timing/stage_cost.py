@@ -1,7 +1,7 @@
 """What a step of a scene costs, stage by stage, what the scene does not need, and what leaving that out saves.
 
-The stages are those that the frame loop of the method marks (massspring.kernels.jit.stage_clock): real steps of the
-real run, on one pinned core. The same frames without marks are run in turns; what they take beyond is the rest.
+The stages are those that the frame loop of the method times (massspring.kernels.jit.stage_clock): real steps of the
+real run, on one pinned core. The same frames without them are run in turns; what they take beyond is the rest.
 """
 
 from dataclasses import replace
@@ -13,7 +13,14 @@ import pandas as pd
 
 from massspring import MassSpringError, Setup, State
 from massspring.kernels.jit.decorators import compiled
-from massspring.kernels.jit.stage_clock import INTEGRATION, OUTSIDE, STAGES, Ticks, mark, new_ticks
+from massspring.kernels.jit.stage_clock import (
+    BETWEEN_FRAMES,
+    INTEGRATION,
+    STAGES,
+    StageTimes,
+    end_stage,
+    new_stage_times,
+)
 from massspring.run.history import EXTRA, Recorder
 from massspring.run.simulation import check_state
 from studies.runs.case import Case
@@ -26,39 +33,41 @@ BUDGET = 4.0
 """Time for the repeats [s]: the next turn is left out when it would take longer than that; the first never is."""
 DEAR = 5.0
 """Times the run as it is, from where one with a stage is run once only: that is far from the noise."""
-MARKS = 100_000
-"""Marks in a row, to learn what one costs."""
+ENDS = 100_000
+"""Ends of stages in a row, to learn what one costs."""
 CALL = "call of the frame"
 """From Python into compiled code and back, with the copies that leave the old state as it was."""
 ROWS = (*STAGES, CALL)
 PATHS, RECORDING = "paths of obstacles and targets", "recording"
 ENERGIES = "energies: no metric reads them"
 """Left out of recording, unless a case asks for them."""
-PLAIN, TICKED = "as it is", "with marks"
+PLAIN, TIMED = "as it is", "with marks"
 STAGE, SKIPPED, FRAME = "stage", "skipped", "per frame"
 
 
 Run = tuple[np.ndarray, np.ndarray, State]
-"""Time of each frame [ns], (F,); of its ROWS, with what marking cost taken off, (rows, F); the last state."""
+"""Time of each frame [ns], (F,); of its ROWS, less what timing them cost, (rows, F); the last state."""
 
 
-def run_frames(setup: Setup, state: State, ticks: Ticks | None = None, frames: int | None = None) -> Run:
+def run_frames(setup: Setup, state: State, times: StageTimes | None = None, frames: int | None = None) -> Run:
     """Runs the first `frames` of a set-up, or all. Raises MassSpringError for a run that breaks off."""
-    state = replace(state, diagnostics=state.diagnostics._replace(ticks=ticks))
+    state = replace(state, diagnostics=state.diagnostics._replace(stage_times=times))
     frames = setup.clock.frames if frames is None else frames
     frame_ns, stage_ns = np.zeros(frames), np.zeros((len(ROWS), frames))
-    price = mark_ns() if ticks is not None else 0.0
+    price = end_stage_ns() if times is not None else 0.0
     for frame in range(frames):
         boundary = setup.boundary(frame)
-        if ticks is not None:
-            ticks.spent[:], ticks.marks[:] = 0, 0
+        if times is not None:
+            times.spent[:], times.ended[:] = 0, 0
         begin = perf_counter_ns()
         state = setup.method.advance(state, boundary)
         frame_ns[frame] = perf_counter_ns() - begin
-        if ticks is not None:
-            # A stage of some nanoseconds may seem to cost less than its mark.
-            stage_ns[:OUTSIDE, frame] = np.maximum(ticks.spent[:OUTSIDE] - price * ticks.marks[:OUTSIDE], 0.0)
-            stage_ns[OUTSIDE, frame] = frame_ns[frame] - ticks.spent[:OUTSIDE].sum()
+        if times is not None:
+            # A stage of some nanoseconds may seem to cost less than its end.
+            stage_ns[:BETWEEN_FRAMES, frame] = np.maximum(
+                times.spent[:BETWEEN_FRAMES] - price * times.ended[:BETWEEN_FRAMES], 0.0
+            )
+            stage_ns[BETWEEN_FRAMES, frame] = frame_ns[frame] - times.spent[:BETWEEN_FRAMES].sum()
         reason = check_state(state, setup.body)
         if reason is not None:
             raise MassSpringError(f"the run broke off while its cost was measured: {reason}; take a smaller dt")
@@ -67,23 +76,23 @@ def run_frames(setup: Setup, state: State, ticks: Ticks | None = None, frames: i
 
 def stage_times(setup: Setup) -> np.ndarray:
     """Time of each of ROWS in each frame [ns], (rows, F); compiled before."""
-    run_frames(setup, setup.start(), new_ticks(), frames=1)
-    return run_frames(setup, setup.start(), new_ticks())[1]
+    run_frames(setup, setup.start(), new_stage_times(), frames=1)
+    return run_frames(setup, setup.start(), new_stage_times())[1]
 
 
 @compiled
-def _marks(ticks, count):
+def _end_stages(times, count):
     for _ in range(count):
-        mark(ticks, INTEGRATION)
+        end_stage(times, INTEGRATION)
 
 
-def mark_ns() -> float:
-    """What a mark costs [ns]."""
-    ticks = new_ticks()
-    _marks(ticks, 1)
+def end_stage_ns() -> float:
+    """What the end of a stage costs [ns]."""
+    times = new_stage_times()
+    _end_stages(times, 1)
     begin = perf_counter_ns()
-    _marks(ticks, MARKS)
-    return (perf_counter_ns() - begin) / MARKS
+    _end_stages(times, ENDS)
+    return (perf_counter_ns() - begin) / ENDS
 
 
 def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget: float = BUDGET) -> pd.DataFrame:
@@ -94,7 +103,7 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget:
     Raises StudyError or MassSpringError for a case that cannot run."""
     setup = prepare(case.replaced(frames=min(frames, case.frames or case.scene.frames))).setup
     skipped = [skip for skip in SKIPS if skip.left_out(setup)]
-    runs = {PLAIN: partial(run_frames, setup, setup.start()), TICKED: partial(_ticked, setup)}
+    runs = {PLAIN: partial(run_frames, setup, setup.start()), TIMED: partial(_ticked, setup)}
     runs |= {skip.name: partial(run_frames, *skip.included(setup, setup.start())) for skip in skipped}
     with pinned(threads=1):
         found = _in_turns(runs, repeats, budget)
@@ -102,7 +111,7 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget:
     to_step = 1e-3 / setup.clock.steps
     whole = {name: to_step * float(np.min([r[0] for r in results], axis=0).mean()) for name, results in found.items()}
     step = whole[PLAIN]
-    stages = to_step * _fastest(found[TICKED]).mean(axis=1)
+    stages = to_step * _fastest(found[TIMED]).mean(axis=1)
     rows = [(STAGE, name, cost, "") for name, cost in zip(ROWS, stages, strict=True) if cost > 0]
     rows += [(STAGE, "rest, not attributed", step - float(stages.sum()), ""), (STAGE, "whole step", step, "")]
     end = found[PLAIN][0][2]
@@ -115,7 +124,7 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget:
 
 
 def _ticked(setup: Setup, frames: int | None = None) -> Run:
-    return run_frames(setup, setup.start(), new_ticks(), frames)
+    return run_frames(setup, setup.start(), new_stage_times(), frames)
 
 
 def _in_turns(runs: dict[str, partial[Run]], repeats: int, budget: float) -> dict[str, list[Run]]:
@@ -140,10 +149,10 @@ def _in_turns(runs: dict[str, partial[Run]], repeats: int, budget: float) -> dic
     return found
 
 
-def _fastest(ticked: list[Run]) -> np.ndarray:
+def _fastest(timed: list[Run]) -> np.ndarray:
     """Times of ROWS in the fastest repeat of each frame, (rows, F)."""
-    quickest = np.argmin([frame_ns for frame_ns, _, _ in ticked], axis=0)
-    stages = np.stack([stage_ns for _, stage_ns, _ in ticked])
+    quickest = np.argmin([frame_ns for frame_ns, _, _ in timed], axis=0)
+    stages = np.stack([stage_ns for _, stage_ns, _ in timed])
     return stages[quickest, :, np.arange(stages.shape[2])].T
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.arrays.spring_layout import Membrane, Slices
-from massspring.kernels.jit.stage_clock import Ticks
+from massspring.kernels.jit.stage_clock import StageTimes
 
 
 class Network(NamedTuple):
@@ -175,5 +175,5 @@ class FrameDiagnostics(NamedTuple):
     """Steps that made up for a part only of a wrong volume, (1,) int64."""
     iterations: np.ndarray
     """Iterations for the multipliers: their sum, and the most in one step, (2,) int64; 0 where they are direct."""
-    ticks: Ticks | None = None
+    stage_times: StageTimes | None = None
     """Where the time goes; None where it is not measured."""

@@ -1,4 +1,4 @@
-"""A clock inside the frame loop: what each stage of a step costs. Without ticks a mark compiles to nothing."""
+"""A clock inside the frame loop: what each stage of a step costs. Without times `end_stage` compiles to nothing."""
 
 from time import perf_counter_ns
 from typing import NamedTuple
@@ -22,26 +22,25 @@ STAGES = (
     "integration",
 )
 """Where one volume is kept by implicit_volume, its gradient is found in the same pass as the springs."""
-SPRINGS, HELD, VOLUME, SEARCH, MULTIPLIER, REVISION, PROBES, INTEGRATION, OUTSIDE = range(len(STAGES) + 1)
-"""OUTSIDE: between two frames."""
+SPRINGS, HELD, VOLUME, SEARCH, MULTIPLIER, REVISION, PROBES, INTEGRATION, BETWEEN_FRAMES = range(len(STAGES) + 1)
 MONOTONIC = 1
 """The clock's number in POSIX systems (Linux)."""
 
 
-class Ticks(NamedTuple):
-    """Where marks write."""
+class StageTimes(NamedTuple):
+    """Where the time of a frame goes."""
 
     spent: np.ndarray
     """Time in each stage and outside [ns], (stages + 1,) int64."""
     last: np.ndarray
-    """Time of the last mark [ns], (1,) int64."""
-    marks: np.ndarray
-    """How many there were, each stage apart, (stages + 1,) int64."""
+    """When the last stage ended [ns], (1,) int64."""
+    ended: np.ndarray
+    """How often each ended, (stages + 1,) int64."""
 
 
-def new_ticks() -> Ticks:
-    """Ticks at zero."""
-    return Ticks(*(np.zeros(size, dtype=np.int64) for size in (len(STAGES) + 1, 1, len(STAGES) + 1)))
+def new_stage_times() -> StageTimes:
+    """Stage times at zero."""
+    return StageTimes(*(np.zeros(size, dtype=np.int64) for size in (len(STAGES) + 1, 1, len(STAGES) + 1)))
 
 
 @intrinsic
@@ -72,10 +71,10 @@ def _compiled_now():
 
 
 @inlined
-def mark(ticks, stage):
-    """Books the time since the last mark on `stage`; nothing where ticks is None."""
-    if ticks is not None:
+def end_stage(times, stage):
+    """Books the time since the last stage ended on `stage`; nothing where `times` is None."""
+    if times is not None:
         time = now()
-        ticks.spent[stage] += time - ticks.last[0]
-        ticks.marks[stage] += 1
-        ticks.last[0] = time
+        times.spent[stage] += time - times.last[0]
+        times.ended[stage] += 1
+        times.last[0] = time

@@ -4,14 +4,14 @@ from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts,
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.fused.sweep import predict_from_places
 from massspring.kernels.jit.decorators import inlined
-from massspring.kernels.jit.stage_clock import HELD, MULTIPLIER, OUTSIDE, REVISION, SEARCH, SPRINGS, mark
+from massspring.kernels.jit.stage_clock import BETWEEN_FRAMES, HELD, MULTIPLIER, REVISION, SEARCH, SPRINGS, end_stage
 from massspring.kernels.step.attachments import prescribe, prescribe_velocity_into
 
 
 @inlined
 def open_frame(frame):
     """Books the time between two frames, and pads the positions for the first step."""
-    mark(frame.diagnostics.ticks, OUTSIDE)
+    end_stage(frame.diagnostics.stage_times, BETWEEN_FRAMES)
     places_into(frame.nodes, frame.work, 0, frame.nodes.x.shape[0])
 
 
@@ -23,12 +23,12 @@ def begin_step(frame, step, keeps):
     """
     network, nodes, boundary = frame.network, frame.nodes, frame.boundary
     volume, _, mobility = predict_from_places(network, nodes, frame.work, boundary, keeps, frame.team)
-    mark(frame.diagnostics.ticks, SPRINGS)
+    end_stage(frame.diagnostics.stage_times, SPRINGS)
     held = boundary.held_displacement[step]
     prescribe_velocity_into(
         nodes.x, network.held_nodes, network.held_group, network.held_rest, held, boundary.dt, nodes.v_star
     )
-    mark(frame.diagnostics.ticks, HELD)
+    end_stage(frame.diagnostics.stage_times, HELD)
     return volume, mobility
 
 
@@ -37,9 +37,9 @@ def begin_summed_step(frame, step):
     """The same with G and with G·v* [m³/s] of all nodes, so that no other pass sums it: (V, G·v*, G·W·G)."""
     network, nodes, boundary = frame.network, frame.nodes, frame.boundary
     volume, flow, mobility = predict_from_places(network, nodes, frame.work, boundary, True, frame.team)
-    mark(frame.diagnostics.ticks, SPRINGS)
+    end_stage(frame.diagnostics.stage_times, SPRINGS)
     flow += prescribe(network, nodes, boundary.held_displacement[step], boundary.dt)
-    mark(frame.diagnostics.ticks, HELD)
+    end_stage(frame.diagnostics.stage_times, HELD)
     return volume, flow, mobility
 
 
@@ -49,7 +49,7 @@ def search_contacts(frame, step, push):
     if frame.boundary.radius.shape[0] == 0:
         return 1
     find_contacts(frame.network, frame.nodes, frame.contacts, frame.boundary, step, push, frame.team)
-    mark(frame.diagnostics.ticks, SEARCH)
+    end_stage(frame.diagnostics.stage_times, SEARCH)
     return CONTACT_PASSES
 
 
@@ -59,11 +59,11 @@ def multiplier_stands(frame, step, push, reach, last):
 
     `reach` [m]: how far the new push can have moved a node; where contacts change, the multiplier is solved for again.
     """
-    mark(frame.diagnostics.ticks, MULTIPLIER)
+    end_stage(frame.diagnostics.stage_times, MULTIPLIER)
     if last:
         return True
     changes = revise_contacts(frame.network, frame.nodes, frame.contacts, frame.boundary, step, push, reach)
-    mark(frame.diagnostics.ticks, REVISION)
+    end_stage(frame.diagnostics.stage_times, REVISION)
     return changes == 0
 
 

@@ -2,7 +2,7 @@
 
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.jit.decorators import inlined
-from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, PROBES, mark
+from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, PROBES, end_stage
 from massspring.kernels.probe.arrays import Stage
 from massspring.kernels.probe.stage import meet_probes
 from massspring.kernels.step.advance import advance
@@ -20,9 +20,9 @@ def end_step(frame, step, push, mobility, volumes):
     push = Push(push.direction, factor)
     network, nodes, boundary, diagnostics = frame.network, frame.nodes, frame.boundary, frame.diagnostics
     add_held_impulse(network, nodes, push, boundary.dt, boundary.gravity, diagnostics.held_impulse)
-    mark(diagnostics.ticks, HELD)
+    end_stage(diagnostics.stage_times, HELD)
     advance(frame, push)
-    mark(diagnostics.ticks, INTEGRATION)
+    end_stage(diagnostics.stage_times, INTEGRATION)
     return factor
 
 
@@ -36,5 +36,5 @@ def probed(frame, step, push, mobility, volumes, probing):
         frame.network, frame.nodes, frame.contacts, boundary.tips, probing, volumes, mobility, step, boundary.dt
     )
     factor = meet_probes(stage, volumes, push)
-    mark(frame.diagnostics.ticks, PROBES)
+    end_stage(frame.diagnostics.stage_times, PROBES)
     return factor

@@ -16,7 +16,7 @@ from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.forces.volume import pyramid_volume, volume_gradient_into
 from massspring.kernels.jit.decorators import compiled, lean
-from massspring.kernels.jit.stage_clock import VOLUME, mark
+from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
 from massspring.layout.state import State
@@ -47,7 +47,7 @@ def pressure_frame(frame, bulk_modulus, law):
         if not mobility > 0.0:
             lam = 0.0
             diagnostics.skipped[0] += 1
-        mark(diagnostics.ticks, VOLUME)
+        end_stage(diagnostics.stage_times, VOLUME)
         pressed = Push(nodes.gradient, lam)
         search_contacts(frame, step, pressed)
         # The pressure is a force that no contact changes: no mobility.

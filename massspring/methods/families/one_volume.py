@@ -22,7 +22,7 @@ from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.jit.decorators import compiled, lean
-from massspring.kernels.jit.stage_clock import MULTIPLIER, VOLUME, mark
+from massspring.kernels.jit.stage_clock import MULTIPLIER, VOLUME, end_stage
 from massspring.kernels.step.begin import begin_step, multiplier_stands, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
 from massspring.layout.state import State
@@ -137,7 +137,7 @@ def constraint_frame(frame, line, lam, rule):
         kept = inertial_change(network, nodes, rule, dt)
         if rule.at_prediction:
             predicted_gradient_into(network, nodes, line, dt)
-        mark(diagnostics.ticks, VOLUME)
+        end_stage(diagnostics.stage_times, VOLUME)
         predicted = lam
         passes = search_contacts(frame, step, Push(nodes.gradient, predicted))
         for sweep in range(passes):
@@ -154,7 +154,7 @@ def constraint_frame(frame, line, lam, rule):
         if rule.stabilised:
             diagnostics.capped[0] += correct_positions(network, nodes, contacts, target, dt)
             places_into(nodes, frame.work, 0, nodes.x.shape[0])
-            mark(diagnostics.ticks, MULTIPLIER)
+            end_stage(diagnostics.stage_times, MULTIPLIER)
     return lam
 
 

@@ -15,7 +15,7 @@ from massspring.kernels.forces.tetrahedron_volumes import (
     mean_pressure,
 )
 from massspring.kernels.jit.decorators import lean
-from massspring.kernels.jit.stage_clock import VOLUME, mark
+from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
 from massspring.kernels.step.predict import add_to_prediction
@@ -64,7 +64,7 @@ def cells_frame(frame, cells, bulk_modulus, barycentric):
         else:
             diagnostics.skipped[0] += add_volume_forces(nodes.x, cells, bulk_modulus, cells.push)
         add_to_prediction(frame.network, nodes, cells.push, boundary.dt)
-        mark(diagnostics.ticks, VOLUME)
+        end_stage(diagnostics.stage_times, VOLUME)
         search_contacts(frame, step, nothing)
         end_step(frame, step, nothing, 0.0, None)
     return mean_pressure(cells)

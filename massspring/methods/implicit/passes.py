@@ -8,7 +8,16 @@ import numpy as np
 from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions, Push
 from massspring.kernels.constraint.jacobian import rows_into, rows_times_into, transposed_rows_times_into
 from massspring.kernels.forces.springs import spring_forces_into
-from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, REVISION, SEARCH, SPRINGS, VOLUME, mark
+from massspring.kernels.jit.stage_clock import (
+    HELD,
+    INTEGRATION,
+    MULTIPLIER,
+    REVISION,
+    SEARCH,
+    SPRINGS,
+    VOLUME,
+    end_stage,
+)
 from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.implicit_step import imbalance_into
 from massspring.layout.jacobian_pattern import DENSE_UP_TO
@@ -63,10 +72,10 @@ class Step:
         transposed_rows_times_into(self.rows, pressure, force)
         return force
 
-    def mark(self, stage: int) -> None:
-        """Adds the time since the last mark to this stage, if stages are timed."""
-        if self.diagnostics.ticks is not None:
-            mark(self.diagnostics.ticks, stage)
+    def end_stage(self, stage: int) -> None:
+        """Adds the time since the last stage ended to this one, if stages are timed."""
+        if self.diagnostics.stage_times is not None:
+            end_stage(self.diagnostics.stage_times, stage)
 
     def take(self, passes: int) -> None:
         """So many passes; then v⁺ = (x⁺ − x)/dt."""
@@ -75,16 +84,16 @@ class Step:
         touching, impulses = self.touch(), np.zeros(0)
         obstacles = len(self.boundary.radius) > 0
         if obstacles:
-            self.mark(SEARCH)
+            self.end_stage(SEARCH)
         for number in range(passes):
             if number > 0 and self.contact.rub(self.p, touching, impulses):
                 touching = self.touch()
             free = self.factor.respond(self.imbalance())
-            self.mark(SPRINGS)
+            self.end_stage(SPRINGS)
             if number == 0 and self.few:
                 self.answers = self.answers_of_all()
                 self.reach(touching)
-                self.mark(VOLUME)
+                self.end_stage(VOLUME)
             if self.few:
                 self.answer()
             if number == 0:
@@ -92,12 +101,12 @@ class Step:
             most = CONTACT_REVISIONS if number + 1 < passes else LAST_REVISIONS
             for revision in range(most):
                 change, impulses = self.solve(free, touching)
-                self.mark(MULTIPLIER)
+                self.end_stage(MULTIPLIER)
                 if not obstacles or revision + 1 == most:
                     break
                 revised = self.contact.revise(self.p + change, touching, impulses)
                 touching = self.touch() if revised else touching
-                self.mark(REVISION)
+                self.end_stage(REVISION)
                 if not revised:
                     break
             self.p += change
@@ -106,10 +115,10 @@ class Step:
                 break  # the pressure of one linear step along J where it began says nothing about J where it ended
         self.diagnostics.skipped[0] += self.idle
         self.book(touching, impulses)
-        self.mark(HELD)
+        self.end_stage(HELD)
         self.nodes.v[:] = (self.p - self.nodes.x) / self.boundary.dt
         self.nodes.x[:] = self.p
-        self.mark(INTEGRATION)
+        self.end_stage(INTEGRATION)
 
     def touch(self) -> Touching:
         """The touched nodes of the moment, and how volumes answer their pressures past them."""

@@ -11,14 +11,14 @@ import pytest
 
 from massspring import METHODS, ImplicitSprings, Setup, Sphere
 from massspring.kernels.jit.stage_clock import (
+    BETWEEN_FRAMES,
     HELD,
     INTEGRATION,
-    OUTSIDE,
     REVISION,
     SEARCH,
     SPRINGS,
     STAGES,
-    new_ticks,
+    new_stage_times,
     now,
 )
 from tests.massspring.conftest import body_of
@@ -43,10 +43,10 @@ def kept_body(row, request):
     return body_of(row[1], request)
 
 
-def run(setup, ticks=None):
+def run(setup, times=None):
     """The last state, and how long the frames took [ns]."""
     state = setup.start()
-    state = replace(state, diagnostics=state.diagnostics._replace(ticks=ticks))
+    state = replace(state, diagnostics=state.diagnostics._replace(stage_times=times))
     elapsed = 0
     for frame in range(FRAMES):
         boundary = setup.boundary(frame)
@@ -62,25 +62,25 @@ def pressed(body, method):
 
 
 def test_ticks_change_no_bit_and_count_every_step(kept_body, method):
-    setup, ticks = pressed(kept_body, method), new_ticks()
+    setup, times = pressed(kept_body, method), new_stage_times()
     plain, _ = run(setup)
-    ticked, elapsed = run(setup, ticks)
-    assert np.array_equal(plain.x, ticked.x) and np.array_equal(plain.v, ticked.v)
-    assert np.array_equal(plain.lam, ticked.lam)
-    assert ticks.marks[OUTSIDE] == FRAMES
-    assert ticks.marks[SEARCH] == ticks.marks[INTEGRATION] == FRAMES * STEPS
+    timed, elapsed = run(setup, times)
+    assert np.array_equal(plain.x, timed.x) and np.array_equal(plain.v, timed.v)
+    assert np.array_equal(plain.lam, timed.lam)
+    assert times.ended[BETWEEN_FRAMES] == FRAMES
+    assert times.ended[SEARCH] == times.ended[INTEGRATION] == FRAMES * STEPS
     passes = method.passes if isinstance(method, ImplicitSprings) else 1
-    assert ticks.marks[SPRINGS] == passes * FRAMES * STEPS
-    assert (ticks.spent[:OUTSIDE] >= 0).all() and 0 < ticks.spent[:OUTSIDE].sum() <= elapsed
+    assert times.ended[SPRINGS] == passes * FRAMES * STEPS
+    assert (times.spent[:BETWEEN_FRAMES] >= 0).all() and 0 < times.spent[:BETWEEN_FRAMES].sum() <= elapsed
 
 
 def test_a_stage_that_a_scene_does_not_need_is_never_entered(kept_body, method):
-    ticks = new_ticks()
+    times = new_stage_times()
     setup = replace(pressed(kept_body, method), obstacles=())
-    bare, _ = run(setup, ticks)
-    assert ticks.marks[SEARCH] == ticks.marks[REVISION] == 0
+    bare, _ = run(setup, times)
+    assert times.ended[SEARCH] == times.ended[REVISION] == 0
     # Bit for bit the same with the stage: an obstacle that nothing ever reaches.
-    far, _ = run(replace(setup, obstacles=(Sphere((100.0, 0.0, 0.0), 0.01),)), new_ticks())
+    far, _ = run(replace(setup, obstacles=(Sphere((100.0, 0.0, 0.0), 0.01),)), new_stage_times())
     assert np.array_equal(bare.x, far.x) and np.array_equal(bare.v, far.v)
 
 
@@ -94,19 +94,19 @@ def test_the_compiled_clock_is_the_one_of_python():
 
 
 def test_stages_have_names_and_outside_is_none_of_them():
-    assert len(set(STAGES)) == len(STAGES) == OUTSIDE
+    assert len(set(STAGES)) == len(STAGES) == BETWEEN_FRAMES
     assert STAGES[HELD] == "attachments"
 
 
 @pytest.mark.slow
 def test_marks_run_without_the_compiler():
     program = """
-from massspring.kernels.jit.stage_clock import mark, new_ticks, SPRINGS
-ticks = new_ticks()
-mark(None, SPRINGS)
-mark(ticks, SPRINGS)
-mark(ticks, SPRINGS)
-assert ticks.marks[SPRINGS] == 2 and ticks.spent[SPRINGS] > 0
+from massspring.kernels.jit.stage_clock import end_stage, new_stage_times, SPRINGS
+times = new_stage_times()
+end_stage(None, SPRINGS)
+end_stage(times, SPRINGS)
+end_stage(times, SPRINGS)
+assert times.ended[SPRINGS] == 2 and times.spent[SPRINGS] > 0
 """
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     subprocess.run([sys.executable, "-c", program], check=True, env=environment, timeout=120)
