@@ -8,7 +8,7 @@ import numpy as np
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Network, Nodes, Workspace
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.jit.stage_clock import StageTimes
-from massspring.kernels.jit.thread_team import Team
+from massspring.kernels.jit.thread_team import ThreadTeam
 from massspring.kernels.probe.arrays import Probing
 from massspring.kernels.step.frame import Frame
 
@@ -35,7 +35,7 @@ class State:
     place: np.ndarray | None = None
     """Where each node is in `network` and `nodes`, (n,); None where they have the numbers of the body."""
 
-    team: Team | None = None
+    team: ThreadTeam | None = None
     """Threads that share the longest loops of a frame; None for one thread."""
 
     @property

@@ -1,4 +1,4 @@
-"""The other threads of a frame: called when it begins, dismissed when it ends (kernels.jit.thread_team)."""
+"""The other threads of a frame: forked when it begins, shut down when it ends (kernels.jit.thread_team)."""
 
 import os
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from massspring.kernels.fused.chunk import TILE
 from massspring.kernels.jit.blocks import BLOCK
 from massspring.kernels.jit.thread_team import READY, ROUND, team_of
 from massspring.kernels.step.frame import Frame
-from massspring.kernels.step.thread_jobs import dismiss, serve
+from massspring.kernels.step.thread_jobs import shutdown, worker
 from massspring.layout.sell_chunks import aligned
 from massspring.layout.state import State
 
@@ -31,7 +31,7 @@ def shared(state: State, threads: int) -> State:
 
 
 @contextmanager
-def crew(frame: Frame, direction: np.ndarray) -> Iterator[None]:
+def team_at_work(frame: Frame, direction: np.ndarray) -> Iterator[None]:
     """Inside, the other threads of `frame.team` wait for their parts; without a team nothing happens.
 
     `direction` (n, 3): of the pushes of the frame.
@@ -43,15 +43,15 @@ def crew(frame: Frame, direction: np.ndarray) -> Iterator[None]:
     others = range(1, len(team.nodes) - 1)
     if not team.signal[READY]:
         # A thread that had to compile, or could not, would keep the frame waiting.
-        dismiss(team)
-        serve(frame, team, direction, 1)
+        shutdown(team)
+        worker(frame, team, direction, 1)
         team.signal[READY] = 1
     team.signal[ROUND] = 0
-    parts = [_pool(os.getpid(), len(others)).submit(serve, frame, team, direction, rank) for rank in others]
+    parts = [_pool(os.getpid(), len(others)).submit(worker, frame, team, direction, rank) for rank in others]
     try:
         yield
     finally:
-        dismiss(team)
+        shutdown(team)
         for part in parts:
             part.result()
 

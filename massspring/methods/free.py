@@ -9,7 +9,7 @@ from massspring.kernels.step.begin import begin_step, open_frame, search_contact
 from massspring.kernels.step.end import end_step
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
-from massspring.methods.method import Method, crewed_frame
+from massspring.methods.method import Method, threaded_frame
 
 
 @lean
@@ -34,6 +34,6 @@ class Free(Method):
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        with crewed_frame(state, boundary) as after:
+        with threaded_frame(state, boundary) as after:
             free_frame(after.frame(boundary))
         return after

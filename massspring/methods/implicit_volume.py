@@ -45,7 +45,7 @@ from massspring.layout.allocate import start
 from massspring.layout.block_jacobi import clusters_at_rest
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
-from massspring.methods.method import Method, crewed_frame
+from massspring.methods.method import Method, threaded_frame
 from massspring.world.obstacles import Attachment
 
 
@@ -185,7 +185,7 @@ class ImplicitVolume(Method):
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        with crewed_frame(state, boundary) as after:
+        with threaded_frame(state, boundary) as after:
             if after.rows is None:
                 lam = implicit_volume_frame(after.frame(boundary), float(after.lam[0]))
                 return replace(after, lam=np.array([lam]))

@@ -13,7 +13,7 @@ from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.allocate import start
 from massspring.layout.probe_arrays import fresh
 from massspring.layout.state import State, new_diagnostics
-from massspring.layout.threads import crew
+from massspring.layout.threads import team_at_work
 from massspring.methods.capabilities import Capabilities
 from massspring.world.obstacles import Attachment
 
@@ -59,9 +59,9 @@ def begin_frame(state: State, boundary: BoundaryConditions) -> State:
 
 
 @contextmanager
-def crewed_frame(state: State, boundary: BoundaryConditions) -> Iterator[State]:
+def threaded_frame(state: State, boundary: BoundaryConditions) -> Iterator[State]:
     """A copy to advance in place; inside, all threads of the state are there."""
     after = begin_frame(state, boundary)
     direction = after.nodes.gradient if after.rows is None else after.rows.push
-    with crew(after.frame(boundary), direction):
+    with team_at_work(after.frame(boundary), direction):
         yield after

@@ -11,7 +11,7 @@ from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from massspring.kernels.contact.node_contact import round_contact
 from massspring.kernels.jit.blocks import BLOCK, any_within
 from massspring.kernels.jit.decorators import inlined, lean
-from massspring.kernels.jit.thread_team import JOB_SEARCH, call, join
+from massspring.kernels.jit.thread_team import JOB_SEARCH, fork, join
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
@@ -88,7 +88,7 @@ def clear_all(network, nodes, contacts, boundary, step, push, team):
     if team is None:
         clearances_into(network, nodes, contacts, boundary, step, push, (0, nodes.x.shape[0]))
     else:
-        call(team, JOB_SEARCH, step, push.factor)
+        fork(team, JOB_SEARCH, step, push.factor)
         clearances_into(network, nodes, contacts, boundary, step, push, (team.nodes[0], team.nodes[1]))
         join(team)
 

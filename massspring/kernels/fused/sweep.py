@@ -8,7 +8,7 @@ from massspring.kernels.fused.chunk import AREA, FORCE, HERE, LANES, RESULT, SHA
 from massspring.kernels.fused.long_rows import add_walls, join_pieces
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.jit.decorators import inlined, lean
-from massspring.kernels.jit.thread_team import JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, call, join
+from massspring.kernels.jit.thread_team import JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, fork, join
 from massspring.kernels.jit.vectors import at_least, gather, lanes_of, load, root, save, spread
 
 
@@ -170,7 +170,7 @@ def pass_all(nodes, work, boundary, slices, keeps, team):
     if team is None:
         pass_slices(nodes, work, boundary, slices, (0, slices.lanes.shape[0]), keeps, work.tile[0])
     else:
-        call(team, JOB_SPRINGS_AND_VOLUME if keeps else JOB_SPRINGS, 0, 0.0)
+        fork(team, JOB_SPRINGS_AND_VOLUME if keeps else JOB_SPRINGS, 0, 0.0)
         pass_slices(nodes, work, boundary, slices, (team.slices[0], team.slices[1]), keeps, work.tile[0])
         join(team)
 

@@ -24,7 +24,7 @@ PATIENCE = 20_000
 """Looks at a counter before the thread offers its core to others: 5 to 10 µs."""
 
 
-class Team(NamedTuple):
+class ThreadTeam(NamedTuple):
     """How T threads share the work: each has the slices and the nodes between two borders of its own.
 
     Borders depend on T, sums do not: a slice is always summed by itself, and slices in their order."""
@@ -118,7 +118,7 @@ def wait_until_other_than(signal, at, value):
 
 
 @inlined
-def call(team, job, step, factor):
+def fork(team, job, step, factor):
     """Gives every other thread its part of a job."""
     team.signal[JOB], team.signal[STEP], team.signal[DONE] = job, step, 0
     team.factor[0] = factor
@@ -136,10 +136,12 @@ def join(team):
         wait_until_other_than(team.signal, DONE, done)
 
 
-def team_of(threads: int, rows: np.ndarray, nodes: int, block: int) -> Team:
+def team_of(threads: int, rows: np.ndarray, nodes: int, block: int) -> ThreadTeam:
     """T threads for slices that begin at `rows` (S + 1,) and for n nodes, as even as whole slices and blocks allow."""
     share = np.arange(threads + 1) / threads
     slices = np.searchsorted(rows, share * rows[-1])
     borders = np.round(share * nodes / block).astype(np.int64) * block
     borders[-1] = nodes
-    return Team(np.zeros(5 * LINE, dtype=np.int64), np.zeros(1), slices.astype(np.int64), np.minimum(borders, nodes))
+    return ThreadTeam(
+        np.zeros(5 * LINE, dtype=np.int64), np.zeros(1), slices.astype(np.int64), np.minimum(borders, nodes)
+    )

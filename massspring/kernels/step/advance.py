@@ -5,7 +5,7 @@ from massspring.kernels.contact.modes import FREE
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.jit.decorators import inlined
 from massspring.kernels.jit.flat import flat
-from massspring.kernels.jit.thread_team import JOB_MOVE, call, join
+from massspring.kernels.jit.thread_team import JOB_MOVE, fork, join
 
 NEAR = 4096
 """Nodes of which a step's end fits the second cache."""
@@ -51,7 +51,7 @@ def move_all(frame, push, team):
     if team is None:
         move(frame, push, 0, frame.nodes.x.shape[0])
     else:
-        call(team, JOB_MOVE, 0, push.factor)
+        fork(team, JOB_MOVE, 0, push.factor)
         move(frame, push, team.nodes[0], team.nodes[1])
         join(team)
 

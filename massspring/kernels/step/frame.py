@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Network, Nodes, Workspace
-from massspring.kernels.jit.thread_team import Team
+from massspring.kernels.jit.thread_team import ThreadTeam
 from massspring.kernels.probe.arrays import Probing
 
 
@@ -18,5 +18,5 @@ class Frame(NamedTuple):
     diagnostics: FrameDiagnostics
     probing: Probing | None = None
     """Thin probes; None where there are none: the loop is then compiled without their stage."""
-    team: Team | None = None
+    team: ThreadTeam | None = None
     """Threads that share the longest loops; None for one thread. Only loops are compiled anew for it."""

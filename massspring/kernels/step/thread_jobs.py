@@ -14,7 +14,7 @@ from massspring.kernels.jit.thread_team import (
     JOB_SPRINGS_AND_VOLUME,
     ROUND,
     STEP,
-    call,
+    fork,
     raise_by_one,
     wait_until_other_than,
 )
@@ -22,7 +22,7 @@ from massspring.kernels.step.advance import advance_nodes
 
 
 @lean
-def serve(frame, team, direction, rank):
+def worker(frame, team, direction, rank):
     """Does part number `rank` of every job of a frame up to its end; `direction` is that of its pushes."""
     network, nodes, contacts, work, boundary = frame.network, frame.nodes, frame.contacts, frame.work, frame.boundary
     slices = team.slices[rank], team.slices[rank + 1]
@@ -47,6 +47,6 @@ def serve(frame, team, direction, rank):
 
 
 @lean
-def dismiss(team):
+def shutdown(team):
     """Ends the frame for the other threads."""
-    call(team, JOB_END, 0, 0.0)
+    fork(team, JOB_END, 0, 0.0)

@@ -21,8 +21,8 @@ from massspring import (
 )
 from massspring.analysis.stability import step_limit
 from massspring.kernels.jit.blocks import BLOCK
-from massspring.kernels.jit.thread_team import JOB, JOB_END, JOB_SPRINGS, call, join, team_of
-from massspring.layout.threads import crew, shared
+from massspring.kernels.jit.thread_team import JOB, JOB_END, JOB_SPRINGS, fork, join, team_of
+from massspring.layout.threads import shared, team_at_work
 from tests.massspring.conftest import SOFT, icosphere
 
 RADIUS = 0.05
@@ -76,8 +76,8 @@ def test_each_thread_writes_on_scratch_of_its_own(ball):
     state = setup.start()
     work, team, untouched = state.work, state.team, -7.0
     work.tile[:] = untouched
-    with crew(state.frame(setup.boundary(0)), state.nodes.gradient):
-        call(team, JOB_SPRINGS, 0, 0.0)
+    with team_at_work(state.frame(setup.boundary(0)), state.nodes.gradient):
+        fork(team, JOB_SPRINGS, 0, 0.0)
         join(team)
     assert (work.tile[0] == untouched).all() and not (work.tile[1] == untouched).all()
 
@@ -109,7 +109,7 @@ def test_the_load_is_even():
 def test_a_frame_that_fails_sends_the_threads_home(ball):
     setup = slid(ball, ImplicitVolume(), threads=2)
     state, boundary = setup.start(), setup.boundary(0)
-    with pytest.raises(RuntimeError, match="halfway"), crew(state.frame(boundary), state.nodes.gradient):
+    with pytest.raises(RuntimeError, match="halfway"), team_at_work(state.frame(boundary), state.nodes.gradient):
         raise RuntimeError("halfway")
     assert state.team is not None and state.team.signal[JOB] == JOB_END
     before = time.thread_time_ns(), time.process_time_ns()
