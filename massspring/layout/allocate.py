@@ -8,7 +8,7 @@ from massspring.body.body import Body
 from massspring.body.springs import EDGES_OF_TRIANGLE, lengths
 from massspring.body.volumes import Volumes
 from massspring.errors import MassSpringError
-from massspring.kernels.arrays.layout import Contacts, Network, Nodes, Workspace
+from massspring.kernels.arrays.layout import Contacts, Model, Nodes, Workspace
 from massspring.kernels.fused.chunk import RESULT, TILE
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.sell_chunks import aligned, slices_of
@@ -24,12 +24,12 @@ def start(
 ) -> State:
     """The body at rest, or with velocities `v` (n, 3) [m/s]. Raises MassSpringError for bad attachments."""
     kept, n = body.kept, body.node_count
-    network = _network(body, attachments, swept_surface(body))
+    model = _model(body, attachments, swept_surface(body))
     velocity = np.zeros((n, 3)) if v is None else np.array(v, dtype=np.float64)
     if velocity.shape != (n, 3):
         raise MassSpringError(f"velocities have shape {velocity.shape}; the body has {n} nodes, give ({n}, 3)")
     real = np.dtype(np.float64)
-    slices = network.slices
+    slices = model.slices
     nodes = Nodes(
         x=body.rest.copy(),
         v=velocity,
@@ -44,7 +44,7 @@ def start(
         sums=np.zeros((len(slices.lanes) + 1, 3)),
     )
     rows = None if keeps_one(kept) else volume_rows(kept, n)
-    return State(network, nodes, _no_contacts(n), work, np.zeros(kept.count), rows, memory=memory)
+    return State(model, nodes, _no_contacts(n), work, np.zeros(kept.count), rows, memory=memory)
 
 
 def _no_contacts(n: int) -> Contacts:
@@ -87,7 +87,7 @@ def nodes_of(attachments: tuple[Attachment, ...], body: Body) -> list[np.ndarray
     return nodes
 
 
-def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarray) -> Network:
+def _model(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarray) -> Model:
     nodes = nodes_of(attachments, body)
     held_nodes = np.concatenate(nodes) if nodes else np.empty(0, dtype=np.int64)
     inverse_mass = 1.0 / body.mass
@@ -95,7 +95,7 @@ def _network(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarra
     touchable = np.zeros(body.node_count, dtype=np.uint8)
     touchable[body.surface_nodes] = 1
     touchable[held_nodes] = 0
-    return Network(
+    return Model(
         ends=body.springs.ends,
         rest_length=body.springs.rest_length,
         stiffness=body.springs.stiffness,

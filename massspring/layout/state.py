@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Network, Nodes, Workspace
+from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Model, Nodes, Workspace
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.jit.stage_clock import StageTimes
 from massspring.kernels.jit.thread_team import ThreadTeam
@@ -17,7 +17,7 @@ from massspring.kernels.step.frame import Frame
 class State:
     """A body in motion. `advance` returns a new one and leaves the old as it was."""
 
-    network: Network
+    model: Model
     nodes: Nodes
     contacts: Contacts
     work: Workspace
@@ -33,7 +33,7 @@ class State:
     probing: Probing | None = None
     """Of thin probes; None where there are none: the frame is then compiled without their stage."""
     place: np.ndarray | None = None
-    """Where each node is in `network` and `nodes`, (n,); None where they have the numbers of the body."""
+    """Where each node is in `model` and `nodes`, (n,); None where they have the numbers of the body."""
 
     team: ThreadTeam | None = None
     """Threads that share the longest loops of a frame; None for one thread."""
@@ -51,7 +51,7 @@ class State:
     def frame(self, boundary: BoundaryConditions) -> Frame:
         """What a frame loop is given."""
         return Frame(
-            self.network, self.nodes, self.contacts, self.work, boundary, self.diagnostics, self.probing, self.team
+            self.model, self.nodes, self.contacts, self.work, boundary, self.diagnostics, self.probing, self.team
         )
 
     def moved_to(self, x: np.ndarray) -> "State":

@@ -25,7 +25,7 @@ def cores() -> int:
 
 def shared(state: State, threads: int) -> State:
     """`state` to be advanced by so many threads, two or more; each has scratch of its own."""
-    team = team_of(threads, state.network.slices.start, len(state.nodes.x), BLOCK)
+    team = team_of(threads, state.model.slices.start, len(state.nodes.x), BLOCK)
     work = state.work._replace(tile=aligned((threads, TILE), state.work.tile.dtype))
     return replace(state, work=work, team=team)
 

@@ -48,7 +48,7 @@ def hard_frame(frame, cells, compliance, accuracy):
         passes = search_contacts(frame, step, push)
         for sweep in range(passes):
             cell_rows_into(nodes.x, cells, cells.right)
-            count = solve_cells(nodes, contacts, frame.network.inverse_mass, cells, boundary.dt, compliance, accuracy)
+            count = solve_cells(nodes, contacts, frame.model.inverse_mass, cells, boundary.dt, compliance, accuracy)
             count_iterations(diagnostics, count)
             cell_forces_into(cells, cells.pressure, cells.push)
             if multiplier_stands(frame, step, push, np.inf, sweep + 1 == passes):

@@ -63,11 +63,11 @@ class ImplicitSprings(Method):
         """One frame."""
         after = begin_frame(state, boundary)
         assert after.rows is not None  # start() made them
-        after.rows.lam[:] = after.lam + after.network.rest_lam
-        factor = after.memory.at(after.network, boundary.dt, boundary.damping)
+        after.rows.lam[:] = after.lam + after.model.rest_lam
+        factor = after.memory.at(after.model, boundary.dt, boundary.damping)
         if after.diagnostics.stage_times is not None:
             end_stage(after.diagnostics.stage_times, BETWEEN_FRAMES)
         accuracy = Accuracy(self.tolerance, self.most_iterations)
         for step in range(len(boundary.position)):
             Step(after, boundary, step, factor, accuracy).take(self.passes)
-        return replace(after, lam=after.rows.lam - after.network.rest_lam)
+        return replace(after, lam=after.rows.lam - after.model.rest_lam)

@@ -52,7 +52,7 @@ from massspring.world.obstacles import Attachment
 @lean
 def implicit_volume_frame(frame, lam):
     """One frame of HCJ05 with contact inside the multiplier (eq. 3.1–3.8); returns the last lam [Pa]."""
-    network, nodes, boundary, diagnostics = frame.network, frame.nodes, frame.boundary, frame.diagnostics
+    model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
     gradient, dt = nodes.gradient, boundary.dt
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
@@ -62,10 +62,10 @@ def implicit_volume_frame(frame, lam):
         passes = search_contacts(frame, step, Push(gradient, predicted))
         for sweep in range(passes):
             lam, left, capped = limited_multiplier(
-                network, frame.nodes, frame.contacts, error, boundary.dt, flow, mobility
+                model, frame.nodes, frame.contacts, error, boundary.dt, flow, mobility
             )
             diagnostics.capped[0] += capped and sweep == 0
-            reach = pressure_reach(lam - predicted, left, network.largest_inverse_mass, dt)
+            reach = pressure_reach(lam - predicted, left, model.largest_inverse_mass, dt)
             if multiplier_stands(frame, step, Push(gradient, lam), reach, sweep + 1 == passes):
                 break
         if not left > 0.0:
@@ -75,12 +75,12 @@ def implicit_volume_frame(frame, lam):
 
 
 @inlined
-def limited_multiplier(network, nodes, contacts, error, dt, flow, mobility):
+def limited_multiplier(model, nodes, contacts, error, dt, flow, mobility):
     """lam [Pa] of the sums over all nodes (eq. 3.3), G·W̃·G, and whether only a part of the error is made up for
     (35)."""
-    weights, longest = network.inverse_mass, network.longest_correction
+    weights, longest = model.inverse_mass, model.longest_correction
     lam, left = multiplier_of_sums(nodes, contacts, weights, error, dt, flow, mobility)
-    if not left > 0.0 or surely_short(error, left, network.largest_inverse_mass, longest):
+    if not left > 0.0 or surely_short(error, left, model.largest_inverse_mass, longest):
         return lam, left, False
     part = capped_error(error, left, steepest(nodes.gradient, weights), longest)
     if part != error:
@@ -89,23 +89,23 @@ def limited_multiplier(network, nodes, contacts, error, dt, flow, mobility):
 
 
 @compiled
-def set_right_side(network, rows, nodes, contacts, target, dt, tolerance):
+def set_right_side(model, rows, nodes, contacts, target, dt, tolerance):
     """rhs_r = (V0_r − V_r)/dt² − (J u)_r/dt [m³/s²] with capped errors (eq. 8.3, 8.5), u = ṽ + dt W̃ Jᵀ lam.
 
     Returns whether a volume was capped, and whether a wrong one had nothing to push on.
     """
-    pushed_velocity_into(nodes, contacts, network.inverse_mass, rows.push, dt, rows.node_vector)
+    pushed_velocity_into(nodes, contacts, model.inverse_mass, rows.push, dt, rows.node_vector)
     padded_rows_times_into(rows, rows.node_vector, rows.right)
-    diagonal_into(rows, contacts, network.inverse_mass, rows.diagonal)
-    lightest, per_second = network.largest_inverse_mass, 1.0 / dt
+    diagonal_into(rows, contacts, model.inverse_mass, rows.diagonal)
+    lightest, per_second = model.largest_inverse_mass, 1.0 / dt
     capped, idle = False, False
     for r in range(target.shape[0]):
         error = target[r] - rows.volume[r]
         if not rows.diagonal[r] > 0.0:
             idle |= abs(error) > tolerance * target[r]
-        elif not surely_short(error, rows.diagonal[r], lightest, network.longest_correction):
-            reachable = steepest_of_row(rows, network.inverse_mass, r)
-            part = capped_error(error, rows.diagonal[r], reachable, network.longest_correction)
+        elif not surely_short(error, rows.diagonal[r], lightest, model.longest_correction):
+            reachable = steepest_of_row(rows, model.inverse_mass, r)
+            part = capped_error(error, rows.diagonal[r], reachable, model.longest_correction)
             capped |= part != error
             error = part
         rows.right[r] = (error * per_second - rows.right[r]) * per_second
@@ -114,17 +114,15 @@ def set_right_side(network, rows, nodes, contacts, target, dt, tolerance):
 
 
 @compiled
-def solve_multipliers(network, rows, contacts, diagnostics, accuracy):
+def solve_multipliers(model, rows, contacts, diagnostics, accuracy):
     """lam += S⁻¹ rhs for the contacts of the moment (eq. 8.3, 8.4); then Jᵀ lam [N] into `rows.push`."""
     if rows.matrix.shape[0] > 0:
-        dense_into(rows, contacts, network.inverse_mass, rows.matrix)
+        dense_into(rows, contacts, model.inverse_mass, rows.matrix)
         solve_dense(rows.matrix, rows.right, rows.search)
         for r in range(rows.lam.shape[0]):
             rows.lam[r] += rows.search[r]
     else:
-        count = solve_iteratively(
-            rows, contacts, network.inverse_mass, rows.lam, rows.allowed, accuracy.most_iterations
-        )
+        count = solve_iteratively(rows, contacts, model.inverse_mass, rows.lam, rows.allowed, accuracy.most_iterations)
         count_iterations(diagnostics, count)
         if count == 0:
             return
@@ -134,8 +132,8 @@ def solve_multipliers(network, rows, contacts, diagnostics, accuracy):
 @lean
 def implicit_volumes_frame(frame, rows, accuracy):
     """One frame of HCJ05 with several volumes (eq. 3.1–3.8, 8.2–8.5); `rows.lam` [Pa] comes in and goes out."""
-    network, nodes, contacts, boundary, diagnostics = (
-        frame.network,
+    model, nodes, contacts, boundary, diagnostics = (
+        frame.model,
         frame.nodes,
         frame.contacts,
         frame.boundary,
@@ -145,13 +143,13 @@ def implicit_volumes_frame(frame, rows, accuracy):
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
         begin_step(frame, step, False)
-        rows_into(nodes.x, network.inverse_mass, rows)
+        rows_into(nodes.x, model.inverse_mass, rows)
         transposed_rows_times_into(rows, rows.lam, rows.push)
         end_stage(diagnostics.stage_times, VOLUME)
         target, passes = boundary.volume_target[step], search_contacts(frame, step, push)
         for sweep in range(passes):
-            capped, idle = set_right_side(network, rows, nodes, contacts, target, boundary.dt, accuracy.tolerance)
-            solve_multipliers(network, rows, contacts, diagnostics, accuracy)
+            capped, idle = set_right_side(model, rows, nodes, contacts, target, boundary.dt, accuracy.tolerance)
+            solve_multipliers(model, rows, contacts, diagnostics, accuracy)
             if multiplier_stands(frame, step, push, math.inf, sweep + 1 == passes):
                 break
         diagnostics.capped[0] += capped
@@ -180,7 +178,7 @@ class ImplicitVolume(Method):
         rows = state.rows
         if rows is None or len(rows.matrix):
             return state
-        clusters = clusters_at_rest(rows, state.nodes.x, state.network.inverse_mass)
+        clusters = clusters_at_rest(rows, state.nodes.x, state.model.inverse_mass)
         return replace(state, rows=rows._replace(clusters=clusters))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
@@ -189,7 +187,7 @@ class ImplicitVolume(Method):
             if after.rows is None:
                 lam = implicit_volume_frame(after.frame(boundary), float(after.lam[0]))
                 return replace(after, lam=np.array([lam]))
-            after.rows.lam[:] = after.lam + after.network.rest_lam
+            after.rows.lam[:] = after.lam + after.model.rest_lam
             accuracy = Accuracy(self.tolerance, self.most_iterations)
             implicit_volumes_frame(after.frame(boundary), after.rows, accuracy)
-            return replace(after, lam=after.rows.lam - after.network.rest_lam)
+            return replace(after, lam=after.rows.lam - after.model.rest_lam)

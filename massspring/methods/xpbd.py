@@ -65,14 +65,14 @@ def xpbd_frame(frame, cells, compliance, iterations, whole):
 def mend(frame, cells, target, compliance, iterations, whole):
     """So many sweeps over the volumes (eq. 10.14, 10.15); the pressure of the whole [Pa], and whether a wrong volume
     had nothing to push on in the last of them."""
-    network, contacts, scale = frame.network, frame.contacts, frame.boundary.dt * frame.boundary.dt
+    model, contacts, scale = frame.model, frame.contacts, frame.boundary.dt * frame.boundary.dt
     lam, idle = 0.0, False
     for _ in range(iterations):
         if whole:
-            lam, idle = relax_whole(network, contacts, cells, target, scale, compliance, lam)
+            lam, idle = relax_whole(model, contacts, cells, target, scale, compliance, lam)
         else:
-            idle = relax_cells(contacts, network.inverse_mass, cells, scale, compliance)
-            idle |= relax_sum(network, contacts, cells, target, scale, compliance)
+            idle = relax_cells(contacts, model.inverse_mass, cells, scale, compliance)
+            idle |= relax_sum(model, contacts, cells, target, scale, compliance)
     return lam, idle
 
 

@@ -117,7 +117,7 @@ class Recorder:
 
     def record(self, frame: int, state: State, elapsed_ns: int) -> None:
         """Reads the state after frame number `frame` (0, 1, …)."""
-        net, x = state.network, state.x.astype(np.float64, copy=False)
+        net, x = state.model, state.x.astype(np.float64, copy=False)
         inside_x, v = (part.astype(np.float64, copy=False) for part in (state.nodes.x, state.nodes.v))
         self.volume[frame] = self.volumes.measure(x)
         self.pressure[frame] = state.lam

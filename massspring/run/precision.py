@@ -38,9 +38,7 @@ def in_precision(state: State, precision: Precision) -> State:
     if precision == "float64":
         return state
     rows = None if state.rows is None else _cast(state.rows, np.dtype(np.float32))
-    parts = {
-        name: _cast(getattr(state, name), np.dtype(np.float32)) for name in ("network", "nodes", "contacts", "work")
-    }
+    parts = {name: _cast(getattr(state, name), np.dtype(np.float32)) for name in ("model", "nodes", "contacts", "work")}
     return replace(state, rows=rows, **parts)
 
 

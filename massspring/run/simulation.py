@@ -115,7 +115,7 @@ class Setup:
         """The state at t = 0."""
         state = self.inside.start(self.method, self.attachments, self.velocity)
         if self.probes:
-            probing = new_probing(self.inside.body, state.network.triangles, self.probes, state.diagnostics)
+            probing = new_probing(self.inside.body, state.model.triangles, self.probes, state.diagnostics)
             state = replace(state, probing=probing)
         if self.positions is not None:
             state = state.moved_to(self.positions)
@@ -199,7 +199,7 @@ def check_probes(state: State, obstacles: tuple[Obstacle, ...]) -> str | None:
     thin = [number for number, obstacle in enumerate(obstacles) if isinstance(obstacle, Probe)]
     p = int(np.flatnonzero(state.probing.passed)[0])
     triangle = int(state.probing.passed[p]) - 1
-    held = int((state.network.inverse_mass[state.network.triangles[triangle]] == 0.0).sum())
+    held = int((state.model.inverse_mass[state.model.triangles[triangle]] == 0.0).sum())
     return (
         f"the thin probe that is obstacle {thin[p]} was driven through triangle {triangle}, {held} of whose corners "
         "are attached; lead its path past attached tissue, or attach fewer nodes"

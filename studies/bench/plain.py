@@ -124,7 +124,7 @@ def plain_run(setup: Setup) -> tuple[np.ndarray, np.ndarray]:
     For one kept volume, planes and attachments that do not move; in the precision and numbers of nodes of the run.
     """
     state = setup.start()
-    net, x = state.network, state.nodes.x
+    net, x = state.model, state.nodes.x
     real = x.dtype.type
     body = net.ends, net.rest_length, net.stiffness, net.triangles, net.inverse_mass, net.held_nodes
     plain = Plain(*body, x, state.nodes.v, np.zeros_like(x), np.zeros_like(x))

@@ -8,7 +8,7 @@ from massspring.kernels.arrays.spring_layout import Membrane, Slices
 from massspring.kernels.jit.stage_clock import StageTimes
 
 
-class Network(NamedTuple):
+class Model(NamedTuple):
     """What does not change during a run; s springs, f triangles, n nodes, h held nodes, c surface nodes."""
 
     ends: np.ndarray

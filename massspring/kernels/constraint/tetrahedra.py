@@ -187,11 +187,11 @@ def relax_cells(contacts, inverse_mass, cells, scale, compliance):
 
 
 @compiled
-def relax_whole(network, contacts, cells, target, scale, compliance, lam):
+def relax_whole(model, contacts, cells, target, scale, compliance, lam):
     """The same for the one volume of the whole: returns its pressure [Pa] as well, first (eq. 10.14)."""
-    y, gradient, force, inverse_mass = cells.y, cells.gradient, cells.push, network.inverse_mass
+    y, gradient, force, inverse_mass = cells.y, cells.gradient, cells.push, model.inverse_mass
     mode, direction = contacts.mode, contacts.direction
-    volume = volume_gradient_into(y, network.triangles, gradient)
+    volume = volume_gradient_into(y, model.triangles, gradient)
     soft = compliance * cells.rest_whole
     stiff = soft
     for i in range(y.shape[0]):
@@ -213,12 +213,12 @@ def relax_whole(network, contacts, cells, target, scale, compliance, lam):
 
 
 @compiled
-def relax_sum(network, contacts, cells, target, scale, compliance):
+def relax_sum(model, contacts, cells, target, scale, compliance):
     """All pressures of cells by as much as mends the sum of their volumes (eq. 10.15).
 
     Returns whether a wrong sum had nothing to push on."""
     mean = mean_pressure(cells)
-    lam, idle = relax_whole(network, contacts, cells, target, scale, compliance, mean)
+    lam, idle = relax_whole(model, contacts, cells, target, scale, compliance, mean)
     for t in range(cells.pressure.shape[0]):
         cells.pressure[t] += lam - mean
     return idle

@@ -18,7 +18,7 @@ CONTACT_PASSES = 3
 
 
 @lean
-def seat(network, nodes, contacts, boundary, step, push, count):
+def seat(model, nodes, contacts, boundary, step, push, count):
     """Puts the first `count` nodes of `contacts.entering` on the obstacle each would enter deepest (eq. 3.7).
 
     `goal` n a, a = n·(target − x)/dt, ends the step on the obstacle. A round one pushes along n = (x − c)/|x − c| of
@@ -27,7 +27,7 @@ def seat(network, nodes, contacts, boundary, step, push, count):
     dt = boundary.dt
     for k in range(count):
         i = contacts.entering[k]
-        u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
+        u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
         deepest = 0.0
         for o in range(boundary.radius.shape[0]):
             s0 = nodes.x[i, 0] - boundary.position[step, o, 0]
@@ -83,28 +83,28 @@ def forget_released(contacts):
 
 
 @inlined
-def clear_all(network, nodes, contacts, boundary, step, push, team):
+def clear_all(model, nodes, contacts, boundary, step, push, team):
     """`clearances_into` of all nodes, by as many threads as there are."""
     if team is None:
-        clearances_into(network, nodes, contacts, boundary, step, push, (0, nodes.x.shape[0]))
+        clearances_into(model, nodes, contacts, boundary, step, push, (0, nodes.x.shape[0]))
     else:
         fork(team, JOB_SEARCH, step, push.factor)
-        clearances_into(network, nodes, contacts, boundary, step, push, (team.nodes[0], team.nodes[1]))
+        clearances_into(model, nodes, contacts, boundary, step, push, (team.nodes[0], team.nodes[1]))
         join(team)
 
 
 @inlined
-def find_contacts(network, nodes, contacts, boundary, step, push, team):
+def find_contacts(model, nodes, contacts, boundary, step, push, team):
     """Touched nodes of the step when the push of the last one acts on them: u = v* + dt W f (eq. 3.7)."""
     let_go(contacts)
-    clear_all(network, nodes, contacts, boundary, step, push, team)
-    enter(network, nodes, contacts, boundary, step, push)
+    clear_all(model, nodes, contacts, boundary, step, push, team)
+    enter(model, nodes, contacts, boundary, step, push)
 
 
 @inlined
-def enter(network, nodes, contacts, boundary, step, push):
+def enter(model, nodes, contacts, boundary, step, push):
     """Seats the nodes whose clearance is negative (eq. 3.7)."""
-    touchable, clearance, entering = network.touchable, contacts.clearance, contacts.entering
+    touchable, clearance, entering = model.touchable, contacts.clearance, contacts.entering
     count = 0
     for begin in range(0, clearance.shape[0], BLOCK):
         if not any_within(clearance, begin, 0.0):
@@ -114,16 +114,16 @@ def enter(network, nodes, contacts, boundary, step, push):
                 entering[count] = i
                 count += 1
     if count > 0:
-        seat(network, nodes, contacts, boundary, step, push, count)
+        seat(model, nodes, contacts, boundary, step, push, count)
         admit(contacts, count)
     if boundary.rough:
-        rub(network, nodes, contacts, boundary, step, push)
+        rub(model, nodes, contacts, boundary, step, push)
     if boundary.radius.shape[0] > 1:
-        wedge(network, nodes, contacts, boundary, step, push)
+        wedge(model, nodes, contacts, boundary, step, push)
 
 
 @inlined
-def release_pulled(network, nodes, contacts, boundary, push):
+def release_pulled(model, nodes, contacts, boundary, push):
     """Releases nodes that their one obstacle would pull (eq. 3.8); how many."""
     changes = 0
     for k in range(contacts.touching_count[0]):
@@ -131,7 +131,7 @@ def release_pulled(network, nodes, contacts, boundary, push):
         if contacts.mode[i] == FREE or contacts.mode[i] == ON_EDGE:
             continue
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
+        u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
         if contacts.goal[i, 0] * n0 + contacts.goal[i, 1] * n1 + contacts.goal[i, 2] * n2 < u0 * n0 + u1 * n1 + u2 * n2:
             # A released node is looked at again in the next pass, whatever the pressure becomes.
             contacts.touched[i], contacts.mode[i], contacts.clearance[i] = 0, FREE, 0.0
@@ -140,10 +140,10 @@ def release_pulled(network, nodes, contacts, boundary, push):
 
 
 @inlined
-def enters(network, nodes, boundary, step, push, i):
+def enters(model, nodes, boundary, step, push, i):
     """Whether the free node i would end the step in an obstacle (eq. 3.7)."""
     dt = boundary.dt
-    u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
+    u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
     y0, y1, y2 = nodes.x[i, 0] + dt * u0, nodes.x[i, 1] + dt * u1, nodes.x[i, 2] + dt * u2
     for o in range(boundary.radius.shape[0]):
         p0, p1, p2 = boundary.position[step, o, 0], boundary.position[step, o, 1], boundary.position[step, o, 2]
@@ -153,19 +153,19 @@ def enters(network, nodes, boundary, step, push, i):
 
 
 @inlined
-def revise_contacts(network, nodes, contacts, boundary, step, push, reach):
+def revise_contacts(model, nodes, contacts, boundary, step, push, reach):
     """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 3.8).
 
     `reach` [m] is how far the new pressure can have moved a node from where `clearance` was measured: distances to
     obstacles change by no more, so a free node farther away need not be looked at.
     """
-    touchable, clearance, entering = network.touchable, contacts.clearance, contacts.entering
+    touchable, clearance, entering = model.touchable, contacts.clearance, contacts.entering
     count, changes = 0, 0
     if boundary.rough:
-        changes += release_slipping(network, nodes, contacts, boundary, push)
+        changes += release_slipping(model, nodes, contacts, boundary, push)
     if boundary.radius.shape[0] > 1:
-        changes += release_wedged(network, nodes, contacts, boundary, push) + wedge(
-            network, nodes, contacts, boundary, step, push
+        changes += release_wedged(model, nodes, contacts, boundary, push) + wedge(
+            model, nodes, contacts, boundary, step, push
         )
     for begin in range(0, clearance.shape[0], BLOCK):
         if not any_within(clearance, begin, reach):
@@ -173,14 +173,14 @@ def revise_contacts(network, nodes, contacts, boundary, step, push, reach):
         for i in range(begin, min(begin + BLOCK, clearance.shape[0])):
             if clearance[i] > reach or contacts.mode[i] > FREE or touchable[i] == 0:
                 continue
-            if enters(network, nodes, boundary, step, push, i):
+            if enters(model, nodes, boundary, step, push, i):
                 entering[count] = i
                 count += 1
-    changes += release_pulled(network, nodes, contacts, boundary, push)
+    changes += release_pulled(model, nodes, contacts, boundary, push)
     if changes > 0:
         forget_released(contacts)
     if count > 0:
-        seat(network, nodes, contacts, boundary, step, push, count)
+        seat(model, nodes, contacts, boundary, step, push, count)
         admit(contacts, count)
     return changes + count
 

@@ -26,7 +26,7 @@ def settled(contacts, i, u0, u1, u2):
 
 
 @inlined
-def book_contacts(network, nodes, contacts, push, dt, contact_impulse):
+def book_contacts(model, nodes, contacts, push, dt, contact_impulse):
     """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 3.5); u is what a node would do without them."""
     v_star, direction, mode = nodes.v_star, push.direction, contacts.mode
     real = nodes.x.dtype.type
@@ -35,11 +35,11 @@ def book_contacts(network, nodes, contacts, push, dt, contact_impulse):
         i = contacts.touching[k]
         if mode[i] == FREE:
             continue
-        w = impulse * real(network.inverse_mass[i])
+        w = impulse * real(model.inverse_mass[i])
         u0, u1 = v_star[i, 0] + w * direction[i, 0], v_star[i, 1] + w * direction[i, 1]
         u2 = v_star[i, 2] + w * direction[i, 2]
         w0, w1, w2 = settled(contacts, i, u0, u1, u2)
-        o, m = contacts.touched[i] - 1, network.mass[i]
+        o, m = contacts.touched[i] - 1, model.mass[i]
         k0, k1, k2 = m * (w0 - u0), m * (w1 - u1), m * (w2 - u2)
         contact_impulse[o, 0] += k0
         contact_impulse[o, 1] += k1

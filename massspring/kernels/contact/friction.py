@@ -14,7 +14,7 @@ PARALLEL = 1e-4
 
 
 @lean
-def rub(network, nodes, contacts, boundary, step, push):
+def rub(model, nodes, contacts, boundary, step, push):
     """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 9.1)."""
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]
@@ -22,7 +22,7 @@ def rub(network, nodes, contacts, boundary, step, push):
             continue
         o = contacts.touched[i] - 1
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
+        u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
         g0, g1, g2 = contacts.goal[i, 0], contacts.goal[i, 1], contacts.goal[i, 2]
         pressed = boundary.friction[o] * ((g0 - u0) * n0 + (g1 - u1) * n1 + (g2 - u2) * n2)
         w0, w1, w2 = boundary.velocity[step, o, 0], boundary.velocity[step, o, 1], boundary.velocity[step, o, 2]
@@ -42,14 +42,14 @@ def rub(network, nodes, contacts, boundary, step, push):
 
 
 @lean
-def release_slipping(network, nodes, contacts, boundary, push):
+def release_slipping(model, nodes, contacts, boundary, push):
     """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 9.1)."""
     changes = 0
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]
         if contacts.mode[i] != STICKS:
             continue
-        w, direction = boundary.dt * push.factor * network.inverse_mass[i], push.direction
+        w, direction = boundary.dt * push.factor * model.inverse_mass[i], push.direction
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
         k0 = contacts.goal[i, 0] - nodes.v_star[i, 0] - w * direction[i, 0]
         k1 = contacts.goal[i, 1] - nodes.v_star[i, 1] - w * direction[i, 1]
@@ -67,7 +67,7 @@ def release_slipping(network, nodes, contacts, boundary, push):
 
 
 @lean
-def wedge(network, nodes, contacts, boundary, step, push):
+def wedge(model, nodes, contacts, boundary, step, push):
     """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 9.2); how many.
 
     Obstacles that face each other have no edge: the deeper one wins, and the other's penetration is recorded.
@@ -79,7 +79,7 @@ def wedge(network, nodes, contacts, boundary, step, push):
         if contacts.mode[i] != SLIDES:
             continue
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
+        u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
         u0, u1, u2 = allowed_part(SLIDES, n0, n1, n2, u0, u1, u2)
         u0, u1, u2 = u0 + contacts.goal[i, 0], u1 + contacts.goal[i, 1], u2 + contacts.goal[i, 2]
         y0, y1, y2 = nodes.x[i, 0] + dt * u0, nodes.x[i, 1] + dt * u1, nodes.x[i, 2] + dt * u2
@@ -128,14 +128,14 @@ def shares(k, n, m):
 
 
 @lean
-def release_wedged(network, nodes, contacts, boundary, push):
+def release_wedged(model, nodes, contacts, boundary, push):
     """Frees nodes in a wedge that one of their obstacles would pull; the next search finds the other (eq. 9.2)."""
     changes = 0
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]
         if contacts.mode[i] != ON_EDGE:
             continue
-        u0, u1, u2 = pushed_velocity(network, nodes, boundary, push, i)
+        u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
         # What the edge leaves free is at right angles to both normals and takes no share.
         n = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
         m = contacts.second_normal[i, 0], contacts.second_normal[i, 1], contacts.second_normal[i, 2]

@@ -12,7 +12,7 @@ from massspring.kernels.jit.flat import flat
 
 
 @inlined
-def clearances_into(network, nodes, contacts, boundary, step, push, part):
+def clearances_into(model, nodes, contacts, boundary, step, push, part):
     """clearance_i = min over obstacles of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 3.7).
 
     Of the nodes first ≤ i < last in `part`, those that nothing can touch among them.
@@ -20,7 +20,7 @@ def clearances_into(network, nodes, contacts, boundary, step, push, part):
     first, last = part
     real = nodes.x.dtype.type
     x, v_star = flat(nodes.x, first, last), flat(nodes.v_star, first, last)
-    direction, inverse_mass = flat(push.direction, first, last), flat(network.inverse_mass, first, last)
+    direction, inverse_mass = flat(push.direction, first, last), flat(model.inverse_mass, first, last)
     course = x, v_star, direction, inverse_mass, real(boundary.dt), real(boundary.dt * push.factor)
     clearance = flat(contacts.clearance, first, last)
     for i in range(clearance.shape[0]):
@@ -73,9 +73,9 @@ def capsule_clearance(course, clearance, p0, p1, p2, a0, a1, a2, radius):
 
 
 @inlined
-def pushed_velocity(network, nodes, boundary, push, i):
+def pushed_velocity(model, nodes, boundary, push, i):
     """u = v* + dt W f of node i when what keeps volumes acts as a force f [m/s] (eq. 3.7)."""
-    w, direction = boundary.dt * push.factor * network.inverse_mass[i], push.direction
+    w, direction = boundary.dt * push.factor * model.inverse_mass[i], push.direction
     u0 = nodes.v_star[i, 0] + w * direction[i, 0]
     u1 = nodes.v_star[i, 1] + w * direction[i, 1]
     u2 = nodes.v_star[i, 2] + w * direction[i, 2]

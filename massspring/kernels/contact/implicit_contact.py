@@ -6,21 +6,21 @@ from massspring.kernels.jit.decorators import compiled
 
 
 @compiled
-def seat_entering(network, nodes, contacts, boundary, step, push):
+def seat_entering(model, nodes, contacts, boundary, step, push):
     """Puts free surface nodes that would enter an obstacle onto it (eq. 3.7) and lists them; how many.
 
     Those that have been released since the last search leave the list.
     """
     forget_released(contacts)
     count = 0
-    for c in range(network.surface_nodes.shape[0]):
-        i = network.surface_nodes[c]
-        if network.inverse_mass[i] == 0.0 or contacts.mode[i] > FREE:
+    for c in range(model.surface_nodes.shape[0]):
+        i = model.surface_nodes[c]
+        if model.inverse_mass[i] == 0.0 or contacts.mode[i] > FREE:
             continue
-        if enters(network, nodes, boundary, step, push, i):
+        if enters(model, nodes, boundary, step, push, i):
             contacts.entering[count] = i
             count += 1
     if count > 0:
-        seat(network, nodes, contacts, boundary, step, push, count)
+        seat(model, nodes, contacts, boundary, step, push, count)
         admit(contacts, count)
     return count

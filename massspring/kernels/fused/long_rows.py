@@ -6,14 +6,14 @@ from massspring.kernels.jit.decorators import lean
 
 
 @lean
-def join_pieces(network, nodes, work, boundary, keeps):
+def join_pieces(model, nodes, work, boundary, keeps):
     """v* and G of the nodes in pieces, and their shares of G·v* and G·W·G in the last of `sums`."""
-    slices = network.slices
+    slices = model.slices
     keep = 1.0 - boundary.damping * boundary.dt
     flow, mobility = 0.0, 0.0
     for k in range(slices.split_node.shape[0]):
         i = slices.split_node[k]
-        w = network.inverse_mass[i]
+        w = model.inverse_mass[i]
         for axis in range(3):
             force, area = 0.0, 0.0
             for p in range(slices.split_start[k], slices.split_start[k + 1]):
@@ -34,15 +34,15 @@ def join_pieces(network, nodes, work, boundary, keeps):
 
 
 @lean
-def add_walls(network, nodes, dt):
+def add_walls(model, nodes, dt):
     """v* += dt W f of the triangle springs [m/s]; returns what that adds to G·v* [m³/s].
 
     `nodes.force` comes with the spring forces of held nodes alone, whose W is 0: theirs are added to.
     """
     flow = 0.0
-    add_membrane_forces(nodes.x, network.membrane, nodes.force)
+    add_membrane_forces(nodes.x, model.membrane, nodes.force)
     for i in range(nodes.x.shape[0]):
-        push = dt * network.inverse_mass[i]
+        push = dt * model.inverse_mass[i]
         for axis in range(3):
             nodes.v_star[i, axis] += push * nodes.force[i, axis]
             flow += nodes.gradient[i, axis] * push * nodes.force[i, axis]

@@ -176,28 +176,28 @@ def pass_all(nodes, work, boundary, slices, keeps, team):
 
 
 @inlined
-def predict_from_places(network, nodes, work, boundary, keeps, team):
+def predict_from_places(model, nodes, work, boundary, keeps, team):
     """v* of eq. 3.1 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
 
     `places` holds the positions. Of the forces only those of held nodes are written out.
     """
-    slices = network.slices
-    walls = network.membrane.triangles.shape[0] > 0
+    slices = model.slices
+    walls = model.membrane.triangles.shape[0] > 0
     if walls:
         nodes.force[:] = 0
     pass_all(nodes, work, boundary, slices, keeps, team)
-    join_pieces(network, nodes, work, boundary, keeps)
+    join_pieces(model, nodes, work, boundary, keeps)
     volume, flow, mobility = add_up(work.sums, slices.pieces)
     if walls:
-        flow += add_walls(network, nodes, boundary.dt)
+        flow += add_walls(model, nodes, boundary.dt)
     return volume, flow, mobility
 
 
 @lean
-def gather_and_predict(network, nodes, work, boundary, keeps):
+def gather_and_predict(model, nodes, work, boundary, keeps):
     """The same from `x`; leaves the positions in `places`, where `advance` looks for them."""
     places_into(nodes, work, 0, nodes.x.shape[0])
-    return predict_from_places(network, nodes, work, boundary, keeps, None)
+    return predict_from_places(model, nodes, work, boundary, keeps, None)
 
 
 @inlined

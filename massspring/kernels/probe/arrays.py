@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.arrays.layout import Contacts, FrameDiagnostics, Network, Nodes, Tips
+from massspring.kernels.arrays.layout import Contacts, FrameDiagnostics, Model, Nodes, Tips
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.probe.continuous import Pair
 
@@ -110,7 +110,7 @@ class Probing(NamedTuple):
 class Stage(NamedTuple):
     """One step as the functions of this stage see it."""
 
-    network: Network
+    model: Model
     nodes: Nodes
     contacts: Contacts
     tips: Tips

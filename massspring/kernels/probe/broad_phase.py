@@ -30,11 +30,11 @@ def fastest_free(v_star, direction, inverse_mass, impulse):
 
 
 @lean
-def fastest_node(network, nodes, contacts, push, dt):
+def fastest_node(model, nodes, contacts, push, dt):
     """At least |v⁺_i| [m/s] of every node in the step as it stands, without thin probes (eq. 3.5)."""
-    n, mode, real = network.inverse_mass.shape[0], contacts.mode, nodes.x.dtype.type
+    n, mode, real = model.inverse_mass.shape[0], contacts.mode, nodes.x.dtype.type
     v_star, direction = flat(nodes.v_star, 0, n), flat(push.direction, 0, n)
-    weight = flat(network.inverse_mass, 0, n)
+    weight = flat(model.inverse_mass, 0, n)
     fastest = float(fastest_free(v_star, direction, weight, real(dt * push.factor)))
     for k in range(contacts.touching_count[0]):
         i = contacts.touching[k]

@@ -66,7 +66,7 @@ def aim_rows(stage):
             i, b = rows.node[k, q], rows.weight[k, q]
             approach += b * (d0 * probes.base[i, 0] + d1 * probes.base[i, 1] + d2 * probes.base[i, 2])
             gap += b * (d0 * nodes.x[i, 0] + d1 * nodes.x[i, 1] + d2 * nodes.x[i, 2])
-            w, m0, m1, m2 = stage.network.inverse_mass[i], d0, d1, d2
+            w, m0, m1, m2 = stage.model.inverse_mass[i], d0, d1, d2
             if contacts.mode[i] > FREE:
                 e0, e1, e2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
                 m0, m1, m2 = allowed_part(contacts.mode[i], e0, e1, e2, m0, m1, m2)
@@ -181,4 +181,4 @@ def solve_rows(stage, volumes):
         answer_into(stage, volumes, rows.flow[k], rows.answer[k])
     matrix_into(rows)
     choose_rows(rows)
-    return spread_push(rows, stage.probes.push, stage.network.inverse_mass) + change_of_rows(stage)
+    return spread_push(rows, stage.probes.push, stage.model.inverse_mass) + change_of_rows(stage)

@@ -81,7 +81,7 @@ def lead(stage, p, n):
 @lean
 def take_along(stage, p):
     """Carries the free corners of all triangles that the tip of probe p passes, or sends those ahead; whether any."""
-    probes, network, contacts = stage.probes, stage.network, stage.contacts
+    probes, model, contacts = stage.probes, stage.model, stage.contacts
     more = False
     look(stage, p)
     for n in range(probes.near_count[p]):
@@ -90,7 +90,7 @@ def take_along(stage, p):
         fresh = False
         for k in range(3):
             i = probes.surface[probes.near[p, n], k]
-            if network.inverse_mass[i] > 0.0 and contacts.mode[i] == FREE:
+            if model.inverse_mass[i] > 0.0 and contacts.mode[i] == FREE:
                 take(stage, p, i)
                 fresh = True
         more |= fresh or lead(stage, p, n)
@@ -103,7 +103,7 @@ def give_way(stage, volumes):
 
     Returns how much faster it makes a node at most [m/s].
     """
-    probes, network, nodes, contacts = stage.probes, stage.network, stage.nodes, stage.contacts
+    probes, model, nodes, contacts = stage.probes, stage.model, stage.nodes, stage.contacts
     flow, answer, change = probes.rows.flow[0], probes.rows.answer[0], probes.change
     for r in range(change.shape[0]):
         flow[r], answer[r], change[r] = 0.0, 0.0, 0.0
@@ -115,7 +115,7 @@ def give_way(stage, volumes):
         if volumes is None:
             g = nodes.gradient
             flow[0] -= g[i, 0] * s0 + g[i, 1] * s1 + g[i, 2] * s2
-            taken += network.inverse_mass[i] * (g[i, 0] ** 2 + g[i, 1] ** 2 + g[i, 2] ** 2)
+            taken += model.inverse_mass[i] * (g[i, 0] ** 2 + g[i, 1] ** 2 + g[i, 2] ** 2)
         else:
             for t in range(volumes.node_start[i], volumes.node_start[i + 1]):
                 e, j = volumes.node_entry[t], volumes.value
@@ -185,18 +185,18 @@ def note_passed(stage):
 @lean
 def settle_carried(stage, push):
     """Carried nodes end the step where they were carried: v* takes the difference, the tip's impulse [N s]."""
-    probes, network, nodes, contacts = stage.probes, stage.network, stage.nodes, stage.contacts
+    probes, model, nodes, contacts = stage.probes, stage.model, stage.nodes, stage.contacts
     impulse = probes.diagnostics.contact_impulse
     first = impulse.shape[0] - probes.radius.shape[0]
     for k in range(probes.taken_count[0]):
         i = probes.taken[k]
         p = probes.carried[i] - 1
         speed = carried_speed(stage, i)
-        w = stage.dt * push.factor * network.inverse_mass[i]
+        w = stage.dt * push.factor * model.inverse_mass[i]
         for axis in range(3):
             gain = speed[axis] - w * push.direction[i, axis] - nodes.v_star[i, axis]
             nodes.v_star[i, axis] += gain
-            impulse[first + p, axis] += network.mass[i] * gain
+            impulse[first + p, axis] += model.mass[i] * gain
             probes.push[i, axis] = 0.0
         probes.carried[i], contacts.mode[i] = 0, FREE
     probes.taken_count[0] = 0

@@ -12,7 +12,7 @@ from massspring.kernels.probe.pressure import swelling
 def gather(stage, push):
     """u_i of the corners of all near triangles (eq. 3.4, 3.5), and v⁺ = u."""
     nodes, contacts, probes = stage.nodes, stage.contacts, stage.probes
-    triangles, weight = probes.surface, stage.network.inverse_mass
+    triangles, weight = probes.surface, stage.model.inverse_mass
     v, f, base, velocity = nodes.v_star, push.direction, probes.base, probes.velocity
     for p in range(probes.radius.shape[0]):
         for n in range(probes.near_count[p]):
@@ -63,7 +63,7 @@ def move(stage, volumes):
 @lean
 def settle(stage):
     """Hands the contacts on to the step: v* takes their pushes; books them for probes and attachments [N s]."""
-    probes, network, rows, diagnostics = stage.probes, stage.network, stage.probes.rows, stage.probes.diagnostics
+    probes, model, rows, diagnostics = stage.probes, stage.model, stage.probes.rows, stage.probes.diagnostics
     first = diagnostics.contact_impulse.shape[0] - probes.radius.shape[0]
     for k in range(rows.count[0]):
         for axis in range(3):
@@ -73,12 +73,12 @@ def settle(stage):
             for axis in range(3):
                 stage.nodes.v_star[i, axis] += probes.push[i, axis]
                 probes.push[i, axis] = 0.0
-            if network.inverse_mass[i] == 0.0:
-                for h in range(network.held_nodes.shape[0]):
-                    if network.held_nodes[h] == i:
+            if model.inverse_mass[i] == 0.0:
+                for h in range(model.held_nodes.shape[0]):
+                    if model.held_nodes[h] == i:
                         for axis in range(3):
                             share = rows.weight[k, q] * rows.impulse[k] * rows.direction[k, axis]
-                            diagnostics.held_impulse[network.held_group[h], axis] -= share
+                            diagnostics.held_impulse[model.held_group[h], axis] -= share
 
 
 @lean

@@ -20,9 +20,9 @@ MOST_ITERATIONS = 400
 def prepare(stage, volumes):
     """S for what can move now; factored where it is dense (eq. 8.3)."""
     if volumes is not None:
-        diagonal_into(volumes, stage.contacts, stage.network.inverse_mass, volumes.diagonal)
+        diagonal_into(volumes, stage.contacts, stage.model.inverse_mass, volumes.diagonal)
         if volumes.matrix.shape[0] > 0:
-            dense_into(volumes, stage.contacts, stage.network.inverse_mass, volumes.matrix)
+            dense_into(volumes, stage.contacts, stage.model.inverse_mass, volumes.matrix)
             factor_dense(volumes.matrix)
 
 
@@ -59,7 +59,7 @@ def answer_into(stage, volumes, flow, answer):
             largest = max(largest, abs(flow[r]))
         for r in range(flow.shape[0]):
             volumes.right[r], volumes.allowed[r], answer[r] = flow[r], ACCURATE * largest, 0.0
-        solve_iteratively(volumes, stage.contacts, stage.network.inverse_mass, answer, volumes.allowed, MOST_ITERATIONS)
+        solve_iteratively(volumes, stage.contacts, stage.model.inverse_mass, answer, volumes.allowed, MOST_ITERATIONS)
 
 
 @lean
@@ -80,7 +80,7 @@ def change_of_rows(stage):
 @lean
 def faster_by(stage, felt):
     """√(max w · dt² δ·S δ) ≥ dt w_i |(Jᵀ δ)_i| [m/s]: how much faster pressures can make any free node."""
-    return 1.0001 * math.sqrt(max(stage.network.largest_inverse_mass * felt, 0.0))
+    return 1.0001 * math.sqrt(max(stage.model.largest_inverse_mass * felt, 0.0))
 
 
 @lean
@@ -97,7 +97,7 @@ def swelling(stage, volumes, i):
             s0 += p * volumes.value[e, 0]
             s1 += p * volumes.value[e, 1]
             s2 += p * volumes.value[e, 2]
-    push = stage.dt * stage.network.inverse_mass[i]
+    push = stage.dt * stage.model.inverse_mass[i]
     s0, s1, s2 = push * s0, push * s1, push * s2
     if contacts.mode[i] > FREE:
         d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]

@@ -28,7 +28,7 @@ def meet_probes(stage, volumes, push):
     """
     nodes, tips, probes, step, dt = stage.nodes, stage.tips, stage.probes, stage.step, stage.dt
     factor = push.factor
-    plain = dt * fastest_node(stage.network, nodes, stage.contacts, push, dt) + longest_way(tips, step)
+    plain = dt * fastest_node(stage.model, nodes, stage.contacts, push, dt) + longest_way(tips, step)
     if not plain < math.inf:
         return factor
     reach, horizon, crosses = plain, ROOM * plain, False

@@ -40,8 +40,8 @@ def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
 @inlined
 def advance(frame, push):
     """The end of a step of all nodes (eq. 3.5); books the impulse of each obstacle, pads the new positions."""
-    network, nodes, contacts, dt = frame.network, frame.nodes, frame.contacts, frame.boundary.dt
-    book_contacts(network, nodes, contacts, push, dt, frame.diagnostics.contact_impulse)
+    model, nodes, contacts, dt = frame.model, frame.nodes, frame.contacts, frame.boundary.dt
+    book_contacts(model, nodes, contacts, push, dt, frame.diagnostics.contact_impulse)
     move_all(frame, push, frame.team)
 
 
@@ -59,7 +59,7 @@ def move_all(frame, push, team):
 @inlined
 def move(frame, push, first, last):
     """`advance_nodes` and `places_into` of some nodes; `NEAR` at a time, so that new positions are still at hand."""
-    nodes, work, weights = frame.nodes, frame.work, frame.network.inverse_mass
+    nodes, work, weights = frame.nodes, frame.work, frame.model.inverse_mass
     for begin in range(first, last, NEAR):
         end = min(begin + NEAR, last)
         advance_nodes(nodes, frame.contacts, work, weights, push, frame.boundary.dt, (begin, end))

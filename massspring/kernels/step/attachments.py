@@ -14,9 +14,9 @@ def prescribe_velocity_into(x, held_nodes, held_group, held_rest, displacement, 
 
 
 @inlined
-def prescribe(network, nodes, displacement, dt):
+def prescribe(model, nodes, displacement, dt):
     """v* of held nodes (eq. 3.2); returns what that changes of G·v* [m³/s]."""
-    held_nodes, groups, rest = network.held_nodes, network.held_group, network.held_rest
+    held_nodes, groups, rest = model.held_nodes, model.held_group, model.held_rest
     x, v_star, gradient = nodes.x, nodes.v_star, nodes.gradient
     flow, per_step = 0.0, 1.0 / dt
     for h in range(held_nodes.shape[0]):
@@ -29,9 +29,9 @@ def prescribe(network, nodes, displacement, dt):
 
 
 @inlined
-def add_held_impulse(network, nodes, push, dt, gravity, held_impulse):
+def add_held_impulse(model, nodes, push, dt, gravity, held_impulse):
     """I_g = −dt Σ_i∈g (f_i + push_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 3.6)."""
-    held_nodes, groups, mass = network.held_nodes, network.held_group, network.mass
+    held_nodes, groups, mass = model.held_nodes, model.held_group, model.mass
     force, direction, factor = nodes.force, push.direction, push.factor
     h, count = 0, held_nodes.shape[0]
     while h < count:

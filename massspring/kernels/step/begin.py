@@ -21,12 +21,12 @@ def begin_step(frame, step, keeps):
 
     Returns V [m³] and G·W·G [m⁴/kg].
     """
-    network, nodes, boundary = frame.network, frame.nodes, frame.boundary
-    volume, _, mobility = predict_from_places(network, nodes, frame.work, boundary, keeps, frame.team)
+    model, nodes, boundary = frame.model, frame.nodes, frame.boundary
+    volume, _, mobility = predict_from_places(model, nodes, frame.work, boundary, keeps, frame.team)
     end_stage(frame.diagnostics.stage_times, SPRINGS)
     held = boundary.held_displacement[step]
     prescribe_velocity_into(
-        nodes.x, network.held_nodes, network.held_group, network.held_rest, held, boundary.dt, nodes.v_star
+        nodes.x, model.held_nodes, model.held_group, model.held_rest, held, boundary.dt, nodes.v_star
     )
     end_stage(frame.diagnostics.stage_times, HELD)
     return volume, mobility
@@ -35,10 +35,10 @@ def begin_step(frame, step, keeps):
 @inlined
 def begin_summed_step(frame, step):
     """The same with G and with G·v* [m³/s] of all nodes, so that no other pass sums it: (V, G·v*, G·W·G)."""
-    network, nodes, boundary = frame.network, frame.nodes, frame.boundary
-    volume, flow, mobility = predict_from_places(network, nodes, frame.work, boundary, True, frame.team)
+    model, nodes, boundary = frame.model, frame.nodes, frame.boundary
+    volume, flow, mobility = predict_from_places(model, nodes, frame.work, boundary, True, frame.team)
     end_stage(frame.diagnostics.stage_times, SPRINGS)
-    flow += prescribe(network, nodes, boundary.held_displacement[step], boundary.dt)
+    flow += prescribe(model, nodes, boundary.held_displacement[step], boundary.dt)
     end_stage(frame.diagnostics.stage_times, HELD)
     return volume, flow, mobility
 
@@ -48,7 +48,7 @@ def search_contacts(frame, step, push):
     """Finds the nodes that touch while the last known push acts (eq. 3.7); how many passes the active set may take."""
     if frame.boundary.radius.shape[0] == 0:
         return 1
-    find_contacts(frame.network, frame.nodes, frame.contacts, frame.boundary, step, push, frame.team)
+    find_contacts(frame.model, frame.nodes, frame.contacts, frame.boundary, step, push, frame.team)
     end_stage(frame.diagnostics.stage_times, SEARCH)
     return CONTACT_PASSES
 
@@ -62,7 +62,7 @@ def multiplier_stands(frame, step, push, reach, last):
     end_stage(frame.diagnostics.stage_times, MULTIPLIER)
     if last:
         return True
-    changes = revise_contacts(frame.network, frame.nodes, frame.contacts, frame.boundary, step, push, reach)
+    changes = revise_contacts(frame.model, frame.nodes, frame.contacts, frame.boundary, step, push, reach)
     end_stage(frame.diagnostics.stage_times, REVISION)
     return changes == 0
 

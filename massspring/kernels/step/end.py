@@ -18,8 +18,8 @@ def end_step(frame, step, push, mobility, volumes):
     """
     factor = probed(frame, step, push, mobility, volumes, frame.probing)
     push = Push(push.direction, factor)
-    network, nodes, boundary, diagnostics = frame.network, frame.nodes, frame.boundary, frame.diagnostics
-    add_held_impulse(network, nodes, push, boundary.dt, boundary.gravity, diagnostics.held_impulse)
+    model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
+    add_held_impulse(model, nodes, push, boundary.dt, boundary.gravity, diagnostics.held_impulse)
     end_stage(diagnostics.stage_times, HELD)
     advance(frame, push)
     end_stage(diagnostics.stage_times, INTEGRATION)
@@ -33,7 +33,7 @@ def probed(frame, step, push, mobility, volumes, probing):
         return push.factor
     boundary = frame.boundary
     stage = Stage(
-        frame.network, frame.nodes, frame.contacts, boundary.tips, probing, volumes, mobility, step, boundary.dt
+        frame.model, frame.nodes, frame.contacts, boundary.tips, probing, volumes, mobility, step, boundary.dt
     )
     factor = meet_probes(stage, volumes, push)
     end_stage(frame.diagnostics.stage_times, PROBES)

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Network, Nodes, Workspace
+from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Model, Nodes, Workspace
 from massspring.kernels.jit.thread_team import ThreadTeam
 from massspring.kernels.probe.arrays import Probing
 
@@ -10,7 +10,7 @@ from massspring.kernels.probe.arrays import Probing
 class Frame(NamedTuple):
     """A body, its surroundings during a frame, and what the frame measures of itself."""
 
-    network: Network
+    model: Model
     nodes: Nodes
     contacts: Contacts
     work: Workspace

@@ -6,14 +6,14 @@ from massspring.kernels.jit.decorators import compiled
 
 
 @compiled
-def imbalance_into(network, nodes, rows, p, boundary, out):
+def imbalance_into(model, nodes, rows, p, boundary, out):
     """dt M v + dt² (f(p) + Jᵀ lam + m g) − (1 + c dt) M (p − x) [kg m], (n, 3) (eq. 12.2); J, V at p go to `rows`."""
     dt = boundary.dt
-    spring_forces_into(p, network.ends, network.rest_length, network.stiffness, nodes.force)
-    rows_into(p, network.inverse_mass, rows)
+    spring_forces_into(p, model.ends, model.rest_length, model.stiffness, nodes.force)
+    rows_into(p, model.inverse_mass, rows)
     transposed_rows_times_into(rows, rows.lam, out)
     for i in range(p.shape[0]):
-        m = network.mass[i]
+        m = model.mass[i]
         for axis in range(3):
             known = dt * dt * (nodes.force[i, axis] + out[i, axis] + m * boundary.gravity[axis])
             moved = (1.0 + boundary.damping * dt) * (p[i, axis] - nodes.x[i, axis])

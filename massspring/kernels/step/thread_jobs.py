@@ -24,7 +24,7 @@ from massspring.kernels.step.advance import advance_nodes
 @lean
 def worker(frame, team, direction, rank):
     """Does part number `rank` of every job of a frame up to its end; `direction` is that of its pushes."""
-    network, nodes, contacts, work, boundary = frame.network, frame.nodes, frame.contacts, frame.work, frame.boundary
+    model, nodes, contacts, work, boundary = frame.model, frame.nodes, frame.contacts, frame.work, frame.boundary
     slices = team.slices[rank], team.slices[rank + 1]
     part = team.nodes[rank], team.nodes[rank + 1]
     known = 0
@@ -35,13 +35,13 @@ def worker(frame, team, direction, rank):
         if job == JOB_END:
             return
         if job == JOB_SPRINGS:
-            pass_slices(nodes, work, boundary, network.slices, slices, False, work.tile[rank])
+            pass_slices(nodes, work, boundary, model.slices, slices, False, work.tile[rank])
         elif job == JOB_SPRINGS_AND_VOLUME:
-            pass_slices(nodes, work, boundary, network.slices, slices, True, work.tile[rank])
+            pass_slices(nodes, work, boundary, model.slices, slices, True, work.tile[rank])
         elif job == JOB_SEARCH:
-            clearances_into(network, nodes, contacts, boundary, step, push, part)
+            clearances_into(model, nodes, contacts, boundary, step, push, part)
         else:
-            advance_nodes(nodes, contacts, work, network.inverse_mass, push, boundary.dt, part)
+            advance_nodes(nodes, contacts, work, model.inverse_mass, push, boundary.dt, part)
             places_into(nodes, work, part[0], part[1])
         raise_by_one(team.signal, DONE)
 

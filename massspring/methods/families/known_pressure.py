@@ -26,24 +26,24 @@ PENALTY, GAS, PYRAMIDS = 0, 1, 2
 
 
 @compiled
-def known_pressure(network, nodes, bulk_modulus, law, volume, target):
+def known_pressure(model, nodes, bulk_modulus, law, volume, target):
     """lam [Pa] of the volume now (eq. 10.8, 10.10)."""
     if law == GAS:
         return bulk_modulus * (target / volume - 1.0) if volume > 0.0 else np.inf
     if law == PYRAMIDS:
-        volume = pyramid_volume(nodes.x, network.mass, network.triangles)
+        volume = pyramid_volume(nodes.x, model.mass, model.triangles)
     return bulk_modulus * (target - volume) / target
 
 
 @lean
 def pressure_frame(frame, bulk_modulus, law):
     """One frame of symplectic Euler with a known pressure (eq. 3.1, 3.2, 3.5, 3.7, 10.8); returns the last one [Pa]."""
-    network, nodes, boundary, diagnostics = frame.network, frame.nodes, frame.boundary, frame.diagnostics
+    model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
     lam = 0.0
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
         volume, mobility = begin_step(frame, step, True)
-        lam = known_pressure(network, nodes, bulk_modulus, law, volume, boundary.volume_target[step, 0])
+        lam = known_pressure(model, nodes, bulk_modulus, law, volume, boundary.volume_target[step, 0])
         if not mobility > 0.0:
             lam = 0.0
             diagnostics.skipped[0] += 1

@@ -47,7 +47,7 @@ class Rule(NamedTuple):
 
 
 @compiled
-def inertial_change(network, nodes, rule, dt):
+def inertial_change(model, nodes, rule, dt):
     """dt (1 − 2 alpha dt) G·v − dt² vᵀHv [m³], what a step leaves of the old change of volume (eq. 10.5)."""
     change = 0.0
     if rule.brake != 1.0:
@@ -57,57 +57,57 @@ def inertial_change(network, nodes, rule, dt):
             change += nodes.gradient[i, 2] * nodes.v[i, 2]
         change *= dt * (1.0 - rule.brake)
     if rule.convective:
-        _, _, half, _ = volume_cubic(nodes.x, nodes.v, network.triangles)
+        _, _, half, _ = volume_cubic(nodes.x, nodes.v, model.triangles)
         change -= 2.0 * dt * dt * half
     return change
 
 
 @compiled
-def linear_multiplier(network, nodes, contacts, error, kept, dt, whole):
+def linear_multiplier(model, nodes, contacts, error, kept, dt, whole):
     """lam [Pa] and G·W̃·G of a step that makes up for `error` [m³] and stops `kept` [m³]; whether the error was cut.
 
     It is not where the `whole` of it is wanted (eq. 3.3, 8.5, 10.5).
     """
-    lam, mobility = volume_multiplier(nodes, contacts, network.inverse_mass, error + kept, dt)
-    lightest, longest = network.largest_inverse_mass, network.longest_correction
+    lam, mobility = volume_multiplier(nodes, contacts, model.inverse_mass, error + kept, dt)
+    lightest, longest = model.largest_inverse_mass, model.longest_correction
     if whole or not mobility > 0.0 or surely_short(error, mobility, lightest, longest):
         return lam, mobility, False
-    part = capped_error(error, mobility, steepest(nodes.gradient, network.inverse_mass), longest)
+    part = capped_error(error, mobility, steepest(nodes.gradient, model.inverse_mass), longest)
     if part != error:
-        lam, mobility = volume_multiplier(nodes, contacts, network.inverse_mass, part + kept, dt)
+        lam, mobility = volume_multiplier(nodes, contacts, model.inverse_mass, part + kept, dt)
     return lam, mobility, part != error
 
 
 @compiled
-def exact_multiplier(network, nodes, contacts, line, target, mobility, dt):
+def exact_multiplier(model, nodes, contacts, line, target, mobility, dt):
     """lam [Pa] with V(y + lam d) = V0, the root of smallest modulus (eq. 10.1, 10.2), and G·W̃·G; (0, 0) without
     one."""
-    line_into(nodes, contacts, network.inverse_mass, dt, line)
-    volume, k1, k2, k3 = volume_cubic(line.y, line.d, network.triangles)
+    line_into(nodes, contacts, model.inverse_mass, dt, line)
+    volume, k1, k2, k3 = volume_cubic(line.y, line.d, model.triangles)
     lam = nearest_root(volume - target, k1, k2, k3)
     return (lam, mobility) if lam == lam else (0.0, 0.0)
 
 
 @compiled
-def predicted_gradient_into(network, nodes, line, dt):
+def predicted_gradient_into(model, nodes, line, dt):
     """G at x + dt v* [m²], (n, 3), before contact (eq. 2.2, 3.1)."""
     for i in range(nodes.x.shape[0]):
         for axis in range(3):
             line.y[i, axis] = nodes.x[i, axis] + dt * nodes.v_star[i, axis]
-    volume_gradient_into(line.y, network.triangles, nodes.gradient)
+    volume_gradient_into(line.y, model.triangles, nodes.gradient)
 
 
 @compiled
-def correct_positions(network, nodes, contacts, target, dt):
+def correct_positions(model, nodes, contacts, target, dt):
     """x += W̃ G (V0 − V)/(G·W̃·G), G at x, velocities untouched (eq. 10.7); whether the correction was cut
     (eq. 8.5)."""
-    error = target - volume_gradient_into(nodes.x, network.triangles, nodes.gradient)
-    _, mobility = volume_multiplier(nodes, contacts, network.inverse_mass, error, dt)
+    error = target - volume_gradient_into(nodes.x, model.triangles, nodes.gradient)
+    _, mobility = volume_multiplier(nodes, contacts, model.inverse_mass, error, dt)
     if not mobility > 0.0:
         return False
-    part = capped_error(error, mobility, steepest(nodes.gradient, network.inverse_mass), network.longest_correction)
+    part = capped_error(error, mobility, steepest(nodes.gradient, model.inverse_mass), model.longest_correction)
     for i in range(nodes.x.shape[0]):
-        push = network.inverse_mass[i] * part / mobility
+        push = model.inverse_mass[i] * part / mobility
         p0, p1, p2 = push * nodes.gradient[i, 0], push * nodes.gradient[i, 1], push * nodes.gradient[i, 2]
         if contacts.mode[i] > FREE:
             d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
@@ -121,8 +121,8 @@ def correct_positions(network, nodes, contacts, target, dt):
 @lean
 def constraint_frame(frame, line, lam, rule):
     """One frame with contact inside the multiplier (eq. 3.1–3.8, 10.1–10.3, 10.5, 10.7); returns the last lam [Pa]."""
-    network, nodes, contacts, boundary, diagnostics = (
-        frame.network,
+    model, nodes, contacts, boundary, diagnostics = (
+        frame.model,
         frame.nodes,
         frame.contacts,
         frame.boundary,
@@ -134,25 +134,25 @@ def constraint_frame(frame, line, lam, rule):
         target = boundary.volume_target[step, 0]
         volume, _ = begin_step(frame, step, True)
         error = rule.pull * (target - volume)
-        kept = inertial_change(network, nodes, rule, dt)
+        kept = inertial_change(model, nodes, rule, dt)
         if rule.at_prediction:
-            predicted_gradient_into(network, nodes, line, dt)
+            predicted_gradient_into(model, nodes, line, dt)
         end_stage(diagnostics.stage_times, VOLUME)
         predicted = lam
         passes = search_contacts(frame, step, Push(nodes.gradient, predicted))
         for sweep in range(passes):
-            lam, mobility, capped = linear_multiplier(network, nodes, contacts, error, kept, dt, rule.exact)
+            lam, mobility, capped = linear_multiplier(model, nodes, contacts, error, kept, dt, rule.exact)
             if rule.exact and mobility > 0.0:
-                lam, mobility = exact_multiplier(network, nodes, contacts, line, target, mobility, dt)
+                lam, mobility = exact_multiplier(model, nodes, contacts, line, target, mobility, dt)
             diagnostics.capped[0] += capped and sweep == 0
-            reach = pressure_reach(lam - predicted, mobility, network.largest_inverse_mass, dt)
+            reach = pressure_reach(lam - predicted, mobility, model.largest_inverse_mass, dt)
             if multiplier_stands(frame, step, Push(nodes.gradient, lam), reach, sweep + 1 == passes):
                 break
         if not mobility > 0.0:
             diagnostics.skipped[0] += 1
         lam = end_step(frame, step, Push(nodes.gradient, lam), mobility, None)
         if rule.stabilised:
-            diagnostics.capped[0] += correct_positions(network, nodes, contacts, target, dt)
+            diagnostics.capped[0] += correct_positions(model, nodes, contacts, target, dt)
             places_into(nodes, frame.work, 0, nodes.x.shape[0])
             end_stage(diagnostics.stage_times, MULTIPLIER)
     return lam

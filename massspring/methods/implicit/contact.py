@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Network, Nodes, Push
+from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Model, Nodes, Push
 from massspring.kernels.contact.active_set import let_go
 from massspring.kernels.contact.friction import wedge
 from massspring.kernels.contact.implicit_contact import seat_entering
@@ -61,10 +61,8 @@ class Touching:
 class Contact:
     """The touched nodes of one step on their way to an active set."""
 
-    def __init__(
-        self, network: Network, nodes: Nodes, contacts: Contacts, boundary: BoundaryConditions, step: int
-    ) -> None:
-        self.network, self.nodes, self.contacts = network, nodes, contacts
+    def __init__(self, model: Model, nodes: Nodes, contacts: Contacts, boundary: BoundaryConditions, step: int) -> None:
+        self.model, self.nodes, self.contacts = model, nodes, contacts
         self.boundary, self.step = boundary, step
         self.rubbed = np.zeros_like(nodes.x)
         """Friction of the nodes that slip, times dt² [kg m], (n, 3)."""
@@ -114,7 +112,7 @@ class Contact:
         normal, carried = contacts.normal[nodes], boundary.velocity[self.step][obstacle]
         slip = _aside((end[nodes] - self.nodes.x[nodes]) / boundary.dt - carried, normal)
         speed = np.linalg.norm(slip, axis=1)
-        still = speed * boundary.dt <= SLIP_RESOLUTION * self.network.longest_correction
+        still = speed * boundary.dt <= SLIP_RESOLUTION * self.model.longest_correction
         driven = still | (np.einsum("ci,ci->c", slip, self.rubbed[nodes]) > 0.0)
         most = boundary.friction[obstacle] * np.maximum(impulses[slides], 0.0)
         self.rubbed[nodes[~driven]] = -(most[~driven] / speed[~driven])[:, None] * slip[~driven]
@@ -136,7 +134,7 @@ class Contact:
         self.nodes.v_star[:] = velocity
         contacts.mode[leaving] = HIDDEN
         unpushed = Push(self.nodes.gradient, 0.0)
-        count = seat_entering(self.network, self.nodes, contacts, boundary, self.step, unpushed)
+        count = seat_entering(self.model, self.nodes, contacts, boundary, self.step, unpushed)
         contacts.mode[leaving] = FREE
         if boundary.rough:
             new = contacts.entering[:count].astype(np.int64)
@@ -144,7 +142,7 @@ class Contact:
             rough = boundary.friction[obstacle] > 0.0
             self._stick(new[rough], boundary.velocity[self.step][obstacle[rough]])
         if len(boundary.radius) > 1:
-            count += wedge(self.network, self.nodes, contacts, boundary, self.step, unpushed)
+            count += wedge(self.model, self.nodes, contacts, boundary, self.step, unpushed)
             self.rubbed[contacts.mode == ON_EDGE] = 0.0
         return count
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array, tril
 from scipy.sparse.linalg import splu
 
-from massspring.kernels.arrays.layout import Network
+from massspring.kernels.arrays.layout import Model
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.constraint.ldl_solve import Triangular, respond_into
 
@@ -16,15 +16,15 @@ from massspring.kernels.constraint.ldl_solve import Triangular, respond_into
 class Factor:
     """A⁻¹ of one step length and damping; held nodes do not respond."""
 
-    def __init__(self, network: Network, dt: float, damping: float) -> None:
-        i, j = network.ends.astype(np.int64).T
-        n = len(network.mass)
+    def __init__(self, model: Model, dt: float, damping: float) -> None:
+        i, j = model.ends.astype(np.int64).T
+        n = len(model.mass)
         rows, columns = np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i])
-        weights = np.concatenate([network.stiffness, network.stiffness, -network.stiffness, -network.stiffness])
+        weights = np.concatenate([model.stiffness, model.stiffness, -model.stiffness, -model.stiffness])
         springs = coo_array((weights, (rows, columns)), shape=(n, n)).tocsr()
-        matrix = diags_array((1.0 + damping * dt) * network.mass) + dt * dt * springs
-        free = np.flatnonzero(network.inverse_mass > 0.0)
-        self.diagonal = np.where(network.inverse_mass > 0.0, matrix.diagonal(), np.inf)
+        matrix = diags_array((1.0 + damping * dt) * model.mass) + dt * dt * springs
+        free = np.flatnonzero(model.inverse_mass > 0.0)
+        self.diagonal = np.where(model.inverse_mass > 0.0, matrix.diagonal(), np.inf)
         """Of A [kg], (n,); inf where held."""
         self._triangular = triangular(matrix.tocsr()[free][:, free].tocsc(), free)
         self._place = np.full(n, -1)
@@ -87,8 +87,8 @@ class Factors:
     def __init__(self) -> None:
         self._known: dict[tuple[float, float], Factor] = {}
 
-    def at(self, network: Network, dt: float, damping: float) -> Factor:
+    def at(self, model: Model, dt: float, damping: float) -> Factor:
         """The factor for steps of `dt` [s] with `damping` [1/s]."""
         if (dt, damping) not in self._known:
-            self._known[dt, damping] = Factor(network, dt, damping)
+            self._known[dt, damping] = Factor(model, dt, damping)
         return self._known[dt, damping]

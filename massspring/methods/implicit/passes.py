@@ -44,12 +44,12 @@ class Step:
     ) -> None:
         assert state.rows is not None  # start() made them
         self.boundary, self.step, self.factor, self.accuracy = boundary, step, factor, accuracy
-        self.network, self.nodes, self.contacts = state.network, state.nodes, state.contacts
+        self.model, self.nodes, self.contacts = state.model, state.nodes, state.contacts
         self.rows, self.diagnostics = state.rows, state.diagnostics
         # Without gravity: passes that start from balance must stay there, or a sum of few would be biased.
         self.p = self.nodes.x + boundary.dt * self.nodes.v
-        held = self.network.held_nodes
-        self.p[held] = self.network.held_rest + boundary.held_displacement[step][self.network.held_group]
+        held = self.model.held_nodes
+        self.p[held] = self.model.held_rest + boundary.held_displacement[step][self.model.held_group]
         self.few = len(self.rows.lam) <= DENSE_UP_TO
         self.target = boundary.volume_target[step]
         """What the volumes are to be at the end of the step [m³], (m,); nearer to what they are where that is far."""
@@ -57,7 +57,7 @@ class Step:
         """Whether a volume is so far off that only a part of it is made up for."""
         self.idle = False
         """Whether a volume has had nothing to push on."""
-        self.contact = Contact(self.network, self.nodes, self.contacts, boundary, step)
+        self.contact = Contact(self.model, self.nodes, self.contacts, boundary, step)
         self.answers: np.ndarray | None = None
 
     def times(self, field: np.ndarray) -> np.ndarray:
@@ -79,7 +79,7 @@ class Step:
 
     def take(self, passes: int) -> None:
         """So many passes; then v⁺ = (x⁺ − x)/dt."""
-        rows_into(self.nodes.x, self.network.inverse_mass, self.rows)
+        rows_into(self.nodes.x, self.model.inverse_mass, self.rows)
         begun = self.rows.volume.copy()
         touching, impulses = self.touch(), np.zeros(0)
         obstacles = len(self.boundary.radius) > 0
@@ -122,7 +122,7 @@ class Step:
 
     def touch(self) -> Touching:
         """The touched nodes of the moment, and how volumes answer their pressures past them."""
-        touching = Touching(self.factor, self.nodes, self.contacts, self.network.surface_nodes, self.boundary.dt)
+        touching = Touching(self.factor, self.nodes, self.contacts, self.model.surface_nodes, self.boundary.dt)
         if self.answers is not None:
             self.reach(touching)
             self.answer()
@@ -144,7 +144,7 @@ class Step:
             gained, moved = np.diag(self.schur), np.linalg.norm(self.reached, axis=2).max(axis=1)
         else:
             gained, moved = self.factor.alone(self.rows)
-        longest = self.network.longest_correction
+        longest = self.model.longest_correction
         most = np.divide(longest * gained, moved, out=np.zeros_like(moved), where=moved > 0.0)
         error = self.target - begun
         cut = (np.abs(error) > most) & (most > 0.0)
@@ -155,7 +155,7 @@ class Step:
     def imbalance(self) -> np.ndarray:
         """J, V at p, and the right-hand side for the pressures of the moment [kg m], (n, 3) (eq. 12.2)."""
         out = np.empty_like(self.p)
-        imbalance_into(self.network, self.nodes, self.rows, self.p, self.boundary, out)
+        imbalance_into(self.model, self.nodes, self.rows, self.p, self.boundary, out)
         return out
 
     def solve(self, free: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
@@ -213,7 +213,7 @@ class Step:
 
     def book(self, touching: Touching, impulses: np.ndarray) -> None:
         """Impulses of obstacles and attachments [N s] (eq. 3.6)."""
-        nodes, contacts, net, dt = self.nodes, self.contacts, self.network, self.boundary.dt
+        nodes, contacts, net, dt = self.nodes, self.contacts, self.model, self.boundary.dt
         given = self.diagnostics.contact_impulse
         np.add.at(given, touching.obstacle, impulses[:, None] / dt * touching.direction)
         if self.boundary.rough:

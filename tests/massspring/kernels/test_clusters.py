@@ -25,7 +25,7 @@ def kept(filled_ball: Body) -> tuple[State, np.ndarray]:
     """A body at rest with one volume per node, two nodes held, and S as a dense matrix."""
     body = filled_ball.keeping(Volumes.nodal(filled_ball))
     state = start(body, (Attachment(np.array([5, 17])),))
-    rows, weight = state.rows, state.network.inverse_mass
+    rows, weight = state.rows, state.model.inverse_mass
     assert rows is not None and body.node_count > SIZE and body.node_count % SIZE  # more than one, one not full
     state = replace(state, rows=rows._replace(clusters=clusters_at_rest(rows, body.rest, weight)))
     jacobian = dense(rows, body.node_count)
@@ -84,10 +84,10 @@ def test_volumes_without_a_node_to_push_are_left_out(filled_ball):
     state = ImplicitVolume().start(body, (Attachment(np.unique(cells).astype(np.int64)),))
     rows = state.rows
     assert rows is not None and np.isfinite(rows.clusters.inverse).all()
-    diagonal_into(rows, state.contacts, state.network.inverse_mass, rows.diagonal)
+    diagonal_into(rows, state.contacts, state.model.inverse_mass, rows.diagonal)
     assert rows.diagonal[9] == 0.0
     rows.right[:], rows.allowed[:], rows.lam[:] = 1.0, 1e-6, 3.0
-    count = solve_iteratively(rows, state.contacts, state.network.inverse_mass, rows.lam, rows.allowed, 200)
+    count = solve_iteratively(rows, state.contacts, state.model.inverse_mass, rows.lam, rows.allowed, 200)
     assert 0 < count < 200 and rows.lam[9] == 3.0 and np.isfinite(rows.lam).all()
 
 
@@ -95,7 +95,7 @@ def test_volumes_without_a_node_to_push_are_left_out(filled_ball):
 def test_it_saves_iterations(kept, filled_ball, bent):
     """Against the diagonal, at rest and with the body bent: both end at the multipliers of a dense solve."""
     state, matrix = kept
-    rows, weight, m = state.rows, state.network.inverse_mass, len(matrix)
+    rows, weight, m = state.rows, state.model.inverse_mass, len(matrix)
     x = moved(filled_ball) if bent else filled_ball.rest
     rows_into(x, weight, rows)
     jacobian = dense(rows, len(x))

@@ -202,7 +202,7 @@ def test_looking_only_at_near_nodes_changes_no_bit(ball_body):
     state, changes, skipped = setup.start(), 0, 0
     for frame in range(30):
         state = setup.method.advance(state, setup.boundary(frame))
-        boundary, net, dt = setup.boundary(frame), state.network, clock.dt
+        boundary, net, dt = setup.boundary(frame), state.model, clock.dt
         lightest = net.inverse_mass.max()
         for factor in (-3.0, 0.5, 1.0, 5.0):
             nodes, push = state.nodes, Push(state.nodes.gradient, state.lam[0])

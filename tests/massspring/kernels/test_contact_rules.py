@@ -51,12 +51,12 @@ class Scene:
         self.obstacles = obstacles
         setup = Setup(shell, ImplicitVolume(), Clock(DT, 1, 1), obstacles)
         state, self.boundary = setup.start(), setup.boundary(0)
-        self.state, self.network, random = state, state.network, np.random.default_rng(4)
+        self.state, self.model, random = state, state.model, np.random.default_rng(4)
         self.contacts = state.contacts
-        self.nodes = self.network.surface_nodes.astype(np.int64)
+        self.nodes = self.model.surface_nodes.astype(np.int64)
         self.state.nodes.x[:] = random.uniform(*box, self.x.shape)
         self.state.nodes.v_star[:] = 2.0 * random.normal(size=self.x.shape)
-        size = 1.0 / (DT * LAM * self.network.inverse_mass[:, None])
+        size = 1.0 / (DT * LAM * self.model.inverse_mass[:, None])
         self.state.nodes.gradient[:] = 2.0 * size * random.normal(size=self.x.shape)
 
     @property
@@ -65,7 +65,7 @@ class Scene:
 
     def free_velocity(self, lam: float) -> np.ndarray:
         """u (n, 3) [m/s]."""
-        return self.state.nodes.v_star + DT * lam * self.network.inverse_mass[:, None] * self.state.nodes.gradient
+        return self.state.nodes.v_star + DT * lam * self.model.inverse_mass[:, None] * self.state.nodes.gradient
 
     def velocity(self, lam: float) -> np.ndarray:
         """v⁺ = P u + goal (n, 3) [m/s] (eq. 3.4, 3.5)."""
@@ -86,15 +86,15 @@ class Scene:
 
     def find(self, lam: float = LAM) -> "Scene":
         push = Push(self.state.nodes.gradient, lam)
-        find_contacts(self.network, self.state.nodes, self.contacts, self.boundary, 0, push, None)
+        find_contacts(self.model, self.state.nodes, self.contacts, self.boundary, 0, push, None)
         return self
 
     def revise(self, lam: float, found_at: float = LAM) -> int:
         square = (self.state.nodes.gradient**2).sum(axis=1)
-        mobility = float(self.network.inverse_mass @ square)
-        reach = pressure_reach(lam - found_at, mobility, self.network.largest_inverse_mass, DT)
+        mobility = float(self.model.inverse_mass @ square)
+        reach = pressure_reach(lam - found_at, mobility, self.model.largest_inverse_mass, DT)
         push = Push(self.state.nodes.gradient, lam)
-        return revise_contacts(self.network, self.state.nodes, self.contacts, self.boundary, 0, push, reach)
+        return revise_contacts(self.model, self.state.nodes, self.contacts, self.boundary, 0, push, reach)
 
 
 def slopes(obstacle: Any, y: np.ndarray) -> np.ndarray:
@@ -125,12 +125,12 @@ def test_a_new_pressure_finds_the_one_node_that_it_moves(shell, change):
     """The reach is as far as a node goes that has all of the gradient, but for a share of round-off, 1e-4; half way
     down there is a floor."""
     scene = Scene(shell, OBSTACLES["a floor"][0])
-    node = int(np.argmax(scene.network.inverse_mass * np.isin(np.arange(len(scene.x)), scene.nodes)))
+    node = int(np.argmax(scene.model.inverse_mass * np.isin(np.arange(len(scene.x)), scene.nodes)))
     scene.state.nodes.v_star[:], scene.state.nodes.gradient[:] = 0.0, 0.0
     scene.state.nodes.gradient[node, 2] = -np.sign(change) * 3e-5
     fall = -DT * (scene.free_velocity(LAM + change) - scene.free_velocity(LAM))[node, 2]
-    mobility = float(scene.network.inverse_mass @ (scene.state.nodes.gradient**2).sum(axis=1))
-    reach = pressure_reach(change, mobility, scene.network.inverse_mass[node], DT)
+    mobility = float(scene.model.inverse_mass @ (scene.state.nodes.gradient**2).sum(axis=1))
+    reach = pressure_reach(change, mobility, scene.model.inverse_mass[node], DT)
     assert 0 < fall < reach < 1.001 * fall
     scene.state.nodes.x[node, 2] = FLOOR.point[2] + 0.5 * fall - DT * scene.free_velocity(LAM)[node, 2]
     assert (

@@ -69,7 +69,7 @@ def touched_and_held(body: Body, dt: float):
     fixed += [(stuck, axis, float(axis @ contacts.goal[stuck])) for axis in np.eye(3)]
     fixed += [(i, contacts.normal[i], a) for i, a in zip(touched, approach, strict=True)]
     fixed += [(i, axis, float(axis @ nodes.v_star[i])) for i in held for axis in np.eye(3)]
-    rows_into(nodes.x, state.network.inverse_mass, rows)
+    rows_into(nodes.x, state.model.inverse_mass, rows)
     return state, fixed
 
 
@@ -82,10 +82,10 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
     state, fixed = touched_and_held(several, dt)
     nodes, contacts, rows, n = state.nodes, state.contacts, state.rows, several.node_count
     target = 1.001 * several.rest_volumes
-    network = state.network._replace(longest_correction=np.inf)
-    set_right_side(network, rows, nodes, contacts, target, dt, 1e-13)
+    model = state.model._replace(longest_correction=np.inf)
+    set_right_side(model, rows, nodes, contacts, target, dt, 1e-13)
     diagnostics = new_diagnostics(1, 1)
-    solve_multipliers(network, rows, contacts, diagnostics, Accuracy(1e-13, 2000))
+    solve_multipliers(model, rows, contacts, diagnostics, Accuracy(1e-13, 2000))
     jacobian = np.zeros((several.kept.count, n, 3))
     for r in range(several.kept.count):
         entries = slice(rows.row_start[r], rows.row_start[r + 1])
@@ -113,9 +113,9 @@ def test_an_iteration_ends_as_soon_as_a_residual_is_no_number(block_body, monkey
     monkeypatch.setattr(rows_module, "DENSE_UP_TO", 0)
     state, _ = touched_and_held(block_body.keeping(Volumes.nodal(block_body)), 1e-3)
     rows = state.rows
-    diagonal_into(rows, state.contacts, state.network.inverse_mass, rows.diagonal)
+    diagonal_into(rows, state.contacts, state.model.inverse_mass, rows.diagonal)
     rows.right[:], rows.right[7] = 1.0, np.nan
-    count = solve_iteratively(rows, state.contacts, state.network.inverse_mass, rows.lam, rows.allowed, 10**9)
+    count = solve_iteratively(rows, state.contacts, state.model.inverse_mass, rows.lam, rows.allowed, 10**9)
     assert count <= 1 and np.isnan(rows.right).any()
 
 
@@ -126,10 +126,10 @@ def test_conjugate_directions_need_no_more_iterations_than_volumes(kind, block_b
     body = hollow_body if kind == "hollow" else block_body.keeping(Volumes.regions(block_body, 7))
     state, _ = touched_and_held(body, 1e-3)
     rows = state.rows
-    diagonal_into(rows, state.contacts, state.network.inverse_mass, rows.diagonal)
+    diagonal_into(rows, state.contacts, state.model.inverse_mass, rows.diagonal)
     rows.right[:] = -np.random.default_rng(1).uniform(0.5, 1.0, body.kept.count)
     rows.allowed[:] = 1e-6  # the residuals start at 1; the preconditioner rounds directions to 6e-8
-    count = solve_iteratively(rows, state.contacts, state.network.inverse_mass, rows.lam, rows.allowed, 100)
+    count = solve_iteratively(rows, state.contacts, state.model.inverse_mass, rows.lam, rows.allowed, 100)
     assert 1 < count <= body.kept.count
     assert np.abs(rows.right).max() <= 1e-6
 

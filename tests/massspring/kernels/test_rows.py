@@ -111,7 +111,7 @@ def test_a_ring_takes_half_as_many_quadrangles_as_it_has_nodes():
 def test_the_diagonal_knows_of_contact(block_body, precision):
     """Nodes that slide, lie in a wedge or stick, one held; and a volume of which every node sticks."""
     state = in_precision(start(nodal(block_body)), precision)
-    nodes, contacts, rows, weight = state.nodes, state.contacts, state.rows, state.network.inverse_mass
+    nodes, contacts, rows, weight = state.nodes, state.contacts, state.rows, state.model.inverse_mass
     assert rows is not None
     nodes.x[:] = moved(block_body)
     weight[12] = 0.0
@@ -135,11 +135,11 @@ def test_the_product_of_all_volumes_equals_dense_matrices(block_body):
     state = start(nodal(block_body))
     rows, n = state.rows, block_body.node_count
     assert rows is not None
-    rows_into(moved(block_body), state.network.inverse_mass, rows)
+    rows_into(moved(block_body), state.model.inverse_mass, rows)
     jacobian = dense(rows, n)
-    matrix = np.einsum("rja,j,sja->rs", jacobian, state.network.inverse_mass, jacobian)
+    matrix = np.einsum("rja,j,sja->rs", jacobian, state.model.inverse_mass, jacobian)
     p, product = np.random.default_rng(3).normal(size=n), np.empty(n)
-    apply_schur(rows, state.contacts, state.network.inverse_mass, p, product)
+    apply_schur(rows, state.contacts, state.model.inverse_mass, p, product)
     assert np.abs(product - matrix @ p).max() < MANY * np.abs(matrix).sum(axis=1).max() * np.abs(p).max()
     assert (rows.value[:, 3] == 0).all() and (rows.node_vector[:, 3] == 0).all()
 

@@ -30,7 +30,7 @@ def gathered(body: Body, x: np.ndarray, keeps: bool = True, held: tuple[int, ...
     state, boundary = start(body, attached), setup.boundary(0)
     state.nodes.x[:] = x
     state.nodes.v[:] = np.random.default_rng(4).normal(size=x.shape)
-    return state, boundary, gather_and_predict(state.network, state.nodes, state.work, boundary, keeps)
+    return state, boundary, gather_and_predict(state.model, state.nodes, state.work, boundary, keeps)
 
 
 def predicted(net, v: np.ndarray, force: np.ndarray, boundary) -> np.ndarray:
@@ -48,7 +48,7 @@ def test_it_equals_the_plain_kernels(kept_body):
     x = moved(kept_body)
     held = tuple(range(0, kept_body.node_count, 7))
     state, boundary, (volume, flow, mobility) = gathered(kept_body, x, held=held)
-    net, nodes = state.network, state.nodes
+    net, nodes = state.model, state.nodes
     force, gradient = np.zeros_like(x), np.zeros_like(x)
     spring_forces_into(x, net.ends, net.rest_length, net.stiffness, force)
     add_membrane_forces(x, net.membrane, force)
@@ -89,7 +89,7 @@ def test_springs_at_rest_pull_with_nothing_at_all(body):
     """Rest is rest to the last bit only if c = k − k L/|d| is 0 and not round-off of k."""
     state = start(body)
     boundary = Setup(body, Free(), Clock(0.01, 1, 10)).boundary(0)
-    gather_and_predict(state.network, state.nodes, state.work, boundary, True)
+    gather_and_predict(state.model, state.nodes, state.work, boundary, True)
     # The length of a spring at rest is summed in another order here: a bit off in some.
     unit = body.springs.stiffness.max() * body.springs.rest_length.max() / body.mass.min() * boundary.dt
     assert np.abs(state.nodes.v_star).max() < 1e-15 * unit * LONGEST
@@ -136,9 +136,9 @@ def test_nodes_in_pieces_equal_the_plain_kernels(make):
 
 def test_a_node_of_two_rings_or_many_springs_is_in_pieces():
     for body in (touching_tetrahedra(), many_neighbours(90)):
-        slices = start(body).network.slices
+        slices = start(body).model.slices
         assert slices.split_node.tolist() == [0] and slices.pieces == 1
-    assert start(many_neighbours(3)).network.slices.pieces == 0
+    assert start(many_neighbours(3)).model.slices.pieces == 0
 
 
 def test_a_volume_enclosed_by_part_of_the_surface(hollow_body):
@@ -150,7 +150,7 @@ def test_a_volume_enclosed_by_part_of_the_surface(hollow_body):
         alone = hollow_body.keeping(Volumes.closed_surfaces(hollow_body, {"lumen": triangles}))
     test_it_equals_the_plain_kernels(alone)
     x = moved(alone)
-    assert gathered(alone, x)[2][0] == pytest.approx(enclosed_volume(x, start(alone).network.triangles), rel=1e-13)
+    assert gathered(alone, x)[2][0] == pytest.approx(enclosed_volume(x, start(alone).model.triangles), rel=1e-13)
 
 
 def test_every_spring_is_there_twice_and_little_else(ball_body):
@@ -169,7 +169,7 @@ def test_the_multiplier_from_sums_is_the_one_over_all_nodes(ball_body):
     """Touched nodes of every kind and held ones: what they take is taken from the sums."""
     held = (3, 40, 77)
     state, boundary, (volume, flow, mobility) = gathered(ball_body, moved(ball_body), held=held)
-    net, nodes, contacts, rng = state.network, state.nodes, state.contacts, np.random.default_rng(1)
+    net, nodes, contacts, rng = state.model, state.nodes, state.contacts, np.random.default_rng(1)
     flow += prescribe(net, nodes, np.array([[0.01, 0.0, -0.02]]), boundary.dt)
     for kind, some in ((SLIDES, [5, 6, 50]), (ON_EDGE, [9, 10]), (STICKS, [60, 61])):
         contacts.mode[some] = kind
@@ -191,5 +191,5 @@ def test_a_body_that_obstacles_hold_everywhere_has_no_multiplier(ball_body):
     state, boundary, (volume, flow, mobility) = gathered(ball_body, moved(ball_body))
     state.contacts.mode[:] = STICKS
     list_touched(state.contacts)
-    args = (state.nodes, state.contacts, state.network.inverse_mass, 0.01 * volume, boundary.dt, flow, mobility)
+    args = (state.nodes, state.contacts, state.model.inverse_mass, 0.01 * volume, boundary.dt, flow, mobility)
     assert multiplier_of_sums(*args) == (0.0, 0.0)

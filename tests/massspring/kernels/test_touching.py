@@ -21,15 +21,15 @@ class Sole:
         fall = np.tile([0.0, 0.0, -1.0], (body.node_count, 1))
         setup = Setup(body, ImplicitSprings(), Clock(DT, 1, 1), (floor,), velocity=fall)
         state, self.boundary = setup.start(), setup.boundary(0)
-        self.state, self.network, self.contacts = state, state.network, state.contacts
-        self.factor = state.memory.at(self.network, DT, 0.0)
-        self.contact = Contact(self.network, state.nodes, self.contacts, self.boundary, 0)
+        self.state, self.model, self.contacts = state, state.model, state.contacts
+        self.factor = state.memory.at(self.model, DT, 0.0)
+        self.contact = Contact(self.model, state.nodes, self.contacts, self.boundary, 0)
         self.nodes = np.flatnonzero(self.contacts.mode == STICKS)
         self.place = (floor.point[2] - self.state.nodes.x[self.nodes, 2]) / DT
         """Speed [m/s] that ends the step on the floor."""
 
     def touching(self) -> Touching:
-        return Touching(self.factor, self.state.nodes, self.contacts, self.network.surface_nodes, DT)
+        return Touching(self.factor, self.state.nodes, self.contacts, self.model.surface_nodes, DT)
 
     def slide(self) -> None:
         self.contacts.mode[self.nodes] = SLIDES
@@ -94,7 +94,7 @@ def test_what_friction_would_drive_sticks(sole):
 def test_a_slip_that_is_round_off_is_none(sole, way, sticks):
     """Just below and just above the bound: its direction would be chance, and its friction as large as any."""
     sole.slide()
-    slip = np.array([0.6, -0.8, 0.0]) * way * SLIP_RESOLUTION * sole.network.longest_correction / DT
+    slip = np.array([0.6, -0.8, 0.0]) * way * SLIP_RESOLUTION * sole.model.longest_correction / DT
     sole.state.nodes.x[sole.nodes] = 0.0  # so that the way is known as closely as it is asked
     carried = sole.boundary.velocity[0, 0]
     carried[:] = 0.0

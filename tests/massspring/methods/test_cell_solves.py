@@ -57,7 +57,7 @@ def saddle_point(body, cells, nodes, contacts, dt, compliance):
 def test_the_hard_solve_equals_the_full_saddle_point(block_body):
     body, dt, compliance = block_body, 1e-3, 1e-5
     state, cells, rng = start(block_body), cells_of(block_body), np.random.default_rng(0)
-    net, nodes, contacts = state.network, state.nodes, state.contacts
+    net, nodes, contacts = state.model, state.nodes, state.contacts
     nodes.x[:] = deformed(body, 0.002)
     nodes.v_star[:] = 0.1 * rng.normal(size=body.rest.shape)
     touched = np.array([1, 5, 9])
@@ -114,7 +114,7 @@ def test_xpbd_that_forgets_its_multipliers_is_hard_whatever_its_compliance(block
     setup = Setup(block_body, method, Clock(1e-3, 1, 1), velocity=0.1 * thrown(block_body))
     state, boundary = setup.start(), setup.boundary(0)
     state.nodes.x[:] = 0.99 * block_body.rest
-    net, nodes, contacts, cells = state.network, state.nodes, state.contacts, state.memory
+    net, nodes, contacts, cells = state.model, state.nodes, state.contacts, state.memory
     open_frame(state.frame(boundary))
     begin_step(state.frame(boundary), 0, False)
     unpushed_into(nodes, contacts, boundary.dt, cells.y)

@@ -162,7 +162,7 @@ def test_post_stabilization_moves_nodes_and_no_velocity(body):
         moved = begin_frame(state, setup.boundary(0))
         moved.nodes.x[:] = scale * body.rest
         v = moved.v.copy()
-        correct_positions(moved.network, moved.nodes, moved.contacts, body.volume, setup.clock.dt)
+        correct_positions(moved.model, moved.nodes, moved.contacts, body.volume, setup.clock.dt)
         assert np.array_equal(moved.v, v)
         left.append(enclosed_volume(moved.x, body.triangles) / body.volume - 1)
     assert left[0] / left[1] == pytest.approx(4.0, rel=0.02)
@@ -184,7 +184,7 @@ def test_a_body_crushed_to_a_thousandth_comes_back_in_one_step_of_shake(body):
     lengths = np.linalg.norm(state.x[edges[:, 1]] - state.x[edges[:, 0]], axis=1)
     assert np.abs(lengths / body.springs.rest_length - 1).max() < 1e-9, "it did not come back to its shape"
     wild = setup.start()
-    wild = replace(wild, network=wild.network._replace(longest_correction=np.inf))
+    wild = replace(wild, model=wild.model._replace(longest_correction=np.inf))
     wild.nodes.x[:] = 1e-3 * body.rest
     wild = advance_by(Rule(), wild, setup.boundary(0))
     assert not np.abs(wild.x).max() < 1e3 * body.size
@@ -197,7 +197,7 @@ def test_contact_and_held_nodes_are_inside_shake_s_multiplier(ball_body):
     state = setup.start()
     for frame in range(60):
         before, state = state, setup.method.advance(state, setup.boundary(frame))
-    free = (state.network.inverse_mass > 0) & (state.contacts.mode == FREE)
+    free = (state.model.inverse_mass > 0) & (state.contacts.mode == FREE)
     touched = state.contacts.mode == SLIDES
     assert touched.sum() > 3
     _, slope = gradient(before.x, ball_body.triangles)

@@ -38,24 +38,24 @@ def started(block_body):
     """A state with two held nodes, and its factor."""
     state = ImplicitSprings().start(block_body, (Attachment(np.array([0, 1])),))
     dt = LONG * limit(block_body)
-    return state, Factor(state.network, dt, 3.0), dt
+    return state, Factor(state.model, dt, 3.0), dt
 
 
-def dense(network, dt: float, damping: float) -> np.ndarray:
+def dense(model, dt: float, damping: float) -> np.ndarray:
     """A by its definition, springs one by one, held nodes without response."""
-    matrix = np.diag((1 + damping * dt) * network.mass)
-    for (i, j), k in zip(network.ends.astype(int), network.stiffness, strict=True):
+    matrix = np.diag((1 + damping * dt) * model.mass)
+    for (i, j), k in zip(model.ends.astype(int), model.stiffness, strict=True):
         matrix[[i, j], [i, j]] += dt * dt * k
         matrix[[i, j], [j, i]] -= dt * dt * k
     inverse = np.zeros_like(matrix)
-    free = np.flatnonzero(network.inverse_mass)
+    free = np.flatnonzero(model.inverse_mass)
     inverse[np.ix_(free, free)] = np.linalg.inv(matrix[np.ix_(free, free)])
     return inverse
 
 
 def test_the_factor_is_that_of_the_matrix(started):
     state, factor, dt = started
-    inverse = dense(state.network, dt, 3.0)
+    inverse = dense(state.model, dt, 3.0)
     forces = np.random.default_rng(0).normal(size=(len(inverse), 3))
     assert np.allclose(factor.respond(forces), inverse @ forces, rtol=1e-10, atol=1e-12 * np.abs(inverse).max())
     nodes = np.array([4, 7, 4])
@@ -77,7 +77,7 @@ def test_the_response_past_obstacles_is_that_of_the_saddle_point_system(started)
     rows = np.zeros((len(touching.nodes), nodes.x.size))
     for row, node, direction in zip(rows, touching.nodes, touching.direction, strict=True):
         row[3 * node : 3 * node + 3] = direction
-    inverse = np.kron(dense(state.network, dt, 3.0), np.eye(3))
+    inverse = np.kron(dense(state.model, dt, 3.0), np.eye(3))
     forces = rng.normal(size=nodes.x.shape)
     base = inverse @ forces.ravel()
     gamma = np.linalg.solve(rows @ inverse @ rows.T, -rows @ base)

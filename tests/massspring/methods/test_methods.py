@@ -192,7 +192,7 @@ class SixfoldGradient(Method):
 
     def advance(self, state: State, boundary) -> State:
         after = begin_frame(state, boundary)
-        net, nodes, contacts, frame = after.network, after.nodes, after.contacts, after.frame(boundary)
+        net, nodes, contacts, frame = after.model, after.nodes, after.contacts, after.frame(boundary)
         open_frame(frame)
         for step in range(len(boundary.position)):
             error = boundary.volume_target[step, 0] - begin_step(frame, step, True)[0]

@@ -45,7 +45,7 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     body = ball_body
     rng = np.random.default_rng(0)
     state = start(body, (Attachment(np.array([5, 17])),), v=0.1 * rng.normal(size=body.rest.shape))
-    net, nodes, contacts, dt = state.network, state.nodes, state.contacts, 1e-3
+    net, nodes, contacts, dt = state.model, state.nodes, state.contacts, 1e-3
     nodes.v_star[:] = state.v
     nodes.v_star[net.held_nodes] = [0.02, 0.0, -0.01]
     touched = np.array([40, 41, 90])

@@ -42,7 +42,7 @@ def test_no_obstacle_pulls_a_node(shell, angle):
         boundary = setup.boundary(frame)
         state = setup.method.advance(state, boundary)
         nodes, contacts, on_one = state.nodes, state.contacts, state.contacts.mode == SLIDES
-        push = boundary.dt * state.lam[0] * state.network.inverse_mass[:, None]
+        push = boundary.dt * state.lam[0] * state.model.inverse_mass[:, None]
         pushed = ((contacts.goal - nodes.v_star - push * nodes.gradient) * contacts.normal).sum(axis=1)
         met += int(on_one.sum())
         assert (pushed[on_one] > -ROUND_OFF).all(), frame
@@ -54,16 +54,16 @@ def test_a_wedge_lets_go_of_a_node_that_either_side_would_pull(shell, first, sec
     """goal − u = α n + β n' with α, β given; the normals are neither parallel nor at right angles."""
     setup = Setup(shell, ImplicitVolume(), Clock(1e-3, 1, 1), wedge_of(0.0, 1.0, 0.4))
     state, boundary = setup.start(), setup.boundary(0)
-    nodes, contacts, node = state.nodes, state.contacts, int(state.network.surface_nodes[3])
+    nodes, contacts, node = state.nodes, state.contacts, int(state.model.surface_nodes[3])
     n, m = (np.array(plane.unit_normal) for plane in setup.obstacles)
     nodes.v_star[node] = (0.1, -0.2, 0.3)
     nodes.gradient[node] = (1e-3, 2e-3, -1e-3)
     lam = 50.0
-    u = nodes.v_star[node] + boundary.dt * lam * state.network.inverse_mass[node] * nodes.gradient[node]
+    u = nodes.v_star[node] + boundary.dt * lam * state.model.inverse_mass[node] * nodes.gradient[node]
     contacts.normal[node], contacts.second_normal[node] = n, m
     contacts.goal[node] = u + first * n + second * m
     contacts.touched[node], contacts.second[node], contacts.mode[node] = 1, 2, ON_EDGE
     list_touched(contacts)
     free = first < 0 or second < 0
-    assert release_wedged(state.network, nodes, contacts, boundary, Push(nodes.gradient, lam)) == int(free)
+    assert release_wedged(state.model, nodes, contacts, boundary, Push(nodes.gradient, lam)) == int(free)
     assert contacts.mode[node] == (FREE if free else ON_EDGE)

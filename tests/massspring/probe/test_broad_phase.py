@@ -36,7 +36,7 @@ def test_no_node_is_faster_than_the_fastest(fast, precision):
     """Outside truth: v⁺ of all nodes by numpy; the node that is fastest is free, or slides on an obstacle."""
     setup = replace(pressed(ImplicitVolume()), precision=precision)
     state, dt, lam, rng = setup.start(), setup.clock.dt, 30.0, np.random.default_rng(3)
-    net, nodes, contacts = state.network, state.nodes, state.contacts
+    net, nodes, contacts = state.model, state.nodes, state.contacts
     for trial in range(20):
         nodes.v_star[:], nodes.gradient[:] = rng.normal(size=(2, *nodes.x.shape)) * [[[1.0]], [[1e-4]]]
         contacts.mode[:] = FREE

@@ -123,7 +123,7 @@ def disturbed_contact():
             break
     boundary = setup.boundary(59)
     after = begin_frame(state, boundary)
-    nodes, contacts, net = after.nodes, after.contacts, after.network
+    nodes, contacts, net = after.nodes, after.contacts, after.model
     rows, rng = after.probing.rows, np.random.default_rng(4)
     nodes.v_star[:] = 0.02 * rng.normal(size=nodes.v_star.shape)
     nodes.v_star[net.held_nodes] = 0.0
@@ -140,7 +140,7 @@ def disturbed_contact():
 def test_contacts_and_volume_equal_the_full_saddle_point_solve():
     """Outside truth: [M, −Cᵀ, −Gᵀ; C, 0; G, 0] solved densely for the rows that press."""
     stage, lam = disturbed_contact(), 50.0
-    probing, nodes, net, dt = stage.probes, stage.nodes, stage.network, stage.dt
+    probing, nodes, net, dt = stage.probes, stage.nodes, stage.model, stage.dt
     g, rows, count = nodes.gradient, probing.rows, int(probing.rows.count[0])
     u = nodes.v_star + dt * lam * net.inverse_mass[:, None] * g
     gather(stage, Push(stage.nodes.gradient, lam))

@@ -61,7 +61,7 @@ def test_a_step_that_carries_nodes_keeps_volumes_and_books_what_the_tip_gives(an
     tip = (boundary.tips.end[0, 0] - boundary.tips.start[0, 0]) / boundary.dt
     carried = np.abs(v - tip).max(axis=1) < 1e-9 * np.linalg.norm(tip)
     assert carried.sum() == counts[CARRIED] >= 3
-    given = (before.network.mass[:, None] * v).sum(axis=0)
+    given = (before.model.mass[:, None] * v).sum(axis=0)
     assert np.abs(after.diagnostics.contact_impulse[0] - given).max() < 1e-9 * np.abs(given).max()
     # From rest, with volumes as they should be, the rates of all volumes stay zero: others make room.
     jacobian = gradients(any_body, before.x)
@@ -104,7 +104,7 @@ def random_step(seed, lam):
     """A step with contacts beside obstacles and attachments, velocities at random; what is left to each node."""
     setup, rng = pressed(METHOD), np.random.default_rng(seed)
     after, boundary = begin_frame(setup.start(), setup.boundary(0)), setup.boundary(0)
-    probing, nodes, contacts, net = after.probing, after.nodes, after.contacts, after.network
+    probing, nodes, contacts, net = after.probing, after.nodes, after.contacts, after.model
     nodes.v_star[:], nodes.gradient[:] = 0.02 * rng.normal(size=(2, *nodes.x.shape))
     nodes.v_star[net.held_nodes] = 0.0
     nodes.gradient[:] *= 0.01
@@ -124,7 +124,7 @@ def test_contacts_beside_obstacles_equal_the_full_saddle_point(seed):
     lam = 40.0
     stage, kept = random_step(seed, lam)
     probing, nodes, contacts, dt = stage.probes, stage.nodes, stage.contacts, stage.dt
-    g, w = nodes.gradient, stage.network.inverse_mass
+    g, w = nodes.gradient, stage.model.inverse_mass
     bound = solve_rows(stage, None)
     move(stage, None)
     u = np.einsum("nij,nj->ni", kept, nodes.v_star + dt * lam * w[:, None] * g)
@@ -164,7 +164,7 @@ def led(weight, held, radius=0.0):
     probing.velocity[corners] = 0.1 * rng.normal(size=(3, 3))
     probing.pair.tip[:] = 1e-3 * rng.normal(size=(2, 3))
     probing.carried[np.delete(corners, held)] = 1
-    stage = Stage(after.network, after.nodes, after.contacts, boundary.tips, probing, None, 0.0, 0, boundary.dt)
+    stage = Stage(after.model, after.nodes, after.contacts, boundary.tips, probing, None, 0.0, 0, boundary.dt)
     return stage, corners, lead(stage, 0, 0)
 
 

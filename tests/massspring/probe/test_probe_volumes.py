@@ -72,8 +72,8 @@ def test_contact_and_volumes_equal_the_saddle_point(parted_body):
     for k in range(len(impulse)):
         for q in range(3):
             c[k, rows.node[k, q]] += rows.weight[k, q] * rows.direction[k]
-    free = np.repeat(touched.network.inverse_mass > 0, 3)
-    force = (np.repeat(touched.network.mass, 3) * difference - np.einsum("k,kij->ij", impulse, c).ravel())[free]
+    free = np.repeat(touched.model.inverse_mass > 0, 3)
+    force = (np.repeat(touched.model.mass, 3) * difference - np.einsum("k,kij->ij", impulse, c).ravel())[free]
     pressures = np.linalg.lstsq(jacobian.T[free], force, rcond=None)[0]
     left = force - jacobian.T[free] @ pressures
     assert np.abs(left).max() < 1e-6 * impulse.max()

@@ -96,12 +96,12 @@ def test_nodes_of_a_full_slice_follow_each_other(ball):
     for body in (ball, shuffled(ball)[0]):
         inside = numbered(body)
         assert sorted(inside.place) == list(range(body.node_count))
-        slices = start(inside.body).network.slices
+        slices = start(inside.body).model.slices
         assert slices.split_node.min() == body.node_count - len(slices.split_node)
         assert (slices.first[slices.pieces :] >= 0).sum() == (body.node_count - len(slices.split_node)) // LANES
         for s in np.flatnonzero(slices.first >= 0):
             assert np.array_equal(slices.node[s], slices.first[s] + np.arange(LANES))
-        assert (start(shuffled(ball)[0]).network.slices.first == -1).all()
+        assert (start(shuffled(ball)[0]).model.slices.first == -1).all()
 
 
 def test_a_body_is_the_same_under_other_numbers(hollow_body):

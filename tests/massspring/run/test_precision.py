@@ -62,13 +62,13 @@ def test_float32_keeps_its_digits_a_metre_from_the_origin(ball_body):
     far = replace(ball_body, rest=ball_body.rest + 1.0)
     state = in_precision(start(far), "float32")
     boundary = Setup(far, ImplicitVolume(), clock_for(far, 1, 1)).boundary(0)
-    volume = gather_and_predict(state.network, state.nodes, state.work, boundary, True)[0]
+    volume = gather_and_predict(state.model, state.nodes, state.work, boundary, True)[0]
     assert volume == pytest.approx(far.volume, rel=2 * SINGLE * 1.0 / 0.01)  # positions round by 1e-7 m of 0.05 m
 
 
 def test_the_state_is_in_single_precision_but_for_sums(kept_body):
     state = Setup(kept_body, ImplicitVolume(), clock_for(kept_body, 1, 1), precision="float32").start()
-    parts = [state.network, state.network.slices, state.nodes, state.contacts, state.work]
+    parts = [state.model, state.model.slices, state.nodes, state.contacts, state.work]
     parts += [state.rows] if state.rows is not None else []
     for part in parts:
         for name, value in part._asdict().items():
