@@ -15,7 +15,7 @@ from massspring.layout.sell_chunks import aligned, slices_of
 from massspring.layout.state import State
 from massspring.world.obstacles import Attachment
 
-LONGEST_CORRECTION = 0.3
+CORRECTION_LIMIT = 0.3
 """How far a step moves a node to make up for a wrong volume, in mean spring lengths: too little to turn a triangle."""
 
 
@@ -110,7 +110,7 @@ def _model(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarray)
         held_group=np.repeat(np.arange(len(nodes)), [len(h) for h in nodes]).astype(np.uint32),
         held_rest=body.rest[held_nodes],
         rest_lam=body.rest_lam,
-        longest_correction=LONGEST_CORRECTION * _mean_length(body),
+        correction_limit=CORRECTION_LIMIT * _mean_length(body),
         slices=slices_of(body.springs, surface, inverse_mass, body.rest),
     )
 

@@ -12,7 +12,7 @@ Kept = Literal["none", "whole", "several", "tetrahedra"]
 tetrahedron by tetrahedron."""
 
 Correction = Literal["limited", "full", "penalty", "unbounded"]
-"""How a step corrects a wrong volume. "limited": each volume moves a node by `longest_correction` at most (eq. 8.5),
+"""How a step corrects a wrong volume. "limited": each volume moves a node by `correction_limit` at most (eq. 8.5),
 the rest is left to later steps; "full": the whole error is corrected in the step; "penalty": by a force whose size only
 the length of a stable step bounds; "unbounded": by a force that grows without bound as the volume goes to 0, so that a
 crushed body bursts and the run diverges."""

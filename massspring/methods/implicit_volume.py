@@ -78,7 +78,7 @@ def implicit_volume_frame(frame, lam):
 def limited_multiplier(model, nodes, contacts, error, dt, flow, mobility):
     """lam [Pa] of the sums over all nodes (eq. 3.3), G·W̃·G, and whether only a part of the error is made up for
     (35)."""
-    weights, longest = model.inverse_mass, model.longest_correction
+    weights, longest = model.inverse_mass, model.correction_limit
     lam, left = multiplier_of_sums(nodes, contacts, weights, error, dt, flow, mobility)
     if not left > 0.0 or surely_short(error, left, model.largest_inverse_mass, longest):
         return lam, left, False
@@ -103,9 +103,9 @@ def set_right_side(model, rows, nodes, contacts, target, dt, tolerance):
         error = target[r] - rows.volume[r]
         if not rows.diagonal[r] > 0.0:
             idle |= abs(error) > tolerance * target[r]
-        elif not surely_short(error, rows.diagonal[r], lightest, model.longest_correction):
+        elif not surely_short(error, rows.diagonal[r], lightest, model.correction_limit):
             reachable = steepest_of_row(rows, model.inverse_mass, r)
-            part = capped_error(error, rows.diagonal[r], reachable, model.longest_correction)
+            part = capped_error(error, rows.diagonal[r], reachable, model.correction_limit)
             capped |= part != error
             error = part
         rows.right[r] = (error * per_second - rows.right[r]) * per_second

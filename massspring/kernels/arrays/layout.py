@@ -38,7 +38,7 @@ class Model(NamedTuple):
     """Rest positions of the held nodes [m], (h, 3)."""
     rest_lam: np.ndarray
     """What each kept volume takes of the pressure that holds springs without length apart at rest [Pa], (m,)."""
-    longest_correction: float
+    correction_limit: float
     """How far a step may move a node to make up for a wrong volume [m]; what is left is made up later."""
     slices: Slices
 

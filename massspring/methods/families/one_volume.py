@@ -69,7 +69,7 @@ def linear_multiplier(model, nodes, contacts, error, kept, dt, whole):
     It is not where the `whole` of it is wanted (eq. 3.3, 8.5, 10.5).
     """
     lam, mobility = volume_multiplier(nodes, contacts, model.inverse_mass, error + kept, dt)
-    lightest, longest = model.largest_inverse_mass, model.longest_correction
+    lightest, longest = model.largest_inverse_mass, model.correction_limit
     if whole or not mobility > 0.0 or surely_short(error, mobility, lightest, longest):
         return lam, mobility, False
     part = capped_error(error, mobility, steepest(nodes.gradient, model.inverse_mass), longest)
@@ -105,7 +105,7 @@ def correct_positions(model, nodes, contacts, target, dt):
     _, mobility = volume_multiplier(nodes, contacts, model.inverse_mass, error, dt)
     if not mobility > 0.0:
         return False
-    part = capped_error(error, mobility, steepest(nodes.gradient, model.inverse_mass), model.longest_correction)
+    part = capped_error(error, mobility, steepest(nodes.gradient, model.inverse_mass), model.correction_limit)
     for i in range(nodes.x.shape[0]):
         push = model.inverse_mass[i] * part / mobility
         p0, p1, p2 = push * nodes.gradient[i, 0], push * nodes.gradient[i, 1], push * nodes.gradient[i, 2]

@@ -112,7 +112,7 @@ class Contact:
         normal, carried = contacts.normal[nodes], boundary.velocity[self.step][obstacle]
         slip = _aside((end[nodes] - self.nodes.x[nodes]) / boundary.dt - carried, normal)
         speed = np.linalg.norm(slip, axis=1)
-        still = speed * boundary.dt <= SLIP_RESOLUTION * self.model.longest_correction
+        still = speed * boundary.dt <= SLIP_RESOLUTION * self.model.correction_limit
         driven = still | (np.einsum("ci,ci->c", slip, self.rubbed[nodes]) > 0.0)
         most = boundary.friction[obstacle] * np.maximum(impulses[slides], 0.0)
         self.rubbed[nodes[~driven]] = -(most[~driven] / speed[~driven])[:, None] * slip[~driven]

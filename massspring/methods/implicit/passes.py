@@ -144,7 +144,7 @@ class Step:
             gained, moved = np.diag(self.schur), np.linalg.norm(self.reached, axis=2).max(axis=1)
         else:
             gained, moved = self.factor.alone(self.rows)
-        longest = self.model.longest_correction
+        longest = self.model.correction_limit
         most = np.divide(longest * gained, moved, out=np.zeros_like(moved), where=moved > 0.0)
         error = self.target - begun
         cut = (np.abs(error) > most) & (most > 0.0)

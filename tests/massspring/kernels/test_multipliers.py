@@ -82,7 +82,7 @@ def test_the_multipliers_equal_the_full_saddle_point_solve(several, dense, monke
     state, fixed = touched_and_held(several, dt)
     nodes, contacts, rows, n = state.nodes, state.contacts, state.rows, several.node_count
     target = 1.001 * several.rest_volumes
-    model = state.model._replace(longest_correction=np.inf)
+    model = state.model._replace(correction_limit=np.inf)
     set_right_side(model, rows, nodes, contacts, target, dt, 1e-13)
     diagnostics = new_diagnostics(1, 1)
     solve_multipliers(model, rows, contacts, diagnostics, Accuracy(1e-13, 2000))

@@ -94,7 +94,7 @@ def test_what_friction_would_drive_sticks(sole):
 def test_a_slip_that_is_round_off_is_none(sole, way, sticks):
     """Just below and just above the bound: its direction would be chance, and its friction as large as any."""
     sole.slide()
-    slip = np.array([0.6, -0.8, 0.0]) * way * SLIP_RESOLUTION * sole.model.longest_correction / DT
+    slip = np.array([0.6, -0.8, 0.0]) * way * SLIP_RESOLUTION * sole.model.correction_limit / DT
     sole.state.nodes.x[sole.nodes] = 0.0  # so that the way is known as closely as it is asked
     carried = sole.boundary.velocity[0, 0]
     carried[:] = 0.0

@@ -184,7 +184,7 @@ def test_a_body_crushed_to_a_thousandth_comes_back_in_one_step_of_shake(body):
     lengths = np.linalg.norm(state.x[edges[:, 1]] - state.x[edges[:, 0]], axis=1)
     assert np.abs(lengths / body.springs.rest_length - 1).max() < 1e-9, "it did not come back to its shape"
     wild = setup.start()
-    wild = replace(wild, model=wild.model._replace(longest_correction=np.inf))
+    wild = replace(wild, model=wild.model._replace(correction_limit=np.inf))
     wild.nodes.x[:] = 1e-3 * body.rest
     wild = advance_by(Rule(), wild, setup.boundary(0))
     assert not np.abs(wild.x).max() < 1e3 * body.size

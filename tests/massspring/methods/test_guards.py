@@ -86,7 +86,7 @@ def corrected(case: Case, matrix, clock: Clock) -> tuple[float, int]:
         after = case.method.advance(setup.start(), boundary._replace(volume_target=target[None, :].copy()))
         ends.append((after.x.astype(np.float64), int(after.diagnostics.capped[0])))
     far = np.linalg.norm(ends[0][0] - ends[1][0], axis=1).max()
-    return far / setup.start().model.longest_correction, ends[0][1]
+    return far / setup.start().model.correction_limit, ends[0][1]
 
 
 @guard(where=lambda method, kind: method.capabilities.correction == "limited" and kind in ("block", "ball"))

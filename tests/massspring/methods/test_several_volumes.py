@@ -52,7 +52,7 @@ def test_a_jump_of_the_target_is_made_up_over_some_steps(hollow_body):
     setup = Setup(hollow_body, ImplicitVolume(), clock, damping=40.0)
     state, longest, capped = setup.start(), 0.0, 0
     jump = (hollow_body.rest_volumes * [1.0, 2.5])[None]
-    cap = state.model.longest_correction
+    cap = state.model.correction_limit
     for frame in range(60):
         before = state.x
         state = setup.method.advance(state, setup.boundary(frame)._replace(volume_target=jump))
