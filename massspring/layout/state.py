@@ -63,7 +63,7 @@ class State:
 
 def new_diagnostics(obstacles: int, attachments: int, stage_times: StageTimes | None = None) -> FrameDiagnostics:
     """Diagnostics at zero; the stage times go on."""
-    skipped, capped, iterations = (np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
+    singular, limited, iterations = (np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
     return FrameDiagnostics(
-        np.zeros((obstacles, 3)), np.zeros((attachments, 3)), skipped, capped, iterations, stage_times
+        np.zeros((obstacles, 3)), np.zeros((attachments, 3)), singular, limited, iterations, stage_times
     )

@@ -53,7 +53,7 @@ def hard_frame(frame, cells, compliance, accuracy):
             cell_forces_into(cells, cells.pressure, cells.push)
             if multiplier_stands(frame, step, push, np.inf, sweep + 1 == passes):
                 break
-        diagnostics.skipped[0] += any_idle(cells, compliance, accuracy.tolerance)
+        diagnostics.singular[0] += any_idle(cells, compliance, accuracy.tolerance)
         end_step(frame, step, push, 0.0, None)
     return mean_pressure(cells)
 

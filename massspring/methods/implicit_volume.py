@@ -27,7 +27,7 @@ from massspring.kernels.constraint.jacobian import (
     steepest_of_row,
     transposed_rows_times_into,
 )
-from massspring.kernels.constraint.one_volume import capped_error, multiplier_of_sums, steepest, surely_short
+from massspring.kernels.constraint.one_volume import limited_error, multiplier_of_sums, steepest, surely_short
 from massspring.kernels.constraint.schur import dense_into, solve_dense, solve_iteratively
 from massspring.kernels.contact.active_set import pressure_reach
 from massspring.kernels.jit.decorators import compiled, inlined, lean
@@ -61,15 +61,15 @@ def implicit_volume_frame(frame, lam):
         predicted, left = lam, 0.0
         passes = search_contacts(frame, step, Push(gradient, predicted))
         for sweep in range(passes):
-            lam, left, capped = limited_multiplier(
+            lam, left, limited = limited_multiplier(
                 model, frame.nodes, frame.contacts, error, boundary.dt, flow, mobility
             )
-            diagnostics.capped[0] += capped and sweep == 0
+            diagnostics.limited[0] += limited and sweep == 0
             reach = pressure_reach(lam - predicted, left, model.largest_inverse_mass, dt)
             if multiplier_stands(frame, step, Push(gradient, lam), reach, sweep + 1 == passes):
                 break
         if not left > 0.0:
-            diagnostics.skipped[0] += 1
+            diagnostics.singular[0] += 1
         lam = end_step(frame, step, Push(gradient, lam), left, None)
     return lam
 
@@ -82,7 +82,7 @@ def limited_multiplier(model, nodes, contacts, error, dt, flow, mobility):
     lam, left = multiplier_of_sums(nodes, contacts, weights, error, dt, flow, mobility)
     if not left > 0.0 or surely_short(error, left, model.largest_inverse_mass, longest):
         return lam, left, False
-    part = capped_error(error, left, steepest(nodes.gradient, weights), longest)
+    part = limited_error(error, left, steepest(nodes.gradient, weights), longest)
     if part != error:
         lam, _ = multiplier_of_sums(nodes, contacts, weights, part, dt, flow, mobility)
     return lam, left, part != error
@@ -98,19 +98,19 @@ def set_right_side(model, rows, nodes, contacts, target, dt, tolerance):
     padded_rows_times_into(rows, rows.node_vector, rows.right)
     diagonal_into(rows, contacts, model.inverse_mass, rows.diagonal)
     lightest, per_second = model.largest_inverse_mass, 1.0 / dt
-    capped, idle = False, False
+    limited, idle = False, False
     for r in range(target.shape[0]):
         error = target[r] - rows.volume[r]
         if not rows.diagonal[r] > 0.0:
             idle |= abs(error) > tolerance * target[r]
         elif not surely_short(error, rows.diagonal[r], lightest, model.correction_limit):
             reachable = steepest_of_row(rows, model.inverse_mass, r)
-            part = capped_error(error, rows.diagonal[r], reachable, model.correction_limit)
-            capped |= part != error
+            part = limited_error(error, rows.diagonal[r], reachable, model.correction_limit)
+            limited |= part != error
             error = part
         rows.right[r] = (error * per_second - rows.right[r]) * per_second
         rows.allowed[r] = tolerance * target[r] * per_second * per_second
-    return capped, idle
+    return limited, idle
 
 
 @compiled
@@ -139,7 +139,7 @@ def implicit_volumes_frame(frame, rows, accuracy):
         frame.boundary,
         frame.diagnostics,
     )
-    push, capped, idle = Push(rows.push, 1.0), False, False
+    push, limited, idle = Push(rows.push, 1.0), False, False
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
         begin_step(frame, step, False)
@@ -148,12 +148,12 @@ def implicit_volumes_frame(frame, rows, accuracy):
         end_stage(diagnostics.stage_times, VOLUME)
         target, passes = boundary.volume_target[step], search_contacts(frame, step, push)
         for sweep in range(passes):
-            capped, idle = set_right_side(model, rows, nodes, contacts, target, boundary.dt, accuracy.tolerance)
+            limited, idle = set_right_side(model, rows, nodes, contacts, target, boundary.dt, accuracy.tolerance)
             solve_multipliers(model, rows, contacts, diagnostics, accuracy)
             if multiplier_stands(frame, step, push, math.inf, sweep + 1 == passes):
                 break
-        diagnostics.capped[0] += capped
-        diagnostics.skipped[0] += idle
+        diagnostics.limited[0] += limited
+        diagnostics.singular[0] += idle
         end_step(frame, step, push, 0.0, rows)
 
 

@@ -54,7 +54,7 @@ def xpbd_frame(frame, cells, compliance, iterations, whole):
             lam, idle = mend(frame, cells, boundary.volume_target[step, 0], compliance, iterations, whole)
             if multiplier_stands(frame, step, push, np.inf, sweep + 1 == passes):
                 break
-        diagnostics.skipped[0] += idle
+        diagnostics.singular[0] += idle
         diagnostics.iterations[0] += iterations
         diagnostics.iterations[1] = iterations
         end_step(frame, step, push, 0.0, None)

@@ -60,9 +60,9 @@ class History:
     """Frames before the early end, F when there was none."""
     message: str
     """Why it stopped; empty when it did not."""
-    skipped_steps: int
+    singular_steps: int
     """Steps in which a volume had no gradient to push on."""
-    capped_steps: int
+    limited_corrections: int
     """Steps that made up for a part only of a wrong volume."""
     iterations: np.ndarray
     """For the multipliers of each frame: their sum over its steps, and the most in one step, (F, 2) int64."""
@@ -112,8 +112,8 @@ class Recorder:
         self.keep = keep
         self.kept: dict[int, np.ndarray] = {}
         self.final = body.rest
-        self.skipped = 0
-        self.capped = 0
+        self.singular = 0
+        self.limited = 0
 
     def record(self, frame: int, state: State, elapsed_ns: int) -> None:
         """Reads the state after frame number `frame` (0, 1, …)."""
@@ -140,8 +140,8 @@ class Recorder:
             self.penetration[frame, o] = max(0.0, depth)
         self.held_force[frame] = state.diagnostics.held_impulse / self.clock.frame
         self.frame_ns[frame] = elapsed_ns
-        self.skipped += int(state.diagnostics.skipped[0])
-        self.capped += int(state.diagnostics.capped[0])
+        self.singular += int(state.diagnostics.singular[0])
+        self.limited += int(state.diagnostics.limited[0])
         self.iterations[frame] = state.diagnostics.iterations
         if state.probing is not None:
             self.probe_counts[frame] = state.probing.counts - self.probe_counts[:frame].sum(axis=0)
@@ -178,8 +178,8 @@ class Recorder:
             outcome=outcome,
             good_frames=good_frames,
             message=message,
-            skipped_steps=self.skipped,
-            capped_steps=self.capped,
+            singular_steps=self.singular,
+            limited_corrections=self.limited,
             iterations=self.iterations,
             probe_counts=self.probe_counts,
         )

@@ -108,8 +108,8 @@ def _attributes(prepared: Prepared, history: History) -> dict[str, float | int |
         "springs": setup.body.springs.count,
         "triangles": len(setup.body.triangles),
         "law": setup.body.law,
-        "skipped_steps": history.skipped_steps,
-        "capped_steps": history.capped_steps,
+        "skipped_steps": history.singular_steps,
+        "capped_steps": history.limited_corrections,
         "volumes": setup.body.kept.count,
         "lumen_column": setup.body.kept.names.index(LUMEN) if LUMEN in setup.body.kept.names else -1,
     }

@@ -169,9 +169,9 @@ class FrameDiagnostics(NamedTuple):
     """Impulse of each obstacle on the body [N s], those of thin probes last, (o + p, 3)."""
     held_impulse: np.ndarray
     """Impulse of each attachment on the body [N s], (g, 3)."""
-    skipped: np.ndarray
+    singular: np.ndarray
     """Steps in which a wrong volume had no gradient to push on, so that no pressure could act, (1,) int64."""
-    capped: np.ndarray
+    limited: np.ndarray
     """Steps that made up for a part only of a wrong volume, (1,) int64."""
     iterations: np.ndarray
     """Iterations for the multipliers: their sum, and the most in one step, (2,) int64; 0 where they are direct."""

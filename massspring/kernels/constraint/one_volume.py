@@ -84,7 +84,7 @@ def surely_short(volume_error, mobility, lightest, longest):
 
 
 @inlined
-def capped_error(volume_error, mobility, steepest, longest):
+def limited_error(volume_error, mobility, steepest, longest):
     """V0 − V, at most `longest` · G·W̃·G / max w|G| [m³]: then no node moves farther than `longest` [m] (eq. 8.5)."""
     most = longest * mobility / steepest if steepest > 0.0 else 0.0
     return min(max(volume_error, -most), most)

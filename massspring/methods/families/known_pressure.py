@@ -46,7 +46,7 @@ def pressure_frame(frame, bulk_modulus, law):
         lam = known_pressure(model, nodes, bulk_modulus, law, volume, boundary.volume_target[step, 0])
         if not mobility > 0.0:
             lam = 0.0
-            diagnostics.skipped[0] += 1
+            diagnostics.singular[0] += 1
         end_stage(diagnostics.stage_times, VOLUME)
         pressed = Push(nodes.gradient, lam)
         search_contacts(frame, step, pressed)

@@ -15,7 +15,7 @@ import numpy as np
 
 from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.constraint.exact_volume import Line, line_into, nearest_root, volume_cubic
-from massspring.kernels.constraint.one_volume import capped_error, steepest, surely_short, volume_multiplier
+from massspring.kernels.constraint.one_volume import limited_error, steepest, surely_short, volume_multiplier
 from massspring.kernels.contact.active_set import pressure_reach
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
@@ -72,7 +72,7 @@ def linear_multiplier(model, nodes, contacts, error, kept, dt, whole):
     lightest, longest = model.largest_inverse_mass, model.correction_limit
     if whole or not mobility > 0.0 or surely_short(error, mobility, lightest, longest):
         return lam, mobility, False
-    part = capped_error(error, mobility, steepest(nodes.gradient, model.inverse_mass), longest)
+    part = limited_error(error, mobility, steepest(nodes.gradient, model.inverse_mass), longest)
     if part != error:
         lam, mobility = volume_multiplier(nodes, contacts, model.inverse_mass, part + kept, dt)
     return lam, mobility, part != error
@@ -105,7 +105,7 @@ def correct_positions(model, nodes, contacts, target, dt):
     _, mobility = volume_multiplier(nodes, contacts, model.inverse_mass, error, dt)
     if not mobility > 0.0:
         return False
-    part = capped_error(error, mobility, steepest(nodes.gradient, model.inverse_mass), model.correction_limit)
+    part = limited_error(error, mobility, steepest(nodes.gradient, model.inverse_mass), model.correction_limit)
     for i in range(nodes.x.shape[0]):
         push = model.inverse_mass[i] * part / mobility
         p0, p1, p2 = push * nodes.gradient[i, 0], push * nodes.gradient[i, 1], push * nodes.gradient[i, 2]
@@ -141,18 +141,18 @@ def constraint_frame(frame, line, lam, rule):
         predicted = lam
         passes = search_contacts(frame, step, Push(nodes.gradient, predicted))
         for sweep in range(passes):
-            lam, mobility, capped = linear_multiplier(model, nodes, contacts, error, kept, dt, rule.exact)
+            lam, mobility, limited = linear_multiplier(model, nodes, contacts, error, kept, dt, rule.exact)
             if rule.exact and mobility > 0.0:
                 lam, mobility = exact_multiplier(model, nodes, contacts, line, target, mobility, dt)
-            diagnostics.capped[0] += capped and sweep == 0
+            diagnostics.limited[0] += limited and sweep == 0
             reach = pressure_reach(lam - predicted, mobility, model.largest_inverse_mass, dt)
             if multiplier_stands(frame, step, Push(nodes.gradient, lam), reach, sweep + 1 == passes):
                 break
         if not mobility > 0.0:
-            diagnostics.skipped[0] += 1
+            diagnostics.singular[0] += 1
         lam = end_step(frame, step, Push(nodes.gradient, lam), mobility, None)
         if rule.stabilised:
-            diagnostics.capped[0] += correct_positions(model, nodes, contacts, target, dt)
+            diagnostics.limited[0] += correct_positions(model, nodes, contacts, target, dt)
             places_into(nodes, frame.work, 0, nodes.x.shape[0])
             end_stage(diagnostics.stage_times, MULTIPLIER)
     return lam

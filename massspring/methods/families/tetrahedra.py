@@ -62,7 +62,7 @@ def cells_frame(frame, cells, bulk_modulus, barycentric):
         if barycentric:
             add_barycentre_forces(nodes.x, cells, bulk_modulus, cells.push)
         else:
-            diagnostics.skipped[0] += add_volume_forces(nodes.x, cells, bulk_modulus, cells.push)
+            diagnostics.singular[0] += add_volume_forces(nodes.x, cells, bulk_modulus, cells.push)
         add_to_prediction(frame.model, nodes, cells.push, boundary.dt)
         end_stage(diagnostics.stage_times, VOLUME)
         search_contacts(frame, step, nothing)

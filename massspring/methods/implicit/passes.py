@@ -113,7 +113,7 @@ class Step:
             self.rows.lam[:] += self.rows.search
             if self.far_off:
                 break  # the pressure of one linear step along J where it began says nothing about J where it ended
-        self.diagnostics.skipped[0] += self.idle
+        self.diagnostics.singular[0] += self.idle
         self.book(touching, impulses)
         self.end_stage(HELD)
         self.nodes.v[:] = (self.p - self.nodes.x) / self.boundary.dt
@@ -149,7 +149,7 @@ class Step:
         error = self.target - begun
         cut = (np.abs(error) > most) & (most > 0.0)
         self.far_off = bool(cut.any())
-        self.diagnostics.capped[0] += self.far_off
+        self.diagnostics.limited[0] += self.far_off
         self.target = np.where(cut, begun + np.clip(error, -most, most), self.target)
 
     def imbalance(self) -> np.ndarray:

@@ -69,8 +69,8 @@ def test_a_body_on_a_line_is_counted_and_not_thrown(case):
     assert np.isfinite(history.pressure).all()
     # The compliance of hard elements leaves no residual where J = 0: their solve does not notice.
     noticed = case.method.capabilities.correction and case.method != CONTESTANTS["element_hard"]
-    assert history.skipped_steps == (30 if noticed else 0)
-    assert history.capped_steps == 0, "a step that makes up for nothing is not one that makes up for a part"
+    assert history.singular_steps == (30 if noticed else 0)
+    assert history.limited_corrections == 0, "a step that makes up for nothing is not one that makes up for a part"
     assert np.abs(history.final[:, 1:] - case.body.rest[:, 1:].mean(axis=0)).max() < 1e-6 * case.body.size
 
 
@@ -84,7 +84,7 @@ def corrected(case: Case, matrix, clock: Clock) -> tuple[float, int]:
     volume = case.body.kept.measure(setup.start().x.astype(np.float64))
     for target in (case.body.rest_volumes, volume):
         after = case.method.advance(setup.start(), boundary._replace(volume_target=target[None, :].copy()))
-        ends.append((after.x.astype(np.float64), int(after.diagnostics.capped[0])))
+        ends.append((after.x.astype(np.float64), int(after.diagnostics.limited[0])))
     far = np.linalg.norm(ends[0][0] - ends[1][0], axis=1).max()
     return far / setup.start().model.correction_limit, ends[0][1]
 
@@ -99,10 +99,10 @@ def test_a_limited_correction_moves_no_node_farther_than_it_claims(case):
     fraction = 0.02 if case.method.volume_tol else 0.5
     reached = 0
     for scale in (0.05, 0.5, 0.9, 0.999):
-        far, capped = corrected(case, scale * np.eye(3), clock_for(case.body, 1, 1, fraction))
+        far, limited = corrected(case, scale * np.eye(3), clock_for(case.body, 1, 1, fraction))
         assert far < 1.0 + 2e-4  # of springs, 1e-4 in implicit ones
-        assert capped == (far > 0.99)
-        reached += capped
+        assert limited == (far > 0.99)
+        reached += limited
     assert 0 < reached < 4, "either nothing was cut or everything"
 
 
@@ -131,7 +131,7 @@ def test_a_target_that_jumps_is_followed_behind_a_warning(case):
     ):
         setup = case.setup(clock, damping=30.0, targets=jump)
     history = simulate(setup)
-    assert history.outcome == "finished" and history.capped_steps == 0
+    assert history.outcome == "finished" and history.limited_corrections == 0
     asked = history.volume_target / case.body.rest_volumes
     assert np.diff(asked, axis=0, prepend=1.0).max() < 1.001 * clock.frame * fastest_filling(case.body)
     assert np.abs(asked[-1] - 1.1).max() < 1e-12

@@ -27,7 +27,7 @@ def test_every_volume_is_kept_under_contact(several, dense, monkeypatch):
     clock = clock_for(several, 150, 20)
     setup = Setup(several, ImplicitVolume(), clock, squeeze(several, depth, 0.8 * clock.duration), damping=40.0)
     history = simulate(setup)
-    assert history.outcome == "finished" and history.capped_steps == 0
+    assert history.outcome == "finished" and history.limited_corrections == 0
     assert np.abs(history.contact_force[-1, :, 2]).min() > 0
     assert np.abs(history.volume / history.volume_target - 1).max() < 1e-4
     assert (history.iterations[:, 1].max() > 0) != dense
@@ -50,15 +50,15 @@ def test_a_jump_of_the_target_is_made_up_over_some_steps(hollow_body):
     the cap says, and all arrives."""
     clock = clock_for(hollow_body, 400, 1)
     setup = Setup(hollow_body, ImplicitVolume(), clock, damping=40.0)
-    state, longest, capped = setup.start(), 0.0, 0
+    state, longest, limited = setup.start(), 0.0, 0
     jump = (hollow_body.rest_volumes * [1.0, 2.5])[None]
     cap = state.model.correction_limit
     for frame in range(60):
         before = state.x
         state = setup.method.advance(state, setup.boundary(frame)._replace(volume_target=jump))
         longest = max(longest, float(np.linalg.norm(state.x - before, axis=1).max()))
-        capped += int(state.diagnostics.capped[0])
-    assert capped > 1 and longest < 1.5 * cap
+        limited += int(state.diagnostics.limited[0])
+    assert limited > 1 and longest < 1.5 * cap
     factor = hollow_body.kept.measure(state.x) / hollow_body.rest_volumes
     assert np.abs(factor - [1.0, 2.5]).max() < 1e-3
 
@@ -69,11 +69,11 @@ def test_a_crushed_body_comes_back(kept_body):
     setup = Setup(body, ImplicitVolume(), clock_for(body, 400, 10, fraction=0.2), damping=60.0)
     state = setup.start()
     state.nodes.x[:] = 1e-3 * body.rest
-    capped = 0
+    limited = 0
     for frame in range(400):
         state = setup.method.advance(state, setup.boundary(frame))
-        capped += int(state.diagnostics.capped[0])
-    assert capped > 0
+        limited += int(state.diagnostics.limited[0])
+    assert limited > 0
     assert np.abs(body.kept.measure(state.x) / body.rest_volumes - 1).max() < 1e-3
 
 
@@ -86,7 +86,7 @@ def test_a_volume_held_by_its_nodes_is_left_alone(block_body, dense, monkeypatch
     held = Attachment(np.flatnonzero(block_body.rest[:, 2] < 0.03))
     clock = clock_for(body, 20, 10)
     history = simulate(Setup(body, ImplicitVolume(), clock, (), (held,), (0.0, 0.0, -9.81), damping=30.0))
-    assert history.outcome == "finished" and history.skipped_steps == 0
+    assert history.outcome == "finished" and history.singular_steps == 0
     assert np.abs(history.volume / body.rest_volumes - 1).max() < 1e-4
     assert (history.pressure == 0).any() and (history.pressure != 0).any()
 
@@ -97,7 +97,7 @@ def test_a_wrong_volume_that_nothing_can_push_is_counted(block_body):
     with pytest.warns(UserWarning, match="'region 2' moves faster"):
         setup = replace(setup, targets={"region 2": Ramp((0.0,), (1.1,))})
     history = simulate(setup)
-    assert history.skipped_steps == 3 and history.capped_steps == 0
+    assert history.singular_steps == 3 and history.limited_corrections == 0
 
 
 def test_more_volumes_come_closer_to_incompressible_everywhere(block_body):

@@ -37,7 +37,7 @@ def test_from_any_start_the_rest_shape_comes_back_with_the_constraint(start, fil
         ends[method.name] = history
     kept, free = ends["implicit_volume"], ends["free"]
     assert kept.min_j[-1] > 0.99
-    assert kept.capped_steps > 0
+    assert kept.limited_corrections > 0
     # Springs alone end in another equilibrium; docs/theory.md has 38 to 100 % inside out, or flat to round-off.
     after = np.empty(len(filled_ball.tetrahedra))
     tetrahedron_volumes_into(free.final, filled_ball.tetrahedra, after)
@@ -64,7 +64,7 @@ def test_a_body_on_a_line_has_nothing_to_push_on(filled_ball):
     x = start_of(filled_ball, np.diag([1, 0, 0]))
     clock = clock_for(filled_ball, 5, 20, fraction=0.2)
     history = simulate(Setup(filled_ball, ImplicitVolume(), clock, damping=20.0, positions=x))
-    assert history.outcome == "finished" and history.skipped_steps == 100
+    assert history.outcome == "finished" and history.singular_steps == 100
     assert (history.pressure == 0).all()
     assert abs(enclosed_volume(history.final, filled_ball.triangles)) < 1e-12 * filled_ball.volume
     still, _ = momentum(filled_ball.mass, history.final, history.final - x)

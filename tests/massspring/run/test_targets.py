@@ -96,7 +96,7 @@ def test_a_jump_of_thirty_per_cent_throws_nothing_apart(block_body, kind):
     peaks = []
     for fraction in (0.5, 0.1):
         history = blown_up(body, fraction)
-        assert history.outcome == "finished" and history.capped_steps == 0
+        assert history.outcome == "finished" and history.limited_corrections == 0
         assert np.abs(history.volume[-1] / body.rest_volumes - JUMP).max() < 1e-3
         assert history.min_j.min() > 0.5
         peaks.append(history.kinetic.max())
