@@ -49,10 +49,10 @@ def start(
 
 def _no_contacts(n: int) -> Contacts:
     return Contacts(
-        **{name: np.zeros(n, dtype=np.uint32) for name in ("touched", "second", "touching", "entering")},
+        **{name: np.zeros(n, dtype=np.uint32) for name in ("contact_id", "second", "active", "entering")},
         mode=np.zeros(n, dtype=np.uint8),
-        **{name: np.zeros((n, 3)) for name in ("normal", "second_normal", "direction", "goal")},
-        touching_count=np.zeros(1, dtype=np.int64),
+        **{name: np.zeros((n, 3)) for name in ("normal", "second_normal", "direction", "v_target")},
+        active_count=np.zeros(1, dtype=np.int64),
         clearance=np.zeros(n),
     )
 

@@ -61,7 +61,7 @@ class Nodes(NamedTuple):
 class Contacts(NamedTuple):
     """Which nodes obstacles touch in this step, and what that takes from their motion."""
 
-    touched: np.ndarray
+    contact_id: np.ndarray
     """0 for a free node, else 1 + the obstacle it lies on, (n,) uint32."""
     second: np.ndarray
     """1 + the other obstacle of a node in an edge between two, (n,) uint32."""
@@ -73,11 +73,11 @@ class Contacts(NamedTuple):
     """Of the second obstacle, (n, 3)."""
     direction: np.ndarray
     """The normal of a node that slides, the edge of one between two obstacles, (n, 3)."""
-    goal: np.ndarray
+    v_target: np.ndarray
     """Velocity that ends the step on the obstacles, in the directions taken, less what friction takes [m/s], (n, 3)."""
-    touching: np.ndarray
+    active: np.ndarray
     """The touched nodes, in the order in which they were found, (n,) uint32; released ones among them."""
-    touching_count: np.ndarray
+    active_count: np.ndarray
     """(1,) int64."""
     entering: np.ndarray
     """Scratch: nodes that would enter an obstacle, (n,) uint32."""

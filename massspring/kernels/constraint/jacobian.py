@@ -83,7 +83,7 @@ def pushed_velocity_into(nodes, contacts, inverse_mass, force, dt, u):
         if contacts.mode[i] > FREE:
             d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
             u0, u1, u2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
-            u0, u1, u2 = u0 + contacts.goal[i, 0], u1 + contacts.goal[i, 1], u2 + contacts.goal[i, 2]
+            u0, u1, u2 = u0 + contacts.v_target[i, 0], u1 + contacts.v_target[i, 1], u2 + contacts.v_target[i, 2]
         u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
 
 

@@ -30,9 +30,9 @@ def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
             p0, p1, p2 = allowed_part(mode, d0, d1, d2, g0, g1, g2)
             square = g0 * p0 + g1 * p1 + g2 * p2
             p0, p1, p2 = allowed_part(mode, d0, d1, d2, v0, v1, v2)
-            flow += g0 * (p0 + contacts.goal[i, 0] - v0)
-            flow += g1 * (p1 + contacts.goal[i, 1] - v1)
-            flow += g2 * (p2 + contacts.goal[i, 2] - v2)
+            flow += g0 * (p0 + contacts.v_target[i, 0] - v0)
+            flow += g1 * (p1 + contacts.v_target[i, 1] - v1)
+            flow += g2 * (p2 + contacts.v_target[i, 2] - v2)
         mobility += inverse_mass[i] * square
     if not mobility > 0.0:
         return 0.0, mobility
@@ -42,23 +42,23 @@ def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
 @inlined
 def multiplier_of_sums(nodes, contacts, inverse_mass, volume_error, dt, flow, mobility):
     """The same from G·v* and G·W·G of all nodes, less what obstacles take of the few they touch (eq. 3.3, 3.4)."""
-    mode, direction, goal, gradient, v_star = (
+    mode, direction, v_target, gradient, v_star = (
         contacts.mode,
         contacts.direction,
-        contacts.goal,
+        contacts.v_target,
         nodes.gradient,
         nodes.v_star,
     )
     free = mobility
-    for k in range(contacts.touching_count[0]):
-        i = contacts.touching[k]
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
         if mode[i] > FREE:
             g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
             v0, v1, v2 = v_star[i, 0], v_star[i, 1], v_star[i, 2]
             d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
             mobility -= inverse_mass[i] * taken_share(mode[i], d0, d1, d2, g0, g1, g2, g0, g1, g2)
             flow -= taken_share(mode[i], d0, d1, d2, g0, g1, g2, v0, v1, v2)
-            flow += g0 * goal[i, 0] + g1 * goal[i, 1] + g2 * goal[i, 2]
+            flow += g0 * v_target[i, 0] + g1 * v_target[i, 1] + g2 * v_target[i, 2]
     if mobility <= NEGLIGIBLE_MOBILITY * free:
         return 0.0, 0.0
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility

@@ -21,7 +21,7 @@ CONTACT_PASSES = 3
 def seat(model, nodes, contacts, boundary, step, push, count):
     """Puts the first `count` nodes of `contacts.entering` on the obstacle each would enter deepest (eq. 3.7).
 
-    `goal` n a, a = n·(target − x)/dt, ends the step on the obstacle. A round one pushes along n = (x − c)/|x − c| of
+    `v_target` n a, a = n·(target − x)/dt, ends the step on the obstacle. A round one pushes along n = (x − c)/|x − c| of
     the position now, not of the prediction: that would do work on a node that slides, and pump its oscillations up.
     """
     dt = boundary.dt
@@ -41,45 +41,45 @@ def seat(model, nodes, contacts, boundary, step, push, count):
                     axis = boundary.span[o, 0], boundary.span[o, 1], boundary.span[o, 2]
                     n0, n1, n2, lift = round_contact((s0, s1, s2), (r0, r1, r2), axis, boundary.radius[o])
                 a = n0 * u0 + n1 * u1 + n2 * u2 + lift / dt
-                contacts.touched[i], contacts.mode[i] = o + 1, SLIDES
+                contacts.contact_id[i], contacts.mode[i] = o + 1, SLIDES
                 contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2] = n0, n1, n2
                 contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2] = n0, n1, n2
-                contacts.goal[i, 0], contacts.goal[i, 1], contacts.goal[i, 2] = a * n0, a * n1, a * n2
+                contacts.v_target[i, 0], contacts.v_target[i, 1], contacts.v_target[i, 2] = a * n0, a * n1, a * n2
 
 
 @inlined
 def let_go(contacts):
     """No node is touched."""
-    for k in range(contacts.touching_count[0]):
-        i = contacts.touching[k]
-        contacts.touched[i], contacts.mode[i] = 0, FREE
-    contacts.touching_count[0] = 0
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
+        contacts.contact_id[i], contacts.mode[i] = 0, FREE
+    contacts.active_count[0] = 0
 
 
 @inlined
 def admit(contacts, count):
     """Lists those of the first `count` nodes of `entering` that have been seated; their clearance is settled."""
-    touching, entering, mode = contacts.touching, contacts.entering, contacts.mode
-    listed = contacts.touching_count[0]
+    active, entering, mode = contacts.active, contacts.entering, contacts.mode
+    listed = contacts.active_count[0]
     for k in range(count):
         i = entering[k]
         if mode[i] > FREE:
-            touching[listed] = i
+            active[listed] = i
             contacts.clearance[i] = math.inf
             listed += 1
-    contacts.touching_count[0] = listed
+    contacts.active_count[0] = listed
 
 
 @inlined
 def forget_released(contacts):
     """Takes nodes that have been released from the list, so that one that comes back is in it once."""
-    touching, mode, kept = contacts.touching, contacts.mode, 0
-    for k in range(contacts.touching_count[0]):
-        i = touching[k]
+    active, mode, kept = contacts.active, contacts.mode, 0
+    for k in range(contacts.active_count[0]):
+        i = active[k]
         if mode[i] > FREE:
-            touching[kept] = i
+            active[kept] = i
             kept += 1
-    contacts.touching_count[0] = kept
+    contacts.active_count[0] = kept
 
 
 @inlined
@@ -126,15 +126,18 @@ def enter(model, nodes, contacts, boundary, step, push):
 def release_pulled(model, nodes, contacts, boundary, push):
     """Releases nodes that their one obstacle would pull (eq. 3.8); how many."""
     changes = 0
-    for k in range(contacts.touching_count[0]):
-        i = contacts.touching[k]
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
         if contacts.mode[i] == FREE or contacts.mode[i] == ON_EDGE:
             continue
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
         u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
-        if contacts.goal[i, 0] * n0 + contacts.goal[i, 1] * n1 + contacts.goal[i, 2] * n2 < u0 * n0 + u1 * n1 + u2 * n2:
+        if (
+            contacts.v_target[i, 0] * n0 + contacts.v_target[i, 1] * n1 + contacts.v_target[i, 2] * n2
+            < u0 * n0 + u1 * n1 + u2 * n2
+        ):
             # A released node is looked at again in the next pass, whatever the pressure becomes.
-            contacts.touched[i], contacts.mode[i], contacts.clearance[i] = 0, FREE, 0.0
+            contacts.contact_id[i], contacts.mode[i], contacts.clearance[i] = 0, FREE, 0.0
             changes += 1
     return changes
 

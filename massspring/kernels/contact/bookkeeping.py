@@ -19,10 +19,10 @@ def book(contact_impulse, o, other, k0, k1, k2):
 
 @inlined
 def settled(contacts, i, u0, u1, u2):
-    """What obstacles make of the velocity of a node they touch [m/s], P u + goal (eq. 3.5)."""
+    """What obstacles make of the velocity of a node they touch [m/s], P u + v_target (eq. 3.5)."""
     d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
     p0, p1, p2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
-    return p0 + contacts.goal[i, 0], p1 + contacts.goal[i, 1], p2 + contacts.goal[i, 2]
+    return p0 + contacts.v_target[i, 0], p1 + contacts.v_target[i, 1], p2 + contacts.v_target[i, 2]
 
 
 @inlined
@@ -31,15 +31,15 @@ def book_contacts(model, nodes, contacts, push, dt, contact_impulse):
     v_star, direction, mode = nodes.v_star, push.direction, contacts.mode
     real = nodes.x.dtype.type
     impulse = real(dt * push.factor)
-    for k in range(contacts.touching_count[0]):
-        i = contacts.touching[k]
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
         if mode[i] == FREE:
             continue
         w = impulse * real(model.inverse_mass[i])
         u0, u1 = v_star[i, 0] + w * direction[i, 0], v_star[i, 1] + w * direction[i, 1]
         u2 = v_star[i, 2] + w * direction[i, 2]
         w0, w1, w2 = settled(contacts, i, u0, u1, u2)
-        o, m = contacts.touched[i] - 1, model.mass[i]
+        o, m = contacts.contact_id[i] - 1, model.mass[i]
         k0, k1, k2 = m * (w0 - u0), m * (w1 - u1), m * (w2 - u2)
         contact_impulse[o, 0] += k0
         contact_impulse[o, 1] += k1

@@ -13,7 +13,7 @@ def unpushed_into(nodes, contacts, dt, y):
         if contacts.mode[i] > FREE:
             e0, e1, e2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
             u0, u1, u2 = allowed_part(contacts.mode[i], e0, e1, e2, u0, u1, u2)
-            u0, u1, u2 = u0 + contacts.goal[i, 0], u1 + contacts.goal[i, 1], u2 + contacts.goal[i, 2]
+            u0, u1, u2 = u0 + contacts.v_target[i, 0], u1 + contacts.v_target[i, 1], u2 + contacts.v_target[i, 2]
         y[i, 0] = nodes.x[i, 0] + dt * u0
         y[i, 1] = nodes.x[i, 1] + dt * u1
         y[i, 2] = nodes.x[i, 2] + dt * u2

@@ -16,14 +16,14 @@ PARALLEL = 1e-4
 @lean
 def rub(model, nodes, contacts, boundary, step, push):
     """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 9.1)."""
-    for k in range(contacts.touching_count[0]):
-        i = contacts.touching[k]
-        if contacts.mode[i] != SLIDES or not boundary.friction[contacts.touched[i] - 1] > 0.0:
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
+        if contacts.mode[i] != SLIDES or not boundary.friction[contacts.contact_id[i] - 1] > 0.0:
             continue
-        o = contacts.touched[i] - 1
+        o = contacts.contact_id[i] - 1
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
         u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
-        g0, g1, g2 = contacts.goal[i, 0], contacts.goal[i, 1], contacts.goal[i, 2]
+        g0, g1, g2 = contacts.v_target[i, 0], contacts.v_target[i, 1], contacts.v_target[i, 2]
         pressed = boundary.friction[o] * ((g0 - u0) * n0 + (g1 - u1) * n1 + (g2 - u2) * n2)
         w0, w1, w2 = boundary.velocity[step, o, 0], boundary.velocity[step, o, 1], boundary.velocity[step, o, 2]
         s0, s1, s2 = allowed_part(SLIDES, n0, n1, n2, u0 - w0, u1 - w1, u2 - w2)
@@ -31,10 +31,10 @@ def rub(model, nodes, contacts, boundary, step, push):
         if slip <= pressed:
             w0, w1, w2 = allowed_part(SLIDES, n0, n1, n2, w0, w1, w2)
             contacts.mode[i] = STICKS
-            contacts.goal[i, 0], contacts.goal[i, 1], contacts.goal[i, 2] = g0 + w0, g1 + w1, g2 + w2
+            contacts.v_target[i, 0], contacts.v_target[i, 1], contacts.v_target[i, 2] = g0 + w0, g1 + w1, g2 + w2
         else:
             lost = pressed / slip
-            contacts.goal[i, 0], contacts.goal[i, 1], contacts.goal[i, 2] = (
+            contacts.v_target[i, 0], contacts.v_target[i, 1], contacts.v_target[i, 2] = (
                 g0 - lost * s0,
                 g1 - lost * s1,
                 g2 - lost * s2,
@@ -45,23 +45,23 @@ def rub(model, nodes, contacts, boundary, step, push):
 def release_slipping(model, nodes, contacts, boundary, push):
     """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 9.1)."""
     changes = 0
-    for k in range(contacts.touching_count[0]):
-        i = contacts.touching[k]
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
         if contacts.mode[i] != STICKS:
             continue
         w, direction = boundary.dt * push.factor * model.inverse_mass[i], push.direction
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
-        k0 = contacts.goal[i, 0] - nodes.v_star[i, 0] - w * direction[i, 0]
-        k1 = contacts.goal[i, 1] - nodes.v_star[i, 1] - w * direction[i, 1]
-        k2 = contacts.goal[i, 2] - nodes.v_star[i, 2] - w * direction[i, 2]
+        k0 = contacts.v_target[i, 0] - nodes.v_star[i, 0] - w * direction[i, 0]
+        k1 = contacts.v_target[i, 1] - nodes.v_star[i, 1] - w * direction[i, 1]
+        k2 = contacts.v_target[i, 2] - nodes.v_star[i, 2] - w * direction[i, 2]
         along = k0 * n0 + k1 * n1 + k2 * n2
         s0, s1, s2 = allowed_part(SLIDES, n0, n1, n2, k0, k1, k2)
-        needed, most = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2), boundary.friction[contacts.touched[i] - 1] * along
+        needed, most = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2), boundary.friction[contacts.contact_id[i] - 1] * along
         if along > 0.0 and needed > SLIPS * most:
-            a = contacts.goal[i, 0] * n0 + contacts.goal[i, 1] * n1 + contacts.goal[i, 2] * n2
+            a = contacts.v_target[i, 0] * n0 + contacts.v_target[i, 1] * n1 + contacts.v_target[i, 2] * n2
             g0, g1, g2 = a * n0 + most / needed * s0, a * n1 + most / needed * s1, a * n2 + most / needed * s2
             contacts.mode[i] = SLIDES
-            contacts.goal[i, 0], contacts.goal[i, 1], contacts.goal[i, 2] = g0, g1, g2
+            contacts.v_target[i, 0], contacts.v_target[i, 1], contacts.v_target[i, 2] = g0, g1, g2
             changes += 1
     return changes
 
@@ -74,18 +74,18 @@ def wedge(model, nodes, contacts, boundary, step, push):
     """
     changes = 0
     dt = boundary.dt
-    for k in range(contacts.touching_count[0]):
-        i = contacts.touching[k]
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
         if contacts.mode[i] != SLIDES:
             continue
         n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
         u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
         u0, u1, u2 = allowed_part(SLIDES, n0, n1, n2, u0, u1, u2)
-        u0, u1, u2 = u0 + contacts.goal[i, 0], u1 + contacts.goal[i, 1], u2 + contacts.goal[i, 2]
+        u0, u1, u2 = u0 + contacts.v_target[i, 0], u1 + contacts.v_target[i, 1], u2 + contacts.v_target[i, 2]
         y0, y1, y2 = nodes.x[i, 0] + dt * u0, nodes.x[i, 1] + dt * u1, nodes.x[i, 2] + dt * u2
         deepest = 0.0
         for o in range(boundary.radius.shape[0]):
-            if o + 1 == contacts.touched[i]:
+            if o + 1 == contacts.contact_id[i]:
                 continue
             p0, p1, p2 = boundary.position[step, o, 0], boundary.position[step, o, 1], boundary.position[step, o, 2]
             gap, m0, m1, m2 = gap_and_normal(boundary, o, y0 - p0, y1 - p1, y2 - p2)
@@ -93,7 +93,7 @@ def wedge(model, nodes, contacts, boundary, step, push):
             square = e0 * e0 + e1 * e1 + e2 * e2
             if gap < deepest and square > PARALLEL:
                 deepest = gap
-                # goal = α n + β m with n·goal = a and m·goal = b.
+                # v_target = α n + β m with n·v_target = a and m·v_target = b.
                 a, b = n0 * u0 + n1 * u1 + n2 * u2, m0 * u0 + m1 * u1 + m2 * u2 - gap / dt
                 cosine, root = n0 * m0 + n1 * m1 + n2 * m2, math.sqrt(square)
                 alpha, beta = (a - cosine * b) / square, (b - cosine * a) / square
@@ -104,9 +104,9 @@ def wedge(model, nodes, contacts, boundary, step, push):
                     e1 / root,
                     e2 / root,
                 )
-                contacts.goal[i, 0] = alpha * n0 + beta * m0
-                contacts.goal[i, 1] = alpha * n1 + beta * m1
-                contacts.goal[i, 2] = alpha * n2 + beta * m2
+                contacts.v_target[i, 0] = alpha * n0 + beta * m0
+                contacts.v_target[i, 1] = alpha * n1 + beta * m1
+                contacts.v_target[i, 2] = alpha * n2 + beta * m2
         if deepest < 0.0:
             contacts.mode[i] = ON_EDGE
             changes += 1
@@ -131,16 +131,18 @@ def shares(k, n, m):
 def release_wedged(model, nodes, contacts, boundary, push):
     """Frees nodes in a wedge that one of their obstacles would pull; the next search finds the other (eq. 9.2)."""
     changes = 0
-    for k in range(contacts.touching_count[0]):
-        i = contacts.touching[k]
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
         if contacts.mode[i] != ON_EDGE:
             continue
         u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
         # What the edge leaves free is at right angles to both normals and takes no share.
         n = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
         m = contacts.second_normal[i, 0], contacts.second_normal[i, 1], contacts.second_normal[i, 2]
-        alpha, beta = shares((contacts.goal[i, 0] - u0, contacts.goal[i, 1] - u1, contacts.goal[i, 2] - u2), n, m)
+        alpha, beta = shares(
+            (contacts.v_target[i, 0] - u0, contacts.v_target[i, 1] - u1, contacts.v_target[i, 2] - u2), n, m
+        )
         if alpha < 0.0 or beta < 0.0:
-            contacts.touched[i], contacts.mode[i], contacts.clearance[i] = 0, FREE, 0.0
+            contacts.contact_id[i], contacts.mode[i], contacts.clearance[i] = 0, FREE, 0.0
             changes += 1
     return changes

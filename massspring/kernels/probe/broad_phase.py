@@ -36,8 +36,8 @@ def fastest_node(model, nodes, contacts, push, dt):
     v_star, direction = flat(nodes.v_star, 0, n), flat(push.direction, 0, n)
     weight = flat(model.inverse_mass, 0, n)
     fastest = float(fastest_free(v_star, direction, weight, real(dt * push.factor)))
-    for k in range(contacts.touching_count[0]):
-        i = contacts.touching[k]
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
         if mode[i] > FREE:
             w = dt * push.factor * weight[i]
             u0, u1 = v_star[3 * i] + w * direction[3 * i], v_star[3 * i + 1] + w * direction[3 * i + 1]

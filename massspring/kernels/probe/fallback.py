@@ -37,7 +37,7 @@ def take(stage, p, i):
     contacts.mode[i] = STICKS
     for axis in range(3):
         # What the node would do; `gather` has no more use for it.
-        contacts.goal[i, axis] = probes.base[i, axis]
+        contacts.v_target[i, axis] = probes.base[i, axis]
 
 
 @lean
@@ -111,7 +111,7 @@ def give_way(stage, volumes):
     for k in range(probes.taken_count[0]):
         i = probes.taken[k]
         s0, s1, s2 = carried_speed(stage, i)
-        s0, s1, s2 = s0 - contacts.goal[i, 0], s1 - contacts.goal[i, 1], s2 - contacts.goal[i, 2]
+        s0, s1, s2 = s0 - contacts.v_target[i, 0], s1 - contacts.v_target[i, 1], s2 - contacts.v_target[i, 2]
         if volumes is None:
             g = nodes.gradient
             flow[0] -= g[i, 0] * s0 + g[i, 1] * s1 + g[i, 2] * s2

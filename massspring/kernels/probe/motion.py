@@ -23,7 +23,11 @@ def gather(stage, push):
                 if contacts.mode[i] > FREE:
                     d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
                     u0, u1, u2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
-                    u0, u1, u2 = u0 + contacts.goal[i, 0], u1 + contacts.goal[i, 1], u2 + contacts.goal[i, 2]
+                    u0, u1, u2 = (
+                        u0 + contacts.v_target[i, 0],
+                        u1 + contacts.v_target[i, 1],
+                        u2 + contacts.v_target[i, 2],
+                    )
                 base[i, 0], base[i, 1], base[i, 2] = u0, u1, u2
                 velocity[i, 0], velocity[i, 1], velocity[i, 2] = u0, u1, u2
 

@@ -29,8 +29,8 @@ def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
             flat_v[3 * i + axis] = u
             flat_x[3 * i + axis] += step * u
     x, v, places = nodes.x, nodes.v, work.places
-    for k in range(contacts.touching_count[0]):
-        i = contacts.touching[k]
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
         if first <= i < last and mode[i] > FREE:
             v[i, 0], v[i, 1], v[i, 2] = settled(contacts, i, v[i, 0], v[i, 1], v[i, 2])
             for axis in range(3):

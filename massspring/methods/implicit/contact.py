@@ -16,7 +16,7 @@ SLIP_RESOLUTION = 1e-11
 1e-15 to 1e-14 of it where a node sticks (measured), and friction would take its direction from that."""
 
 
-class Touching:
+class ActiveSet:
     """The directions that obstacles take in a step, as rows C of unit vectors at nodes, and their Schur complement."""
 
     def __init__(self, factor: Factor, nodes: Nodes, contacts: Contacts, surface_nodes: np.ndarray, dt: float) -> None:
@@ -27,10 +27,10 @@ class Touching:
         self.direction = np.concatenate(
             [contacts.normal[slides], contacts.normal[wedged], contacts.second_normal[wedged], axes]
         )
-        self.obstacle = contacts.touched[self.nodes].astype(np.int64) - 1
+        self.obstacle = contacts.contact_id[self.nodes].astype(np.int64) - 1
         second = len(slides) + len(wedged) + np.arange(len(wedged))
         self.obstacle[second] = contacts.second[wedged].astype(np.int64) - 1
-        self.place = np.einsum("ci,ci->c", self.direction, nodes.x[self.nodes] + dt * contacts.goal[self.nodes])
+        self.place = np.einsum("ci,ci->c", self.direction, nodes.x[self.nodes] + dt * contacts.v_target[self.nodes])
         """Where each row ends the step, along its direction [m], (c,)."""
         if len(self.nodes):
             self._columns = factor.columns(self.nodes)
@@ -69,16 +69,16 @@ class Contact:
         let_go(contacts)
         self._seat(np.empty(0, dtype=np.int64), nodes.v)
 
-    def revise(self, end: np.ndarray, touching: Touching, impulses: np.ndarray) -> bool:
+    def revise(self, end: np.ndarray, active: ActiveSet, impulses: np.ndarray) -> bool:
         """Releases nodes that an obstacle would pull, seats those that would enter one, and lets slip those that would
         stick too hard; whether any was (eq. 3.8, 12.4)."""
-        contacts, nodes = self.contacts, touching.nodes
+        contacts, nodes = self.contacts, active.nodes
         pushes = np.zeros_like(end)
-        np.add.at(pushes, nodes, impulses[:, None] * touching.direction)
+        np.add.at(pushes, nodes, impulses[:, None] * active.direction)
         sticks = contacts.mode[nodes] == STICKS
         inward = np.where(sticks, np.einsum("ci,ci->c", contacts.normal[nodes], pushes[nodes]), impulses)
         leaving = np.unique(nodes[inward < 0.0])
-        contacts.mode[leaving], contacts.touched[leaving] = FREE, 0
+        contacts.mode[leaving], contacts.contact_id[leaving] = FREE, 0
         self.rubbed[leaving] = 0.0
         slipped = self._let_slip(pushes) if self.boundary.rough else 0
         entered = self._seat(leaving, (end - self.nodes.x) / self.boundary.dt)
@@ -88,7 +88,7 @@ class Contact:
         """Nodes that stick although that asks for more than mu times their normal part slip from now on (eq. 12.4)."""
         contacts = self.contacts
         nodes = np.flatnonzero(contacts.mode == STICKS)
-        friction = self.boundary.friction[contacts.touched[nodes].astype(np.int64) - 1]
+        friction = self.boundary.friction[contacts.contact_id[nodes].astype(np.int64) - 1]
         nodes, friction = nodes[np.isfinite(friction)], friction[np.isfinite(friction)]
         normal, push = contacts.normal[nodes], pushes[nodes]
         pressed = np.einsum("ci,ci->c", normal, push)
@@ -98,17 +98,17 @@ class Contact:
         nodes, normal = nodes[slips], normal[slips]
         self.rubbed[nodes] = (friction * pressed)[slips, None] * aside[slips] / asked[slips, None]
         contacts.mode[nodes] = SLIDES
-        contacts.goal[nodes] = np.einsum("ci,ci->c", normal, contacts.goal[nodes])[:, None] * normal
+        contacts.v_target[nodes] = np.einsum("ci,ci->c", normal, contacts.v_target[nodes])[:, None] * normal
         return len(nodes)
 
-    def rub(self, end: np.ndarray, touching: Touching, impulses: np.ndarray) -> bool:
+    def rub(self, end: np.ndarray, active: ActiveSet, impulses: np.ndarray) -> bool:
         """Friction against the slip of the last pass; a node that it would drive sticks: whether one does
         (eq. 12.4)."""
         contacts, boundary = self.contacts, self.boundary
         if not boundary.rough:
             return False
-        slides = (contacts.mode[touching.nodes] == SLIDES) & (boundary.friction[touching.obstacle] > 0.0)
-        nodes, obstacle = touching.nodes[slides], touching.obstacle[slides]
+        slides = (contacts.mode[active.nodes] == SLIDES) & (boundary.friction[active.obstacle] > 0.0)
+        nodes, obstacle = active.nodes[slides], active.obstacle[slides]
         normal, carried = contacts.normal[nodes], boundary.velocity[self.step][obstacle]
         slip = _aside((end[nodes] - self.nodes.x[nodes]) / boundary.dt - carried, normal)
         speed = np.linalg.norm(slip, axis=1)
@@ -123,7 +123,7 @@ class Contact:
         """Nodes move along with what they touch, `carried` [m/s]."""
         contacts = self.contacts
         contacts.mode[nodes] = STICKS
-        contacts.goal[nodes] += _aside(carried, contacts.normal[nodes])
+        contacts.v_target[nodes] += _aside(carried, contacts.normal[nodes])
         self.rubbed[nodes] = 0.0
 
     def _seat(self, leaving: np.ndarray, velocity: np.ndarray) -> int:
@@ -138,7 +138,7 @@ class Contact:
         contacts.mode[leaving] = FREE
         if boundary.rough:
             new = contacts.entering[:count].astype(np.int64)
-            obstacle = contacts.touched[new].astype(np.int64) - 1
+            obstacle = contacts.contact_id[new].astype(np.int64) - 1
             rough = boundary.friction[obstacle] > 0.0
             self._stick(new[rough], boundary.velocity[self.step][obstacle[rough]])
         if len(boundary.radius) > 1:

@@ -22,7 +22,7 @@ from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.implicit_step import imbalance_into
 from massspring.layout.jacobian_pattern import DENSE_UP_TO
 from massspring.layout.state import State
-from massspring.methods.implicit.contact import Contact, Touching
+from massspring.methods.implicit.contact import ActiveSet, Contact
 from massspring.methods.implicit.factor import Factor
 
 CONTACT_REVISIONS, LAST_REVISIONS = 3, 12
@@ -81,18 +81,18 @@ class Step:
         """So many passes; then v⁺ = (x⁺ − x)/dt."""
         rows_into(self.nodes.x, self.model.inverse_mass, self.rows)
         begun = self.rows.volume.copy()
-        touching, impulses = self.touch(), np.zeros(0)
+        active, impulses = self.active_set(), np.zeros(0)
         obstacles = len(self.boundary.radius) > 0
         if obstacles:
             self.end_stage(SEARCH)
         for number in range(passes):
-            if number > 0 and self.contact.rub(self.p, touching, impulses):
-                touching = self.touch()
+            if number > 0 and self.contact.rub(self.p, active, impulses):
+                active = self.active_set()
             free = self.factor.respond(self.imbalance())
             self.end_stage(SPRINGS)
             if number == 0 and self.few:
                 self.answers = self.answers_of_all()
-                self.reach(touching)
+                self.reach(active)
                 self.end_stage(VOLUME)
             if self.few:
                 self.answer()
@@ -100,12 +100,12 @@ class Step:
                 self.cap(begun)
             most = CONTACT_REVISIONS if number + 1 < passes else LAST_REVISIONS
             for revision in range(most):
-                change, impulses = self.solve(free, touching)
+                change, impulses = self.solve(free, active)
                 self.end_stage(MULTIPLIER)
                 if not obstacles or revision + 1 == most:
                     break
-                revised = self.contact.revise(self.p + change, touching, impulses)
-                touching = self.touch() if revised else touching
+                revised = self.contact.revise(self.p + change, active, impulses)
+                active = self.active_set() if revised else active
                 self.end_stage(REVISION)
                 if not revised:
                     break
@@ -114,24 +114,24 @@ class Step:
             if self.far_off:
                 break  # the pressure of one linear step along J where it began says nothing about J where it ended
         self.diagnostics.singular[0] += self.idle
-        self.book(touching, impulses)
+        self.book(active, impulses)
         self.end_stage(HELD)
         self.nodes.v[:] = (self.p - self.nodes.x) / self.boundary.dt
         self.nodes.x[:] = self.p
         self.end_stage(INTEGRATION)
 
-    def touch(self) -> Touching:
+    def active_set(self) -> ActiveSet:
         """The touched nodes of the moment, and how volumes answer their pressures past them."""
-        touching = Touching(self.factor, self.nodes, self.contacts, self.model.surface_nodes, self.boundary.dt)
+        active = ActiveSet(self.factor, self.nodes, self.contacts, self.model.surface_nodes, self.boundary.dt)
         if self.answers is not None:
-            self.reach(touching)
+            self.reach(active)
             self.answer()
-        return touching
+        return active
 
-    def reach(self, touching: Touching) -> None:
+    def reach(self, active: ActiveSet) -> None:
         """dt² W̃ J_rᵀ [m/Pa], (m, n, 3)."""
         assert self.answers is not None
-        self.reached = np.stack([touching.without(answer) for answer in self.answers])
+        self.reached = np.stack([active.without(answer) for answer in self.answers])
 
     def answer(self) -> None:
         """dt² J W̃ Jᵀ [m³/Pa] with J at p, (m, m)."""
@@ -158,16 +158,16 @@ class Step:
         imbalance_into(self.model, self.nodes, self.rows, self.p, self.boundary, out)
         return out
 
-    def solve(self, free: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
+    def solve(self, free: np.ndarray, active: ActiveSet) -> tuple[np.ndarray, np.ndarray]:
         """(δ [m], contact impulses γ [kg m]) that end the pass at V0 and on the obstacles; `rows.search` is Δlam."""
         if self.boundary.rough:
             free = free + self.factor.respond(self.contact.rubbed)
-        missing = touching.place - touching.along(self.p + free)
-        change = free + touching.moved_by(touching.impulses(missing)) if len(missing) else free
+        missing = active.place - active.along(self.p + free)
+        change = free + active.moved_by(active.impulses(missing)) if len(missing) else free
         error = self.target - self.rows.volume - self.times(change)
-        self.rows.search[:], answer = self.directly(error) if self.few else self.iteratively(error, touching)
-        reached = np.tensordot(self.rows.search, self.reached, 1) if self.few else touching.without(answer)
-        return change + reached, touching.impulses(missing - touching.along(answer))
+        self.rows.search[:], answer = self.directly(error) if self.few else self.iteratively(error, active)
+        reached = np.tensordot(self.rows.search, self.reached, 1) if self.few else active.without(answer)
+        return change + reached, active.impulses(missing - active.along(answer))
 
     def directly(self, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(Δlam, dt² A⁻¹ Jᵀ Δlam) of few volumes by a dense solve (eq. 12.3)."""
@@ -189,7 +189,7 @@ class Step:
         units = np.eye(len(self.rows.lam))
         return self.boundary.dt**2 * np.stack([self.factor.respond(self.pushed(unit)) for unit in units])
 
-    def iteratively(self, error: np.ndarray, touching: Touching) -> tuple[np.ndarray, np.ndarray]:
+    def iteratively(self, error: np.ndarray, active: ActiveSet) -> tuple[np.ndarray, np.ndarray]:
         """(Δlam, dt² A⁻¹ Jᵀ Δlam) of many volumes by conjugate gradients, one back-solve an iteration (eq. 8.4)."""
         diagonal = self.boundary.dt**2 * self.factor.alone(self.rows)[0]
         able = diagonal > 0.0
@@ -203,7 +203,7 @@ class Step:
             rho = float(residual @ scaled)
             search = scaled + (rho / before if count else 0.0) * search
             response = self.boundary.dt**2 * self.factor.respond(self.pushed(search))
-            image = self.times(touching.without(response))
+            image = self.times(active.without(response))
             step = rho / float(search @ image)
             pressure, answer, residual = pressure + step * search, answer + step * response, residual - step * image
             before, count = rho, count + 1
@@ -211,14 +211,14 @@ class Step:
         self.diagnostics.iterations[1] = max(int(self.diagnostics.iterations[1]), count)
         return pressure, answer
 
-    def book(self, touching: Touching, impulses: np.ndarray) -> None:
+    def book(self, active: ActiveSet, impulses: np.ndarray) -> None:
         """Impulses of obstacles and attachments [N s] (eq. 3.6)."""
         nodes, contacts, net, dt = self.nodes, self.contacts, self.model, self.boundary.dt
         given = self.diagnostics.contact_impulse
-        np.add.at(given, touching.obstacle, impulses[:, None] / dt * touching.direction)
+        np.add.at(given, active.obstacle, impulses[:, None] / dt * active.direction)
         if self.boundary.rough:
             rubbed = np.flatnonzero(self.contact.rubbed.any(axis=1))
-            np.add.at(given, contacts.touched[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
+            np.add.at(given, contacts.contact_id[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
         spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, nodes.force)
         push = Push(self.pushed(self.rows.lam), 1.0)
         add_held_impulse(net, nodes, push, dt, self.boundary.gravity, self.diagnostics.held_impulse)

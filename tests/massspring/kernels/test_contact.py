@@ -214,7 +214,7 @@ def test_looking_only_at_near_nodes_changes_no_bit(ball_body):
             reach = pressure_reach(lam - state.lam[0], mobility, lightest, dt)
             changed = revise_contacts(net, nodes, near, boundary, 0, Push(nodes.gradient, lam), reach)
             assert changed == revise_contacts(net, nodes, far, boundary, 0, Push(nodes.gradient, lam), np.inf)
-            for name in ("touched", "mode", "normal", "goal"):
+            for name in ("contact_id", "mode", "normal", "v_target"):
                 assert np.array_equal(getattr(near, name), getattr(far, name))
             changes += changed
             skipped += int((near.clearance[ball_body.surface_nodes] > reach).sum())

@@ -68,7 +68,7 @@ class Scene:
         return self.state.nodes.v_star + DT * lam * self.model.inverse_mass[:, None] * self.state.nodes.gradient
 
     def velocity(self, lam: float) -> np.ndarray:
-        """v⁺ = P u + goal (n, 3) [m/s] (eq. 3.4, 3.5)."""
+        """v⁺ = P u + v_target (n, 3) [m/s] (eq. 3.4, 3.5)."""
         contacts, u = self.contacts, self.free_velocity(lam)
         kept = {
             FREE: u,
@@ -77,7 +77,7 @@ class Scene:
             STICKS: 0 * u,
         }
         return np.choose(contacts.mode[:, None], list(kept.values())) + np.where(
-            contacts.mode[:, None] > FREE, contacts.goal, 0.0
+            contacts.mode[:, None] > FREE, contacts.v_target, 0.0
         )
 
     def gaps(self, y: np.ndarray) -> np.ndarray:
@@ -114,7 +114,7 @@ def test_nodes_sit_on_the_obstacle_that_they_would_enter_deepest(shell, name):
     assert (scene.contacts.clearance[~away] == np.inf).all()
     wanted = np.where(gaps.min(axis=0) < 0, gaps.argmin(axis=0) + 1, 0)
     wanted[inner] = 0
-    assert (scene.contacts.touched == wanted).all() and len(np.unique(wanted)) == len(scene.obstacles) + 1
+    assert (scene.contacts.contact_id == wanted).all() and len(np.unique(wanted)) == len(scene.obstacles) + 1
     one = np.flatnonzero(scene.contacts.mode == SLIDES)
     ends = scene.gaps(scene.x + DT * scene.velocity(LAM))[wanted[one] - 1, one]
     assert np.abs(ends).max() < ROUND_OFF  # also beside a rod: no node here comes near its ends
@@ -142,10 +142,10 @@ def test_a_new_pressure_finds_the_one_node_that_it_moves(shell, change):
 def test_the_next_step_knows_nothing_of_the_last(shell):
     """Obstacles gone: no clearance, no touch is left of them."""
     scene = Scene(shell, *OBSTACLES["two spheres"]).find()
-    assert scene.contacts.touched.any()
+    assert scene.contacts.contact_id.any()
     scene.boundary.position[:] -= 1.0
     scene.find()
-    assert not scene.contacts.touched.any() and not scene.contacts.mode.any()
+    assert not scene.contacts.contact_id.any() and not scene.contacts.mode.any()
     assert scene.contacts.clearance.min() > 0.9
 
 
@@ -158,7 +158,7 @@ def test_revised_contacts_are_those_of_the_new_pressure(shell, name, way):
     for lam in LAM * np.array(way):
         held = scene.contacts.mode == SLIDES
         u = scene.free_velocity(lam)
-        pulled = held & (((scene.contacts.goal - u) * scene.contacts.normal).sum(axis=1) < 0)
+        pulled = held & (((scene.contacts.v_target - u) * scene.contacts.normal).sum(axis=1) < 0)
         enters = ~held & (scene.gaps(scene.x + DT * u)[0] < 0)
         enters[np.setdiff1d(np.arange(len(u)), scene.nodes)] = False
         count = scene.revise(lam)
@@ -176,11 +176,11 @@ def test_slip_loses_what_coulomb_says(shell, name, friction):
     smooth, rough = (Scene(shell, (type(still)(*_shape(still), ALONG, mu),)).find() for mu in (0.0, friction))
     on = np.flatnonzero(smooth.contacts.mode == SLIDES)
     n, u = smooth.contacts.normal[on], smooth.free_velocity(LAM)[on]
-    p = ((smooth.contacts.goal[on] - u) * n).sum(axis=1)
+    p = ((smooth.contacts.v_target[on] - u) * n).sum(axis=1)
     w = np.array(ALONG.displacements[1])
     slip = u - w - ((u - w) * n).sum(axis=1)[:, None] * n
     left = np.maximum(0.0, 1 - friction * p / np.linalg.norm(slip, axis=1))
-    across = (smooth.contacts.goal[on] * n).sum(axis=1)[:, None] * n
+    across = (smooth.contacts.v_target[on] * n).sum(axis=1)[:, None] * n
     expected = w - (n @ w)[:, None] * n + left[:, None] * slip + across
     assert np.abs(rough.velocity(LAM)[on] - expected).max() < ROUND_OFF
     assert np.array_equal(rough.contacts.mode[on] == STICKS, left == 0)
@@ -197,7 +197,7 @@ def test_what_sticks_too_hard_at_the_new_pressure_slips(shell):
     scene = Scene(shell, (Plane((0, 0, -0.0501), (0, 0, 1), ALONG, mu),)).find()
     sticks = np.flatnonzero(scene.contacts.mode == STICKS)
     u = scene.free_velocity(lam)[sticks]
-    k, n = scene.contacts.goal[sticks] - u, scene.contacts.normal[sticks]
+    k, n = scene.contacts.v_target[sticks] - u, scene.contacts.normal[sticks]
     p = (k * n).sum(axis=1)
     aside = k - p[:, None] * n
     asked = np.linalg.norm(aside, axis=1)
@@ -217,7 +217,7 @@ def test_between_two_obstacles_nodes_keep_both(shell, name):
     scene, wedged = Scene(shell, obstacles, box).find(), 0
     for first, second in ((0, 1), (1, 0)):
         alone = Scene(shell, (obstacles[first],), box).find()
-        on = np.flatnonzero(scene.contacts.touched == first + 1)
+        on = np.flatnonzero(scene.contacts.contact_id == first + 1)
         v = alone.velocity(LAM)
         y = alone.x + DT * v
         n, gap = alone.contacts.normal[on], obstacles[second].gap(y, DT)[on]

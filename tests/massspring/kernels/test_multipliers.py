@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.massspring.contact_id import list_active, seat
 
 import massspring.layout.jacobian_pattern as rows_module
 from massspring import (
@@ -27,7 +28,6 @@ from massspring.layout.state import new_diagnostics
 from massspring.methods.implicit_volume import set_right_side, solve_multipliers
 from tests.massspring.kernels.test_kernels import ROUND_OFF, directional, moved
 from tests.massspring.methods.test_methods import clock_for, squeeze
-from tests.massspring.touched import list_touched, seat
 
 
 def test_rows_are_the_derivative_of_the_volumes(several):
@@ -59,14 +59,14 @@ def touched_and_held(body: Body, dt: float):
     nodes.v_star[held] = [0.02, 0.0, -0.01]
     approach = seat(contacts, touched, random)
     edge, wedged, stuck = np.linalg.qr(random.normal(size=(3, 3)))[0], 31, 40
-    contacts.touched[[wedged, stuck]], contacts.second[wedged] = 1, 2
+    contacts.contact_id[[wedged, stuck]], contacts.second[wedged] = 1, 2
     contacts.mode[[wedged, stuck]] = ON_EDGE, STICKS
-    list_touched(contacts)
+    list_active(contacts)
     contacts.direction[wedged] = edge[0]
-    contacts.goal[wedged] = 0.03 * edge[1] - 0.02 * edge[2]
-    contacts.goal[stuck] = [0.01, -0.02, 0.03]
+    contacts.v_target[wedged] = 0.03 * edge[1] - 0.02 * edge[2]
+    contacts.v_target[stuck] = [0.01, -0.02, 0.03]
     fixed = [(wedged, edge[1], 0.03), (wedged, edge[2], -0.02)]
-    fixed += [(stuck, axis, float(axis @ contacts.goal[stuck])) for axis in np.eye(3)]
+    fixed += [(stuck, axis, float(axis @ contacts.v_target[stuck])) for axis in np.eye(3)]
     fixed += [(i, contacts.normal[i], a) for i, a in zip(touched, approach, strict=True)]
     fixed += [(i, axis, float(axis @ nodes.v_star[i])) for i in held for axis in np.eye(3)]
     rows_into(nodes.x, state.model.inverse_mass, rows)

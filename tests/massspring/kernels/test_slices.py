@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.massspring.contact_id import list_active
 
 from massspring import Attachment, Body, Clock, Free, ImplicitVolume, Setup, Volumes, tetrahedral_body
 from massspring.body.springs import Springs
@@ -17,7 +18,6 @@ from massspring.layout.allocate import start
 from massspring.layout.sell_chunks import LONGEST, rings, slices_of
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.kernels.test_kernels import DIFFERENCE, STEP, moved
-from tests.massspring.touched import list_touched
 
 ROUND_OFF = 1e-14  # relative to the largest: sums of at most some hundred doubles in another order
 
@@ -175,8 +175,8 @@ def test_the_multiplier_from_sums_is_the_one_over_all_nodes(ball_body):
         contacts.mode[some] = kind
         contacts.direction[some] = rng.normal(size=(len(some), 3))
         contacts.direction[some] /= np.linalg.norm(contacts.direction[some], axis=1)[:, None]
-        contacts.goal[some] = rng.normal(size=(len(some), 3))
-    list_touched(contacts)
+        contacts.v_target[some] = rng.normal(size=(len(some), 3))
+    list_active(contacts)
     error = 0.01 * volume
     expected = volume_multiplier(nodes, contacts, net.inverse_mass, error, boundary.dt)
     found = multiplier_of_sums(nodes, contacts, net.inverse_mass, error, boundary.dt, flow, mobility)
@@ -190,6 +190,6 @@ def test_a_body_that_obstacles_hold_everywhere_has_no_multiplier(ball_body):
     """What is left of G·W·G is round-off then; dividing by it would be a pressure of any size."""
     state, boundary, (volume, flow, mobility) = gathered(ball_body, moved(ball_body))
     state.contacts.mode[:] = STICKS
-    list_touched(state.contacts)
+    list_active(state.contacts)
     args = (state.nodes, state.contacts, state.model.inverse_mass, 0.01 * volume, boundary.dt, flow, mobility)
     assert multiplier_of_sums(*args) == (0.0, 0.0)

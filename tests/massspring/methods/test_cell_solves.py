@@ -49,7 +49,7 @@ def saddle_point(body, cells, nodes, contacts, dt, compliance):
     mass = np.repeat(body.mass, 3)
     soft = np.diag(np.concatenate([compliance * cells.rest_volume, np.zeros(len(touched))]))
     system = np.block([[np.diag(mass), -rows.T], [rows, soft]])
-    approach = np.einsum("ij,ij->i", contacts.goal[touched], contacts.normal[touched])
+    approach = np.einsum("ij,ij->i", contacts.v_target[touched], contacts.normal[touched])
     right = np.concatenate([mass * nodes.v_star.ravel(), cells.rest_volume - cell_volumes(body, nodes.x), approach])
     return np.linalg.solve(system, right)[: 3 * n + k]
 
@@ -64,7 +64,7 @@ def test_the_hard_solve_equals_the_full_saddle_point(block_body):
     normals = rng.normal(size=(3, 3))
     contacts.normal[touched] = normals / np.linalg.norm(normals, axis=1)[:, None]
     contacts.direction[touched], contacts.mode[touched] = contacts.normal[touched], SLIDES
-    contacts.goal[touched] = 0.05 * contacts.normal[touched]
+    contacts.v_target[touched] = 0.05 * contacts.normal[touched]
     cell_rows_into(nodes.x, cells, cells.right)
     cells.pressure[:] = 100.0  # a warm start must not matter
     count = solve_cells(nodes, contacts, net.inverse_mass, cells, dt, compliance, Accuracy(1e-12, 2000))

@@ -20,7 +20,7 @@ from massspring import (
     tetrahedral_body,
 )
 from massspring.kernels.contact.modes import ON_EDGE, SLIDES, STICKS
-from massspring.methods.implicit.contact import Touching
+from massspring.methods.implicit.contact import ActiveSet
 from massspring.methods.implicit.factor import Factor
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.methods.test_methods import squeeze, thrown
@@ -70,20 +70,20 @@ def test_the_response_past_obstacles_is_that_of_the_saddle_point_system(started)
         vectors = rng.normal(size=nodes.x.shape)
         getattr(contacts, name)[:] = vectors / np.linalg.norm(vectors, axis=1)[:, None]
     contacts.mode[[3, 5, 8, 20]] = [SLIDES, STICKS, ON_EDGE, SLIDES]
-    contacts.touched[[3, 5, 8, 20]], contacts.second[8] = 1, 2
-    contacts.goal[:] = rng.normal(size=nodes.x.shape)
-    touching = Touching(factor, nodes, contacts, np.arange(len(nodes.x), dtype=np.uint32), dt)
-    assert len(touching.nodes) == 1 + 3 + 2 + 1 and sorted(set(touching.obstacle)) == [0, 1]
-    rows = np.zeros((len(touching.nodes), nodes.x.size))
-    for row, node, direction in zip(rows, touching.nodes, touching.direction, strict=True):
+    contacts.contact_id[[3, 5, 8, 20]], contacts.second[8] = 1, 2
+    contacts.v_target[:] = rng.normal(size=nodes.x.shape)
+    active = ActiveSet(factor, nodes, contacts, np.arange(len(nodes.x), dtype=np.uint32), dt)
+    assert len(active.nodes) == 1 + 3 + 2 + 1 and sorted(set(active.obstacle)) == [0, 1]
+    rows = np.zeros((len(active.nodes), nodes.x.size))
+    for row, node, direction in zip(rows, active.nodes, active.direction, strict=True):
         row[3 * node : 3 * node + 3] = direction
     inverse = np.kron(dense(state.model, dt, 3.0), np.eye(3))
     forces = rng.normal(size=nodes.x.shape)
     base = inverse @ forces.ravel()
     gamma = np.linalg.solve(rows @ inverse @ rows.T, -rows @ base)
     exact = (base + inverse @ rows.T @ gamma).reshape(-1, 3)
-    assert np.allclose(touching.without(factor.respond(forces)), exact, atol=1e-10 * np.abs(exact).max())
-    assert np.abs(touching.along(exact)).max() < 1e-10 * np.abs(exact).max()
+    assert np.allclose(active.without(factor.respond(forces)), exact, atol=1e-10 * np.abs(exact).max())
+    assert np.abs(active.along(exact)).max() < 1e-10 * np.abs(exact).max()
 
 
 def test_short_steps_agree_with_explicit_ones(kept_body):

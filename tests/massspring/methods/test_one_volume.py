@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.massspring.contact_id import seat
 
 from massspring import (
     Attachment,
@@ -22,7 +23,6 @@ from massspring.kernels.step.begin import open_frame
 from massspring.layout.allocate import start
 from massspring.layout.state import new_diagnostics
 from tests.massspring.methods.test_methods import clock_for, squeeze, thrown
-from tests.massspring.touched import seat
 
 
 def test_the_one_step_residual_is_exact(body):

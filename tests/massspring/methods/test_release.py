@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.massspring.contact_id import list_active
 
 from massspring import Attachment, Clock, ImplicitVolume, Plane, Setup, Trajectory, surface_body
 from massspring.analysis.stability import step_limit
@@ -10,7 +11,6 @@ from massspring.kernels.contact.friction import release_wedged
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.kernels.test_rubbing import wedge_of
-from tests.massspring.touched import list_touched
 
 ROUND_OFF = 1e-12  # m/s, of some 0.1
 
@@ -43,7 +43,7 @@ def test_no_obstacle_pulls_a_node(shell, angle):
         state = setup.method.advance(state, boundary)
         nodes, contacts, on_one = state.nodes, state.contacts, state.contacts.mode == SLIDES
         push = boundary.dt * state.lam[0] * state.model.inverse_mass[:, None]
-        pushed = ((contacts.goal - nodes.v_star - push * nodes.gradient) * contacts.normal).sum(axis=1)
+        pushed = ((contacts.v_target - nodes.v_star - push * nodes.gradient) * contacts.normal).sum(axis=1)
         met += int(on_one.sum())
         assert (pushed[on_one] > -ROUND_OFF).all(), frame
     assert met > 5000
@@ -51,7 +51,7 @@ def test_no_obstacle_pulls_a_node(shell, angle):
 
 @pytest.mark.parametrize(("first", "second"), [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])
 def test_a_wedge_lets_go_of_a_node_that_either_side_would_pull(shell, first, second):
-    """goal − u = α n + β n' with α, β given; the normals are neither parallel nor at right angles."""
+    """v_target − u = α n + β n' with α, β given; the normals are neither parallel nor at right angles."""
     setup = Setup(shell, ImplicitVolume(), Clock(1e-3, 1, 1), wedge_of(0.0, 1.0, 0.4))
     state, boundary = setup.start(), setup.boundary(0)
     nodes, contacts, node = state.nodes, state.contacts, int(state.model.surface_nodes[3])
@@ -61,9 +61,9 @@ def test_a_wedge_lets_go_of_a_node_that_either_side_would_pull(shell, first, sec
     lam = 50.0
     u = nodes.v_star[node] + boundary.dt * lam * state.model.inverse_mass[node] * nodes.gradient[node]
     contacts.normal[node], contacts.second_normal[node] = n, m
-    contacts.goal[node] = u + first * n + second * m
-    contacts.touched[node], contacts.second[node], contacts.mode[node] = 1, 2, ON_EDGE
-    list_touched(contacts)
+    contacts.v_target[node] = u + first * n + second * m
+    contacts.contact_id[node], contacts.second[node], contacts.mode[node] = 1, 2, ON_EDGE
+    list_active(contacts)
     free = first < 0 or second < 0
     assert release_wedged(state.model, nodes, contacts, boundary, Push(nodes.gradient, lam)) == int(free)
     assert contacts.mode[node] == (FREE if free else ON_EDGE)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.massspring.contact_id import list_active
 
 from massspring import Clock, Free, ImplicitVolume, Probe, Setup, Trajectory
 from massspring.kernels.arrays.layout import Push
@@ -13,7 +14,6 @@ from massspring.kernels.probe.broad_phase import TRIANGLE_BLOCK, fastest_node
 from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, stays_off
 from tests.massspring.probe.test_collision import pair_of
 from tests.massspring.probe.test_probe import BALL, EDGE, R, pressed
-from tests.massspring.touched import list_touched
 
 
 def test_triangles_of_a_block_are_neighbours():
@@ -42,20 +42,20 @@ def test_no_node_is_faster_than_the_fastest(fast, precision):
         contacts.mode[:] = FREE
         chosen = rng.choice(BALL.node_count, 5, replace=False)
         contacts.mode[chosen] = [SLIDES, SLIDES, ON_EDGE, STICKS, STICKS]
-        list_touched(contacts)
+        list_active(contacts)
         contacts.direction[chosen] = np.eye(3)[rng.integers(3, size=5)]
-        contacts.goal[chosen] = 0.1 * rng.normal(size=(5, 3))
+        contacts.v_target[chosen] = 0.1 * rng.normal(size=(5, 3))
         if fast == "free":
             nodes.v_star[np.setdiff1d(np.arange(BALL.node_count), chosen)[trial]] *= 10.0
         else:
-            contacts.goal[chosen[trial % 5]] *= 100.0
+            contacts.v_target[chosen[trial % 5]] *= 100.0
         u = nodes.v_star + dt * lam * net.inverse_mass[:, None] * nodes.gradient
         for i in chosen:
             d = contacts.direction[i]
             kept = {SLIDES: np.eye(3) - np.outer(d, d), ON_EDGE: np.outer(d, d), STICKS: np.zeros((3, 3))}[
                 int(contacts.mode[i])
             ]
-            u[i] = kept @ u[i] + contacts.goal[i]
+            u[i] = kept @ u[i] + contacts.v_target[i]
         truth = np.linalg.norm(u, axis=1).max()
         found = fastest_node(net, nodes, contacts, Push(nodes.gradient, lam), dt)
         assert found >= truth * (1 - 1e-6)  # what SAFE makes up for

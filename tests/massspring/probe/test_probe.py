@@ -128,7 +128,7 @@ def disturbed_contact():
     nodes.v_star[:] = 0.02 * rng.normal(size=nodes.v_star.shape)
     nodes.v_star[net.held_nodes] = 0.0
     contacts.mode[:] = FREE
-    contacts.touching_count[0] = 0
+    contacts.active_count[0] = 0
     count = int(rows.count[0])
     rows.direction[:count] += 0.3 * rng.normal(size=(count, 3))
     rows.direction[:count] /= np.linalg.norm(rows.direction[:count], axis=1)[:, None]

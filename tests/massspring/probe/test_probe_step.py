@@ -89,7 +89,7 @@ def some_rows(stage, rng, count=5):
     contacts.mode[chosen] = rng.permutation(np.arange(len(chosen)) % 3 + 1)
     contacts.direction[chosen] = rng.normal(size=(len(chosen), 3))
     contacts.direction[chosen] /= np.linalg.norm(contacts.direction[chosen], axis=1)[:, None]
-    contacts.goal[chosen] = np.einsum(
+    contacts.v_target[chosen] = np.einsum(
         "nij,nj->ni", taken_from(contacts)[chosen], 0.02 * rng.normal(size=(len(chosen), 3))
     )
 
@@ -128,7 +128,7 @@ def test_contacts_beside_obstacles_equal_the_full_saddle_point(seed):
     bound = solve_rows(stage, None)
     move(stage, None)
     u = np.einsum("nij,nj->ni", kept, nodes.v_star + dt * lam * w[:, None] * g)
-    u += contacts.goal * (contacts.mode > FREE)[:, None]
+    u += contacts.v_target * (contacts.mode > FREE)[:, None]
     on = np.unique(BALL.triangles)
     assert np.allclose(probing.base[on], u[on], atol=1e-14)
     found = np.where(np.isin(np.arange(len(u)), on)[:, None], probing.velocity, u)

@@ -6,11 +6,11 @@ from massspring.kernels.arrays.layout import Contacts
 from massspring.kernels.contact.modes import SLIDES
 
 
-def list_touched(contacts: Contacts) -> None:
+def list_active(contacts: Contacts) -> None:
     """Lists the touched nodes, as the contact search does for those that it seats."""
     nodes = np.flatnonzero(contacts.mode)
-    contacts.touching[: len(nodes)] = nodes
-    contacts.touching_count[0] = len(nodes)
+    contacts.active[: len(nodes)] = nodes
+    contacts.active_count[0] = len(nodes)
 
 
 def seat(contacts: Contacts, nodes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -18,8 +18,8 @@ def seat(contacts: Contacts, nodes: np.ndarray, rng: np.random.Generator) -> np.
     normals = rng.normal(size=(len(nodes), 3))
     contacts.normal[nodes] = normals / np.linalg.norm(normals, axis=1)[:, None]
     approach = 0.05 * rng.normal(size=len(nodes))
-    contacts.touched[nodes], contacts.mode[nodes] = 1, SLIDES
+    contacts.contact_id[nodes], contacts.mode[nodes] = 1, SLIDES
     contacts.direction[nodes] = contacts.normal[nodes]
-    contacts.goal[nodes] = approach[:, None] * contacts.normal[nodes]
-    list_touched(contacts)
+    contacts.v_target[nodes] = approach[:, None] * contacts.normal[nodes]
+    list_active(contacts)
     return approach

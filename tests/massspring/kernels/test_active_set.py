@@ -5,7 +5,7 @@ import pytest
 
 from massspring import Clock, ImplicitSprings, Plane, Setup, Trajectory
 from massspring.kernels.contact.modes import SLIDES, STICKS
-from massspring.methods.implicit.contact import SLIP_RESOLUTION, Contact, Touching
+from massspring.methods.implicit.contact import SLIP_RESOLUTION, ActiveSet, Contact
 
 DT, MU = 5e-3, 0.5
 BELOW = 1e-3
@@ -28,12 +28,12 @@ class Sole:
         self.place = (floor.point[2] - self.state.nodes.x[self.nodes, 2]) / DT
         """Speed [m/s] that ends the step on the floor."""
 
-    def touching(self) -> Touching:
-        return Touching(self.factor, self.state.nodes, self.contacts, self.model.surface_nodes, DT)
+    def active(self) -> ActiveSet:
+        return ActiveSet(self.factor, self.state.nodes, self.contacts, self.model.surface_nodes, DT)
 
     def slide(self) -> None:
         self.contacts.mode[self.nodes] = SLIDES
-        self.contacts.goal[self.nodes, :2] = 0.0
+        self.contacts.v_target[self.nodes, :2] = 0.0
 
     def end(self, slip: np.ndarray) -> np.ndarray:
         """Where nodes end that slip on the floor by so much [m/s]."""
@@ -49,18 +49,18 @@ def sole(block_body):
 
 @pytest.mark.parametrize(("asked", "slips"), [(0.98 * MU, False), (1.02 * MU, True)])
 def test_a_node_sticks_up_to_what_its_friction_can_take(sole, asked, slips):
-    touching, (first, *others) = sole.touching(), sole.nodes
-    impulses = np.zeros((len(touching.nodes) // 3, 3))
-    assert np.array_equal(touching.nodes[::3], sole.nodes)
+    active, (first, *others) = sole.active(), sole.nodes
+    impulses = np.zeros((len(active.nodes) // 3, 3))
+    assert np.array_equal(active.nodes[::3], sole.nodes)
     impulses[:] = (0.1 * MU, 0.0, 1.0)
     impulses[0] = (0.0, asked, 1.0)
-    changed = sole.contact.revise(sole.end(np.zeros(3)), touching, impulses.ravel())
+    changed = sole.contact.revise(sole.end(np.zeros(3)), active, impulses.ravel())
     assert changed == slips
     assert sole.contacts.mode[first] == (SLIDES if slips else STICKS)
     assert (sole.contacts.mode[others] == STICKS).all()
     # Up to the floor within the step; along it with the floor, or freely.
     expected = [*(0.0 * CARRIED[:2] if slips else CARRIED[:2]), sole.place[0]]
-    assert np.allclose(sole.contacts.goal[first], expected, rtol=0, atol=1e-12)
+    assert np.allclose(sole.contacts.v_target[first], expected, rtol=0, atol=1e-12)
     rubbed = [0.0, MU, 0.0] if slips else [0.0, 0.0, 0.0]
     assert np.allclose(sole.contact.rubbed[first], rubbed, rtol=0, atol=1e-15)
 
@@ -68,9 +68,9 @@ def test_a_node_sticks_up_to_what_its_friction_can_take(sole, asked, slips):
 def test_friction_acts_against_the_slip(sole):
     """By mu times what the floor pushes, and that is never less than nothing."""
     sole.slide()
-    touching, slip = sole.touching(), np.array([-0.03, 0.04, 0.0])
+    active, slip = sole.active(), np.array([-0.03, 0.04, 0.0])
     impulses = np.linspace(-1.0, 2.0, len(sole.nodes))
-    assert not sole.contact.rub(sole.end(slip), touching, impulses)
+    assert not sole.contact.rub(sole.end(slip), active, impulses)
     expected = -MU * np.maximum(impulses, 0.0)[:, None] * slip / 0.05
     # A way of 0.25 mm is known to 1e-17 m.
     assert np.abs(sole.contact.rubbed[sole.nodes] - expected).max() < 1e-11
@@ -84,10 +84,10 @@ def test_what_friction_would_drive_sticks(sole):
     slip = np.array([-0.03, 0.04, 0.0])
     sole.contact.rubbed[sole.nodes] = -slip
     sole.contact.rubbed[first] = slip
-    assert sole.contact.rub(sole.end(slip), sole.touching(), np.ones(len(sole.nodes)))
+    assert sole.contact.rub(sole.end(slip), sole.active(), np.ones(len(sole.nodes)))
     assert sole.contacts.mode[first] == STICKS and (sole.contacts.mode[others] == SLIDES).all()
     assert (sole.contact.rubbed[first] == 0).all()
-    assert np.allclose(sole.contacts.goal[first, :2], CARRIED[:2], rtol=0, atol=1e-15)
+    assert np.allclose(sole.contacts.v_target[first, :2], CARRIED[:2], rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(("way", "sticks"), [(0.0, True), (0.5, True), (2.0, False)])
@@ -100,6 +100,6 @@ def test_a_slip_that_is_round_off_is_none(sole, way, sticks):
     carried[:] = 0.0
     end = sole.state.nodes.x.copy()
     end[sole.nodes] = DT * slip
-    assert sole.contact.rub(end, sole.touching(), np.ones(len(sole.nodes))) == sticks
+    assert sole.contact.rub(end, sole.active(), np.ones(len(sole.nodes))) == sticks
     assert (sole.contacts.mode[sole.nodes] == (STICKS if sticks else SLIDES)).all()
     assert np.linalg.norm(sole.contact.rubbed, axis=1).max() == pytest.approx(0.0 if sticks else MU, rel=1e-9)
