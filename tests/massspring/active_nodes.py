@@ -1,4 +1,4 @@
-"""Nodes that a test seats on obstacles by hand."""
+"""Nodes that a test activates on obstacles by hand."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from massspring.kernels.contact.modes import SLIDES
 
 
 def list_active(contacts: Contacts) -> None:
-    """Lists the touched nodes, as the contact search does for those that it seats."""
+    """Lists the touched nodes, as the contact search does for those that it activates."""
     nodes = np.flatnonzero(contacts.mode)
     contacts.active[: len(nodes)] = nodes
     contacts.active_count[0] = len(nodes)
 
 
-def seat(contacts: Contacts, nodes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Seats free nodes (c,) on one obstacle, with any normals; the speeds a along them that it asks for [m/s], (c,)."""
+def activate(contacts: Contacts, nodes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Activates free nodes (c,) on one obstacle, with any normals; the speeds a along them that it asks for [m/s], (c,)."""
     normals = rng.normal(size=(len(nodes), 3))
     contacts.normal[nodes] = normals / np.linalg.norm(normals, axis=1)[:, None]
     approach = 0.05 * rng.normal(size=len(nodes))

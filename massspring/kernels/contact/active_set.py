@@ -18,7 +18,7 @@ CONTACT_PASSES = 3
 
 
 @lean
-def seat(model, nodes, contacts, boundary, step, push, count):
+def activate(model, nodes, contacts, boundary, step, push, count):
     """Puts the first `count` nodes of `contacts.entering` on the obstacle each would enter deepest (eq. 3.7).
 
     `v_target` n a, a = n·(target − x)/dt, ends the step on the obstacle. A round one pushes along n = (x − c)/|x − c| of
@@ -48,7 +48,7 @@ def seat(model, nodes, contacts, boundary, step, push, count):
 
 
 @inlined
-def let_go(contacts):
+def release_all(contacts):
     """No node is touched."""
     for k in range(contacts.active_count[0]):
         i = contacts.active[k]
@@ -57,8 +57,8 @@ def let_go(contacts):
 
 
 @inlined
-def admit(contacts, count):
-    """Lists those of the first `count` nodes of `entering` that have been seated; their clearance is settled."""
+def register(contacts, count):
+    """Lists those of the first `count` nodes of `entering` that have been activated; their clearance is settled."""
     active, entering, mode = contacts.active, contacts.entering, contacts.mode
     listed = contacts.active_count[0]
     for k in range(count):
@@ -96,14 +96,14 @@ def clear_all(model, nodes, contacts, boundary, step, push, team):
 @inlined
 def find_contacts(model, nodes, contacts, boundary, step, push, team):
     """Touched nodes of the step when the push of the last one acts on them: u = v* + dt W f (eq. 3.7)."""
-    let_go(contacts)
+    release_all(contacts)
     clear_all(model, nodes, contacts, boundary, step, push, team)
     enter(model, nodes, contacts, boundary, step, push)
 
 
 @inlined
 def enter(model, nodes, contacts, boundary, step, push):
-    """Seats the nodes whose clearance is negative (eq. 3.7)."""
+    """Activates the nodes whose clearance is negative (eq. 3.7)."""
     touchable, clearance, entering = model.touchable, contacts.clearance, contacts.entering
     count = 0
     for begin in range(0, clearance.shape[0], BLOCK):
@@ -114,8 +114,8 @@ def enter(model, nodes, contacts, boundary, step, push):
                 entering[count] = i
                 count += 1
     if count > 0:
-        seat(model, nodes, contacts, boundary, step, push, count)
-        admit(contacts, count)
+        activate(model, nodes, contacts, boundary, step, push, count)
+        register(contacts, count)
     if boundary.rough:
         rub(model, nodes, contacts, boundary, step, push)
     if boundary.radius.shape[0] > 1:
@@ -183,8 +183,8 @@ def revise_contacts(model, nodes, contacts, boundary, step, push, reach):
     if changes > 0:
         forget_released(contacts)
     if count > 0:
-        seat(model, nodes, contacts, boundary, step, push, count)
-        admit(contacts, count)
+        activate(model, nodes, contacts, boundary, step, push, count)
+        register(contacts, count)
     return changes + count
 
 

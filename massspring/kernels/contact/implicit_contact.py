@@ -1,12 +1,12 @@
 """Contact for methods whose steps are long and solved as a whole."""
 
-from massspring.kernels.contact.active_set import admit, enters, forget_released, seat
+from massspring.kernels.contact.active_set import activate, enters, forget_released, register
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.jit.decorators import compiled
 
 
 @compiled
-def seat_entering(model, nodes, contacts, boundary, step, push):
+def activate_entering(model, nodes, contacts, boundary, step, push):
     """Puts free surface nodes that would enter an obstacle onto it (eq. 3.7) and lists them; how many.
 
     Those that have been released since the last search leave the list.
@@ -21,6 +21,6 @@ def seat_entering(model, nodes, contacts, boundary, step, push):
             contacts.entering[count] = i
             count += 1
     if count > 0:
-        seat(model, nodes, contacts, boundary, step, push, count)
-        admit(contacts, count)
+        activate(model, nodes, contacts, boundary, step, push, count)
+        register(contacts, count)
     return count

@@ -4,9 +4,9 @@ import numpy as np
 from scipy.linalg import get_lapack_funcs
 
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Model, Nodes, Push
-from massspring.kernels.contact.active_set import let_go
+from massspring.kernels.contact.active_set import release_all
 from massspring.kernels.contact.friction import wedge
-from massspring.kernels.contact.implicit_contact import seat_entering
+from massspring.kernels.contact.implicit_contact import activate_entering
 from massspring.kernels.contact.modes import FREE, HIDDEN, ON_EDGE, SLIDES, STICKS
 from massspring.methods.implicit.factor import Factor
 
@@ -66,11 +66,11 @@ class Contact:
         self.boundary, self.step = boundary, step
         self.rubbed = np.zeros_like(nodes.x)
         """Friction of the nodes that slip, times dt² [kg m], (n, 3)."""
-        let_go(contacts)
-        self._seat(np.empty(0, dtype=np.int64), nodes.v)
+        release_all(contacts)
+        self._activate(np.empty(0, dtype=np.int64), nodes.v)
 
     def revise(self, end: np.ndarray, active: ActiveSet, impulses: np.ndarray) -> bool:
-        """Releases nodes that an obstacle would pull, seats those that would enter one, and lets slip those that would
+        """Releases nodes that an obstacle would pull, activates those that would enter one, and lets slip those that would
         stick too hard; whether any was (eq. 3.8, 12.4)."""
         contacts, nodes = self.contacts, active.nodes
         pushes = np.zeros_like(end)
@@ -81,7 +81,7 @@ class Contact:
         contacts.mode[leaving], contacts.contact_id[leaving] = FREE, 0
         self.rubbed[leaving] = 0.0
         slipped = self._let_slip(pushes) if self.boundary.rough else 0
-        entered = self._seat(leaving, (end - self.nodes.x) / self.boundary.dt)
+        entered = self._activate(leaving, (end - self.nodes.x) / self.boundary.dt)
         return bool(len(leaving) or slipped or entered)
 
     def _let_slip(self, pushes: np.ndarray) -> int:
@@ -126,15 +126,15 @@ class Contact:
         contacts.v_target[nodes] += _aside(carried, contacts.normal[nodes])
         self.rubbed[nodes] = 0.0
 
-    def _seat(self, leaving: np.ndarray, velocity: np.ndarray) -> int:
-        """Seats nodes that `velocity` carries into an obstacle, but for those just let go; how many."""
+    def _activate(self, leaving: np.ndarray, velocity: np.ndarray) -> int:
+        """Activates nodes that `velocity` carries into an obstacle, but for those just let go; how many."""
         contacts, boundary = self.contacts, self.boundary
         if not len(boundary.radius):
             return 0
         self.nodes.v_star[:] = velocity
         contacts.mode[leaving] = HIDDEN
         unpushed = Push(self.nodes.gradient, 0.0)
-        count = seat_entering(self.model, self.nodes, contacts, boundary, self.step, unpushed)
+        count = activate_entering(self.model, self.nodes, contacts, boundary, self.step, unpushed)
         contacts.mode[leaving] = FREE
         if boundary.rough:
             new = contacts.entering[:count].astype(np.int64)

@@ -154,7 +154,7 @@ def test_the_next_step_knows_nothing_of_the_last(shell):
 def test_revised_contacts_are_those_of_the_new_pressure(shell, name, way):
     """Pulled nodes are let go, free ones that would enter sit down; so is a node that was let go before."""
     scene, changed, again = Scene(shell, *OBSTACLES[name]).find(), 0, 0
-    let_go = np.zeros(len(scene.x), dtype=bool)
+    release_all = np.zeros(len(scene.x), dtype=bool)
     for lam in LAM * np.array(way):
         held = scene.contacts.mode == SLIDES
         u = scene.free_velocity(lam)
@@ -164,7 +164,7 @@ def test_revised_contacts_are_those_of_the_new_pressure(shell, name, way):
         count = scene.revise(lam)
         assert count == pulled.sum() + enters.sum()
         assert np.array_equal(scene.contacts.mode == SLIDES, (held & ~pulled) | enters)
-        changed, again, let_go = changed + count, again + (enters & let_go).sum(), let_go | pulled
+        changed, again, release_all = changed + count, again + (enters & release_all).sum(), release_all | pulled
     assert changed > 10 and again > 0
 
 

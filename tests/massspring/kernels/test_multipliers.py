@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.massspring.contact_id import list_active, seat
+from tests.massspring.contact_id import activate, list_active
 
 import massspring.layout.jacobian_pattern as rows_module
 from massspring import (
@@ -57,7 +57,7 @@ def touched_and_held(body: Body, dt: float):
     nodes, contacts, rows = state.nodes, state.contacts, state.rows
     nodes.v_star[:] = state.v
     nodes.v_star[held] = [0.02, 0.0, -0.01]
-    approach = seat(contacts, touched, random)
+    approach = activate(contacts, touched, random)
     edge, wedged, stuck = np.linalg.qr(random.normal(size=(3, 3)))[0], 31, 40
     contacts.contact_id[[wedged, stuck]], contacts.second[wedged] = 1, 2
     contacts.mode[[wedged, stuck]] = ON_EDGE, STICKS

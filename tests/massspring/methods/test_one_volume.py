@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.massspring.contact_id import seat
+from tests.massspring.contact_id import activate
 
 from massspring import (
     Attachment,
@@ -49,7 +49,7 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     nodes.v_star[:] = state.v
     nodes.v_star[net.held_nodes] = [0.02, 0.0, -0.01]
     touched = np.array([40, 41, 90])
-    approach = seat(contacts, touched, rng)
+    approach = activate(contacts, touched, rng)
     wanted = 1.02 * body.volume
     error = wanted - volume_gradient_into(nodes.x, net.triangles, nodes.gradient)
     lam, _ = volume_multiplier(nodes, contacts, net.inverse_mass, error, dt)
