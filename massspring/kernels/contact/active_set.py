@@ -5,7 +5,7 @@ What is rare (friction, two obstacles at once) has loops of its own in `kernels.
 
 import math
 
-from massspring.kernels.contact.friction import release_slipping, release_wedged, rub, wedge
+from massspring.kernels.contact.friction import activate_edges, release_edges, release_slipping, rub
 from massspring.kernels.contact.gaps import clearances_into, gap_and_normal, pushed_velocity
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from massspring.kernels.contact.node_contact import round_contact
@@ -119,7 +119,7 @@ def enter(model, nodes, contacts, boundary, step, push):
     if boundary.rough:
         rub(model, nodes, contacts, boundary, step, push)
     if boundary.radius.shape[0] > 1:
-        wedge(model, nodes, contacts, boundary, step, push)
+        activate_edges(model, nodes, contacts, boundary, step, push)
 
 
 @inlined
@@ -167,7 +167,7 @@ def revise_contacts(model, nodes, contacts, boundary, step, push, reach):
     if boundary.rough:
         changes += release_slipping(model, nodes, contacts, boundary, push)
     if boundary.radius.shape[0] > 1:
-        changes += release_wedged(model, nodes, contacts, boundary, push) + wedge(
+        changes += release_edges(model, nodes, contacts, boundary, push) + activate_edges(
             model, nodes, contacts, boundary, step, push
         )
     for begin in range(0, clearance.shape[0], BLOCK):

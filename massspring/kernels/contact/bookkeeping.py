@@ -8,7 +8,7 @@ from massspring.kernels.jit.decorators import inlined, lean
 
 @lean
 def book(contact_impulse, o, other, k0, k1, k2):
-    """Moves an impulse [N s] from the account of one obstacle to another's: a wedge pushes with both."""
+    """Moves an impulse [N s] from the account of one obstacle to another's: an edge pushes with both."""
     contact_impulse[o, 0] -= k0
     contact_impulse[o, 1] -= k1
     contact_impulse[o, 2] -= k2

@@ -67,7 +67,7 @@ def release_slipping(model, nodes, contacts, boundary, push):
 
 
 @lean
-def wedge(model, nodes, contacts, boundary, step, push):
+def activate_edges(model, nodes, contacts, boundary, step, push):
     """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 9.2); how many.
 
     Obstacles that face each other have no edge: the deeper one wins, and the other's penetration is recorded.
@@ -128,8 +128,8 @@ def shares(k, n, m):
 
 
 @lean
-def release_wedged(model, nodes, contacts, boundary, push):
-    """Frees nodes in a wedge that one of their obstacles would pull; the next search finds the other (eq. 9.2)."""
+def release_edges(model, nodes, contacts, boundary, push):
+    """Frees nodes on an edge that one of their obstacles would pull; the next search finds the other (eq. 9.2)."""
     changes = 0
     for k in range(contacts.active_count[0]):
         i = contacts.active[k]

@@ -5,7 +5,7 @@ from scipy.linalg import get_lapack_funcs
 
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Model, Nodes, Push
 from massspring.kernels.contact.active_set import release_all
-from massspring.kernels.contact.friction import wedge
+from massspring.kernels.contact.friction import activate_edges
 from massspring.kernels.contact.implicit_contact import activate_entering
 from massspring.kernels.contact.modes import FREE, HIDDEN, ON_EDGE, SLIDES, STICKS
 from massspring.methods.implicit.factor import Factor
@@ -21,15 +21,15 @@ class ActiveSet:
 
     def __init__(self, factor: Factor, nodes: Nodes, contacts: Contacts, surface_nodes: np.ndarray, dt: float) -> None:
         mode = contacts.mode[surface_nodes]
-        slides, wedged, sticks = (surface_nodes[mode == kind].astype(np.int64) for kind in (SLIDES, ON_EDGE, STICKS))
+        slides, on_edge, sticks = (surface_nodes[mode == kind].astype(np.int64) for kind in (SLIDES, ON_EDGE, STICKS))
         axes = np.tile(np.eye(3), (len(sticks), 1))
-        self.nodes = np.concatenate([slides, wedged, wedged, np.repeat(sticks, 3)])
+        self.nodes = np.concatenate([slides, on_edge, on_edge, np.repeat(sticks, 3)])
         self.direction = np.concatenate(
-            [contacts.normal[slides], contacts.normal[wedged], contacts.second_normal[wedged], axes]
+            [contacts.normal[slides], contacts.normal[on_edge], contacts.second_normal[on_edge], axes]
         )
         self.obstacle = contacts.contact_id[self.nodes].astype(np.int64) - 1
-        second = len(slides) + len(wedged) + np.arange(len(wedged))
-        self.obstacle[second] = contacts.second[wedged].astype(np.int64) - 1
+        second = len(slides) + len(on_edge) + np.arange(len(on_edge))
+        self.obstacle[second] = contacts.second[on_edge].astype(np.int64) - 1
         self.place = np.einsum("ci,ci->c", self.direction, nodes.x[self.nodes] + dt * contacts.v_target[self.nodes])
         """Where each row ends the step, along its direction [m], (c,)."""
         if len(self.nodes):
@@ -142,7 +142,7 @@ class Contact:
             rough = boundary.friction[obstacle] > 0.0
             self._stick(new[rough], boundary.velocity[self.step][obstacle[rough]])
         if len(boundary.radius) > 1:
-            count += wedge(self.model, self.nodes, contacts, boundary, self.step, unpushed)
+            count += activate_edges(self.model, self.nodes, contacts, boundary, self.step, unpushed)
             self.rubbed[contacts.mode == ON_EDGE] = 0.0
         return count
 

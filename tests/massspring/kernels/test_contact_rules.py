@@ -214,7 +214,7 @@ def test_what_sticks_too_hard_at_the_new_pressure_slips(shell):
 def test_between_two_obstacles_nodes_keep_both(shell, name):
     """n·v⁺ as beside the first alone, m·v⁺ up to the second, free along n × m; without an edge the first counts."""
     obstacles, box = OBSTACLES[name]
-    scene, wedged = Scene(shell, obstacles, box).find(), 0
+    scene, on_edge = Scene(shell, obstacles, box).find(), 0
     for first, second in ((0, 1), (1, 0)):
         alone = Scene(shell, (obstacles[first],), box).find()
         on = np.flatnonzero(scene.contacts.contact_id == first + 1)
@@ -232,8 +232,8 @@ def test_between_two_obstacles_nodes_keep_both(shell, name):
             expected = np.linalg.solve(np.array([n[k], m[k], edge[k]]), right)
             assert np.abs(new[k] - expected).max() < 1e-4  # normals are known to 1e-6, edges as short as 0.01
             assert scene.contacts.second[on[k]] == second + 1
-        wedged += both.sum()
-    assert wedged == 0 if name == "almost one plane" else wedged > 3
+        on_edge += both.sum()
+    assert on_edge == 0 if name == "almost one plane" else on_edge > 3
 
 
 def test_a_node_that_slides_fast_round_a_sphere_is_not_between_it_and_itself(shell):

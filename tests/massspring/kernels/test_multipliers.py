@@ -47,7 +47,7 @@ def test_rows_are_the_derivative_of_the_volumes(several):
 
 
 def touched_and_held(body: Body, dt: float):
-    """A state in motion, its rows filled: two nodes held, three sliding, one in a wedge, one sticking.
+    """A state in motion, its rows filled: two nodes held, three sliding, one on an edge, one sticking.
 
     And what that fixes: (node, direction, velocity along it [m/s]).
     """
@@ -58,14 +58,14 @@ def touched_and_held(body: Body, dt: float):
     nodes.v_star[:] = state.v
     nodes.v_star[held] = [0.02, 0.0, -0.01]
     approach = activate(contacts, touched, random)
-    edge, wedged, stuck = np.linalg.qr(random.normal(size=(3, 3)))[0], 31, 40
-    contacts.contact_id[[wedged, stuck]], contacts.second[wedged] = 1, 2
-    contacts.mode[[wedged, stuck]] = ON_EDGE, STICKS
+    edge, on_edge, stuck = np.linalg.qr(random.normal(size=(3, 3)))[0], 31, 40
+    contacts.contact_id[[on_edge, stuck]], contacts.second[on_edge] = 1, 2
+    contacts.mode[[on_edge, stuck]] = ON_EDGE, STICKS
     list_active(contacts)
-    contacts.direction[wedged] = edge[0]
-    contacts.v_target[wedged] = 0.03 * edge[1] - 0.02 * edge[2]
+    contacts.direction[on_edge] = edge[0]
+    contacts.v_target[on_edge] = 0.03 * edge[1] - 0.02 * edge[2]
     contacts.v_target[stuck] = [0.01, -0.02, 0.03]
-    fixed = [(wedged, edge[1], 0.03), (wedged, edge[2], -0.02)]
+    fixed = [(on_edge, edge[1], 0.03), (on_edge, edge[2], -0.02)]
     fixed += [(stuck, axis, float(axis @ contacts.v_target[stuck])) for axis in np.eye(3)]
     fixed += [(i, contacts.normal[i], a) for i, a in zip(touched, approach, strict=True)]
     fixed += [(i, axis, float(axis @ nodes.v_star[i])) for i in held for axis in np.eye(3)]

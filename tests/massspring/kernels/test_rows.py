@@ -109,7 +109,7 @@ def test_a_ring_takes_half_as_many_quadrangles_as_it_has_nodes():
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_the_diagonal_knows_of_contact(block_body, precision):
-    """Nodes that slide, lie in a wedge or stick, one held; and a volume of which every node sticks."""
+    """Nodes that slide, lie on an edge or stick, one held; and a volume of which every node sticks."""
     state = in_precision(start(nodal(block_body)), precision)
     nodes, contacts, rows, weight = state.nodes, state.contacts, state.rows, state.model.inverse_mass
     assert rows is not None

@@ -35,11 +35,11 @@ def test_a_body_in_a_wedge_enters_neither_side_and_keeps_its_volume(ball_body):
     planes = wedge_of(0.03, 0.5 * clock.duration, 0.4)
     held = Attachment(np.flatnonzero(ball_body.rest[:, 2] > 0.04))
     setup = Setup(ball_body, ImplicitVolume(), clock, planes, (held,), damping=40.0)
-    state, wedged = setup.start(), 0
+    state, on_edge = setup.start(), 0
     for frame in range(clock.frames):
         state = setup.method.advance(state, setup.boundary(frame))
-        wedged = max(wedged, int((state.contacts.mode == ON_EDGE).sum()))
-    assert wedged > 0, "no node came between the planes"
+        on_edge = max(on_edge, int((state.contacts.mode == ON_EDGE).sum()))
+    assert on_edge > 0, "no node came between the planes"
     history = simulate(setup)
     assert history.penetration.max() < INSIDE
     assert np.abs(history.volume / ball_body.volume - 1).max() < 1e-4

@@ -7,7 +7,7 @@ from tests.massspring.contact_id import list_active
 from massspring import Attachment, Clock, ImplicitVolume, Plane, Setup, Trajectory, surface_body
 from massspring.analysis.stability import step_limit
 from massspring.kernels.arrays.layout import Push
-from massspring.kernels.contact.friction import release_wedged
+from massspring.kernels.contact.friction import release_edges
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.kernels.test_rubbing import wedge_of
@@ -65,5 +65,5 @@ def test_a_wedge_lets_go_of_a_node_that_either_side_would_pull(shell, first, sec
     contacts.contact_id[node], contacts.second[node], contacts.mode[node] = 1, 2, ON_EDGE
     list_active(contacts)
     free = first < 0 or second < 0
-    assert release_wedged(state.model, nodes, contacts, boundary, Push(nodes.gradient, lam)) == int(free)
+    assert release_edges(state.model, nodes, contacts, boundary, Push(nodes.gradient, lam)) == int(free)
     assert contacts.mode[node] == (FREE if free else ON_EDGE)
