@@ -5,7 +5,7 @@ What is rare (friction, two obstacles at once) has loops of its own in `kernels.
 
 import math
 
-from massspring.kernels.contact.friction import activate_edges, release_edges, release_slipping, rub
+from massspring.kernels.contact.friction import activate_edges, apply_friction, release_edges, release_slipping
 from massspring.kernels.contact.gaps import clearances_into, gap_and_normal, pushed_velocity
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from massspring.kernels.contact.node_contact import round_contact
@@ -117,7 +117,7 @@ def enter(model, nodes, contacts, boundary, step, push):
         activate(model, nodes, contacts, boundary, step, push, count)
         register(contacts, count)
     if boundary.rough:
-        rub(model, nodes, contacts, boundary, step, push)
+        apply_friction(model, nodes, contacts, boundary, step, push)
     if boundary.radius.shape[0] > 1:
         activate_edges(model, nodes, contacts, boundary, step, push)
 

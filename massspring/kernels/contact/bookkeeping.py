@@ -1,6 +1,6 @@
 """Velocities that obstacles leave to touched nodes, and the impulses of the obstacles."""
 
-from massspring.kernels.contact.friction import shares
+from massspring.kernels.contact.friction import impulse_shares
 from massspring.kernels.contact.modes import FREE, ON_EDGE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import inlined, lean
@@ -47,5 +47,5 @@ def book_contacts(model, nodes, contacts, push, dt, contact_impulse):
         if mode[i] == ON_EDGE:
             m0, m1, m2 = contacts.second_normal[i, 0], contacts.second_normal[i, 1], contacts.second_normal[i, 2]
             n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
-            _, beta = shares((k0, k1, k2), (n0, n1, n2), (m0, m1, m2))
+            _, beta = impulse_shares((k0, k1, k2), (n0, n1, n2), (m0, m1, m2))
             book(contact_impulse, o, contacts.second[i] - 1, beta * m0, beta * m1, beta * m2)

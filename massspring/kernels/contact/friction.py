@@ -14,7 +14,7 @@ PARALLEL = 1e-4
 
 
 @lean
-def rub(model, nodes, contacts, boundary, step, push):
+def apply_friction(model, nodes, contacts, boundary, step, push):
     """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 9.1)."""
     for k in range(contacts.active_count[0]):
         i = contacts.active[k]
@@ -120,7 +120,7 @@ def dot(a, b):
 
 
 @lean
-def shares(k, n, m):
+def impulse_shares(k, n, m):
     """The parts of k = α n + β n' + rest along two normals that are not parallel, tuples of three numbers: (α, β)."""
     along, other, cosine = dot(k, n), dot(k, m), dot(n, m)
     square = 1.0 - cosine * cosine
@@ -139,7 +139,7 @@ def release_edges(model, nodes, contacts, boundary, push):
         # What the edge leaves free is at right angles to both normals and takes no share.
         n = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
         m = contacts.second_normal[i, 0], contacts.second_normal[i, 1], contacts.second_normal[i, 2]
-        alpha, beta = shares(
+        alpha, beta = impulse_shares(
             (contacts.v_target[i, 0] - u0, contacts.v_target[i, 1] - u1, contacts.v_target[i, 2] - u2), n, m
         )
         if alpha < 0.0 or beta < 0.0:

@@ -64,7 +64,7 @@ class Contact:
     def __init__(self, model: Model, nodes: Nodes, contacts: Contacts, boundary: BoundaryConditions, step: int) -> None:
         self.model, self.nodes, self.contacts = model, nodes, contacts
         self.boundary, self.step = boundary, step
-        self.rubbed = np.zeros_like(nodes.x)
+        self.friction_impulse = np.zeros_like(nodes.x)
         """Friction of the nodes that slip, times dt² [kg m], (n, 3)."""
         release_all(contacts)
         self._activate(np.empty(0, dtype=np.int64), nodes.v)
@@ -79,7 +79,7 @@ class Contact:
         inward = np.where(sticks, np.einsum("ci,ci->c", contacts.normal[nodes], pushes[nodes]), impulses)
         leaving = np.unique(nodes[inward < 0.0])
         contacts.mode[leaving], contacts.contact_id[leaving] = FREE, 0
-        self.rubbed[leaving] = 0.0
+        self.friction_impulse[leaving] = 0.0
         slipped = self._let_slip(pushes) if self.boundary.rough else 0
         entered = self._activate(leaving, (end - self.nodes.x) / self.boundary.dt)
         return bool(len(leaving) or slipped or entered)
@@ -96,12 +96,12 @@ class Contact:
         asked = np.linalg.norm(aside, axis=1)
         slips = asked > friction * pressed
         nodes, normal = nodes[slips], normal[slips]
-        self.rubbed[nodes] = (friction * pressed)[slips, None] * aside[slips] / asked[slips, None]
+        self.friction_impulse[nodes] = (friction * pressed)[slips, None] * aside[slips] / asked[slips, None]
         contacts.mode[nodes] = SLIDES
         contacts.v_target[nodes] = np.einsum("ci,ci->c", normal, contacts.v_target[nodes])[:, None] * normal
         return len(nodes)
 
-    def rub(self, end: np.ndarray, active: ActiveSet, impulses: np.ndarray) -> bool:
+    def apply_friction(self, end: np.ndarray, active: ActiveSet, impulses: np.ndarray) -> bool:
         """Friction against the slip of the last pass; a node that it would drive sticks: whether one does
         (eq. 12.4)."""
         contacts, boundary = self.contacts, self.boundary
@@ -113,9 +113,9 @@ class Contact:
         slip = _aside((end[nodes] - self.nodes.x[nodes]) / boundary.dt - carried, normal)
         speed = np.linalg.norm(slip, axis=1)
         still = speed * boundary.dt <= SLIP_RESOLUTION * self.model.correction_limit
-        driven = still | (np.einsum("ci,ci->c", slip, self.rubbed[nodes]) > 0.0)
+        driven = still | (np.einsum("ci,ci->c", slip, self.friction_impulse[nodes]) > 0.0)
         most = boundary.friction[obstacle] * np.maximum(impulses[slides], 0.0)
-        self.rubbed[nodes[~driven]] = -(most[~driven] / speed[~driven])[:, None] * slip[~driven]
+        self.friction_impulse[nodes[~driven]] = -(most[~driven] / speed[~driven])[:, None] * slip[~driven]
         self._stick(nodes[driven], carried[driven])
         return bool(driven.any())
 
@@ -124,7 +124,7 @@ class Contact:
         contacts = self.contacts
         contacts.mode[nodes] = STICKS
         contacts.v_target[nodes] += _aside(carried, contacts.normal[nodes])
-        self.rubbed[nodes] = 0.0
+        self.friction_impulse[nodes] = 0.0
 
     def _activate(self, leaving: np.ndarray, velocity: np.ndarray) -> int:
         """Activates nodes that `velocity` carries into an obstacle, but for those just let go; how many."""
@@ -143,7 +143,7 @@ class Contact:
             self._stick(new[rough], boundary.velocity[self.step][obstacle[rough]])
         if len(boundary.radius) > 1:
             count += activate_edges(self.model, self.nodes, contacts, boundary, self.step, unpushed)
-            self.rubbed[contacts.mode == ON_EDGE] = 0.0
+            self.friction_impulse[contacts.mode == ON_EDGE] = 0.0
         return count
 
 

@@ -86,7 +86,7 @@ class Step:
         if obstacles:
             self.end_stage(SEARCH)
         for number in range(passes):
-            if number > 0 and self.contact.rub(self.p, active, impulses):
+            if number > 0 and self.contact.apply_friction(self.p, active, impulses):
                 active = self.active_set()
             free = self.factor.respond(self.imbalance())
             self.end_stage(SPRINGS)
@@ -161,7 +161,7 @@ class Step:
     def solve(self, free: np.ndarray, active: ActiveSet) -> tuple[np.ndarray, np.ndarray]:
         """(δ [m], contact impulses γ [kg m]) that end the pass at V0 and on the obstacles; `rows.search` is Δlam."""
         if self.boundary.rough:
-            free = free + self.factor.respond(self.contact.rubbed)
+            free = free + self.factor.respond(self.contact.friction_impulse)
         missing = active.place - active.along(self.p + free)
         change = free + active.moved_by(active.impulses(missing)) if len(missing) else free
         error = self.target - self.rows.volume - self.times(change)
@@ -217,8 +217,10 @@ class Step:
         given = self.diagnostics.contact_impulse
         np.add.at(given, active.obstacle, impulses[:, None] / dt * active.direction)
         if self.boundary.rough:
-            rubbed = np.flatnonzero(self.contact.rubbed.any(axis=1))
-            np.add.at(given, contacts.contact_id[rubbed].astype(np.int64) - 1, self.contact.rubbed[rubbed] / dt)
+            slipping = np.flatnonzero(self.contact.friction_impulse.any(axis=1))
+            np.add.at(
+                given, contacts.contact_id[slipping].astype(np.int64) - 1, self.contact.friction_impulse[slipping] / dt
+            )
         spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, nodes.force)
         push = Push(self.pushed(self.rows.lam), 1.0)
         add_held_impulse(net, nodes, push, dt, self.boundary.gravity, self.diagnostics.held_impulse)

@@ -61,8 +61,8 @@ def test_a_node_sticks_up_to_what_its_friction_can_take(sole, asked, slips):
     # Up to the floor within the step; along it with the floor, or freely.
     expected = [*(0.0 * CARRIED[:2] if slips else CARRIED[:2]), sole.place[0]]
     assert np.allclose(sole.contacts.v_target[first], expected, rtol=0, atol=1e-12)
-    rubbed = [0.0, MU, 0.0] if slips else [0.0, 0.0, 0.0]
-    assert np.allclose(sole.contact.rubbed[first], rubbed, rtol=0, atol=1e-15)
+    slipping = [0.0, MU, 0.0] if slips else [0.0, 0.0, 0.0]
+    assert np.allclose(sole.contact.friction_impulse[first], slipping, rtol=0, atol=1e-15)
 
 
 def test_friction_acts_against_the_slip(sole):
@@ -70,10 +70,10 @@ def test_friction_acts_against_the_slip(sole):
     sole.slide()
     active, slip = sole.active(), np.array([-0.03, 0.04, 0.0])
     impulses = np.linspace(-1.0, 2.0, len(sole.nodes))
-    assert not sole.contact.rub(sole.end(slip), active, impulses)
+    assert not sole.contact.apply_friction(sole.end(slip), active, impulses)
     expected = -MU * np.maximum(impulses, 0.0)[:, None] * slip / 0.05
     # A way of 0.25 mm is known to 1e-17 m.
-    assert np.abs(sole.contact.rubbed[sole.nodes] - expected).max() < 1e-11
+    assert np.abs(sole.contact.friction_impulse[sole.nodes] - expected).max() < 1e-11
     assert (sole.contacts.mode[sole.nodes] == SLIDES).all()
 
 
@@ -82,11 +82,11 @@ def test_what_friction_would_drive_sticks(sole):
     sole.slide()
     first, *others = sole.nodes
     slip = np.array([-0.03, 0.04, 0.0])
-    sole.contact.rubbed[sole.nodes] = -slip
-    sole.contact.rubbed[first] = slip
-    assert sole.contact.rub(sole.end(slip), sole.active(), np.ones(len(sole.nodes)))
+    sole.contact.friction_impulse[sole.nodes] = -slip
+    sole.contact.friction_impulse[first] = slip
+    assert sole.contact.apply_friction(sole.end(slip), sole.active(), np.ones(len(sole.nodes)))
     assert sole.contacts.mode[first] == STICKS and (sole.contacts.mode[others] == SLIDES).all()
-    assert (sole.contact.rubbed[first] == 0).all()
+    assert (sole.contact.friction_impulse[first] == 0).all()
     assert np.allclose(sole.contacts.v_target[first, :2], CARRIED[:2], rtol=0, atol=1e-15)
 
 
@@ -100,6 +100,6 @@ def test_a_slip_that_is_round_off_is_none(sole, way, sticks):
     carried[:] = 0.0
     end = sole.state.nodes.x.copy()
     end[sole.nodes] = DT * slip
-    assert sole.contact.rub(end, sole.active(), np.ones(len(sole.nodes))) == sticks
+    assert sole.contact.apply_friction(end, sole.active(), np.ones(len(sole.nodes))) == sticks
     assert (sole.contacts.mode[sole.nodes] == (STICKS if sticks else SLIDES)).all()
-    assert np.linalg.norm(sole.contact.rubbed, axis=1).max() == pytest.approx(0.0 if sticks else MU, rel=1e-9)
+    assert np.linalg.norm(sole.contact.friction_impulse, axis=1).max() == pytest.approx(0.0 if sticks else MU, rel=1e-9)

@@ -10,7 +10,7 @@ from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.friction import release_edges
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from tests.massspring.conftest import SOFT, icosphere
-from tests.massspring.kernels.test_rubbing import wedge_of
+from tests.massspring.kernels.test_friction import wedge_of
 
 ROUND_OFF = 1e-12  # m/s, of some 0.1
 
