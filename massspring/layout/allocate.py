@@ -53,7 +53,7 @@ def _no_contacts(n: int) -> Contacts:
         mode=np.zeros(n, dtype=np.uint8),
         **{name: np.zeros((n, 3)) for name in ("normal", "second_normal", "direction", "v_target")},
         active_count=np.zeros(1, dtype=np.int64),
-        clearance=np.zeros(n),
+        predicted_gap=np.zeros(n),
     )
 
 

@@ -81,7 +81,7 @@ class Contacts(NamedTuple):
     """(1,) int64."""
     entering: np.ndarray
     """Scratch: nodes that would enter an obstacle, (n,) uint32."""
-    clearance: np.ndarray
+    predicted_gap: np.ndarray
     """Distance to the nearest obstacle at the end of the predicted step [m], inf for touched nodes, (n,)."""
 
 

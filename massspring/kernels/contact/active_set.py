@@ -6,10 +6,10 @@ What is rare (friction, two obstacles at once) has loops of its own in `kernels.
 import math
 
 from massspring.kernels.contact.friction import activate_edges, apply_friction, release_edges, release_slipping
-from massspring.kernels.contact.gaps import clearances_into, gap_and_normal, pushed_velocity
+from massspring.kernels.contact.gaps import gap_and_normal, predicted_gaps_into, pushed_velocity
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from massspring.kernels.contact.node_contact import round_contact
-from massspring.kernels.jit.blocks import BLOCK, any_within
+from massspring.kernels.jit.blocks import BLOCK, any_gap_within
 from massspring.kernels.jit.decorators import inlined, lean
 from massspring.kernels.jit.thread_team import JOB_SEARCH, fork, join
 
@@ -58,14 +58,14 @@ def release_all(contacts):
 
 @inlined
 def register(contacts, count):
-    """Lists those of the first `count` nodes of `entering` that have been activated; their clearance is settled."""
+    """Lists those of the first `count` nodes of `entering` that have been activated; their gap is settled."""
     active, entering, mode = contacts.active, contacts.entering, contacts.mode
     listed = contacts.active_count[0]
     for k in range(count):
         i = entering[k]
         if mode[i] > FREE:
             active[listed] = i
-            contacts.clearance[i] = math.inf
+            contacts.predicted_gap[i] = math.inf
             listed += 1
     contacts.active_count[0] = listed
 
@@ -83,13 +83,13 @@ def forget_released(contacts):
 
 
 @inlined
-def clear_all(model, nodes, contacts, boundary, step, push, team):
-    """`clearances_into` of all nodes, by as many threads as there are."""
+def predict_gaps(model, nodes, contacts, boundary, step, push, team):
+    """`predicted_gaps_into` of all nodes, by as many threads as there are."""
     if team is None:
-        clearances_into(model, nodes, contacts, boundary, step, push, (0, nodes.x.shape[0]))
+        predicted_gaps_into(model, nodes, contacts, boundary, step, push, (0, nodes.x.shape[0]))
     else:
         fork(team, JOB_SEARCH, step, push.factor)
-        clearances_into(model, nodes, contacts, boundary, step, push, (team.nodes[0], team.nodes[1]))
+        predicted_gaps_into(model, nodes, contacts, boundary, step, push, (team.nodes[0], team.nodes[1]))
         join(team)
 
 
@@ -97,20 +97,20 @@ def clear_all(model, nodes, contacts, boundary, step, push, team):
 def find_contacts(model, nodes, contacts, boundary, step, push, team):
     """Touched nodes of the step when the push of the last one acts on them: u = v* + dt W f (eq. 3.7)."""
     release_all(contacts)
-    clear_all(model, nodes, contacts, boundary, step, push, team)
+    predict_gaps(model, nodes, contacts, boundary, step, push, team)
     enter(model, nodes, contacts, boundary, step, push)
 
 
 @inlined
 def enter(model, nodes, contacts, boundary, step, push):
-    """Activates the nodes whose clearance is negative (eq. 3.7)."""
-    touchable, clearance, entering = model.touchable, contacts.clearance, contacts.entering
+    """Activates the nodes whose predicted gap is negative (eq. 3.7)."""
+    touchable, predicted_gap, entering = model.touchable, contacts.predicted_gap, contacts.entering
     count = 0
-    for begin in range(0, clearance.shape[0], BLOCK):
-        if not any_within(clearance, begin, 0.0):
+    for begin in range(0, predicted_gap.shape[0], BLOCK):
+        if not any_gap_within(predicted_gap, begin, 0.0):
             continue
-        for i in range(begin, min(begin + BLOCK, clearance.shape[0])):
-            if clearance[i] < 0.0 and touchable[i] > 0:
+        for i in range(begin, min(begin + BLOCK, predicted_gap.shape[0])):
+            if predicted_gap[i] < 0.0 and touchable[i] > 0:
                 entering[count] = i
                 count += 1
     if count > 0:
@@ -137,7 +137,7 @@ def release_pulled(model, nodes, contacts, boundary, push):
             < u0 * n0 + u1 * n1 + u2 * n2
         ):
             # A released node is looked at again in the next pass, whatever the pressure becomes.
-            contacts.contact_id[i], contacts.mode[i], contacts.clearance[i] = 0, FREE, 0.0
+            contacts.contact_id[i], contacts.mode[i], contacts.predicted_gap[i] = 0, FREE, 0.0
             changes += 1
     return changes
 
@@ -159,10 +159,10 @@ def enters(model, nodes, boundary, step, push, i):
 def revise_contacts(model, nodes, contacts, boundary, step, push, reach):
     """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 3.8).
 
-    `reach` [m] is how far the new pressure can have moved a node from where `clearance` was measured: distances to
+    `reach` [m] is how far the new pressure can have moved a node from where `predicted_gap` was measured: distances to
     obstacles change by no more, so a free node farther away need not be looked at.
     """
-    touchable, clearance, entering = model.touchable, contacts.clearance, contacts.entering
+    touchable, predicted_gap, entering = model.touchable, contacts.predicted_gap, contacts.entering
     count, changes = 0, 0
     if boundary.rough:
         changes += release_slipping(model, nodes, contacts, boundary, push)
@@ -170,11 +170,11 @@ def revise_contacts(model, nodes, contacts, boundary, step, push, reach):
         changes += release_edges(model, nodes, contacts, boundary, push) + activate_edges(
             model, nodes, contacts, boundary, step, push
         )
-    for begin in range(0, clearance.shape[0], BLOCK):
-        if not any_within(clearance, begin, reach):
+    for begin in range(0, predicted_gap.shape[0], BLOCK):
+        if not any_gap_within(predicted_gap, begin, reach):
             continue
-        for i in range(begin, min(begin + BLOCK, clearance.shape[0])):
-            if clearance[i] > reach or contacts.mode[i] > FREE or touchable[i] == 0:
+        for i in range(begin, min(begin + BLOCK, predicted_gap.shape[0])):
+            if predicted_gap[i] > reach or contacts.mode[i] > FREE or touchable[i] == 0:
                 continue
             if enters(model, nodes, boundary, step, push, i):
                 entering[count] = i

@@ -143,6 +143,6 @@ def release_edges(model, nodes, contacts, boundary, push):
             (contacts.v_target[i, 0] - u0, contacts.v_target[i, 1] - u1, contacts.v_target[i, 2] - u2), n, m
         )
         if alpha < 0.0 or beta < 0.0:
-            contacts.contact_id[i], contacts.mode[i], contacts.clearance[i] = 0, FREE, 0.0
+            contacts.contact_id[i], contacts.mode[i], contacts.predicted_gap[i] = 0, FREE, 0.0
             changes += 1
     return changes

@@ -12,8 +12,8 @@ from massspring.kernels.jit.flat import flat
 
 
 @inlined
-def clearances_into(model, nodes, contacts, boundary, step, push, part):
-    """clearance_i = min over obstacles of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 3.7).
+def predicted_gaps_into(model, nodes, contacts, boundary, step, push, part):
+    """gap_i = min over obstacles of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 3.7).
 
     Of the nodes first ≤ i < last in `part`, those that nothing can touch among them.
     """
@@ -22,19 +22,19 @@ def clearances_into(model, nodes, contacts, boundary, step, push, part):
     x, v_star = flat(nodes.x, first, last), flat(nodes.v_star, first, last)
     direction, inverse_mass = flat(push.direction, first, last), flat(model.inverse_mass, first, last)
     course = x, v_star, direction, inverse_mass, real(boundary.dt), real(boundary.dt * push.factor)
-    clearance = flat(contacts.clearance, first, last)
-    for i in range(clearance.shape[0]):
-        clearance[i] = math.inf
+    predicted_gap = flat(contacts.predicted_gap, first, last)
+    for i in range(predicted_gap.shape[0]):
+        predicted_gap[i] = math.inf
     for o in range(boundary.radius.shape[0]):
         place, span, radius = boundary.position[step, o], boundary.span[o], real(boundary.radius[o])
         p0, p1, p2 = real(place[0]), real(place[1]), real(place[2])
         if boundary.is_plane[o]:
             normal = boundary.plane_normal[o]
-            plane_clearance(course, clearance, p0, p1, p2, real(normal[0]), real(normal[1]), real(normal[2]))
+            plane_gap(course, predicted_gap, p0, p1, p2, real(normal[0]), real(normal[1]), real(normal[2]))
         elif span[0] == 0.0 and span[1] == 0.0 and span[2] == 0.0:
-            sphere_clearance(course, clearance, p0, p1, p2, radius)
+            sphere_gap(course, predicted_gap, p0, p1, p2, radius)
         else:
-            capsule_clearance(course, clearance, p0, p1, p2, real(span[0]), real(span[1]), real(span[2]), radius)
+            capsule_gap(course, predicted_gap, p0, p1, p2, real(span[0]), real(span[1]), real(span[2]), radius)
 
 
 @inlined
@@ -49,27 +49,27 @@ def way_from(p0, p1, p2, course, i):
 
 
 @inlined
-def plane_clearance(course, clearance, p0, p1, p2, n0, n1, n2):
+def plane_gap(course, predicted_gap, p0, p1, p2, n0, n1, n2):
     """n·(y − p) [m]."""
-    for i in range(clearance.shape[0]):
+    for i in range(predicted_gap.shape[0]):
         r0, r1, r2 = way_from(p0, p1, p2, course, i)
-        clearance[i] = min(clearance[i], n0 * r0 + n1 * r1 + n2 * r2)
+        predicted_gap[i] = min(predicted_gap[i], n0 * r0 + n1 * r1 + n2 * r2)
 
 
 @inlined
-def sphere_clearance(course, clearance, c0, c1, c2, radius):
+def sphere_gap(course, predicted_gap, c0, c1, c2, radius):
     """|y − c| − R [m]."""
-    for i in range(clearance.shape[0]):
+    for i in range(predicted_gap.shape[0]):
         r0, r1, r2 = way_from(c0, c1, c2, course, i)
-        clearance[i] = min(clearance[i], math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius)
+        predicted_gap[i] = min(predicted_gap[i], math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius)
 
 
 @inlined
-def capsule_clearance(course, clearance, p0, p1, p2, a0, a1, a2, radius):
+def capsule_gap(course, predicted_gap, p0, p1, p2, a0, a1, a2, radius):
     """Distance of y to the axis p … p + a less R [m]."""
-    for i in range(clearance.shape[0]):
+    for i in range(predicted_gap.shape[0]):
         r0, r1, r2 = way_from(p0, p1, p2, course, i)
-        clearance[i] = min(clearance[i], round_gap(r0, r1, r2, a0, a1, a2, radius))
+        predicted_gap[i] = min(predicted_gap[i], round_gap(r0, r1, r2, a0, a1, a2, radius))
 
 
 @inlined

@@ -8,14 +8,14 @@ BLOCK = 64
 
 
 @inlined
-def any_within(clearance, begin, reach):
+def any_gap_within(gap, begin, reach):
     """Whether any node of the block is no farther than `reach` [m]; a block that is not full is always looked through.
 
     What is not a number counts as near.
     """
-    if begin + BLOCK > clearance.shape[0]:
+    if begin + BLOCK > gap.shape[0]:
         return True
-    block, found = flat(clearance, begin, begin + BLOCK), 0
+    block, found = flat(gap, begin, begin + BLOCK), 0
     for i in range(BLOCK):
         found += not block[i] > reach
     return found > 0

@@ -1,7 +1,7 @@
 """What the other threads of a team do during a frame (kernels.jit.thread_team)."""
 
 from massspring.kernels.arrays.layout import Push
-from massspring.kernels.contact.gaps import clearances_into
+from massspring.kernels.contact.gaps import predicted_gaps_into
 from massspring.kernels.fused.padded import places_into
 from massspring.kernels.fused.sweep import pass_slices
 from massspring.kernels.jit.decorators import lean
@@ -39,7 +39,7 @@ def worker(frame, team, direction, rank):
         elif job == JOB_SPRINGS_AND_VOLUME:
             pass_slices(nodes, work, boundary, model.slices, slices, True, work.tile[rank])
         elif job == JOB_SEARCH:
-            clearances_into(model, nodes, contacts, boundary, step, push, part)
+            predicted_gaps_into(model, nodes, contacts, boundary, step, push, part)
         else:
             advance_nodes(nodes, contacts, work, model.inverse_mass, push, boundary.dt, part)
             places_into(nodes, work, part[0], part[1])

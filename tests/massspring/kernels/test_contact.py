@@ -217,7 +217,7 @@ def test_looking_only_at_near_nodes_changes_no_bit(ball_body):
             for name in ("contact_id", "mode", "normal", "v_target"):
                 assert np.array_equal(getattr(near, name), getattr(far, name))
             changes += changed
-            skipped += int((near.clearance[ball_body.surface_nodes] > reach).sum())
+            skipped += int((near.predicted_gap[ball_body.surface_nodes] > reach).sum())
     assert changes > 0 and skipped > 0, "the test saw no change of contact, or nothing to skip"
 
 

@@ -110,8 +110,8 @@ def test_nodes_sit_on_the_obstacle_that_they_would_enter_deepest(shell, name):
     gaps = scene.gaps(scene.x + DT * scene.free_velocity(LAM))
     inner = np.setdiff1d(np.arange(len(scene.x)), scene.nodes)
     away = scene.contacts.mode == FREE
-    assert np.abs(scene.contacts.clearance - gaps.min(axis=0))[away].max() < ROUND_OFF
-    assert (scene.contacts.clearance[~away] == np.inf).all()
+    assert np.abs(scene.contacts.predicted_gap - gaps.min(axis=0))[away].max() < ROUND_OFF
+    assert (scene.contacts.predicted_gap[~away] == np.inf).all()
     wanted = np.where(gaps.min(axis=0) < 0, gaps.argmin(axis=0) + 1, 0)
     wanted[inner] = 0
     assert (scene.contacts.contact_id == wanted).all() and len(np.unique(wanted)) == len(scene.obstacles) + 1
@@ -134,19 +134,20 @@ def test_a_new_pressure_finds_the_one_node_that_it_moves(shell, change):
     assert 0 < fall < reach < 1.001 * fall
     scene.state.nodes.x[node, 2] = FLOOR.point[2] + 0.5 * fall - DT * scene.free_velocity(LAM)[node, 2]
     assert (
-        scene.find().contacts.clearance[node] == pytest.approx(0.5 * fall, rel=1e-6) and not scene.contacts.mode.any()
+        scene.find().contacts.predicted_gap[node] == pytest.approx(0.5 * fall, rel=1e-6)
+        and not scene.contacts.mode.any()
     )
     assert scene.revise(LAM + change) == 1 and scene.contacts.mode[node] == SLIDES
 
 
 def test_the_next_step_knows_nothing_of_the_last(shell):
-    """Obstacles gone: no clearance, no touch is left of them."""
+    """Obstacles gone: no predicted gap, no contact is left of them."""
     scene = Scene(shell, *OBSTACLES["two spheres"]).find()
     assert scene.contacts.contact_id.any()
     scene.boundary.position[:] -= 1.0
     scene.find()
     assert not scene.contacts.contact_id.any() and not scene.contacts.mode.any()
-    assert scene.contacts.clearance.min() > 0.9
+    assert scene.contacts.predicted_gap.min() > 0.9
 
 
 @pytest.mark.parametrize("name", ["a floor", "a sphere"])

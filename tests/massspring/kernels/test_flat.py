@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from massspring.kernels.jit.blocks import BLOCK, any_within
+from massspring.kernels.jit.blocks import BLOCK, any_gap_within
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.jit.flat import flat
 from massspring.layout.morton import along_curve
@@ -19,8 +19,8 @@ def doubled(table, first, last):
 
 
 @lean
-def block_with(clearance, begin, reach):
-    return any_within(clearance, begin, reach)
+def block_with(gap, begin, reach):
+    return any_gap_within(gap, begin, reach)
 
 
 @pytest.mark.parametrize("real", [np.float64, np.float32, np.uint8])
@@ -44,11 +44,11 @@ def test_what_is_not_contiguous_has_no_flat_rows():
 @pytest.mark.parametrize("near", [-1.0, 0.25, np.nan])
 @pytest.mark.parametrize("where", [0, BLOCK - 1, BLOCK, 2 * BLOCK - 1])
 def test_a_block_is_passed_over_only_where_nothing_is_near(where, near, real):
-    clearance = np.full(2 * BLOCK + 5, 0.5, dtype=real)
-    clearance[0 if where >= BLOCK else BLOCK] = np.inf
-    clearance[where] = near
-    assert [bool(block_with(clearance, begin, 0.25)) for begin in (0, BLOCK)] == [where < BLOCK, where >= BLOCK]
-    assert block_with(clearance, 2 * BLOCK, 0.25)  # the last one is not full and always looked through
+    gap = np.full(2 * BLOCK + 5, 0.5, dtype=real)
+    gap[0 if where >= BLOCK else BLOCK] = np.inf
+    gap[where] = near
+    assert [bool(block_with(gap, begin, 0.25)) for begin in (0, BLOCK)] == [where < BLOCK, where >= BLOCK]
+    assert block_with(gap, 2 * BLOCK, 0.25)  # the last one is not full and always looked through
 
 
 def test_neighbours_in_space_are_neighbours_on_the_curve():

@@ -67,7 +67,7 @@ def test_threads_search_all_nodes_where_obstacles_are_in_that_step(ball):
     found = []
     for threads in (1, 2, 3):
         setup = slid(ball, Free(), threads=threads)
-        found.append(setup.method.advance(setup.start(), setup.boundary(0)).contacts.clearance)
+        found.append(setup.method.advance(setup.start(), setup.boundary(0)).contacts.predicted_gap)
     assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
 
 
