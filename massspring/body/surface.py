@@ -5,7 +5,7 @@ import numpy as np
 from massspring.body.springs import EDGES_OF_TRIANGLE
 from massspring.errors import MassSpringError
 from massspring.kernels.forces.volume import enclosed_volume
-from massspring.kernels.probe.point_query import turns_round
+from massspring.kernels.probe.point_query import winding_number_at
 
 
 def winding_number(point: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> float:
@@ -13,7 +13,7 @@ def winding_number(point: np.ndarray, points: np.ndarray, triangles: np.ndarray)
 
     `points` (n, 3) [m], `triangles` (f, 3).
     """
-    return float(turns_round(np.asarray(point, dtype=np.float64), points, triangles))
+    return float(winding_number_at(np.asarray(point, dtype=np.float64), points, triangles))
 
 
 def check_finite(what: str, values: np.ndarray) -> None:

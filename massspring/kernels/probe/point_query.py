@@ -24,7 +24,7 @@ def distance_to(point, x, triangles, corner, weight):
 
 
 @lean
-def turns_round(point, x, triangles):
+def winding_number_at(point, x, triangles):
     """How often a closed surface goes round a point (3,): its solid angle over 4π [1].
 
     Van Oosterom and Strackee (1983), equation 8: tan(Ω/2) = a·(b × c) / (|a||b||c| + a·b |c| + b·c |a| + c·a |b|).
