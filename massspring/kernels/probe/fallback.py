@@ -27,7 +27,7 @@ corner would have to go fifty times as far as the tip."""
 
 
 @lean
-def take(stage, p, i):
+def carry_node(stage, p, i):
     """Carries node i with the tip of probe p: it takes no share in any volume from then on."""
     probes, contacts = stage.probes, stage.contacts
     probes.carried[i] = p + 1
@@ -41,7 +41,7 @@ def take(stage, p, i):
 
 
 @lean
-def lead(stage, p, n):
+def overshoot(stage, p, n):
     """Sends the carried corners of the near triangle n ahead, until its point that is passed rests seen from the tip.
 
     They share Σ b_i Δ_i = −(what the point moves towards the tip) by their weights; whether there are any.
@@ -79,7 +79,7 @@ def lead(stage, p, n):
 
 
 @lean
-def take_along(stage, p):
+def carry_triangles(stage, p):
     """Carries the free corners of all triangles that the tip of probe p passes, or sends those ahead; whether any."""
     probes, model, contacts = stage.probes, stage.model, stage.contacts
     more = False
@@ -91,14 +91,14 @@ def take_along(stage, p):
         for k in range(3):
             i = probes.surface[probes.near[p, n], k]
             if model.inverse_mass[i] > 0.0 and contacts.mode[i] == FREE:
-                take(stage, p, i)
+                carry_node(stage, p, i)
                 fresh = True
-        more |= fresh or lead(stage, p, n)
+        more |= fresh or overshoot(stage, p, n)
     return more
 
 
 @lean
-def give_way(stage, volumes):
+def compensate_volume(stage, volumes):
     """δ with dt S δ = −J (v − u) of the carried nodes: the volumes are left to the others (eq. 11.7).
 
     Returns how much faster it makes a node at most [m/s].
@@ -148,14 +148,14 @@ def carry(stage, volumes, push, plain, horizon):
         move(stage, volumes)
         more = False
         for p in range(probes.radius.shape[0]):
-            more |= take_along(stage, p)
+            more |= carry_triangles(stage, p)
         if not more:
             break
         fastest = 0.0
         for k in range(probes.taken_count[0]):
             s0, s1, s2 = carried_speed(stage, probes.taken[k])
             fastest = max(fastest, math.sqrt(s0 * s0 + s1 * s1 + s2 * s2))
-        reach = plain + stage.dt * (fastest + give_way(stage, volumes))
+        reach = plain + stage.dt * (fastest + compensate_volume(stage, volumes))
         if reach > horizon:
             horizon = ROOM * reach
             find_near(stage.nodes, stage.tips, stage.step, probes, horizon)

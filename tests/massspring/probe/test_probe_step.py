@@ -11,7 +11,7 @@ from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND, Stage
 from massspring.kernels.probe.contacts import solve_rows
-from massspring.kernels.probe.fallback import lead
+from massspring.kernels.probe.fallback import overshoot
 from massspring.kernels.probe.motion import gather, move
 from massspring.kernels.probe.pressure import change_of_rows, swelling
 from massspring.methods.method import begin_frame
@@ -165,7 +165,7 @@ def led(weight, held, radius=0.0):
     probing.pair.tip[:] = 1e-3 * rng.normal(size=(2, 3))
     probing.carried[np.delete(corners, held)] = 1
     stage = Stage(after.model, after.nodes, after.contacts, boundary.tips, probing, None, 0.0, 0, boundary.dt)
-    return stage, corners, lead(stage, 0, 0)
+    return stage, corners, overshoot(stage, 0, 0)
 
 
 @pytest.mark.parametrize("radius", [0.0, 2e-3])
