@@ -38,7 +38,7 @@ def start(
         gradient=aligned((n, 3), real),
     )
     work = Workspace(
-        places=aligned((n, 4), real),
+        padded_positions=aligned((n, 4), real),
         tile=aligned((1, TILE), real),
         pulled=aligned((slices.pieces, RESULT), real),
         sums=np.zeros((len(slices.lanes) + 1, 3)),

@@ -88,7 +88,7 @@ class Contacts(NamedTuple):
 class Workspace(NamedTuple):
     """Scratch of the pass over all springs: nothing is allocated inside a frame."""
 
-    places: np.ndarray
+    padded_positions: np.ndarray
     """Positions [m] and a zero, (n, 4)."""
     tile: np.ndarray
     """Of `kernels.fused`, one row a thread."""

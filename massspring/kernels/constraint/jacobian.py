@@ -15,20 +15,20 @@ NEGLIGIBLE_DIAGONAL = 1e-12
 def rows_into(x, inverse_mass, rows):
     """J_rj [m²], the non-zero entries (e, 4), padded with 0, V_r [m³] (eq. 8.2, 8.6) and S_rr without contact
     [m⁴/kg]."""
-    places = rows.node_vector
+    padded = rows.node_vector
     for i in range(x.shape[0]):
-        places[i, 0], places[i, 1], places[i, 2] = x[i, 0], x[i, 1], x[i, 2]
-    areas_into(rows, places)
+        padded[i, 0], padded[i, 1], padded[i, 2] = x[i, 0], x[i, 1], x[i, 2]
+    areas_into(rows, padded)
     for r in range(rows.volume.shape[0]):
         first, last = rows.row_start[r], rows.row_start[r + 1]
         three, square = 0.0, 0.0
         if last > first:
-            three, square = sums_from_origin(first, last, rows.column, rows.value, places, inverse_mass)
+            three, square = sums_from_origin(first, last, rows.column, rows.value, padded, inverse_mass)
         rows.volume[r], rows.free_diagonal[r] = three / 3.0, square
 
 
 @lean
-def areas_into(rows, places):
+def areas_into(rows, padded):
     """J_rj = Σ_q c_q (x_2 − x_0) × (x_3 − x_1) [m²], the area of the ring of node j in volume r (eq. 8.6).
 
     Σ_j J_rj = 0. Where J_jr = −J_rj always, one of the two is summed.
@@ -36,7 +36,7 @@ def areas_into(rows, places):
     value, node_value, target = rows.value, rows.node_value, rows.target
     for k in range(target.shape[0]):
         e, twin = target[k, 0], target[k, 2]
-        sum_of_areas(rows.ring_start[k], rows.ring_start[k + 1], rows.corner, rows.corner_share, places, value, e)
+        sum_of_areas(rows.ring_start[k], rows.ring_start[k + 1], rows.corner, rows.corner_share, padded, value, e)
         copy_scaled(1.0, value, e, node_value, target[k, 1])
         if twin != e:
             copy_scaled(-1.0, value, e, value, twin)

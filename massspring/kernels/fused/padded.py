@@ -5,10 +5,10 @@ from massspring.kernels.jit.flat import flat
 
 
 @inlined
-def places_into(nodes, work, first, last):
+def pad_positions(nodes, work, first, last):
     """The positions of some nodes in fours, as one move of memory fetches them, (n, 4)."""
-    x, places = flat(nodes.x, first, last), flat(work.places, first, last)
+    x, padded = flat(nodes.x, first, last), flat(work.padded_positions, first, last)
     zero = nodes.x.dtype.type(0)
     for i in range(last - first):
-        places[4 * i], places[4 * i + 1] = x[3 * i], x[3 * i + 1]
-        places[4 * i + 2], places[4 * i + 3] = x[3 * i + 2], zero
+        padded[4 * i], padded[4 * i + 1] = x[3 * i], x[3 * i + 1]
+        padded[4 * i + 2], padded[4 * i + 3] = x[3 * i + 2], zero

@@ -6,14 +6,14 @@ Each spring is computed at both of its ends: nothing is scattered, and all lanes
 from massspring.kernels.forces.springs import SHORTEST
 from massspring.kernels.fused.chunk import AREA, FORCE, HERE, LANES, RESULT, SHARE, SPEED, SUMS, put, take, total
 from massspring.kernels.fused.long_rows import add_walls, join_pieces
-from massspring.kernels.fused.padded import places_into
+from massspring.kernels.fused.padded import pad_positions
 from massspring.kernels.jit.decorators import inlined, lean
 from massspring.kernels.jit.thread_team import JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, fork, join
 from massspring.kernels.jit.vectors import at_least, gather, lanes_of, load, root, save, spread
 
 
 @inlined
-def gather_slice(places, slices, s, keeps, shortest, o0, o1, o2, tile):
+def gather_slice(padded, slices, s, keeps, shortest, o0, o1, o2, tile):
     """f_i [N] (eq. 1.1) and, where a volume is kept, 6 G_i = Σ_k d_k × d_k+1 [m²] (eq. 2.4) of a slice; its share of V.
 
     The share is the slice's in 18 V = Σ 6 G·(x − o); o is a node of the surface, so that no digits are lost far from
@@ -21,43 +21,43 @@ def gather_slice(places, slices, s, keeps, shortest, o0, o1, o2, tile):
     """
     first, last = slices.start[s], slices.start[s + 1]
     ring_end = first + (slices.rings[s] if keeps else 0)
-    none = spread(0, places)
-    origin = spread(o0, places), spread(o1, places), spread(o2, places)
-    for lane in range(0, LANES, lanes_of(places)):
-        here = gather(places, slices.node, s, lane)
+    none = spread(0, padded)
+    origin = spread(o0, padded), spread(o1, padded), spread(o2, padded)
+    for lane in range(0, LANES, lanes_of(padded)):
+        here = gather(padded, slices.node, s, lane)
         force, area = (none, none, none), (none, none, none)
         if ring_end > first:
-            force, area = walk_rings(places, slices, first, ring_end, lane, spread(shortest, places), here)
+            force, area = walk_rings(padded, slices, first, ring_end, lane, spread(shortest, padded), here)
             save(dot(area, minus(here, origin)), tile, SHARE + lane)
         for row in range(ring_end, last):
-            d = minus(gather(places, slices.neighbour, row, lane), here)
-            force = pulled_by(force, slices, row, lane, spread(shortest, places), d)
+            d = minus(gather(padded, slices.neighbour, row, lane), here)
+            force = pulled_by(force, slices, row, lane, spread(shortest, padded), d)
         save_three(force, tile, FORCE + lane)
         save_three(area, tile, AREA + lane)
     return total(tile, SHARE) if ring_end > first else 0.0
 
 
 @inlined
-def walk_rings(places, slices, first, last, lane, shortest, here):
+def walk_rings(padded, slices, first, last, lane, shortest, here):
     """f_i of the springs to the rings of some lanes, and 6 G_i.
 
     d_k = x_k − x_i goes round the ring of neighbours of node i. Two products with a common factor are one:
     d_k−1 × (d_k − d_k−2).
     """
-    none = spread(0, places)
-    start = minus(gather(places, slices.neighbour, first, lane), here)
+    none = spread(0, padded)
+    start = minus(gather(padded, slices.neighbour, first, lane), here)
     force = pulled_by((none, none, none), slices, first, lane, shortest, start)
     area, even = (none, none, none), start
     for row in range(first + 1, last - 1, 2):
-        odd = minus(gather(places, slices.neighbour, row, lane), here)
+        odd = minus(gather(padded, slices.neighbour, row, lane), here)
         force = pulled_by(force, slices, row, lane, shortest, odd)
-        after = minus(gather(places, slices.neighbour, row + 1, lane), here)
+        after = minus(gather(padded, slices.neighbour, row + 1, lane), here)
         force = pulled_by(force, slices, row + 1, lane, shortest, after)
         area = plus(area, cross(odd, minus(after, even)))
         even = after
     if (last - first) % 2:
         return force, plus(area, cross(even, start))
-    odd = minus(gather(places, slices.neighbour, last - 1, lane), here)
+    odd = minus(gather(padded, slices.neighbour, last - 1, lane), here)
     force = pulled_by(force, slices, last - 1, lane, shortest, odd)
     return force, plus(area, cross(odd, minus(start, even)))
 
@@ -146,11 +146,11 @@ def pass_slices(nodes, work, boundary, slices, part, keeps, tile):
         real(boundary.dt * boundary.gravity[1]),
         real(boundary.dt * boundary.gravity[2]),
     )
-    places, pulled, sums, v_star, gradient = work.places, work.pulled, work.sums, nodes.v_star, nodes.gradient
+    padded, pulled, sums, v_star, gradient = work.padded_positions, work.pulled, work.sums, nodes.v_star, nodes.gradient
     shortest = real(SHORTEST)
-    o0, o1, o2 = places[slices.origin, 0], places[slices.origin, 1], places[slices.origin, 2]
+    o0, o1, o2 = padded[slices.origin, 0], padded[slices.origin, 1], padded[slices.origin, 2]
     for s in range(part[0], part[1]):
-        sums[s, 0] = gather_slice(places, slices, s, keeps, shortest, o0, o1, o2, tile)
+        sums[s, 0] = gather_slice(padded, slices, s, keeps, shortest, o0, o1, o2, tile)
         if s < slices.pieces:
             for entry in range(RESULT):
                 pulled[s, entry] = tile[entry]
@@ -179,7 +179,7 @@ def pass_all(nodes, work, boundary, slices, keeps, team):
 def predict_from_places(model, nodes, work, boundary, keeps, team):
     """v* of eq. 3.1 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
 
-    `places` holds the positions. Of the forces only those of held nodes are written out.
+    `padded_positions` holds the positions. Of the forces only those of held nodes are written out.
     """
     slices = model.slices
     walls = model.membrane.triangles.shape[0] > 0
@@ -195,8 +195,8 @@ def predict_from_places(model, nodes, work, boundary, keeps, team):
 
 @lean
 def gather_and_predict(model, nodes, work, boundary, keeps):
-    """The same from `x`; leaves the positions in `places`, where `advance` looks for them."""
-    places_into(nodes, work, 0, nodes.x.shape[0])
+    """The same from `x`; leaves the positions in `padded_positions`, where `advance` looks for them."""
+    pad_positions(nodes, work, 0, nodes.x.shape[0])
     return predict_from_places(model, nodes, work, boundary, keeps, None)
 
 

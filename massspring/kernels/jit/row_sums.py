@@ -32,21 +32,21 @@ def sum_of_products(start, stop, index, value, field):
     return total
 
 
-def sums_from_origin(start, stop, index, value, places, weight):
+def sums_from_origin(start, stop, index, value, padded, weight):
     """Σ_e (places_j − places_o) · value_e and Σ_e weight_j |value_e|², j = index_e, o the first of them, in double."""
     products, squares = 0.0, 0.0
     for e in range(start, stop):
-        away = places[index[e]] - places[index[start]]
+        away = padded[index[e]] - padded[index[start]]
         products += float(away.astype(np.float64) @ value[e])
         squares += float(weight[index[e]]) * float(value[e].astype(np.float64) @ value[e])
     return products, squares
 
 
-def sum_of_areas(start, stop, corner, share, places, out, place):
-    """out_place = Σ_q share_q (x_2 − x_0) × (x_3 − x_1) with places x of the corners (q, 4); `out` (·, 4)."""
+def sum_of_areas(start, stop, corner, share, padded, out, place):
+    """out_place = Σ_q share_q (x_2 − x_0) × (x_3 − x_1) with padded positions x of the corners (q, 4); `out` (·, 4)."""
     out[place, :] = 0.0
     for q in range(start, stop):
-        x = places[corner[q], :3]
+        x = padded[corner[q], :3]
         out[place, :3] += share[q] * np.cross(x[2] - x[0], x[3] - x[1])
 
 
@@ -85,7 +85,7 @@ def _products(typingctx: Any, start: Any, stop: Any, index: Any, value: Any, fie
 
 
 @intrinsic
-def _from_origin(typingctx: Any, start: Any, stop: Any, index: Any, value: Any, places: Any, weight: Any) -> Any:
+def _from_origin(typingctx: Any, start: Any, stop: Any, index: Any, value: Any, padded: Any, weight: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         row = Row(context, builder, signature, args, types.float64)
         origin = row.four(4, row.index(2, args[0]))
@@ -101,13 +101,13 @@ def _from_origin(typingctx: Any, start: Any, stop: Any, index: Any, value: Any, 
         )
 
     pair = types.UniTuple(types.float64, 2)
-    return pair(types.intp, types.intp, index, value, places, weight), generate
+    return pair(types.intp, types.intp, index, value, padded, weight), generate
 
 
 @intrinsic
-def _areas(typingctx: Any, start: Any, stop: Any, corner: Any, share: Any, places: Any, out: Any, place: Any) -> Any:
+def _areas(typingctx: Any, start: Any, stop: Any, corner: Any, share: Any, padded: Any, out: Any, place: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        row = Row(context, builder, signature, args, places.dtype)
+        row = Row(context, builder, signature, args, padded.dtype)
 
         def step(q: Any, totals: list[Any]) -> list[Any]:
             x = [row.four(4, row.index(2, q, column)) for column in range(4)]
@@ -120,7 +120,7 @@ def _areas(typingctx: Any, start: Any, stop: Any, corner: Any, share: Any, place
         row.put(row.turned(row.sums(1, step)[0], NEXT), 5, args[6])
         return context.get_dummy_value()
 
-    return types.void(types.intp, types.intp, corner, share, places, out, types.intp), generate
+    return types.void(types.intp, types.intp, corner, share, padded, out, types.intp), generate
 
 
 @intrinsic
@@ -146,13 +146,13 @@ def _compiled_products(start, stop, index, value, field):
 
 
 @overload(sums_from_origin, jit_options=INLINED)
-def _compiled_from_origin(start, stop, index, value, places, weight):
-    return lambda start, stop, index, value, places, weight: _from_origin(start, stop, index, value, places, weight)  # pyright: ignore[reportCallIssue]
+def _compiled_from_origin(start, stop, index, value, padded, weight):
+    return lambda start, stop, index, value, padded, weight: _from_origin(start, stop, index, value, padded, weight)  # pyright: ignore[reportCallIssue]
 
 
 @overload(sum_of_areas, jit_options=INLINED)
-def _compiled_areas(start, stop, corner, share, places, out, place):
-    return lambda start, stop, corner, share, places, out, place: _areas(start, stop, corner, share, places, out, place)  # pyright: ignore[reportCallIssue]
+def _compiled_areas(start, stop, corner, share, padded, out, place):
+    return lambda start, stop, corner, share, padded, out, place: _areas(start, stop, corner, share, padded, out, place)  # pyright: ignore[reportCallIssue]
 
 
 @overload(copy_scaled, jit_options=INLINED)

@@ -40,9 +40,9 @@ def save(vector: Any, table: np.ndarray, at: int) -> None:
     table[at : at + len(vector)] = vector
 
 
-def gather(places: np.ndarray, nodes: np.ndarray, row: int, column: int) -> tuple[Any, Any, Any]:
-    """x, y and z of the nodes of as many lanes as a register holds; `places` (n, 4), four numbers in one move."""
-    x, y, z, _ = places[nodes[row, column : column + lanes_of(places)]].T
+def gather(padded: np.ndarray, nodes: np.ndarray, row: int, column: int) -> tuple[Any, Any, Any]:
+    """x, y and z of the nodes of as many lanes as a register holds; `padded` (n, 4), four numbers in one move."""
+    x, y, z, _ = padded[nodes[row, column : column + lanes_of(padded)]].T
     return x, y, z
 
 
@@ -166,21 +166,21 @@ def _save(context: Any, builder: Any, signature: Any, args: Any) -> Any:
 
 @type_callable(gather)
 def _type_of_gather(context: Any) -> Any:
-    return lambda places, nodes, row, column: types.UniTuple(Vector(places.dtype), 3)
+    return lambda padded, nodes, row, column: types.UniTuple(Vector(padded.dtype), 3)
 
 
 @lower_builtin(gather, types.Array, types.Array, types.Integer, types.Integer)
 def _gather(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    places, nodes, row_kind, column_kind = signature.args
+    padded, nodes, row_kind, column_kind = signature.args
     first = _address(context, builder, nodes, args[1], [(args[2], row_kind), (args[3], column_kind)])
-    base = context.make_array(places)(context, builder, args[0]).data
+    base = context.make_array(padded)(context, builder, args[0]).data
     four, word = ir.VectorType(base.type.pointee, 4), context.get_value_type(types.intp)
     rows = []
     for lane in range(signature.return_type.dtype.count):
         node = builder.zext(builder.load(builder.gep(first, [word(lane)])), word)
         pointer = builder.gep(base, [builder.mul(node, word(4))])
-        rows.append(builder.load(builder.bitcast(pointer, four.as_pointer()), align=_bytes(places)))
-    turned = _turned_double if places.dtype.bitwidth == 64 else _turned_single
+        rows.append(builder.load(builder.bitcast(pointer, four.as_pointer()), align=_bytes(padded)))
+    turned = _turned_double if padded.dtype.bitwidth == 64 else _turned_single
     return context.make_tuple(builder, signature.return_type, turned(builder, rows))
 
 

@@ -2,7 +2,7 @@
 
 from massspring.kernels.contact.bookkeeping import book_contacts, settled
 from massspring.kernels.contact.modes import FREE
-from massspring.kernels.fused.padded import places_into
+from massspring.kernels.fused.padded import pad_positions
 from massspring.kernels.jit.decorators import inlined
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.jit.thread_team import JOB_MOVE, fork, join
@@ -15,7 +15,7 @@ NEAR = 4096
 def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
     """v⁺ = ṽ + dt W̃ f, x⁺ = x + dt v⁺ (eq. 3.5) of the nodes first ≤ i < last in `part`.
 
-    `places` holds the x of the step's start.
+    `padded_positions` holds the x of the step's start.
     """
     first, last = part
     flat_x, flat_v = flat(nodes.x, first, last), flat(nodes.v, first, last)
@@ -28,13 +28,13 @@ def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
             u = flat_v_star[3 * i + axis] + w * direction[3 * i + axis]
             flat_v[3 * i + axis] = u
             flat_x[3 * i + axis] += step * u
-    x, v, places = nodes.x, nodes.v, work.places
+    x, v, padded = nodes.x, nodes.v, work.padded_positions
     for k in range(contacts.active_count[0]):
         i = contacts.active[k]
         if first <= i < last and mode[i] > FREE:
             v[i, 0], v[i, 1], v[i, 2] = settled(contacts, i, v[i, 0], v[i, 1], v[i, 2])
             for axis in range(3):
-                x[i, axis] = places[i, axis] + step * v[i, axis]
+                x[i, axis] = padded[i, axis] + step * v[i, axis]
 
 
 @inlined
@@ -58,9 +58,9 @@ def move_all(frame, push, team):
 
 @inlined
 def move(frame, push, first, last):
-    """`advance_nodes` and `places_into` of some nodes; `NEAR` at a time, so that new positions are still at hand."""
+    """`advance_nodes` and `pad_positions` of some nodes; `NEAR` at a time, so that new positions are still at hand."""
     nodes, work, weights = frame.nodes, frame.work, frame.model.inverse_mass
     for begin in range(first, last, NEAR):
         end = min(begin + NEAR, last)
         advance_nodes(nodes, frame.contacts, work, weights, push, frame.boundary.dt, (begin, end))
-        places_into(nodes, work, begin, end)
+        pad_positions(nodes, work, begin, end)

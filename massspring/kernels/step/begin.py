@@ -1,7 +1,7 @@
 """How every step begins: all that is known before the volumes are solved for, and which nodes touch obstacles."""
 
 from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, revise_contacts
-from massspring.kernels.fused.padded import places_into
+from massspring.kernels.fused.padded import pad_positions
 from massspring.kernels.fused.sweep import predict_from_places
 from massspring.kernels.jit.decorators import inlined
 from massspring.kernels.jit.stage_clock import BETWEEN_FRAMES, HELD, MULTIPLIER, REVISION, SEARCH, SPRINGS, end_stage
@@ -12,7 +12,7 @@ from massspring.kernels.step.attachments import prescribe, prescribe_velocity_in
 def open_frame(frame):
     """Books the time between two frames, and pads the positions for the first step."""
     end_stage(frame.diagnostics.stage_times, BETWEEN_FRAMES)
-    places_into(frame.nodes, frame.work, 0, frame.nodes.x.shape[0])
+    pad_positions(frame.nodes, frame.work, 0, frame.nodes.x.shape[0])
 
 
 @inlined

@@ -2,7 +2,7 @@
 
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.gaps import predicted_gaps_into
-from massspring.kernels.fused.padded import places_into
+from massspring.kernels.fused.padded import pad_positions
 from massspring.kernels.fused.sweep import pass_slices
 from massspring.kernels.jit.decorators import lean
 from massspring.kernels.jit.thread_team import (
@@ -42,7 +42,7 @@ def worker(frame, team, direction, rank):
             predicted_gaps_into(model, nodes, contacts, boundary, step, push, part)
         else:
             advance_nodes(nodes, contacts, work, model.inverse_mass, push, boundary.dt, part)
-            places_into(nodes, work, part[0], part[1])
+            pad_positions(nodes, work, part[0], part[1])
         raise_by_one(team.signal, DONE)
 
 

@@ -20,7 +20,7 @@ from massspring.kernels.contact.active_set import pressure_reach
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.forces.volume import volume_gradient_into
-from massspring.kernels.fused.padded import places_into
+from massspring.kernels.fused.padded import pad_positions
 from massspring.kernels.jit.decorators import compiled, lean
 from massspring.kernels.jit.stage_clock import MULTIPLIER, VOLUME, end_stage
 from massspring.kernels.step.begin import begin_step, multiplier_stands, open_frame, search_contacts
@@ -153,7 +153,7 @@ def constraint_frame(frame, line, lam, rule):
         lam = end_step(frame, step, Push(nodes.gradient, lam), mobility, None)
         if rule.stabilised:
             diagnostics.limited[0] += correct_positions(model, nodes, contacts, target, dt)
-            places_into(nodes, frame.work, 0, nodes.x.shape[0])
+            pad_positions(nodes, frame.work, 0, nodes.x.shape[0])
             end_stage(diagnostics.stage_times, MULTIPLIER)
     return lam
 

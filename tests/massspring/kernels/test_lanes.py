@@ -48,18 +48,18 @@ def test_sums_in_registers_equal_the_plain_ones(real):
 
 
 @compiled
-def sums_seen_from_the_first(starts, index, value, places, weight, out):
+def sums_seen_from_the_first(starts, index, value, padded, weight, out):
     """What the plain function does, compiled."""
     for r in range(starts.shape[0] - 1):
         if starts[r] < starts[r + 1]:
-            out[r] = sums_from_origin(starts[r], starts[r + 1], index, value, places, weight)
+            out[r] = sums_from_origin(starts[r], starts[r + 1], index, value, padded, weight)
 
 
 @compiled
-def sums_of_areas(starts, corner, share, places, out):
+def sums_of_areas(starts, corner, share, padded, out):
     """What the plain functions do, compiled: each sum, and −3 times it further down."""
     for r in range(starts.shape[0] - 1):
-        sum_of_areas(starts[r], starts[r + 1], corner, share, places, out, r)
+        sum_of_areas(starts[r], starts[r + 1], corner, share, padded, out, r)
         copy_scaled(-3.0, out, r, out, r + 5)
 
 
@@ -69,16 +69,16 @@ def test_what_a_row_says_of_a_volume_equals_the_plain_sums(real):
     random = np.random.default_rng(1)
     starts = np.concatenate([[0], np.cumsum([3, 0, 6, 1, 4])]).astype(np.uint32)
     index = random.integers(0, 9, starts[-1]).astype(np.uint32)
-    value, places = random.normal(size=(len(index), 4)).astype(real), (1e4 + random.normal(size=(9, 4))).astype(real)
+    value, padded = random.normal(size=(len(index), 4)).astype(real), (1e4 + random.normal(size=(9, 4))).astype(real)
     weight = random.uniform(1.0, 2.0, 9).astype(real)
     out = np.zeros((5, 2))
-    sums_seen_from_the_first(starts, index, value, places, weight, out)
+    sums_seen_from_the_first(starts, index, value, padded, weight, out)
     for r in np.flatnonzero(np.diff(starts.astype(int))):
         e = np.arange(starts[r], starts[r + 1])
-        away = places[index[e]].astype(np.float64) - places[index[e[0]]]
+        away = padded[index[e]].astype(np.float64) - padded[index[e[0]]]
         squares = (value[e].astype(np.float64) ** 2).sum(axis=1)
         exact = (away * value[e]).sum(), (weight[index[e]] * squares).sum()
-        plain = sums_from_origin(starts[r], starts[r + 1], index, value, places, weight)
+        plain = sums_from_origin(starts[r], starts[r + 1], index, value, padded, weight)
         assert np.abs(out[r] - exact).max() < 100 * MANY and np.abs(np.subtract(plain, exact)).max() < 100 * MANY
 
 
@@ -88,15 +88,15 @@ def test_sums_of_areas_equal_the_plain_ones(real):
     random = np.random.default_rng(1)
     starts = np.concatenate([[0], np.cumsum([3, 0, 6, 1, 4])]).astype(np.uint32)
     corner = random.integers(0, 9, (starts[-1], 4)).astype(np.uint32)
-    share, places = random.normal(size=len(corner)).astype(real), np.zeros((9, 4), dtype=real)
-    places[:, :3] = random.normal(size=(9, 3))
+    share, padded = random.normal(size=len(corner)).astype(real), np.zeros((9, 4), dtype=real)
+    padded[:, :3] = random.normal(size=(9, 3))
     out, plain = np.ones((10, 4), dtype=real), np.ones((10, 4), dtype=real)
-    sums_of_areas(starts, corner, share, places, out)
+    sums_of_areas(starts, corner, share, padded, out)
     for r in range(5):
-        sum_of_areas(starts[r], starts[r + 1], corner, share, places, plain, r)
+        sum_of_areas(starts[r], starts[r + 1], corner, share, padded, plain, r)
         copy_scaled(-3.0, plain, r, plain, r + 5)
     assert np.abs(out - plain).max() < 100 * float(np.finfo(real).eps)
-    x = places[corner[9], :3].astype(np.float64)
+    x = padded[corner[9], :3].astype(np.float64)
     assert starts[3] == 9  # the row of a single quadrangle
     assert np.abs(out[3, :3] - share[9] * np.cross(x[2] - x[0], x[3] - x[1])).max() < 100 * float(np.finfo(real).eps)
     assert (out[:, 3] == 0).all()
