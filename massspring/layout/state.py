@@ -32,7 +32,7 @@ class State:
     """Arrays that only the method knows, made by its `start`."""
     probing: Probing | None = None
     """Of thin probes; None where there are none: the frame is then compiled without their stage."""
-    place: np.ndarray | None = None
+    permutation: np.ndarray | None = None
     """Where each node is in `model` and `nodes`, (n,); None where they have the numbers of the body."""
 
     team: ThreadTeam | None = None
@@ -41,12 +41,12 @@ class State:
     @property
     def x(self) -> np.ndarray:
         """Positions [m], (n, 3)."""
-        return self.nodes.x if self.place is None else self.nodes.x[self.place]
+        return self.nodes.x if self.permutation is None else self.nodes.x[self.permutation]
 
     @property
     def v(self) -> np.ndarray:
         """Velocities [m/s], (n, 3)."""
-        return self.nodes.v if self.place is None else self.nodes.v[self.place]
+        return self.nodes.v if self.permutation is None else self.nodes.v[self.permutation]
 
     def frame(self, boundary: BoundaryConditions) -> Frame:
         """What a frame loop is given."""
@@ -57,7 +57,7 @@ class State:
     def moved_to(self, x: np.ndarray) -> "State":
         """The same at positions `x` (n, 3) [m]."""
         nodes = self.nodes._replace(x=self.nodes.x.copy())
-        nodes.x[slice(None) if self.place is None else self.place] = x
+        nodes.x[slice(None) if self.permutation is None else self.permutation] = x
         return replace(self, nodes=nodes)
 
 

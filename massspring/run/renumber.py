@@ -23,7 +23,7 @@ class Numbered:
     """A body with the numbers of a run."""
 
     body: Body
-    place: np.ndarray | None
+    permutation: np.ndarray | None
     """Number in `body` of each node of the mesh, (n,); None where it has the mesh's."""
 
     def start(self, method: Method, attachments: tuple[Attachment, ...], velocity: np.ndarray | None) -> State:
@@ -31,28 +31,28 @@ class Numbered:
 
         Raises MassSpringError for bad attachments.
         """
-        if self.place is None:
+        if self.permutation is None:
             return method.start(self.body, attachments, velocity)
         held = tuple(
-            replace(attachment, nodes=np.sort(self.place[nodes]))
+            replace(attachment, nodes=np.sort(self.permutation[nodes]))
             for attachment, nodes in zip(attachments, nodes_of(attachments, self.body), strict=True)
         )
-        order = np.argsort(self.place)
+        order = np.argsort(self.permutation)
         state = method.start(self.body, held, None if velocity is None else np.asarray(velocity)[order])
-        return replace(state, place=self.place)
+        return replace(state, permutation=self.permutation)
 
 
 def numbered(body: Body) -> Numbered:
     """The nodes of a large body in the order in which `kernels.fused` passes over them."""
     if body.node_count < MANY:
         return Numbered(body, None)
-    place = places_in_slices(body.springs, swept_surface(body), body.rest)
-    return Numbered(renumbered(body, place), place)
+    permutation = places_in_slices(body.springs, swept_surface(body), body.rest)
+    return Numbered(renumbered(body, permutation), permutation)
 
 
-def renumbered(body: Body, place: np.ndarray) -> Body:
-    """The same body, whose node i has number `place[i]` (n,); springs, triangles and volumes keep theirs."""
-    order, number = np.argsort(place), place.astype(np.uint32)
+def renumbered(body: Body, permutation: np.ndarray) -> Body:
+    """The same body, whose node i has number `permutation[i]` (n,); springs, triangles and volumes keep theirs."""
+    order, number = np.argsort(permutation), permutation.astype(np.uint32)
     volumes = body.volumes
     return replace(
         body,

@@ -136,7 +136,7 @@ def plain_run(setup: Setup) -> tuple[np.ndarray, np.ndarray]:
         begin = perf_counter_ns()
         plain_frame(plain, targets, points.astype(real), normals.astype(real), boundary.dt, boundary.damping, fall)
         times[frame] = perf_counter_ns() - begin
-    return times, x if state.place is None else x[state.place]
+    return times, x if state.permutation is None else x[state.permutation]
 
 
 def plain_lines() -> list[Line]:

@@ -95,7 +95,7 @@ def test_nodes_of_a_full_slice_follow_each_other(ball):
     """From a mesh numbered at random too, and all but the last of a kind are full."""
     for body in (ball, shuffled(ball)[0]):
         inside = numbered(body)
-        assert sorted(inside.place) == list(range(body.node_count))
+        assert sorted(inside.permutation) == list(range(body.node_count))
         slices = start(inside.body).model.slices
         assert slices.split_node.min() == body.node_count - len(slices.split_node)
         assert (slices.first[slices.pieces :] >= 0).sum() == (body.node_count - len(slices.split_node)) // LANES
@@ -129,4 +129,4 @@ def test_attachments_of_large_bodies_are_refused_by_the_mesh_s_numbers(ball, nod
 def test_small_bodies_keep_the_numbers_of_the_mesh(ball_body):
     assert ball_body.node_count < MANY
     state = Setup(ball_body, Free(), clock_for(ball_body, 1, 1)).start()
-    assert state.place is None and state.x is state.nodes.x
+    assert state.permutation is None and state.x is state.nodes.x
