@@ -21,8 +21,8 @@ CONTACT_PASSES = 3
 def activate(model, nodes, contacts, boundary, step, push, count):
     """Puts the first `count` nodes of `contacts.entering` on the obstacle each would enter deepest (eq. 3.7).
 
-    `v_target` n a, a = n·(target − x)/dt, ends the step on the obstacle. A round one pushes along n = (x − c)/|x − c| of
-    the position now, not of the prediction: that would do work on a node that slides, and pump its oscillations up.
+    `v_target` = n a, a = n·(target − x)/dt, ends the step on the obstacle. A round one pushes along n = (x − c)/|x − c|
+    of the position now, not of the prediction: that would do work on a node that slides, and pump its oscillations up.
     """
     dt = boundary.dt
     for k in range(count):

@@ -70,8 +70,8 @@ class Contact:
         self._activate(np.empty(0, dtype=np.int64), nodes.v)
 
     def revise(self, end: np.ndarray, active: ActiveSet, impulses: np.ndarray) -> bool:
-        """Releases nodes that an obstacle would pull, activates those that would enter one, and lets slip those that would
-        stick too hard; whether any was (eq. 3.8, 12.4)."""
+        """Releases nodes that an obstacle would pull, activates those that would enter one, and lets slip those that
+        would stick too hard; whether any was (eq. 3.8, 12.4)."""
         contacts, nodes = self.contacts, active.nodes
         pushes = np.zeros_like(end)
         np.add.at(pushes, nodes, impulses[:, None] * active.direction)
