@@ -20,7 +20,7 @@ from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions, Push
 from massspring.kernels.constraint.tetrahedra import any_idle, cell_forces_into, cell_rows_into, solve_cells
 from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.step.begin import begin_step, count_iterations, multiplier_stands, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
@@ -33,7 +33,7 @@ from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 
 
-@lean
+@njit_lean
 def hard_frame(frame, cells, compliance, accuracy):
     """One frame, all cells and contact inside the solve (eq. 3.1–3.8, 10.13); the mean pressure [Pa]."""
     nodes, contacts, boundary, diagnostics = frame.nodes, frame.contacts, frame.boundary, frame.diagnostics

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from massspring.kernels.arrays.layout import BoundaryConditions, Push
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
 from massspring.layout.state import State
@@ -12,7 +12,7 @@ from massspring.methods.capabilities import Capabilities
 from massspring.methods.method import Method, threaded_frame
 
 
-@lean
+@njit_lean
 def free_frame(frame):
     """One frame of symplectic Euler with contact (eq. 3.1, 3.2, 3.5, 3.7)."""
     nothing = Push(frame.nodes.gradient, 0.0)

@@ -30,7 +30,7 @@ from massspring.kernels.constraint.jacobian import (
 from massspring.kernels.constraint.one_volume import limited_error, multiplier_of_sums, steepest, surely_short
 from massspring.kernels.constraint.schur import dense_into, solve_dense, solve_iteratively
 from massspring.kernels.contact.active_set import pressure_reach
-from massspring.kernels.jit.decorators import compiled, inlined, lean
+from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.step.begin import (
     begin_step,
@@ -49,7 +49,7 @@ from massspring.methods.method import Method, threaded_frame
 from massspring.world.obstacles import Attachment
 
 
-@lean
+@njit_lean
 def implicit_volume_frame(frame, lam):
     """One frame of HCJ05 with contact inside the multiplier (eq. 3.1–3.8); returns the last lam [Pa]."""
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
@@ -74,7 +74,7 @@ def implicit_volume_frame(frame, lam):
     return lam
 
 
-@inlined
+@njit_inlined
 def limited_multiplier(model, nodes, contacts, error, dt, flow, mobility):
     """lam [Pa] of the sums over all nodes (eq. 3.3), G·W̃·G, and whether only a part of the error is made up for
     (35)."""
@@ -129,7 +129,7 @@ def solve_multipliers(model, rows, contacts, diagnostics, accuracy):
     transposed_rows_times_into(rows, rows.lam, rows.push)
 
 
-@lean
+@njit_lean
 def implicit_volumes_frame(frame, rows, accuracy):
     """One frame of HCJ05 with several volumes (eq. 3.1–3.8, 8.2–8.5); `rows.lam` [Pa] comes in and goes out."""
     model, nodes, contacts, boundary, diagnostics = (

@@ -26,7 +26,7 @@ from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.constraint.tetrahedra import relax_cells, relax_sum, relax_whole
 from massspring.kernels.contact.constrained_motion import unpushed_into
 from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.step.begin import begin_step, multiplier_stands, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
 from massspring.layout.allocate import start
@@ -37,7 +37,7 @@ from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 
 
-@lean
+@njit_lean
 def xpbd_frame(frame, cells, compliance, iterations, whole):
     """One frame (eq. 3.1–3.8, 10.14); returns the last pressure, of cells their mean [Pa]."""
     nodes, contacts, boundary, diagnostics = frame.nodes, frame.contacts, frame.boundary, frame.diagnostics
@@ -61,7 +61,7 @@ def xpbd_frame(frame, cells, compliance, iterations, whole):
     return lam if whole else mean_pressure(cells)
 
 
-@lean
+@njit_lean
 def mend(frame, cells, target, compliance, iterations, whole):
     """So many sweeps over the volumes (eq. 10.14, 10.15); the pressure of the whole [Pa], and whether a wrong volume
     had nothing to push on in the last of them."""

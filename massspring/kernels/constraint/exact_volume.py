@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.contact.constrained_motion import pushed_by_into, unpushed_into
-from massspring.kernels.jit.decorators import compiled, inlined
+from massspring.kernels.jit.decorators import compiled, njit_inlined
 
 POLISHES = 4
 """Newton steps after the closed form: each doubles the digits that cancellation has left of it."""
@@ -30,7 +30,7 @@ def line_into(nodes, contacts, inverse_mass, dt, line):
     pushed_by_into(contacts, inverse_mass, dt * dt, nodes.gradient, line.d)
 
 
-@inlined
+@njit_inlined
 def triple(a, b, c):
     """a · (b × c) of three vectors, each a tuple of three numbers."""
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])

@@ -4,7 +4,7 @@ import math
 
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
-from massspring.kernels.jit.decorators import compiled, lean
+from massspring.kernels.jit.decorators import compiled, njit_lean
 from massspring.kernels.jit.row_sums import copy_scaled, sum_of_areas, sum_of_products, sum_of_scaled, sums_from_origin
 
 NEGLIGIBLE_DIAGONAL = 1e-12
@@ -27,7 +27,7 @@ def rows_into(x, inverse_mass, rows):
         rows.volume[r], rows.free_diagonal[r] = three / 3.0, square
 
 
-@lean
+@njit_lean
 def areas_into(rows, padded):
     """J_rj = Σ_q c_q (x_2 − x_0) × (x_3 − x_1) [m²], the area of the ring of node j in volume r (eq. 8.6).
 
@@ -54,7 +54,7 @@ def rows_times_into(rows, u, product):
         product[r] = total
 
 
-@lean
+@njit_lean
 def padded_rows_times_into(rows, u, product):
     """(J u)_r as above for `u` (n, 4) with 0 as fourth number, twice as fast."""
     value, column, start = rows.value, rows.column, rows.row_start
@@ -62,7 +62,7 @@ def padded_rows_times_into(rows, u, product):
         product[r] = sum_of_products(start[r], start[r + 1], column, value, u)
 
 
-@lean
+@njit_lean
 def transposed_rows_times_into(rows, p, out):
     """(Jᵀ p)_j = Σ_r J_rj p_r, (n, 3): with pressures p [Pa] the force of all volumes on each node [N]."""
     u, start, row, value = rows.node_vector, rows.node_start, rows.node_row, rows.node_value
@@ -87,7 +87,7 @@ def pushed_velocity_into(nodes, contacts, inverse_mass, force, dt, u):
         u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
 
 
-@lean
+@njit_lean
 def mobilised_into(rows, contacts, inverse_mass, p, u):
     """u = W̃ Jᵀ p, (n, 4): no motion of a held node, none into an obstacle (eq. 3.4)."""
     start, row, value, mode, direction = (

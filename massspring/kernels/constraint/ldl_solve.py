@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 
 
 class Triangular(NamedTuple):
@@ -24,7 +24,7 @@ class Triangular(NamedTuple):
     """(q, 4); rows of four lie side by side without a gap."""
 
 
-@lean
+@njit_lean
 def respond_into(factor, force, moved):
     """A⁻¹ F, (n, 3): forward with L, then with D and back with Lᵀ; nodes without a column do not move (eq. 12.1)."""
     start, row, value, node, z = factor.start, factor.row, factor.value, factor.node, factor.scratch

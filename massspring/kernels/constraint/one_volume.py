@@ -4,13 +4,13 @@ import math
 
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part, taken_share
-from massspring.kernels.jit.decorators import inlined, lean
+from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
 NEGLIGIBLE_MOBILITY = 1e-12
 """A mobility this much smaller than what it was taken from is round-off."""
 
 
-@lean
+@njit_lean
 def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
     """lam = [(V0 − V) − dt G·ṽ] / (dt² G·W̃·G) [Pa]: one division (eq. 3.3). Returns (lam, G·W̃·G).
 
@@ -39,7 +39,7 @@ def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
 
 
-@inlined
+@njit_inlined
 def multiplier_of_sums(nodes, contacts, inverse_mass, volume_error, dt, flow, mobility):
     """The same from G·v* and G·W·G of all nodes, less what obstacles take of the few they touch (eq. 3.3, 3.4)."""
     mode, direction, v_target, gradient, v_star = (
@@ -64,7 +64,7 @@ def multiplier_of_sums(nodes, contacts, inverse_mass, volume_error, dt, flow, mo
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
 
 
-@lean
+@njit_lean
 def steepest(gradient, inverse_mass):
     """max_i w_i |G_i| [m²/kg]: how far the node that moves most goes per unit of pressure and dt²."""
     largest = 0.0
@@ -74,7 +74,7 @@ def steepest(gradient, inverse_mass):
     return largest
 
 
-@inlined
+@njit_inlined
 def surely_short(volume_error, mobility, lightest, longest):
     """Whether no node moves farther than `longest` [m] to make up for a wrong volume: |e| √(max w / G·W̃·G) ≤ longest.
 
@@ -83,7 +83,7 @@ def surely_short(volume_error, mobility, lightest, longest):
     return volume_error * volume_error * lightest <= longest * longest * mobility
 
 
-@inlined
+@njit_inlined
 def limited_error(volume_error, mobility, steepest, longest):
     """V0 − V, at most `longest` · G·W̃·G / max w|G| [m³]: then no node moves farther than `longest` [m] (eq. 8.5)."""
     most = longest * mobility / steepest if steepest > 0.0 else 0.0

@@ -6,7 +6,7 @@ from massspring.kernels.constraint.block_jacobi import precondition_into, scale_
 from massspring.kernels.constraint.jacobian import NEGLIGIBLE_DIAGONAL, mobilised_into, padded_rows_times_into
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
-from massspring.kernels.jit.decorators import compiled, inlined, lean, summing
+from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean, njit_reassociated
 
 
 @compiled
@@ -79,14 +79,14 @@ def substitute(factor, right, change):
         change[k] = total / factor[k, k] if factor[k, k] > 0.0 else 0.0
 
 
-@lean
+@njit_lean
 def apply_schur(rows, contacts, inverse_mass, p, product):
     """S p = J (W̃ (Jᵀ p)), (m,) (eq. 8.3)."""
     mobilised_into(rows, contacts, inverse_mass, p, rows.node_vector)
     padded_rows_times_into(rows, rows.node_vector, product)
 
 
-@summing
+@njit_reassociated
 def dot(a, b):
     """a · b."""
     total = 0.0
@@ -95,7 +95,7 @@ def dot(a, b):
     return total
 
 
-@summing
+@njit_reassociated
 def beyond(residual, allowed):
     """How many volumes are farther off than allowed; one that is no number is not."""
     count = 0
@@ -104,7 +104,7 @@ def beyond(residual, allowed):
     return count
 
 
-@inlined
+@njit_inlined
 def along(search, image, alpha, lam, residual):
     """One step of the iteration: lam += alpha search, residual −= alpha S search."""
     for r in range(search.shape[0]):
@@ -112,7 +112,7 @@ def along(search, image, alpha, lam, residual):
         residual[r] -= alpha * image[r]
 
 
-@lean
+@njit_lean
 def solve_iteratively(rows, contacts, inverse_mass, lam, allowed, most):
     """lam += S⁻¹ rhs by conjugate gradients with clusters of S at rest as preconditioner (eq. 8.4, 8.7).
 

@@ -6,7 +6,7 @@ from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.forces.tetrahedron_volumes import add_four, cell_slopes, mean_pressure
 from massspring.kernels.forces.volume import volume_gradient_into
-from massspring.kernels.jit.decorators import compiled, inlined
+from massspring.kernels.jit.decorators import compiled, njit_inlined
 
 WRONG = 1e-6
 """Of a volume: an error that is counted where nothing can mend it; 1 % of what a kept volume may be off."""
@@ -53,7 +53,7 @@ def cell_changes_into(cells, u, out):
         out[t] = total
 
 
-@inlined
+@njit_inlined
 def moved_by(inverse_mass, mode, direction, i, g0, g1, g2):
     """W̃ g at node i (eq. 3.4)."""
     w = inverse_mass[i]

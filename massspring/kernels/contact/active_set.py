@@ -10,14 +10,14 @@ from massspring.kernels.contact.gaps import gap_and_normal, predicted_gaps_into,
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from massspring.kernels.contact.node_contact import round_contact
 from massspring.kernels.jit.blocks import BLOCK, any_gap_within
-from massspring.kernels.jit.decorators import inlined, lean
+from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.thread_team import JOB_SEARCH, fork, join
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
 
 
-@lean
+@njit_lean
 def activate(model, nodes, contacts, boundary, step, push, count):
     """Puts the first `count` nodes of `contacts.entering` on the obstacle each would enter deepest (eq. 3.7).
 
@@ -47,7 +47,7 @@ def activate(model, nodes, contacts, boundary, step, push, count):
                 contacts.v_target[i, 0], contacts.v_target[i, 1], contacts.v_target[i, 2] = a * n0, a * n1, a * n2
 
 
-@inlined
+@njit_inlined
 def release_all(contacts):
     """No node is touched."""
     for k in range(contacts.active_count[0]):
@@ -56,7 +56,7 @@ def release_all(contacts):
     contacts.active_count[0] = 0
 
 
-@inlined
+@njit_inlined
 def register(contacts, count):
     """Lists those of the first `count` nodes of `entering` that have been activated; their gap is settled."""
     active, entering, mode = contacts.active, contacts.entering, contacts.mode
@@ -70,7 +70,7 @@ def register(contacts, count):
     contacts.active_count[0] = listed
 
 
-@inlined
+@njit_inlined
 def forget_released(contacts):
     """Takes nodes that have been released from the list, so that one that comes back is in it once."""
     active, mode, kept = contacts.active, contacts.mode, 0
@@ -82,7 +82,7 @@ def forget_released(contacts):
     contacts.active_count[0] = kept
 
 
-@inlined
+@njit_inlined
 def predict_gaps(model, nodes, contacts, boundary, step, push, team):
     """`predicted_gaps_into` of all nodes, by as many threads as there are."""
     if team is None:
@@ -93,7 +93,7 @@ def predict_gaps(model, nodes, contacts, boundary, step, push, team):
         join(team)
 
 
-@inlined
+@njit_inlined
 def find_contacts(model, nodes, contacts, boundary, step, push, team):
     """Touched nodes of the step when the push of the last one acts on them: u = v* + dt W f (eq. 3.7)."""
     release_all(contacts)
@@ -101,7 +101,7 @@ def find_contacts(model, nodes, contacts, boundary, step, push, team):
     enter(model, nodes, contacts, boundary, step, push)
 
 
-@inlined
+@njit_inlined
 def enter(model, nodes, contacts, boundary, step, push):
     """Activates the nodes whose predicted gap is negative (eq. 3.7)."""
     touchable, predicted_gap, entering = model.touchable, contacts.predicted_gap, contacts.entering
@@ -122,7 +122,7 @@ def enter(model, nodes, contacts, boundary, step, push):
         activate_edges(model, nodes, contacts, boundary, step, push)
 
 
-@inlined
+@njit_inlined
 def release_pulled(model, nodes, contacts, boundary, push):
     """Releases nodes that their one obstacle would pull (eq. 3.8); how many."""
     changes = 0
@@ -142,7 +142,7 @@ def release_pulled(model, nodes, contacts, boundary, push):
     return changes
 
 
-@inlined
+@njit_inlined
 def enters(model, nodes, boundary, step, push, i):
     """Whether the free node i would end the step in an obstacle (eq. 3.7)."""
     dt = boundary.dt
@@ -155,7 +155,7 @@ def enters(model, nodes, boundary, step, push, i):
     return False
 
 
-@inlined
+@njit_inlined
 def revise_contacts(model, nodes, contacts, boundary, step, push, reach):
     """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 3.8).
 
@@ -188,7 +188,7 @@ def revise_contacts(model, nodes, contacts, boundary, step, push, reach):
     return changes + count
 
 
-@inlined
+@njit_inlined
 def pressure_reach(lam_change, mobility, lightest, dt):
     """dt² |Δlam| √(max w · Σ w |G|²) ≥ dt² |Δlam| w_i |G_i| [m]: how far a change of pressure moves any free node."""
     return 1.0001 * dt * dt * abs(lam_change) * math.sqrt(max(lightest * mobility, 0.0))

@@ -3,10 +3,10 @@
 from massspring.kernels.contact.friction import impulse_shares
 from massspring.kernels.contact.modes import FREE, ON_EDGE
 from massspring.kernels.contact.node_contact import allowed_part
-from massspring.kernels.jit.decorators import inlined, lean
+from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
 
-@lean
+@njit_lean
 def book(contact_impulse, o, other, k0, k1, k2):
     """Moves an impulse [N s] from the account of one obstacle to another's: an edge pushes with both."""
     contact_impulse[o, 0] -= k0
@@ -17,7 +17,7 @@ def book(contact_impulse, o, other, k0, k1, k2):
     contact_impulse[other, 2] += k2
 
 
-@inlined
+@njit_inlined
 def settled(contacts, i, u0, u1, u2):
     """What obstacles make of the velocity of a node they touch [m/s], P u + v_target (eq. 3.5)."""
     d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
@@ -25,7 +25,7 @@ def settled(contacts, i, u0, u1, u2):
     return p0 + contacts.v_target[i, 0], p1 + contacts.v_target[i, 1], p2 + contacts.v_target[i, 2]
 
 
-@inlined
+@njit_inlined
 def book_contacts(model, nodes, contacts, push, dt, contact_impulse):
     """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 3.5); u is what a node would do without them."""
     v_star, direction, mode = nodes.v_star, push.direction, contacts.mode

@@ -5,7 +5,7 @@ import math
 from massspring.kernels.contact.gaps import gap_and_normal, pushed_velocity
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
 from massspring.kernels.contact.node_contact import allowed_part
-from massspring.kernels.jit.decorators import inlined, lean
+from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
 SLIPS = 1.0 + 1e-9
 """Round-off must not turn a node that just sticks into one that slips."""
@@ -13,7 +13,7 @@ PARALLEL = 1e-4
 """Squared sine between two normals (0.6°) below which they count as one: there is no edge to slide along."""
 
 
-@lean
+@njit_lean
 def apply_friction(model, nodes, contacts, boundary, step, push):
     """Coulomb: a touched node sticks while |s| ≤ mu (a − n·u), else its slip s loses mu (a − n·u) (eq. 9.1)."""
     for k in range(contacts.active_count[0]):
@@ -41,7 +41,7 @@ def apply_friction(model, nodes, contacts, boundary, step, push):
             )
 
 
-@lean
+@njit_lean
 def release_slipping(model, nodes, contacts, boundary, push):
     """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 9.1)."""
     changes = 0
@@ -66,7 +66,7 @@ def release_slipping(model, nodes, contacts, boundary, push):
     return changes
 
 
-@lean
+@njit_lean
 def activate_edges(model, nodes, contacts, boundary, step, push):
     """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 9.2); how many.
 
@@ -113,13 +113,13 @@ def activate_edges(model, nodes, contacts, boundary, step, push):
     return changes
 
 
-@inlined
+@njit_inlined
 def dot(a, b):
     """a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@lean
+@njit_lean
 def impulse_shares(k, n, m):
     """The parts of k = α n + β n' + rest along two normals that are not parallel, tuples of three numbers: (α, β)."""
     along, other, cosine = dot(k, n), dot(k, m), dot(n, m)
@@ -127,7 +127,7 @@ def impulse_shares(k, n, m):
     return (along - cosine * other) / square, (other - cosine * along) / square
 
 
-@lean
+@njit_lean
 def release_edges(model, nodes, contacts, boundary, push):
     """Frees nodes on an edge that one of their obstacles would pull; the next search finds the other (eq. 9.2)."""
     changes = 0

@@ -7,11 +7,11 @@ ones.
 import math
 
 from massspring.kernels.contact.node_contact import axis_share, round_gap
-from massspring.kernels.jit.decorators import inlined
+from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.flat import flat
 
 
-@inlined
+@njit_inlined
 def predicted_gaps_into(model, nodes, contacts, boundary, step, push, part):
     """gap_i = min over obstacles of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 3.7).
 
@@ -37,7 +37,7 @@ def predicted_gaps_into(model, nodes, contacts, boundary, step, push, part):
             capsule_gap(course, predicted_gap, p0, p1, p2, real(span[0]), real(span[1]), real(span[2]), radius)
 
 
-@inlined
+@njit_inlined
 def way_from(p0, p1, p2, course, i):
     """y − p [m] of a node, y = x + dt (v* + dt W f)."""
     x, v_star, direction, inverse_mass, dt, impulse = course
@@ -48,7 +48,7 @@ def way_from(p0, p1, p2, course, i):
     return r0, r1, r2
 
 
-@inlined
+@njit_inlined
 def plane_gap(course, predicted_gap, p0, p1, p2, n0, n1, n2):
     """n·(y − p) [m]."""
     for i in range(predicted_gap.shape[0]):
@@ -56,7 +56,7 @@ def plane_gap(course, predicted_gap, p0, p1, p2, n0, n1, n2):
         predicted_gap[i] = min(predicted_gap[i], n0 * r0 + n1 * r1 + n2 * r2)
 
 
-@inlined
+@njit_inlined
 def sphere_gap(course, predicted_gap, c0, c1, c2, radius):
     """|y − c| − R [m]."""
     for i in range(predicted_gap.shape[0]):
@@ -64,7 +64,7 @@ def sphere_gap(course, predicted_gap, c0, c1, c2, radius):
         predicted_gap[i] = min(predicted_gap[i], math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius)
 
 
-@inlined
+@njit_inlined
 def capsule_gap(course, predicted_gap, p0, p1, p2, a0, a1, a2, radius):
     """Distance of y to the axis p … p + a less R [m]."""
     for i in range(predicted_gap.shape[0]):
@@ -72,7 +72,7 @@ def capsule_gap(course, predicted_gap, p0, p1, p2, a0, a1, a2, radius):
         predicted_gap[i] = min(predicted_gap[i], round_gap(r0, r1, r2, a0, a1, a2, radius))
 
 
-@inlined
+@njit_inlined
 def pushed_velocity(model, nodes, boundary, push, i):
     """u = v* + dt W f of node i when what keeps volumes acts as a force f [m/s] (eq. 3.7)."""
     w, direction = boundary.dt * push.factor * model.inverse_mass[i], push.direction
@@ -82,7 +82,7 @@ def pushed_velocity(model, nodes, boundary, push, i):
     return u0, u1, u2
 
 
-@inlined
+@njit_inlined
 def gap_and_normal(boundary, o, r0, r1, r2):
     """Distance [m] of r to obstacle o, negative inside, and its normal there; r is seen from the obstacle's position.
 

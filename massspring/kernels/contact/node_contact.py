@@ -7,10 +7,10 @@ in either precision.
 import math
 
 from massspring.kernels.contact.modes import ON_EDGE, SLIDES
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 
 
-@lean
+@njit_lean
 def allowed_part(mode, d0, d1, d2, g0, g1, g2):
     """P g, what obstacles leave of a vector: P = I − n nᵀ on one, e eᵀ on two, 0 where a node sticks (eq. 3.4)."""
     along = g0 * d0 + g1 * d1 + g2 * d2
@@ -21,7 +21,7 @@ def allowed_part(mode, d0, d1, d2, g0, g1, g2):
     return 0.0, 0.0, 0.0
 
 
-@lean
+@njit_lean
 def taken_share(mode, d0, d1, d2, g0, g1, g2, v0, v1, v2):
     """g·(I − P) v, what obstacles take of a product (eq. 3.4)."""
     along = (g0 * d0 + g1 * d1 + g2 * d2) * (v0 * d0 + v1 * d1 + v2 * d2)
@@ -31,7 +31,7 @@ def taken_share(mode, d0, d1, d2, g0, g1, g2, v0, v1, v2):
     return whole - along if mode == ON_EDGE else whole
 
 
-@lean
+@njit_lean
 def axis_share(r0, r1, r2, s0, s1, s2):
     """Where on a segment 0 … s the point nearest to r lies, 0 … 1; 0 where s has no length.
 
@@ -43,7 +43,7 @@ def axis_share(r0, r1, r2, s0, s1, s2):
     return min(max((r0 * s0 + r1 * s1 + r2 * s2) / square, zero), one) if square > zero else zero
 
 
-@lean
+@njit_lean
 def round_gap(r0, r1, r2, a0, a1, a2, radius):
     """Distance [m] of r to the axis 0 … a less a radius, negative inside (eq. 3.7)."""
     share = axis_share(r0, r1, r2, a0, a1, a2)
@@ -51,7 +51,7 @@ def round_gap(r0, r1, r2, a0, a1, a2, radius):
     return math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius
 
 
-@lean
+@njit_lean
 def sphere_contact(s, r, radius):
     """(normal, lift) of a node at s now and at r after the predicted step, seen from the centre [m] (eq. 3.7).
 
@@ -70,7 +70,7 @@ def sphere_contact(s, r, radius):
     return r0 / distance, r1 / distance, r2 / distance, radius - distance
 
 
-@lean
+@njit_lean
 def round_contact(s, r, a, radius):
     """`sphere_contact` with the sphere around the nearest point of an axis 0 … a, a capsule's; a = 0: a sphere's.
 

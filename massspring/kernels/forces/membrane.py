@@ -1,9 +1,9 @@
 """Triangle springs: a wall that stretches and shears like a thin sheet of tissue (Delingette 2008)."""
 
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 
 
-@lean
+@njit_lean
 def add_membrane_forces(x, membrane, force):
     """f_b += 2 g_a (x_c − x_b), f_c −= the same [N], (n, 3), with g_a = k_a Δ_a + c_b Δ_c + c_c Δ_b (eq. 4.6).
 
@@ -33,7 +33,7 @@ def add_membrane_forces(x, membrane, force):
         force[k, 2] += gb * b2 - ga * a2
 
 
-@lean
+@njit_lean
 def membrane_energy(x, membrane):
     """U = Σ_t Σ_a ½ k_a Δ_a² + c_a Δ_b Δ_c [J] (eq. 4.6)."""
     energy = 0.0

@@ -2,12 +2,12 @@
 
 import math
 
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 
 SHORTEST = 1e-30  # [m] a collapsed spring has no direction: it pulls with 0 instead of NaN; a float32 can hold it
 
 
-@lean
+@njit_lean
 def spring_forces_into(x, ends, rest_length, stiffness, force):
     """f_i = Σ_e k_e (1 − L_e/|d_e|) d_e [N], (n, 3); d_e = x_j − x_i (eq. 1.1).
 
@@ -30,7 +30,7 @@ def spring_forces_into(x, ends, rest_length, stiffness, force):
         force[j, 2] -= c * d2
 
 
-@lean
+@njit_lean
 def spring_energy(x, ends, rest_length, stiffness):
     """U = Σ_e ½ k_e (|d_e| − L_e)² [J] (eq. 1.2)."""
     energy = 0.0

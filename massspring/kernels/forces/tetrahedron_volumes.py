@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.forces.springs import SHORTEST
-from massspring.kernels.jit.decorators import compiled, inlined
+from massspring.kernels.jit.decorators import compiled, njit_inlined
 
 
 class Cells(NamedTuple):
@@ -42,7 +42,7 @@ class Cells(NamedTuple):
     """Node vectors, scratch, (n, 3)."""
 
 
-@inlined
+@njit_inlined
 def cell_slopes(x, a, b, c, d):
     """V_t [m³] and dV_t/dx of b, c, d [m²]: (1/6) (x_c − x_a) × (x_d − x_a) and its rotations (eq. 2.3, 10.11)."""
     b0, b1, b2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
@@ -54,7 +54,7 @@ def cell_slopes(x, a, b, c, d):
     return b0 * p0 + b1 * p1 + b2 * p2, p0, p1, p2, q0, q1, q2, r0, r1, r2
 
 
-@inlined
+@njit_inlined
 def add_four(out, nodes, f, p, q, r):
     """Adds f p, f q, f r to the last three of four nodes and minus their sum to the first: net force 0."""
     a, b, c, d = nodes
@@ -99,7 +99,7 @@ def add_volume_forces(x, cells, bulk_modulus, force):
     return idle
 
 
-@inlined
+@njit_inlined
 def unit(r0, r1, r2):
     """(|r|, r/|r|); a node on the barycentre has no direction."""
     length = max(math.sqrt(r0 * r0 + r1 * r1 + r2 * r2), SHORTEST)

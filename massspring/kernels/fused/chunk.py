@@ -1,6 +1,6 @@
 """64 nodes side by side: what a pass over them leaves in memory, and how it goes to the nodes from there."""
 
-from massspring.kernels.jit.decorators import inlined
+from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.flat import flat
 
 LANES = 64
@@ -15,7 +15,7 @@ SHARE, SPEED = THERE, THERE
 TILE = 5 * VECTOR
 
 
-@inlined
+@njit_inlined
 def take(x, first, tile):
     """The rows of 64 nodes that follow each other in memory into `THERE`."""
     rows = flat(x, first, first + LANES)
@@ -23,7 +23,7 @@ def take(x, first, tile):
         tile[THERE + k] = rows[k]
 
 
-@inlined
+@njit_inlined
 def total(tile, at):
     """The sum of 64 numbers, always in the same order: eight at a time, then those eight."""
     for eight in range(8, LANES, 8):
@@ -35,7 +35,7 @@ def total(tile, at):
     return found
 
 
-@inlined
+@njit_inlined
 def put(tile, block, slices, s, x):
     """x_i = the block of the tile, for the lanes in use."""
     for lane in range(LANES):

@@ -2,10 +2,10 @@
 
 from massspring.kernels.forces.membrane import add_membrane_forces
 from massspring.kernels.fused.chunk import AREA, FORCE, LANES
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 
 
-@lean
+@njit_lean
 def join_pieces(model, nodes, work, boundary, keeps):
     """v* and G of the nodes in pieces, and their shares of G·v* and G·W·G in the last of `sums`."""
     slices = model.slices
@@ -33,7 +33,7 @@ def join_pieces(model, nodes, work, boundary, keeps):
     work.sums[last, 1], work.sums[last, 2] = flow, mobility
 
 
-@lean
+@njit_lean
 def add_walls(model, nodes, dt):
     """v* += dt W f of the triangle springs [m/s]; returns what that adds to G·v* [m³/s].
 

@@ -1,10 +1,10 @@
 """Positions padded to four numbers, as one move of memory fetches them."""
 
-from massspring.kernels.jit.decorators import inlined
+from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.flat import flat
 
 
-@inlined
+@njit_inlined
 def pad_positions(nodes, work, first, last):
     """The positions of some nodes in fours, as one move of memory fetches them, (n, 4)."""
     x, padded = flat(nodes.x, first, last), flat(work.padded_positions, first, last)

@@ -7,12 +7,12 @@ from massspring.kernels.forces.springs import SHORTEST
 from massspring.kernels.fused.chunk import AREA, FORCE, HERE, LANES, RESULT, SHARE, SPEED, SUMS, put, take, total
 from massspring.kernels.fused.long_rows import add_walls, join_pieces
 from massspring.kernels.fused.padded import pad_positions
-from massspring.kernels.jit.decorators import inlined, lean
+from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.thread_team import JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, fork, join
 from massspring.kernels.jit.vectors import at_least, gather, lanes_of, load, root, save, spread
 
 
-@inlined
+@njit_inlined
 def gather_slice(padded, slices, s, keeps, shortest, o0, o1, o2, tile):
     """f_i [N] (eq. 1.1) and, where a volume is kept, 6 G_i = Σ_k d_k × d_k+1 [m²] (eq. 2.4) of a slice; its share of V.
 
@@ -37,7 +37,7 @@ def gather_slice(padded, slices, s, keeps, shortest, o0, o1, o2, tile):
     return total(tile, SHARE) if ring_end > first else 0.0
 
 
-@inlined
+@njit_inlined
 def walk_rings(padded, slices, first, last, lane, shortest, here):
     """f_i of the springs to the rings of some lanes, and 6 G_i.
 
@@ -62,7 +62,7 @@ def walk_rings(padded, slices, first, last, lane, shortest, here):
     return force, plus(area, cross(odd, minus(start, even)))
 
 
-@inlined
+@njit_inlined
 def pulled_by(force, slices, row, lane, shortest, d):
     """f_i + (k − k L/|d|) d [N] (eq. 1.1); exactly f_i at rest length."""
     stiffness = load(slices.stiffness, slices.stiffness_row[row], lane)
@@ -71,27 +71,27 @@ def pulled_by(force, slices, row, lane, shortest, d):
     return force[0] + c * d[0], force[1] + c * d[1], force[2] + c * d[2]
 
 
-@inlined
+@njit_inlined
 def minus(a, b):
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@inlined
+@njit_inlined
 def plus(a, b):
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@inlined
+@njit_inlined
 def dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@inlined
+@njit_inlined
 def cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@inlined
+@njit_inlined
 def save_three(vector, tile, at):
     """The components into blocks of the tile that follow each other."""
     save(vector[0], tile, at)
@@ -99,7 +99,7 @@ def save_three(vector, tile, at):
     save(vector[2], tile, at + 2 * LANES)
 
 
-@inlined
+@njit_inlined
 def predict_slice(nodes, slices, s, dt, keep, a0, a1, a2, tile):
     """v* (eq. 3.1) and G of the nodes of a slice in place of x and 6 G, and their shares of G·v* and G·W·G."""
     v, node, inverse_mass = nodes.v, slices.node, slices.inverse_mass
@@ -123,7 +123,7 @@ def predict_slice(nodes, slices, s, dt, keep, a0, a1, a2, tile):
         tile[AREA + lane], tile[AREA + LANES + lane], tile[AREA + 2 * LANES + lane] = g0, g1, g2
 
 
-@inlined
+@njit_inlined
 def keep_held(slices, s, force, tile):
     """The spring forces of the held nodes of a slice [N]: what their attachments take."""
     for h in range(slices.held_start[s], slices.held_start[s + 1]):
@@ -133,7 +133,7 @@ def keep_held(slices, s, force, tile):
             force[i, axis] = tile[FORCE + axis * LANES + lane]
 
 
-@inlined
+@njit_inlined
 def pass_slices(nodes, work, boundary, slices, part, keeps, tile):
     """v* and G of the slices first ≤ s < last in `part`, with their shares of 18 V, G·v* and G·W·G in `sums`.
 
@@ -164,7 +164,7 @@ def pass_slices(nodes, work, boundary, slices, part, keeps, tile):
             sums[s, 1], sums[s, 2] = total(tile, SUMS), total(tile, SUMS + LANES)
 
 
-@inlined
+@njit_inlined
 def pass_all(nodes, work, boundary, slices, keeps, team):
     """`pass_slices` of all slices, by as many threads as there are."""
     if team is None:
@@ -175,7 +175,7 @@ def pass_all(nodes, work, boundary, slices, keeps, team):
         join(team)
 
 
-@inlined
+@njit_inlined
 def predict_from_places(model, nodes, work, boundary, keeps, team):
     """v* of eq. 3.1 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
 
@@ -193,14 +193,14 @@ def predict_from_places(model, nodes, work, boundary, keeps, team):
     return volume, flow, mobility
 
 
-@lean
+@njit_lean
 def gather_and_predict(model, nodes, work, boundary, keeps):
     """The same from `x`; leaves the positions in `padded_positions`, where `advance` looks for them."""
     pad_positions(nodes, work, 0, nodes.x.shape[0])
     return predict_from_places(model, nodes, work, boundary, keeps, None)
 
 
-@inlined
+@njit_inlined
 def add_up(sums, pieces):
     """(V, G·v*, G·W·G) from the shares of the slices, in double precision and always in the same order."""
     volume, flow, mobility = 0.0, 0.0, 0.0

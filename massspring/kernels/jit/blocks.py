@@ -1,13 +1,13 @@
 """Looking for the few among many: 64 nodes are passed over at once where none of them is meant."""
 
-from massspring.kernels.jit.decorators import inlined
+from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.flat import flat
 
 BLOCK = 64
 """Nodes."""
 
 
-@inlined
+@njit_inlined
 def any_gap_within(gap, begin, reach):
     """Whether any node of the block is no farther than `reach` [m]; a block that is not full is always looked through.
 

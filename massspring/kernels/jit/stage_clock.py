@@ -9,7 +9,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
-from massspring.kernels.jit.decorators import inlined
+from massspring.kernels.jit.decorators import njit_inlined
 
 STAGES = (
     "springs and prediction",
@@ -70,7 +70,7 @@ def _compiled_now():
     return lambda: _clock()  # pyright: ignore[reportCallIssue]
 
 
-@inlined
+@njit_inlined
 def end_stage(times, stage):
     """Books the time since the last stage ended on `stage`; nothing where `times` is None."""
     if times is not None:

@@ -4,7 +4,7 @@ import math
 
 from massspring.kernels.contact.bookkeeping import settled
 from massspring.kernels.contact.modes import FREE
-from massspring.kernels.jit.decorators import comparing, lean
+from massspring.kernels.jit.decorators import njit_ignoring_nan, njit_lean
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.probe.arrays import COMPARED
 
@@ -16,7 +16,7 @@ SAFE = 1.0 + 1e-6
 """Sums of distances over a million steps lose less than this, speeds in single precision too."""
 
 
-@comparing
+@njit_ignoring_nan
 def fastest_free(v_star, direction, inverse_mass, impulse):
     """max_i |v*_i + impulse w_i d_i|² [m²/s²] of flat tables, as if no node were held (eq. 3.5)."""
     fastest = v_star.dtype.type(0)
@@ -29,7 +29,7 @@ def fastest_free(v_star, direction, inverse_mass, impulse):
     return fastest
 
 
-@lean
+@njit_lean
 def fastest_node(model, nodes, contacts, push, dt):
     """At least |v⁺_i| [m/s] of every node in the step as it stands, without thin probes (eq. 3.5)."""
     n, mode, real = model.inverse_mass.shape[0], contacts.mode, nodes.x.dtype.type
@@ -46,7 +46,7 @@ def fastest_node(model, nodes, contacts, push, dt):
     return math.sqrt(fastest)
 
 
-@lean
+@njit_lean
 def box_gap(x, triangles, f, p0, p1, p2):
     """Distance [m] of a point to the axis-aligned box of a triangle: never more than to the triangle (eq. 11.5)."""
     a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
@@ -56,7 +56,7 @@ def box_gap(x, triangles, f, p0, p1, p2):
     return math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
 
 
-@lean
+@njit_lean
 def find_near(nodes, tips, step, probes, reach):
     """Fills `near` with the triangles whose box may come within the radius of a tip in `reach` [m] of motion
     (eq. 11.5).

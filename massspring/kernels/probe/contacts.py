@@ -11,7 +11,7 @@ Eliminating the change of pressure δ leaves A c ≥ right with A_kl = Σ_i b_ki
 from massspring.kernels.constraint.schur import solve_dense
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.probe.pressure import answer_into, change_of_rows, flow_into
 
 RIGID = 1e-10
@@ -24,7 +24,7 @@ SLACK = 1e-9
 """Share of the largest right side by which a contact that does not press may be missed: round-off."""
 
 
-@lean
+@njit_lean
 def row_of(rows, p, f):
     """The row of a probe and a triangle, or the number of rows."""
     count = rows.count[0]
@@ -34,7 +34,7 @@ def row_of(rows, p, f):
     return count
 
 
-@lean
+@njit_lean
 def set_row(rows, p, f, triangles, pair):
     """Makes what `pair` has found of probe p and triangle f their row; whether there is room for it."""
     k = row_of(rows, p, f)
@@ -49,7 +49,7 @@ def set_row(rows, p, f, triangles, pair):
     return True
 
 
-@lean
+@njit_lean
 def aim_rows(stage):
     """W̃ n and the right side of every row (eq. 11.6).
 
@@ -74,7 +74,7 @@ def aim_rows(stage):
         rows.right[k] = (probes.radius[p] - gap) / stage.dt - approach
 
 
-@lean
+@njit_lean
 def matrix_into(rows):
     """A_kj = Σ_i b_ki b_ji n_k·W̃_i n_j − g_k·S⁻¹ g_j [1/kg], both halves (eq. 11.6)."""
     for k in range(rows.count[0]):
@@ -96,7 +96,7 @@ def matrix_into(rows):
             rows.matrix[k, j], rows.matrix[j, k] = value, value
 
 
-@lean
+@njit_lean
 def press(rows):
     """A_aa c_a = right_a for the rows that press, the others 0 [N s] (eq. 11.6)."""
     count, active = 0, rows.active
@@ -118,7 +118,7 @@ def press(rows):
             count += 1
 
 
-@lean
+@njit_lean
 def choose_rows(rows):
     """c ≥ 0, A c ≥ right, and one of them equal in every row: a contact that would pull is left (eq. 11.6)."""
     n = rows.count[0]
@@ -147,7 +147,7 @@ def choose_rows(rows):
         rows.impulse[k] = max(rows.impulse[k], 0.0)
 
 
-@lean
+@njit_lean
 def spread_push(rows, push, inverse_mass):
     """push_i = Σ_k b_ki c_k W̃_i n_k [m/s] of the corners of all rows; the largest bound w Σ b c on it [m/s]."""
     clear_push(rows, push)
@@ -161,7 +161,7 @@ def spread_push(rows, push, inverse_mass):
     return fastest
 
 
-@lean
+@njit_lean
 def clear_push(rows, push):
     """Takes the pushes of all rows away."""
     for k in range(rows.count[0]):
@@ -170,7 +170,7 @@ def clear_push(rows, push):
                 push[rows.node[k, q], axis] = 0.0
 
 
-@lean
+@njit_lean
 def solve_rows(stage, volumes):
     """Impulses of all rows and the change of pressures beside them; how much faster they make a node at most [m/s]
     (eq. 11.6)."""

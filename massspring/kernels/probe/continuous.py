@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.contact.node_contact import axis_share
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 
 NEVER = 2.0
 """Time of a meeting that does not happen within the step, whose times run from 0 to 1."""
@@ -41,7 +41,7 @@ class Pair(NamedTuple):
     """Unit vector from the point into the triangle, (3,)."""
 
 
-@lean
+@njit_lean
 def nearest_into(corner, weight):
     """Weights (3,) of the point of a triangle (3, 3) nearest to the origin; returns its distance [m] (eq. 11.1).
 
@@ -73,7 +73,7 @@ def nearest_into(corner, weight):
     return math.sqrt(best)
 
 
-@lean
+@njit_lean
 def triple(p, i, q, j, r, k):
     """p_i · (q_j × r_k) of rows of three arrays (3, 3) [m³]."""
     return (
@@ -83,7 +83,7 @@ def triple(p, i, q, j, r, k):
     )
 
 
-@lean
+@njit_lean
 def coplanarity(begin, move):
     """Coefficients of (a + t a') · ((b + t b') × (c + t c')) = f0 + f1 t + f2 t² + f3 t³ [m³] (eq. 11.2).
 
@@ -95,7 +95,7 @@ def coplanarity(begin, move):
     return f0, f1, f2, triple(move, 0, move, 1, move, 2)
 
 
-@lean
+@njit_lean
 def turning_points(f1, f2, f3):
     """Times in (0, 1) at which f0 + f1 t + f2 t² + f3 t³ turns, ascending; NEVER for one that is not there."""
     root = f2 * f2 - 3.0 * f1 * f3
@@ -110,7 +110,7 @@ def turning_points(f1, f2, f3):
     return min(first, second), max(first, second)
 
 
-@lean
+@njit_lean
 def single_root(low, high, f0, f1, f2, f3):
     """The root of f0 + f1 t + f2 t² + f3 t³ between `low` and `high`, where its sign differs: halving (eq. 11.2)."""
     rising = f0 + low * (f1 + low * (f2 + low * f3)) < 0.0
@@ -123,7 +123,7 @@ def single_root(low, high, f0, f1, f2, f3):
     return high
 
 
-@lean
+@njit_lean
 def at_time(pair, t):
     """Corners at time t of the step, in `pair.corner`."""
     for k in range(3):
@@ -131,7 +131,7 @@ def at_time(pair, t):
             pair.corner[k, axis] = (1.0 - t) * pair.begin[k, axis] + t * pair.end[k, axis]
 
 
-@lean
+@njit_lean
 def point_along(pair, sign):
     """Makes `direction` the triangle's unit normal times `sign`; without area or sign, against its motion
     (eq. 11.3)."""
@@ -151,7 +151,7 @@ def point_along(pair, sign):
         d[0], d[1], d[2] = d[0] / length, d[1] / length, d[2] / length
 
 
-@lean
+@njit_lean
 def touching(pair, radius):
     """First time at which the triangle is within `radius` [m] of the point, by steps that cannot overshoot (eq. 11.4).
 
@@ -185,7 +185,7 @@ def touching(pair, radius):
     return t
 
 
-@lean
+@njit_lean
 def passes_by(pair):
     """Whether one coordinate of all corners keeps its sign through the step: nothing crosses then (eq. 11.2)."""
     apart, size = 0.0, 0.0
@@ -198,7 +198,7 @@ def passes_by(pair):
     return apart > 2.0 * ON * size
 
 
-@lean
+@njit_lean
 def stays_off(corner, distance):
     """Whether a coordinate of all corners (3, 3) alone keeps them more than `distance` [m] from the origin."""
     apart = 0.0
@@ -209,7 +209,7 @@ def stays_off(corner, distance):
     return apart * (1.0 - ON) > distance
 
 
-@lean
+@njit_lean
 def crossing(pair):
     """First time at which the point passes through the triangle, or NEVER: roots of (11.2) at which it lies inside.
 

@@ -9,7 +9,7 @@ import math
 
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.modes import FREE, STICKS
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND
 from massspring.kernels.probe.broad_phase import ROOM, find_near
 from massspring.kernels.probe.contacts import clear_push
@@ -26,7 +26,7 @@ FREE_SHARE = 0.02
 corner would have to go fifty times as far as the tip."""
 
 
-@lean
+@njit_lean
 def carry_node(stage, p, i):
     """Carries node i with the tip of probe p: it takes no share in any volume from then on."""
     probes, contacts = stage.probes, stage.contacts
@@ -40,7 +40,7 @@ def carry_node(stage, p, i):
         contacts.v_target[i, axis] = probes.base[i, axis]
 
 
-@lean
+@njit_lean
 def overshoot(stage, p, n):
     """Sends the carried corners of the near triangle n ahead, until its point that is passed rests seen from the tip.
 
@@ -78,7 +78,7 @@ def overshoot(stage, p, n):
     return True
 
 
-@lean
+@njit_lean
 def carry_triangles(stage, p):
     """Carries the free corners of all triangles that the tip of probe p passes, or sends those ahead; whether any."""
     probes, model, contacts = stage.probes, stage.model, stage.contacts
@@ -97,7 +97,7 @@ def carry_triangles(stage, p):
     return more
 
 
-@lean
+@njit_lean
 def compensate_volume(stage, volumes):
     """δ with dt S δ = −J (v − u) of the carried nodes: the volumes are left to the others (eq. 11.7).
 
@@ -133,7 +133,7 @@ def compensate_volume(stage, volumes):
     return faster_by(stage, felt)
 
 
-@lean
+@njit_lean
 def carry(stage, volumes, push, plain, horizon):
     """Nodes of triangles that a tip would pass move with the tip or ahead of it, so that nothing passes it (eq. 11.7).
 
@@ -167,7 +167,7 @@ def carry(stage, volumes, push, plain, horizon):
     return factor, reach
 
 
-@lean
+@njit_lean
 def note_passed(stage):
     """Counts the step if a tip still goes through a triangle, and keeps the first triangle of each tip."""
     probes = stage.probes
@@ -182,7 +182,7 @@ def note_passed(stage):
     probes.counts[LEFT_BEHIND] += passed
 
 
-@lean
+@njit_lean
 def settle_carried(stage, push):
     """Carried nodes end the step where they were carried: v* takes the difference, the tip's impulse [N s]."""
     probes, model, nodes, contacts = stage.probes, stage.model, stage.nodes, stage.contacts

@@ -4,11 +4,11 @@ import math
 
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.probe.pressure import swelling
 
 
-@lean
+@njit_lean
 def gather(stage, push):
     """u_i of the corners of all near triangles (eq. 3.4, 3.5), and v⁺ = u."""
     nodes, contacts, probes = stage.nodes, stage.contacts, stage.probes
@@ -32,7 +32,7 @@ def gather(stage, push):
                 velocity[i, 0], velocity[i, 1], velocity[i, 2] = u0, u1, u2
 
 
-@lean
+@njit_lean
 def carried_speed(stage, i):
     """Of a carried node [m/s]: its tip's, and what it goes faster (eq. 11.7)."""
     tips, push, dt, step = stage.tips, stage.probes.push, stage.dt, stage.step
@@ -44,7 +44,7 @@ def carried_speed(stage, i):
     )
 
 
-@lean
+@njit_lean
 def move(stage, volumes):
     """v⁺_i = u_i + push_i + dt W̃_i (Jᵀ δ)_i of the near corners, or as they are carried [m/s] (eq. 11.6, 11.7)."""
     probes, triangles, base, push = stage.probes, stage.probes.surface, stage.probes.base, stage.probes.push
@@ -64,7 +64,7 @@ def move(stage, volumes):
                 probes.velocity[i, 0], probes.velocity[i, 1], probes.velocity[i, 2] = u0, u1, u2
 
 
-@lean
+@njit_lean
 def settle(stage):
     """Hands the contacts on to the step: v* takes their pushes; books them for probes and attachments [N s]."""
     probes, model, rows, diagnostics = stage.probes, stage.model, stage.probes.rows, stage.probes.diagnostics
@@ -85,7 +85,7 @@ def settle(stage):
                             diagnostics.held_impulse[model.held_group[h], axis] -= share
 
 
-@lean
+@njit_lean
 def longest_way(tips, step):
     """Of any tip in the step [m]."""
     longest = 0.0

@@ -2,12 +2,12 @@
 
 import math
 
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.probe.broad_phase import box_gap
 from massspring.kernels.probe.continuous import nearest_into
 
 
-@lean
+@njit_lean
 def distance_to(point, x, triangles, corner, weight):
     """Of a point (3,) to the nearest of triangles (f, 3) [m] (eq. 11.1); `corner` (3, 3) and `weight` (3,) are scratch.
 
@@ -23,7 +23,7 @@ def distance_to(point, x, triangles, corner, weight):
     return nearest
 
 
-@lean
+@njit_lean
 def winding_number_at(point, x, triangles):
     """How often a closed surface goes round a point (3,): its solid angle over 4π [1].
 

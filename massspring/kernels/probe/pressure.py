@@ -9,14 +9,14 @@ from massspring.kernels.constraint.jacobian import diagonal_into, transposed_row
 from massspring.kernels.constraint.schur import dense_into, factor_dense, solve_iteratively, substitute
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 
 ACCURATE = 1e-7
 """Of the largest flow: what an iterative solve may leave. The next step makes up for it, as for every volume error."""
 MOST_ITERATIONS = 400
 
 
-@lean
+@njit_lean
 def prepare(stage, volumes):
     """S for what can move now; factored where it is dense (eq. 8.3)."""
     if volumes is not None:
@@ -26,7 +26,7 @@ def prepare(stage, volumes):
             factor_dense(volumes.matrix)
 
 
-@lean
+@njit_lean
 def flow_into(stage, volumes, k):
     """g_k = Σ_i b_i J_i W̃_i n [m²/kg] of row k (eq. 11.6)."""
     rows = stage.probes.rows
@@ -45,7 +45,7 @@ def flow_into(stage, volumes, k):
                 rows.flow[k, r] += b * (j[e, 0] * m[k, q, 0] + j[e, 1] * m[k, q, 1] + j[e, 2] * m[k, q, 2])
 
 
-@lean
+@njit_lean
 def answer_into(stage, volumes, flow, answer):
     """S⁻¹ g [1/m²], (m,): the division of one volume, a back-solve of few, an iteration for many (eq. 8.3, 8.4)."""
     if volumes is None:
@@ -62,7 +62,7 @@ def answer_into(stage, volumes, flow, answer):
         solve_iteratively(volumes, stage.contacts, stage.model.inverse_mass, answer, volumes.allowed, MOST_ITERATIONS)
 
 
-@lean
+@njit_lean
 def change_of_rows(stage):
     """δ = −Σ_k S⁻¹ g_k c_k/dt [Pa]; how much faster it makes a node at most, √(max w · δ·S δ) dt [m/s] (eq. 11.6)."""
     rows, change = stage.probes.rows, stage.probes.change
@@ -77,13 +77,13 @@ def change_of_rows(stage):
     return faster_by(stage, felt)
 
 
-@lean
+@njit_lean
 def faster_by(stage, felt):
     """√(max w · dt² δ·S δ) ≥ dt w_i |(Jᵀ δ)_i| [m/s]: how much faster pressures can make any free node."""
     return 1.0001 * math.sqrt(max(stage.model.largest_inverse_mass * felt, 0.0))
 
 
-@lean
+@njit_lean
 def swelling(stage, volumes, i):
     """dt W̃_i (Jᵀ δ)_i [m/s], what the change of pressures does to a node (eq. 11.6)."""
     nodes, contacts, change = stage.nodes, stage.contacts, stage.probes.change
@@ -105,7 +105,7 @@ def swelling(stage, volumes, i):
     return s0, s1, s2
 
 
-@lean
+@njit_lean
 def pressed_on(stage, volumes, push):
     """The factor of the push with the change of pressures; of several volumes the push itself changes."""
     if volumes is None:

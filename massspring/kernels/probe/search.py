@@ -1,6 +1,6 @@
 """What a thin tip runs into in the step as it stands: triangles passed or too near (docs/theory.md, section 11)."""
 
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.probe.arrays import TESTED
 from massspring.kernels.probe.contacts import row_of, set_row
 from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, stays_off, touching
@@ -11,7 +11,7 @@ ENOUGH = 0.95
 """Share of the radius left at which a contact is not turned once more: what is missing is second order in the step."""
 
 
-@lean
+@njit_lean
 def pair_into(pair, x, velocity, triangles, f, dt):
     """Corners of a triangle seen from the tip of `pair`, at the start of the step and at its end [m]."""
     for k in range(3):
@@ -22,7 +22,7 @@ def pair_into(pair, x, velocity, triangles, f, dt):
             pair.end[k, axis] = pair.begin[k, axis] + way
 
 
-@lean
+@njit_lean
 def look(stage, p):
     """When and where the tip passes through each near triangle in the step as it stands; the first time, or NEVER."""
     probes, x, triangles, pair = stage.probes, stage.nodes.x, stage.probes.surface, stage.probes.pair
@@ -42,7 +42,7 @@ def look(stage, p):
     return first
 
 
-@lean
+@njit_lean
 def add_crossings(probes, p, first):
     """A contact for every triangle that the tip passes through at the first time; how many found room.
 
@@ -57,7 +57,7 @@ def add_crossings(probes, p, first):
     return room
 
 
-@lean
+@njit_lean
 def add_touches(stage, p):
     """A contact for every triangle that ends the step within the radius, where it first touches; how many found room.
 
@@ -85,7 +85,7 @@ def add_touches(stage, p):
     return room
 
 
-@lean
+@njit_lean
 def search(stage):
     """Adds what the step as it stands runs into; (contacts that found room, whether a tip crosses)."""
     found, crosses = 0, False

@@ -6,7 +6,7 @@ contact, and the search begins again until nothing crosses (docs/theory.md, sect
 
 import math
 
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.probe.arrays import IN_CONTACT, SEARCH_ROUNDS
 from massspring.kernels.probe.broad_phase import ROOM, SAFE, fastest_node, find_near
 from massspring.kernels.probe.contacts import solve_rows
@@ -19,7 +19,7 @@ PASSES = 24
 """Searches for what the last solution runs into; each adds contacts or turns one."""
 
 
-@lean
+@njit_lean
 def meet_probes(stage, volumes, push):
     """Contact with thin probes, once pressures and the other contacts of the step are known (eq. 11.1–11.7).
 

@@ -3,7 +3,7 @@
 from massspring.kernels.contact.bookkeeping import book_contacts, settled
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.fused.padded import pad_positions
-from massspring.kernels.jit.decorators import inlined
+from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.jit.thread_team import JOB_MOVE, fork, join
 
@@ -11,7 +11,7 @@ NEAR = 4096
 """Nodes of which a step's end fits the second cache."""
 
 
-@inlined
+@njit_inlined
 def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
     """v⁺ = ṽ + dt W̃ f, x⁺ = x + dt v⁺ (eq. 3.5) of the nodes first ≤ i < last in `part`.
 
@@ -37,7 +37,7 @@ def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
                 x[i, axis] = padded[i, axis] + step * v[i, axis]
 
 
-@inlined
+@njit_inlined
 def advance(frame, push):
     """The end of a step of all nodes (eq. 3.5); books the impulse of each obstacle, pads the new positions."""
     model, nodes, contacts, dt = frame.model, frame.nodes, frame.contacts, frame.boundary.dt
@@ -45,7 +45,7 @@ def advance(frame, push):
     move_all(frame, push, frame.team)
 
 
-@inlined
+@njit_inlined
 def move_all(frame, push, team):
     """`move` of all nodes, by as many threads as there are."""
     if team is None:
@@ -56,7 +56,7 @@ def move_all(frame, push, team):
         join(team)
 
 
-@inlined
+@njit_inlined
 def move(frame, push, first, last):
     """`advance_nodes` and `pad_positions` of some nodes; `NEAR` at a time, so that new positions are still at hand."""
     nodes, work, weights = frame.nodes, frame.work, frame.model.inverse_mass

@@ -4,7 +4,7 @@ from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.gaps import predicted_gaps_into
 from massspring.kernels.fused.padded import pad_positions
 from massspring.kernels.fused.sweep import pass_slices
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.jit.thread_team import (
     DONE,
     JOB,
@@ -21,7 +21,7 @@ from massspring.kernels.jit.thread_team import (
 from massspring.kernels.step.advance import advance_nodes
 
 
-@lean
+@njit_lean
 def worker(frame, team, direction, rank):
     """Does part number `rank` of every job of a frame up to its end; `direction` is that of its pushes."""
     model, nodes, contacts, work, boundary = frame.model, frame.nodes, frame.contacts, frame.work, frame.boundary
@@ -46,7 +46,7 @@ def worker(frame, team, direction, rank):
         raise_by_one(team.signal, DONE)
 
 
-@lean
+@njit_lean
 def shutdown(team):
     """Ends the frame for the other threads."""
     fork(team, JOB_END, 0, 0.0)

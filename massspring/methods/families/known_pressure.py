@@ -15,7 +15,7 @@ from massspring.body.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.forces.volume import pyramid_volume, volume_gradient_into
-from massspring.kernels.jit.decorators import compiled, lean
+from massspring.kernels.jit.decorators import compiled, njit_lean
 from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
@@ -35,7 +35,7 @@ def known_pressure(model, nodes, bulk_modulus, law, volume, target):
     return bulk_modulus * (target - volume) / target
 
 
-@lean
+@njit_lean
 def pressure_frame(frame, bulk_modulus, law):
     """One frame of symplectic Euler with a known pressure (eq. 3.1, 3.2, 3.5, 3.7, 10.8); returns the last one [Pa]."""
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics

@@ -21,7 +21,7 @@ from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.fused.padded import pad_positions
-from massspring.kernels.jit.decorators import compiled, lean
+from massspring.kernels.jit.decorators import compiled, njit_lean
 from massspring.kernels.jit.stage_clock import MULTIPLIER, VOLUME, end_stage
 from massspring.kernels.step.begin import begin_step, multiplier_stands, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
@@ -118,7 +118,7 @@ def correct_positions(model, nodes, contacts, target, dt):
     return part != error
 
 
-@lean
+@njit_lean
 def constraint_frame(frame, line, lam, rule):
     """One frame with contact inside the multiplier (eq. 3.1–3.8, 10.1–10.3, 10.5, 10.7); returns the last lam [Pa]."""
     model, nodes, contacts, boundary, diagnostics = (

@@ -14,7 +14,7 @@ from massspring.kernels.forces.tetrahedron_volumes import (
     fill,
     mean_pressure,
 )
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
@@ -49,7 +49,7 @@ def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_ar
     return coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * body.node_count, k)).tocsr()
 
 
-@lean
+@njit_lean
 def cells_frame(frame, cells, bulk_modulus, barycentric):
     """One frame of symplectic Euler with a known pressure in every cell (eq. 3.1, 3.2, 3.5, 3.7, 10.11, 10.12)."""
     nodes, boundary, diagnostics = frame.nodes, frame.boundary, frame.diagnostics

@@ -5,12 +5,12 @@ import pytest
 from numba.core.errors import TypingError
 
 from massspring.kernels.jit.blocks import BLOCK, any_gap_within
-from massspring.kernels.jit.decorators import lean
+from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.jit.flat import flat
 from massspring.layout.morton import along_curve
 
 
-@lean
+@njit_lean
 def doubled(table, first, last):
     rows = flat(table, first, last)
     for entry in range(rows.shape[0]):
@@ -18,7 +18,7 @@ def doubled(table, first, last):
     return rows.shape[0]
 
 
-@lean
+@njit_lean
 def block_with(gap, begin, reach):
     return any_gap_within(gap, begin, reach)
 
