@@ -31,7 +31,7 @@ from studies.timing.skips import SKIPS
 FRAMES, REPEATS = 100, 5
 BUDGET = 4.0
 """Time for the repeats [s]: the next turn is left out when it would take longer than that; the first never is."""
-DEAR = 5.0
+EXPENSIVE = 5.0
 """Times the run as it is, from where one with a stage is run once only: that is far from the noise."""
 ENDS = 100_000
 """Ends of stages in a row, to learn what one costs."""
@@ -128,7 +128,7 @@ def _ticked(setup: Setup, frames: int | None = None) -> Run:
 
 
 def _in_turns(runs: dict[str, partial[Run]], repeats: int, budget: float) -> dict[str, list[Run]]:
-    """Every run up to `repeats` times, in turns, compiled before; one that is `DEAR`, once. No turn begins that would
+    """Every run up to `repeats` times, in turns, compiled before; one that is `EXPENSIVE`, once. No turn begins that would
     end after `budget` [s], but the first."""
     for run in runs.values():
         run(frames=1)
@@ -140,12 +140,12 @@ def _in_turns(runs: dict[str, partial[Run]], repeats: int, budget: float) -> dic
         if turn and start - began + longest > 1e9 * budget:
             break
         for name, run in runs.items():
-            if shortest[name] > DEAR * shortest[PLAIN]:
+            if shortest[name] > EXPENSIVE * shortest[PLAIN]:
                 continue
             found[name].append(run())
             took = float(found[name][-1][0].sum())
             shortest[name] = min(took, shortest[name]) if turn else took
-        longest = perf_counter_ns() - start  # later turns leave out what is dear, so they take no longer
+        longest = perf_counter_ns() - start  # later turns leave out what is expensive, so they take no longer
     return found
 
 

@@ -224,7 +224,7 @@ def test_a_terminal_without_the_letters_shows_question_marks(organbench, monkeyp
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
-def test_output_that_nobody_takes(organbench, monkeypatch):
+def test_output_that_is_not_taken(organbench, monkeypatch):
     with open("/dev/full", "w", encoding="utf-8") as full:
         monkeypatch.setattr(sys, "stdout", full)
         code, _, err = organbench("list")

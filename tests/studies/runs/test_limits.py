@@ -23,7 +23,7 @@ from tests.studies.tiny import SQUEEZE, tiny_case
     ],
     ids=lambda value: "",
 )
-def test_what_nobody_can_compute_is_refused_at_once(mesh_cache, changes, told):
+def test_what_cannot_be_computed_is_refused_at_once(mesh_cache, changes, told):
     record = measure(tiny_case(**changes))
     assert record.status == Status.FAILED
     assert told in record.message

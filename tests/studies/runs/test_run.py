@@ -66,7 +66,7 @@ def test_a_record_with_energies_replays_with_them(tmp_path, mesh_cache):
     assert gap is None and "elastic" in stored.fields and "elastic" in new.fields and "kinetic" not in new.fields
 
 
-def test_a_field_that_nobody_can_record_is_refused():
+def test_an_unknown_field_is_refused():
     with pytest.raises(StudyError, match="no extra field is called 'enstrophy'; there are kinetic, elastic"):
         tiny_case().replaced(recorded=("enstrophy",))
 
