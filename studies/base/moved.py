@@ -152,6 +152,7 @@ NAMES = {
 
 RENAMED = {
     "massspring.Path": "Trajectory",
+    "reference_fem.Held": "PrescribedDisplacement",
     "reference_fem.ReferenceProblem": "SolveError",
     "studies.Probed": "ForceOutput",
     "studies.Start": "InitialConditions",

@@ -128,8 +128,8 @@ def _ticked(setup: Setup, frames: int | None = None) -> Run:
 
 
 def _in_turns(runs: dict[str, partial[Run]], repeats: int, budget: float) -> dict[str, list[Run]]:
-    """Every run up to `repeats` times, in turns, compiled before; one that is `EXPENSIVE`, once. No turn begins that would
-    end after `budget` [s], but the first."""
+    """Every run up to `repeats` times, in turns, compiled before; one that is `EXPENSIVE`, once. No turn begins that
+    would end after `budget` [s], but the first."""
     for run in runs.values():
         run(frames=1)
     found: dict[str, list[Run]] = {name: [] for name in runs}
