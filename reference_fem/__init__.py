@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from reference_fem.model.loads import BodyForce, Traction
     from reference_fem.model.material import Material, MooneyRivlin, NeoHookean
     from reference_fem.model.obstacles import RigidCapsule, RigidPlane, RigidSphere
-    from reference_fem.model.problem import Held, Problem
+    from reference_fem.model.problem import PrescribedDisplacement, Problem
     from reference_fem.statics.equilibrium import Checkpoint, Equilibrium, equilibrium_path
     from reference_fem.system.state import NewtonSettings, State
 
@@ -28,13 +28,13 @@ _FACE = {
     "Element": "reference_fem.elements.table",
     "Equilibrium": "reference_fem.statics.equilibrium",
     "Evaluator": "reference_fem.elements.evaluate",
-    "Held": "reference_fem.model.problem",
     "Material": "reference_fem.model.material",
     "Modes": "reference_fem.dynamics.modes",
     "Moment": "reference_fem.dynamics.motion_path",
     "MooneyRivlin": "reference_fem.model.material",
     "NeoHookean": "reference_fem.model.material",
     "NewtonSettings": "reference_fem.system.state",
+    "PrescribedDisplacement": "reference_fem.model.problem",
     "Problem": "reference_fem.model.problem",
     "RigidCapsule": "reference_fem.model.obstacles",
     "RigidPlane": "reference_fem.model.obstacles",

@@ -8,7 +8,7 @@ from skfem import MeshTet
 
 from reference_fem.model.material import NeoHookean
 from reference_fem.model.obstacles import RigidPlane
-from reference_fem.model.problem import Held, Problem
+from reference_fem.model.problem import PrescribedDisplacement, Problem
 from reference_fem.statics.equilibrium import equilibrium_path
 from reference_fem.system.saddle_point import System
 from reference_fem.system.state import Loads, NewtonSettings
@@ -18,7 +18,7 @@ def slab(cells, obstacles=()):
     """A cube of side 1 m, mu = 1 Pa, held at the bottom; `cells` along each edge, 9 make about 9,000 unknowns."""
     ticks = np.linspace(0.0, 1.0, cells + 1)
     mesh = MeshTet.init_tensor(ticks, ticks, ticks)
-    return Problem(mesh, NeoHookean(1.0, 5000.0), [Held(lambda x: x[2] < 1e-9)], obstacles)
+    return Problem(mesh, NeoHookean(1.0, 5000.0), [PrescribedDisplacement(lambda x: x[2] < 1e-9)], obstacles)
 
 
 def fastest(action, repeats):

@@ -1,7 +1,7 @@
 """A second opinion from NGSolve, where the extra `crosscheck` is installed; nothing else in the project needs it."""
 
 from reference_fem.crosscheck.cases import clamped_ball, pulled_organ, thick_sphere
-from reference_fem.crosscheck.ngsolve_code import Solution, available, solve
+from reference_fem.crosscheck.ngsolve_code import NgsolveSolution, available, solve
 from reference_fem.crosscheck.opinions import opinions
 
-__all__ = ["Solution", "available", "clamped_ball", "opinions", "pulled_organ", "solve", "thick_sphere"]
+__all__ = ["NgsolveSolution", "available", "clamped_ball", "opinions", "pulled_organ", "solve", "thick_sphere"]

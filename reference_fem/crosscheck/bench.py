@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from reference_fem.crosscheck.cases import clamped_ball
-from reference_fem.crosscheck.ngsolve_code import Model
+from reference_fem.crosscheck.ngsolve_code import NgsolveModel
 from reference_fem.model.problem import Problem
 from reference_fem.oracles.base import unknowns
 from reference_fem.statics.tangent import Tangent
@@ -57,7 +57,7 @@ def own_iteration(problem: Problem) -> Callable[[], float]:
 
 def ngsolve_iteration(problem: Problem, inverse) -> Callable[[], float]:
     """The same in NGSolve's own Newton: two of its iterations, halved."""
-    model = Model(problem)
+    model = NgsolveModel(problem)
     model.advance(FIRST, inverse)
 
     def action():

@@ -9,7 +9,7 @@ from skfem import MeshTet
 from reference_fem.elements.shapes import facet_nodes, nodes
 from reference_fem.errors import SolveError
 from reference_fem.model.material import NeoHookean
-from reference_fem.model.problem import Held, Problem
+from reference_fem.model.problem import PrescribedDisplacement, Problem
 from reference_fem.oracles.bodies import shell_octant, symmetry, whole_ball
 
 STEPS = (0.25, 0.5, 0.75, 1.0)
@@ -22,7 +22,7 @@ def straight(mesh) -> MeshTet:
 
 
 def facets_where(mesh: MeshTet, inside: Callable) -> Callable:
-    """What Held.where asks, for the boundary facets all of whose vertices are `inside`: (3, n) points -> bool (n,)."""
+    """What `where` asks, for the boundary facets all of whose vertices are `inside`: (3, n) points -> bool (n,)."""
     table, x = facet_nodes(mesh), nodes(mesh)
     whole = np.asarray(inside(x.T), dtype=bool)[table[:, :3]].all(axis=1)
     if not whole.any():
@@ -36,15 +36,15 @@ def clamped_ball(n=4) -> Problem:
     """A ball between clamped caps (those beyond 0.8 of the radius), one pushed in by 0.3 of the radius and aside."""
     mesh = straight(whole_ball(n))
     top, bottom = (facets_where(mesh, lambda x, sign=sign: sign * x[2] > 0.8) for sign in (1.0, -1.0))
-    push = Held(top, motion=lambda t: (0.1 * t, 0.0, -0.3 * t))
-    return Problem(mesh, NeoHookean(1.0, 500.0), [push, Held(bottom)])
+    push = PrescribedDisplacement(top, motion=lambda t: (0.1 * t, 0.0, -0.3 * t))
+    return Problem(mesh, NeoHookean(1.0, 500.0), [push, PrescribedDisplacement(bottom)])
 
 
 def thick_sphere(n=6, layers=4) -> Problem:
     """An eighth of a shell, 0.5 to 1 of the radius, whose inner surface is blown up by 0.3 of its radius."""
     mesh = straight(shell_octant(0.5, n, layers))
     wall = facets_where(mesh, lambda x: np.abs(np.linalg.norm(x, axis=0) - 0.5) < 1e-9)
-    blow = Held(wall, motion=lambda t: (0.15 * t,) * 3, shape=lambda x: x / np.linalg.norm(x, axis=0))
+    blow = PrescribedDisplacement(wall, motion=lambda t: (0.15 * t,) * 3, shape=lambda x: x / np.linalg.norm(x, axis=0))
     return Problem(mesh, NeoHookean(1.0, 5000.0), [blow, *symmetry()])
 
 
@@ -56,5 +56,5 @@ def pulled_organ(mesh: MeshTet, attached, grip, move) -> Problem:
     def patch(numbers):
         return facets_where(mesh, lambda x: np.isin(np.arange(x.shape[1]), numbers))
 
-    pull = Held(patch(grip), motion=lambda t: tuple(t * np.asarray(move, dtype=float)))
-    return Problem(mesh, NeoHookean(1800.0, 1800.0 * 5000.0), [pull, Held(patch(attached))])
+    pull = PrescribedDisplacement(patch(grip), motion=lambda t: tuple(t * np.asarray(move, dtype=float)))
+    return Problem(mesh, NeoHookean(1800.0, 1800.0 * 5000.0), [pull, PrescribedDisplacement(patch(attached))])

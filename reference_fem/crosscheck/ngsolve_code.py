@@ -38,7 +38,7 @@ def load(name: str) -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class NgsolveSolution:
     """What NGSolve found; nodes and vertices as in this project."""
 
     u: np.ndarray
@@ -80,7 +80,7 @@ def check_middles(mesh: MeshTet, held: list[HeldNodes]):
         )
 
 
-class Model:
+class NgsolveModel:
     """A problem in NGSolve. Raises SolveError for problems that it does not cover."""
 
     def __init__(self, problem: Problem):
@@ -186,9 +186,9 @@ class Model:
         return forces
 
 
-def solve(problem: Problem, times) -> Solution:
+def solve(problem: Problem, times) -> NgsolveSolution:
     """The state at the last of the times, reached step by step; raises SolveError."""
-    model = Model(problem)
+    model = NgsolveModel(problem)
     iterations = sum(model.advance(t) for t in times)
     u, p = model.fields(model.vector())
-    return Solution(u, p, model.forces(), iterations)
+    return NgsolveSolution(u, p, model.forces(), iterations)

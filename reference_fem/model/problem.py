@@ -16,7 +16,7 @@ from reference_fem.model.obstacles import Obstacle, finite_vector
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class PrescribedDisplacement:
     """Displacement components prescribed at boundary nodes.
 
     where: (3, N) rest positions -> bool (N,), asked at the nodes of the boundary.
@@ -42,7 +42,7 @@ class Problem:
 
     mesh: MeshTet
     material: Material
-    held: Sequence[Held]
+    held: Sequence[PrescribedDisplacement]
     obstacles: Sequence[Obstacle] = ()
     gravity: Sequence[float] = (0.0, 0.0, 0.0)
     density: float = 0.0
@@ -60,7 +60,7 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class HeldNodes:
-    """One Held on one mesh: its nodes, its unknowns, and the displacement factors."""
+    """One PrescribedDisplacement on one mesh: its nodes, its unknowns, and the displacement factors."""
 
     nodes: np.ndarray
     dofs: np.ndarray

@@ -8,7 +8,7 @@ from skfem import MeshTet, MeshTet2
 
 from reference_fem.elements.curve import curve
 from reference_fem.elements.shapes import nodes
-from reference_fem.model.problem import Held
+from reference_fem.model.problem import PrescribedDisplacement
 
 
 def block(cells=(2, 2, 2), skew=0.0):
@@ -21,7 +21,7 @@ def block(cells=(2, 2, 2), skew=0.0):
 
 def symmetry():
     """The three coordinate planes, each holding its own component."""
-    return [Held(lambda x, c=c: np.abs(x[c]) < 1e-9, (c,)) for c in range(3)]
+    return [PrescribedDisplacement(lambda x, c=c: np.abs(x[c]) < 1e-9, (c,)) for c in range(3)]
 
 
 def kuhn_simplex(n):
@@ -120,4 +120,4 @@ def straight(mesh):
 
 def between(bottom, top):
     """A slab one element thick in plane strain: z is held on both faces [m]."""
-    return Held(lambda x: (x[2] < bottom + 1e-9) | (x[2] > top - 1e-9), (2,))
+    return PrescribedDisplacement(lambda x: (x[2] < bottom + 1e-9) | (x[2] > top - 1e-9), (2,))

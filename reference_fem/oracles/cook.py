@@ -6,7 +6,7 @@ from reference_fem import exact
 from reference_fem.elements.shapes import nodes
 from reference_fem.model.loads import Traction
 from reference_fem.model.material import NeoHookean
-from reference_fem.model.problem import Held, Problem
+from reference_fem.model.problem import PrescribedDisplacement, Problem
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import between, mapped
 from reference_fem.statics.equilibrium import equilibrium_path
@@ -43,7 +43,7 @@ def bend(cells):
     def push(t, x):
         return np.array([np.zeros_like(x[0]), np.full_like(x[0], shear * t), np.zeros_like(x[0])])
 
-    held = [Held(lambda x: x[0] < 1e-9), between(0.0, thickness)]
+    held = [PrescribedDisplacement(lambda x: x[0] < 1e-9), between(0.0, thickness)]
     load = Traction(lambda x: x[0] > RIGHT - 1e-9, push)
     problem = Problem(mesh, NeoHookean(MU, KAPPA * MU), held, loads=[load])
     state, x = equilibrium_path(problem, (0.25, 0.5, 0.75, 1.0))[-1], nodes(mesh)

@@ -15,7 +15,7 @@ from reference_fem.elements.shapes import basis_table, element_nodes, nodes
 from reference_fem.elements.table import DEFAULT, ELEMENTS
 from reference_fem.model.loads import BodyForce
 from reference_fem.model.material import Material, MooneyRivlin
-from reference_fem.model.problem import Held, Problem
+from reference_fem.model.problem import PrescribedDisplacement, Problem
 from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import block
 from reference_fem.statics.equilibrium import advance
@@ -73,7 +73,7 @@ def build(name: str, cells: int, material: Material = MATERIAL) -> Problem:
     def displacement(x):
         return motion(x, material.kappa)[0] - x
 
-    held = Held(lambda x: np.ones(x.shape[1], bool), (0, 1, 2), lambda t: (t, t, t), displacement)
+    held = PrescribedDisplacement(lambda x: np.ones(x.shape[1], bool), (0, 1, 2), lambda t: (t, t, t), displacement)
     return Problem(block((cells,) * 3), material, [held], element=name, loads=[BodyForce(body_force(material))])
 
 

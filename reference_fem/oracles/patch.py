@@ -5,7 +5,7 @@ import numpy as np
 from reference_fem.elements.shapes import nodes
 from reference_fem.elements.table import ELEMENTS
 from reference_fem.model.material import MooneyRivlin
-from reference_fem.model.problem import Held, Problem
+from reference_fem.model.problem import PrescribedDisplacement, Problem
 from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import block
 from reference_fem.oracles.uniaxial import TIGHT
@@ -30,7 +30,7 @@ def measure() -> Outcome:
         for ratio in RATIOS:
             material = MooneyRivlin(0.3, 0.2, ratio)
             shape = lambda x: (F - np.eye(3)) @ x  # noqa: E731
-            held = [Held(lambda x: np.ones(x.shape[1], bool), (0, 1, 2), lambda t: (t, t, t), shape)]
+            held = [PrescribedDisplacement(lambda x: np.ones(x.shape[1], bool), (0, 1, 2), lambda t: (t, t, t), shape)]
             problem = Problem(mesh, material, held, element=name)
             state = equilibrium_path(problem, [1.0], TIGHT)[0]
             misfit = float(np.abs(state.u - x @ (F - np.eye(3)).T).max())

@@ -2,7 +2,7 @@
 
 from reference_fem import exact
 from reference_fem.model.material import MooneyRivlin, NeoHookean
-from reference_fem.model.problem import Held, Problem
+from reference_fem.model.problem import PrescribedDisplacement, Problem
 from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import block, symmetry
 from reference_fem.statics.equilibrium import equilibrium_path
@@ -16,7 +16,7 @@ TIGHT = NewtonSettings(force_tol=1e-11, volume_tol=1e-12)
 
 def pull(material, stretch, mesh, element="P2/P1"):
     """(problem, equilibrium) of the block at one stretch; the pulled end is the last held region."""
-    end = Held(lambda x: x[2] > 1 - 1e-9, (2,), lambda t: (0.0, 0.0, (stretch - 1.0) * t))
+    end = PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (2,), lambda t: (0.0, 0.0, (stretch - 1.0) * t))
     problem = Problem(mesh, material, [*symmetry(), end], element=element)
     return problem, equilibrium_path(problem, [0.5, 1.0], TIGHT)[-1]
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Line:
+class BenchLine:
     """A promised number beside the measured one; without a target it measures the machine, not the code."""
 
     what: str

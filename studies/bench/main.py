@@ -16,7 +16,7 @@ from reference_fem import crosscheck, equilibrium_path
 from reference_fem.crosscheck.bench import iteration_ratio
 from reference_fem.exact import BALL_BETWEEN_PLANES
 from studies.bench import meshes as geometry_bench
-from studies.bench.line import Line
+from studies.bench.line import BenchLine
 from studies.bench.plain import plain_lines
 from studies.bench.slide import slide_lines
 from studies.bench.solver import growth_lines, large_lines, step_lines, threads_lines, volumes_lines
@@ -32,15 +32,15 @@ APPROACHES = (0.10, 0.20, 0.30)
 """Of the planes over the diameter, at which the reference is held against the converged solution."""
 
 
-def volume_lines() -> list[Line]:
+def volume_lines() -> list[BenchLine]:
     """Worst volume error of ball_squeeze with the constraint, at two time steps; and what is lost without it."""
     lines = []
     for kind in ("tetrahedral", "surface"):
         for fraction, target in ((0.5, 3e-4), (0.05, 1e-5)):
             case = Case(BALL_SQUEEZE, BodyRecipe(kind), ImplicitVolume(), dt_fraction=fraction)
-            lines.append(Line(f"ball_squeeze {kind}, |V/V0 - 1| at {fraction:g} dt_c", _worst(case), "1", target))
+            lines.append(BenchLine(f"ball_squeeze {kind}, |V/V0 - 1| at {fraction:g} dt_c", _worst(case), "1", target))
     free = Case(BALL_SQUEEZE, BodyRecipe("tetrahedral"), Free())
-    lines.append(Line("ball_squeeze tetrahedral, free: loss", _worst(free), "1", 0.05, at_most=False))
+    lines.append(BenchLine("ball_squeeze tetrahedral, free: loss", _worst(free), "1", 0.05, at_most=False))
     return lines
 
 
@@ -49,7 +49,7 @@ def _worst(case: Case) -> float:
     return float(np.max(np.abs(record.fields["volume"].values / record.fields["volume_target"].values - 1)))
 
 
-def reference_lines() -> list[Line]:
+def reference_lines() -> list[BenchLine]:
     """The reference on ball_squeeze against oracle 5."""
     assert BALL_SQUEEZE.reference is not None
     level = BALL_SQUEEZE.reference.levels[-1]
@@ -62,55 +62,57 @@ def reference_lines() -> list[Line]:
         force, equator = BALL_BETWEEN_PLANES[share]
         got = float(-whole_forces(BALL_SQUEEZE, found.obstacle_force[None])[0, 0, 2]) / scale
         radius = float(np.hypot(*(problem.mesh.doflocs[:2] + found.u.T[:2])).max()) / RADIUS
-        lines.append(Line(f"reference force at d = {share:.2f}, deviation", abs(got / force - 1), "1", 5e-3))
-        lines.append(Line(f"reference equator at d = {share:.2f}, deviation", abs(radius / equator - 1), "1", 5e-4))
-    lines.append(Line("reference volume change", abs(path[-1].volume / path[-1].volume0 - 1), "1", 1e-4))
+        lines.append(BenchLine(f"reference force at d = {share:.2f}, deviation", abs(got / force - 1), "1", 5e-3))
+        lines.append(
+            BenchLine(f"reference equator at d = {share:.2f}, deviation", abs(radius / equator - 1), "1", 5e-4)
+        )
+    lines.append(BenchLine("reference volume change", abs(path[-1].volume / path[-1].volume0 - 1), "1", 1e-4))
     return lines
 
 
-def speed_lines() -> list[Line]:
+def speed_lines() -> list[BenchLine]:
     """Assembly and a Newton iteration of the reference on one pinned core."""
     with pinned(threads=1):
         cost = reference_bench.iteration_costs(cells=7)
     note = f"{cost['unknowns']:.0f} unknowns"
     return [
-        Line(
+        BenchLine(
             "assembly of tangent and residual", cost["assembled_per_s"], "unknowns/s", 400e3, at_most=False, note=note
         ),
-        Line("Newton iteration", cost["iteration_s"], "s", 0.2, note=note),
+        BenchLine("Newton iteration", cost["iteration_s"], "s", 0.2, note=note),
     ]
 
 
-def path_lines() -> list[Line]:
+def path_lines() -> list[BenchLine]:
     """Ten load steps with contact on a mesh of about 45,000 unknowns (twelve cells to an edge: 49,000), on one core."""
     with pinned(threads=1):
         found = reference_bench.contact_path(cells=12, steps=10)
     note = f"{found['unknowns']} unknowns, ten load steps, one thread on one core"
     return [
-        Line("quasi-static path with contact", found["wall_s"], "s", 240.0, note=note),
-        Line("its peak memory", found["peak_bytes"] / 1e9, "GB", 3.0, note=f"{note}; of the whole process"),
-        Line("its Newton iterations per step, median", float(np.median(found["iterations"])), "1", 6.0, note=note),
+        BenchLine("quasi-static path with contact", found["wall_s"], "s", 240.0, note=note),
+        BenchLine("its peak memory", found["peak_bytes"] / 1e9, "GB", 3.0, note=f"{note}; of the whole process"),
+        BenchLine("its Newton iterations per step, median", float(np.median(found["iterations"])), "1", 6.0, note=note),
     ]
 
 
-def second_code_lines() -> list[Line]:
+def second_code_lines() -> list[BenchLine]:
     """A Newton iteration of the reference over one of NGSolve's own Newton, same problem, mesh and core."""
     if not crosscheck.available():
         return []
     with pinned(threads=1):
         cost = iteration_ratio()
     note = f"{cost['unknowns']} unknowns; NGSolve with {cost['inverse']}: {cost['ngsolve_s']:.3g} s"
-    return [Line("Newton iteration over NGSolve's", cost["ratio"], "1", 1.5, note=note)]
+    return [BenchLine("Newton iteration over NGSolve's", cost["ratio"], "1", 1.5, note=note)]
 
 
-def geometry_lines() -> list[Line]:
+def geometry_lines() -> list[BenchLine]:
     """Meshes of random organs, of a fine liver and of families."""
-    return [Line(*promise) for promise in geometry_bench.promises()]
+    return [BenchLine(*promise) for promise in geometry_bench.promises()]
 
 
 def main() -> None:
     """Measures everything; the table says for each number whether it is met."""
-    stages: tuple[Callable[[], list[Line]], ...] = (
+    stages: tuple[Callable[[], list[BenchLine]], ...] = (
         step_lines,
         plain_lines,
         large_lines,

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from massspring import ImplicitVolume, Setup, simulate
-from studies.bench.line import Line
+from studies.bench.line import BenchLine
 from studies.bench.solver import FRAMES, LARGE, LARGE_FRAMES, LARGE_REPEATS, REPEATS, squeezed_setup
 from studies.timing.protocol import interleave, pinned
 from studies.timing.statistics import kernel_ns, ratio_with_spread
@@ -139,7 +139,7 @@ def plain_run(setup: Setup) -> tuple[np.ndarray, np.ndarray]:
     return times, x if state.permutation is None else x[state.permutation]
 
 
-def plain_lines() -> list[Line]:
+def plain_lines() -> list[BenchLine]:
     """How many times as long a plain step takes as one of implicit_volume, in turns on one pinned core."""
     lines = []
     for nodes, frames, repeats in ((550, FRAMES, REPEATS), (LARGE, LARGE_FRAMES, LARGE_REPEATS)):
@@ -154,5 +154,5 @@ def plain_lines() -> list[Line]:
             plain, fused = (1e-3 * kernel_ns(times[name]) / setup.clock.steps for name in ("plain", "fused"))
             note = f"{plain:.3g} over {fused:.3g} µs a step; rounds {ratio.low:.3g} to {ratio.high:.3g}"
             what = f"plain step over fused step, {nodes} surface nodes, {precision}"
-            lines.append(Line(what, ratio.median, "1", target, at_most=False, note=note))
+            lines.append(BenchLine(what, ratio.median, "1", target, at_most=False, note=note))
     return lines

@@ -11,7 +11,7 @@ import numpy as np
 
 from massspring import Clock, MassSpringError, Setup
 from massspring.run.simulation import check_state
-from studies.bench.line import Line
+from studies.bench.line import BenchLine
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.scenes.stomach_slide import NODES, STOMACH_SLIDE
@@ -82,7 +82,7 @@ def counted_ns(frames: int) -> np.ndarray:
     return times
 
 
-def slide_lines() -> list[Line]:
+def slide_lines() -> list[BenchLine]:
     """A step in contact, and p99 of updates and frames in the wall time that their simulated time leaves."""
     video = slide_setup()
     haptic, dt = stepwise(video), video.clock.dt
@@ -100,14 +100,14 @@ def slide_lines() -> list[Line]:
     )
     name = f"stomach_slide, {NODES} nodes"
     lines = [
-        Line(f"{name}: a step", 1e-6 * kernel_ns(frame_ns) / video.clock.steps, "ms", 1e3 * dt, note=note),
-        Line(f"{name}: a step with its call", 1e-6 * kernel_ns(step_ns), "ms", 1e3 * dt, note="as a device waits"),
+        BenchLine(f"{name}: a step", 1e-6 * kernel_ns(frame_ns) / video.clock.steps, "ms", 1e3 * dt, note=note),
+        BenchLine(f"{name}: a step with its call", 1e-6 * kernel_ns(step_ns), "ms", 1e3 * dt, note="as a device waits"),
     ]
     restless = percentiles(counting)["p99"] / kernel_ns(counting)
     for what, ns, span, needs in late:
         found = percentiles(ns)
         note = f"{needs}; median {1e-6 * found['p50']:.3g}"
-        lines.append(Line(f"stomach_slide: {what}", 1e-6 * found["p99"], "ms", 1e3 * span, note=note))
+        lines.append(BenchLine(f"stomach_slide: {what}", 1e-6 * found["p99"], "ms", 1e3 * span, note=note))
     what = "a loop of plain Python, at its fastest as long as that step with its call: the limit of the machine"
     note = f"p99; {restless:.3g} times the fastest"
-    return [*lines, Line(what, 1e-6 * restless * kernel_ns(step_ns), "ms", note=note)]
+    return [*lines, BenchLine(what, 1e-6 * restless * kernel_ns(step_ns), "ms", note=note)]

@@ -27,7 +27,7 @@ from massspring import (
     tetrahedral_body,
 )
 from massspring.layout.threads import cores
-from studies.bench.line import Line
+from studies.bench.line import BenchLine
 from studies.geometry import ball
 from studies.scenes.ball_squeeze import RADIUS
 from studies.timing.protocol import interleave, pinned
@@ -108,7 +108,7 @@ def without_ns(setup: Setup, method: Method) -> np.ndarray:
     return times
 
 
-def step_lines() -> list[Line]:
+def step_lines() -> list[BenchLine]:
     """Cost of a step of the 550-node surface body in both precisions, and of its volume constraint."""
     kept = squeezed_setup(ImplicitVolume())
     setups = {"kept": kept, "free": squeezed_setup(Free()), "single": replace(kept, precision="float32")}
@@ -122,29 +122,31 @@ def step_lines() -> list[Line]:
     apart = f"in runs of their own, where less is touched without it, {cost['kept'] / cost['free']:.3g}"
     rounds = f"from the same states; rounds {ratio.median:.3g} ({ratio.low:.3g} to {ratio.high:.3g}); {apart}"
     return [
-        Line("step, 550 surface nodes, m = 1, one plane", cost["kept"], "µs", 20.0, note=springs),
-        Line("the same in float32", cost["single"], "µs", 14.0),
-        Line("the same without the constraint", cost["free"], "µs", 20.0),
-        Line("constraint on / off", kernel_ns(on) / kernel_ns(off), "1", 1.18, note=rounds),
+        BenchLine("step, 550 surface nodes, m = 1, one plane", cost["kept"], "µs", 20.0, note=springs),
+        BenchLine("the same in float32", cost["single"], "µs", 14.0),
+        BenchLine("the same without the constraint", cost["free"], "µs", 20.0),
+        BenchLine("constraint on / off", kernel_ns(on) / kernel_ns(off), "1", 1.18, note=rounds),
     ]
 
 
-def large_lines() -> list[Line]:
+def large_lines() -> list[BenchLine]:
     """19,500 surface nodes with a probe that slides: a step in both precisions, and frames at p99."""
     double = probed_setup(LARGE)
     setups = {"double": double, "single": replace(double, precision="float32")}
     times = _timed(setups, LARGE_REPEATS)
     note = f"{double.body.springs.count} springs; a sphere slides on it"
     lines = [
-        Line(f"step, {LARGE} surface nodes, m = 1", 1e-3 * _step_us(times["double"], double), "ms", 0.75, note=note),
-        Line("the same in float32", 1e-3 * _step_us(times["single"], double), "ms", 0.5),
+        BenchLine(
+            f"step, {LARGE} surface nodes, m = 1", 1e-3 * _step_us(times["double"], double), "ms", 0.75, note=note
+        ),
+        BenchLine("the same in float32", 1e-3 * _step_us(times["single"], double), "ms", 0.5),
     ]
     late = percentiles(times["double"])["p99"] * 1e-9 / double.clock.frame
     needs = f"p99 of computing over simulated time, dt = {double.clock.dt:.3g} s; at most 1 to keep up"
-    return [*lines, Line("its frames: wall over simulated time", late, "1", 1.0, note=needs)]
+    return [*lines, BenchLine("its frames: wall over simulated time", late, "1", 1.0, note=needs)]
 
 
-def threads_lines() -> list[Line]:
+def threads_lines() -> list[BenchLine]:
     """The same step on two cores, where there are two: the paper's refined stomach again, both precisions."""
     if cores() < 2:
         return []
@@ -165,7 +167,7 @@ def threads_lines() -> list[Line]:
         ):
             ratio = ratio_with_spread(times["one"], times[name])
             note = f"{precision}; interval {cores_used * ratio.low:.3g} to {cores_used * ratio.high:.3g}"
-            lines.append(Line(what, cores_used * ratio.median, "1", target, at_most=False, note=note))
+            lines.append(BenchLine(what, cores_used * ratio.median, "1", target, at_most=False, note=note))
     return lines
 
 
@@ -191,7 +193,7 @@ def spiral_setup(nodes: int) -> Setup:
     return Setup(body, ImplicitVolume(), clock, (Plane((0.0, 0.0, RADIUS), (0.0, 0.0, -1.0)),), (_bottom(body),))
 
 
-def growth_lines() -> list[Line]:
+def growth_lines() -> list[BenchLine]:
     """Time per spring and step at 200,000 surface nodes over that at 2,000; and memory per spring."""
     setups = {"small": spiral_setup(SMALL), "huge": spiral_setup(HUGE)}
     times = _timed(setups, 9)
@@ -201,19 +203,23 @@ def growth_lines() -> list[Line]:
     memory = (held_bytes(huge.body, seen) + held_bytes(huge.start(), seen)) / huge.body.springs.count
     note = f"{cost['small']:.3g} and {cost['huge']:.3g} ns"
     return [
-        Line(f"time per spring-step, {HUGE} over {SMALL} nodes", cost["huge"] / cost["small"], "1", 1.6, note=note),
-        Line("memory of body and state per spring", memory, "bytes", 400.0, note=f"{HUGE} surface nodes"),
+        BenchLine(
+            f"time per spring-step, {HUGE} over {SMALL} nodes", cost["huge"] / cost["small"], "1", 1.6, note=note
+        ),
+        BenchLine("memory of body and state per spring", memory, "bytes", 400.0, note=f"{HUGE} surface nodes"),
     ]
 
 
-def volumes_lines() -> list[Line]:
+def volumes_lines() -> list[BenchLine]:
     """Cost of a step with 128 regions and with one volume per node."""
     setups = {"regions": volumes_setup(128), "nodal": volumes_setup(None)}
     times = _timed(setups, 5)
     count = setups["nodal"].body.kept.count
     return [
-        Line("step, m = 128, filled ball", _step_us(times["regions"], setups["regions"]), "µs", 150.0),
-        Line("step, one volume per node", _step_us(times["nodal"], setups["nodal"]), "µs", 300.0, note=f"m = {count}"),
+        BenchLine("step, m = 128, filled ball", _step_us(times["regions"], setups["regions"]), "µs", 150.0),
+        BenchLine(
+            "step, one volume per node", _step_us(times["nodal"], setups["nodal"]), "µs", 300.0, note=f"m = {count}"
+        ),
     ]
 
 

@@ -68,7 +68,7 @@ def _curved_octant(scene: Scene, straight: MeshTet) -> MeshTet2:
     return curve(straight, lambda x: project_ball(x.T, radius).T, on_sphere)
 
 
-def _curved(body: "Body", coarse: "Body", curved_coarse: MeshTet2) -> MeshTet2:
+def _curved(body: "MeshedBody", coarse: "MeshedBody", curved_coarse: MeshTet2) -> MeshTet2:
     """The finer mesh with sides as curved as those of the coarse one that lie on the true shape.
 
     The quadratic map of a coarse element takes its parts with it exactly, so they stay upright however small they are;
@@ -81,7 +81,7 @@ def _curved(body: "Body", coarse: "Body", curved_coarse: MeshTet2) -> MeshTet2:
     return replace(finer, doflocs=np.ascontiguousarray((nodes(finer) + move).T))
 
 
-def _on_true_shape(organ_mesh: OrganMesh, body: "Body", shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:
+def _on_true_shape(organ_mesh: OrganMesh, body: "MeshedBody", shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:
     """The mesh with the nodes of its boundary on the true surfaces, those of outlines on the true outlines.
 
     A polygon instead would hold the body h²/8r too little or too much, of first order in the force.
@@ -103,7 +103,7 @@ def true_shape(organ: Organ) -> Shape | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class MeshedBody:
     """A mesh with straight sides, and where on its surface it is held."""
 
     mesh: MeshTet
@@ -135,7 +135,7 @@ class Body:
             deep |= obstacle.gap(x, t) < 0
         return np.flatnonzero(np.isin(self.mesh.t, outer[deep]).any(axis=0))
 
-    def bisected(self, elements: np.ndarray) -> "Body":
+    def bisected(self, elements: np.ndarray) -> "MeshedBody":
         """Each of the elements halved at its longest edge, and of their neighbours as many as that takes."""
         talk = logging.getLogger("skfem.mesh.mesh")
         before = talk.level
@@ -147,10 +147,10 @@ class Body:
         return replace(self, mesh=MeshTet(np.ascontiguousarray(finer.p), np.ascontiguousarray(finer.t)))
 
 
-def coarse_body(mesh: MeshTet, patches: list[np.ndarray]) -> Body:
+def coarse_body(mesh: MeshTet, patches: list[np.ndarray]) -> MeshedBody:
     """A body that is held at the boundary facets whose vertices are all in one of the patches."""
     outer = boundary_triangles(mesh.t.T)
-    return Body(mesh, mesh.p.T.copy(), [outer[np.isin(outer, patch).all(axis=1)] for patch in patches])
+    return MeshedBody(mesh, mesh.p.T.copy(), [outer[np.isin(outer, patch).all(axis=1)] for patch in patches])
 
 
 def rim_sides(facets: np.ndarray) -> np.ndarray:

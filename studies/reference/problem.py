@@ -5,8 +5,16 @@ from scipy.spatial import KDTree
 from skfem import MeshTet2
 
 from massspring import Capsule, Obstacle, Plane, Probe
-from reference_fem import Cavity, NeoHookean, Problem, RigidCapsule, RigidPlane, RigidSphere, nodes
-from reference_fem import Held as HeldPatch
+from reference_fem import (
+    Cavity,
+    NeoHookean,
+    PrescribedDisplacement,
+    Problem,
+    RigidCapsule,
+    RigidPlane,
+    RigidSphere,
+    nodes,
+)
 from studies.base.errors import StudyError
 from studies.reference.mesh import reference_mesh
 from studies.scene.scene import Scene
@@ -70,16 +78,19 @@ def whole_forces(scene: Scene, forces: np.ndarray) -> np.ndarray:
     return whole
 
 
-def _symmetry_planes() -> tuple[HeldPatch, ...]:
-    return tuple(HeldPatch(where=lambda x, axis=axis: np.abs(x[axis]) < 1e-12, components=(axis,)) for axis in range(3))
+def _symmetry_planes() -> tuple[PrescribedDisplacement, ...]:
+    return tuple(
+        PrescribedDisplacement(where=lambda x, axis=axis: np.abs(x[axis]) < 1e-12, components=(axis,))
+        for axis in range(3)
+    )
 
 
-def _held(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray]) -> tuple[HeldPatch, ...]:
+def _held(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray]) -> tuple[PrescribedDisplacement, ...]:
     points = nodes(mesh)
     reach = SAME_POINT * float(np.ptp(points))
     trees = [KDTree(points[patch]) for patch in patches]
     return tuple(
-        HeldPatch(where=lambda x, tree=tree: tree.query(x.T)[0] < reach, motion=held.path)
+        PrescribedDisplacement(where=lambda x, tree=tree: tree.query(x.T)[0] < reach, motion=held.path)
         for held, tree in zip(scene.held, trees, strict=True)
     )
 

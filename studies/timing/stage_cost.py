@@ -45,11 +45,11 @@ PLAIN, TIMED = "as it is", "with marks"
 STAGE, SKIPPED, FRAME = "stage", "skipped", "per frame"
 
 
-Run = tuple[np.ndarray, np.ndarray, State]
+TimedFrames = tuple[np.ndarray, np.ndarray, State]
 """Time of each frame [ns], (F,); of its ROWS, less what timing them cost, (rows, F); the last state."""
 
 
-def run_frames(setup: Setup, state: State, times: StageTimes | None = None, frames: int | None = None) -> Run:
+def run_frames(setup: Setup, state: State, times: StageTimes | None = None, frames: int | None = None) -> TimedFrames:
     """Runs the first `frames` of a set-up, or all. Raises MassSpringError for a run that breaks off."""
     state = replace(state, diagnostics=state.diagnostics._replace(stage_times=times))
     frames = setup.clock.frames if frames is None else frames
@@ -103,7 +103,7 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget:
     Raises StudyError or MassSpringError for a case that cannot run."""
     setup = prepare(case.replaced(frames=min(frames, case.frames or case.scene.frames))).setup
     skipped = [skip for skip in SKIPS if skip.left_out(setup)]
-    runs = {PLAIN: partial(run_frames, setup, setup.start()), TIMED: partial(_ticked, setup)}
+    runs = {PLAIN: partial(run_frames, setup, setup.start()), TIMED: partial(_timed, setup)}
     runs |= {skip.name: partial(run_frames, *skip.included(setup, setup.start())) for skip in skipped}
     with pinned(threads=1):
         found = _in_turns(runs, repeats, budget)
@@ -123,16 +123,16 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget:
     return table
 
 
-def _ticked(setup: Setup, frames: int | None = None) -> Run:
+def _timed(setup: Setup, frames: int | None = None) -> TimedFrames:
     return run_frames(setup, setup.start(), new_stage_times(), frames)
 
 
-def _in_turns(runs: dict[str, partial[Run]], repeats: int, budget: float) -> dict[str, list[Run]]:
+def _in_turns(runs: dict[str, partial[TimedFrames]], repeats: int, budget: float) -> dict[str, list[TimedFrames]]:
     """Every run up to `repeats` times, in turns, compiled before; one that is `EXPENSIVE`, once. No turn begins that
     would end after `budget` [s], but the first."""
     for run in runs.values():
         run(frames=1)
-    found: dict[str, list[Run]] = {name: [] for name in runs}
+    found: dict[str, list[TimedFrames]] = {name: [] for name in runs}
     shortest = dict.fromkeys(runs, 0.0)
     began, longest = perf_counter_ns(), 0
     for turn in range(repeats):
@@ -149,7 +149,7 @@ def _in_turns(runs: dict[str, partial[Run]], repeats: int, budget: float) -> dic
     return found
 
 
-def _fastest(timed: list[Run]) -> np.ndarray:
+def _fastest(timed: list[TimedFrames]) -> np.ndarray:
     """Times of ROWS in the fastest repeat of each frame, (rows, F)."""
     quickest = np.argmin([frame_ns for frame_ns, _, _ in timed], axis=0)
     stages = np.stack([stage_ns for _, stage_ns, _ in timed])

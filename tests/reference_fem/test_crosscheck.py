@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from reference_fem import (
-    Held,
     NeoHookean,
+    PrescribedDisplacement,
     Problem,
     RigidPlane,
     SolveError,
@@ -28,8 +28,10 @@ needs_ngsolve = pytest.mark.skipif(
 
 def stretched(**changes):
     """A skewed block drawn out and aside: no element is like another."""
-    grip = Held(lambda x: x[2] > 1 - 1e-9, motion=lambda t: (0.1 * t, 0.0, 0.2 * t))
-    problem = Problem(block((2, 2, 2), skew=0.1), NeoHookean(1.0, 1000.0), [grip, Held(lambda x: x[2] < 1e-9)])
+    grip = PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, motion=lambda t: (0.1 * t, 0.0, 0.2 * t))
+    problem = Problem(
+        block((2, 2, 2), skew=0.1), NeoHookean(1.0, 1000.0), [grip, PrescribedDisplacement(lambda x: x[2] < 1e-9)]
+    )
     return replace(problem, **changes)
 
 
@@ -91,7 +93,10 @@ def test_the_three_opinions():
         ({"obstacles": [RigidPlane((0, 0, 2), (0, 0, -1))]}, "held regions and nothing else"),
         ({"element": "MINI"}, "held regions and nothing else"),
         ({"mesh": ball_octant(2), "held": symmetry()}, "straight elements"),
-        ({"held": [Held(lambda x: np.abs(x[2] - 0.75) < 1e-9)]}, "mid-side nodes are held while a vertex"),
+        (
+            {"held": [PrescribedDisplacement(lambda x: np.abs(x[2] - 0.75) < 1e-9)]},
+            "mid-side nodes are held while a vertex",
+        ),
     ],
 )
 def test_what_the_translation_does_not_cover_is_refused(changes, message):

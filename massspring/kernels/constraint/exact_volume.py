@@ -14,7 +14,7 @@ BEYOND = 1e-12
 """A root this many times farther away than the linear step is round-off of one at infinity."""
 
 
-class Line(NamedTuple):
+class LineSearch(NamedTuple):
     """Where a step would end without pressure, and where a pressure moves it."""
 
     y: np.ndarray

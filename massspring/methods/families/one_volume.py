@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.arrays.layout import BoundaryConditions, Push
-from massspring.kernels.constraint.exact_volume import Line, line_into, nearest_root, volume_cubic
+from massspring.kernels.constraint.exact_volume import LineSearch, line_into, nearest_root, volume_cubic
 from massspring.kernels.constraint.one_volume import limited_error, steepest, surely_short, volume_multiplier
 from massspring.kernels.contact.active_set import pressure_reach
 from massspring.kernels.contact.modes import FREE
@@ -161,7 +161,7 @@ def constraint_frame(frame, line, lam, rule):
 def advance_by(rule: Rule, state: State, boundary: BoundaryConditions) -> State:
     """One frame by `rule`."""
     after = begin_frame(state, boundary)
-    line = Line(np.empty_like(after.x), np.empty_like(after.x))
+    line = LineSearch(np.empty_like(after.x), np.empty_like(after.x))
     start = float(after.lam[0])
     lam = constraint_frame(after.frame(boundary), line, start, rule)
     return replace(after, lam=np.array([lam]))

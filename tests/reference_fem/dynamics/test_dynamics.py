@@ -6,9 +6,9 @@ import scipy.sparse as sp
 
 from reference_fem import (
     DynamicsSettings,
-    Held,
     NeoHookean,
     NewtonSettings,
+    PrescribedDisplacement,
     Problem,
     SolveError,
     motion_path,
@@ -118,7 +118,9 @@ def test_the_tangent_is_the_slope_of_the_residual_with_inertia():
     """Central differences along one direction of the free unknowns; held ones bring no inertia of their own."""
     mesh = block((1, 1, 1))
     system = MovingSystem(
-        Problem(mesh, NeoHookean(MU, 10.0 * MU), [Held(lambda x: x[2] < 1e-9)], density=RHO), NewtonSettings(), 40.0
+        Problem(mesh, NeoHookean(MU, 10.0 * MU), [PrescribedDisplacement(lambda x: x[2] < 1e-9)], density=RHO),
+        NewtonSettings(),
+        40.0,
     )
     random, free = np.random.default_rng(1), system.pattern.free
     v, a, memory = random.standard_normal((3, system.displacement_count))
@@ -218,7 +220,7 @@ def test_settings_out_of_range_are_refused(given, message):
 def test_what_cannot_move_is_refused():
     mesh, material = block((1, 1, 1)), NeoHookean(MU, 1e3 * MU)
     with pytest.raises(SolveError, match="density is 0"):
-        motion_path(Problem(mesh, material, [Held(lambda x: x[2] < 1e-9)]), (1.0,))
+        motion_path(Problem(mesh, material, [PrescribedDisplacement(lambda x: x[2] < 1e-9)]), (1.0,))
     problem = Problem(mesh, material, (), density=RHO)
     with pytest.raises(SolveError, match="element 'MINI' is asked for: use 'P2/P1'"):
         motion_path(Problem(mesh, material, (), density=RHO, element="MINI"), (1.0,))

@@ -7,9 +7,9 @@ from skfem import MeshTet
 from reference_fem import (
     Cavity,
     DynamicsSettings,
-    Held,
     NeoHookean,
     NewtonSettings,
+    PrescribedDisplacement,
     Problem,
     RigidPlane,
     RigidSphere,
@@ -119,7 +119,7 @@ def test_a_point_on_its_way_out_is_out_of_place():
 @pytest.fixture(scope="module")
 def probed():
     """A spherical probe pushed into a ball within a second, then held; the body swings much faster and is damped."""
-    held = [Held(lambda x: np.abs(x[2]) < 1e-9), *symmetry()[:2]]
+    held = [PrescribedDisplacement(lambda x: np.abs(x[2]) < 1e-9), *symmetry()[:2]]
     probe = RigidSphere((0.0, 0.0, 1.35), 0.35, lambda t: (0.0, 0.0, -0.15 * np.sin(0.5 * np.pi * min(t, 1.0)) ** 2))
     problem = Problem(ball_octant(4), MATERIAL, held, [probe], density=0.02)
     path = motion_path(problem, np.linspace(0.0, 2.0, 11), DynamicsSettings(dt=0.02, damping=20.0))
@@ -145,7 +145,11 @@ def test_the_energy_of_a_probed_body_is_accounted_for(probed):
 def shaken(steps):
     """A single tetrahedron, all of whose nodes are shaken: it can only move as one."""
     swing, damping = 3.0, 0.8
-    held = [Held(lambda x: np.ones(x.shape[1], bool), motion=lambda t: (0.1 * np.sin(swing * t), 0.0, 0.0))]
+    held = [
+        PrescribedDisplacement(
+            lambda x: np.ones(x.shape[1], bool), motion=lambda t: (0.1 * np.sin(swing * t), 0.0, 0.0)
+        )
+    ]
     mesh = MeshTet(np.array([[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]), np.arange(4)[:, None])
     problem = Problem(mesh, MATERIAL, held, density=12.0)
     path = motion_path(problem, (0.5, 1.0), DynamicsSettings(1.0 / steps, damping))
@@ -171,7 +175,7 @@ def test_work_of_the_holders_is_kinetic_energy_and_damping():
 
 def test_a_prescribed_motion_with_a_kink_does_not_ring():
     """Pulled from rest at once: held nodes have exactly the speed of their motion, and no acceleration later."""
-    held = [Held(lambda x: x[2] < 1e-9, motion=lambda t: (0.0, 0.0, -0.1 * t))]
+    held = [PrescribedDisplacement(lambda x: x[2] < 1e-9, motion=lambda t: (0.0, 0.0, -0.1 * t))]
     problem = Problem(block((1, 1, 1)), MATERIAL, held, density=1.0)
     bottom = nodes(problem.mesh)[:, 2] < 1e-9
     for moment in motion_path(problem, (0.0, 0.2, 0.4), DynamicsSettings(dt=0.05)):
@@ -205,8 +209,10 @@ def test_filling_a_hollow_body_does_work():
 
 def pulled(settings):
     """A cube drawn out by a half of its height, in a time in which shear waves cross it four times."""
-    grip = Held(lambda x: x[2] > 1 - 1e-9, motion=lambda t: (0.0, 0.0, 0.5 * np.sin(0.5 * np.pi * t) ** 2))
-    problem = Problem(block((2, 2, 2)), MATERIAL, [Held(lambda x: x[2] < 1e-9), grip], density=0.05)
+    grip = PrescribedDisplacement(
+        lambda x: x[2] > 1 - 1e-9, motion=lambda t: (0.0, 0.0, 0.5 * np.sin(0.5 * np.pi * t) ** 2)
+    )
+    problem = Problem(block((2, 2, 2)), MATERIAL, [PrescribedDisplacement(lambda x: x[2] < 1e-9), grip], density=0.05)
     return motion_path(problem, (0.5, 1.0), settings)
 
 
@@ -226,7 +232,7 @@ def test_a_motion_that_cannot_go_on_says_where_it_was():
 
 
 def test_a_start_on_another_mesh_is_refused():
-    held = [Held(lambda x: x[2] < 1e-9)]
+    held = [PrescribedDisplacement(lambda x: x[2] < 1e-9)]
     start = equilibrium_path(Problem(block((1, 1, 1)), MATERIAL, held), (1.0,))[0]
     with pytest.raises(SolveError, match="start from an equilibrium on this mesh"):
         motion_path(Problem(block((2, 1, 1)), MATERIAL, held, density=1.0), (1.0,), start=start)
@@ -234,7 +240,7 @@ def test_a_start_on_another_mesh_is_refused():
 
 def test_moments_are_seen_as_they_are_found():
     seen = []
-    held = [Held(lambda x: x[2] < 1e-9)]
+    held = [PrescribedDisplacement(lambda x: x[2] < 1e-9)]
     problem = Problem(block((1, 1, 1)), MATERIAL, held, gravity=(0.0, 0.0, -0.1), density=1.0)
     path = motion_path(problem, (0.0, 0.1), DynamicsSettings(), on_step=seen.append)
     assert seen == path

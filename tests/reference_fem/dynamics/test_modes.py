@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 from skfem import Basis, BilinearForm, ElementTetP2
 
-from reference_fem import Held, NeoHookean, NewtonSettings, Problem, SolveError, exact, natural_frequencies, nodes
+from reference_fem import (
+    NeoHookean,
+    NewtonSettings,
+    PrescribedDisplacement,
+    Problem,
+    SolveError,
+    exact,
+    natural_frequencies,
+    nodes,
+)
 from reference_fem.dynamics.inertia import MovingSystem
 from tests.reference_fem.bodies import ball_octant, block, symmetry, whole_ball
 
@@ -54,7 +63,7 @@ def test_a_free_body_has_six_rigid_modes(ringing):
     assert len(modes.elastic) == 10
 
 
-@pytest.mark.parametrize(("held", "rigid"), [([Held(lambda x: x[2] < 1e-9)], 0), (symmetry()[2:], 3)])
+@pytest.mark.parametrize(("held", "rigid"), [([PrescribedDisplacement(lambda x: x[2] < 1e-9)], 0), (symmetry()[2:], 3)])
 def test_rigid_modes_are_what_the_holders_leave_free(held, rigid):
     """Glued: none. On a frictionless table: two slides and a turn."""
     modes = modes_of(block((2, 2, 2)), 1000.0, 4, held)
@@ -71,7 +80,7 @@ def test_symmetry_planes_keep_the_modes_that_respect_them():
 
 def test_shapes_are_orthonormal_and_vanish_where_held():
     mesh = block((2, 2, 2), skew=0.1)
-    modes = modes_of(mesh, 1000.0, 6, [Held(lambda x: x[2] < 1e-9)])
+    modes = modes_of(mesh, 1000.0, 6, [PrescribedDisplacement(lambda x: x[2] < 1e-9)])
     mass = MovingSystem(Problem(mesh, NeoHookean(MU, 1e3 * MU), (), density=RHO), NewtonSettings()).mass
     products = np.einsum("kni,lni->kl", modes.shapes, np.stack([mass.times(shape) for shape in modes.shapes]))
     np.testing.assert_allclose(products, np.eye(6), atol=1e-10)

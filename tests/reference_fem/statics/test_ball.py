@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from reference_fem import (
-    Held,
     NeoHookean,
     NewtonSettings,
+    PrescribedDisplacement,
     Problem,
     RigidPlane,
     RigidSphere,
@@ -80,7 +80,7 @@ def test_small_approach_is_softer_than_hertz_by_little():
 @pytest.fixture(scope="module")
 def probed():
     """A ball of a third of the body's radius pushed in along the axis, the equator glued."""
-    held = [Held(lambda x: np.abs(x[2]) < 1e-9), *symmetry()[:2]]
+    held = [PrescribedDisplacement(lambda x: np.abs(x[2]) < 1e-9), *symmetry()[:2]]
     probe = RigidSphere((0.0, 0.0, 1.35), 0.35, lambda t: (0.0, 0.0, -t))
     mesh = ball_octant(6)
     return mesh, probe, equilibrium_path(Problem(mesh, NeoHookean(1.0, 1000.0), held, [probe]), (0.1, 0.2))
@@ -105,12 +105,12 @@ def test_a_probe_leaves_no_node_far_inside(probed):
 def test_a_turned_scene_gives_the_turned_answer():
     """To the Newton tolerance: the unknowns come in another order, so round-off differs."""
     mesh = ball_octant(4)
-    held = [Held(lambda x: np.abs(x[2]) < 1e-9), *symmetry()[:2]]
+    held = [PrescribedDisplacement(lambda x: np.abs(x[2]) < 1e-9), *symmetry()[:2]]
     probe = RigidSphere((0.0, 0.0, 1.5), 0.5, lambda t: (0.0, 0.0, -t))
     straight = equilibrium_path(Problem(mesh, NeoHookean(1.0, 1000.0), held, [probe]), (0.1,))[0]
     turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     turned_mesh = type(mesh)(turn @ mesh.doflocs, mesh.t)
-    turned_held = [Held(lambda x: np.abs(x[0]) < 1e-9), *symmetry()[1:]]
+    turned_held = [PrescribedDisplacement(lambda x: np.abs(x[0]) < 1e-9), *symmetry()[1:]]
     turned_probe = RigidSphere(tuple(turn @ (0.0, 0.0, 1.5)), 0.5, lambda t: turn @ (0.0, 0.0, -t))
     turned = equilibrium_path(Problem(turned_mesh, NeoHookean(1.0, 1000.0), turned_held, [turned_probe]), (0.1,))[0]
     np.testing.assert_allclose(turned.u, straight.u @ turn.T, atol=1e-6)

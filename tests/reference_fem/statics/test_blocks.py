@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference_fem import Held, NeoHookean, NewtonSettings, Problem, equilibrium_path, exact, nodes
+from reference_fem import NeoHookean, NewtonSettings, PrescribedDisplacement, Problem, equilibrium_path, exact, nodes
 from tests.reference_fem.bodies import block, symmetry
 
 TIGHT = NewtonSettings(force_tol=1e-11, volume_tol=1e-12)
@@ -14,7 +14,10 @@ ROUND_OFF = 1e-9
 
 
 def pulled(material, stretch, mesh):
-    held = [*symmetry(), Held(lambda x: x[2] > 1 - 1e-9, (2,), lambda t: (0.0, 0.0, (stretch - 1.0) * t))]
+    held = [
+        *symmetry(),
+        PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (2,), lambda t: (0.0, 0.0, (stretch - 1.0) * t)),
+    ]
     return equilibrium_path(Problem(mesh, material, held), [0.5, 1.0], TIGHT)[-1]
 
 
@@ -23,7 +26,11 @@ def test_affine_boundary_gives_an_affine_body_and_constant_pressure():
     F = np.array([[1.1, 0.2, 0.0], [0.0, 0.95, 0.1], [0.05, 0.0, 0.98]])
     F /= np.linalg.det(F) ** (1 / 3)
     F[:, 2] *= 1.0005  # a known volume change, so that the pressure is not zero
-    held = [Held(lambda x: np.ones(x.shape[1], bool), (0, 1, 2), lambda t: (t, t, t), lambda x: (F - np.eye(3)) @ x)]
+    held = [
+        PrescribedDisplacement(
+            lambda x: np.ones(x.shape[1], bool), (0, 1, 2), lambda t: (t, t, t), lambda x: (F - np.eye(3)) @ x
+        )
+    ]
     state = equilibrium_path(Problem(mesh, material, held), [1.0], TIGHT)[0]
     np.testing.assert_allclose(state.u, nodes(mesh) @ (F - np.eye(3)).T, atol=ROUND_OFF)
     np.testing.assert_allclose(state.p, material.kappa * (np.linalg.det(F) - 1.0), rtol=1e-7)
@@ -62,7 +69,11 @@ def test_uniaxial_test_notices_a_material_that_is_a_thousandth_too_stiff():
 def test_holders_carry_the_weight():
     """A block that hangs from its top: the reaction is its weight, and rest has no pressure jump at the free end."""
     problem = Problem(
-        block(), NeoHookean(1800.0, 1.8e6), [Held(lambda x: x[2] > 1 - 1e-9)], gravity=(0.0, 0.0, -9.81), density=10.0
+        block(),
+        NeoHookean(1800.0, 1.8e6),
+        [PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9)],
+        gravity=(0.0, 0.0, -9.81),
+        density=10.0,
     )
     state = equilibrium_path(problem, [0.0], TIGHT)[0]
     np.testing.assert_allclose(state.held_force[0], (0.0, 0.0, 98.1), atol=98.1 * 1e-9)
@@ -71,7 +82,7 @@ def test_holders_carry_the_weight():
 
 def test_energy_is_the_work_of_the_holders():
     """Simpson's rule over the stretch, whose error at these nine points is below 1e-7."""
-    held = [*symmetry(), Held(lambda x: x[2] > 1 - 1e-9, (2,), lambda t: (0.0, 0.0, 0.4 * t))]
+    held = [*symmetry(), PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (2,), lambda t: (0.0, 0.0, 0.4 * t))]
     times = np.arange(1, 9) / 8
     path = equilibrium_path(Problem(block((1, 1, 1)), NeoHookean(1.0, 1000.0), held), times, TIGHT)
     force = np.array([0.0] + [state.held_force[3, 2] for state in path])

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from skfem import MeshTet
 
-from reference_fem import Cavity, Held, NeoHookean, NewtonSettings, Problem, SolveError, equilibrium_path, exact
+from reference_fem import (
+    Cavity,
+    NeoHookean,
+    NewtonSettings,
+    PrescribedDisplacement,
+    Problem,
+    SolveError,
+    equilibrium_path,
+    exact,
+)
 from reference_fem.statics.tangent import Tangent
 from reference_fem.system.saddle_point import System
 from reference_fem.system.state import Loads
@@ -42,7 +51,12 @@ def in_the_middle(x):
 
 
 def closed_problem(**content):
-    return Problem(hollow_cube(), TISSUE, [Held(lambda x: x[2] < 1e-9)], cavities=[Cavity(in_the_middle, **content)])
+    return Problem(
+        hollow_cube(),
+        TISSUE,
+        [PrescribedDisplacement(lambda x: x[2] < 1e-9)],
+        cavities=[Cavity(in_the_middle, **content)],
+    )
 
 
 def test_volume_of_a_closed_lumen():
@@ -146,7 +160,7 @@ def test_a_prescribed_pressure_gives_the_volume_of_the_closed_form():
 
 def test_incompressible_content_stiffens_a_squeezed_body():
     """A lid pressed onto the hollow cube: the full lumen keeps its volume and pushes back, the open one collapses."""
-    lid = Held(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.0, 0.0, -0.1 * t))
+    lid = PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.0, 0.0, -0.1 * t))
     full = closed_problem()
     full = replace(full, held=[*full.held, lid])
     closed, vented = (equilibrium_path(p, [1.0])[0] for p in (full, replace(full, cavities=())))
@@ -167,8 +181,8 @@ def test_what_is_inside_at_the_start_is_switched_on_first():
 
 def test_a_moved_scene_has_the_same_pressure():
     """Far from the origin: the volume is taken about the lumen's own centre."""
-    lid = Held(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.05 * t, 0.0, -0.1 * t))
-    here = replace(closed_problem(), held=[Held(lambda x: x[2] < 1e-9), lid])
+    lid = PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.05 * t, 0.0, -0.1 * t))
+    here = replace(closed_problem(), held=[PrescribedDisplacement(lambda x: x[2] < 1e-9), lid])
     move = np.array([[30.0], [-20.0], [10.0]])
     there = Problem(
         MeshTet(here.mesh.p + move, here.mesh.t),
@@ -211,9 +225,14 @@ def test_two_lumens_have_their_own_pressures():
         return lambda x: (np.abs(x - np.array([[first], [1.5], [1.5]])) < 0.51).all(axis=0)
 
     mesh = mesh.restrict(np.flatnonzero(~(cell(1.5)(centre) | cell(3.5)(centre))))
-    tilted = Held(lambda x: x[2] > 3 - 1e-9, (2,), lambda t: (0.0, 0.0, t), lambda x: -0.06 * np.tile(x[0], (3, 1)))
+    tilted = PrescribedDisplacement(
+        lambda x: x[2] > 3 - 1e-9, (2,), lambda t: (0.0, 0.0, t), lambda x: -0.06 * np.tile(x[0], (3, 1))
+    )
     problem = Problem(
-        mesh, TISSUE, [Held(lambda x: x[2] < 1e-9), tilted], cavities=[Cavity(cell(1.5)), Cavity(cell(3.5))]
+        mesh,
+        TISSUE,
+        [PrescribedDisplacement(lambda x: x[2] < 1e-9), tilted],
+        cavities=[Cavity(cell(1.5)), Cavity(cell(3.5))],
     )
     state = equilibrium_path(problem, [1.0])[0]
     np.testing.assert_allclose(state.cavity_volume, 1.0, rtol=1e-7)

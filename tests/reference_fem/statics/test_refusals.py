@@ -7,9 +7,9 @@ import pytest
 from skfem import MeshTet, MeshTet2
 
 from reference_fem import (
-    Held,
     NeoHookean,
     NewtonSettings,
+    PrescribedDisplacement,
     Problem,
     RigidPlane,
     RigidSphere,
@@ -20,7 +20,7 @@ from reference_fem import (
 from tests.reference_fem.bodies import block, symmetry
 
 TISSUE = NeoHookean(1.0, 1000.0)
-BOTTOM = Held(lambda x: x[2] < 1e-9)
+BOTTOM = PrescribedDisplacement(lambda x: x[2] < 1e-9)
 
 
 def refused(problem, times=(1.0,), settings=None):
@@ -77,10 +77,10 @@ def test_a_folded_curved_element():
     [
         ([], ["slide along (1, 0, 0)", "slide along (0, 1, 0)", "slide along (0, 0, 1)", "turn about"]),
         (
-            [Held(lambda x: x[2] < 1e-9, (2,))],
+            [PrescribedDisplacement(lambda x: x[2] < 1e-9, (2,))],
             ["slide along (1, 0, 0)", "slide along (0, 1, 0)", "turn about (0, 0, 1)"],
         ),
-        ([Held(lambda x: (x[0] < 1e-9) & (x[1] < 1e-9))], ["free to turn about (0, 0, 1):"]),
+        ([PrescribedDisplacement(lambda x: (x[0] < 1e-9) & (x[1] < 1e-9))], ["free to turn about (0, 0, 1):"]),
     ],
 )
 def test_a_free_rigid_motion_is_named(held, words):
@@ -96,9 +96,9 @@ def test_three_symmetry_planes_hold_a_body():
 @pytest.mark.parametrize(
     "held, words",
     [
-        (Held(lambda x: x[0] > 7.0), "contains no boundary node"),
-        (Held(lambda x: x[2] < 1e-9, (3,)), "components"),
-        (Held(lambda x: x[2] < 1e-9, motion=lambda t: (np.nan, 0.0, 0.0)), "three finite numbers"),
+        (PrescribedDisplacement(lambda x: x[0] > 7.0), "contains no boundary node"),
+        (PrescribedDisplacement(lambda x: x[2] < 1e-9, (3,)), "components"),
+        (PrescribedDisplacement(lambda x: x[2] < 1e-9, motion=lambda t: (np.nan, 0.0, 0.0)), "three finite numbers"),
     ],
 )
 def test_bad_held_regions(held, words):
@@ -106,7 +106,7 @@ def test_bad_held_regions(held, words):
 
 
 def test_contradictory_held_regions():
-    other = Held(lambda x: x[0] < 1e-9, motion=lambda t: (0.0, 0.0, 0.1 * t))
+    other = PrescribedDisplacement(lambda x: x[0] < 1e-9, motion=lambda t: (0.0, 0.0, 0.1 * t))
     assert "prescribes" in refused(Problem(block(), TISSUE, [BOTTOM, other]))[0]
 
 
@@ -141,7 +141,9 @@ def test_bad_times(times):
 
 def test_a_load_that_cannot_converge_keeps_what_was_reached():
     """The lid is pushed through the floor between the second and third time: the path stops, with two states."""
-    lid = Held(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.0, 0.0, -0.1 * t if t <= 2 else -0.2 - 1.5 * (t - 2)))
+    lid = PrescribedDisplacement(
+        lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.0, 0.0, -0.1 * t if t <= 2 else -0.2 - 1.5 * (t - 2))
+    )
     seen = []
     problem = Problem(block((1, 1, 1)), TISSUE, [BOTTOM, lid])
     with pytest.raises(
@@ -154,7 +156,7 @@ def test_a_load_that_cannot_converge_keeps_what_was_reached():
 
 def test_a_step_that_is_too_long_is_cut():
     """One wanted time far away: reached in several sub-steps, with the answer of an even path."""
-    lid = Held(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (1.2 * t, 0.0, -0.35 * t))
+    lid = PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (1.2 * t, 0.0, -0.35 * t))
     problem = Problem(block((2, 2, 2)), TISSUE, [BOTTOM, lid])
     settings = NewtonSettings(max_iterations=5)
     state = equilibrium_path(problem, (1.0,), settings)[0]

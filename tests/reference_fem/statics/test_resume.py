@@ -6,8 +6,8 @@ import pytest
 from reference_fem import (
     Cavity,
     Checkpoint,
-    Held,
     NeoHookean,
+    PrescribedDisplacement,
     Problem,
     RigidPlane,
     RigidSphere,
@@ -28,7 +28,7 @@ def pressed_and_filled():
     return Problem(
         hollow_cube(),
         NeoHookean(1.0, 1000.0),
-        [Held(lambda x: x[2] < 1e-9)],
+        [PrescribedDisplacement(lambda x: x[2] < 1e-9)],
         [plate, ball],
         gravity=(0.0, 0.0, -1.0),
         density=0.05,
@@ -66,7 +66,7 @@ def test_a_resumed_path_is_the_uninterrupted_one(kept, stop, tmp_path):
 
 
 def test_going_on_from_another_mesh_is_refused(kept):
-    other = Problem(block(), NeoHookean(1.0, 1000.0), [Held(lambda x: x[2] < 1e-9)])
+    other = Problem(block(), NeoHookean(1.0, 1000.0), [PrescribedDisplacement(lambda x: x[2] < 1e-9)])
     with pytest.raises(SolveError, match="it is of another mesh"):
         equilibrium_path(other, TIMES, resume=kept[0])
 

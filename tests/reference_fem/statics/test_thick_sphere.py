@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference_fem import Held, NeoHookean, Problem, equilibrium_path, exact
+from reference_fem import NeoHookean, PrescribedDisplacement, Problem, equilibrium_path, exact
 from tests.reference_fem.bodies import on_radius, shell_octant, symmetry
 
 INNER = 0.5
@@ -13,7 +13,7 @@ def inflate(mesh, stretches, kappa=5000.0):
     """Pressure [Pa] at each inner stretch: P 4 pi a² da / 8 = sum of reaction · da over the inner nodes."""
     held = [
         *symmetry(),
-        Held(on_radius(INNER), (0, 1, 2), lambda t: (t, t, t), lambda x: x),
+        PrescribedDisplacement(on_radius(INNER), (0, 1, 2), lambda t: (t, t, t), lambda x: x),
     ]
     path = equilibrium_path(Problem(mesh, NeoHookean(1.0, kappa), held), [s - 1.0 for s in stretches])
     x = mesh.doflocs.T

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference_fem import Cavity, Held, NeoHookean, NewtonSettings, Problem, RigidPlane, RigidSphere
+from reference_fem import Cavity, NeoHookean, NewtonSettings, PrescribedDisplacement, Problem, RigidPlane, RigidSphere
 from reference_fem.bench import contact_path
 from reference_fem.elements.surface import point_positions
 from reference_fem.statics import active_set, newton
@@ -23,7 +23,9 @@ def pressed(obstacle=None):
     plane = RigidPlane((1.0, 0.0, 1.0), (-0.05, 0.03, -1.0), lambda t: (0.0, 0.0, -SINK * t))
     ball = RigidSphere((0.4, 0.45, 1.51), 0.5, lambda t: (0.0, 0.0, -SINK * t))
     obstacles = {None: (plane, ball), "plane": (plane,), "ball": (ball,)}[obstacle]
-    return Problem(block((4, 4, 4), 0.1), NeoHookean(1.0, 1000.0), [Held(lambda x: x[2] < 1e-9)], obstacles)
+    return Problem(
+        block((4, 4, 4), 0.1), NeoHookean(1.0, 1000.0), [PrescribedDisplacement(lambda x: x[2] < 1e-9)], obstacles
+    )
 
 
 def first_step(problem):
@@ -102,7 +104,10 @@ def test_the_potential_falls_with_every_share():
 def test_many_right_hand_sides_answer_like_one_by_one():
     """With a cavity, whose border each column has to satisfy."""
     problem = Problem(
-        hollow_cube(), NeoHookean(1.0, 1000.0), [Held(lambda x: x[2] < 1e-9)], cavities=[Cavity(in_the_middle)]
+        hollow_cube(),
+        NeoHookean(1.0, 1000.0),
+        [PrescribedDisplacement(lambda x: x[2] < 1e-9)],
+        cavities=[Cavity(in_the_middle)],
     )
     system = System(problem, NewtonSettings())
     state = system.rest()

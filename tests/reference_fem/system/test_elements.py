@@ -6,9 +6,9 @@ import pytest
 from reference_fem import (
     ELEMENTS,
     BodyForce,
-    Held,
     NeoHookean,
     NewtonSettings,
+    PrescribedDisplacement,
     Problem,
     SolveError,
     Traction,
@@ -23,7 +23,7 @@ from reference_fem.system.saddle_point import System
 from tests.reference_fem.bodies import block
 
 SOFT = NeoHookean(1.0, 1000.0)
-BOTTOM = Held(lambda x: x[2] < 1e-9)
+BOTTOM = PrescribedDisplacement(lambda x: x[2] < 1e-9)
 PUSH = np.array([0.03, -0.02, 0.05])
 
 

@@ -5,10 +5,10 @@ import pytest
 
 from reference_fem import (
     ELEMENTS,
-    Held,
     MooneyRivlin,
     NeoHookean,
     NewtonSettings,
+    PrescribedDisplacement,
     Problem,
     RigidPlane,
     RigidSphere,
@@ -47,7 +47,7 @@ BLOCKS = [("u", "p"), ("p", "p"), ("u", "u")]
 def system(request):
     element, material = request.param
     obstacles = [RigidPlane((0.0, 0.0, 1.2), (0.1, 0.0, -1.0)), RigidSphere((1.55, 0.5, 0.5), 0.55)]
-    held = [Held(lambda x: x[2] < 1e-9)]
+    held = [PrescribedDisplacement(lambda x: x[2] < 1e-9)]
     problem = Problem(bumpy(), MATERIALS[material], held, obstacles, element=element)
     return System(problem, NewtonSettings(penalty=20.0))
 
@@ -133,7 +133,7 @@ def test_predictor_linearises_the_move_of_the_obstacles(system, state):
 
 
 def test_rest_is_stress_free(system):
-    problem = Problem(bumpy(), NeoHookean(2.0, 50.0), [Held(lambda x: x[2] < 1e-9)])
+    problem = Problem(bumpy(), NeoHookean(2.0, 50.0), [PrescribedDisplacement(lambda x: x[2] < 1e-9)])
     bare = System(problem, NewtonSettings())
     found = bare.evaluate(np.zeros(bare.total), Loads(0.0, bare.rows, bare.rest().multiplier))
     assert np.abs(found.residual).max() < 1e-15  # mu is 2 Pa, areas about 0.1 m²: round-off

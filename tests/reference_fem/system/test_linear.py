@@ -9,9 +9,9 @@ import pytest
 import scipy.sparse as sp
 
 from reference_fem import (
-    Held,
     NeoHookean,
     NewtonSettings,
+    PrescribedDisplacement,
     Problem,
     SlowSolverWarning,
     SolveError,
@@ -71,7 +71,10 @@ def test_a_stale_factorisation_is_noticed():
 
 @pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
 def test_both_backends_give_the_same_equilibrium():
-    held = [*symmetry(), Held(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.0, 0.1 * t, -0.2 * t))]
+    held = [
+        *symmetry(),
+        PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.0, 0.1 * t, -0.2 * t)),
+    ]
     problem = Problem(block(skew=0.1), NeoHookean(1.0, 1000.0), held[2:])
     states = [equilibrium_path(problem, [1.0], NewtonSettings(solver=backend))[0] for backend in BACKENDS]
     np.testing.assert_allclose(states[0].u, states[1].u, atol=1e-9)
@@ -109,7 +112,7 @@ def test_the_scipy_backend_never_warns():
 def test_factors_that_do_not_fit_are_refused_before_they_are_made(monkeypatch):
     """A cube of 3,000 unknowns on a machine with 3 MB left; the factors of its tangent take some 10 MB."""
     monkeypatch.setattr(linear, "free_bytes", lambda: 3_000_000)
-    problem = Problem(block((5, 5, 5)), NeoHookean(1.0, 1000.0), [Held(lambda x: x[2] < 1e-9)])
+    problem = Problem(block((5, 5, 5)), NeoHookean(1.0, 1000.0), [PrescribedDisplacement(lambda x: x[2] < 1e-9)])
     with pytest.raises(SolveError, match=r"unknowns needs 0\.0\d+ GB of memory and 0\.003 GB are free"):
         equilibrium_path(problem, [1.0])
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from reference_fem import (
-    Held,
     NeoHookean,
     NewtonSettings,
+    PrescribedDisplacement,
     Problem,
     RigidCapsule,
     RigidPlane,
@@ -22,7 +22,7 @@ from reference_fem.system.state import Loads
 from tests.reference_fem.bodies import ball_octant, block, symmetry
 
 TISSUE = NeoHookean(1.0, 1000.0)
-BOTTOM = Held(lambda x: x[2] < 1e-9)
+BOTTOM = PrescribedDisplacement(lambda x: x[2] < 1e-9)
 STEP = 1e-6
 """Central differences: truncation about STEP² and round-off about 1e-16 / STEP, both near 1e-10 of the values."""
 AGREES = 1e-7
@@ -119,7 +119,7 @@ def test_tangent_of_stuck_points(gripped):
 def test_a_plate_without_slip_is_a_bonded_lid():
     """Pressed, then sheared: forces of the same motion prescribed at the top nodes, to the slip that is allowed."""
     plate = Problem(block((3, 3, 3)), TISSUE, [BOTTOM], [lid("no_slip")])
-    bonded = Problem(block((3, 3, 3)), TISSUE, [BOTTOM, Held(lambda x: x[2] > 1 - 1e-9, motion=push)])
+    bonded = Problem(block((3, 3, 3)), TISSUE, [BOTTOM, PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, motion=push)])
     settings = NewtonSettings(penetration_tol=1e-4)
     for sticking, held in zip(
         equilibrium_path(plate, (0.5, 1.0, 2.0), settings), equilibrium_path(bonded, (0.5, 1.0, 2.0)), strict=True
@@ -165,7 +165,7 @@ def test_what_no_slip_adds_to_hertz(kappa, ratio):
 
 
 def test_the_end_of_a_capsule_is_a_sphere():
-    held = [Held(lambda x: np.abs(x[2]) < 1e-9), *symmetry()[:2]]
+    held = [PrescribedDisplacement(lambda x: np.abs(x[2]) < 1e-9), *symmetry()[:2]]
     forces = []
     for probe in (
         RigidSphere((0.0, 0.0, 1.5), 0.5, lambda t: (0.0, 0.0, -t)),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from massspring import Clock, Free, MassSpringError, Setup, simulate
-from studies.bench.line import Line
+from studies.bench.line import BenchLine
 from studies.bench.slide import counted_ns, steps_of_updates, stepwise, updates_ns, waited_ns
 from tests.massspring.probe.test_probe import BALL, pressed
 
@@ -46,10 +46,10 @@ def test_every_frame_is_timed_and_a_run_that_breaks_off_is_none():
 
 
 def test_a_line_is_judged_by_its_target_or_not_at_all():
-    assert Line("p99", 1.0, "ms", 2.0).verdict == "yes" and Line("p99", 3.0, "ms", 2.0).verdict == "NO"
-    faster = Line("times faster", 1.5, "1", 1.6, at_most=False)
+    assert BenchLine("p99", 1.0, "ms", 2.0).verdict == "yes" and BenchLine("p99", 3.0, "ms", 2.0).verdict == "NO"
+    faster = BenchLine("times faster", 1.5, "1", 1.6, at_most=False)
     assert faster.verdict == "NO" and faster.promise == ">= 1.6"
-    limit = Line("the machine", 1e9, "ms")
+    limit = BenchLine("the machine", 1e9, "ms")
     assert limit.verdict == limit.promise == ""
 
 
