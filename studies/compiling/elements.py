@@ -6,8 +6,8 @@ from reference_fem import (
     ELEMENTS,
     Cavity,
     DynamicsSettings,
-    Held,
     NeoHookean,
+    PrescribedDisplacement,
     Problem,
     RigidPlane,
     RigidSphere,
@@ -17,7 +17,7 @@ from reference_fem import (
 from reference_fem.oracles.bodies import block, shell_octant, symmetry
 
 SOFT = NeoHookean(1.0, 500.0)
-HELD = (Held(lambda x: x[2] < 1e-9),)
+HELD = (PrescribedDisplacement(lambda x: x[2] < 1e-9),)
 INNER = 0.5
 """Radius of the lumen over that of the shell [1]."""
 

@@ -37,10 +37,10 @@ def njit_inlined(function: Function) -> Function:
 
 
 def njit_ignoring_nan(function: Function) -> Function:
-    """As `njit_inlined`, for maxima along arrays: a vector register compares several numbers. NaN makes them anything."""
+    """As `njit_inlined`, for maxima along arrays: a vector register compares several. NaN makes them anything."""
     return _jit(function, _nrt=False, forceinline=True, fastmath={"nnan", "nsz"})
 
 
 def njit_reassociated(function: Function) -> Function:
-    """As `njit_inlined`, for sums along arrays: terms are added in any order, so that a vector register adds several."""
+    """As `njit_inlined`, for sums along arrays: terms may be added in any order, several at once in a vector register."""
     return _jit(function, _nrt=False, forceinline=True, fastmath={"reassoc", "contract"})

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.massspring.contact_id import activate, list_active
 
 import massspring.layout.jacobian_pattern as rows_module
 from massspring import (
@@ -26,6 +25,7 @@ from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.state import new_diagnostics
 from massspring.methods.implicit_volume import set_right_side, solve_multipliers
+from tests.massspring.active_nodes import activate, list_active
 from tests.massspring.kernels.test_kernels import ROUND_OFF, directional, moved
 from tests.massspring.methods.test_methods import clock_for, squeeze
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from tests.massspring.contact_id import list_active
 
 from massspring import Attachment, Body, Clock, Free, ImplicitVolume, Setup, Volumes, tetrahedral_body
 from massspring.body.springs import Springs
@@ -16,6 +15,7 @@ from massspring.kernels.fused.sweep import gather_and_predict
 from massspring.kernels.step.attachments import prescribe
 from massspring.layout.allocate import start
 from massspring.layout.sell_chunks import LONGEST, rings, slices_of
+from tests.massspring.active_nodes import list_active
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.kernels.test_kernels import DIFFERENCE, STEP, moved
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.massspring.contact_id import activate
 
 from massspring import (
     Attachment,
@@ -22,6 +21,7 @@ from massspring.kernels.step.advance import advance
 from massspring.kernels.step.begin import open_frame
 from massspring.layout.allocate import start
 from massspring.layout.state import new_diagnostics
+from tests.massspring.active_nodes import activate
 from tests.massspring.methods.test_methods import clock_for, squeeze, thrown
 
 

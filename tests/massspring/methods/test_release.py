@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from tests.massspring.contact_id import list_active
 
 from massspring import Attachment, Clock, ImplicitVolume, Plane, Setup, Trajectory, surface_body
 from massspring.analysis.stability import step_limit
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.friction import release_edges
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
+from tests.massspring.active_nodes import list_active
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.kernels.test_friction import wedge_of
 

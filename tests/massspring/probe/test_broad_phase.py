@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.massspring.contact_id import list_active
 
 from massspring import Clock, Free, ImplicitVolume, Probe, Setup, Trajectory
 from massspring.kernels.arrays.layout import Push
@@ -12,6 +11,7 @@ from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
 from massspring.kernels.probe.arrays import IN_CONTACT
 from massspring.kernels.probe.broad_phase import TRIANGLE_BLOCK, fastest_node
 from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, stays_off
+from tests.massspring.active_nodes import list_active
 from tests.massspring.probe.test_collision import pair_of
 from tests.massspring.probe.test_probe import BALL, EDGE, R, pressed
 
