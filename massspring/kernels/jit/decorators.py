@@ -42,5 +42,5 @@ def njit_ignoring_nan(function: Function) -> Function:
 
 
 def njit_reassociated(function: Function) -> Function:
-    """As `njit_inlined`, for sums along arrays: terms may be added in any order, several at once in a vector register."""
+    """As `njit_inlined`, for sums along arrays: terms may be added in any order, so a register adds several."""
     return _jit(function, _nrt=False, forceinline=True, fastmath={"reassoc", "contract"})
