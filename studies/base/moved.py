@@ -152,6 +152,7 @@ NAMES = {
 
 RENAMED = {
     "massspring.Path": "Trajectory",
+    "massspring.new_tally": "new_diagnostics",
     "reference_fem.Held": "PrescribedDisplacement",
     "reference_fem.ReferenceProblem": "SolveError",
     "studies.Probed": "ForceOutput",
