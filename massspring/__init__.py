@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from massspring.body.body import Body, Material
     from massspring.body.build import surface_body, tetrahedral_body
     from massspring.body.membranes import membrane_body
+    from massspring.body.quadratic import quadratic_body
     from massspring.body.volumes import Volumes
     from massspring.errors import MassSpringError
     from massspring.layout.state import State
@@ -38,6 +39,7 @@ _FACE = {
     "Volumes": "massspring.body.volumes",
     "make_clock": "massspring.world.clock",
     "membrane_body": "massspring.body.membranes",
+    "quadratic_body": "massspring.body.quadratic",
     "simulate": "massspring.run.simulation",
     "step_limit": "massspring.analysis.stability",
     "surface_body": "massspring.body.build",

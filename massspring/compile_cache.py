@@ -22,6 +22,7 @@ ARGUMENTS = (
     "massspring.kernels.constraint.exact_volume",
     "massspring.kernels.constraint.ldl_solve",
     "massspring.kernels.forces.tetrahedron_volumes",
+    "massspring.kernels.points.arrays",
     "massspring.kernels.step.frame",
 )
 """Modules that define, or import, the named tuples which kernels are given.

@@ -19,10 +19,13 @@ SCATTER = 2.0
 """Factor on the spread of values that go to and fro: the range of three is on average 1.7 of their standard deviation,
 and the finest may be two of these off."""
 SLOWEST, FASTEST = 1.0, 3.0
-"""Range of orders that are believed: where a held patch ends the stress is singular, which leaves order 1 in the force
-(energy) however small the elements; 3 is the order of the displacement of quadratic elements."""
+"""Range of orders that are believed: where a held patch ends the displacement goes as √r, which leaves order 1 in the
+force (energy) and in the displacement however small the elements; 3 is the order of the displacement of quadratic
+elements. A family whose elements there shrink as the others do has SLOWEST for both (order_at_outlines)."""
+HALVING = 2.0 ** (1.0 / 3.0)
+"""Factor on the size of elements that are halved once: three times, and each edge is halved."""
 ORDERS = 81
-"""Orders tried for a field, 0.025 apart: the error bar then changes by under 1 % from one to the next."""
+"""Orders tried for a field, at most 0.025 apart: the error bar then changes by under 1 % from one to the next."""
 ALIKE = 0.5
 """Cosine of two changes of a series above which they go the same way: one and the same error has 1."""
 
@@ -44,13 +47,21 @@ class MeshError:
         return self.order == self.order
 
 
-def cell_size(volume: float, cells: int) -> float:
-    """Representative size (V/n)^(1/3) [m] of a mesh of `cells` elements, graded or not (Celik et al., eq. 1.1)."""
-    return float(np.cbrt(volume / cells))
+def order_at_outlines(ratio: float, more: int) -> float:
+    """Largest order to believe where √r leaves order 1 in the elements there, within SLOWEST to FASTEST.
+
+    ratio: size of a mesh over that of the next finer, away from the outline; more: times that the finer mesh has its
+    elements at the outline halved more often. They shrink by ratio · HALVING^more, which is ratio^order.
+    Raises SolveError for meshes of no different size.
+    """
+    if not ratio > 1:
+        raise SolveError(f"two meshes with element sizes in the ratio {ratio:.3g} have no order: it must exceed 1")
+    order = 1.0 + more * float(np.log(HALVING) / np.log(ratio))
+    return min(FASTEST, max(SLOWEST, order))
 
 
-def observed_order(sizes: Sequence[float], coarse_change: float, fine_change: float) -> float:
-    """Order p of |f − f_h| ~ h^p from the sizes h1 < h2 < h3 and |f3 − f2|, |f2 − f1|, within SLOWEST to FASTEST.
+def observed_order(sizes: Sequence[float], coarse_change: float, fine_change: float, fastest: float = FASTEST) -> float:
+    """Order p of |f − f_h| ~ h^p from the sizes h1 < h2 < h3 and |f3 − f2|, |f2 − f1|, within SLOWEST to `fastest`.
 
     With r = h2/h1, R = h3/h2 the changes are in the ratio r^p (R^p − 1)/(r^p − 1), which grows with p.
     Raises SolveError for sizes that are not three different ones.
@@ -61,17 +72,19 @@ def observed_order(sizes: Sequence[float], coarse_change: float, fine_change: fl
         return np.log(r**p * (R**p - 1) / (r**p - 1)) - np.log(coarse_change / fine_change)
 
     if fine_change == 0.0:
-        return FASTEST
+        return fastest
     if coarse_change == 0.0 or miss(SLOWEST) >= 0:
         return SLOWEST
-    return FASTEST if miss(FASTEST) <= 0 else float(root_scalar(miss, bracket=(SLOWEST, FASTEST), xtol=1e-12).root)
+    return fastest if miss(fastest) <= 0 else float(root_scalar(miss, bracket=(SLOWEST, fastest), xtol=1e-12).root)
 
 
-def mesh_error(sizes: Sequence[float], values: Sequence) -> MeshError:
+def mesh_error(sizes: Sequence[float], values: Sequence, fastest: float = FASTEST) -> MeshError:
     """Error of the finest of two or three values of a number, or of a series of them (n,), fine to coarse.
 
-    sizes: h1 < h2 (< h3) [m]. Changes that go the same way: the grid convergence index SAFETY |f2 − f1|/(r^p − 1).
-    Otherwise SCATTER times the spread, the largest difference of two. Two values: order SLOWEST, safety TWO_MESHES.
+    sizes: h1 < h2 (< h3) [m]; fastest: largest order that is believed. Changes that go the same way: the grid
+    convergence index SAFETY |f2 − f1|/(r^p − 1). Otherwise SCATTER times the spread, the largest difference of two.
+    A fine change that is small by chance does not make the bar small: |f3 − f1|/((rR)^p − 1), R = h3/h2, counts where
+    it is larger, as it is for an order faster than believed. Two values: order SLOWEST, safety TWO_MESHES.
     Raises SolveError for sizes that do not grow, and values that are not finite.
     """
     values = _finite(values)
@@ -83,12 +96,13 @@ def mesh_error(sizes: Sequence[float], values: Sequence) -> MeshError:
     far = values[2] - values[1]
     if _dot(near, far) < ALIKE * change * _norm(far):
         return MeshError(SCATTER * max(change, _norm(far), _norm(values[2] - values[0])), 0.0, float("nan"))
-    order = observed_order(sizes, _norm(far), change)
+    order = observed_order(sizes, _norm(far), change, fastest)
     shift = change / (ratios[0] ** order - 1)
-    return MeshError(SAFETY * shift, sign * shift, order)
+    whole = _norm(values[2] - values[0]) / ((ratios[0] * ratios[1]) ** order - 1)
+    return MeshError(SAFETY * max(shift, whole), sign * shift, order)
 
 
-def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray) -> MeshError:
+def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray, fastest: float = FASTEST) -> MeshError:
     """Error of the finest of two or three fields (n, c) at the same n points of weight (n,), fine to coarse.
 
     Over hundreds of points two parts can be separated: f_i = f + a h_i^p + b_i, where a is the same field on every
@@ -97,9 +111,9 @@ def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray) -
         |f2 − f1|² = a² (h2^p − h1^p)² + b² (h1^2p + h2^2p), |f3 − f2|² alike,
         (f2 − f1)·(f3 − f2) = a² (h2^p − h1^p) (h3^p − h2^p) − b² h2^2p,
 
-    three equations for p, a², b², solved by least squares with p from SLOWEST to FASTEST and a², b² >= 0. The error is
-    SAFETY √(a² + b²) h1^p; without b this is the grid convergence index. Fields that come no closer have SCATTER times
-    the spread. The shift is the size of the part that could be extrapolated. Two fields: as mesh_error.
+    three equations for p, a², b², solved by least squares with p from SLOWEST to `fastest` and a², b² >= 0. The error
+    is SAFETY √(a² + b²) h1^p; without b this is the grid convergence index. Fields that come no closer have SCATTER
+    times the spread. The shift is the size of the part that could be extrapolated. Two fields: as mesh_error.
     Raises SolveError for sizes that do not grow, and values that are not finite.
     """
     root = np.sqrt(weights)[:, None]
@@ -111,7 +125,7 @@ def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray) -
     known = np.array([_dot(near, near), _dot(far, far), _dot(near, far)])
     if known[0] >= known[1]:
         return MeshError(SCATTER * max(_norm(near), _norm(far), _norm(scaled[2] - scaled[0])), 0.0, float("nan"))
-    fits = [(*_parts(order, ratios, known), order) for order in np.linspace(SLOWEST, FASTEST, ORDERS)]
+    fits = [(*_parts(order, ratios, known), order) for order in np.linspace(SLOWEST, fastest, ORDERS)]
     _, (common, own), order = min(fits, key=lambda fit: fit[0])
     return MeshError(SAFETY * float(np.sqrt(common + own)), float(np.sqrt(common)), float(order))
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from massspring.methods.pyramid import Pyramid
     from massspring.methods.shake import Shake
     from massspring.methods.xpbd import Xpbd
+    from studies.advice.answer import Advice, Recommendation, advise, recommended
     from studies.base.errors import StudyError
     from studies.catalog import STUDIES
     from studies.catalog.study import Chart, Study
@@ -66,6 +67,7 @@ _FACE = {
     "STOMACH_PROBE": "studies.scenes.stomach_probe",
     "STOMACH_SLIDE": "studies.scenes.stomach_slide",
     "STUDIES": "studies.catalog",
+    "Advice": "studies.advice.answer",
     "Barycentre": "massspring.methods.barycentre",
     "Baumgarte": "massspring.methods.baumgarte",
     "BodyRecipe": "studies.runs.case",
@@ -87,6 +89,7 @@ _FACE = {
     "Pressure": "massspring.methods.pressure",
     "Projection": "massspring.methods.projection",
     "Pyramid": "massspring.methods.pyramid",
+    "Recommendation": "studies.advice.answer",
     "Record": "studies.store.record",
     "ReferencePlan": "studies.scene.scene",
     "Run": "studies.metrics.run",
@@ -97,10 +100,12 @@ _FACE = {
     "StudyError": "studies.base.errors",
     "Tissue": "studies.scene.tissues",
     "Xpbd": "massspring.methods.xpbd",
+    "advise": "studies.advice.answer",
     "load_runs": "studies.sweep.load",
     "measure": "studies.runs.run",
     "organ": "studies.geometry.api.organs",
     "read_record": "studies.store.record",
+    "recommended": "studies.advice.answer",
     "run_studies": "studies.sweep.run_studies",
     "study_table": "studies.metrics.table",
 }

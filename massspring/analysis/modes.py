@@ -1,28 +1,15 @@
 """Natural frequencies of a body whose volumes are kept: how it rings."""
 
 import numpy as np
-from scipy.sparse import block_array, coo_array, csr_array, diags_array, eye_array
+from scipy.sparse import block_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import ArpackError, eigsh
 
 from massspring.analysis.stiffness import stiffness_at_rest
 from massspring.body.body import Body
-from massspring.body.volumes import Volumes
 from massspring.errors import MassSpringError
 
 SOFTNESS = 1e-10
 """Relative compliance of the kept volumes: where some depend on others the system stays regular."""
-
-
-def volume_gradients(volumes: Volumes, x: np.ndarray) -> csr_array:
-    """J_r = ∂V_r/∂x [m²] at positions `x` (n, 3) [m], (m, 3n) (eq. 8.2)."""
-    a, b, c = (x[corner] for corner in volumes.triangles.T)
-    sixth = np.cross(b - a, c - a) / 6.0
-    triangles = len(sixth)
-    rows = np.repeat(np.arange(triangles), 9)
-    columns = (3 * volumes.triangles.astype(np.int64)[:, :, None] + np.arange(3)).ravel()
-    values = np.broadcast_to(sixth[:, None, :], (triangles, 3, 3)).ravel()
-    corner = coo_array((values, (rows, columns)), shape=(triangles, x.size)).tocsr()
-    return csr_array(volumes.share @ corner)
 
 
 def natural_frequencies(body: Body, count: int, keep: bool = True) -> tuple[np.ndarray, np.ndarray]:
@@ -35,16 +22,16 @@ def natural_frequencies(body: Body, count: int, keep: bool = True) -> tuple[np.n
     if not 1 <= count < n - body.kept.count:
         raise MassSpringError(f"{count} modes asked of {body.node_count} nodes; give 1 to {n - body.kept.count - 1}")
     stiffness = stiffness_at_rest(body)
-    mass = diags_array(np.repeat(body.mass, 3))
+    mass = diags_array(np.repeat(body.moved_mass, 3))
     level = float(stiffness.diagonal().mean())
     if keep:
-        gradients = volume_gradients(body.kept, body.rest)
+        gradients = body.kept.jacobian(body.rest)
         gradients = gradients * (level / np.abs(gradients.data).mean())
         m = body.kept.count
         stiffness = block_array([[stiffness, gradients.T], [gradients, -SOFTNESS * level * eye_array(m)]])
         mass = block_array([[mass, None], [None, csr_array((m, m))]])
     # Below all frequencies, near the lowest: that of a shear wave across the body.
-    shift = -level / float(body.mass.mean()) * body.node_count ** (-2.0 / 3.0)
+    shift = -level / float(body.moved_mass.mean()) * body.node_count ** (-2.0 / 3.0)
     start = np.random.default_rng(0).standard_normal(n + body.kept.count * keep)
     try:
         square, shape = eigsh(stiffness.tocsc(), count, M=mass.tocsc(), sigma=shift, v0=start)

@@ -17,7 +17,7 @@ LANCZOS_TOLERANCE = 1e-4
 
 def scaled_stiffness(body: Body, held_nodes: np.ndarray) -> csr_array:
     """M^-½ K M^-½ [1/s²] of the free nodes at rest, (3n, 3n); rows of held nodes are zero (eq. 5.1)."""
-    root = 1.0 / np.sqrt(body.mass)
+    root = 1.0 / np.sqrt(body.moved_mass)
     root[held_nodes] = 0.0
     scale = diags_array(np.repeat(root, 3))
     return csr_array(scale @ stiffness_at_rest(body) @ scale)
@@ -42,7 +42,7 @@ def largest_frequency(body: Body, held_nodes: np.ndarray | None = None, added: c
 
 def _with_added(matrix: csr_array, body: Body, held: np.ndarray, added: csr_array) -> LinearOperator:
     """M^-½ (K + B Bᵀ) M^-½ without forming B Bᵀ, which is full for a volume of the whole."""
-    root = np.repeat(1.0 / np.sqrt(body.mass), 3)
+    root = np.repeat(1.0 / np.sqrt(body.moved_mass), 3)
     root.reshape(-1, 3)[held] = 0.0
     factor = csr_array(added.multiply(root[:, None]))
     return LinearOperator(matrix.shape, matvec=lambda q: matrix @ q + factor @ (factor.T @ q), dtype=np.float64)  # pyright: ignore[reportCallIssue]

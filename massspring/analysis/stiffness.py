@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from massspring.body.body import Body
+from massspring.body.points import PointVolumes
 
 AXIS = np.arange(3)
 
@@ -71,9 +72,43 @@ def membrane_stiffness(body: Body) -> csr_array:
     return blocks(rows, columns, block.reshape(-1, 3, 3), n)
 
 
+def point_hessian(volumes: PointVolumes, x: np.ndarray, pressure: np.ndarray) -> csr_array:
+    """Σ_q p_q w_q ∂²J_q/∂x² [N/m] with `pressure` (k, 4) [Pa] at the points, at `x` (n, 3) [m], symmetric, (3n, 3n).
+
+    J is linear in each column of F: the block of nodes a and b is −[F_q (∇N_a × ∇N_b)]×.
+    """
+    g = volumes.gradient
+    turned = np.cross(g[:, :, :, None, :], g[:, :, None, :, :])
+    vector = np.einsum("kq,kqij,kqabj->kabi", volumes.weight * pressure, volumes.deformation(x), turned)
+    block = np.zeros((*vector.shape, 3))
+    for i, j, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        block[..., i, j], block[..., j, i] = vector[..., c], -vector[..., c]
+    return _element_blocks(volumes, block, len(x))
+
+
+def local_stiffness(volumes: PointVolumes, bulk: float, x: np.ndarray) -> csr_array:
+    """b Σ_q w_q ∂J_q/∂x ⊗ ∂J_q/∂x [N/m] of a pressure −b (J_q − 1) where J_q = 1, symmetric, (3n, 3n)."""
+    area = volumes.areas(x)
+    block = np.einsum("kq,kqai,kqbj->kabij", bulk / volumes.weight, area, area)
+    return _element_blocks(volumes, block, len(x))
+
+
+def _element_blocks(volumes: PointVolumes, block: np.ndarray, nodes: int) -> csr_array:
+    """Σ over the elements of blocks (k, 10, 10, 3, 3) between their nodes."""
+    cells = volumes.cells
+    rows, columns = np.repeat(cells, 10, axis=1).ravel(), np.tile(cells, (1, 10)).ravel()
+    return blocks(rows, columns, block.reshape(-1, 3, 3), nodes)
+
+
 def stiffness_at_rest(body: Body) -> csr_array:
-    """−∂f/∂x [N/m] of springs, triangle springs and rest pressure together at rest, (3n, 3n) (eq. 5.1, 5.3)."""
+    """−∂f/∂x [N/m] of springs, triangle springs, rest pressure and the local pressure of points together at rest,
+    (3n, 3n) (eq. 5.1, 5.3)."""
     springs = csr_array(spring_stiffness(body, body.rest) + membrane_stiffness(body))
+    if isinstance(body.kept, PointVolumes):
+        volumes = body.kept
+        pressure = np.full(volumes.weight.shape, body.rest_pressure)
+        local = local_stiffness(volumes, body.local_bulk, body.rest)
+        return csr_array(springs + local - point_hessian(volumes, body.rest, pressure))
     if not body.rest_pressure:
         return springs
     return csr_array(springs - body.rest_pressure * volume_hessian(body.triangles, body.rest))

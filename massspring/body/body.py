@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from massspring.body.points import PointVolumes
 from massspring.body.springs import Springs, lengths
 from massspring.body.surface import check_finite, check_surface
 from massspring.body.volumes import Volumes, tetrahedron_volumes
@@ -19,6 +20,7 @@ BALANCED = 1e-8
 """Of the largest force at a node: far above round-off, far below one spring too many."""
 NO_MEMBRANE = Membrane(np.empty((0, 3), dtype=np.uint32), *(np.empty((0, 3)) for _ in range(3)))
 NO_TETRAHEDRA = np.empty((0, 4), dtype=np.uint32)
+NO_FACETS = np.empty((0, 6), dtype=np.uint32)
 
 
 def check_positive(volumes: np.ndarray) -> None:
@@ -61,12 +63,18 @@ class Body:
     """(k, 4) uint32, positive; empty for a surface body."""
     law: str = "given"
     """Stiffness law, recorded with every result: it alone moves a force by 12–16 %."""
-    volumes: Volumes | None = None
+    volumes: Volumes | PointVolumes | None = None
     """What methods keep; None: the whole."""
     rest_pressure: float = 0.0
     """Pressure that balances springs without length at rest [Pa]; 0 for springs that rest at their own length."""
     membrane: Membrane = NO_MEMBRANE
     """Triangle springs of a wall."""
+    local_bulk: float = 0.0
+    """b [Pa]: a pressure −b (J_q − 1) at the points of `PointVolumes` beside that of the volumes."""
+    contact_facets: np.ndarray = field(default_factory=lambda: NO_FACETS)
+    """Quadratic facets at whose points obstacles touch a body of `PointVolumes`, (f, 6); of none: at its nodes."""
+    inertia: np.ndarray | None = None
+    """What resists motion [kg], (n,), where that is not `mass`: weight is always that of `mass`."""
 
     def __post_init__(self) -> None:
         check_finite("rest positions", self.rest)
@@ -77,6 +85,8 @@ class Body:
         if not (self.mass > 0).all():
             node = int(np.argmin(self.mass))
             raise MassSpringError(f"node {node} has mass {self.mass[node]:g} kg; every node needs a positive mass")
+        if self.inertia is not None and not (len(self.inertia) == len(self.rest) and (self.inertia > 0).all()):
+            raise MassSpringError("the inertia is not positive at every node; give one positive mass per node, or none")
         self._check_springs()
         check_positive(self.tetrahedron_volumes)
         self._check_volumes()
@@ -88,7 +98,7 @@ class Body:
                 f"the surface encloses {self.volume:.6g} m³ but the tetrahedra fill {filled:.6g} m³; "
                 "give all sheets of their boundary, each turned outward of the tissue"
             )
-        if int(self.kept.triangles.max()) >= len(self.rest):
+        if self.kept.highest_node >= len(self.rest):
             raise MassSpringError(
                 f"a kept volume names a node beyond the {len(self.rest)} there are; build it on this body"
             )
@@ -120,10 +130,14 @@ class Body:
 
     def _check_balance(self) -> None:
         """Springs that are taut at rest are held apart by the rest pressure, at every node."""
-        springs, pull, gradient = self.springs, np.empty_like(self.rest), np.empty_like(self.rest)
+        springs, pull, push = self.springs, np.empty_like(self.rest), np.empty_like(self.rest)
         spring_forces_into(self.rest, springs.ends, springs.rest_length, springs.stiffness, pull)
-        volume_gradient_into(self.rest, self.triangles, gradient)
-        if np.abs(pull + self.rest_pressure * gradient).max() > BALANCED * np.abs(pull).max():
+        if isinstance(self.kept, PointVolumes):
+            push = (self.kept.jacobian(self.rest).T @ self.rest_lam).reshape(-1, 3)
+        else:
+            volume_gradient_into(self.rest, self.triangles, push)
+            push *= self.rest_pressure
+        if np.abs(pull + push).max() > BALANCED * np.abs(pull).max():
             raise MassSpringError(
                 f"a rest pressure of {self.rest_pressure:g} Pa does not balance the springs at rest; "
                 "give springs without length the stiffnesses of the cotangent law, and its mu as the pressure"
@@ -145,7 +159,7 @@ class Body:
         return float(enclosed_volume(self.rest, self.triangles))
 
     @cached_property
-    def kept(self) -> Volumes:
+    def kept(self) -> Volumes | PointVolumes:
         """The volumes that methods keep: `volumes`, or the whole."""
         return Volumes.whole(self) if self.volumes is None else self.volumes
 
@@ -160,6 +174,17 @@ class Body:
         if not self.rest_pressure:
             return np.zeros(self.kept.count)
         return self.rest_pressure * self.kept.parts_of(self.triangles)
+
+    @property
+    def moved_mass(self) -> np.ndarray:
+        """What resists motion [kg], (n,): `inertia`, or `mass`."""
+        return self.mass if self.inertia is None else self.inertia
+
+    def local_energy(self, x: np.ndarray) -> float:
+        """½ b Σ_q w_q (J_q − 1)² [J] at positions `x` (n, 3) [m]; 0 for a body without `local_bulk`."""
+        if not isinstance(self.kept, PointVolumes):
+            return 0.0
+        return float(0.5 * self.local_bulk * (self.kept.weight * (self.kept.jacobians(x) - 1.0) ** 2).sum())
 
     @property
     def rest_energy(self) -> float:
@@ -177,7 +202,7 @@ class Body:
         """Diagonal of the bounding box at rest [m]."""
         return float(np.linalg.norm(np.ptp(self.rest, axis=0)))
 
-    def keeping(self, volumes: Volumes) -> "Body":
+    def keeping(self, volumes: Volumes | PointVolumes) -> "Body":
         """The same body with other volumes to keep. Raises MassSpringError for one that is not positive at rest."""
         return replace(self, volumes=volumes)
 
@@ -187,4 +212,10 @@ class Body:
         membrane = self.membrane._replace(
             stiffness=self.membrane.stiffness * factor, coupling=self.membrane.coupling * factor
         )
-        return replace(self, springs=stiffer, rest_pressure=self.rest_pressure * factor, membrane=membrane)
+        return replace(
+            self,
+            springs=stiffer,
+            rest_pressure=self.rest_pressure * factor,
+            local_bulk=self.local_bulk * factor,
+            membrane=membrane,
+        )

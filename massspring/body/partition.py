@@ -13,6 +13,7 @@ from massspring.errors import MassSpringError
 
 FACES_OF_TETRAHEDRON = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Outward faces; face k lies opposite node k."""
+PAIRS_OF_NODES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 TIE = 1e-9
 """Distances closer than this fraction of the largest are equal: far above round-off, far below an edge."""
 
@@ -56,24 +57,38 @@ def partition(points: np.ndarray, tetrahedra: np.ndarray, volume: np.ndarray, co
     """
     if not 1 <= count <= len(tetrahedra):
         raise MassSpringError(f"{count} regions asked of {len(tetrahedra)} tetrahedra; give 1 to {len(tetrahedra)}")
-    graph = cell_graph(points, tetrahedra)
+    return _cut(cell_graph(points, tetrahedra), volume, count)
+
+
+def node_patches(points: np.ndarray, tetrahedra: np.ndarray, size: int) -> np.ndarray:
+    """Patch of each of the n nodes at `points`, joined by the edges of `tetrahedra` (k, 4): connected patches of about
+    `size` nodes, (n,). Raises MassSpringError."""
+    ends = np.unique(np.sort(tetrahedra[:, PAIRS_OF_NODES].reshape(-1, 2).astype(np.int64), axis=1), axis=0)
+    length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
+    both = np.r_[ends[:, 0], ends[:, 1]], np.r_[ends[:, 1], ends[:, 0]]
+    graph = coo_array((np.r_[length, length], both), shape=(len(points), len(points))).tocsr()
+    return _cut(graph, np.ones(len(points)), -(-len(points) // size))
+
+
+def _cut(graph: csr_array, weight: np.ndarray, count: int) -> np.ndarray:
+    """Part 0 … count − 1 of each member of a graph of distances, balanced by `weight`, each part connected."""
     pieces, _ = connected_components(graph, directed=False)
     if pieces > 1:
         raise MassSpringError(f"the mesh has {pieces} separate pieces; cut one connected body into regions")
-    region = np.zeros(len(tetrahedra), dtype=np.int64)
-    waiting = [(np.arange(len(tetrahedra)), 0, count)]
+    part = np.zeros(len(weight), dtype=np.int64)
+    waiting = [(np.arange(len(weight)), 0, count)]
     while waiting:
-        cells, first, parts = waiting.pop()
-        region[cells] = first
+        members, first, parts = waiting.pop()
+        part[members] = first
         if parts > 1:
-            left = _near_half(graph[cells][:, cells], volume[cells], (parts // 2) / parts)
+            left = _near_half(graph[members][:, members], weight[members], (parts // 2) / parts)
             if min(left.sum(), (~left).sum()) < parts // 2:
                 raise MassSpringError(
                     f"the mesh is too coarse for {count} connected regions; ask for fewer or refine it"
                 )
-            waiting.append((cells[left], first, parts // 2))
-            waiting.append((cells[~left], first + parts // 2, parts - parts // 2))
-    return region
+            waiting.append((members[left], first, parts // 2))
+            waiting.append((members[~left], first + parts // 2, parts - parts // 2))
+    return part
 
 
 def _near_half(graph: csr_array, volume: np.ndarray, share: float) -> np.ndarray:

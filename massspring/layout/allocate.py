@@ -1,16 +1,18 @@
 """Arrays of a run, made once: topology, state and scratch of a body at rest."""
 
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
 from massspring.body.body import Body
+from massspring.body.points import PointVolumes
 from massspring.body.springs import EDGES_OF_TRIANGLE, lengths
 from massspring.body.volumes import Volumes
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import Contacts, Model, Nodes, Workspace
 from massspring.kernels.fused.chunk import RESULT, TILE
 from massspring.layout.jacobian_pattern import volume_rows
+from massspring.layout.point_rows import point_rows
 from massspring.layout.sell_chunks import aligned, slices_of
 from massspring.layout.state import State
 from massspring.world.obstacles import Attachment
@@ -43,7 +45,10 @@ def start(
         pulled=aligned((slices.pieces, RESULT), real),
         sums=np.zeros((len(slices.lanes) + 1, 3)),
     )
-    rows = None if keeps_one(kept) else volume_rows(kept, n)
+    if isinstance(kept, PointVolumes):
+        rows = point_rows(body, kept, model.inverse_mass)
+    else:
+        rows = None if keeps_one(kept) else volume_rows(kept, n)
     return State(model, nodes, _no_contacts(n), work, np.zeros(kept.count), rows, memory=memory)
 
 
@@ -57,9 +62,9 @@ def _no_contacts(n: int) -> Contacts:
     )
 
 
-def keeps_one(volumes: Volumes) -> bool:
+def keeps_one(volumes: Volumes | PointVolumes) -> TypeGuard[Volumes]:
     """Whether a division is enough: one closed surface."""
-    return volumes.count == 1 and bool((np.abs(volumes.share.data) == 1.0).all())
+    return isinstance(volumes, Volumes) and volumes.count == 1 and bool((np.abs(volumes.share.data) == 1.0).all())
 
 
 def swept_surface(body: Body) -> np.ndarray:
@@ -90,7 +95,7 @@ def nodes_of(attachments: tuple[Attachment, ...], body: Body) -> list[np.ndarray
 def _model(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarray) -> Model:
     nodes = nodes_of(attachments, body)
     held_nodes = np.concatenate(nodes) if nodes else np.empty(0, dtype=np.int64)
-    inverse_mass = 1.0 / body.mass
+    inverse_mass = 1.0 / body.moved_mass
     inverse_mass[held_nodes] = 0.0
     touchable = np.zeros(body.node_count, dtype=np.uint8)
     touchable[body.surface_nodes] = 1
@@ -101,7 +106,7 @@ def _model(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarray)
         stiffness=body.springs.stiffness,
         membrane=body.membrane,
         triangles=surface,
-        mass=body.mass,
+        mass=body.moved_mass,
         inverse_mass=inverse_mass,
         largest_inverse_mass=float(inverse_mass.max()),
         surface_nodes=body.surface_nodes,

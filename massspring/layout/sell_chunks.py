@@ -218,4 +218,5 @@ def slices_of(springs: Springs, triangles: np.ndarray, inverse_mass: np.ndarray,
         held_start=np.searchsorted(held, LANES * np.arange(slices + 1)),
         held_lane=held % LANES,
         origin=int(triangles[0, 0]),
+        without_length=bool(springs.count and not springs.rest_length.any()),
     )

@@ -9,6 +9,7 @@ from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Frame
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.jit.stage_clock import StageTimes
 from massspring.kernels.jit.thread_team import ThreadTeam
+from massspring.kernels.points.arrays import PointRows
 from massspring.kernels.probe.arrays import Probing
 from massspring.kernels.step.frame import Frame
 
@@ -24,7 +25,7 @@ class State:
     lam: np.ndarray
     """Interior gauge pressure of each kept volume in the last step, beyond what it is at rest [Pa], (m,); 0 for
     methods that keep none."""
-    rows: VolumeRows | None = None
+    rows: VolumeRows | PointRows | None = None
     """None where one closed surface is kept: a division needs no rows."""
     diagnostics: FrameDiagnostics = field(default_factory=lambda: new_diagnostics(0, 0))
     """What the last frame measured of itself."""

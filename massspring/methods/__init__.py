@@ -12,6 +12,7 @@ from massspring.methods.post_stabilization import PostStabilization
 from massspring.methods.pressure import Pressure
 from massspring.methods.projection import Projection
 from massspring.methods.pyramid import Pyramid
+from massspring.methods.semi_implicit import SemiImplicit
 from massspring.methods.shake import Shake
 from massspring.methods.xpbd import Xpbd
 
@@ -29,6 +30,7 @@ METHODS: tuple[type[Method], ...] = (
     Element,
     Xpbd,
     ImplicitSprings,
+    SemiImplicit,
 )
 
 VARIANTS: tuple[Method, ...] = (Element(hard=True), Xpbd(volumes="whole"))

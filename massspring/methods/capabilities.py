@@ -6,10 +6,11 @@ from typing import Literal
 import numpy as np
 
 from massspring.body.body import SAME_VOLUME, Body
+from massspring.body.points import PointVolumes
 
-Kept = Literal["none", "whole", "several", "tetrahedra"]
+Kept = Literal["none", "whole", "several", "tetrahedra", "points"]
 """Volumes that a method keeps: none; the one inside the body's surface; one or several of any kind; the tissue,
-tetrahedron by tetrahedron."""
+tetrahedron by tetrahedron; those over the points of quadratic elements alone."""
 
 Correction = Literal["limited", "full", "penalty", "unbounded"]
 """How a step corrects a wrong volume. "limited": each volume moves a node by `correction_limit` at most (eq. 8.5),
@@ -45,6 +46,8 @@ class Capabilities:
     """Bodies with triangle springs (membranes)."""
     prestress: Support = No("it starts without the pressures that balance them at rest")
     """Springs without rest length, balanced at rest by the pressure of the kept volumes."""
+    point_volumes: Support = No("it has no sums over points")
+    """Volumes over points of quadratic elements."""
     thin_probes: Support = No("its steps have no stage for them")
     """Thin probes, met in continuous time."""
     threads: Support = No("its steps are not divided among threads")
@@ -65,14 +68,24 @@ class Capabilities:
                 f"it supports no springs without length (law '{body.law}'), {self.prestress.because}; "
                 "take implicit_volume, or another law"
             )
+        if isinstance(body.kept, PointVolumes) and isinstance(self.point_volumes, No):
+            return f"it supports no quadratic body, {self.point_volumes.because}; take implicit_volume"
+        if self.keeps == "points":
+            return _why_not_points(body)
         if self.keeps == "tetrahedra":
             return _why_not_each_tetrahedron(body)
         return _why_not_one_volume(body) if self.keeps == "whole" else None
 
 
+def _why_not_points(body: Body) -> str | None:
+    if not isinstance(body.kept, PointVolumes):
+        return "its springs must have no length and its volumes lie at points; take a quadratic body"
+    return None if len(body.contact_facets) else "it meets obstacles inside facets, not at nodes; take contact 'facets'"
+
+
 def _why_not_one_volume(body: Body) -> str | None:
     kept = body.kept
-    if kept.count > 1:
+    if isinstance(kept, PointVolumes) or kept.count > 1:
         return f"it keeps one volume, the body keeps {kept.count}; keep the whole, or take implicit_volume"
     if not (np.abs(kept.share.data) == 1.0).all():
         return "it keeps what one closed surface encloses, the body keeps a share of it; take implicit_volume"

@@ -18,6 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from massspring.body.body import Body
+from massspring.body.volumes import Volumes
 from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions
 from massspring.kernels.jit.stage_clock import BETWEEN_FRAMES, end_stage
 from massspring.layout.allocate import start
@@ -56,6 +57,7 @@ class ImplicitSprings(Method):
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """The body at rest, or with velocities `v` (n, 3) [m/s], and no matrix factored yet."""
         state = start(body, attachments, v)
+        assert isinstance(body.kept, Volumes)  # others are refused
         rows = volume_rows(body.kept, body.node_count) if state.rows is None else state.rows
         return replace(state, rows=rows, memory=Factors())
 

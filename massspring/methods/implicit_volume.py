@@ -19,6 +19,7 @@ import numpy as np
 
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions, Push
+from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.constraint.jacobian import (
     diagonal_into,
     padded_rows_times_into,
@@ -32,6 +33,7 @@ from massspring.kernels.constraint.schur import dense_into, solve_dense, solve_i
 from massspring.kernels.contact.active_set import pressure_reach
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import VOLUME, end_stage
+from massspring.kernels.points.arrays import PointRows
 from massspring.kernels.step.begin import (
     begin_step,
     begin_summed_step,
@@ -45,6 +47,7 @@ from massspring.layout.allocate import start
 from massspring.layout.block_jacobi import clusters_at_rest
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
+from massspring.methods.families.points import point_volumes_frame
 from massspring.methods.method import Method, threaded_frame
 from massspring.world.obstacles import Attachment
 
@@ -169,14 +172,14 @@ class ImplicitVolume(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 3e-4
     capabilities: ClassVar[Capabilities] = Capabilities(
-        "several", "limited", prestress=True, thin_probes=True, threads=True, float32=True
+        "several", "limited", prestress=True, point_volumes=True, thin_probes=True, threads=True, float32=True
     )
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """The body at rest, or with velocities `v` (n, 3) [m/s], and clusters of its volumes where they are many."""
         state = start(body, attachments, v)
         rows = state.rows
-        if rows is None or len(rows.matrix):
+        if not isinstance(rows, VolumeRows) or len(rows.matrix):
             return state
         clusters = clusters_at_rest(rows, state.nodes.x, state.model.inverse_mass)
         return replace(state, rows=rows._replace(clusters=clusters))
@@ -189,5 +192,8 @@ class ImplicitVolume(Method):
                 return replace(after, lam=np.array([lam]))
             after.rows.lam[:] = after.lam + after.model.rest_lam
             accuracy = Accuracy(self.tolerance, self.most_iterations)
-            implicit_volumes_frame(after.frame(boundary), after.rows, accuracy)
+            if isinstance(after.rows, PointRows):
+                point_volumes_frame(after.frame(boundary), after.rows, None, accuracy)
+            else:
+                implicit_volumes_frame(after.frame(boundary), after.rows, accuracy)
             return replace(after, lam=after.rows.lam - after.model.rest_lam)

@@ -6,7 +6,9 @@ import numpy as np
 
 from massspring.body.body import Body
 from massspring.body.inside import is_inside, mean_edge
+from massspring.body.points import PointVolumes
 from massspring.body.surface import winding_number
+from massspring.body.volumes import PATCH, Volumes
 from massspring.errors import MassSpringError
 from massspring.layout.probe_arrays import tip_depth
 from massspring.layout.threads import cores
@@ -64,26 +66,31 @@ def check_targets(targets: Mapping[str, Ramp], body: Body, method: Method) -> No
 def check_body(body: Body, method: Method) -> None:
     """Raises MassSpringError for a body that the method cannot advance.
 
-    Springs without length need a volume at every node: one for many nodes would let some shrink as others grow.
+    Springs without length need a volume at every node or for a few: one for many would let some shrink as others grow.
     """
     reason = method.why_not(body)
     if reason is not None:
         raise MassSpringError(f"method '{method.name}' does not apply to this body: {reason}")
-    if body.rest_pressure and body.kept.count < body.node_count:
+    if body.rest_pressure and isinstance(body.kept, Volumes) and PATCH * body.kept.count < body.node_count:
         raise MassSpringError(
             f"springs of law '{body.law}' pull every part of the body together, and it keeps {body.kept.count} "
-            f"volumes for {body.node_count} nodes; keep one volume per node"
+            f"volumes for {body.node_count} nodes; keep one volume per node, or for {PATCH} of them"
         )
 
 
 def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.ndarray) -> None:
-    """Raises MassSpringError for a thin probe that the method does not meet, that starts inside the body at `x` (n, 3)
-    or is too thick for contact with single triangles."""
+    """Raises MassSpringError for a thin probe that the method or the body does not meet, that starts inside the body at
+    `x` (n, 3) or is too thick for contact with single triangles."""
     supported = method.capabilities.thin_probes
     if isinstance(supported, No):
         raise MassSpringError(
             f"obstacle {number} is a thin probe, which method '{method.name}' does not meet: {supported.because}; "
             "use a Sphere, or implicit_volume"
+        )
+    if isinstance(body.kept, PointVolumes):
+        raise MassSpringError(
+            f"obstacle {number} is a thin probe, beside which the volumes of a quadratic body are not kept; "
+            "use a Sphere, or a tetrahedral body"
         )
     edge = mean_edge(body)
     if probe.radius > edge:

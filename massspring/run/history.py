@@ -126,7 +126,7 @@ class Recorder:
             self.scalars["kinetic"][frame] = 0.5 * float(np.einsum("i,ij,ij->", net.mass, v, v))
         if "elastic" in self.extra:
             taut = spring_energy(inside_x, net.ends, net.rest_length, net.stiffness) - self.rest_energy
-            self.scalars["elastic"][frame] = taut + membrane_energy(inside_x, net.membrane)
+            self.scalars["elastic"][frame] = taut + membrane_energy(inside_x, net.membrane) + self.body.local_energy(x)
         if len(self.rest_volumes):
             tetrahedron_volumes_into(x, self.body.tetrahedra, self.cell_volumes)
             self.scalars["min_j"][frame] = smallest_ratio(self.cell_volumes, self.rest_volumes)

@@ -58,9 +58,11 @@ def renumbered(body: Body, permutation: np.ndarray) -> Body:
         body,
         rest=body.rest[order],
         mass=body.mass[order],
+        contact_facets=number[body.contact_facets],
+        inertia=None if body.inertia is None else body.inertia[order],
         springs=replace(body.springs, ends=number[body.springs.ends]),
         triangles=number[body.triangles],
         tetrahedra=number[body.tetrahedra],
-        volumes=None if volumes is None else replace(volumes, triangles=number[volumes.triangles]),
+        volumes=None if volumes is None else volumes.renumbered(number),
         membrane=body.membrane._replace(triangles=number[body.membrane.triangles]),
     )

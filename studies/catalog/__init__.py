@@ -1,5 +1,6 @@
 """The studies, one file each. Adding one: a file and a line in STUDIES."""
 
+from studies.catalog.accuracy import ACCURACY
 from studies.catalog.frame_rate import FRAME_RATE
 from studies.catalog.laws import LAWS_STUDY
 from studies.catalog.methods import METHODS_STUDY
@@ -19,6 +20,7 @@ STUDIES: tuple[Study, ...] = (
     STRESS,
     LAWS_STUDY,
     METHODS_STUDY,
+    ACCURACY,
 )
 
 __all__ = ["STUDIES", "Chart", "Study"]

@@ -19,6 +19,8 @@ Drawing = Callable[[Sequence["Run"], Path], None]
 
 SMOKE_NODES, SMOKE_NODES_HOLLOW = 150, 400
 """A wall folds on a coarser surface."""
+SMOKE_QUADRATIC = (594, 794)
+"""Of 150 and 200 vertices: fewer hold no node of a small region."""
 RESERVED = ("cache", "figures", "main", "reference", "smoke", "verify")
 """Folders of the results that are no study's, and the word for the main studies."""
 SMOKE_FRAMES = 20
@@ -92,12 +94,18 @@ class Study:
         return tuple({case.scene.name: case.scene for case in self.cases}.values())
 
 
+def smoke_nodes(case: Case) -> int:
+    """Surface nodes of a smoke run, of a quadratic body with those between its vertices."""
+    few, few_hollow = SMOKE_QUADRATIC if case.body.kind == "quadratic" else (SMOKE_NODES, SMOKE_NODES_HOLLOW)
+    return few_hollow if case.scene.lumen else few
+
+
 def smoke_case(case: Case) -> Case:
     """A case small enough for a smoke run."""
     plan = case.scene.reference
-    coarse = replace(plan, levels=plan.levels[:2], variants=()) if plan is not None else None
+    coarse = replace(plan.coarsest(2), variants=()) if plan is not None else None
     return case.replaced(
         scene=replace(case.scene, reference=coarse),
-        body=replace(case.body, nodes=min(case.body.nodes, SMOKE_NODES_HOLLOW if case.scene.lumen else SMOKE_NODES)),
+        body=replace(case.body, nodes=min(case.body.nodes, smoke_nodes(case))),
         frames=min(case.frames or case.scene.frames, SMOKE_FRAMES),
     )

@@ -14,7 +14,7 @@ from studies.compiling.bodies import EDGE, KINDS, tiny_body
 
 FRAMES, STEPS = 2, 2
 PLAIN, CLOCK, PROBE, THREADS = "", "stage clock", "thin probe", "threads"
-OWN_TYPES = ("whole", "several")
+OWN_TYPES = ("whole", "several", "quadratic")
 """Kinds of bodies whose types are not those of another. Options are compiled for them, in double precision; threads in
 single precision too."""
 
@@ -50,10 +50,11 @@ def variants_of(method: Method) -> Iterator[Variant]:
     """Those of a method: each body that it advances in each precision, and each option that it supports."""
     table = method.capabilities
     precisions: tuple[Precision, ...] = ("float64", "float32") if table.float32 else ("float64",)
-    supported = {CLOCK: True, PROBE: table.thin_probes, THREADS: table.threads}
     for kind in KINDS:
         if method.why_not(tiny_body(kind)) is not None:
             continue
+        thin_probes = table.thin_probes and kind != "quadratic"  # beside which they are refused
+        supported = {CLOCK: True, PROBE: thin_probes, THREADS: table.threads}
         for precision in precisions:
             yield Variant(method, kind, precision)
             for option, yes in supported.items() if kind in OWN_TYPES else ():
@@ -63,7 +64,7 @@ def variants_of(method: Method) -> Iterator[Variant]:
 
 def _rank(method: Method) -> int:
     """The method that shares most with others comes first."""
-    return ("several", "whole", "tetrahedra", "none").index(method.capabilities.keeps)
+    return ("several", "whole", "tetrahedra", "points", "none").index(method.capabilities.keeps)
 
 
 def advance(variant: Variant) -> None:

@@ -6,6 +6,7 @@ import pandas as pd
 
 from studies.base.lookup import lookup
 from studies.metrics.metrics import METRICS, Metric, Run
+from studies.runs.recipe_text import recipe_text
 
 UNRESOLVED = "doubtful"
 """Column with the metrics of which the reference knows the truth less than ten times better than the model."""
@@ -42,6 +43,7 @@ def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
         "dt [ms]": 1e3 * attributes["dt"] if "dt" in attributes else float("nan"),
         "dt/dt_c": attributes["dt"] / attributes["dt_limit"] if "dt" in attributes else float("nan"),
         "status": str(run.record.status),
+        "recipe": recipe_text(case),
     }
     for entry in metrics:
         row[f"{entry.name} [{entry.unit}]"] = entry(run)

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from massspring import Method
-from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run
+from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run, real_time
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import (
     blank,
@@ -23,7 +23,6 @@ from studies.plots.style.page import (
     unresolved_notes,
 )
 from studies.plots.style.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, heading, readable, save, styled
-from studies.plots.work_precision import cost
 from studies.runs.case import chosen_settings
 
 TITLE = "Ways to keep a volume, on the same bodies, at one share of their step limits unless a step is named"
@@ -35,6 +34,7 @@ QUANTITIES = {
     "j_spread": "spread of J [%]",
 }
 COST = "computing time [ms/s]"
+MS_PER_S = 1e3
 SCENE_LOOKS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"))
 LEAST = 1e-4
 """Volume errors below a millionth are drawn there, with an arrow [%]."""
@@ -123,6 +123,11 @@ def _draw(axes: Axes, names: dict[int, str], scenes: dict[str, list[Run]], metri
     axes.set_axisbelow(True)
     axes.tick_params(axis="x", labelsize=SMALL)
     axes.tick_params(axis="y", length=0, labelsize=SMALL)
+
+
+def cost(run: Run) -> float:
+    """Computing time per simulated second [ms/s]: what explicit steps of different size are compared by."""
+    return MS_PER_S / real_time(run)
 
 
 def _value(run: Run, metric: Metric | None) -> float:

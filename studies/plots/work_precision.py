@@ -1,4 +1,4 @@
-"""What accuracy costs: error against computing time, over mesh size, time step and method."""
+"""What accuracy costs: errors of force and displacement against computing time, from the paper's body on."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,14 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run, real_time
-from studies.plots.style.bodies import BodyLook, body_looks
+from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, front, judged
+from studies.metrics.metrics import Metric, Run
+from studies.metrics.wish import usual_wish
+from studies.plots.style.families import PAPER, Family, family_of
 from studies.plots.style.page import (
-    band_handle,
     blank,
     by_scene,
     finish,
-    grouped,
     log_axis,
     page,
     panels,
@@ -23,138 +23,211 @@ from studies.plots.style.page import (
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, remark, save, styled
+from studies.plots.style.style import BLACK, GREEN, GREY, SMALL, heading, readable, remark, save, styled
 from studies.runs.case import BodyRecipe
+from studies.scene.scene import Scene
 from studies.store.record import Status
 
-TITLE = "Accuracy for computing time"
-ROWS = {"force_error": "force error [%]", "interior_error": "displacement error [%]"}
-STEP_LINES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (5, 2, 1.5, 2)))
-MS_PER_S = 1e3
+TITLE = "Accuracy for computing time: down and to the left is better"
+COLUMNS = 3
+"""Scenes beside each other."""
+ROWS = {FORCE.name: "error of the force [%]", DISPLACEMENT.name: "mean error / largest u [%]"}
+FIELDS = {FORCE.name: "force", DISPLACEMENT.name: "displacement"}
+"""Of a wish and of a judged case."""
+REAL_TIME, HALF = 1.0, 0.5
+"""Computing time over simulated time."""
+ROOM, BELOW, SIDE = 1.6, 3.0, 2.0
+"""Ends of the axes over the outermost values: above, below, where a name stands, and at the sides."""
+MOST_NAMED = 3
+"""Runs that a note names."""
+LOWEST, HIGHEST = 1e-3, 1e3
+"""Errors outside are drawn at the edge [%]."""
 
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One column of panels per scene, one row per quantity; a line joins the meshes of one method and step."""
-    timed = [run for run in runs if run.timing is not None and run.record.status in COMPARABLE]
-    if not timed:
+    """For each scene a panel of the force and one of the displacement below it."""
+    scenes = {name: _judged(group) for name, group in by_scene(runs).items()}
+    scenes = {name: found for name, found in scenes.items() if found}
+    if not scenes:
         return blank(TITLE, "no frame times from this machine and this code yet")
-    scenes, looks = by_scene(timed), body_looks(timed, ignored=("nodes",))
-    metrics = [metric for name in ROWS for metric in METRICS if metric.name == name]
-    sheet = page(4.6 * len(scenes) + 0.8, 6.4)
-    axes = panels(sheet, len(metrics), len(scenes), sharex="col", sharey=True)
-    steps = sorted({_step(run) for run in timed}, reverse=True)
-    values = [1.0, 100.0]
-    for column, (name, group) in zip(axes.T, scenes.items(), strict=True):
-        column[0].set_title(heading(name) + unresolved_mark(group, metrics))
-        column[-1].set_xlabel("computing time per simulated second [ms/s]")
-        for panel, metric in zip(column, metrics, strict=True):
-            values += _draw_panel(panel, group, metric, steps, looks)
-            log_axis(panel.xaxis)
-    for panel, metric in zip(axes[:, 0], metrics, strict=True):
-        log_axis(panel.yaxis)
-        panel.set_ylabel(ROWS[metric.name])
-    axes[0, 0].set_ylim(0.7 * min(values), 1.2 * max(values))
-    return finish(
-        sheet,
-        TITLE,
-        _handles(timed, steps, looks),
-        [_meaning(), *unresolved_notes(timed, metrics), *remarks(runs)],
-        columns=3,
+    shown = [run for run in runs if run.case.scene.name in scenes]
+    columns = min(COLUMNS, len(scenes))
+    blocks = -(-len(scenes) // columns)
+    sheet = page(min(12.0, 3.9 * columns + 0.6), 5.4 * blocks + 0.4)
+    axes = panels(sheet, 2 * blocks, columns, sharex=True, sharey="row")
+    for spare in range(len(scenes), blocks * columns):
+        for row in (0, 1):
+            axes[2 * (spare // columns) + row, spare % columns].set_axis_off()
+    low, high = _ends([one.cost.value for found in scenes.values() for one in found] + [REAL_TIME, HALF])
+    for place, (name, found) in enumerate(scenes.items()):
+        column = axes[2 * (place // columns) : 2 * (place // columns) + 2, place % columns]
+        group = [run for run in shown if run.case.scene.name == name]
+        column[0].set_title(heading(name) + unresolved_mark(group, (FORCE, DISPLACEMENT)))
+        column[0].set_xlim(low, high)
+        _draw_scene(column, found, group[0].case.scene)
+    for row, metric in zip(axes, (FORCE, DISPLACEMENT) * blocks, strict=True):
+        row[0].set_ylabel(ROWS[metric.name])
+        log_axis(row[0].yaxis)
+    for panel in axes[-1]:
+        panel.set_xlabel("computing time / simulated time [s/s]")
+    log_axis(axes[-1, 0].xaxis)
+    notes = [*_notes(scenes), *_left_out(runs), *unresolved_notes(shown, (FORCE, DISPLACEMENT))]
+    return finish(sheet, TITLE, _handles(scenes), notes, columns=3)
+
+
+def _judged(group: Sequence[Run]) -> list[Judged]:
+    """Those that ended well and were timed here."""
+    return [one for one in map(judged, group) if one is not None and one.cost.known]
+
+
+def _ends(values: Sequence[float]) -> tuple[float, float]:
+    return min(values) / SIDE, SIDE * max(values)
+
+
+def _draw_scene(column: np.ndarray, found: Sequence[Judged], scene: Scene) -> None:
+    wish = usual_wish(scene)
+    recommended = cheapest(found, wish)
+    for panel, metric in zip(column, (FORCE, DISPLACEMENT), strict=True):
+        points = [(one, getattr(one, FIELDS[metric.name])) for one in found]
+        points = [(one, error) for one, error in points if error.known]
+        bound = getattr(wish, FIELDS[metric.name])
+        _draw_goals(panel, bound)
+        if not points:
+            remark(panel, "no reference, no error" if not any(one.compared for one in found) else _why_not(metric))
+            panel.set_ylim(0.1, 100.0)
+            continue
+        _draw_front(panel, points)
+        for one, error in points:
+            _draw_point(panel, one, error)
+        heights = [_height(error) for _, error in points]
+        panel.set_ylim(max(LOWEST, min(*heights, bound)) / BELOW, ROOM * max(*heights, bound))
+        _name(panel, points, recommended)
+
+
+def _why_not(metric: Metric) -> str:
+    return f"the scene compares no {FIELDS[metric.name]}"
+
+
+def _draw_goals(panel: Axes, bound: float) -> None:
+    """The corner that is accurate enough in real time; real time, and half of it."""
+    panel.fill_between([1e-9, REAL_TIME], 1e-12, bound, color=GREEN, alpha=0.12, linewidth=0)
+    panel.axvline(REAL_TIME, color=BLACK, linewidth=1.4)
+    panel.axvline(HALF, color=BLACK, linewidth=1.0, linestyle=(0, (1.5, 2)))
+
+
+def _draw_front(panel: Axes, points: Sequence[tuple[Judged, Measured]]) -> None:
+    best = front([(one.cost.value, _height(error)) for one, error in points])
+    panel.step(*zip(*best, strict=True), where="post", color=GREY, linewidth=1.2, zorder=1)
+
+
+def _height(error: Measured) -> float:
+    """Where an error is drawn: closer to the reference than it is to itself means no more than as good as it."""
+    uncertainty = error.uncertainty if error.uncertainty == error.uncertainty else 0.0
+    return float(np.clip(max(abs(error.value), uncertainty), LOWEST, HIGHEST))
+
+
+def _draw_point(panel: Axes, one: Judged, error: Measured) -> None:
+    """A marker with the reference's uncertainty up and down, and the spread of the repeats to the sides."""
+    look, height = family_of(one.case), _height(error)
+    up = error.uncertainty if error.uncertainty == error.uncertainty else 0.0
+    wide = one.cost.uncertainty if one.cost.uncertainty == one.cost.uncertainty else 0.0
+    down, left = min(up, 0.95 * height), min(wide, 0.95 * one.cost.value)
+    panel.errorbar(
+        one.cost.value,
+        height,
+        xerr=[[left], [wide]],
+        yerr=[[down], [up]],
+        color=look.colour,
+        marker=look.marker,
+        markersize=_size(look),
+        markeredgecolor="white",
+        markeredgewidth=0.5,
+        elinewidth=1.0,
+        zorder=2,
     )
 
 
-def cost(run: Run) -> float:
-    """Computing time per simulated second [ms/s]: what explicit steps of different size are compared by."""
-    return MS_PER_S / real_time(run)
+def _size(look: Family) -> float:
+    return 11.0 if look.marker == "*" else 7.0
 
 
-def _step(run: Run) -> float:
-    """Time step over the stability limit, as asked for; as measured where it was given in seconds."""
-    if run.case.dt == "auto":
-        return run.case.dt_fraction
-    return round(run.record.attributes["dt"] / run.record.attributes["dt_limit"], 2)
+def _name(panel: Axes, points: Sequence[tuple[Judged, Measured]], recommended: Judged | None) -> None:
+    """Writes which points are the paper's body, the costliest, and the recommended recipe."""
+    papers = [(one, error) for one, error in points if family_of(one.case).name == PAPER]
+    if papers:
+        one, error = max(papers, key=lambda pair: pair[0].cost.value)
+        _write(panel, one, error, PAPER, "center")
+    for one, error in points:
+        if one is recommended:
+            # To the lower left of the best for the time there is nothing.
+            _write(panel, one, error, "recommended", "top")
+            panel.plot(one.cost.value, _height(error), marker="o", markersize=15, markerfacecolor="none", color=BLACK)
 
 
-def _draw_panel(
-    axes: Axes, group: Sequence[Run], metric: Metric, steps: Sequence[float], looks: dict[BodyRecipe, BodyLook]
-) -> list[float]:
-    """The values drawn."""
-    uncertainty = metric.uncertainty(group[0])
-    if uncertainty == uncertainty:
-        axes.axhspan(1e-12, uncertainty, color=GREY, alpha=0.3, linewidth=0)
-    drawn: list[float] = [uncertainty] if uncertainty == uncertainty else []
-    lines = []
-    for same in grouped(group, lambda run: (run.case.method.name, _step(run), looks[run.case.body])):
-        line = sorted((run for run in same if metric(run) == metric(run)), key=lambda run: run.case.body.nodes)
-        # Closer to the reference than it is to itself means no more than: as good as it.
-        heights = [max(metric(run), uncertainty) if uncertainty == uncertainty else metric(run) for run in line]
-        colour = method_colour(same[0].case.method.name)
-        dashes = STEP_LINES[steps.index(_step(same[0])) % len(STEP_LINES)]
-        axes.plot([cost(run) for run in line], heights, color=colour, linestyle=dashes, linewidth=1.5)
-        for run, height in zip(line, heights, strict=True):
-            _draw_point(axes, run, height, looks[run.case.body].marker)
-        lines.append((line, heights))
-        drawn += heights
-    if metric.name == next(iter(ROWS)) and lines:
-        _number(axes, *max(lines, key=lambda pair: _upper_left(*pair)))
-    if group[0].reference is None:
-        remark(axes, "no reference, no error")
-    elif len(drawn) < 2:
-        remark(axes, "not compared in this scene")
-    return drawn
+def _write(panel: Axes, one: Judged, error: Measured, words: str, vertical: str) -> None:
+    """Beside a point: to its right in the left half of the panel, else to its left."""
+    left, right = panel.get_xlim()
+    in_left = one.cost.value < np.sqrt(left * right)
+    panel.annotate(
+        words,
+        (one.cost.value, _height(error)),
+        xytext=(9 if in_left else -9, -7 if vertical == "top" else 0),
+        textcoords="offset points",
+        ha="left" if in_left else "right",
+        va=vertical,
+        size=SMALL,
+        weight="bold" if vertical == "top" else "normal",
+        zorder=3,
+    )
 
 
-def _number(axes: Axes, line: Sequence[Run], heights: Sequence[float]) -> None:
-    """Writes the nodes over the markers of one line."""
-    place = {"xytext": (0, 8), "textcoords": "offset points", "ha": "center", "color": GREY, "size": SMALL}
-    for run, height in zip(line, heights, strict=True):
-        axes.annotate(f"{run.case.body.nodes:,}", (cost(run), height), **place)
+def words_of(body: BodyRecipe) -> str:
+    """A recommended body in a note: its series and its size."""
+    return f"{body.series}, {body.nodes:,} surface nodes"
 
 
-def _upper_left(line: Sequence[Run], heights: Sequence[float]) -> float:
-    """How far to the upper left a line lies, where no other is in the way: mean logarithm of error over cost."""
-    return float(np.mean(np.log(heights) - np.log([cost(run) for run in line]))) if line else -np.inf
-
-
-def _draw_point(axes: Axes, run: Run, height: float, marker: str) -> None:
-    """A marker as large as its mesh; white inside where the run ended with a fault."""
-    colour = method_colour(run.case.method.name)
-    face = colour if run.record.status == Status.OK else "white"
-    look = {"color": colour, "markerfacecolor": face, "markeredgewidth": 1.5}
-    axes.plot(cost(run), height, marker=marker, markersize=_size(run.case.body.nodes), **look)
-
-
-def _size(nodes: int) -> float:
-    """Marker diameter [pt]: area in proportion to the nodes."""
-    return 0.36 * np.sqrt(nodes)
-
-
-def _handles(timed: Sequence[Run], steps: Sequence[float], looks: dict[BodyRecipe, BodyLook]) -> list:
-    methods = dict.fromkeys(run.case.method.name for run in timed)
-    look = {"color": BLACK, "linewidth": 1.5}
-    lines = [
-        Line2D([], [], linestyle=STEP_LINES[k % len(STEP_LINES)], label=f"step {step:g} of the stability limit", **look)
-        for k, step in enumerate(steps)
+def _notes(scenes: dict[str, list[Judged]]) -> list[str]:
+    told = [
+        "Green: force within 3 % and displacement within 1 % (hollow organs 6 and 3 %) in real time on one core. Bars: "
+        "uncertainty of the reference, and spread of five timings. Nothing is drawn below the uncertainty."
     ]
-    hollow = {"marker": "o", "color": BLACK, "markerfacecolor": "white", "linestyle": "", "markersize": 7}
-    bodies = dict.fromkeys(looks.values())
-    marks = [Line2D([], [], color=BLACK, marker=b.marker, linestyle="", markersize=7, label=b.name) for b in bodies]
-    faults = sorted({readable(run.record.status) for run in timed if run.record.status != Status.OK})
+    best = {name: cheapest(found, usual_wish(found[0].case.scene)) for name, found in scenes.items()}
+    named = [f"{readable(name)}: {words_of(one.case.body)}" for name, one in best.items() if one is not None]
+    lacking = [readable(name) for name, one in best.items() if one is None]
+    if named:
+        told.append(f"Recommended, the cheapest that is accurate enough: {'; '.join(named)}.")
+    if lacking:
+        told.append(f"Nothing here is accurate enough for {', '.join(lacking)}.")
+    return told
+
+
+def _left_out(runs: Sequence[Run]) -> list[str]:
+    """What is no point of the chart, and why."""
+    ended = [f"{run.case.name} {readable(run.record.status)}" for run in runs if run.record.status != Status.OK]
+    well = [run for run in runs if run.record.status == Status.OK]
+    told = remarks(well)
+    if ended:
+        more = f" and {len(ended) - MOST_NAMED} more" if len(ended) > MOST_NAMED else ""
+        told.append(f"Not drawn, because they ended with a fault: {', '.join(ended[:MOST_NAMED])}{more}.")
+    untimed = sum(run.timing is None for run in well)
+    if untimed:
+        told.append(f"Not drawn: {untimed} without frame times from this machine and this code.")
+    return told
+
+
+def _handles(scenes: dict[str, list[Judged]]) -> list[Line2D]:
+    looks = dict.fromkeys(family_of(one.case) for found in scenes.values() for one in found)
+    plain = {"linestyle": "", "markeredgecolor": "white", "markeredgewidth": 0.5}
     return [
-        *(Line2D([], [], color=method_colour(name), marker="o", label=readable(name)) for name in methods),
-        *lines,
-        *(marks if len(marks) > 1 else []),
-        band_handle("the reference's own uncertainty"),
-        *([Line2D([], [], label=f"hollow: ended {', '.join(faults)}", **hollow)] if faults else []),
+        *(
+            Line2D([], [], color=look.colour, marker=look.marker, markersize=_size(look), label=look.name, **plain)
+            for look in looks
+        ),
+        Line2D([], [], color=GREY, linewidth=1.2, label="best for the time"),
+        Line2D([], [], color=BLACK, linewidth=1.4, label="real time"),
+        Line2D([], [], color=BLACK, linewidth=1.0, linestyle=(0, (1.5, 2)), label="half of it"),
     ]
-
-
-def _meaning() -> str:
-    return (
-        "Numbers and marker areas: surface nodes of the mesh. Displacement: volume-weighted "
-        "relative L2 at the last checkpoint. Nothing is drawn below the uncertainty of the reference."
-    )
 
 
 def draw(runs: Sequence[Run], path: Path) -> None:

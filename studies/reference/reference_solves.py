@@ -41,7 +41,7 @@ class ReferenceSolve:
             title="",
             duration=0.0,
             frames=0,
-            reference=replace(plan, levels=(self.level, self.level), variants=()),
+            reference=plan.alone(self.level),
             quantities=(),
             not_for=(),
         )

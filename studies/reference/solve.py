@@ -21,6 +21,7 @@ from studies.reference.checkpoints import drop, keep, kept
 from studies.reference.fields import fields_of
 from studies.reference.problem import reference_problem
 from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint
+from studies.reference.size import element_size
 from studies.store.new_record import new_record
 from studies.store.record import Status, write_record
 
@@ -120,6 +121,7 @@ def _attributes(reference_solve: ReferenceSolve, problem: Problem, found: list[E
         "scene": reference_solve.scene.name,
         "level": float(reference_solve.level),
         "variant": reference_solve.variant,
+        "size": element_size(reference_solve.scene, reference_solve.level),
         "unknowns": 3 * len(nodes(problem.mesh)) + problem.mesh.nvertices,
         "steps_done": len(found),
         "seconds": seconds,

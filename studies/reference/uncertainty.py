@@ -7,11 +7,20 @@ that a mesh refined somewhere does not count more there.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_fem.uncertainty import MeshError, cell_size, combined, field_error, mesh_error, setting_error
+from reference_fem.uncertainty import (
+    FASTEST,
+    MeshError,
+    combined,
+    field_error,
+    mesh_error,
+    order_at_outlines,
+    setting_error,
+)
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import boundary_triangles, tetrahedron_volumes, triangle_areas
 from studies.geometry.surface.distance import hausdorff
@@ -86,9 +95,14 @@ class Sample:
         return self.solution.force
 
     @property
-    def cell_size(self) -> float:
-        """Representative size of an element [m]."""
-        return cell_size(float(self.at.volumes.sum()), len(self.solution.field("tetrahedra")))
+    def element_size(self) -> float:
+        """Of the mesh before elements were halved [m]. Raises StudyError for a record of older code."""
+        known = self.solution.record.attributes
+        if "size" not in known:
+            raise StudyError(
+                f"the reference {self.solution.record.name} does not tell its element size; solve it again"
+            )
+        return float(known["size"])
 
     def series(self, name: str) -> np.ndarray:
         """A stored series of numbers, (K,)."""
@@ -203,14 +217,31 @@ def uncertainties(
 
 def _of_mesh(name: str, family: Sequence[Sample]) -> MeshError:
     """What the meshes leave, relative to the size of the quantity."""
-    sizes = [sample.cell_size for sample in family]
+    sizes = [sample.element_size for sample in family]
+    fastest = fastest_order(family, sizes)
     if name in NUMBERS:
         values = [NUMBERS[name][1](sample) for sample in family]
         size = 1.0 if name == "volume" else float(np.linalg.norm(values[0]))
-        error, sign = mesh_error(sizes, values), float(np.sign(values[0][0]))
+        error, sign = mesh_error(sizes, values, fastest), float(np.sign(values[0][0]))
         return MeshError(error.uncertainty / size, sign * error.shift / size, error.order)
     weights = FIELDS[name if name in FIELDS else "surface"][1](family[0].at)
-    field = field_error(sizes, [sample.u for sample in family], weights)
+    field = field_error(sizes, [sample.u for sample in family], weights, fastest)
     change = np.sqrt(weights @ ((family[1].u - family[0].u) ** 2).sum(axis=1))
     scale = QUANTITIES[name](family[1], family[0]) / change if change else 0.0
     return MeshError(scale * field.uncertainty, scale * field.shift, field.order)
+
+
+def fastest_order(family: Sequence[Sample], sizes: Sequence[float]) -> float:
+    """Largest order to believe of meshes, fine to coarse, of `sizes` [m]: what the outlines of held regions allow.
+
+    Observed orders are not enough: what converges fast shows first, and the singularity is left (docs, section 6).
+    """
+    scene = family[0].solution.scene
+    plan = scene.reference
+    assert plan is not None  # it was solved
+    if not scene.held or scene.symmetric:
+        return FASTEST
+    halved = [plan.bisections(float(sample.solution.record.attributes["level"]))[0] for sample in family]
+    ratios = [coarse / fine for fine, coarse in pairwise(sizes)]
+    more = [fine - coarse for fine, coarse in pairwise(halved)]
+    return min(order_at_outlines(ratio, count) for ratio, count in zip(ratios, more, strict=True))

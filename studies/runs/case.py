@@ -13,7 +13,7 @@ from massspring.body.laws import laws_by_name
 from massspring.body.membranes import MEMBRANE_LAWS
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.runs.case_checks import check_settings
+from studies.runs.case_checks import check_recipe, check_settings
 from studies.scene.as_json import _scene_adapter, scene_from_dict
 from studies.scene.scene import Scene
 
@@ -24,39 +24,59 @@ Seconds = float | Literal["auto"]
 class BodyRecipe:
     """How the mass-spring body is made from the scene's organ."""
 
-    kind: Literal["tetrahedral", "surface", "membrane"] = "tetrahedral"
+    kind: Literal["tetrahedral", "surface", "membrane", "quadratic"] = "tetrahedral"
     """"surface": the paper's (JHC05); "tetrahedral": springs on the edges of the filled mesh; "membrane": the outer
-    surface of a hollow organ as a thin wall round its content."""
+    surface of a hollow organ as a thin wall round its content; "quadratic": springs between all nodes of quadratic
+    tetrahedra, which follow the true shape, with one volume per vertex."""
     nodes: int = 550
-    """Surface nodes."""
+    """Nodes on the outer surface; of a quadratic body mid-side nodes too, so that it has a quarter of them as vertices,
+    and of a graded one those that grading adds (within 5 %)."""
     law: str = "van_gelder"
     """Stiffness law: of a tetrahedral body one of LAWS, where "cotangent", springs without length, needs nodal volumes;
     of a membrane "delingette" or "lloyd"."""
     stiffness: float = 1.0
     """Factor on every spring; 1 matches the tissue's shear modulus."""
-    volumes: Literal["scene", "whole", "regions", "nodal"] = "scene"
+    volumes: Literal["scene", "whole", "regions", "patches", "nodal"] = "scene"
     """Which volumes are kept. "scene": those that physics keeps apart, the wall and a closed lumen of a hollow organ;
-    "whole": one, enclosed by the outer surface, as in the paper; "regions": `regions` parts; "nodal": one per node."""
+    "whole": one, enclosed by the outer surface, as in the paper; "regions": `regions` parts; "nodal": one per node;
+    "patches": one for about eight nodes."""
     regions: int = 32
     """How many, where volumes is "regions"."""
     axis: Literal["straight", "centre_line"] = "straight"
     """Of a surface body: "centre_line" follows a bent organ."""
     weights: tuple[float, float, float, float] | None = None
     """Of a surface body: relative stiffness of structural, bending, inner and axial springs; None for 1, ½, ½, 1."""
+    graded: bool = False
+    """Whether elements are halved where the scene holds and touches the body (studies.grading.graded_mesh), once at
+    outlines and twice at contacts, of a hollow organ once at contacts."""
+    mass: Literal["lumped", "stiffness"] = "lumped"
+    """What resists the motion of a quadratic body: its mass, or the same in all, shared in proportion to the stiffness
+    at each node, for longer steps where inertia does not matter (studies.scene.inertia)."""
+    contact: Literal["facets", "nodes"] = "facets"
+    """Where obstacles touch a quadratic body: at points inside its facets, or at its nodes, which is cheaper."""
 
     def __post_init__(self) -> None:
         lookup(self.law, (*laws_by_name(), *MEMBRANE_LAWS), "stiffness law")
+        check_recipe(self)
 
     @property
     def series(self) -> str:
-        """What sets it apart in charts and tables: its kind, and the volumes it keeps where that was chosen."""
+        """What sets it apart in charts and tables: its kind, whether it is graded, the volumes it keeps and its masses
+        where they were chosen."""
         chosen = {
             "scene": "",
             "whole": ", one volume",
             "regions": f", {self.regions} volumes",
+            "patches": ", volumes of patches",
             "nodal": ", nodal volumes",
         }
-        return self.kind + chosen[self.volumes]
+        words = ("graded " if self.graded else "") + self.kind + chosen[self.volumes]
+        words += ", contact at nodes" if self.contact == "nodes" else ""
+        return words if self.mass == "lumped" else words + ", masses by stiffness"
+
+
+LATER = {"weights": None, "graded": False, "mass": "lumped", "contact": "facets"}
+"""Settings of a recipe that came after the first records, and what they were before."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +115,12 @@ class Case:
             parts.append(self.body.law)
         if self.body.volumes != "scene":
             parts.append(f"{self.body.regions}regions" if self.body.volumes == "regions" else self.body.volumes)
+        if self.body.graded:
+            parts.append("graded")
+        if self.body.mass != "lumped":
+            parts.append(f"{self.body.mass}_mass")
+        if self.body.contact != "facets":
+            parts.append(f"{self.body.contact}_contact")
         if self.body.axis != "straight":
             parts.append(self.body.axis)
         if self.body.stiffness != 1.0:
@@ -154,11 +180,8 @@ def case_to_dict(case: Case) -> dict[str, Any]:
 
 
 def _recipe_to_dict(recipe: BodyRecipe) -> dict[str, Any]:
-    """JSON-able form; without weights where none are chosen, so that records from before they could be stay current."""
-    fields = asdict(recipe)
-    if recipe.weights is None:
-        del fields["weights"]
-    return fields
+    """JSON-able form; of LATER only what was chosen, so that records from before it could be stay current."""
+    return {name: value for name, value in asdict(recipe).items() if name not in LATER or value != LATER[name]}
 
 
 def case_from_json(text: str) -> Case:

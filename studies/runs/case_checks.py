@@ -10,6 +10,21 @@ from massspring.run.precision import check_precision
 from studies.base.errors import StudyError
 
 
+def check_recipe(recipe: Any) -> None:
+    """Raises StudyError for settings of a `studies.runs.case.BodyRecipe` that do not go together."""
+    quadratic = recipe.kind == "quadratic"
+    if recipe.graded and not quadratic and recipe.kind != "tetrahedral":
+        raise StudyError(f"a {recipe.kind} body cannot be graded; choose kind 'tetrahedral' or 'quadratic'")
+    if recipe.mass != "lumped" and not quadratic:
+        raise StudyError(f"a {recipe.kind} body has no masses by stiffness; choose kind 'quadratic' or mass 'lumped'")
+    if quadratic and recipe.volumes != "scene":
+        raise StudyError(
+            f"a quadratic body keeps one volume per vertex, not volumes '{recipe.volumes}'; leave them at 'scene'"
+        )
+    if quadratic and recipe.law != "van_gelder":
+        raise StudyError(f"the springs of a quadratic body follow no law, not '{recipe.law}' either; leave the law out")
+
+
 def check_settings(case: Any) -> None:
     """Raises StudyError for the first setting of a `studies.runs.case.Case` that is none."""
     if isinstance(case.method, type) or not is_dataclass(case.method):

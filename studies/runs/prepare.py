@@ -22,8 +22,10 @@ from massspring.body.volumes import Volumes
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
+from studies.grading.quadratic_mesh import QuadraticMesh
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.limits import check_size
+from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scene.scene import Scene
 
@@ -39,10 +41,24 @@ class Prepared:
     limit: StepLimit
 
 
-def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh) -> Body:
+def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
+    """The mesh that a recipe asks for. Raises StudyError."""
+    quadratic = recipe.kind == "quadratic"
+    if recipe.graded or quadratic:
+        # Loaded where it is asked for: it brings the finite elements.
+        from studies.grading.graded_mesh import graded_mesh, usual_grading
+
+        return graded_mesh(scene, recipe.nodes, *(usual_grading(scene) if recipe.graded else (0, 0)), quadratic)
+    # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.
+    return mesh_for(scene, recipe.nodes, filled=recipe.kind == "tetrahedral" or scene.lumen is not None)
+
+
+def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh) -> Body:
     """The mass-spring body of the scene's tissue on a mesh. Raises StudyError or MassSpringError."""
     if not recipe.stiffness > 0:
         raise StudyError(f"the stiffness factor is {recipe.stiffness}; it must be positive")
+    if isinstance(mesh, QuadraticMesh):
+        return quadratic_for(scene, recipe, mesh)
     material = Material(scene.tissue.shear_modulus, scene.tissue.density)
     outside = mesh.outer() if mesh.hollow else mesh
     if recipe.kind == "membrane":
@@ -83,7 +99,10 @@ def volumes_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, body: Body) -
         surfaces = {LUMEN: mesh.lumen_triangles}
     if recipe.volumes in ("scene", "whole"):
         return None
-    tissue = Volumes.nodal(body) if recipe.volumes == "nodal" else Volumes.regions(body, recipe.regions)
+    if recipe.volumes == "regions":
+        tissue = Volumes.regions(body, recipe.regions)
+    else:
+        tissue = Volumes.nodal(body) if recipe.volumes == "nodal" else Volumes.patches(body)
     return tissue.joined(Volumes.closed_surfaces(body, surfaces)) if surfaces else tissue
 
 
@@ -110,14 +129,16 @@ def prepare(case: Case) -> Prepared:
     reason = scene.skip(case.method.name)
     if reason is not None:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
-    # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.
-    mesh = mesh_for(scene, case.body.nodes, filled=case.body.kind == "tetrahedral" or scene.lumen is not None)
+    check_masses(scene, case.body)
+    mesh = mesh_of(scene, case.body)
     body = body_for(scene, case.body, mesh)
+    if isinstance(mesh, QuadraticMesh):
+        mesh = flat_mesh(mesh, body)
     reason = case.method.why_not(body)
     if reason is not None:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to the {case.body.kind} body: {reason}")
     targets = targets_for(scene, mesh, body)
-    if case.body.kind != "tetrahedral" and mesh.hollow:
+    if case.body.kind in ("surface", "membrane") and mesh.hollow:
         mesh = mesh.outer()
     attachments = attachments_for(scene, mesh)
     held = np.concatenate([a.nodes for a in attachments]) if attachments else None

@@ -6,19 +6,20 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.geometry import OrganMesh, fill, organ, read_mesh, scan
 from studies.geometry.organs import SHAPES
-from studies.scene.scene import Scene
+from studies.scene.scene import Organ, Scene
 
 FILE_PARAMETERS = ("path", "unit", "remesh", "smooth", "wall")
 """Of the organ "file"."""
 
 
-def mesh_for(scene: Scene, nodes: int, filled: bool = True) -> OrganMesh:
-    """The scene's organ with `nodes` surface nodes. Raises StudyError.
+def mesh_for(scene: Scene, nodes: int, filled: bool = True, layers: int | None = None) -> OrganMesh:
+    """The scene's organ with `nodes` surface nodes, the wall of a hollow one in `layers` (None: as many as make their
+    elements as high as long). Raises StudyError.
 
     A mesh file comes as it is, unless its parameters ask for a new surface: "remesh": true, or "smooth" or "wall" [m].
     """
     if lookup(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
-        return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters)
+        return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters, layers)
     parameters = scene.organ.parameters
     if "path" not in parameters or "unit" not in parameters:
         raise StudyError(
@@ -27,10 +28,16 @@ def mesh_for(scene: Scene, nodes: int, filled: bool = True) -> OrganMesh:
     for key in parameters:
         lookup(key, FILE_PARAMETERS, "parameter of an organ from a file")
     asked = {key: parameters[key] for key in ("smooth", "wall") if key in parameters}
-    if asked or parameters.get("remesh"):
-        return scan(parameters["path"], nodes, unit=parameters["unit"], fill=filled, **asked)
+    if remeshed(scene.organ):
+        return scan(parameters["path"], nodes, unit=parameters["unit"], fill=filled, layers=layers, **asked)
     mesh = read_mesh(parameters["path"], unit=parameters["unit"])
     return fill(mesh) if filled and not len(mesh.tetrahedra) else mesh
+
+
+def remeshed(organ: Organ) -> bool:
+    """Whether the number of surface nodes is free: a mesh file that comes as it is has its own."""
+    parameters = organ.parameters
+    return organ.shape != "file" or bool("smooth" in parameters or "wall" in parameters or parameters.get("remesh"))
 
 
 def patch_nodes(mesh: OrganMesh, name: str, region: object) -> np.ndarray:

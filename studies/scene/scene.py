@@ -1,7 +1,7 @@
 """A scene: what happens to which organ. Both solvers read the same one: load, contact and clock agree."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -67,6 +67,10 @@ class ForceOutput:
             raise StudyError(f"a force is probed at an 'obstacle' or a 'held' region, not at '{self.what}'")
 
 
+Times = int | tuple[int, ...]
+"""How often something is done on every mesh of a family, or on each of them, coarse to fine."""
+
+
 @dataclass(frozen=True)
 class ReferencePlan:
     """The family of meshes the reference is computed on, coarse to fine; the last one is the reference."""
@@ -77,10 +81,10 @@ class ReferencePlan:
     """Surface nodes ("solid"), or element size over radius away from the contact ("octant"); three are the rule."""
     variants: tuple[str, ...] = ("steps", "contact", "kappa")
     """Settings that are made better on the coarsest mesh, for their share of the error bar."""
-    at_outlines: int = 0
-    """Times the elements at the outlines of held regions are halved; three halve their size."""
-    at_contact: int = 0
-    """Times the elements at the surface that an obstacle will reach are halved."""
+    at_outlines: Times = 0
+    """Times the elements at the outlines of held regions are halved, on every mesh or on each; three halve the size."""
+    at_contact: Times = 0
+    """Times the elements at the surface that an obstacle will reach are halved, likewise."""
 
     dt: float | None = None
     """Largest time step of a motion [s]; None: a load path without inertia, as slow as it takes."""
@@ -90,8 +94,39 @@ class ReferencePlan:
             raise StudyError(
                 "a reference needs a 'solid' or 'octant' mesh and at least two levels, or it has no error bar"
             )
+        for times in (self.at_outlines, self.at_contact):
+            listed = times if isinstance(times, tuple) else (times,) * len(self.levels)
+            if len(listed) != len(self.levels) or any(number < 0 for number in listed):
+                raise StudyError(
+                    f"a reference plan halves elements {times} times on meshes {self.levels}; give one number of at "
+                    f"least 0, or one for each mesh"
+                )
         if self.dt is not None and not 0.0 < self.dt < np.inf:
             raise StudyError(f"a reference plan has dt = {self.dt} s; give a positive time step, or None for no motion")
+
+    def bisections(self, level: float) -> tuple[int, int]:
+        """Times the elements at outlines and those at the contact are halved on mesh `level`. Raises StudyError."""
+        return _on(self.at_outlines, self.levels, level), _on(self.at_contact, self.levels, level)
+
+    def alone(self, level: float) -> "ReferencePlan":
+        """What of the plan the mesh `level` depends on: the same in every family that has it. Raises StudyError."""
+        outlines, contact = self.bisections(level)
+        return replace(self, levels=(level, level), variants=(), at_outlines=outlines, at_contact=contact)
+
+    def coarsest(self, count: int) -> "ReferencePlan":
+        """The plan of its `count` coarsest meshes."""
+        outlines, contact = (
+            times[:count] if isinstance(times, tuple) else times for times in (self.at_outlines, self.at_contact)
+        )
+        return replace(self, levels=self.levels[:count], at_outlines=outlines, at_contact=contact)
+
+
+def _on(times: Times, levels: tuple[float, ...], level: float) -> int:
+    if not isinstance(times, tuple):
+        return times
+    if level not in levels:
+        raise StudyError(f"mesh {level:g} is none of the plan's, {levels}: it does not say how often to halve there")
+    return times[levels.index(level)]
 
 
 @dataclass(frozen=True)

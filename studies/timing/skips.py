@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from massspring import ImplicitVolume, Probe, Setup, Sphere, State
+from massspring.body.volumes import Volumes
 from massspring.kernels.probe.arrays import COMPARED, IN_CONTACT, LEFT_BEHIND, TESTED
 from massspring.layout.jacobian_pattern import volume_rows
 
@@ -46,7 +47,9 @@ def _with_friction(setup: Setup, state: State) -> tuple[Setup, State]:
 
 
 def _with_rows(setup: Setup, state: State) -> tuple[Setup, State]:
-    return setup, replace(state, rows=volume_rows(setup.inside.body.kept, setup.body.node_count))
+    kept = setup.inside.body.kept
+    assert isinstance(kept, Volumes)  # asked of bodies that keep one volume
+    return setup, replace(state, rows=volume_rows(kept, setup.body.node_count))
 
 
 def _awake(setup: Setup, state: State) -> tuple[Setup, State]:

@@ -9,7 +9,6 @@ from matplotlib.lines import Line2D
 
 from massspring import METHODS, Free, ImplicitVolume
 from studies.plots import force_path, laws, methods, recovery, stability, volume_history
-from studies.plots import work_precision as work
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, styled
 from studies.scenes.stomach_press import STOMACH_PRESS
@@ -103,17 +102,6 @@ def pattern(line: Line2D):
     """Dashes in multiples of the width, and colour, of a line."""
     dashes = line._unscaled_dash_pattern[1]  # pyright: ignore[reportAttributeAccessIssue]
     return (tuple(np.round(dashes, 6)) if dashes else "-", to_hex(line.get_color()))
-
-
-def test_meshes_of_different_bodies_are_not_joined():
-    runs = [
-        run(nodes=nodes, frame_ms=1.0, recipe=recipe) for nodes in (150, 550) for recipe in ({}, {"volumes": "nodal"})
-    ]
-    figure = work.figure(runs)
-    joined = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 2 and line.get_marker() == "None"]
-    assert [list(line.get_ydata()) for line in joined[:2]]
-    assert len(joined) == 2
-    assert {"tetrahedral", "tetrahedral, nodal volumes"} <= {t.get_text() for t in figure.legends[0].get_texts()}
 
 
 def test_regions_of_different_number_have_lines_of_their_own_among_the_laws():

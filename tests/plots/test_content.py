@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from massspring import Free
-from studies.plots import accuracy, force_path, uncertainty, volume_history
+from studies.plots import accuracy, force_path, methods, uncertainty, volume_history
 from studies.plots import work_precision as work
 from studies.plots.style.page import UNRESOLVED_MARK
 from studies.plots.style.style import BLACK, BLUE, ORANGE, VERMILLION
@@ -12,7 +12,7 @@ from studies.reference.uncertainty import Uncertainty
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status
-from tests.plots.made_up import FRAMES, UNCERTAINTY, run, timed_grid
+from tests.plots.made_up import FRAMES, UNCERTAINTY, run
 from tests.plots.reading import lines, points, words
 
 
@@ -87,37 +87,11 @@ def test_accuracy_leaves_out_what_a_scene_does_not_allow():
     assert words(axes).count("not\ncompared") == 2
 
 
-@pytest.mark.parametrize("error", [0.0, 0.3])
-def test_work_precision_never_below_the_floor(error):
-    figure = work.figure(
-        [run(BALL_CLAMPED, error=error, frame_ms=0.5), run(BALL_CLAMPED, error=error, nodes=99, frame_ms=1)]
-    )
-    for axes, name in zip(figure.axes, ("force", "interior"), strict=True):
-        bound = 100 * UNCERTAINTY[name]
-        drawn = np.concatenate([line.get_ydata() for line in lines(axes, BLUE)])
-        assert (drawn >= bound).all()
-        assert drawn == pytest.approx(max(100 * error, bound))
-        assert axes.patches[0].get_y() + axes.patches[0].get_height() == pytest.approx(bound)
-
-
-def test_work_precision_costs_computing_time_per_simulated_second():
+def test_a_method_costs_computing_time_per_simulated_second():
     timed = run(BALL_CLAMPED, frame_ms=2.0)
     frame = BALL_CLAMPED.duration / FRAMES
     median = 2.0 * 1.02  # the middle one of the five repeats of made_up.frame_ns
-    assert work.cost(timed) == pytest.approx(median / frame)
-
-
-def test_work_precision_lines_join_meshes_of_one_method_and_step():
-    figure = work.figure(timed_grid())
-    joined = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 2 and line.get_marker() == "None"]
-    assert len(joined) == 4  # two methods, two steps; two meshes each
-    assert "150" in words(figure.axes[0])
-
-
-def test_work_precision_marks_a_run_that_ended_with_a_fault():
-    figure = work.figure([run(BALL_CLAMPED, frame_ms=1.0, status=Status.INVERTED)])
-    assert points(figure.axes[0], BLUE)[0][2]
-    assert "ended inverted" in words(figure.legends[0])
+    assert methods.cost(timed) == pytest.approx(median / frame)
 
 
 @pytest.mark.parametrize("chart", [accuracy, force_path, work])

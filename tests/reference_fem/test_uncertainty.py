@@ -14,6 +14,7 @@ from reference_fem.uncertainty import (
     field_error,
     mesh_error,
     observed_order,
+    order_at_outlines,
     setting_error,
 )
 
@@ -35,12 +36,54 @@ def test_a_power_law_is_extrapolated_to_its_limit(order, slope):
     assert error.uncertainty == pytest.approx(SAFETY * abs(slope), rel=1e-9)
 
 
-@pytest.mark.parametrize(("order", "believed"), [(0.2, SLOWEST), (6.0, FASTEST)])
-def test_orders_that_are_not_plausible_are_not_believed(order, believed):
-    error = mesh_error(SIZES, law(order))
-    assert error.order == believed
-    gap = abs(law(order)[1] - law(order)[0])
-    assert error.uncertainty == pytest.approx(SAFETY * gap / (1.3**believed - 1), rel=1e-12)
+def test_an_order_that_is_too_low_is_not_believed():
+    error = mesh_error(SIZES, law(0.2))
+    assert error.order == SLOWEST
+    gap = abs(law(0.2)[1] - law(0.2)[0])
+    assert error.uncertainty == pytest.approx(SAFETY * gap / (1.3**SLOWEST - 1), rel=1e-12)
+
+
+@pytest.mark.parametrize("fastest", [1.0, 2.0, FASTEST])
+@pytest.mark.parametrize("fine_change", [1e-6, 0.01, 0.05])
+def test_a_fine_change_that_is_small_by_chance_makes_no_small_bar(fine_change, fastest):
+    """The coarsest mesh is 0.3 (h3^p − 1) off the finest, and what that leaves is the bar."""
+    coarse = 7.0 + 0.3 * (1.9**fastest - 1)
+    error = mesh_error(SIZES, [7.0, 7.0 + fine_change, coarse], fastest)
+    assert error.order == fastest
+    assert error.shift == pytest.approx(-fine_change / (1.3**fastest - 1), rel=1e-9)
+    assert error.uncertainty == pytest.approx(SAFETY * 0.3, rel=1e-9)
+
+
+def fast_then_slow(h):
+    """Off by h, as beside an outline, and by a part that fills the change of the coarse pair."""
+    return 1.0 * h + 0.0075 * h**12
+
+
+def test_a_fast_change_of_the_coarse_pair_does_not_hide_the_slow_one():
+    """The observed order is 3 and its bar smaller than what is left; the order that an outline allows covers it."""
+    sizes = (1.0, 1.2, 1.45)
+    values = [fast_then_slow(h) for h in sizes]
+    field = [SLOPES * value for value in values]
+    left = np.sqrt(WEIGHTS @ (SLOPES**2).sum(axis=1)) * values[0]
+    assert mesh_error(sizes, values).order == FASTEST
+    assert mesh_error(sizes, values).uncertainty < 0.8 * values[0]
+    assert field_error(sizes, field, WEIGHTS).uncertainty < 0.6 * left
+    fastest = order_at_outlines(1.2, 0)
+    assert values[0] < mesh_error(sizes, values, fastest).uncertainty < 4 * values[0]
+    assert left < field_error(sizes, field, WEIGHTS, fastest).uncertainty < 2 * left
+
+
+@pytest.mark.parametrize(
+    ("ratio", "more", "order"), [(1.2, 0, 1.0), (2.0, 3, 2.0), (1.2, -2, SLOWEST), (1.2, 9, FASTEST)]
+)
+def test_an_outline_allows_the_order_at_which_its_elements_shrink(ratio, more, order):
+    """Halved three times more often at half the size elsewhere: a quarter of the size, which is order 2."""
+    assert order_at_outlines(ratio, more) == pytest.approx(order, rel=1e-12)
+
+
+def test_one_size_has_no_order():
+    with pytest.raises(SolveError, match="must exceed 1"):
+        order_at_outlines(1.0, 1)
 
 
 SLOPES, WEIGHTS = np.array([[0.3, -0.1], [0.2, 0.5], [0.0, 0.1]]), np.array([1.0, 4.0, 0.5])

@@ -59,3 +59,5 @@ class Slices(NamedTuple):
     """Lanes of the nodes whose motion is prescribed, but for those in pieces, int64."""
     origin: int
     """The node from which the volume is seen."""
+    without_length: bool
+    """Whether all springs have a rest length of 0."""

@@ -29,9 +29,12 @@ def gather_slice(padded, slices, s, keeps, shortest, o0, o1, o2, tile):
         if ring_end > first:
             force, area = walk_rings(padded, slices, first, ring_end, lane, spread(shortest, padded), here)
             save(dot(area, minus(here, origin)), tile, SHARE + lane)
-        for row in range(ring_end, last):
-            d = minus(gather(padded, slices.neighbour, row, lane), here)
-            force = pulled_by(force, slices, row, lane, spread(shortest, padded), d)
+        if slices.without_length:
+            force = pulled_without_length(force, padded, slices, (ring_end, last), lane, here)
+        else:
+            for row in range(ring_end, last):
+                d = minus(gather(padded, slices.neighbour, row, lane), here)
+                force = pulled_by(force, slices, row, lane, spread(shortest, padded), d)
         save_three(force, tile, FORCE + lane)
         save_three(area, tile, AREA + lane)
     return total(tile, SHARE) if ring_end > first else 0.0
@@ -69,6 +72,16 @@ def pulled_by(force, slices, row, lane, shortest, d):
     length = at_least(root(dot(d, d)), shortest)
     c = stiffness - stiffness * (load(slices.rest_length, row, lane) / length)
     return force[0] + c * d[0], force[1] + c * d[1], force[2] + c * d[2]
+
+
+@njit_inlined
+def pulled_without_length(force, padded, slices, rows, lane, here):
+    """f_i + Σ k d [N] of rows of springs without length: neither root nor division; the same to the last bit."""
+    for row in range(rows[0], rows[1]):
+        d = minus(gather(padded, slices.neighbour, row, lane), here)
+        k = load(slices.stiffness, slices.stiffness_row[row], lane)
+        force = force[0] + k * d[0], force[1] + k * d[1], force[2] + k * d[2]
+    return force
 
 
 @njit_inlined

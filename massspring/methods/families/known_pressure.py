@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from massspring.body.body import Body
+from massspring.body.volumes import Volumes
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.forces.volume import pyramid_volume, volume_gradient_into
@@ -65,6 +66,7 @@ def push(state: State, boundary: BoundaryConditions, bulk_modulus: float, law: i
 def volume_stiffness(body: Body, bulk_modulus: float) -> csr_array:
     """B = √(K/V0) G at rest [√(N/m)], (3n, 1): dlam/dV = −K/V0, so that K_added = (K/V0) G Gᵀ (eq. 10.9)."""
     volumes = body.kept
+    assert isinstance(volumes, Volumes)  # the methods that ask refuse others
     gradient = np.zeros_like(body.rest)
     share = volumes.share.tocoo()
     triangles = volumes.triangles[share.col]

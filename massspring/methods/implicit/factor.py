@@ -5,7 +5,7 @@ sides. A is positive definite also where single weights of a cotangent network a
 """
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, diags_array, tril
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array, tril
 from scipy.sparse.linalg import splu
 
 from massspring.kernels.arrays.layout import Model
@@ -17,12 +17,7 @@ class Factor:
     """A⁻¹ of one step length and damping; held nodes do not respond."""
 
     def __init__(self, model: Model, dt: float, damping: float) -> None:
-        i, j = model.ends.astype(np.int64).T
-        n = len(model.mass)
-        rows, columns = np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i])
-        weights = np.concatenate([model.stiffness, model.stiffness, -model.stiffness, -model.stiffness])
-        springs = coo_array((weights, (rows, columns)), shape=(n, n)).tocsr()
-        matrix = diags_array((1.0 + damping * dt) * model.mass) + dt * dt * springs
+        n, matrix = len(model.mass), constant_matrix(model, dt, damping)
         free = np.flatnonzero(model.inverse_mass > 0.0)
         self.diagonal = np.where(model.inverse_mass > 0.0, matrix.diagonal(), np.inf)
         """Of A [kg], (n,); inf where held."""
@@ -62,6 +57,16 @@ class Factor:
         while self._known + count > len(self._columns):
             more = np.empty((max(64, len(self._columns)), len(self._place)))
             self._columns = np.concatenate([self._columns, more])
+
+
+def constant_matrix(model: Model, dt: float, damping: float) -> csr_array:
+    """A = (1 + c dt) M + dt² K [kg] of all nodes, (n, n) (eq. 12.1)."""
+    i, j = model.ends.astype(np.int64).T
+    n = len(model.mass)
+    rows, columns = np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i])
+    weights = np.concatenate([model.stiffness, model.stiffness, -model.stiffness, -model.stiffness])
+    springs = coo_array((weights, (rows, columns)), shape=(n, n)).tocsr()
+    return csr_array(diags_array((1.0 + damping * dt) * model.mass) + dt * dt * springs)
 
 
 def triangular(matrix: csc_array, nodes: np.ndarray) -> Triangular:

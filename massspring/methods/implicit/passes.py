@@ -6,6 +6,7 @@ import math
 import numpy as np
 
 from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions, Push
+from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.constraint.jacobian import rows_into, rows_times_into, transposed_rows_times_into
 from massspring.kernels.forces.springs import spring_forces_into
 from massspring.kernels.jit.stage_clock import (
@@ -42,7 +43,7 @@ class Step:
     def __init__(
         self, state: State, boundary: BoundaryConditions, step: int, factor: Factor, accuracy: Accuracy
     ) -> None:
-        assert state.rows is not None  # start() made them
+        assert isinstance(state.rows, VolumeRows)  # start() made them
         self.boundary, self.step, self.factor, self.accuracy = boundary, step, factor, accuracy
         self.model, self.nodes, self.contacts = state.model, state.nodes, state.contacts
         self.rows, self.diagnostics = state.rows, state.diagnostics

@@ -1,6 +1,7 @@
 """`organbench run`: studies brought up to date."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -35,6 +36,7 @@ def run(
     ] = None,
     results: Results = Path("results"),
     smoke: Annotated[bool, typer.Option(help="small meshes, few frames; kept apart in results/smoke")] = False,
+    case: Annotated[str, typer.Option(help="this case alone, by its name, with its reference; no charts")] = "",
     only: Annotated[str, typer.Option(help="failed, stale, or both with a comma: nothing else runs")] = "",
     jobs: Annotated[int, typer.Option(min=1, help="processes for the physics; timing always runs alone")] = 2,
     dry: Annotated[bool, typer.Option("--dry-run", help="say what would run, why and how long; run nothing")] = False,
@@ -44,13 +46,21 @@ def run(
     root = results / SMOKE if smoke else results
     for found in _checked(studies or []):
         study = found.smoke() if smoke else found
+        if case:
+            study = _case_alone(study, case)
         if dry:
             dry_run(console, study.name, plan(root, study, wanted), jobs)
         else:
-            _bring_up_to_date(root, study, jobs, wanted)
+            _bring_up_to_date(root, study, jobs, wanted, not case)
 
 
-def _bring_up_to_date(root: Path, study: Study, jobs: int, wanted: Wanted) -> None:
+def _case_alone(study: Study, name: str) -> Study:
+    """A study of one of its cases. Raises StudyError with the nearest name."""
+    chosen = lookup(name, {case.name: case for case in study.cases}, f"case of {study.name}")
+    return replace(study, cases=(chosen,))
+
+
+def _bring_up_to_date(root: Path, study: Study, jobs: int, wanted: Wanted, drawn: bool = True) -> None:
     with TerminalProgress(console, plan(root, study, wanted), jobs) as progress:
         count = run_studies(root, [study], jobs, progress, wanted, progress.compiling)
     for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
@@ -60,8 +70,10 @@ def _bring_up_to_date(root: Path, study: Study, jobs: int, wanted: Wanted) -> No
     if warnings:
         more = f" (and {len(warnings) - 1} more cases warn; `organbench show` prints them)" if len(warnings) > 1 else ""
         warn([warnings[0] + more])
-    warn(refresh(root, study)[1])
-    say(f"{study.name}: {count} pieces ran, charts in {study_folder(root, study.name)}")
+    if drawn:
+        warn(refresh(root, study)[1])
+    what = "charts" if drawn else "records"
+    say(f"{study.name}: {count} pieces ran, {what} in {study_folder(root, study.name)}")
 
 
 def _checked(names: list[str]) -> list[Study]:

@@ -72,17 +72,19 @@ def organ_family(
     return [organ(name, nodes, regions, fill, parameters, layers) for nodes in sizes]
 
 
-def curved(mesh: OrganMesh) -> CurvedMesh:
+def curved(mesh: OrganMesh, may_fold: bool = False) -> CurvedMesh:
     """The filled organ with second-order elements that follow its true shape, its lumen's too; cached.
 
-    The vertices are those of `mesh`, and no element is folded anywhere. Raises StudyError for a mesh that is not
-    filled, whose true shape is not known, or that is too coarse to be curved.
+    The vertices are those of `mesh`, and no element is folded anywhere, unless it `may_fold`. Raises StudyError for a
+    mesh that is not filled, whose true shape is not known, or that is too coarse to be curved.
     """
     arrays = {"points": mesh.points, "tetrahedra": mesh.tetrahedra}
     recipe = {"kind": "curved", "name": f"{mesh.name}-curved", "source": mesh.recipe}
+    if may_fold:
+        recipe["may_fold"] = True
 
     def make() -> dict[str, np.ndarray]:
-        made = make_curved(mesh)
+        made = make_curved(mesh, may_fold)
         return {"points": made.points, "cells": made.cells}
 
     stored = cached(recipe, arrays, ("points", "cells"), make)

@@ -20,7 +20,7 @@ class OrganMesh:
     patches: name -> indices of the outer surface's nodes inside that attachment region
     recipe: how to make it again, JSON-able
     outer_count: number of nodes of the outer surface, which come first of all (0 means all of `surface_count`); in a
-        layered wall node i + outer_count of the lumen faces node i
+        layered wall of which no element was halved node i + outer_count of the lumen faces node i
     """
 
     name: str
@@ -135,9 +135,14 @@ def unique_edges(triangles: np.ndarray) -> np.ndarray:
     return pairs[np.unique(row_keys(pairs), return_index=True)[1]]
 
 
+def tetrahedron_facets(tetrahedra: np.ndarray) -> np.ndarray:
+    """The four facets of every element, shape (4 m, 3), outward for tetrahedra of positive volume."""
+    return tetrahedra[:, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]].reshape(-1, 3)
+
+
 def boundary_triangles(tetrahedra: np.ndarray) -> np.ndarray:
     """Faces that belong to one tetrahedron only, shape (t, 3), outward for tetrahedra of positive volume."""
-    faces = tetrahedra[:, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]].reshape(-1, 3)
+    faces = tetrahedron_facets(tetrahedra)
     _, first, counts = np.unique(row_keys(np.sort(faces, axis=1)), return_index=True, return_counts=True)
     return faces[np.sort(first[counts == 1])]
 

@@ -27,7 +27,7 @@ MOST_BAD = 0.05
 class CurvedMesh:
     """Quadratic tetrahedra whose boundary nodes lie on the true surface.
 
-    The surface is met to O(h^3), the volume to O(h^4); no element is folded anywhere.
+    The surface is met to O(h^3), the volume to O(h^4); no element is folded anywhere, unless that was allowed.
 
     points: [m], shape (n2, 3); the vertices, numbered as in the straight mesh, come first
     cells: shape (k, 10), vertices and mid-side nodes in VTK's order of a quadratic tetrahedron
@@ -76,10 +76,11 @@ def true_outlines(mesh: OrganMesh) -> list[tuple[np.ndarray, Region]]:
     return outlines
 
 
-def make_curved(mesh: OrganMesh) -> CurvedMesh:
+def make_curved(mesh: OrganMesh, may_fold: bool = False) -> CurvedMesh:
     """The second-order mesh of a filled organ, its boundary on the true surfaces and outlines, the rest moved along.
 
-    Raises StudyError for a mesh without tetrahedra or true shape, or too coarse to be curved unfolded.
+    Raises StudyError for a mesh without tetrahedra or true shape, or (unless it `may_fold`) too coarse to be curved
+    unfolded.
     """
     if not len(mesh.tetrahedra):
         raise StudyError(f"{mesh.name}: only a filled mesh can be curved; ask for fill=True")
@@ -103,7 +104,7 @@ def make_curved(mesh: OrganMesh) -> CurvedMesh:
     points = np.concatenate([mesh.points, mesh.points[edges].mean(axis=1) + moved])
     points = unfold(points, cells, np.concatenate([np.zeros(count, bool), ~fixed]))
     worst = smallest_jacobian(points, cells)
-    if worst.min() <= 0:
+    if worst.min() <= 0 and not may_fold:
         raise StudyError(
             f"{mesh.name}: {int((worst <= 0).sum())} of {len(cells)} elements fold when they follow the true shape at "
             f"{mesh.outer_count} surface nodes; use more nodes"

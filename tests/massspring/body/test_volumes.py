@@ -16,7 +16,8 @@ from massspring import (
     Volumes,
     tetrahedral_body,
 )
-from massspring.body.partition import cell_graph, partition
+from massspring.body.partition import cell_graph, node_patches, partition
+from massspring.body.volumes import PATCH
 from tests.massspring.conftest import SOFT, block, hollow_block
 
 
@@ -160,3 +161,19 @@ def test_bad_targets_are_refused(hollow_body, targets, words):
 def test_bad_ramps_are_refused(times, values, words):
     with pytest.raises(MassSpringError, match=words):
         Ramp(times, values)
+
+
+def test_patches_are_connected_sums_of_nodal_volumes(block_body):
+    patches, nodal = Volumes.patches(block_body), Volumes.nodal(block_body)
+    patch = node_patches(block_body.rest, block_body.tetrahedra, PATCH)
+    x = block_body.rest + 0.01 * block_body.size * np.random.default_rng(3).standard_normal(block_body.rest.shape)
+    assert patches.count == -(-block_body.node_count // PATCH)
+    np.testing.assert_allclose(patches.measure(x), np.bincount(patch, weights=nodal.measure(x)), rtol=1e-10)
+    assert np.bincount(patch).max() <= 2 * PATCH
+    for number in range(patches.count):
+        own = np.flatnonzero(patch == number)
+        reached, inside = {own[0]}, set(own)
+        for _ in range(len(own)):
+            near = block_body.tetrahedra[np.isin(block_body.tetrahedra, list(reached)).any(axis=1)].ravel()
+            reached |= inside & set(near.tolist())
+        assert reached == inside

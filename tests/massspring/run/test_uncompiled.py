@@ -20,6 +20,7 @@ from massspring import (
     Sphere,
     Trajectory,
     Volumes,
+    quadratic_body,
     simulate,
     surface_body,
     tetrahedral_body,
@@ -27,6 +28,7 @@ from massspring import (
 from massspring.kernels.probe.arrays import CARRIED
 from tests.massspring.conftest import SOFT, block, icosphere
 from tests.massspring.methods.test_methods import clock_for, squeeze
+from tests.massspring.quadratic import quadratic_block
 
 REPOSITORY = Path(__file__).parents[3]
 
@@ -64,7 +66,20 @@ def probed():
     return Setup(body, ImplicitVolume(), clock, (probe,), (held,), damping=5.0)
 
 
-SCENES = {scene.__name__: scene for scene in (slices, implicit, probed)}
+def facets():
+    """A quadratic block on a rough floor, held at a corner, under a ball that presses inside its facets."""
+    body = quadratic_body(*quadratic_block((1, 1, 1)), SOFT)
+    clock = clock_for(body, 4, 5)
+    low, high = body.rest[:, 2].min(), body.rest[:, 2].max()
+    floor = Plane((0, 0, float(low)), (0, 0, 1), friction=0.4)
+    way = Trajectory((0.0, clock.duration), ((0, 0, 0), (0.001, 0, -0.003)))
+    middle = body.rest.mean(axis=0)
+    ball = Sphere((float(middle[0]), float(middle[1]), float(high) + 0.0101), 0.01, way, friction="no_slip")
+    held = Attachment(np.array([int(body.rest[:, 0].argmax())]))
+    return Setup(body, ImplicitVolume(), clock, (floor, ball), (held,), (0.0, 0.0, -9.81), damping=20.0)
+
+
+SCENES = {scene.__name__: scene for scene in (slices, implicit, probed, facets)}
 
 
 def answers(name) -> dict[str, object]:

@@ -4,7 +4,7 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
-from studies.catalog.study import SMOKE_FRAMES, SMOKE_NODES, SMOKE_NODES_HOLLOW
+from studies.catalog.study import SMOKE_FRAMES, SMOKE_NODES, SMOKE_NODES_HOLLOW, SMOKE_QUADRATIC
 from studies.metrics.table import metric
 from studies.runs.prepare import prepare
 from studies.store.paths import readable
@@ -70,7 +70,8 @@ def test_smoke_is_small_and_still_the_same_question(study):
     assert {case.scene.name for case in smoke.cases} == {case.scene.name for case in study.cases}
     assert {case.timed for case in smoke.cases} == {case.timed for case in study.cases}
     for case in smoke.cases:
-        assert case.body.nodes <= (SMOKE_NODES_HOLLOW if case.scene.lumen else SMOKE_NODES)
+        few = SMOKE_QUADRATIC if case.body.kind == "quadratic" else (SMOKE_NODES, SMOKE_NODES_HOLLOW)
+        assert case.body.nodes <= few[case.scene.lumen is not None]
         assert case.frames <= SMOKE_FRAMES
         assert case.scene.reference is None or len(case.scene.reference.levels) == 2
     assert smoke.smoke() == smoke

@@ -37,6 +37,23 @@ def test_current_until_the_load_or_the_code_changes(solved, monkeypatch):
     assert not reference_solve.is_current(solved)
 
 
+def test_a_mesh_is_the_same_in_every_plan_that_halves_it_as_often():
+    each = replace(BALL_CLAMPED, reference=ReferencePlan("solid", (150, 230, 350), at_outlines=(1, 2, 3)))
+    alike = replace(BALL_CLAMPED, reference=ReferencePlan("solid", (230, 400), at_outlines=2))
+    assert ReferenceSolve(each, 230).key == ReferenceSolve(alike, 230).key
+    assert ReferenceSolve(each, 150).key != ReferenceSolve(replace(each, reference=alike.reference), 150).key
+    smoke = each.reference.coarsest(2)
+    assert (smoke.levels, smoke.at_outlines, smoke.at_contact) == ((150, 230), (1, 2), 0)
+
+
+@pytest.mark.parametrize("times", [(1, 2), (1, 2, 3, 4), (0, -1, 2), -1])
+def test_a_plan_says_for_each_of_its_meshes_how_often_to_halve(times):
+    with pytest.raises(StudyError, match="one for each mesh"):
+        ReferencePlan("solid", (150, 230, 350), at_outlines=times)
+    with pytest.raises(StudyError, match="one for each mesh"):
+        ReferencePlan("solid", (150, 230, 350), at_contact=times)
+
+
 def test_settings_are_varied_only_where_they_matter():
     assert [reference_solve.variant for reference_solve in reference_solves(SCENE)] == [
         "",

@@ -23,6 +23,9 @@ CHANGES = {
     "law": {"body": BodyRecipe(law="uniform")},
     "weights": {"body": BodyRecipe("surface", weights=(1.0, 0.5, 0.25, 1.0))},
     "stiffness": {"body": BodyRecipe(stiffness=1.01)},
+    "quadratic": {"body": BodyRecipe("quadratic")},
+    "graded": {"body": BodyRecipe(graded=True)},
+    "mass": {"body": BodyRecipe("quadratic", graded=True, mass="stiffness")},
     "method": {"method": Free()},
     "dt": {"dt": 1e-4},
     "dt_fraction": {"dt_fraction": 0.51},
@@ -94,6 +97,30 @@ def test_a_setting_that_is_not_chosen_leaves_old_keys_as_they_were():
     """The key of the first scene's default case as it was before surface weights could be chosen."""
     assert "weights" not in json.loads(Case(SCENES[0]).key)["body"]
     assert "precision" not in json.loads(Case(SCENES[0]).key)
+    assert not {"graded", "mass"} & set(json.loads(Case(SCENES[0]).key)["body"])
+
+
+def test_grading_and_masses_stand_in_names_and_series():
+    assert Case(SCENES[0], BodyRecipe(graded=True)).name == "ball_squeeze-tetrahedral-550-implicit_volume-dt0.5-graded"
+    body = BodyRecipe("quadratic", 800, graded=True, mass="stiffness")
+    assert Case(SCENES[0], body).name == "ball_squeeze-quadratic-800-implicit_volume-dt0.5-graded-stiffness_mass"
+    assert body.series == "graded quadratic, masses by stiffness"
+    assert BodyRecipe(volumes="nodal", graded=True).series == "graded tetrahedral, nodal volumes"
+
+
+@pytest.mark.parametrize(
+    ("recipe", "told"),
+    [
+        ({"kind": "surface", "graded": True}, "a surface body cannot be graded; choose kind 'tetrahedral' or"),
+        ({"kind": "membrane", "law": "delingette", "graded": True}, "a membrane body cannot be graded"),
+        ({"mass": "stiffness"}, "a tetrahedral body has no masses by stiffness; choose kind 'quadratic'"),
+        ({"kind": "quadratic", "volumes": "regions"}, "one volume per vertex, not volumes 'regions'; leave"),
+        ({"kind": "quadratic", "law": "uniform"}, "follow no law, not 'uniform' either; leave the law out"),
+    ],
+)
+def test_settings_of_a_body_that_do_not_go_together_are_refused(recipe, told):
+    with pytest.raises(StudyError, match=told):
+        BodyRecipe(**recipe)
 
 
 UNREADABLE = {

@@ -15,9 +15,12 @@ BOTH = {
     "studies.geometry.organs.liver",
     "studies.geometry.mesher.gmsh_calls",
     "massspring.world.trajectories",
+    "studies.grading.held_mesh",
+    "studies.grading.true_shape",
 }
 RUNS = BOTH | {
     "studies.runs.prepare",
+    "studies.grading.graded_mesh",
     "massspring.body.laws",
     "massspring.kernels.fused.sweep",
     "massspring.run.history",

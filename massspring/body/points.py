@@ -1,0 +1,119 @@
+"""Volumes of quadratic tetrahedra: one per vertex, summed over points inside the elements, and closed surfaces beside.
+
+V_r = Σ_q ρ_rq w_q J_q with J_q = det F_q at the points q of the elements, Σ_r ρ_rq = 1 (docs/theory.md, eq. 8.9):
+with ρ_rq the linear shape function of vertex r it is the pressure space of Taylor and Hood (1973).
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array, vstack
+
+from massspring.body.volumes import Volumes
+
+PAIRS = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
+"""Corners beside each mid-side node, in VTK's order of a quadratic tetrahedron."""
+POINTS = 4
+"""Of an element: exact for polynomials of second degree (Hammer, Marlowe, Stroud 1956)."""
+FAR, NEAR = (5.0 - np.sqrt(5.0)) / 20.0, (5.0 + 3.0 * np.sqrt(5.0)) / 20.0
+BARYCENTRIC = np.full((POINTS, 4), FAR) + (NEAR - FAR) * np.eye(POINTS)
+"""Linear shape functions of the corners at the points, (4, 4); also ρ."""
+
+
+def _local_slopes() -> np.ndarray:
+    """∂N_a/∂b_i at the points, (4, 10, 4): N = b (2b − 1) at corners, 4 b_i b_j between."""
+    slopes = np.zeros((POINTS, 10, 4))
+    corner = np.arange(4)
+    slopes[:, corner, corner] = 4.0 * BARYCENTRIC - 1.0
+    for a, (i, j) in enumerate(PAIRS, start=4):
+        slopes[:, a, i], slopes[:, a, j] = 4.0 * BARYCENTRIC[:, j], 4.0 * BARYCENTRIC[:, i]
+    return slopes
+
+
+SLOPES = _local_slopes()[:, :, 1:] - _local_slopes()[:, :, :1]
+"""∂N_a/∂(b_2, b_3, b_4) with b_1 = 1 − b_2 − b_3 − b_4, (4, 10, 3)."""
+
+
+def gradients(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """∇N_a [1/m] at the points of `cells` (k, 10) with nodes at `points` (n, 3) [m], (k, 4, 10, 3), and the weights
+    det/24 of the points [m³], (k, 4)."""
+    jacobian = np.einsum("kai,qaj->kqij", points[cells], SLOPES)
+    return np.einsum("qaj,kqji->kqai", SLOPES, np.linalg.inv(jacobian)), np.linalg.det(jacobian) / 24.0
+
+
+@dataclass(frozen=True, eq=False)
+class PointVolumes:
+    """m volumes of k quadratic tetrahedra: one per vertex in ascending order, then closed surfaces such as a lumen."""
+
+    cells: np.ndarray
+    """VTK's order, (k, 10) uint32."""
+    gradient: np.ndarray
+    """∇N_a at the points at rest [1/m], (k, 4, 10, 3)."""
+    weight: np.ndarray
+    """w_q [m³], (k, 4); their sum is the rest volume."""
+    corner_volume: np.ndarray
+    """The volume of each corner of each element, (k, 4)."""
+    closed: Volumes | None = None
+    """Further volumes inside closed surfaces of flat triangles."""
+
+    @cached_property
+    def vertex_count(self) -> int:
+        """Number of vertices, and of their volumes."""
+        return int(self.corner_volume.max()) + 1
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """m different names."""
+        own = tuple(f"vertex {r}" for r in range(self.vertex_count))
+        return own if self.closed is None else own + self.closed.names
+
+    @property
+    def count(self) -> int:
+        """m."""
+        return self.vertex_count + (0 if self.closed is None else self.closed.count)
+
+    @property
+    def highest_node(self) -> int:
+        """Largest number of a node that is named."""
+        return int(self.cells.max())
+
+    def deformation(self, x: np.ndarray) -> np.ndarray:
+        """F_q = Σ_a x_a ⊗ ∇N_a [1] at positions `x` (n, 3) [m], (k, 4, 3, 3)."""
+        return np.einsum("kai,kqaj->kqij", x[self.cells], self.gradient)
+
+    def jacobians(self, x: np.ndarray) -> np.ndarray:
+        """J_q = det F_q [1], (k, 4)."""
+        return np.linalg.det(self.deformation(x))
+
+    def measure(self, x: np.ndarray) -> np.ndarray:
+        """V_r [m³] at positions `x` (n, 3) [m], (m,)."""
+        parts = np.einsum("kq,qr->kr", self.weight * self.jacobians(x), BARYCENTRIC)
+        own = np.bincount(self.corner_volume.ravel(), weights=parts.ravel(), minlength=self.vertex_count)
+        return own if self.closed is None else np.concatenate([own, self.closed.measure(x)])
+
+    def jacobian(self, x: np.ndarray) -> csr_array:
+        """J_r = ∂V_r/∂x [m²] at positions `x` (n, 3) [m], (m, 3n): Σ_q ρ_rq w_q cof F_q ∇N_a."""
+        areas = self.areas(x)
+        entry = np.einsum("kqai,qr->krai", areas, BARYCENTRIC)
+        rows = np.broadcast_to(self.corner_volume[:, :, None, None], entry.shape)
+        columns = 3 * self.cells.astype(np.int64)[:, None, :, None] + np.arange(3)
+        shape = (self.vertex_count, x.size)
+        own = csr_array((entry.ravel(), (rows.ravel(), np.broadcast_to(columns, entry.shape).ravel())), shape=shape)
+        own.sum_duplicates()
+        return own if self.closed is None else csr_array(vstack([own, self.closed.jacobian(x)]))
+
+    def areas(self, x: np.ndarray) -> np.ndarray:
+        """D_qa = w_q cof F_q ∇N_a [m²], (k, 4, 10, 3): what moving node a adds to w_q J_q."""
+        f = self.deformation(x)
+        columns = [np.cross(f[..., :, i], f[..., :, j]) for i, j in ((1, 2), (2, 0), (0, 1))]
+        return self.weight[:, :, None, None] * np.einsum("kqij,kqaj->kqai", np.stack(columns, axis=-1), self.gradient)
+
+    def parts_of(self, triangles: np.ndarray) -> np.ndarray:
+        """What each volume has in the tissue, (m,): 1 of each vertex, 0 of closed surfaces beside it."""
+        return np.r_[np.ones(self.vertex_count), np.zeros(self.count - self.vertex_count)]
+
+    def renumbered(self, number: np.ndarray) -> "PointVolumes":
+        """The same volumes in the same order, with node i called `number[i]` (n,) uint32."""
+        closed = None if self.closed is None else self.closed.renumbered(number)
+        return replace(self, cells=number[self.cells], closed=closed)

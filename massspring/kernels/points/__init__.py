@@ -1,0 +1,1 @@
+"""Volumes of quadratic tetrahedra, summed over points inside the elements; their gradients are never assembled."""

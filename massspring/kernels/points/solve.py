@@ -1,0 +1,156 @@
+"""The multipliers of volumes over points: S lam = rhs with S = J W̃ Jᵀ by conjugate gradients, S⁻¹ at rest as
+preconditioner (docs/theory.md, eq. 8.3, 8.4, 8.13)."""
+
+import math
+
+from massspring.kernels.constraint.ldl_solve import respond_into
+from massspring.kernels.constraint.one_volume import limited_error, surely_short
+from massspring.kernels.constraint.schur import along, beyond, dot
+from massspring.kernels.contact.modes import FREE
+from massspring.kernels.contact.node_contact import allowed_part
+from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean, njit_reassociated
+from massspring.kernels.jit.flat import flat
+from massspring.kernels.points.elements import push_elements, push_of, times_into
+
+
+@compiled
+def weigh_into(model, nodes, rows, boundary):
+    """Gravity on mass that does not resist motion: v* of free nodes, the force that attachments take of held ones."""
+    for i in range(rows.heavier.shape[0]):
+        push = boundary.dt * model.inverse_mass[i] * rows.heavier[i]
+        for axis in range(3):
+            nodes.v_star[i, axis] += push * boundary.gravity[axis]
+    for h in range(model.held_nodes.shape[0]):
+        i = model.held_nodes[h]
+        for axis in range(3):
+            nodes.force[i, axis] += rows.heavier[i] * boundary.gravity[axis]
+
+
+@njit_inlined
+def respond(model, force, implicit, moved):
+    """W f [m/s per s] into `moved` (n, 3): of each node alone, or of the matrix of springs taken implicitly."""
+    if implicit is None:
+        for i in range(force.shape[0]):
+            w = model.inverse_mass[i]
+            moved[i, 0], moved[i, 1], moved[i, 2] = w * force[i, 0], w * force[i, 1], w * force[i, 2]
+    else:
+        respond_into(implicit.factor, force, moved)
+
+
+@njit_lean
+def pushed_velocity_into(model, nodes, contacts, rows, implicit, dt):
+    """u = ṽ + dt W̃ F [m/s] into `node_vector`, (n, 4), with the force F [N] of `rows.push` (eq. 3.4, 3.5)."""
+    u, moved = rows.node_vector, rows.moved
+    respond(model, rows.push, implicit, moved)
+    for i in range(moved.shape[0]):
+        u0, u1 = nodes.v_star[i, 0] + dt * moved[i, 0], nodes.v_star[i, 1] + dt * moved[i, 1]
+        u2 = nodes.v_star[i, 2] + dt * moved[i, 2]
+        if contacts.mode[i] > FREE:
+            d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
+            u0, u1, u2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
+            u0, u1, u2 = u0 + contacts.v_target[i, 0], u1 + contacts.v_target[i, 1], u2 + contacts.v_target[i, 2]
+        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+
+
+@njit_lean
+def set_right_side(frame, rows, implicit, target, tolerance):
+    """rhs_r = (V0_r − V_r)/dt² − (J u)_r/dt [m³/s²], errors capped by the bound of eq. 8.5, u = ṽ + dt W̃ F.
+
+    Returns whether a volume was capped, and whether a wrong one had nothing to push on.
+    """
+    model, dt = frame.model, frame.boundary.dt
+    pushed_velocity_into(model, frame.nodes, frame.contacts, rows, implicit, dt)
+    times_into(rows, rows.node_vector, rows.right)
+    lightest, longest, per_second = model.largest_inverse_mass, model.correction_limit, 1.0 / dt
+    limited, idle = False, False
+    for r in range(target.shape[0]):
+        error = target[r] - rows.volume[r]
+        if not rows.diagonal[r] > 0.0:
+            idle |= abs(error) > tolerance * target[r]
+        elif not surely_short(error, rows.diagonal[r], lightest, longest):
+            part = limited_error(error, rows.diagonal[r], math.sqrt(lightest * rows.diagonal[r]), longest)
+            limited |= part != error
+            error = part
+        rows.right[r] = (error * per_second - rows.right[r]) * per_second
+        rows.allowed[r] = tolerance * target[r] * per_second * per_second
+    return limited, idle
+
+
+@njit_lean
+def apply_schur(frame, rows, implicit, p, product):
+    """S p = J (W̃ (Jᵀ p)), (m,): no motion of a held node, none into an obstacle (eq. 3.4, 8.3)."""
+    push_elements(rows, p, False)
+    force, u, contacts = flat(rows.element_push, 0, rows.element_push.shape[0]), rows.node_vector, frame.contacts
+    field, moved = rows.field, rows.moved
+    for i in range(field.shape[0]):
+        field[i, 0], field[i, 1], field[i, 2] = push_of(rows, force, p, i)
+    respond(frame.model, field, implicit, moved)
+    for i in range(moved.shape[0]):
+        u0, u1, u2 = moved[i, 0], moved[i, 1], moved[i, 2]
+        if contacts.mode[i] > FREE:
+            d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
+            u0, u1, u2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
+        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+    times_into(rows, u, product)
+
+
+@njit_lean
+def add_response(model, nodes, rows, implicit, dt):
+    """v* += dt W f for the forces in `rows.field` [N], booked at held nodes (eq. 3.1, 3.6)."""
+    respond(model, rows.field, implicit, rows.moved)
+    for i in range(rows.moved.shape[0]):
+        for axis in range(3):
+            nodes.v_star[i, axis] += dt * rows.moved[i, axis]
+    for h in range(model.held_nodes.shape[0]):
+        i = model.held_nodes[h]
+        for axis in range(3):
+            nodes.force[i, axis] += rows.field[i, axis]
+
+
+@njit_reassociated
+def product_of(row, vector):
+    """row · vector in single precision: it need not be exact."""
+    total = row[0] * vector[0]
+    for k in range(1, row.shape[0]):
+        total += row[k] * vector[k]
+    return total
+
+
+@njit_inlined
+def precondition_into(rows, residual, product):
+    """z = S⁻¹ residual with S at rest, which turning the body leaves as it is; returns residual · z."""
+    scale, scaled, rho = rows.scale, rows.scaled, 0.0
+    for r in range(scale.shape[0]):
+        scaled[r] = scale[r] * residual[r]
+    for r in range(scale.shape[0]):
+        product[r] = scale[r] * product_of(flat(rows.inverse, r, r + 1), scaled)
+        rho += residual[r] * product[r]
+    return rho
+
+
+@njit_lean
+def solve_iteratively(frame, rows, implicit, most):
+    """lam += S⁻¹ rhs by conjugate gradients (eq. 8.4).
+
+    Ends when |rhs − S Δlam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number. A volume
+    without a diagonal has nothing to push on and is left out.
+    """
+    residual, search, image, allowed = rows.right, rows.search, rows.image, rows.allowed
+    for r in range(search.shape[0]):
+        search[r] = 0.0
+        if not rows.diagonal[r] > 0.0:
+            residual[r], allowed[r] = 0.0, math.inf
+    before, iteration = math.inf, 0
+    while iteration < most and beyond(residual, allowed) > 0:
+        rho = precondition_into(rows, residual, image)
+        keep = rho / before
+        for r in range(search.shape[0]):
+            search[r] = image[r] + keep * search[r]
+        apply_schur(frame, rows, implicit, search, image)
+        curvature = dot(search, image)
+        if not curvature > 0.0:
+            break
+        along(search, image, rho / curvature, rows.lam, residual)
+        before = rho
+        iteration += 1
+    return iteration

@@ -1,0 +1,97 @@
+"""Builds the arrays of volumes over points (kernels.points), once, before a run."""
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+
+from massspring.body.body import Body
+from massspring.body.points import FAR, NEAR, PointVolumes
+from massspring.kernels.points.arrays import BLOCK, CORNERS, POINTS, ROWS, PointRows
+from massspring.layout.facet_rows import facet_rows
+from massspring.layout.sell_chunks import aligned
+
+SHIFT = 1e-6
+"""Added to the diagonal of 1 of S: volumes that depend on each other leave its inverse bounded."""
+REAL = np.dtype(np.float64)
+
+
+def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> PointRows:
+    """The arrays of `volumes` on `body`; `inverse_mass` (n,) [1/kg] is 0 at held nodes."""
+    m, n, blocks = volumes.count, body.node_count, -(-len(volumes.cells) // BLOCK)
+    rows = volumes.jacobian(body.rest)
+    diagonal, scale, inverse = inverse_at_rest(csr_array(rows @ diags_array(np.repeat(inverse_mass, 3)) @ rows.T))
+    closed = np.empty((0, 3), dtype=np.uint32) if volumes.closed is None else volumes.closed.triangles
+    node_start, node_entry = _entries(volumes.cells, n, 3)
+    volume_start, volume_entry = _entries(volumes.corner_volume, volumes.vertex_count, 1)
+    return PointRows(
+        node=_in_blocks(volumes.cells.astype(np.uint32)),
+        gradient=_in_blocks(volumes.gradient.reshape(-1, POINTS * ROWS), padding=0),
+        weight=_in_blocks(volumes.weight, padding=0),
+        own=float(NEAR),
+        other=float(FAR),
+        bulk=body.local_bulk,
+        corner_volume=_in_blocks(volumes.corner_volume.astype(np.uint32)),
+        node_start=node_start,
+        node_entry=node_entry,
+        volume_start=volume_start,
+        volume_entry=volume_entry,
+        closed_triangles=closed,
+        closed_nodes=np.unique(closed).astype(np.uint32),
+        closed_gradient=np.zeros((n, 3)),
+        heavier=body.mass - body.moved_mass,
+        area=aligned((blocks * POINTS * ROWS, BLOCK), REAL),
+        stretch=aligned((blocks * POINTS, BLOCK), REAL),
+        corner_pressure=aligned((blocks * CORNERS, BLOCK), REAL),
+        corner_share=aligned((blocks * CORNERS, BLOCK), REAL),
+        element_push=aligned((blocks * ROWS, BLOCK), REAL),
+        tile=aligned((ROWS + POINTS, BLOCK), REAL),
+        push=aligned((n, 3), REAL),
+        diagonal=diagonal,
+        inverse=inverse,
+        scale=scale,
+        scaled=aligned((m,), np.dtype(np.float32)),
+        node_vector=aligned((n, 4), REAL),
+        field=aligned((n, 3), REAL),
+        moved=aligned((n, 3), REAL),
+        facets=facet_rows(body.contact_facets, body.rest, inverse_mass),
+        **{name: np.zeros(m) for name in ("volume", "lam", "right", "search", "image", "allowed")},
+    )
+
+
+def _in_blocks(table: np.ndarray, padding: int | None = None) -> np.ndarray:
+    """Of elements (k, c) the numbers of each column side by side, (c b, BLOCK).
+
+    Empty places have `padding`, or repeat the first element.
+    """
+    count, width = table.shape
+    blocks = -(-count // BLOCK)
+    filled = np.full((blocks * BLOCK, width), table[:1] if padding is None else padding, dtype=table.dtype)
+    filled[:count] = table
+    found = aligned((blocks * width, BLOCK), table.dtype)
+    found[:] = filled.reshape(blocks, BLOCK, width).transpose(0, 2, 1).reshape(-1, BLOCK)
+    return found
+
+
+def _entries(table: np.ndarray, count: int, components: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of each of `count` owners named in `table` (k, c) where its places begin, (count + 1,), and those places in a
+    blocked table with `components` rows for each column, (k c,)."""
+    elements, width = table.shape
+    element, column = np.repeat(np.arange(elements), width), np.tile(np.arange(width), elements)
+    place = ((element // BLOCK * width + column) * components) * BLOCK + element % BLOCK
+    order = np.argsort(table.ravel(), kind="stable")
+    start = np.concatenate([[0], np.cumsum(np.bincount(table.ravel(), minlength=count))])
+    return start.astype(np.uint32), place[order].astype(np.uint32)
+
+
+def inverse_at_rest(schur: csr_array | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of S (m, m) its diagonal, 1/√S_rr (m,), and the inverse of S scaled to a diagonal of 1, (m, m) float32.
+
+    A volume whose nodes are all held has neither.
+    """
+    whole = schur if isinstance(schur, np.ndarray) else schur.toarray()
+    diagonal = np.diag(whole).copy()
+    able = diagonal > 0.0
+    scale = np.where(able, 1.0 / np.sqrt(np.where(able, diagonal, 1.0)), 0.0)
+    inverse = np.linalg.inv(scale[:, None] * whole * scale + np.diag(np.where(able, SHIFT, 1.0)))
+    found = aligned(inverse.shape, np.dtype(np.float32))
+    found[:] = 0.5 * (inverse + inverse.T)
+    return diagonal, scale, found

@@ -1,0 +1,132 @@
+"""The frame of bodies whose volumes are summed over points of quadratic elements (HCJ05 with many volumes)."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from massspring.kernels.arrays.layout import Push
+from massspring.kernels.constraint.ldl_solve import Triangular, respond_into
+from massspring.kernels.jit.decorators import njit_inlined, njit_lean
+from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, SEARCH, SPRINGS, VOLUME, end_stage
+from massspring.kernels.points.elements import measure_into, push_into
+from massspring.kernels.points.facets import corrections_into, known_forces_into
+from massspring.kernels.points.solve import (
+    add_response,
+    pushed_velocity_into,
+    set_right_side,
+    solve_iteratively,
+    weigh_into,
+)
+from massspring.kernels.step.advance import advance
+from massspring.kernels.step.attachments import add_held_impulse
+from massspring.kernels.step.begin import (
+    begin_step,
+    count_iterations,
+    multiplier_stands,
+    open_frame,
+    search_contacts,
+)
+from massspring.kernels.step.end import end_step
+
+
+class ImplicitSprings(NamedTuple):
+    """Springs without length taken at the end of the step: A = (1 + c dt) M + dt² K, factored once (eq. 12.1)."""
+
+    factor: Triangular
+    start: np.ndarray
+    """Where the entries of each free node begin in the next two, (n + 1,) uint32."""
+    column: np.ndarray
+    """Held neighbours, (e,) uint32."""
+    value: np.ndarray
+    """dt² K_ih [kg], (e,)."""
+
+
+@njit_inlined
+def take_springs_implicitly(frame, rows, implicit):
+    """v* = A⁻¹ (M (v*₀ + c dt v) − dt² K_h v_h), of the v*₀ that an explicit step predicts (eq. 12.2)."""
+    model, nodes, dt, field = frame.model, frame.nodes, frame.boundary.dt, rows.field
+    keep = frame.boundary.damping * dt
+    for i in range(field.shape[0]):
+        for axis in range(3):
+            field[i, axis] = model.mass[i] * (nodes.v_star[i, axis] + keep * nodes.v[i, axis])
+        for k in range(implicit.start[i], implicit.start[i + 1]):
+            for axis in range(3):
+                field[i, axis] -= implicit.value[k] * nodes.v_star[implicit.column[k], axis]
+    respond_of_free(model, nodes, implicit, rows)
+    end_stage(frame.diagnostics.stage_times, SPRINGS)
+
+
+@njit_inlined
+def respond_of_free(model, nodes, implicit, rows):
+    """A⁻¹ of `rows.field` into v* of the free nodes."""
+    respond_into(implicit.factor, rows.field, rows.moved)
+    for i in range(rows.moved.shape[0]):
+        if model.inverse_mass[i] > 0.0:
+            nodes.v_star[i, 0], nodes.v_star[i, 1] = rows.moved[i, 0], rows.moved[i, 1]
+            nodes.v_star[i, 2] = rows.moved[i, 2]
+
+
+@njit_inlined
+def meet_points(frame, step, push, rows, implicit):
+    """Contact inside facets, as known forces, or of nodes (eq. 3.7, 9.3–9.9); the most passes of the active set."""
+    facets, boundary, model, nodes = rows.facets, frame.boundary, frame.model, frame.nodes
+    if facets.node.shape[0] == 0:
+        return search_contacts(frame, step, push)
+    if boundary.radius.shape[0] > 0:
+        known_forces_into(nodes, facets, boundary, step, rows.field)
+        add_response(model, nodes, rows, implicit, boundary.dt)
+        pushed_velocity_into(model, nodes, frame.contacts, rows, implicit, boundary.dt)
+        speed, impulse = rows.node_vector, frame.diagnostics.contact_impulse
+        corrections_into(nodes, facets, boundary, step, speed, rows.field, model.inverse_mass, impulse)
+        add_response(model, nodes, rows, implicit, boundary.dt)
+        end_stage(frame.diagnostics.stage_times, SEARCH)
+    return 1
+
+
+@njit_lean
+def point_volumes_frame(frame, rows, implicit, accuracy):
+    """One frame with one volume per vertex (eq. 3.1–3.8, 8.3–8.5, 8.8–8.13); `rows.lam` [Pa] comes in and goes out.
+
+    `implicit`: springs taken at the end of the step, or None.
+    """
+    model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
+    push, limited, idle = Push(rows.push, 1.0), False, False
+    open_frame(frame)
+    for step in range(boundary.position.shape[0]):
+        begin_step(frame, step, False)
+        weigh_into(model, nodes, rows, boundary)
+        if implicit is not None:
+            take_springs_implicitly(frame, rows, implicit)
+        measure_into(rows, nodes.x, frame.work.padded_positions)
+        push_into(rows, rows.lam)
+        end_stage(diagnostics.stage_times, VOLUME)
+        target, passes = boundary.volume_target[step], meet_points(frame, step, push, rows, implicit)
+        for sweep in range(passes):
+            limited, idle = set_right_side(frame, rows, implicit, target, accuracy.tolerance)
+            count = solve_iteratively(frame, rows, implicit, accuracy.most_iterations)
+            count_iterations(diagnostics, count)
+            if count > 0:
+                push_into(rows, rows.lam)
+            if multiplier_stands(frame, step, push, math.inf, sweep + 1 == passes):
+                break
+        diagnostics.limited[0] += limited
+        diagnostics.singular[0] += idle
+        if implicit is None:
+            end_step(frame, step, push, 0.0, None)
+        else:
+            end_implicitly(frame, rows, implicit)
+
+
+@njit_inlined
+def end_implicitly(frame, rows, implicit):
+    """v⁺ = v* + dt A⁻¹ F and x⁺ (eq. 3.5, 12.2); books what attachments give."""
+    model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
+    add_held_impulse(model, nodes, Push(rows.push, 1.0), boundary.dt, boundary.gravity, diagnostics.held_impulse)
+    end_stage(diagnostics.stage_times, HELD)
+    respond_into(implicit.factor, rows.push, rows.moved)
+    for i in range(rows.moved.shape[0]):
+        for axis in range(3):
+            nodes.v_star[i, axis] += boundary.dt * rows.moved[i, axis]
+    advance(frame, Push(rows.push, 0.0))
+    end_stage(diagnostics.stage_times, INTEGRATION)

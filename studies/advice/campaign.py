@@ -1,0 +1,109 @@
+"""What is stored of the campaign: its runs below the results folder, and the table that is published."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from studies.base.atomic import is_there
+from studies.base.errors import StudyError
+from studies.catalog.accuracy import ACCURACY
+from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, judged
+from studies.metrics.metrics import Metric
+from studies.runs.case import Case
+from studies.runs.current import case_path
+from studies.runs.recipe_text import case_of_recipe, recipe_text
+from studies.scene.scene import Scene
+from studies.store.machine import machine_id
+from studies.store.record import Status
+from studies.sweep.load import load_runs
+
+PUBLISHED = "published"
+"""Folder below the results with tables that come with the repository."""
+COST = "real_time [s/s]"
+
+
+@dataclass(frozen=True)
+class Stored:
+    """What is known of some scenes."""
+
+    found: dict[str, list[Judged]]
+    """Name of a scene -> its cases that ended well and whose errors are known."""
+    where: str
+    """Folder or table it was read from."""
+
+
+def stored(results: Path, scenes: Iterable[Scene]) -> Stored:
+    """What is stored of the campaign's `scenes`: the runs of each, and published rows of recipes that were not run.
+
+    Raises StudyError when nothing is stored of any.
+    """
+    wanted = {scene.name: scene for scene in scenes}
+    found, origins = dict[str, list[Judged]](), []
+    for name, scene in wanted.items():
+        own, told = _runs(results, scene)
+        others = [one for one in _published(results, scene) if one.compared and recipe_text(one.case) not in told]
+        if own or others:
+            found[name] = [*own, *others]
+            origins += [str(results / ACCURACY.name)] * bool(own) + [str(_table(results))] * bool(others)
+    if not found:
+        raise StudyError(
+            f"nothing is stored of the study '{ACCURACY.name}' for {', '.join(wanted)}, neither below "
+            f"{results / ACCURACY.name} nor in {_table(results)}; `organbench run {ACCURACY.name}` measures it"
+        )
+    return Stored(found, " and ".join(dict.fromkeys(origins)))
+
+
+def _table(results: Path) -> Path:
+    return results / PUBLISHED / ACCURACY.name / f"{ACCURACY.name}.csv"
+
+
+def _runs(results: Path, scene: Scene) -> tuple[list[Judged], set[str]]:
+    """Runs of a scene that ended well and whose errors are known, and the recipes of all that tell something: those
+    that ended badly too."""
+    cases = [case for case in ACCURACY.cases if case.scene.name == scene.name]
+    there = tuple(case for case in cases if is_there(case_path(results, ACCURACY.name, case)))
+    if not there:
+        return [], set()
+    runs, _ = load_runs(results, replace(ACCURACY, cases=there))  # the study itself reports what is missing
+    own = [one for one in map(judged, runs) if one is not None and one.compared]
+    bad = [run.case for run in runs if run.record.status != Status.OK]
+    return own, {recipe_text(case) for case in (*(one.case for one in own), *bad)}
+
+
+def _published(results: Path, scene: Scene) -> list[Judged]:
+    """Rows of the published table. Raises StudyError for a table that lacks what makes a recipe again."""
+    path = _table(results)
+    if not path.is_file():
+        return []
+    try:
+        rows = pd.read_csv(path)
+        here = _machine_of(results) == machine_id()
+        chosen = rows.loc[(rows["scene"] == scene.name) & (rows["status"] == Status.OK)]
+        return [_judged_row(scene, row, here) for row in chosen.to_dict("records")]
+    except (KeyError, ValueError, OSError) as error:
+        if isinstance(error, StudyError):
+            raise
+        raise StudyError(
+            f"{path} cannot be read ({error}); `organbench run {ACCURACY.name}` and `organbench publish` write it anew"
+        ) from error
+
+
+def _machine_of(results: Path) -> str | None:
+    """Id of the machine that the published times are of."""
+    path = results / PUBLISHED / "machine.json"
+    return json.loads(path.read_text(encoding="utf-8")).get("id") if path.is_file() else None
+
+
+def _judged_row(scene: Scene, row: dict[Any, Any], here: bool) -> Judged:
+    case: Case = case_of_recipe(scene, row["recipe"])
+    cost = Measured(1.0 / float(row[COST]) if float(row.get(COST, "nan")) > 0 else float("nan"))
+    return Judged(case, _of(row, FORCE), _of(row, DISPLACEMENT), cost, 1e-3 * float(row["dt [ms]"]), here)
+
+
+def _of(row: dict[Any, Any], metric: Metric) -> Measured:
+    name, unit = metric.name, metric.unit
+    return Measured(float(row.get(f"{name} [{unit}]", "nan")), float(row.get(f"{name} floor [{unit}]", "nan")))

@@ -1,0 +1,52 @@
+"""What is known of a scene that was never run: the worst that was measured in the scenes of its kind."""
+
+from collections.abc import Iterable, Sequence
+
+from studies.base.errors import DoesNotApply
+from studies.metrics.judged import UNKNOWN, Judged, Measured
+from studies.runs.case import Case
+from studies.runs.quadratic import check_masses
+from studies.runs.recipe_text import recipe_text
+from studies.scene.kind import kind_of
+from studies.scene.scene import Scene
+
+
+def same_kind(scene: Scene, known: Iterable[Scene]) -> list[Scene]:
+    """The scenes that are as hollow and loaded in the same way."""
+    kind = kind_of(scene)
+    return [other for other in known if kind_of(other) == kind]
+
+
+def worst_of(scene: Scene, groups: Sequence[Sequence[Judged]]) -> list[Judged]:
+    """The recipes that ended well in all `groups`, one for each scene, as cases of `scene` with their largest errors
+    and costs; without those that the scene refuses. The step is not known before the body is made."""
+    by_recipe = [{recipe_text(one.case): one for one in group} for group in groups]
+    common = [text for text in by_recipe[0] if all(text in group for group in by_recipe)]
+    found = []
+    for text in common:
+        same = [group[text] for group in by_recipe]
+        case = same[0].case.replaced(scene=scene)
+        if _refused(scene, case):
+            continue
+        force, displacement, cost = (
+            _largest([getattr(one, name) for one in same]) for name in ("force", "displacement", "cost")
+        )
+        found.append(Judged(case, force, displacement, cost))
+    return found
+
+
+def _largest(values: Sequence[Measured]) -> Measured:
+    """The one that is farthest from zero, with the largest uncertainty of all; unknown where none is known."""
+    known = [value for value in values if value.known]
+    if not known:
+        return UNKNOWN
+    uncertain = [value.uncertainty for value in known if value.uncertainty == value.uncertainty]
+    return Measured(max(known, key=lambda value: abs(value.value)).value, max(uncertain, default=float("nan")))
+
+
+def _refused(scene: Scene, case: Case) -> bool:
+    try:
+        check_masses(scene, case.body)
+    except DoesNotApply:
+        return True
+    return scene.skip(case.method.name) is not None

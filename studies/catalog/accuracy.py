@@ -1,0 +1,100 @@
+"""Which body is how accurate, at what cost, on every organ: from the paper's surface to graded quadratic elements?"""
+
+from typing import Literal
+
+from massspring import ImplicitVolume
+from studies.catalog.study import Chart, Study
+from studies.runs.case import BodyRecipe, Case
+from studies.scene.inertia import why_inertia_matters
+from studies.scene.kind import has_wall, load_of
+from studies.scene.scene import Scene
+from studies.scenes import JUDGED
+
+VERTICES = (150, 200, 300)
+"""On the outer surface of an even quadratic body."""
+BUDGETS = tuple(4 * vertices - 6 for vertices in VERTICES)
+"""Nodes on its outer surface, mid-side nodes among them (Euler); of graded bodies too."""
+SHORT, LONG = 0.5, 0.8
+"""Steps over the stability limit."""
+
+
+def judged_at_rest() -> tuple[Scene, ...]:
+    """The scenes with a reference that end at rest: force and displacement are compared there."""
+    return tuple(scene for scene in JUDGED if load_of(scene) != "motion")
+
+
+def linear_bodies(scene: Scene) -> tuple[BodyRecipe, ...]:
+    """The rungs below quadratic bodies, two sizes each: the paper's body; one volume; a volume for every four nodes;
+    one per node with springs without length. A hollow organ has as many nodes again on its lumen, and a coarser
+    surface of it folds."""
+    hollow = has_wall(scene)
+    sizes, share = ((550, 800), 2) if hollow else ((300, 550), 3)  # surface nodes in four nodes of all
+    axis = "centre_line" if hollow else "straight"
+    return tuple(
+        recipe
+        for nodes in sizes
+        for recipe in (
+            BodyRecipe("surface", nodes, axis=axis),
+            BodyRecipe(nodes=nodes),
+            BodyRecipe(nodes=nodes, volumes="regions", regions=nodes // share),
+            BodyRecipe(nodes=nodes, law="cotangent", volumes="nodal"),
+        )
+    )
+
+
+def headline(scene: Scene) -> BodyRecipe:
+    """Graded, of the middle size, with the masses that allow the longest step."""
+    return BodyRecipe("quadratic", BUDGETS[1], graded=True, mass=_mass(scene))
+
+
+def quadratic_cases(scene: Scene) -> tuple[Case, ...]:
+    """Even and graded bodies; of the middle size also the other masses and the other contact, of the even one a shorter
+    step; the headline at half its step and, among the graded ones, on the next finer body."""
+    even = [BodyRecipe("quadratic", nodes, mass=_mass(scene)) for nodes in BUDGETS]
+    graded = [BodyRecipe("quadratic", nodes, graded=True, mass=_mass(scene)) for nodes in BUDGETS[1:]]
+    middle = (even[1], graded[0])
+    found = [_timed(scene, body, LONG) for body in (*even, *graded)]
+    found += [_timed(scene, even[1], SHORT), _timed(scene, headline(scene), LONG / 2)]
+    if _mass(scene) != "lumped":
+        found += [_timed(scene, BodyRecipe("quadratic", b.nodes, graded=b.graded), LONG) for b in middle]
+    if scene.obstacles:
+        found += [_timed(scene, _at_nodes(body), LONG) for body in middle]
+    return tuple(found)
+
+
+def _mass(scene: Scene) -> Literal["lumped", "stiffness"]:
+    return "lumped" if why_inertia_matters(scene) else "stiffness"
+
+
+def _at_nodes(body: BodyRecipe) -> BodyRecipe:
+    return BodyRecipe("quadratic", body.nodes, graded=body.graded, mass=body.mass, contact="nodes")
+
+
+def _timed(scene: Scene, body: BodyRecipe, fraction: float) -> Case:
+    return Case(scene, body, ImplicitVolume(), dt_fraction=fraction, timed=True)
+
+
+ACCURACY = Study(
+    name="accuracy",
+    question=__doc__ or "",
+    cases=tuple(
+        case
+        for scene in judged_at_rest()
+        for case in (*(_timed(scene, body, SHORT) for body in linear_bodies(scene)), *quadratic_cases(scene))
+    ),
+    charts=(Chart("accuracy.png", "studies.plots.work_precision:draw"),),
+    columns=(
+        "force_end",
+        "mean_error",
+        "real_time",
+        "step_time",
+        "force_error",
+        "surface_error",
+        "interior_error",
+        "silhouette_error",
+        "pressure_error",
+        "lumen_pressure_error",
+        "volume_worst",
+        "min_j",
+    ),
+)

@@ -1,0 +1,97 @@
+"""The mesh of a body that is finer where its scene holds and touches it, with a wanted number of surface nodes."""
+
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.geometry import OrganMesh
+from studies.geometry.surface.node_count import FEWEST, MOST
+from studies.grading.held_mesh import HeldMesh, held_mesh
+from studies.grading.quadratic_mesh import QuadraticMesh
+from studies.grading.shaping import all_facets, linear_mesh, quadratic_mesh
+from studies.grading.true_shape import true_shape
+from studies.scene.meshing import mesh_for, remeshed
+from studies.scene.scene import Scene
+
+SOLID, HOLLOW = (1, 2), (0, 1)
+"""Times that elements are halved at outlines and at contacts. A probe on a liver of 2,471 nodes: force within 2.3 %,
+surface within 0.7 %, against 5.9 and 5.8 % on an even mesh of 1,473; the wall of a stomach is thin everywhere and gains
+from contacts alone."""
+CLOSE, TOLERANCE = 0.03, 0.05
+"""Deviation from the wanted number of nodes at which the search stops, and beyond which it has failed."""
+TRIES = 10
+
+
+def usual_grading(scene: Scene) -> tuple[int, int]:
+    """Times that elements are halved at outlines and at contacts of a scene's organ."""
+    return HOLLOW if is_hollow(scene) else SOLID
+
+
+def graded_mesh(
+    scene: Scene, nodes: int, at_outlines: int, at_contact: int, quadratic: bool
+) -> OrganMesh | QuadraticMesh:
+    """The scene's organ with `nodes` nodes on its outer surface (within 5 %; mid-side nodes count), elements halved
+    `at_outlines` times at the outlines of held regions and `at_contact` times where obstacles will be.
+
+    A mesh file that comes as it is has its own number of nodes and is halved all the same. The wall of a hollow organ
+    has one layer. Raises StudyError for a mesh that cannot be made.
+    """
+    if not remeshed(scene.organ):
+        return mesh_at(scene, nodes, at_outlines, at_contact, quadratic)
+    level = coarse_level(scene, nodes, at_outlines, at_contact, quadratic)
+    return mesh_at(scene, level, at_outlines, at_contact, quadratic)
+
+
+def mesh_at(scene: Scene, level: int, at_outlines: int, at_contact: int, quadratic: bool) -> OrganMesh | QuadraticMesh:
+    """The same from `level` vertices on the outer surface before any is halved."""
+    organ_mesh, coarse, fine = halved(scene, level, at_outlines, at_contact)
+    return (quadratic_mesh if quadratic else linear_mesh)(scene, organ_mesh, coarse, fine)
+
+
+def halved(scene: Scene, level: int, at_outlines: int, at_contact: int) -> tuple[OrganMesh, HeldMesh, HeldMesh]:
+    """The organ's mesh, the same with where it is held, and that one halved; all with straight sides."""
+    organ_mesh = mesh_for(scene, level, layers=1 if is_hollow(scene) else None)
+    coarse = held_mesh(scene, organ_mesh)
+    fine = coarse.refined(scene, at_outlines, at_contact)
+    return organ_mesh, coarse, coarse if fine.mesh.nelements == coarse.mesh.nelements else fine
+
+
+def is_hollow(scene: Scene) -> bool:
+    """Whether the scene's organ has a wall."""
+    shape = true_shape(scene.organ)
+    return "wall" in scene.organ.parameters if shape is None else shape.wall is not None
+
+
+def coarse_level(scene: Scene, nodes: int, at_outlines: int, at_contact: int, quadratic: bool) -> int:
+    """Surface vertices before halving that end in `nodes` nodes on the outer surface. Raises StudyError."""
+    most = 4 * MOST - 6 if quadratic else MOST
+    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or not FEWEST <= nodes <= most:
+        raise StudyError(
+            f"scene '{scene.name}': {nodes!r} surface nodes asked for; give a whole number from {FEWEST} to {most}"
+        )
+    found: dict[int, int] = {}
+    level, failed = max(FEWEST, (nodes + 6) // 4 if quadratic else nodes), None
+    for _ in range(TRIES):
+        try:
+            found[level] = outer_nodes(halved(scene, level, at_outlines, at_contact)[2], quadratic)
+        except StudyError as error:
+            failed = failed or error  # raised below, unless a neighbour of this level can be meshed
+            level += max(1, level // 50)
+            continue
+        wanted = max(FEWEST, round(level * nodes / found[level]))
+        if abs(found[level] / nodes - 1.0) <= CLOSE or wanted in found:
+            break
+        level = wanted
+    if failed is not None and not found:
+        raise failed
+    best = min(found, key=lambda tried: abs(found[tried] - nodes))
+    if abs(found[best] / nodes - 1.0) > TOLERANCE:
+        raise StudyError(
+            f"scene '{scene.name}': no graded mesh has {nodes} surface nodes; ask for {found[best]}, the nearest found"
+        )
+    return best
+
+
+def outer_nodes(body: HeldMesh, quadratic: bool) -> int:
+    """Nodes on the outer surface, mid-side nodes among them where there are any."""
+    facets = all_facets(body)[-2]
+    return len(set((facets if quadratic else facets[:, :3]).ravel().tolist()))

@@ -1,0 +1,80 @@
+"""Quadratic tetrahedra of a scene's organ, and how upright their elements are."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from studies.geometry.mesh.jacobian import curved_volume, jacobian_coefficients
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+
+TURNED = [0, 2, 1, 5, 4, 3]
+"""A six-node facet seen from its other side."""
+CORNER_PARTS = np.array([[0, 4, 6, 7], [4, 1, 5, 8], [6, 5, 2, 9], [7, 8, 9, 3]])
+"""Flat tetrahedra at the corners of an element in VTK's order."""
+MIDDLE_PARTS = np.array(
+    [
+        [[4, 9, 6, 7], [4, 9, 7, 8], [4, 9, 8, 5], [4, 9, 5, 6]],
+        [[5, 7, 4, 8], [5, 7, 8, 9], [5, 7, 9, 6], [5, 7, 6, 4]],
+        [[6, 8, 7, 4], [6, 8, 4, 5], [6, 8, 5, 9], [6, 8, 9, 7]],
+    ]
+)
+"""The octahedron between them, cut along each of its three diagonals."""
+
+
+@dataclass(frozen=True, eq=False)
+class QuadraticMesh:
+    """A body of quadratic tetrahedra, curved where its true shape is known."""
+
+    name: str
+    points: np.ndarray
+    """Rest positions [m], (n, 3): nodes of the outer surface, then of the lumen, then inner ones."""
+    cells: np.ndarray
+    """(k, 10) in VTK's order of a quadratic tetrahedron, upright."""
+    facets: np.ndarray
+    """The whole boundary, outward from the tissue, (f, 6): corners, then the nodes between first and second, second and
+    third, third and first."""
+    lumen: np.ndarray
+    """Facets of the lumen, turned so that they enclose it with positive volume, (l, 6)."""
+    surface_count: int
+    """Boundary nodes."""
+    outer_count: int
+    """Nodes of the outer surface."""
+    patches: dict[str, np.ndarray]
+    """Of each held region all nodes of its facets."""
+    recipe: dict[str, Any] = field(default_factory=dict)
+    """How to make the mesh again from which it comes, JSON-able."""
+
+    @property
+    def hollow(self) -> bool:
+        """Whether there is a lumen."""
+        return len(self.lumen) > 0
+
+    @property
+    def volume(self) -> float:
+        """Volume of the tissue inside the curved sides [m³]."""
+        return curved_volume(self.points, self.cells)
+
+    @property
+    def smallest_jacobian(self) -> float:
+        """Least Bernstein coefficient of an element's Jacobian over their mean, 1 when straight: a lower bound of the
+        Jacobian over that of the mean. Positive: no element folds anywhere."""
+        coefficients = jacobian_coefficients(self.points, self.cells)
+        return float((coefficients.min(axis=1) / np.abs(coefficients.mean(axis=1))).min())
+
+
+def uprightness(points: np.ndarray, cells: np.ndarray, straight_volume: np.ndarray) -> np.ndarray:
+    """How far each element (k, 10) is from folding, (k,): 1 when straight, at most 0 when it folds or a part does.
+
+    The smaller of two ratios to straight_volume (k,) [m³]: of the least Bernstein coefficient of the Jacobian, over 6,
+    and of the least of the eight flat tetrahedra that stand for the element where it touches, times 8. Of the three
+    ways to cut its middle the best one counts.
+    """
+    bent = jacobian_coefficients(points, cells).min(axis=1) / 6.0
+    corners = _volumes(points, cells[:, CORNER_PARTS]).min(axis=1)
+    middles = np.max([_volumes(points, cells[:, parts]).min(axis=1) for parts in MIDDLE_PARTS], axis=0)
+    return np.minimum(bent, 8.0 * np.minimum(corners, middles)) / straight_volume
+
+
+def _volumes(points: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    return tetrahedron_volumes(points, parts.reshape(-1, 4)).reshape(parts.shape[:2])

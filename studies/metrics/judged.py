@@ -1,0 +1,116 @@
+"""A recipe in a scene with what was measured of it, and how it stands to a wish."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from studies.metrics.metrics import Run
+from studies.metrics.table import metric
+from studies.metrics.wish import Wish
+from studies.runs.case import Case
+from studies.store.record import Status
+
+NAN = float("nan")
+FORCE, DISPLACEMENT = metric("force_end"), metric("mean_error")
+
+
+class Measured(NamedTuple):
+    """A number and how well it is known, in one unit; NaN where it is not."""
+
+    value: float
+    uncertainty: float = NAN
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a number."""
+        return self.value == self.value
+
+
+UNKNOWN = Measured(NAN)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A case that ended well, beside its errors and its cost."""
+
+    case: Case
+    force: Measured = UNKNOWN
+    """force_end [%], signed; unknown where the scene compares no force."""
+    displacement: Measured = UNKNOWN
+    """mean_error [%]."""
+    cost: Measured = UNKNOWN
+    """Computing time over simulated time [1], and half the range of the repeats of its median frame."""
+    dt: float = NAN
+    """[s]."""
+    timed_here: bool = False
+    """Whether the cost is of this machine."""
+
+    @property
+    def compared(self) -> bool:
+        """Whether anything is known of its errors."""
+        return self.force.known or self.displacement.known
+
+    def shares(self, wish: Wish) -> dict[str, float]:
+        """Every bound of a wish that can be judged here -> measured over wished for [1]: 1 or less meets it."""
+        found = {"force": self.force, "displacement": self.displacement, "budget": self.cost}
+        wished = {name: getattr(wish, name) for name in found}
+        return {name: abs(found[name].value) / bound for name, bound in wished.items() if bound and found[name].known}
+
+    def worst(self, wish: Wish) -> float:
+        """The largest of its shares: 1 or less meets the wish; infinite where none of its errors is known."""
+        shares = self.shares(wish)
+        return max(shares.values()) if set(shares) - {"budget"} else np.inf
+
+
+def judged(run: Run) -> Judged | None:
+    """What a run measured; None where it ended badly."""
+    if run.record.status != Status.OK:
+        return None
+    force, displacement = (Measured(entry(run), entry.uncertainty(run)) for entry in (FORCE, DISPLACEMENT))
+    dt = float(run.record.attributes["dt"])
+    return Judged(run.case, force, displacement, cost_of(run), dt, run.timing is not None)
+
+
+def cost_of(run: Run) -> Measured:
+    """Computing time over simulated time [1], and half the range over the repeats."""
+    if run.timing is None:
+        return UNKNOWN
+    return cost_of_frames(run.timing.frame_ns, float(run.record.attributes["frame"]))
+
+
+def cost_of_frames(frame_ns: np.ndarray, frame: float) -> Measured:
+    """The median frame over its simulated time [1], and half the range of that over the repeats.
+
+    frame_ns: (repeat, F) [ns]; frame: simulated time of a frame [s].
+    """
+    costs = 1e-9 * np.median(frame_ns, axis=1) / frame
+    return Measured(1e-9 * float(np.median(frame_ns)) / frame, float(np.ptp(costs)) / 2)
+
+
+def cheapest(found: Iterable[Judged], wish: Wish) -> Judged | None:
+    """The one of least cost that meets a wish; those of unknown cost come last. None where none does."""
+    meeting = [one for one in found if one.worst(wish) <= 1.0]
+    return min(meeting, key=by_cost, default=None)
+
+
+def nearest(found: Iterable[Judged], wish: Wish) -> Judged | None:
+    """The one that misses a wish by the smallest factor; None of those whose errors are not known."""
+    known = [one for one in found if one.worst(wish) < np.inf]
+    return min(known, key=lambda one: one.worst(wish), default=None)
+
+
+def by_cost(one: Judged) -> tuple[bool, float, float]:
+    """Orders by cost, where that is unknown by nodes over step."""
+    step = one.dt if one.dt == one.dt else one.case.dt_fraction
+    return not one.cost.known, one.cost.value if one.cost.known else 0.0, one.case.body.nodes / step
+
+
+def front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The (cost, error) that no other point beats in both, by ascending cost."""
+    best: list[tuple[float, float]] = []
+    for cost, error in sorted(points):
+        if not best or error < best[-1][1]:
+            best.append((cost, error))
+    return best

@@ -1,0 +1,41 @@
+"""What tells the rungs from the paper's body to quadratic elements apart in a chart: a name, a colour and a marker."""
+
+from dataclasses import dataclass
+
+from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
+from studies.runs.case import Case
+
+PAPER = "the paper's body"
+
+
+@dataclass(frozen=True)
+class Family:
+    """Bodies that differ by size, masses, contact and step only."""
+
+    name: str
+    colour: str
+    marker: str
+
+
+FAMILIES: dict[tuple[str, bool, str], Family] = {
+    ("surface", False, "scene"): Family(PAPER, BLACK, "s"),
+    ("tetrahedral", False, "scene"): Family("tetrahedra, one volume", VERMILLION, "o"),
+    ("tetrahedral", False, "regions"): Family("tetrahedra, some volumes", ORANGE, "D"),
+    ("tetrahedral", False, "nodal"): Family("tetrahedra, a volume per node", PURPLE, "^"),
+    ("quadratic", False, "scene"): Family("quadratic, even", SKY, "P"),
+    ("quadratic", True, "scene"): Family("quadratic, graded", BLUE, "*"),
+    ("tetrahedral", True, "scene"): Family("tetrahedra, graded", GREEN, "v"),
+}
+"""By kind of body, whether it is graded, and its volumes; colours by Okabe and Ito, no two markers alike."""
+WHOLE = "implicit_volume"
+"""The method that needs no name."""
+
+
+def family_of(case: Case) -> Family:
+    """The family of a case; a body or a method that is none of the ladder is grey, under its own name."""
+    body = case.body
+    known = FAMILIES.get((body.kind, body.graded, body.volumes))
+    if known is not None and case.method.name == WHOLE:
+        return known
+    own = "" if case.method.name == WHOLE else f", {case.method.name.replace('_', ' ')}"
+    return Family(f"{body.series}{own}", GREY, "X" if known is None else known.marker)

@@ -1,0 +1,41 @@
+"""All of a case but its scene as a short text, from which it is made again: how a table names what a row was."""
+
+import json
+from typing import Any
+
+from studies.base.errors import StudyError
+from studies.runs.case import Case, case_from_json, case_to_dict
+from studies.scene.scene import Scene
+
+
+def recipe_text(case: Case) -> str:
+    """JSON of the settings that are not those of `Case(scene)`: '{"body": {"kind": "quadratic", "nodes": 794}}'."""
+    usual, given = _parts(Case(case.scene)), _parts(case)
+    differing = {name: value for name, value in given.items() if value != usual.get(name)}
+    return json.dumps({name: _chosen(value, usual.get(name)) for name, value in differing.items()})
+
+
+def case_of_recipe(scene: Scene, text: str) -> Case:
+    """The case of which `text` is the recipe in a scene. Raises StudyError when it is none."""
+    try:
+        chosen = json.loads(text)
+    except (TypeError, ValueError) as error:
+        raise StudyError(f"{str(text)[:60]!r} is no recipe of a case ({error})") from error
+    if not isinstance(chosen, dict):
+        raise StudyError(f"{text[:60]!r} is no recipe of a case; it must be a JSON object")
+    whole = case_to_dict(Case(scene))
+    for name, value in chosen.items():
+        mixes = name == "body" and isinstance(value, dict)
+        whole[name] = {**whole[name], **value} if mixes else value
+    return case_from_json(json.dumps(whole))
+
+
+def _parts(case: Case) -> dict[str, Any]:
+    return {name: value for name, value in case_to_dict(case).items() if name != "scene"}
+
+
+def _chosen(value: Any, usual: Any) -> Any:
+    """Of a body only what was chosen; a method whole: its settings are its own."""
+    if not isinstance(value, dict) or "name" in value:
+        return value
+    return {name: item for name, item in value.items() if item != usual.get(name)}

@@ -1,0 +1,50 @@
+"""Whether a scene is so slow that what its body weighs where makes no difference to how it moves."""
+
+import numpy as np
+
+from massspring import Probe, Trajectory
+from studies.scene.scene import Scene
+
+SLOW = 0.01
+"""Of the speed of a shear wave: inertia then adds some 1e-4 to the forces, as its square."""
+
+
+def why_inertia_matters(scene: Scene) -> str | None:
+    """Why masses that are not the tissue's would change the answer of the scene; None where loads are so slow that the
+    body passes from rest to rest. Weight is no reason where the body is held: it has masses of its own."""
+    if scene.start is not None:
+        return "it starts in motion or out of shape, and rings"
+    if scene.reference is not None and scene.reference.dt is not None:
+        return "its reference is a motion in time"
+    if any(scene.gravity) and not scene.held:
+        return "nothing holds the body, so it falls"
+    if any(isinstance(obstacle, Probe) for obstacle in scene.obstacles):
+        return "a thin probe moves one triangle at a time, which answers by its mass"
+    wave = float(np.sqrt(scene.tissue.shear_modulus / scene.tissue.density))
+    for path in [moving.path for moving in (*scene.obstacles, *scene.held)]:
+        if turns(path):
+            return "what touches or holds the body turns on its way"
+        if top_speed(path) > SLOW * wave:
+            return (
+                f"what touches or holds the body moves at {1e3 * top_speed(path):.3g} mm/s, "
+                f"over a hundredth of the speed of its shear waves, {wave:.2g} m/s"
+            )
+    return None
+
+
+def top_speed(path: Trajectory) -> float:
+    """Largest speed along a path [m/s]."""
+    return float(max(np.linalg.norm(velocities(path), axis=1), default=0.0))
+
+
+def turns(path: Trajectory) -> bool:
+    """Whether a path changes its direction; it may rest in between."""
+    moves = velocities(path)
+    length = np.linalg.norm(moves, axis=1)
+    ways = moves[length > 0] / length[length > 0, None]
+    return bool((np.abs(np.diff(ways, axis=0)) > 1e-9).any())
+
+
+def velocities(path: Trajectory) -> np.ndarray:
+    """Between key positions [m/s], (k − 1, 3)."""
+    return np.diff(path.displacements, axis=0) / np.diff(path.times)[:, None]

@@ -1,0 +1,56 @@
+"""What kind of scene it is, read off what it holds: a solid or hollow organ, and how it is loaded."""
+
+from dataclasses import dataclass
+
+from massspring import Capsule, Plane, Probe, Sphere
+from studies.geometry.organs.make_shape import make_shape
+from studies.scene.inertia import top_speed
+from studies.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Scenes of one kind ask the same of a body."""
+
+    hollow: bool
+    load: str
+    """"press": a plane against a held organ; "probe": a sphere or capsule; "squeeze": between two planes, or two held
+    regions; "sag": its weight; "fill": its lumen; "thin probe"; "motion": it starts in motion; "rest": nothing."""
+
+    def __str__(self) -> str:
+        """As it is told: "hollow, press"."""
+        return f"{'hollow' if self.hollow else 'solid'}, {self.load}"
+
+
+def kind_of(scene: Scene) -> Kind:
+    """The kind of a scene. Raises StudyError for an organ that there is not."""
+    return Kind(has_wall(scene), load_of(scene))
+
+
+def has_wall(scene: Scene) -> bool:
+    """Whether the organ of a scene is hollow; of a mesh file, whether it is given a wall or a lumen."""
+    organ = scene.organ
+    if scene.lumen is not None:
+        return True
+    if organ.shape == "file":
+        return "wall" in organ.parameters
+    return make_shape(organ.shape, organ.parameters).wall is not None
+
+
+def load_of(scene: Scene) -> str:
+    """How the organ is loaded; where several loads act, the one that bends it most locally."""
+    if scene.start is not None or (scene.reference is not None and scene.reference.dt is not None):
+        return "motion"
+    if any(isinstance(obstacle, Probe) for obstacle in scene.obstacles):
+        return "thin probe"
+    moving = [obstacle for obstacle in scene.obstacles if top_speed(obstacle.path) > 0]
+    if any(isinstance(obstacle, Sphere | Capsule) for obstacle in moving):
+        return "probe"
+    if scene.lumen is not None and set(scene.lumen.filling.values) != {1.0}:
+        return "fill"
+    planes = [obstacle for obstacle in moving if isinstance(obstacle, Plane)]
+    if any(top_speed(held.path) > 0 for held in scene.held) or len(planes) > 1 or (planes and not scene.held):
+        return "squeeze"
+    if planes:
+        return "press"
+    return "sag" if any(scene.gravity) else "rest"

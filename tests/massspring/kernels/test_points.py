@@ -1,0 +1,154 @@
+"""Sums over points of blocked elements, against NumPy at positions far from rest."""
+
+import numpy as np
+import pytest
+from scipy.sparse import diags_array
+
+from massspring import Attachment, Body, Clock, ImplicitVolume, Setup, quadratic_body
+from massspring.body.points import PointVolumes
+from massspring.kernels.points.elements import measure_into, push_into, times_into
+from massspring.kernels.points.facets import SHARE
+from massspring.kernels.points.solve import apply_schur, precondition_into, pushed_velocity_into, solve_iteratively
+from massspring.layout.facet_rows import facet_rows, facet_rule
+from massspring.layout.point_rows import SHIFT
+from tests.massspring.body.test_quadratic import local_force
+from tests.massspring.conftest import SOFT
+from tests.massspring.quadratic import curved_block, hollow_ball, jiggled, quadratic_block
+
+CLOSE = 1e-12
+DT = 1e-3
+
+
+@pytest.fixture(params=["small", "curved", "hollow"])
+def body(request) -> Body:
+    """6 elements, fewer than a block; 54, not a multiple of it; 240 with a lumen."""
+    if request.param == "hollow":
+        return hollow_ball()
+    return quadratic_body(*(quadratic_block((1, 1, 1)) if request.param == "small" else curved_block((3, 3, 1))), SOFT)
+
+
+def prepared(body: Body, held=()):
+    """Volumes, rows, positions and the frame with nodes `held`; what depends on positions is measured."""
+    attachments = (Attachment(np.asarray(held)),) if len(held) else ()
+    setup = Setup(body, ImplicitVolume(), Clock(DT, 1, 1), (), attachments)
+    state = setup.start()
+    x = np.ascontiguousarray(jiggled(body, 0.05))
+    measure_into(state.rows, x, np.column_stack([x, np.zeros(len(x))]))
+    assert isinstance(body.kept, PointVolumes) and setup.inside.place is None
+    return body.kept, state.rows, x, state.frame(setup.boundary(0))
+
+
+def close(found, exact, bound=CLOSE):
+    assert np.abs(found - exact).max() < bound * np.abs(exact).max()
+
+
+def test_volumes_and_pushes_are_those_of_numpy(body):
+    volumes, rows, x, _ = prepared(body)
+    close(rows.volume, volumes.measure(x))
+    lam = np.random.default_rng(1).standard_normal(volumes.count) * SOFT.shear_modulus
+    push_into(rows, lam)
+    close(rows.push.ravel(), volumes.jacobian(x).T @ lam + local_force(body, x))
+
+
+def test_products_with_velocities_are_those_of_numpy(body):
+    volumes, rows, x, _ = prepared(body)
+    u = np.zeros((len(x), 4))
+    u[:, :3] = np.random.default_rng(2).standard_normal(x.shape)
+    product = np.zeros(volumes.count)
+    times_into(rows, u, product)
+    close(product, volumes.jacobian(x) @ u[:, :3].ravel())
+
+
+def test_the_schur_complement_is_that_of_numpy_with_held_nodes(body):
+    held = np.arange(0, body.node_count, 5)
+    volumes, rows, x, frame = prepared(body, held)
+    inverse_mass = frame.model.inverse_mass
+    p, product = np.random.default_rng(3).standard_normal(volumes.count), np.zeros(volumes.count)
+    apply_schur(frame, rows, None, p, product)
+    j = volumes.jacobian(x)
+    close(product, j @ (diags_array(np.repeat(inverse_mass, 3)) @ (j.T @ p)))
+
+
+def test_the_predicted_velocity_has_the_push_and_no_fourth_number(body):
+    volumes, rows, x, frame = prepared(body)
+    push_into(rows, np.full(volumes.count, 700.0))
+    frame.nodes.v_star[:] = np.random.default_rng(4).standard_normal(x.shape)
+    pushed_velocity_into(frame.model, frame.nodes, frame.contacts, rows, None, DT)
+    close(rows.node_vector[:, :3], frame.nodes.v_star + DT * rows.push / body.mass[:, None])
+    assert not rows.node_vector[:, 3].any()
+
+
+def test_the_preconditioner_is_the_inverse_at_rest(body):
+    """In single precision: six digits of the condition of S are left."""
+    held = np.arange(0, body.node_count, 7)
+    volumes, rows, _, frame = prepared(body, held)
+    inverse_mass = frame.model.inverse_mass
+    j = volumes.jacobian(body.rest)
+    schur = (j @ diags_array(np.repeat(inverse_mass, 3)) @ j.T).toarray()
+    assert np.allclose(rows.diagonal, np.diag(schur), rtol=1e-12)
+    shifted = schur + SHIFT * np.diag(np.diag(schur))
+    residual, product = np.random.default_rng(5).standard_normal(volumes.count), np.zeros(volumes.count)
+    rho = precondition_into(rows, residual, product)
+    assert rho == pytest.approx(float(residual @ product), rel=1e-12) and rho > 0.0
+    close(shifted @ product, residual, 1e-6 * np.linalg.cond(rows.inverse))
+
+
+def test_conjugate_gradients_solve_for_every_volume(body):
+    volumes, rows, x, frame = prepared(body)
+    inverse_mass = frame.model.inverse_mass
+    j = volumes.jacobian(x)
+    schur = (j @ diags_array(np.repeat(inverse_mass, 3)) @ j.T).toarray()
+    right = schur @ np.random.default_rng(6).standard_normal(volumes.count)
+    rows.right[:], rows.lam[:] = right, 0.0
+    rows.allowed[:] = 1e-9 * np.abs(right).max()
+    count = solve_iteratively(frame, rows, None, 200)
+    assert 0 < count < 60
+    assert np.abs(schur @ rows.lam - right).max() < 2e-9 * np.abs(right).max()
+
+
+def test_volumes_whose_nodes_are_all_held_are_left_out(body):
+    """They have nothing to push on: no pressure, no part in the iteration, and the others are solved for as before."""
+    volumes = prepared(body)[0]
+    assert isinstance(volumes, PointVolumes)
+    around = (volumes.corner_volume == 0).any(axis=1)
+    held = np.unique(volumes.cells[around])
+    _, rows, _, frame = prepared(body, held)
+    dead = rows.diagonal == 0.0
+    assert dead[0] and np.isfinite(rows.inverse).all() and (rows.scale[dead] == 0.0).all()
+    rows.right[:], rows.lam[:], rows.allowed[:] = 1.0, 3.0, 1e-9
+    if not dead.all():
+        assert solve_iteratively(frame, rows, None, 200) > 0
+    assert (rows.lam[dead] == 3.0).all() and np.isfinite(rows.lam).all()
+
+
+def test_the_rule_of_facets_is_exact_to_the_fourth_degree():
+    """∫ over a triangle of b_1^i b_2^j b_3^k is 2 i! j! k!/(i + j + k + 2)!, per area; and N is 1 at its own node."""
+    shape, weight = facet_rule()
+    assert np.allclose(shape.sum(axis=1), 1.0, atol=1e-14) and weight.sum() == pytest.approx(1.0, abs=1e-14)
+    assert np.allclose(weight @ shape, [0, 0, 0, 1 / 3, 1 / 3, 1 / 3], atol=1e-14)
+    # ∫ N_a N_b of six-node triangles (Zienkiewicz, Taylor): degree four.
+    mass = np.array(
+        [
+            [6, -1, -1, 0, -4, 0],
+            [-1, 6, -1, 0, 0, -4],
+            [-1, -1, 6, -4, 0, 0],
+            [0, 0, -4, 32, 16, 16],
+            [-4, 0, 0, 16, 32, 16],
+            [0, -4, 0, 16, 16, 32],
+        ]
+    )
+    assert np.allclose(shape.T @ (weight[:, None] * shape), mass / 180.0, atol=1e-14)
+
+
+def test_the_bed_of_contact_points_is_as_stiff_as_it_says(body):
+    """Largest eigenvalue of M⁻¹ Σ k dt² N Nᵀ, dense, is SHARE; facets that are held have none."""
+    inverse_mass = 1.0 / body.mass
+    inverse_mass[body.contact_facets[0]] = 0.0
+    rows = facet_rows(body.contact_facets, body.rest, inverse_mass)
+    assert len(rows.node) == len(body.contact_facets) - (inverse_mass[body.contact_facets] == 0).all(axis=1).sum()
+    bed = np.zeros((body.node_count, body.node_count))
+    for f, nodes in enumerate(rows.node):
+        bed[np.ix_(nodes, nodes)] += rows.shape.T @ (rows.stiffness[f][:, None] * rows.shape)
+    root = np.sqrt(inverse_mass)
+    largest = np.linalg.eigvalsh(root[:, None] * bed * root).max()
+    assert largest == pytest.approx(SHARE, rel=2e-2) and (rows.stiffness > 0).all()

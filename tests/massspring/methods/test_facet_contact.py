@@ -1,0 +1,247 @@
+"""Contact at points inside facets: balance, lag, stability, friction, round obstacles, and what holds beside it."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from massspring import (
+    Attachment,
+    Body,
+    Capsule,
+    Clock,
+    ImplicitVolume,
+    Plane,
+    Setup,
+    Sphere,
+    Trajectory,
+    quadratic_body,
+    simulate,
+    step_limit,
+)
+from massspring.kernels.points.facets import FASTEST, FOLLOWING, SHARE
+from massspring.layout.facet_rows import facet_rows, facet_rule
+from tests.massspring.conftest import SOFT
+from tests.massspring.quadratic import RADIUS, ball_mesh, quadratic_block
+
+DEPTH = 0.15 * RADIUS
+"""What each plane travels."""
+PRESSED, HELD = 0.25, 0.75
+"""Seconds of pressing, and to the end."""
+INSIDE = 2.5e-3
+"""Of the radius, half a second after the press: stiff local patterns go back slowly (eq. 9.8)."""
+EDGE = 0.04
+"""Of the block that slides [m]."""
+FRICTION = 0.5
+WEAK = 2.0
+"""Gravity [m/s²]: a soft block keeps its shape."""
+
+
+@cache
+def ball() -> Body:
+    return quadratic_body(*ball_mesh(), SOFT)
+
+
+@cache
+def slab() -> Body:
+    """A block whose sides are flat."""
+    return quadratic_body(*quadratic_block((2, 2, 1), 0.5 * EDGE, 0.0), SOFT)
+
+
+def places(body: Body, x: np.ndarray) -> np.ndarray:
+    """Of the contact points [m], (p, 3)."""
+    return np.einsum("qa,fai->fqi", facet_rule()[0], x[body.contact_facets]).reshape(-1, 3)
+
+
+def clock_of(body: Body, fraction: float, duration: float, frames: int, held=()) -> Clock:
+    """Frames of equal numbers of steps, each at most `fraction` of the limit."""
+    limit = step_limit(body, held_nodes=np.asarray(held, dtype=np.int64)).undamped
+    steps = int(np.ceil(duration / frames / (fraction * limit)))
+    return Clock(duration / frames, frames, steps)
+
+
+def planes_at(path: Trajectory, friction=0.0) -> tuple[Plane, Plane]:
+    down = Trajectory(path.times, tuple((0.0, 0.0, -z) for _, _, z in path.displacements))
+    up, low = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
+    return Plane((0, 0, RADIUS), low, down, friction), Plane((0, 0, -RADIUS), up, path, friction)
+
+
+@cache
+def squeezed(fraction: float):
+    """A ball pressed by two planes that then stand still."""
+    path = Trajectory((0.0, PRESSED), ((0.0, 0.0, 0.0), (0.0, 0.0, DEPTH)))
+    clock = clock_of(ball(), fraction, HELD, 60)
+    planes = planes_at(path)
+    setup = Setup(ball(), ImplicitVolume(), clock, planes, damping=40.0)
+    return planes, simulate(setup, snapshots=(15,))
+
+
+@pytest.mark.parametrize("fraction", [pytest.param(0.1, marks=pytest.mark.slow), 0.25, 0.5, 0.85])
+def test_a_squeezed_ball_comes_to_rest_between_equal_forces(fraction):
+    """At every share of the stable step: the limit without contact need not be lowered up to 0.86 of it."""
+    planes, history = squeezed(fraction)
+    assert history.outcome == "finished"
+    top, bottom = history.contact_force[-1]
+    assert bottom[2] > 0.5 and np.abs(top + bottom).max() < 1e-4 * bottom[2]
+    assert np.abs(top[:2]).max() < 1e-9 * bottom[2]
+    still = np.abs(np.diff(history.contact_force[-5:, 1, 2])).max()
+    assert still < 1e-3 * bottom[2] and history.kinetic[-1] < 1e-6 * history.elastic[-1]
+    for plane in planes:
+        assert plane.gap(places(ball(), history.final), HELD).min() > -INSIDE * RADIUS
+    assert np.abs(history.volume / ball().rest_volumes - 1.0).max() < 1e-5
+
+
+def test_the_force_does_not_depend_on_the_step():
+    forces = [squeezed(fraction)[1].contact_force[-1, 1, 2] for fraction in (0.25, 0.5, 0.85)]
+    assert np.ptp(forces) < 3e-3 * forces[0]
+
+
+def test_what_a_moving_plane_enters_falls_with_the_square_of_the_step():
+    """ḟ dt³/(φ κ m) with φ ~ dt (eq. 9.5, 9.8): half the step, a quarter of the depth, but for which points touch."""
+    depths = []
+    for fraction in (0.25, 0.5):
+        planes, history = squeezed(fraction)
+        depths.append(-planes[1].gap(places(ball(), history.snapshots[0]), float(history.t[14])).min())
+    assert 0.0 < depths[0] < depths[1] / 3.0 and depths[1] < 15e-3 * RADIUS
+
+
+def slid(angle: float, friction, duration: float = 0.4, fraction: float = 0.5):
+    """A block on a plane, gravity at `angle` [degrees] to its normal; positions after settling are kept."""
+    body, tilt = slab(), np.radians(angle)
+    floor = Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), friction=friction)
+    clock = clock_of(body, fraction, duration, 40)
+    gravity = (WEAK * float(np.sin(tilt)), 0.0, -WEAK * float(np.cos(tilt)))
+    damping = 25.0 if friction == "no_slip" or np.tan(tilt) < friction else 0.0
+    setup = Setup(body, ImplicitVolume(), clock, (floor,), gravity=gravity, damping=damping)
+    return simulate(setup, snapshots=(20, 40)), clock
+
+
+def mean_motion(history, before: int, after: int) -> np.ndarray:
+    mass = slab().mass
+    return mass @ (history.snapshots[after] - history.snapshots[before]) / mass.sum()
+
+
+def test_a_block_slides_above_the_angle_of_friction():
+    """g (sin − mu cos): twice the distance between the middle and the end of the run."""
+    history, clock = slid(40.0, FRICTION)
+    half = 0.5 * clock.duration
+    expected = WEAK * (np.sin(np.radians(40.0)) - FRICTION * np.cos(np.radians(40.0)))
+    moved = slab().mass @ (history.final - slab().rest) / slab().mass.sum()
+    assert history.outcome == "finished" and moved[0] == pytest.approx(0.5 * expected * (2 * half) ** 2, rel=0.05)
+    force = history.contact_force[:, 0]
+    assert (np.linalg.norm(force[:, :2], axis=1) <= FRICTION * force[:, 2] * (1 + 1e-9)).all()
+    assert force[20:, 0].mean() == pytest.approx(-FRICTION * force[20:, 2].mean(), rel=1e-3)
+    assert force[:, 2].mean() == pytest.approx(slab().mass.sum() * WEAK * np.cos(np.radians(40.0)), rel=0.03)
+
+
+@pytest.mark.parametrize(("angle", "friction"), [(20.0, FRICTION), (30.0, "no_slip")], ids=["Coulomb", "no slip"])
+def test_a_block_rests_below_the_angle_and_without_slip(angle, friction):
+    """The force along the plane is the weight's part, and nothing creeps. Gravity begins at once: there is a first slip
+    while the pressure builds up, which only the plane without slip takes back."""
+    history, _ = slid(angle, friction, 1.2)
+    weight = WEAK * slab().mass.sum()
+    force = history.contact_force[-1, 0]
+    tilt = np.radians(angle)
+    assert np.allclose(force, weight * np.array([-np.sin(tilt), 0.0, np.cos(tilt)]), atol=1e-2 * weight)
+    low = places(slab(), slab().rest)[:, 2] < 1e-9
+    first, middle, end = (places(slab(), x)[low, :2].mean(axis=0) for x in (slab().rest, *history.snapshots))
+    assert np.abs(end - middle).max() < 1e-5 and np.abs(mean_motion(history, 0, 1)).max() < 1e-5
+    if friction == "no_slip":
+        assert np.abs(end - first).max() < 0.25 * np.abs(history.final - slab().rest).max()
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3, "no_slip"])
+@pytest.mark.parametrize("shape", ["sphere", "capsule"])
+def test_a_round_obstacle_presses_a_held_ball(shape, friction):
+    """Contact and attachment together: their forces sum to nothing, and the obstacle stays outside."""
+    radius, way = 0.4 * RADIUS, 0.12 * RADIUS
+    path = Trajectory((0.0, PRESSED), ((0.0, 0.0, 0.0), (0.0, 0.0, -way)))
+    centre = (0.0, 0.0, RADIUS + radius)
+    if shape == "sphere":
+        obstacle = Sphere(centre, radius, path, friction)
+    else:
+        obstacle = Capsule((-RADIUS, 0.0, centre[2]), (RADIUS, 0.0, centre[2]), radius, path, friction)
+    held = Attachment(np.flatnonzero(ball().rest[:, 2] < -0.7 * RADIUS))
+    clock = clock_of(ball(), 0.5, HELD, 40, held.nodes)
+    history = simulate(Setup(ball(), ImplicitVolume(), clock, (obstacle,), (held,), damping=40.0))
+    assert history.outcome == "finished"
+    push, hold = history.contact_force[-1, 0], history.held_force[-1, 0]
+    assert push[2] < -0.05 and np.abs(push + hold).max() < 2e-3 * abs(push[2])
+    assert obstacle.gap(places(ball(), history.final), HELD).min() > -INSIDE * RADIUS
+    assert np.abs(history.volume / ball().rest_volumes - 1.0).max() < 1e-5
+
+
+def test_facets_and_nodes_meet_in_the_same_force():
+    """Two ways to touch, one body: the nodes' force is coarser."""
+    by_nodes = quadratic_body(*ball_mesh(), SOFT, contact="nodes")
+    path = Trajectory((0.0, PRESSED), ((0.0, 0.0, 0.0), (0.0, 0.0, DEPTH)))
+    clock = clock_of(by_nodes, 0.5, HELD, 60)
+    history = simulate(Setup(by_nodes, ImplicitVolume(), clock, planes_at(path), damping=40.0))
+    force = squeezed(0.5)[1].contact_force[-1, 1, 2]
+    assert history.contact_force[-1, 1, 2] == pytest.approx(force, rel=0.15)
+    assert not len(by_nodes.contact_facets)
+
+
+@pytest.mark.parametrize("contact", ["facets", "nodes"])
+def test_a_block_between_smooth_planes_is_compressed_uniformly(contact):
+    """mu A (1/s² − s) at rest, s = 0.85: a deformation that the elements represent exactly."""
+    body = quadratic_body(*quadratic_block((2, 2, 1), 0.5 * EDGE, 0.0), SOFT, contact=contact)
+    height, shorter = 0.5 * EDGE, 0.85
+    down = Trajectory((0.0, PRESSED), ((0.0, 0.0, 0.0), (0.0, 0.0, (shorter - 1.0) * height)))
+    planes = Plane((0, 0, height), (0, 0, -1), down), Plane((0, 0, 0), (0, 0, 1))
+    clock = clock_of(body, 0.5, 2.0 * HELD, 40)
+    history = simulate(Setup(body, ImplicitVolume(), clock, planes, damping=40.0))
+    expected = SOFT.shear_modulus * EDGE**2 * (shorter**-2 - shorter)
+    assert history.contact_force[-1, 1, 2] == pytest.approx(expected, rel=5e-3)
+    wide = np.ptp(history.final[:, 0]) / EDGE
+    assert wide == pytest.approx(shorter**-0.5, rel=2e-3)
+
+
+def test_a_plane_that_leaves_lets_go():
+    """No force is left behind: neither pressure nor friction pulls."""
+    times = (0.0, 0.1, 0.15, 0.3)
+    path = Trajectory(times, tuple((0.0, 0.0, z) for z in (0.0, DEPTH, -0.5 * DEPTH, -0.5 * DEPTH)))
+    clock = clock_of(ball(), 0.5, times[-1], 30)
+    history = simulate(Setup(ball(), ImplicitVolume(), clock, planes_at(path, 0.4), damping=40.0))
+    assert (history.contact_force[:, 1, 2] >= 0.0).all() and (history.contact_force[:, 0, 2] <= 0.0).all()
+    assert history.contact_force[5, 1, 2] > 0.1 and not history.contact_force[-5:].any()
+
+
+def step_matrix(omega2: float, kappa: float, phi: float, c: float) -> np.ndarray:
+    """Of (x, dt v, λ dt²/m) for a mode that touches, as `press` and the end of a step do it (dt = 1)."""
+    found = np.zeros((3, 3))
+    for column, (x, v, lam) in enumerate(np.eye(3)):
+        known = (1.0 - c) * v - omega2 * x + lam
+        gap = x + known
+        v_end = known - kappa * gap
+        found[:, column] = x + v_end, v_end, lam - phi * kappa * gap
+    return found
+
+
+def test_a_mode_that_touches_is_stable_exactly_where_the_theory_says():
+    """Eigenvalues of one step against eq. 9.6, at random stiffness, damping and following."""
+    random, seen = np.random.default_rng(9), {True: 0, False: 0}
+    for omega2, kappa, phi, c in random.uniform((0.0, 0.01, 0.0, 0.0), (6.0, 0.9, 1.0, 0.5), (4000, 4)):
+        first = (1 - kappa) * (3 - omega2 - 2 * c) + 1 - 0.5 * phi * kappa
+        second = (kappa + c - kappa * c) * (kappa + (1 - kappa) * omega2) - phi * kappa * (1 - kappa) * (1 - c)
+        radius = np.abs(np.linalg.eigvals(step_matrix(omega2, kappa, phi, c))).max()
+        if min(abs(first), abs(second)) > 1e-3 and abs(radius - 1.0) > 1e-6:
+            assert (radius < 1.0) == (first > 0.0 and second > 0.0)
+            seen[bool(radius < 1.0)] += 1
+    assert min(seen.values()) > 200
+
+
+def test_what_follows_is_slow_enough_for_every_stiffness():
+    """φ of eq. 9.5 below the limit of the body, however soft the points are."""
+    for c in (0.0, 1e-3, 0.02, 0.1, 0.4):
+        phi = min(FOLLOWING * c, FASTEST)
+        for kappa in np.linspace(1e-4, SHARE, 40):
+            for omega2 in np.linspace(0.0, 3.9 * (1.0 - 0.5 * c), 40):
+                assert np.abs(np.linalg.eigvals(step_matrix(omega2, kappa, phi, c))).max() < 1.0 + 1e-9
+
+
+def test_points_are_as_stiff_as_masses_allow():
+    rows = facet_rows(ball().contact_facets, ball().rest, 1.0 / ball().mass)
+    assert rows.stiffness.min() > 0.0 and (rows.reach > 0.0).all()
+    lighter = facet_rows(ball().contact_facets, ball().rest, 4.0 / ball().mass)
+    assert np.allclose(lighter.stiffness, 0.25 * rows.stiffness, rtol=1e-2)

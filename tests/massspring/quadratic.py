@@ -1,0 +1,102 @@
+"""Meshes of quadratic tetrahedra made without a mesher: blocks, straight or curved, balls and hollow balls."""
+
+import numpy as np
+
+from massspring import Body, quadratic_body
+from massspring.body.points import PAIRS
+from massspring.body.quadratic import boundary_facets
+from tests.massspring.conftest import SOFT, block, hollow_block, icosphere
+
+RADIUS = 0.05
+BENT = 0.06
+"""Of an edge: how far mid-side nodes of a curved block leave the middle, and the amplitude of its waves."""
+
+
+def second_order(points: np.ndarray, tetrahedra: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) [m] and cells (k, 10) in VTK's order of straight quadratic tetrahedra."""
+    ends = np.sort(tetrahedra[:, PAIRS].reshape(-1, 2), axis=1)
+    edges, middle = np.unique(ends, axis=0, return_inverse=True)
+    return np.vstack([points, points[edges].mean(axis=1)]), np.hstack([tetrahedra, len(points) + middle.reshape(-1, 6)])
+
+
+def quadratic_block(cells=(2, 2, 2), edge: float = 0.02, distortion: float = 0.15) -> tuple[np.ndarray, np.ndarray]:
+    """A straight block with moved nodes."""
+    points, _, tetrahedra = block(cells, edge, distortion)
+    return second_order(points, tetrahedra)
+
+
+def curved_block(cells=(2, 2, 2), edge: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
+    """A block whose sides are bent."""
+    points, nodes = quadratic_block(cells, edge, 0.1)
+    waves = np.sin(2.0 * points[:, [1, 2, 0]] / edge) * np.cos(1.5 * points[:, [2, 0, 1]] / edge)
+    return points + BENT * edge * waves, nodes
+
+
+def ball_mesh(levels: int = 1, shells=(0.55, 1.0), inner: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A ball of `RADIUS` in shells of curved elements; with `inner` > 0 a wall from that share of the radius."""
+    sphere, triangles = icosphere(levels, 1.0)
+    radii, n = [*([inner] if inner else []), *shells], len(sphere)
+    points = np.vstack([np.zeros((0 if inner else 1, 3)), *(radius * sphere for radius in radii)])
+    first, ordered = 0 if inner else 1, np.sort(triangles, axis=1)
+    centre = np.zeros(len(triangles), dtype=int)
+    parts = [] if inner else [np.column_stack([centre, first + ordered])]
+    for shell in range(len(radii) - 1):
+        a, b, c = (first + shell * n + ordered).T
+        p, q, r = (first + (shell + 1) * n + ordered).T
+        parts += [np.column_stack(part) for part in ((a, b, c, r), (a, b, q, r), (a, p, q, r))]
+    tetrahedra = upright(points, np.vstack(parts))
+    points, nodes = second_order(points, tetrahedra)
+    count = int(tetrahedra.max()) + 1
+    reach = np.linalg.norm(points[:count], axis=1)
+    wanted = np.zeros(len(points))
+    for a, (i, j) in enumerate(PAIRS, start=4):
+        wanted[nodes[:, a]] = 0.5 * (reach[nodes[:, i]] + reach[nodes[:, j]])
+    middle = points[count:]
+    points[count:] = middle * (wanted[count:] / np.linalg.norm(middle, axis=1))[:, None]
+    return RADIUS * points, nodes
+
+
+def upright(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    """The same with positive volumes."""
+    a, b, c, d = points[tetrahedra].transpose(1, 0, 2)
+    negative = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0
+    return np.where(negative[:, None], tetrahedra[:, [0, 2, 1, 3]], tetrahedra)
+
+
+def lumen_of(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Facets of the inner sheet of a hollow body, turned so that they enclose it, (f, 6)."""
+    facets = boundary_facets(nodes)
+    centre = points.mean(axis=0)
+    x = points[facets[:, :3]]
+    away = np.einsum("fi,fi->f", np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), x.mean(axis=1) - centre)
+    return facets[away < 0][:, [0, 2, 1, 5, 4, 3]]
+
+
+def hollow_ball(**options) -> Body:
+    """A wall between 0.6 and 1 of the radius, its lumen kept."""
+    points, nodes = ball_mesh(1, (1.0,), inner=0.6)
+    return quadratic_body(points, nodes, SOFT, lumen_of(points, nodes), **options)
+
+
+def straight_hollow() -> tuple[np.ndarray, np.ndarray]:
+    """A hollow block with straight sides."""
+    points, _, tetrahedra, _ = hollow_block()
+    return second_order(points, tetrahedra)
+
+
+MESHES = {"straight": quadratic_block, "curved": curved_block, "ball": ball_mesh}
+
+
+def bodies(**options) -> dict[str, Body]:
+    """One of every mesh, and the hollow ball with its lumen."""
+    solid = {name: quadratic_body(*mesh(), SOFT, **options) for name, mesh in MESHES.items()}
+    return {**solid, "hollow": hollow_ball(**options)}
+
+
+def jiggled(body: Body, share: float = 0.03, seed: int = 5) -> np.ndarray:
+    """Positions [m] away from rest by `share` of the mean spring length, at random, and sheared."""
+    from massspring.body.springs import lengths
+
+    scale = share * lengths(body.rest, body.springs.ends).mean()
+    shear = np.eye(3) + np.array([[0.1, 0.2, 0.0], [-0.1, -0.05, 0.1], [0.05, 0.0, 0.1]])
+    return body.rest @ shear.T + scale * np.random.default_rng(seed).standard_normal(body.rest.shape)

@@ -1,0 +1,131 @@
+"""What the chart of accuracy for computing time says: where points lie, what is best for the time, what is named."""
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+
+from massspring import Free
+from studies.metrics.judged import front
+from studies.metrics.metrics import METRICS
+from studies.plots import work_precision as work
+from studies.plots.style.families import FAMILIES, PAPER, family_of
+from studies.plots.style.style import BLACK, BLUE, GREY, VERMILLION
+from studies.scenes import JUDGED
+from studies.scenes.ball_clamped import BALL_CLAMPED
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scenes.liver_press import LIVER_PRESS
+from studies.store.record import Status
+from tests.plots.made_up import FRAMES, UNCERTAINTY, run
+from tests.plots.reading import words
+
+FRAME_MS = 1e3 * BALL_CLAMPED.duration / FRAMES
+"""Of a run in real time, but for the middle one of five repeats, which is 1.02 times as slow."""
+
+
+def at(cost, error, scene=BALL_CLAMPED, kind="tetrahedral", **options):
+    """A run of so much computing over simulated time."""
+    frame_ms = cost * 1e3 * scene.duration / FRAMES / 1.02
+    return run(scene, kind, error=error, frame_ms=frame_ms, **options)
+
+
+LADDER = (
+    at(0.01, 0.7, kind="surface"),
+    at(0.03, 0.3),
+    at(0.2, 0.05, kind="quadratic", nodes=594),
+    at(0.6, 0.025, kind="quadratic", nodes=794, recipe={"graded": True}),
+    at(0.9, 0.2, recipe={"volumes": "nodal", "law": "cotangent"}),
+)
+
+
+def markers(axes, marker):
+    """(x, y) of the points of one family, whatever their error bars."""
+    found = [line for line in axes.get_lines() if line.get_marker() == marker and line.get_markerfacecolor() != "none"]
+    return [(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in found if len(line.get_xdata()) == 1]
+
+
+def test_points_lie_at_cost_and_error_of_force_and_displacement():
+    force, displacement = work.figure(LADDER).axes
+    (_, _, mean) = (m for m in METRICS if m.name in ("force_end", "surface_error", "mean_error"))
+    assert markers(force, "s") == [(pytest.approx(0.01), pytest.approx(70.0))]
+    assert markers(displacement, "s") == [(pytest.approx(0.01), pytest.approx(mean(LADDER[0])))]
+    assert force.get_xscale() == force.get_yscale() == displacement.get_yscale() == "log"
+    assert force.get_ylabel().startswith("error of the force") and "[s/s]" in displacement.get_xlabel()
+
+
+def test_error_bars_are_the_reference_s_uncertainty_and_the_spread_of_repeats():
+    (axes, _) = work.figure(LADDER[1:2]).axes
+    across, up = (collection.get_segments()[0] for collection in axes.collections[-2:])
+    assert np.ptp(up[:, 1]) == pytest.approx(2 * 100 * UNCERTAINTY["force_end"])
+    assert np.ptp(across[:, 0]) == pytest.approx(0.03 * 0.04 / 1.02)
+
+
+@pytest.mark.parametrize("error", [0.0, 1e-4])
+def test_nothing_is_drawn_below_the_uncertainty(error):
+    (axes, _) = work.figure([at(0.1, error)]).axes
+    assert markers(axes, "o") == [(pytest.approx(0.1), pytest.approx(100 * UNCERTAINTY["force_end"]))]
+
+
+def test_the_front_joins_what_nothing_beats():
+    assert front([(1, 5), (2, 3), (3, 4), (0.5, 9), (4, 3)]) == [(0.5, 9), (1, 5), (2, 3)]
+    (axes, _) = work.figure(LADDER).axes
+    (line,) = [each for each in axes.get_lines() if to_hex(each.get_color()) == GREY.lower()]
+    assert list(line.get_xdata()) == pytest.approx([0.01, 0.03, 0.2, 0.6])
+
+
+def test_real_time_half_of_it_and_the_goal_are_drawn():
+    force, displacement = work.figure(LADDER).axes
+    upright = [
+        float(line.get_xdata()[0])
+        for line in force.get_lines()
+        if len(line.get_xdata()) == 2 and line.get_xdata()[0] == line.get_xdata()[1]
+    ]
+    assert upright == [1.0, 0.5]
+    for axes, bound in ((force, 3.0), (displacement, 1.0)):
+        corner = axes.collections[0].get_paths()[0].get_extents()
+        assert (corner.x1, corner.y1) == pytest.approx((1.0, bound))
+
+
+def test_the_paper_s_body_and_what_is_recommended_are_named():
+    accurate = at(0.7, 0.005, kind="quadratic", nodes=1194, recipe={"graded": True})
+    figure = work.figure([*LADDER, accurate])
+    assert all(PAPER in words(axes) and "recommended" in words(axes) for axes in figure.axes)
+    rings = [line for line in figure.axes[0].get_lines() if line.get_markerfacecolor() == "none"]
+    assert [float(line.get_xdata()[0]) for line in rings] == [pytest.approx(0.7)]
+    assert "ball clamped: graded quadratic, 1,194 surface nodes" in words(figure).replace("\n", " ")
+
+
+def test_where_nothing_is_accurate_enough_nothing_is_recommended():
+    figure = work.figure(LADDER[:3])
+    assert "recommended" not in words(figure.axes[0])
+    assert "Nothing here is accurate enough for ball clamped." in words(figure).replace("\n", " ")
+
+
+def test_a_run_that_ended_with_a_fault_is_no_point():
+    faulty = at(0.1, 0.1, status=Status.INVERTED)
+    figure = work.figure([LADDER[0], faulty, run(BALL_CLAMPED, nodes=99)])
+    assert markers(figure.axes[0], "o") == []
+    told = words(figure).replace("\n", " ")
+    assert f"ended with a fault: {faulty.case.name} inverted." in told
+    assert "Not drawn: 1 without frame times" in told
+
+
+def test_what_a_scene_does_not_compare_is_said():
+    force, displacement = work.figure([at(0.1, 0.1, scene=BALL_SQUEEZE)]).axes
+    assert "compares no displacement" in words(displacement) and "compares" not in words(force)
+
+
+def test_every_scene_has_two_panels_below_one_another():
+    scenes = [scene for scene in JUDGED if scene.name != "ball_ringing"][:4]
+    figure = work.figure([at(0.1, 0.1, scene=scene) for scene in scenes])
+    shown = [axes for axes in figure.axes if axes.axison]
+    assert len(shown) == 2 * len(scenes)
+    assert [axes.get_title() != "" for axes in shown] == [True] * 3 + [False] * 3 + [True, False]
+
+
+def test_families_are_told_apart_without_colour():
+    looks = list(FAMILIES.values())
+    assert len({look.marker for look in looks}) == len({look.colour for look in looks}) == len(looks)
+    assert family_of(LADDER[0].case).colour == BLACK and family_of(LADDER[1].case).colour == VERMILLION
+    assert family_of(LADDER[3].case).colour == BLUE
+    other = family_of(run(LIVER_PRESS, method=Free()).case)
+    assert other.colour == GREY and other.name == "tetrahedral, free"

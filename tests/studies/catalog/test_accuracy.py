@@ -1,0 +1,70 @@
+"""The campaign holds what it promises: every scene that can be judged, a ladder of bodies, no case that is refused."""
+
+from dataclasses import replace
+
+import pytest
+
+from studies.catalog import STUDIES
+from studies.catalog.accuracy import ACCURACY, headline, judged_at_rest
+from studies.catalog.work_precision import WORK_PRECISION
+from studies.metrics.metrics import METRICS
+from studies.runs.quadratic import check_masses
+from studies.scene.inertia import why_inertia_matters
+from studies.scene.quantities import allowed
+from studies.scenes import JUDGED
+from studies.store.paths import readable
+
+
+def of(scene):
+    return [case for case in ACCURACY.cases if case.scene == scene]
+
+
+def test_it_has_every_scene_of_which_force_or_displacement_is_compared():
+    compared = [s for s in JUDGED if allowed(s, "force_end") or allowed(s, "surface_mean")]
+    assert list(ACCURACY.scenes) == compared == list(judged_at_rest())
+    assert ACCURACY in STUDIES and not ACCURACY.main
+    assert all(case.timed for case in ACCURACY.cases)
+
+
+def test_a_case_is_found_by_its_name():
+    names = [readable(case.name) for case in ACCURACY.cases]
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)
+def test_every_rung_has_two_sizes_and_nothing_that_the_scene_refuses(scene):
+    rungs = {}
+    for case in of(scene):
+        check_masses(scene, case.body)
+        assert scene.skip(case.method.name) is None
+        body = case.body
+        rungs.setdefault((body.kind, body.graded, body.volumes, body.law), set()).add(body.nodes)
+    assert len(rungs) == 6
+    assert all(len(sizes) >= 2 for sizes in rungs.values())
+
+
+@pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)
+def test_the_headline_has_half_its_step_and_a_finer_body(scene):
+    best = headline(scene)
+    steps = {case.dt_fraction for case in of(scene) if case.body == best}
+    assert steps == {0.8, 0.4}
+    even = {case.dt_fraction for case in of(scene) if case.body == replace(best, graded=False)}
+    assert even == {0.8, 0.5}
+    assert any(c.body.graded and c.body.nodes > best.nodes and c.body.mass == best.mass for c in of(scene))
+
+
+@pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)
+def test_masses_and_contact_vary_where_the_scene_allows_it(scene):
+    quadratic = [case.body for case in of(scene) if case.body.kind == "quadratic"]
+    masses = {"lumped"} if why_inertia_matters(scene) else {"lumped", "stiffness"}
+    assert {body.mass for body in quadratic} == masses
+    assert {body.contact for body in quadratic} == ({"facets", "nodes"} if scene.obstacles else {"facets"})
+
+
+def test_the_small_cut_holds_cases_of_the_campaign():
+    assert {case.key for case in WORK_PRECISION.cases} <= {case.key for case in ACCURACY.cases}
+    assert {case.body.kind for case in WORK_PRECISION.cases} == {"surface", "tetrahedral", "quadratic"}
+
+
+def test_columns_are_what_advice_is_read_off():
+    assert {"force_end", "mean_error", "real_time"} <= set(ACCURACY.columns) <= {metric.name for metric in METRICS}

@@ -1,0 +1,114 @@
+"""`organbench advise` says what was measured, how well that is known, what it costs and how to run it again."""
+
+import pytest
+
+from studies.catalog.accuracy import ACCURACY
+from studies.runs.case import BodyRecipe, Case
+from studies.scenes import KIDNEY_PROBE, LIVER_PRESS, LIVER_PROBE
+from tests.studies.advice.made_up_campaign import GRADED, LADDER, publish, row, rows_of
+
+STUDY = """
+from dataclasses import replace
+from massspring import ImplicitVolume
+from studies import LIVER_PROBE, BALL_CLAMPED, BodyRecipe, Case, Study
+
+MINE = replace(LIVER_PROBE, name="mine", duration=9.0, reference=None)
+STUDY = Study("mine", "Does it run?", tuple(Case(s, BodyRecipe(), ImplicitVolume()) for s in {scenes}), (), ())
+"""
+
+
+@pytest.fixture
+def told(organbench, tmp_path):
+    """Asks about a scene of a published campaign: the answer as one text."""
+    publish(tmp_path, [*rows_of(LIVER_PRESS), *rows_of(LIVER_PROBE), *rows_of(KIDNEY_PROBE)])
+
+    def ask(*words) -> str:
+        code, out, err = organbench("advise", *words, "--results", tmp_path)
+        assert (code, err) == (0, "")
+        return out
+
+    return ask
+
+
+def test_an_answer_holds_recipe_errors_cost_source_and_commands(told, tmp_path):
+    out = told("liver_press")
+    assert "liver_press: force within 3 %, displacement within 1 % (the usual wish" in out
+    assert "graded quadratic, masses by stiffness, 794 surface nodes, dt = 0.8 dt_c, 2 ms" in out
+    assert "−1.2 ± 0.5 %" in out and "0.8 ± 0.1 %" in out
+    assert "0.5 ms per 1 ms of simulated time, 2 times real time, on this machine" in out
+    assert str(tmp_path / "published" / "accuracy" / "accuracy.csv") in out.replace("\n", "")
+    (name,) = (line.split("--case ")[1] for line in out.splitlines() if "--case" in line)
+    assert Case(LIVER_PRESS, GRADED, dt_fraction=0.8, timed=True) in [c for c in ACCURACY.cases if c.name == name]
+    (python,) = (line.split("in Python")[1] for line in out.splitlines() if "in Python" in line)
+    made = eval(python, {"Case": Case, "BodyRecipe": BodyRecipe, "LIVER_PRESS": LIVER_PRESS})
+    assert made == Case(LIVER_PRESS, GRADED, dt_fraction=0.8)
+
+
+def test_a_miss_says_by_how_much(told):
+    out = told("liver_press", "--budget", "250us")
+    assert "at most 0.25 ms of computing per 1 ms of simulated time" in out
+    assert "nothing here does; the nearest is (displacement 1.4 times too large):" in out
+
+
+def test_a_wish_finer_than_the_reference_cannot_be_told(told):
+    assert "cannot be told: the reference is known to ±0.5 % of the force" in told("liver_press", "--force", "0.4%")
+
+
+def test_a_wish_within_the_uncertainty_is_said(told):
+    assert "reaches beyond the wish (displacement)" in told("liver_press", "--displacement", "0.85 %")
+    assert "reaches beyond" not in told("liver_press")
+
+
+def test_a_scene_of_the_user_gets_the_worst_of_its_kind(told, tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text(STUDY.format(scenes="[MINE]"))
+    out = told(file, "--no-timing")
+    assert "it was never run: errors are the worst of liver_probe, kidney_probe, scenes of the same kind" in out
+    assert "on another machine" in out and "in Python     Case(scene, BodyRecipe(kind='quadratic'" in out
+
+
+def test_times_of_another_machine_are_called_so(organbench, tmp_path):
+    publish(tmp_path, rows_of(LIVER_PRESS), machine="0badcafe")
+    _, out, _ = organbench("advise", "liver_press", "--no-timing", "--results", tmp_path)
+    assert "2 times real time, on another machine" in out
+
+
+def test_a_budget_without_a_time_is_not_met(organbench, tmp_path):
+    rows = [row(LIVER_PRESS, b, n) | {"real_time [s/s]": float("nan")} for b, n in LADDER.items()]
+    publish(tmp_path, rows)
+    _, out, _ = organbench("advise", "liver_press", "--budget", "1ms", "--no-timing", "--results", tmp_path)
+    assert "its computing time is not known here" in out and "leave --no-timing out" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("liver_pres",), "unknown scene 'liver_pres'; did you mean 'liver_press'"),
+        (("liver_press", "--force", "much"), "force 'much' is no error"),
+        (("liver_press", "--displacement", "-1%"), "displacement '-1%' is no error"),
+        (("liver_press", "--budget", "1"), "budget '1' is no time"),
+        (("liver_press",), "nothing is stored of the study 'accuracy'"),
+        (("ball_ringing",), "nothing is known for scene 'ball_ringing'"),
+        (("nothing.py",), "there is no study file nothing.py"),
+    ],
+)
+def test_bad_input_is_one_sentence(refused, tmp_path, words, said):
+    assert said in refused("advise", *words, "--results", tmp_path)
+
+
+def test_a_file_of_two_scenes_is_one_sentence(refused, tmp_path):
+    file = tmp_path / "two.py"
+    file.write_text(STUDY.format(scenes="[MINE, BALL_CLAMPED]"))
+    assert "has 2 scenes; advice is given for one" in refused("advise", file, "--results", tmp_path)
+
+
+def test_a_case_that_there_is_not_is_answered_with_the_nearest(refused, tmp_path):
+    name = ACCURACY.cases[0].name
+    said = refused("run", "accuracy", "--case", f"{name}x", "--results", tmp_path)
+    assert f"unknown case of accuracy '{name}x'; did you mean '{name}'" in said
+
+
+def test_one_case_of_a_study_can_be_asked_for(organbench, tmp_path):
+    case = next(c for c in ACCURACY.cases if c.scene == LIVER_PRESS)
+    code, out, _ = organbench("run", "accuracy", "--case", case.name, "--dry-run", "--results", tmp_path)
+    assert code == 0 and "1 case (missing)" in out and "1 timing (missing)" in out

@@ -1,0 +1,43 @@
+"""A case is made again from its scene and the text that a table has of it."""
+
+import pytest
+
+from massspring import Free, Xpbd
+from studies.base.errors import StudyError
+from studies.catalog import STUDIES
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.recipe_text import case_of_recipe, recipe_text
+from studies.scenes.liver_press import LIVER_PRESS
+
+
+@pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
+def test_every_case_of_the_catalogue_comes_back(study):
+    for case in study.cases:
+        assert case_of_recipe(case.scene, recipe_text(case)) == case.replaced(timed=False)
+
+
+def test_only_what_was_chosen_is_named():
+    assert recipe_text(Case(LIVER_PRESS)) == "{}"
+    case = Case(LIVER_PRESS, BodyRecipe("quadratic", 794), dt_fraction=0.8)
+    assert recipe_text(case) == '{"body": {"kind": "quadratic", "nodes": 794}, "dt_fraction": 0.8}'
+
+
+@pytest.mark.parametrize("method", [Free(), Xpbd("whole", iterations=2)])
+def test_a_method_comes_back_with_its_settings(method):
+    case = Case(LIVER_PRESS, method=method, dt=1e-3, frames=7, precision="float32" if method == Free() else "float64")
+    assert case_of_recipe(LIVER_PRESS, recipe_text(case)) == case
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "is no recipe of a case"),
+        ("[1]", "must be a JSON object"),
+        ('{"body": {"nodes": 300, "shape": "cube"}}', "the text is no stored case"),
+        ('{"steps": 3}', "nothing reads steps"),
+        ('{"body": {"kind": "cubic"}}', "the text is no stored case"),
+    ],
+)
+def test_what_is_no_recipe_is_one_sentence(text, said):
+    with pytest.raises(StudyError, match=said):
+        case_of_recipe(LIVER_PRESS, text)
