@@ -1,8 +1,9 @@
-"""Contact at points inside quadratic facets, by a pressure that grows until nothing is inside (theory, eq. 9.3–9.9).
+"""Contact at points inside quadratic facets, by impulses that leave nothing inside at the end of the step.
 
 At a corner of a quadratic facet a uniform pressure leaves no force, so that nodes alone meet an obstacle unevenly. Here
-the force acts where the facet is: f = max(0, λ − k g) with the gap g [m] that the step would end with, and λ follows f
-(an augmented Lagrangian with one iteration a step, Simo and Laursen 1992). Friction acts the same way along the facet.
+the force acts where the facet is: 0 ≤ f ⟂ g ≥ 0 with the gap g that the step would end with, solved for point after
+point from the forces of the last step (projected Gauss–Seidel; Moreau 1988, Jourdan, Alart, Jean 1998; theory, eq.
+9.3–9.6). Friction acts the same way along the facet.
 """
 
 import math
@@ -13,11 +14,10 @@ import numpy as np
 from massspring.kernels.contact.gaps import gap_and_normal
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
-SHARE = 1.0 / 3.0
-"""k dt²/m: with the body's own stiffness a step stays stable up to 0.86 of the limit without contact, ω²dt² + 3 k dt²/m
-< 4, for the gap is that at the end of the step."""
-FOLLOWING, FASTEST = 0.7, 0.05
-"""λ makes up for φ = min(FOLLOWING c dt, FASTEST) of its difference from f in a step, c the damping [1/s] (eq. 9.5)."""
+SWEEPS = 12
+"""Over all points, at most."""
+SETTLED = 1e-3
+"""Change of the forces in a sweep, over the largest of them, at which they stand."""
 
 
 class FacetRows(NamedTuple):
@@ -27,24 +27,22 @@ class FacetRows(NamedTuple):
     """Corners, then mid-sides, (f, 6) uint32."""
     shape: np.ndarray
     """Shape functions at the points, (p, 6)."""
-    stiffness: np.ndarray
-    """k dt² [kg], (f, p)."""
+    mass: np.ndarray
+    """What resists a push at a point, 1/Σ_a w_a N_a² [kg], (f, p)."""
     reach: np.ndarray
     """How far a facet is from its middle at most [m], (f,)."""
-    touched: np.ndarray
+    near: np.ndarray
+    """Scratch: facets that may touch an obstacle in this step, (f,) uint32."""
+    contact_id: np.ndarray
     """1 + the obstacle that a point touches, 0 for none, (f, p) int64."""
     pressing: np.ndarray
-    """λ [N], (f, p)."""
+    """f [N], (f, p)."""
+    normal: np.ndarray
+    """Of the obstacle, towards the body, (f, p, 3)."""
     dragging: np.ndarray
-    """The same along the obstacle [N], (f, p, 3)."""
+    """The force along the obstacle [N], (f, p, 3)."""
     anchor: np.ndarray
     """Where friction holds a point, seen from the obstacle [m], (f, p, 3)."""
-
-
-@njit_inlined
-def following(boundary):
-    """How much of the difference between f and λ a step makes up for."""
-    return min(FOLLOWING * boundary.damping * boundary.dt, FASTEST)
 
 
 @njit_inlined
@@ -92,61 +90,79 @@ def forget(facets, f, q):
 
 
 @njit_inlined
-def rub(facets, f, q, stiffness, most, place, normal):
-    """The force along the obstacle [N]: Coulomb's, at most `most`, towards where friction holds the point.
+def rub(facets, f, q, k, most, place):
+    """Moves the force along the obstacle [N] towards where friction holds the point: Coulomb's, at most `most`.
 
-    `stiffness`: k [N/m] and how much λ follows; `place` (3) [m]: where the point would end the step, seen from the
+    `k` [N/m] takes back a whole way within the step; `place` (3) [m]: where the point would end the step, seen from the
     obstacle. A point that slides is held there from then on.
     """
-    drag, anchor = facets.dragging, facets.anchor
-    k, follow = stiffness
+    drag, anchor, normal = facets.dragging, facets.anchor, facets.normal
     t0 = drag[f, q, 0] - k * (place[0] - anchor[f, q, 0])
     t1 = drag[f, q, 1] - k * (place[1] - anchor[f, q, 1])
     t2 = drag[f, q, 2] - k * (place[2] - anchor[f, q, 2])
-    inward = t0 * normal[0] + t1 * normal[1] + t2 * normal[2]
-    t0, t1, t2 = t0 - inward * normal[0], t1 - inward * normal[1], t2 - inward * normal[2]
+    inward = t0 * normal[f, q, 0] + t1 * normal[f, q, 1] + t2 * normal[f, q, 2]
+    t0, t1, t2 = t0 - inward * normal[f, q, 0], t1 - inward * normal[f, q, 1], t2 - inward * normal[f, q, 2]
     size = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
     if size > most:
         part = most / size
         t0, t1, t2 = part * t0, part * t1, part * t2
-        drag[f, q, 0], drag[f, q, 1], drag[f, q, 2] = t0, t1, t2
         anchor[f, q, 0], anchor[f, q, 1], anchor[f, q, 2] = place
-        return t0, t1, t2
-    drag[f, q, 0] += follow * (t0 - drag[f, q, 0])
-    drag[f, q, 1] += follow * (t1 - drag[f, q, 1])
-    drag[f, q, 2] += follow * (t2 - drag[f, q, 2])
-    return t0, t1, t2
+    drag[f, q, 0], drag[f, q, 1], drag[f, q, 2] = t0, t1, t2
+
+
+@njit_inlined
+def force_at(facets, f, q):
+    """The force on point q of facet f [N]; 0 where nothing is touched."""
+    pressing, normal, drag = facets.pressing[f, q], facets.normal, facets.dragging
+    return (
+        pressing * normal[f, q, 0] + drag[f, q, 0],
+        pressing * normal[f, q, 1] + drag[f, q, 1],
+        pressing * normal[f, q, 2] + drag[f, q, 2],
+    )
+
+
+@njit_inlined
+def touch(facets, boundary, step, y, o, place):
+    """Point `place` (f, q) at y [m] touches obstacle o from now on, along the normal where it is now.
+
+    Along that of the prediction a round obstacle would do work on what slides over it.
+    """
+    f, q = place
+    centre, v, dt = boundary.position[step, o], boundary.velocity[step, o], boundary.dt
+    _, n0, n1, n2 = gap_and_normal(boundary, o, y[0] - centre[0], y[1] - centre[1], y[2] - centre[2])
+    facets.normal[f, q, 0], facets.normal[f, q, 1], facets.normal[f, q, 2] = n0, n1, n2
+    if facets.contact_id[f, q] != o + 1:
+        forget(facets, f, q)
+        facets.contact_id[f, q] = o + 1
+        for axis in range(3):
+            facets.anchor[f, q, axis] = y[axis] - (centre[axis] - dt * v[axis])
 
 
 @njit_inlined
 def press(facets, boundary, step, state, f, q):
-    """The force of the deepest obstacle on point q of facet f [N] and which obstacle; `state`: its position and speed.
-
-    The speed is what the step would end with under the force that the point has, λ and what friction holds.
-    """
+    """Corrects the force on point q of facet f so that it ends the step outside; `state`: its position and speed."""
     y, u = state
     dt = boundary.dt
-    o, gap, normal = deepest(facets, boundary, step, (y[0] + dt * u[0], y[1] + dt * u[1], y[2] + dt * u[2]))
-    place, v = boundary.position[step, o], boundary.velocity[step, o]
+    end = y[0] + dt * u[0], y[1] + dt * u[1], y[2] + dt * u[2]
+    o, gap, _ = deepest(facets, boundary, step, end)
+    if facets.contact_id[f, q] == 0 and not gap < 0.0:
+        return
     if facets.contact_id[f, q] != o + 1:
-        forget(facets, f, q)
-        if gap < 0.0:
-            facets.contact_id[f, q] = o + 1
-            for axis in range(3):
-                facets.anchor[f, q, axis] = y[axis] - (place[axis] - dt * v[axis])
-    k = facets.stiffness[f, q] / (dt * dt)
-    force = max(0.0, facets.pressing[f, q] - k * gap)
-    facets.pressing[f, q] += following(boundary) * (force - facets.pressing[f, q])
+        if not gap < 0.0:
+            forget(facets, f, q)
+            return
+        touch(facets, boundary, step, y, o, (f, q))
+    k = facets.mass[f, q] / (dt * dt)
+    force = facets.pressing[f, q] - k * gap
     if not force > 0.0:
-        forget(facets, f, q)
-        return o, 0.0, 0.0, 0.0
-    p0, p1, p2 = force * normal[0], force * normal[1], force * normal[2]
+        facets.pressing[f, q] = 0.0
+        for axis in range(3):
+            facets.dragging[f, q, axis] = 0.0
+        return
+    facets.pressing[f, q] = force
     if boundary.friction[o] > 0.0:
-        end = y[0] + dt * u[0] - place[0], y[1] + dt * u[1] - place[1], y[2] + dt * u[2] - place[2]
-        stiffness = k, following(boundary)
-        t0, t1, t2 = rub(facets, f, q, stiffness, boundary.friction[o] * force, end, normal)
-        p0, p1, p2 = p0 + t0, p1 + t1, p2 + t2
-    return o, p0, p1, p2
+        centre = boundary.position[step, o]
+        rub(facets, f, q, k, boundary.friction[o] * force, (end[0] - centre[0], end[1] - centre[1], end[2] - centre[2]))
 
 
 @njit_inlined
@@ -158,26 +174,53 @@ def add_at_point(facets, field, force, f, q):
             field[i, axis] += share * force[axis]
 
 
-@njit_inlined
-def known_force(facets, boundary, step, y, f, q):
-    """The force that point q of facet f had [N], λ along the normal of today and what friction holds; 0 for none."""
-    if facets.contact_id[f, q] == 0:
-        return 0.0, 0.0, 0.0
-    o, pressing, drag = facets.contact_id[f, q] - 1, facets.pressing[f, q], facets.dragging
-    place = boundary.position[step, o]
-    _, n0, n1, n2 = gap_and_normal(boundary, o, y[0] - place[0], y[1] - place[1], y[2] - place[2])
-    return pressing * n0 + drag[f, q, 0], pressing * n1 + drag[f, q, 1], pressing * n2 + drag[f, q, 2]
-
-
 @njit_lean
 def known_forces_into(nodes, facets, boundary, step, field):
-    """What all points had in the last step [N], into `field` (n, 3)."""
+    """What all points had in the last step [N], along the normals of now, into `field` (n, 3)."""
     field[:] = 0.0
     for f in range(facets.node.shape[0]):
         for q in range(facets.shape.shape[0]):
             if facets.contact_id[f, q] > 0:
                 y = at_point(nodes.x, facets.node, facets.shape[q], f)
-                add_at_point(facets, field, known_force(facets, boundary, step, y, f, q), f, q)
+                touch(facets, boundary, step, y, facets.contact_id[f, q] - 1, (f, q))
+                add_at_point(facets, field, force_at(facets, f, q), f, q)
+
+
+@njit_inlined
+def list_near(facets, nodes, boundary, step):
+    """How many facets touch an obstacle or may come to do so in this step, listed in `near`."""
+    count = 0
+    for f in range(facets.node.shape[0]):
+        wanted = not is_far(facets, nodes, boundary, step, f)
+        for q in range(facets.shape.shape[0]):
+            wanted |= facets.contact_id[f, q] > 0
+        if wanted:
+            facets.near[count] = f
+            count += 1
+    return count
+
+
+@njit_inlined
+def sweep_over(nodes, facets, boundary, step, speed, field, inverse_mass, count):
+    """`press` for all points of the first `count` facets in `near`; the largest change of a force, and the largest."""
+    node, dt, changed, largest = facets.node, boundary.dt, 0.0, 0.0
+    for k in range(count):
+        f = facets.near[k]
+        for q in range(facets.shape.shape[0]):
+            weights = facets.shape[q]
+            y, u = at_point(nodes.x, node, weights, f), at_point(speed, node, weights, f)
+            k0, k1, k2 = force_at(facets, f, q)
+            press(facets, boundary, step, (y, u), f, q)
+            f0, f1, f2 = force_at(facets, f, q)
+            change = f0 - k0, f1 - k1, f2 - k2
+            changed = max(changed, abs(change[0]) + abs(change[1]) + abs(change[2]))
+            largest = max(largest, abs(f0) + abs(f1) + abs(f2))
+            add_at_point(facets, field, change, f, q)
+            for a in range(6):
+                i = node[f, a]
+                for axis in range(3):
+                    speed[i, axis] += dt * inverse_mass[i] * weights[a] * change[axis]
+    return changed, largest
 
 
 @njit_lean
@@ -186,23 +229,22 @@ def corrections_into(nodes, facets, boundary, step, speed, field, inverse_mass, 
 
     `speed` (n, 4): of nodes under the forces that were known [m/s]; a correction moves it for the points that follow.
     """
-    node, dt = facets.node, boundary.dt
     field[:] = 0.0
-    for f in range(node.shape[0]):
-        far = is_far(facets, nodes, boundary, step, f)
+    count = list_near(facets, nodes, boundary, step)
+    for _ in range(SWEEPS):
+        changed, largest = sweep_over(nodes, facets, boundary, step, speed, field, inverse_mass, count)
+        if not changed > SETTLED * largest:
+            break
+    dt = boundary.dt
+    for k in range(count):
+        f = facets.near[k]
         for q in range(facets.shape.shape[0]):
-            if far and facets.contact_id[f, q] == 0:
+            if facets.contact_id[f, q] == 0:
                 continue
-            weights = facets.shape[q]
-            y, u = at_point(nodes.x, node, weights, f), at_point(speed, node, weights, f)
-            k0, k1, k2 = known_force(facets, boundary, step, y, f, q)
-            o, f0, f1, f2 = press(facets, boundary, step, (y, u), f, q)
+            o = facets.contact_id[f, q] - 1
+            f0, f1, f2 = force_at(facets, f, q)
             contact_impulse[o, 0] += dt * f0
             contact_impulse[o, 1] += dt * f1
             contact_impulse[o, 2] += dt * f2
-            change = f0 - k0, f1 - k1, f2 - k2
-            add_at_point(facets, field, change, f, q)
-            for a in range(6):
-                i = node[f, a]
-                for axis in range(3):
-                    speed[i, axis] += dt * inverse_mass[i] * weights[a] * change[axis]
+            if f0 == 0.0 and f1 == 0.0 and f2 == 0.0:
+                forget(facets, f, q)
