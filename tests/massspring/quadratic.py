@@ -1,9 +1,11 @@
 """Meshes of quadratic tetrahedra made without a mesher: blocks, straight or curved, balls and hollow balls."""
 
+from itertools import product
+
 import numpy as np
 
 from massspring import Body, quadratic_body
-from massspring.body.points import PAIRS
+from massspring.body.points import PAIRS, PointVolumes
 from massspring.body.quadratic import boundary_facets
 from tests.massspring.conftest import SOFT, block, hollow_block, icosphere
 
@@ -100,3 +102,44 @@ def jiggled(body: Body, share: float = 0.03, seed: int = 5) -> np.ndarray:
     scale = share * lengths(body.rest, body.springs.ends).mean()
     shear = np.eye(3) + np.array([[0.1, 0.2, 0.0], [-0.1, -0.05, 0.1], [0.05, 0.0, 0.1]])
     return body.rest @ shear.T + scale * np.random.default_rng(seed).standard_normal(body.rest.shape)
+
+
+def volumes_of(body: Body) -> PointVolumes:
+    assert isinstance(body.kept, PointVolumes)
+    return body.kept
+
+
+def local_force(body: Body, x: np.ndarray) -> np.ndarray:
+    """Of the pressure −b (J_q − 1) at the points [N], (3n,)."""
+    volumes = volumes_of(body)
+    pressure = -body.local_bulk * (volumes.jacobians(x) - 1.0)
+    each = np.einsum("kq,kqai->kai", pressure, volumes.areas(x))
+    force = np.zeros_like(x)
+    np.add.at(force, volumes.cells, each)
+    return force.ravel()
+
+
+def shape_functions(b: np.ndarray) -> np.ndarray:
+    """At barycentric places (p, 4), (p, 10), from their values at the nodes alone: a fit of all quadratics."""
+    nodes = np.vstack([np.eye(4), 0.5 * (np.eye(4)[PAIRS[:, 0]] + np.eye(4)[PAIRS[:, 1]])])
+    return terms(b) @ np.linalg.inv(terms(nodes))
+
+
+def terms(b: np.ndarray) -> np.ndarray:
+    x, y, z = b[:, 1:].T
+    return np.column_stack([np.ones(len(b)), x, y, z, x * x, y * y, z * z, x * y, y * z, z * x])
+
+
+def exact_volume(points: np.ndarray, cells: np.ndarray) -> float:
+    """Of curved elements: det dx/db is a cubic, met exactly by Gauss' three points in each collapsed direction."""
+    at, weight = np.polynomial.legendre.leggauss(3)
+    at, weight, step, total = 0.5 * (at + 1.0), 0.5 * weight, 1e-4, 0.0
+    for (r, wr), (s, ws), (t, wt) in product(zip(at, weight, strict=True), repeat=3):
+        place = np.array([r, s * (1 - r), t * (1 - r) * (1 - s)])
+        sides = []
+        for axis in np.eye(3):
+            ends = np.array([place - step * axis, place + step * axis])
+            b = np.column_stack([1.0 - ends.sum(axis=1), ends])
+            sides.append(np.tensordot(np.diff(shape_functions(b), axis=0)[0] / (2 * step), points[cells], (0, 1)))
+        total += wr * ws * wt * (1 - r) ** 2 * (1 - s) * float(np.linalg.det(np.stack(sides, axis=1)).sum())
+    return total

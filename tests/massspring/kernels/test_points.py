@@ -11,9 +11,8 @@ from massspring.kernels.points.facets import SHARE
 from massspring.kernels.points.solve import apply_schur, precondition_into, pushed_velocity_into, solve_iteratively
 from massspring.layout.facet_rows import facet_rows, facet_rule
 from massspring.layout.point_rows import SHIFT
-from tests.massspring.body.test_quadratic import local_force
 from tests.massspring.conftest import SOFT
-from tests.massspring.quadratic import curved_block, hollow_ball, jiggled, quadratic_block
+from tests.massspring.quadratic import curved_block, hollow_ball, jiggled, local_force, quadratic_block
 
 CLOSE = 1e-12
 DT = 1e-3

@@ -76,7 +76,8 @@ def facets():
     middle = body.rest.mean(axis=0)
     ball = Sphere((float(middle[0]), float(middle[1]), float(high) + 0.0101), 0.01, way, friction="no_slip")
     held = Attachment(np.array([int(body.rest[:, 0].argmax())]))
-    return Setup(body, ImplicitVolume(), clock, (floor, ball), (held,), (0.0, 0.0, -9.81), damping=20.0)
+    exact = ImplicitVolume(tolerance=1e-12)
+    return Setup(body, exact, clock, (floor, ball), (held,), (0.0, 0.0, -9.81), damping=20.0)
 
 
 SCENES = {scene.__name__: scene for scene in (slices, implicit, probed, facets)}
