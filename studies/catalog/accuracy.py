@@ -1,5 +1,6 @@
 """Which body is how accurate, at what cost, on every organ: from the paper's surface to graded quadratic elements?"""
 
+from dataclasses import replace
 from typing import Literal
 
 from massspring import ImplicitVolume
@@ -44,30 +45,31 @@ def linear_bodies(scene: Scene) -> tuple[BodyRecipe, ...]:
 
 def headline(scene: Scene) -> BodyRecipe:
     """Graded, of the middle size, with the masses that allow the longest step."""
-    return BodyRecipe("quadratic", BUDGETS[1], graded=True, mass=_mass(scene))
+    return BodyRecipe("quadratic", BUDGETS[1], graded=can_be_graded(scene), mass=_mass(scene))
+
+
+def can_be_graded(scene: Scene) -> bool:
+    """Whether grading changes a body: that of a hollow organ is graded at contacts alone."""
+    return bool(scene.obstacles) or (bool(scene.held) and not has_wall(scene))
 
 
 def quadratic_cases(scene: Scene) -> tuple[Case, ...]:
     """Even and graded bodies; of the middle size also the other masses and the other contact, of the even one a shorter
     step; the headline at half its step and, among the graded ones, on the next finer body."""
     even = [BodyRecipe("quadratic", nodes, mass=_mass(scene)) for nodes in BUDGETS]
-    graded = [BodyRecipe("quadratic", nodes, graded=True, mass=_mass(scene)) for nodes in BUDGETS[1:]]
-    middle = (even[1], graded[0])
+    graded = [replace(body, graded=True) for body in even[1:] if can_be_graded(scene)]
+    middle = dict.fromkeys((even[1], headline(scene)))
     found = [_timed(scene, body, LONG) for body in (*even, *graded)]
     found += [_timed(scene, even[1], SHORT), _timed(scene, headline(scene), LONG / 2)]
     if _mass(scene) != "lumped":
-        found += [_timed(scene, BodyRecipe("quadratic", b.nodes, graded=b.graded), LONG) for b in middle]
+        found += [_timed(scene, replace(body, mass="lumped"), LONG) for body in middle]
     if scene.obstacles:
-        found += [_timed(scene, _at_nodes(body), LONG) for body in middle]
+        found += [_timed(scene, replace(body, contact="nodes"), LONG) for body in middle]
     return tuple(found)
 
 
 def _mass(scene: Scene) -> Literal["lumped", "stiffness"]:
     return "lumped" if why_inertia_matters(scene) else "stiffness"
-
-
-def _at_nodes(body: BodyRecipe) -> BodyRecipe:
-    return BodyRecipe("quadratic", body.nodes, graded=body.graded, mass=body.mass, contact="nodes")
 
 
 def _timed(scene: Scene, body: BodyRecipe, fraction: float) -> Case:

@@ -106,6 +106,10 @@ def smoke_case(case: Case) -> Case:
     coarse = replace(plan.coarsest(2), variants=()) if plan is not None else None
     return case.replaced(
         scene=replace(case.scene, reference=coarse),
-        body=replace(case.body, nodes=min(case.body.nodes, smoke_nodes(case))),
+        body=replace(
+            case.body,
+            nodes=min(case.body.nodes, smoke_nodes(case)),
+            regions=min(case.body.regions, smoke_nodes(case) // 3),
+        ),
         frames=min(case.frames or case.scene.frames, SMOKE_FRAMES),
     )

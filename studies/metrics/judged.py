@@ -58,6 +58,11 @@ class Judged:
         wished = {name: getattr(wish, name) for name in found}
         return {name: abs(found[name].value) / bound for name, bound in wished.items() if bound and found[name].known}
 
+    def untold(self, wish: Wish) -> bool:
+        """Whether an error is wished finer than the reference is known."""
+        pairs = ((self.force, wish.force), (self.displacement, wish.displacement))
+        return any(bound is not None and error.uncertainty > bound for error, bound in pairs)
+
     def worst(self, wish: Wish) -> float:
         """The largest of its shares: 1 or less meets the wish; infinite where none of its errors is known."""
         shares = self.shares(wish)
@@ -90,8 +95,9 @@ def cost_of_frames(frame_ns: np.ndarray, frame: float) -> Measured:
 
 
 def cheapest(found: Iterable[Judged], wish: Wish) -> Judged | None:
-    """The one of least cost that meets a wish; those of unknown cost come last. None where none does."""
-    meeting = [one for one in found if one.worst(wish) <= 1.0]
+    """The one of least cost that meets a wish; those of unknown cost come last. None where none does, or where the
+    reference is less well known than is wished."""
+    meeting = [one for one in found if one.worst(wish) <= 1.0 and not one.untold(wish)]
     return min(meeting, key=by_cost, default=None)
 
 

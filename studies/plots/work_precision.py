@@ -59,14 +59,17 @@ def figure(runs: Sequence[Run]) -> Figure:
     for spare in range(len(scenes), blocks * columns):
         for row in (0, 1):
             axes[2 * (spare // columns) + row, spare % columns].set_axis_off()
+    heights: list[list[float]] = [[] for _ in range(2 * blocks)]
     low, high = _ends([one.cost.value for found in scenes.values() for one in found] + [REAL_TIME, HALF])
     for place, (name, found) in enumerate(scenes.items()):
         column = axes[2 * (place // columns) : 2 * (place // columns) + 2, place % columns]
         group = [run for run in shown if run.case.scene.name == name]
         column[0].set_title(heading(name) + unresolved_mark(group, (FORCE, DISPLACEMENT)))
         column[0].set_xlim(low, high)
-        _draw_scene(column, found, group[0].case.scene)
-    for row, metric in zip(axes, (FORCE, DISPLACEMENT) * blocks, strict=True):
+        for row, drawn in enumerate(_draw_scene(column, found, group[0].case.scene)):
+            heights[2 * (place // columns) + row] += drawn
+    for row, metric, drawn in zip(axes, (FORCE, DISPLACEMENT) * blocks, heights, strict=True):
+        row[0].set_ylim(max(LOWEST, min(drawn or [0.3])) / BELOW, ROOM * max(drawn or [60.0]))
         row[0].set_ylabel(ROWS[metric.name])
         log_axis(row[0].yaxis)
     for panel in axes[-1]:
@@ -85,8 +88,9 @@ def _ends(values: Sequence[float]) -> tuple[float, float]:
     return min(values) / SIDE, SIDE * max(values)
 
 
-def _draw_scene(column: np.ndarray, found: Sequence[Judged], scene: Scene) -> None:
-    wish = usual_wish(scene)
+def _draw_scene(column: np.ndarray, found: Sequence[Judged], scene: Scene) -> list[list[float]]:
+    """The heights drawn in each of the two panels."""
+    wish, heights = usual_wish(scene), []
     recommended = cheapest(found, wish)
     for panel, metric in zip(column, (FORCE, DISPLACEMENT), strict=True):
         points = [(one, getattr(one, FIELDS[metric.name])) for one in found]
@@ -95,14 +99,14 @@ def _draw_scene(column: np.ndarray, found: Sequence[Judged], scene: Scene) -> No
         _draw_goals(panel, bound)
         if not points:
             remark(panel, "no reference, no error" if not any(one.compared for one in found) else _why_not(metric))
-            panel.set_ylim(0.1, 100.0)
+            heights.append([])
             continue
         _draw_front(panel, points)
         for one, error in points:
             _draw_point(panel, one, error)
-        heights = [_height(error) for _, error in points]
-        panel.set_ylim(max(LOWEST, min(*heights, bound)) / BELOW, ROOM * max(*heights, bound))
+        heights.append([bound, *(_height(error) for _, error in points)])
         _name(panel, points, recommended)
+    return heights
 
 
 def _why_not(metric: Metric) -> str:

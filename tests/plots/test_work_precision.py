@@ -129,3 +129,14 @@ def test_families_are_told_apart_without_colour():
     assert family_of(LADDER[3].case).colour == BLUE
     other = family_of(run(LIVER_PRESS, method=Free()).case)
     assert other.colour == GREY and other.name == "tetrahedral, free"
+
+
+def test_every_point_of_a_row_is_in_sight():
+    figure = work.figure([at(0.1, 0.9), at(0.1, 0.05, scene=LIVER_PRESS)])
+    assert [axes.get_ylim()[1] > 90.0 for axes in figure.axes[:2]] == [True, True]
+
+
+def test_nothing_is_recommended_that_the_reference_cannot_tell():
+    accurate = at(0.7, 0.005, kind="quadratic")
+    accurate.reference.total_uncertainty["surface_mean"] = 0.02
+    assert "recommended" not in words(work.figure([accurate]).axes[0])
