@@ -16,6 +16,9 @@ from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
 SWEEPS = 12
 """Over all points, at most."""
+LEFT = 0.8
+"""Of what is inside at the start of a step that may be inside at its end: pressures answer a step later, and to push
+all of it out at once would shake the body."""
 SETTLED = 1e-3
 """Change of the forces in a sweep, over the largest of them, at which they stand."""
 
@@ -139,6 +142,14 @@ def touch(facets, boundary, step, y, o, place):
 
 
 @njit_inlined
+def depth_now(boundary, step, y, o):
+    """The gap of y to obstacle o at the start of the step where it is inside [m], else 0."""
+    centre, v, dt = boundary.position[step, o], boundary.velocity[step, o], boundary.dt
+    r0, r1, r2 = y[0] - centre[0] + dt * v[0], y[1] - centre[1] + dt * v[1], y[2] - centre[2] + dt * v[2]
+    return min(gap_and_normal(boundary, o, r0, r1, r2)[0], 0.0)
+
+
+@njit_inlined
 def press(facets, boundary, step, state, f, q):
     """Corrects the force on point q of facet f so that it ends the step outside; `state`: its position and speed."""
     y, u = state
@@ -153,7 +164,7 @@ def press(facets, boundary, step, state, f, q):
             return
         touch(facets, boundary, step, y, o, (f, q))
     k = facets.mass[f, q] / (dt * dt)
-    force = facets.pressing[f, q] - k * gap
+    force = facets.pressing[f, q] - k * (gap - LEFT * depth_now(boundary, step, y, o))
     if not force > 0.0:
         facets.pressing[f, q] = 0.0
         for axis in range(3):
