@@ -1,6 +1,6 @@
 """What a set-up is checked for before it runs; each complaint is one sentence."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -75,6 +75,16 @@ def check_body(body: Body, method: Method) -> None:
         raise MassSpringError(
             f"springs of law '{body.law}' pull every part of the body together, and it keeps {body.kept.count} "
             f"volumes for {body.node_count} nodes; keep one volume per node, or for {PATCH} of them"
+        )
+
+
+def check_facets(precision: str, body: Body, obstacles: Collection[object]) -> None:
+    """Raises MassSpringError for single precision where obstacles touch points inside facets: what their forces settle
+    to would differ in the fourth digit."""
+    if precision == "float32" and len(body.contact_facets) and obstacles:
+        raise MassSpringError(
+            "obstacles touch this quadratic body inside its facets, which runs in float64 only; "
+            "leave precision at float64, or make the body with contact at its nodes"
         )
 
 

@@ -18,6 +18,7 @@ from massspring.layout.threads import shared
 from massspring.methods.method import Method
 from massspring.run.checks import (
     check_body,
+    check_facets,
     check_nodal,
     check_probe,
     check_solid,
@@ -65,6 +66,7 @@ class Setup:
     def __post_init__(self) -> None:
         check_body(self.body, self.method)
         check_precision(self.precision, self.method)
+        check_facets(self.precision, self.body, self.solids)
         check_threads(self.threads, self.method)
         limited = self.method.capabilities.conditionally_stable
         check_surroundings(self.gravity, self.damping, self.clock.dt if limited else 0.0)

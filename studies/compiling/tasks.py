@@ -38,7 +38,12 @@ def tasks() -> dict[str, Callable[[], None]]:
     return {name: elements.TASKS.get(name) or found[name] for name in order}
 
 
-ESSENTIAL: tuple[str, ...] = ("implicit_volume, whole, float64", "reference, P2/P1", "free, whole, float64")
+ESSENTIAL: tuple[str, ...] = (
+    "implicit_volume, whole, float64",
+    "reference, P2/P1",
+    "free, whole, float64",
+    "implicit_volume, quadratic, float64",
+)
 """What `make study` begins with; its first chart does not wait for the rest."""
 
 

