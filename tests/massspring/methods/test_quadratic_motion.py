@@ -220,5 +220,5 @@ def test_single_precision_gives_the_answer_to_its_digits():
 
 def test_single_precision_is_refused_with_contact_inside_facets(block):
     plane = Plane((0.0, 0.0, -10.0), (0.0, 0.0, 1.0))
-    with pytest.raises(MassSpringError, match="float64 only.*contact at its nodes"):
+    with pytest.raises(MassSpringError, match=r"float64 only.*contact at its nodes"):
         Setup(block, ImplicitVolume(), clock_for(block, 1, 1), (plane,), precision="float32")
