@@ -40,6 +40,7 @@ OPTIONS: Mapping[str, str] = {
     "targets": "targets of volumes that change",
     "triangle_springs": "triangle springs (membranes)",
     "prestress": "springs without length",
+    "point_volumes": "quadratic bodies",
     "thin_probes": "thin probes",
     "threads": "several threads",
     "float32": "float32",

@@ -69,7 +69,7 @@ def respond_of_free(model, nodes, implicit, rows):
 
 @njit_inlined
 def meet_points(frame, step, push, rows, implicit):
-    """Contact inside facets, as known forces, or of nodes (eq. 3.7, 9.3–9.9); the most passes of the active set."""
+    """Contact inside facets, as known forces, or of nodes (eq. 3.7, 9.3–9.5); the most passes of the active set."""
     facets, boundary, model, nodes = rows.facets, frame.boundary, frame.model, frame.nodes
     if facets.node.shape[0] == 0:
         return search_contacts(frame, step, push)

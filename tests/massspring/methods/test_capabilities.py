@@ -20,6 +20,7 @@ from massspring import (
     Trajectory,
     Volumes,
     membrane_body,
+    quadratic_body,
     simulate,
     tetrahedral_body,
 )
@@ -27,25 +28,32 @@ from massspring.methods.capabilities import Capabilities, No
 from studies.report.methods_page import OPTIONS, methods_page
 from tests.massspring.conftest import SOFT, block, body_of, hollow_block, icosphere
 from tests.massspring.methods.test_methods import clock_for
+from tests.massspring.quadratic import quadratic_block
 from tests.massspring.rows import CONTESTANTS, KINDS, SUPPORTED, by_pairs, kinds_of
 
 EACH = pytest.mark.parametrize("method", CONTESTANTS.values(), ids=CONTESTANTS.keys())
 MANY, NO_TETRAHEDRA = "it keeps one volume, the body keeps", "the body has none; fill its mesh"
 SHARE, LUMEN = "the body keeps a share of it", "the body keeps a lumen too"
+POINTS = "its volumes lie at points; take a quadratic body"
 REFUSED = {
-    "block": {},
-    "ball": {"tetrahedra": NO_TETRAHEDRA},
-    "hollow": {"whole": MANY, "tetrahedra": MANY},
-    "regions": {"whole": MANY, "tetrahedra": MANY},
-    "nodal": {"whole": MANY, "tetrahedra": MANY},
-    "lumen": {"tetrahedra": LUMEN},
-    "share": {"whole": SHARE, "tetrahedra": SHARE},
-    "membrane": {"tetrahedra": NO_TETRAHEDRA},
-    "prestressed": {"whole": "", "tetrahedra": ""},
+    "block": {"points": POINTS},
+    "ball": {"tetrahedra": NO_TETRAHEDRA, "points": POINTS},
+    "hollow": {"whole": MANY, "tetrahedra": MANY, "points": POINTS},
+    "regions": {"whole": MANY, "tetrahedra": MANY, "points": POINTS},
+    "nodal": {"whole": MANY, "tetrahedra": MANY, "points": POINTS},
+    "lumen": {"tetrahedra": LUMEN, "points": POINTS},
+    "share": {"whole": SHARE, "tetrahedra": SHARE, "points": POINTS},
+    "membrane": {"tetrahedra": NO_TETRAHEDRA, "points": POINTS},
+    "prestressed": {"whole": "", "tetrahedra": "", "points": POINTS},
+    "quadratic": {},
 }
 """Kind of body -> what a method keeps -> words of the refusal."""
-NEEDED = {"membrane": "triangle_springs", "prestressed": "prestress"}
-"""Kind of body -> the capability that it needs."""
+NEEDED = {
+    "membrane": ("triangle_springs",),
+    "prestressed": ("prestress",),
+    "quadratic": ("prestress", "point_volumes"),
+}
+"""Kind of body -> the capabilities that it needs, in the order in which they are asked for."""
 
 
 @pytest.fixture(params=REFUSED)
@@ -68,6 +76,8 @@ def body_of_any(kind, request):
     if kind == "prestressed":
         taut = tetrahedral_body(*block((2, 2, 2)), SOFT, "cotangent")
         return taut.keeping(Volumes.nodal(taut))
+    if kind == "quadratic":
+        return quadratic_body(*quadratic_block((2, 2, 1)), SOFT)
     if kind == "lumen":
         hollow = request.getfixturevalue("hollow_body")
         inner = np.unique(hollow_block()[3])
@@ -77,6 +87,11 @@ def body_of_any(kind, request):
     return whole.keeping(Volumes(("half",), whole.triangles, csr_array(np.full((1, len(whole.triangles)), 0.5))))
 
 
+def block_for(method, request):
+    """A block that the method advances."""
+    return body_of_any("quadratic" if method.capabilities.keeps == "points" else "block", request)
+
+
 def runs(setup) -> bool:
     history = simulate(setup)
     return history.outcome == "finished" and bool(np.isfinite(history.final).all())
@@ -84,8 +99,9 @@ def runs(setup) -> bool:
 
 @EACH
 def test_a_body_runs_or_is_refused_with_the_sentence_of_the_table(method, kind, any_body):
-    supported = getattr(method.capabilities, NEEDED[kind]) if kind in NEEDED else True
-    reason = REFUSED[kind].get(method.capabilities.keeps) if supported else supported.because
+    table = [getattr(method.capabilities, name) for name in NEEDED.get(kind, ())]
+    denied = [support.because for support in table if not support]
+    reason = denied[0] if denied else REFUSED[kind].get(method.capabilities.keeps)
     if reason is None:
         assert method.why_not(any_body) is None
         assert runs(Setup(any_body, method, clock_for(any_body, 1, 2, method=method)))
@@ -106,24 +122,28 @@ ASKED = {
 
 @EACH
 @pytest.mark.parametrize("option", ASKED)
-def test_an_option_runs_or_is_refused_with_the_sentence_of_the_table(method, option, block_body, monkeypatch):
+def test_an_option_runs_or_is_refused_with_the_sentence_of_the_table(method, option, request, monkeypatch):
     monkeypatch.setattr("massspring.run.checks.cores", lambda: 2)
     asked, sentence = ASKED[option]
-    clock, supported = clock_for(block_body, 1, 2, method=method), getattr(method.capabilities, option)
+    body = block_for(method, request)
+    if "targets" in asked:
+        asked = {"targets": {body.kept.names[0]: asked["targets"]["whole"]}}
+    clock, supported = clock_for(body, 1, 2, method=method), getattr(method.capabilities, option)
     if supported:
-        assert runs(Setup(block_body, method, clock, **asked))
+        assert runs(Setup(body, method, clock, **asked))
     else:
         with pytest.raises(MassSpringError, match=sentence.format(method.name, supported.because)):
-            Setup(block_body, method, clock, **asked)
+            Setup(body, method, clock, **asked)
 
 
 @EACH
-def test_every_method_supports_friction(method, block_body):
+def test_every_method_supports_friction(method, request):
     """A rough plane that presses and slides drags the body along."""
-    clock = clock_for(block_body, 5, 10, method=method)
-    top = float(block_body.rest[:, 2].max())
+    body = block_for(method, request)
+    clock = clock_for(body, 5, 10, method=method)
+    top = float(body.rest[:, 2].max())
     way = Trajectory((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.002, 0.0, -0.002)))
-    setup = Setup(block_body, method, clock, (Plane((0, 0, top), (0, 0, -1), way, friction=0.5),))
+    setup = Setup(body, method, clock, (Plane((0, 0, top), (0, 0, -1), way, friction=0.5),))
     drag = simulate(setup).contact_force.sum(axis=0)[0]
     assert drag[2] < 0 and 0.05 * -drag[2] < drag[0] <= 0.5 * -drag[2] * (1 + 1e-9)
 
@@ -146,7 +166,7 @@ def test_every_pair_meets(options, exclude):
 
 
 def test_every_capability_is_asked_for_here():
-    assert set(OPTIONS) == set(ASKED) | set(NEEDED.values())
+    assert set(OPTIONS) == set(ASKED) | {name for names in NEEDED.values() for name in names}
     assert set(KINDS) <= set(REFUSED)
     for keeps, kinds in SUPPORTED.items():
         assert set(kinds) == {kind for kind in KINDS if keeps not in REFUSED[kind]}
