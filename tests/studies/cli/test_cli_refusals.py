@@ -120,8 +120,8 @@ CHARTS = {
         (("plot", "frames"), "unknown study 'frames'"),
         (("safe-dt", "bal_squeeze"), "unknown scene 'bal_squeeze'; did you mean 'ball_squeeze'"),
         (
-            ("safe-dt", "ball_squeeze", "--method", "implicit"),
-            "unknown method 'implicit'; did you mean 'implicit_volume'",
+            ("safe-dt", "ball_squeeze", "--method", "implicit_vol"),
+            "unknown method 'implicit_vol'; did you mean 'implicit_volume'",
         ),
         (("safe-dt", "ball_squeeze", "--body", "solid"), "unknown body 'solid'"),
         (("safe-dt", "ball_squeeze", "--nodes", "-3"), "-3"),
