@@ -170,7 +170,7 @@ def test_the_order_of_nodes_does_not_matter(monkeypatch):
     inside = simulate(setup)
     monkeypatch.setattr(renumber, "MANY", 10**6)
     plain = replace(setup)
-    assert plain.inside.place is None
+    assert plain.inside.permutation is None
     found = simulate(plain)
     assert np.abs(found.final - inside.final).max() < 1e-10 * body.size
     assert np.allclose(found.contact_force, inside.contact_force, atol=1e-6 * np.abs(found.contact_force).max())
