@@ -9,11 +9,11 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from massspring.body.springs import EDGES_OF_TETRAHEDRON
 from massspring.errors import MassSpringError
 
 FACES_OF_TETRAHEDRON = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Outward faces; face k lies opposite node k."""
-PAIRS_OF_NODES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 TIE = 1e-9
 """Distances closer than this fraction of the largest are equal: far above round-off, far below an edge."""
 
@@ -63,7 +63,7 @@ def partition(points: np.ndarray, tetrahedra: np.ndarray, volume: np.ndarray, co
 def node_patches(points: np.ndarray, tetrahedra: np.ndarray, size: int) -> np.ndarray:
     """Patch of each of the n nodes at `points`, joined by the edges of `tetrahedra` (k, 4): connected patches of about
     `size` nodes, (n,). Raises MassSpringError."""
-    ends = np.unique(np.sort(tetrahedra[:, PAIRS_OF_NODES].reshape(-1, 2).astype(np.int64), axis=1), axis=0)
+    ends = np.unique(np.sort(tetrahedra[:, EDGES_OF_TETRAHEDRON].reshape(-1, 2).astype(np.int64), axis=1), axis=0)
     length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
     both = np.r_[ends[:, 0], ends[:, 1]], np.r_[ends[:, 1], ends[:, 0]]
     graph = coo_array((np.r_[length, length], both), shape=(len(points), len(points))).tocsr()

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from massspring.kernels.points.facets import FacetRows
+from massspring.kernels.points.arrays import FacetRows
 
 CORNER = np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]])
 """Of each side of a facet its ends and its middle."""

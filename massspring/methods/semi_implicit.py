@@ -26,7 +26,7 @@ from massspring.layout.allocate import start
 from massspring.layout.point_rows import inverse_at_rest
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
-from massspring.methods.families.points import ImplicitSprings, point_volumes_frame
+from massspring.methods.families.points import SpringFactor, point_volumes_frame
 from massspring.methods.implicit.factor import constant_matrix, triangular
 from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
@@ -68,9 +68,9 @@ class Prepared:
 
     jacobian: csr_array
     """J at rest [m²], (m, 3n)."""
-    known: dict[tuple[float, float], tuple[ImplicitSprings, Any]]
+    known: dict[tuple[float, float], tuple[SpringFactor, Any]]
 
-    def at(self, model: Model, rows: PointRows, dt: float, damping: float) -> tuple[ImplicitSprings, PointRows]:
+    def at(self, model: Model, rows: PointRows, dt: float, damping: float) -> tuple[SpringFactor, PointRows]:
         """The factor for steps of `dt` [s] with `damping` [1/s], and the rows with S⁻¹ of that response."""
         if (dt, damping) not in self.known:
             self.known[dt, damping] = _factored(self.jacobian, model, dt, damping)
@@ -78,7 +78,7 @@ class Prepared:
         return implicit, rows._replace(diagonal=diagonal, scale=scale, inverse=inverse)
 
 
-def _factored(jacobian: csr_array, model: Model, dt: float, damping: float) -> tuple[ImplicitSprings, Any]:
+def _factored(jacobian: csr_array, model: Model, dt: float, damping: float) -> tuple[SpringFactor, Any]:
     matrix = constant_matrix(model, dt, damping)
     free, held = (np.flatnonzero(mask) for mask in (model.inverse_mass > 0.0, model.inverse_mass == 0.0))
     inner = csr_array(matrix[free][:, free])
@@ -86,7 +86,7 @@ def _factored(jacobian: csr_array, model: Model, dt: float, damping: float) -> t
     across.data[~np.isin(across.indices, held)] = 0.0
     across.data[np.repeat(model.inverse_mass == 0.0, np.diff(across.indptr))] = 0.0
     across.eliminate_zeros()
-    implicit = ImplicitSprings(
+    implicit = SpringFactor(
         triangular(inner.tocsc(), free),
         across.indptr.astype(np.uint32),
         across.indices.astype(np.uint32),

@@ -5,21 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from massspring.body.quadratic import CORNER_PARTS, MIDDLE_PARTS
 from studies.geometry.mesh.jacobian import curved_volume, jacobian_coefficients
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 
 TURNED = [0, 2, 1, 5, 4, 3]
 """A six-node facet seen from its other side."""
-CORNER_PARTS = np.array([[0, 4, 6, 7], [4, 1, 5, 8], [6, 5, 2, 9], [7, 8, 9, 3]])
-"""Flat tetrahedra at the corners of an element in VTK's order."""
-MIDDLE_PARTS = np.array(
-    [
-        [[4, 9, 6, 7], [4, 9, 7, 8], [4, 9, 8, 5], [4, 9, 5, 6]],
-        [[5, 7, 4, 8], [5, 7, 8, 9], [5, 7, 9, 6], [5, 7, 6, 4]],
-        [[6, 8, 7, 4], [6, 8, 4, 5], [6, 8, 5, 9], [6, 8, 9, 7]],
-    ]
-)
-"""The octahedron between them, cut along each of its three diagonals."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,13 +4,36 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.points.facets import FacetRows
-
 BLOCK = 16
 """Elements side by side: a multiple of what a vector register holds."""
 NODES, POINTS, CORNERS = 10, 4, 4
 ROWS = 3 * NODES
 """Of a point in `gradient` and `area`: x, y, z of every node."""
+
+
+class FacetRows(NamedTuple):
+    """p points in each of f facets, and the state of their contact."""
+
+    node: np.ndarray
+    """Corners, then mid-sides, (f, 6) uint32."""
+    shape: np.ndarray
+    """Shape functions at the points, (p, 6)."""
+    mass: np.ndarray
+    """What resists a push at a point, 1/Σ_a w_a N_a² [kg], (f, p)."""
+    reach: np.ndarray
+    """How far a facet is from its middle at most [m], (f,)."""
+    near: np.ndarray
+    """Scratch: facets that may touch an obstacle in this step, (f,) uint32."""
+    contact_id: np.ndarray
+    """1 + the obstacle that a point touches, 0 for none, (f, p) int64."""
+    pressing: np.ndarray
+    """f [N], (f, p)."""
+    normal: np.ndarray
+    """Of the obstacle, towards the body, (f, p, 3)."""
+    dragging: np.ndarray
+    """The force along the obstacle [N], (f, p, 3)."""
+    anchor: np.ndarray
+    """Where friction holds a point, seen from the obstacle [m], (f, p, 3)."""
 
 
 class PointRows(NamedTuple):

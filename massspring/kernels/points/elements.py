@@ -4,6 +4,7 @@ A vector register holds the same number of several elements.
 """
 
 from massspring.kernels.forces.volume import volume_gradient_into
+from massspring.kernels.fused.sweep import cross, dot
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.jit.vectors import gather, lanes_of, load, save, spread
@@ -33,16 +34,6 @@ def gather_block(rows, vector, block):
 def load_three(table, row, lane):
     """x, y and z from rows that follow each other."""
     return load(table, row, lane), load(table, row + 1, lane), load(table, row + 2, lane)
-
-
-@njit_inlined
-def cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit_inlined
-def dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit_inlined

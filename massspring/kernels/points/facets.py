@@ -7,9 +7,6 @@ point from the forces of the last step (projected Gauss–Seidel; Moreau 1988, J
 """
 
 import math
-from typing import NamedTuple
-
-import numpy as np
 
 from massspring.kernels.contact.gaps import gap_and_normal
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
@@ -23,31 +20,6 @@ NEARLY = 1.0 - 1e-9
 """Of the square of a force that was cut to its limit: round-off."""
 SETTLED = 1e-3
 """Change of the forces in a sweep, over the largest of them, at which they stand."""
-
-
-class FacetRows(NamedTuple):
-    """p points in each of f facets, and the state of their contact."""
-
-    node: np.ndarray
-    """Corners, then mid-sides, (f, 6) uint32."""
-    shape: np.ndarray
-    """Shape functions at the points, (p, 6)."""
-    mass: np.ndarray
-    """What resists a push at a point, 1/Σ_a w_a N_a² [kg], (f, p)."""
-    reach: np.ndarray
-    """How far a facet is from its middle at most [m], (f,)."""
-    near: np.ndarray
-    """Scratch: facets that may touch an obstacle in this step, (f,) uint32."""
-    contact_id: np.ndarray
-    """1 + the obstacle that a point touches, 0 for none, (f, p) int64."""
-    pressing: np.ndarray
-    """f [N], (f, p)."""
-    normal: np.ndarray
-    """Of the obstacle, towards the body, (f, p, 3)."""
-    dragging: np.ndarray
-    """The force along the obstacle [N], (f, p, 3)."""
-    anchor: np.ndarray
-    """Where friction holds a point, seen from the obstacle [m], (f, p, 3)."""
 
 
 @njit_inlined
@@ -76,14 +48,14 @@ def is_far(facets, nodes, boundary, step, f):
 
 @njit_inlined
 def deepest(facets, boundary, step, y):
-    """The obstacle that the point y is deepest in, its gap [m] and normal."""
-    best, least, n0, n1, n2 = 0, math.inf, 0.0, 0.0, 0.0
+    """The obstacle that the point y is deepest in, and its gap [m]."""
+    best, least = 0, math.inf
     for o in range(boundary.radius.shape[0]):
         place = boundary.position[step, o]
-        gap, m0, m1, m2 = gap_and_normal(boundary, o, y[0] - place[0], y[1] - place[1], y[2] - place[2])
+        gap, _, _, _ = gap_and_normal(boundary, o, y[0] - place[0], y[1] - place[1], y[2] - place[2])
         if gap < least:
-            best, least, n0, n1, n2 = o, gap, m0, m1, m2
-    return best, least, (n0, n1, n2)
+            best, least = o, gap
+    return best, least
 
 
 @njit_inlined
@@ -166,7 +138,7 @@ def press(facets, boundary, step, state, f, q):
     y, u = state
     dt = boundary.dt
     end = y[0] + dt * u[0], y[1] + dt * u[1], y[2] + dt * u[2]
-    o, gap, _ = deepest(facets, boundary, step, end)
+    o, gap = deepest(facets, boundary, step, end)
     if facets.contact_id[f, q] == 0 and not gap < 0.0:
         return
     if facets.contact_id[f, q] != o + 1:
