@@ -11,15 +11,15 @@ import math
 from massspring.kernels.contact.gaps import gap_and_normal
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
-SWEEPS = 12
+SWEEPS = 40
 """Over all points, at most."""
 LEFT = 0.8
 """Of what is inside at the start of a step that may be inside at its end: pressures answer a step later, and to push
 all of it out at once would shake the body."""
 NEARLY = 1.0 - 1e-9
 """Of the square of a force that was cut to its limit: round-off."""
-SETTLED = 1e-3
-"""Change of the forces in a sweep, over the largest of them, at which they stand."""
+SETTLED = 1e-6
+"""Change of the forces in a sweep, over the largest, at which they stand: what is left shakes a body at rest."""
 
 
 @njit_inlined

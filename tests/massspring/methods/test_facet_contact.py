@@ -83,10 +83,10 @@ def test_a_squeezed_ball_comes_to_rest_between_equal_forces(fraction):
     planes, history = squeezed(fraction)
     assert history.outcome == "finished"
     top, bottom = history.contact_force[-1]
-    assert bottom[2] > 0.5 and np.abs(top + bottom).max() < 1e-3 * bottom[2]
+    assert bottom[2] > 0.5 and np.abs(top + bottom).max() < 1e-4 * bottom[2]
     assert np.abs(top[:2]).max() < 1e-9 * bottom[2]
     still = np.abs(np.diff(history.contact_force[-5:, 1, 2])).max()
-    assert still < 2e-3 * bottom[2] and history.kinetic[-1] < 1e-6 * history.elastic[-1]
+    assert still < 1e-3 * bottom[2] and history.kinetic[-1] < 1e-6 * history.elastic[-1]
     for plane in planes:
         assert plane.gap(places(ball(), history.final), HELD).min() > -INSIDE * RADIUS
     assert np.abs(history.volume / ball().rest_volumes - 1.0).max() < 1e-5
@@ -147,7 +147,13 @@ def test_a_block_slides_above_the_angle_of_friction():
     assert force[:, 2].mean() == pytest.approx(slab().mass.sum() * WEAK * np.cos(np.radians(40.0)), rel=0.03)
 
 
-@pytest.mark.parametrize(("angle", "friction"), [(20.0, FRICTION), (30.0, "no_slip")], ids=["Coulomb", "no slip"])
+SHAKES = pytest.mark.xfail(strict=True, reason="a block held without slip shakes by more than a hundredth of its weight")
+
+
+@pytest.mark.parametrize(
+    ("angle", "friction"),
+    [pytest.param(20.0, FRICTION, id="Coulomb"), pytest.param(30.0, "no_slip", id="no slip", marks=SHAKES)],
+)
 def test_a_block_rests_below_the_angle_and_without_slip(angle, friction):
     """The force along the plane is the weight's part, and nothing creeps. Gravity begins at once: there is a first slip
     while the pressure builds up, which only the plane without slip takes back."""
@@ -181,7 +187,7 @@ def test_a_round_obstacle_presses_a_held_ball(shape, friction):
     push, hold = history.contact_force[-1, 0], history.held_force[-1, 0]
     assert push[2] < -0.05 and np.abs(push + hold).max() < 2e-3 * abs(push[2])
     assert obstacle.gap(places(ball(), history.final), HELD).min() > -INSIDE * RADIUS
-    assert np.abs(history.volume / ball().rest_volumes - 1.0).max() < 1e-4
+    assert np.abs(history.volume / ball().rest_volumes - 1.0).max() < 1e-5
 
 
 def test_facets_and_nodes_meet_in_the_same_force():
