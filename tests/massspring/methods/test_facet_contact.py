@@ -147,7 +147,9 @@ def test_a_block_slides_above_the_angle_of_friction():
     assert force[:, 2].mean() == pytest.approx(slab().mass.sum() * WEAK * np.cos(np.radians(40.0)), rel=0.03)
 
 
-SHAKES = pytest.mark.xfail(strict=True, reason="a block held without slip shakes by more than a hundredth of its weight")
+SHAKES = pytest.mark.xfail(
+    strict=True, reason="a block held without slip shakes by more than a hundredth of its weight"
+)
 
 
 @pytest.mark.parametrize(
