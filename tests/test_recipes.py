@@ -177,16 +177,15 @@ def test_an_added_method_keeps_the_contract(method, request):
 
 @pytest.mark.slow
 def test_an_added_method_supports_what_its_table_says(method, request, monkeypatch):
-    block_of_cells = body_of("block", request)
     for kind in test_capabilities.REFUSED:
         body = test_capabilities.body_of_any(kind, request)
         test_capabilities.test_a_body_runs_or_is_refused_with_the_sentence_of_the_table(method, kind, body)
     for option in test_capabilities.ASKED:
         with monkeypatch.context() as patch:
             test_capabilities.test_an_option_runs_or_is_refused_with_the_sentence_of_the_table(
-                method, option, block_of_cells, patch
+                method, option, request, patch
             )
-    test_capabilities.test_every_method_supports_friction(method, block_of_cells)
+    test_capabilities.test_every_method_supports_friction(method, request)
 
 
 def test_an_added_study_keeps_the_contract(recipe, add):

@@ -4,7 +4,7 @@ import itertools
 import re
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from massspring import (
@@ -125,9 +125,29 @@ def apart(body, most):
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(**PATHS)
 def test_nor_where_single_nodes_are_attached(**path):
-    """Every other triangle has an attached corner, none has two. Their free corners go ahead of the tip."""
-    state = check_crossing(crossing_setup(**path, held=apart(BALL, 32)), path["share"])[0]
+    """Every other triangle has an attached corner, none has two. Their free corners go ahead of the tip.
+
+    A tip that meets an attached node head-on has nowhere to push it: the run ends there, as the next test asks.
+    """
+    held = apart(BALL, 32)
+    setup = crossing_setup(**path, held=held)
+    assume(nearest(setup.probes[0], BALL.rest[held]) > 1e-6 * EDGE)
+    state = check_crossing(setup, path["share"])[0]
     assert not state.probing.passed.any()
+
+
+def nearest(probe, nodes):
+    """Distance of the line of a tip's path from the nearest of some nodes [m]."""
+    way = probe.path(np.inf) - probe.path(0.0)
+    way /= np.linalg.norm(way)
+    return np.linalg.norm(np.cross(nodes - probe.anchor, way), axis=1).min()
+
+
+def test_a_tip_that_meets_an_attached_node_ends_the_run():
+    top = int(np.argmax(BALL.rest[:, 2]))
+    path = {"side": (0, 0, 1), "through": (0, 0, 0), "start": 1.25, "length": 2.0, "share": 0.3, "thickness": 0.0}
+    state = check_crossing(crossing_setup(**path, method=METHODS[0], held=np.array([top])), 0.3)[0]
+    assert top in BALL.triangles[state.probing.passed[0] - 1]
 
 
 @settings(max_examples=25, deadline=None, derandomize=True)
