@@ -32,10 +32,11 @@ def facet_rows(facets: np.ndarray, rest: np.ndarray, inverse_mass: np.ndarray) -
     x = rest[node]
     reach = MARGIN * np.linalg.norm(x - x[:, :3].mean(axis=1, keepdims=True), axis=2).max(axis=1, initial=0.0)
     points = (len(node), len(weight))
+    coupling = np.einsum("fa,qa,pa->fqp", inverse_mass[node], shape, shape)
     return FacetRows(
         node=np.ascontiguousarray(node, dtype=np.uint32),
         shape=shape,
-        mass=1.0 / np.einsum("fa,qa->fq", inverse_mass[node], shape**2),
+        mass=1.0 / np.einsum("fqq->fq", coupling),
         reach=reach,
         near=np.zeros(len(node), dtype=np.uint32),
         contact_id=np.zeros(points, dtype=np.int64),
@@ -43,4 +44,10 @@ def facet_rows(facets: np.ndarray, rest: np.ndarray, inverse_mass: np.ndarray) -
         normal=np.zeros((*points, 3)),
         dragging=np.zeros((*points, 3)),
         anchor=np.zeros((*points, 3)),
+        coupling=coupling,
+        candidate=np.zeros(points, dtype=np.int64),
+        gap=np.zeros(points),
+        pressed=np.zeros(len(node), dtype=bool),
+        **{name: np.zeros((*points, 3)) for name in ("slope", "start", "known")},
+        **{name: np.zeros((len(weight), 3)) for name in ("point_speed", "change")},
     )

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from massspring import Free, simulate
+from massspring import Free, Setup, simulate
 from studies.base.atomic import is_there
 from studies.base.compile_watch import watching
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
@@ -17,9 +17,13 @@ from studies.store.paths import timing_path
 from studies.store.record import Status, canonical, peek, read_record, write_record
 from studies.store.staleness import is_current
 from studies.timing.protocol import FrameTiming, interleave, pinned
-from studies.timing.stage_cost import ROWS, stage_times
+from studies.timing.stage_cost import ROWS, run_frames, stage_times
 
-REPEATS = 5
+REPEATS, FEWEST = 5, 2
+BUDGET = 10.0
+"""Of the repeats of a case [s]: a run of some seconds holds thousands of steps, and is repeated less often."""
+WARM_UP = 3
+"""Frames that run before anything is measured: they compile what the case needs."""
 
 
 def timing_file(root: Path, study: str, case: Case) -> Path:
@@ -73,13 +77,23 @@ def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[
             with watching(lambda name: None) as watch:
                 setups = {case.key: prepare(case).setup for case in group}
                 contestants = {key: (lambda s=setup: simulate(s).frame_ns) for key, setup in setups.items()}
-                measured = interleave(contestants, REPEATS)
+                measured = interleave(contestants, max(map(repeats_for, setups.values())), warmups=0)
                 stages = {case.key: stage_times(setups[case.key]) for case in group}
             seconds = (time.perf_counter() - started - watch.seconds) / len(group)
             for case in group:
                 timing = FrameTiming(measured[case.key], core, stage_ns=stages[case.key], stages=ROWS)
                 write_timing(root, study, case, timing, seconds)
                 on_case(case.name)
+
+
+def repeats_for(setup: Setup) -> int:
+    """How often the run is timed, from the time of its first frames, which are not counted."""
+    frames = min(WARM_UP, setup.clock.frames)
+    run_frames(setup, setup.start(), frames=1)
+    begin = time.perf_counter()
+    run_frames(setup, setup.start(), frames=frames)
+    whole = (time.perf_counter() - begin) / frames * setup.clock.frames
+    return int(min(max(BUDGET / whole, FEWEST), REPEATS))
 
 
 def write_timing(root: Path, study: str, case: Case, timing: FrameTiming, seconds: float | None = None) -> None:

@@ -34,6 +34,24 @@ class FacetRows(NamedTuple):
     """The force along the obstacle [N], (f, p, 3)."""
     anchor: np.ndarray
     """Where friction holds a point, seen from the obstacle [m], (f, p, 3)."""
+    coupling: np.ndarray
+    """What a force at a point gives the others of its facet, Σ_a w_a N_qa N_pa [1/kg], (f, p, p)."""
+    candidate: np.ndarray
+    """Scratch: 1 + the obstacle that a point may touch in this step, 0 for none, (f, p) int64."""
+    slope: np.ndarray
+    """Scratch: the gradient of its gap where the point would end the step, (f, p, 3)."""
+    gap: np.ndarray
+    """Scratch: the gap that a point at no speed would end with, less what may be left inside [m], (f, p)."""
+    start: np.ndarray
+    """Scratch: where a point is at the start of the step [m], (f, p, 3)."""
+    known: np.ndarray
+    """Scratch: the force on a point before it is corrected [N], (f, p, 3)."""
+    pressed: np.ndarray
+    """Scratch: whether a facet had a force when it was last looked at, (f,) bool."""
+    point_speed: np.ndarray
+    """Scratch: of the points of a facet [m/s], (p, 3)."""
+    change: np.ndarray
+    """Scratch: of the forces on them [N], (p, 3)."""
 
 
 class PointRows(NamedTuple):

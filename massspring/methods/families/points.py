@@ -10,7 +10,8 @@ from massspring.kernels.constraint.ldl_solve import Triangular, respond_into
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, SEARCH, SPRINGS, VOLUME, end_stage
 from massspring.kernels.points.elements import measure_into, push_into
-from massspring.kernels.points.facets import corrections_into, known_forces_into
+from massspring.kernels.points.facet_forces import corrections_into
+from massspring.kernels.points.facets import known_forces_into
 from massspring.kernels.points.solve import (
     add_response,
     pushed_velocity_into,
