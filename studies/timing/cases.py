@@ -17,13 +17,13 @@ from studies.store.paths import timing_path
 from studies.store.record import Status, canonical, peek, read_record, write_record
 from studies.store.staleness import is_current
 from studies.timing.protocol import FrameTiming, interleave, pinned
-from studies.timing.stage_cost import ROWS, run_frames, stage_times
+from studies.timing.stage_cost import ROWS, stage_times
 
 REPEATS, FEWEST = 5, 2
 BUDGET = 10.0
 """Of the repeats of a case [s]: a run of some seconds holds thousands of steps, and is repeated less often."""
-WARM_UP = 3
-"""Frames that run before anything is measured: they compile what the case needs."""
+WARM_UP = 1.0
+"""Of a run before anything is measured, at most [s]: it compiles what the case needs."""
 
 
 def timing_file(root: Path, study: str, case: Case) -> Path:
@@ -87,13 +87,12 @@ def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[
 
 
 def repeats_for(setup: Setup) -> int:
-    """How often the run is timed, from the time of its first frames, which are not counted."""
-    frames = min(WARM_UP, setup.clock.frames)
-    run_frames(setup, setup.start(), frames=1)
-    begin = time.perf_counter()
-    run_frames(setup, setup.start(), frames=frames)
-    whole = (time.perf_counter() - begin) / frames * setup.clock.frames
-    return int(min(max(BUDGET / whole, FEWEST), REPEATS))
+    """How often the run is timed, from what its first frames take."""
+    simulate(setup, time_limit=0.0)
+    first = simulate(setup, time_limit=WARM_UP)
+    frames = max(first.good_frames, 1)
+    whole = 1e-9 * first.frame_ns[:frames].mean() * setup.clock.frames
+    return int(min(max(BUDGET / whole, FEWEST), REPEATS)) if whole > 0.0 else REPEATS
 
 
 def write_timing(root: Path, study: str, case: Case, timing: FrameTiming, seconds: float | None = None) -> None:

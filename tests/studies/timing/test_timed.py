@@ -77,9 +77,10 @@ def test_methods_of_one_body_take_turns(results, monkeypatch):
     """Their ratio is wanted: a slow minute of the machine must fall on both. Another step is another group."""
     turns = []
 
-    def spy(setup):
-        turns.append((setup.method.name, setup.clock.steps))
-        return simulate(setup)
+    def spy(setup, **warm_up):
+        if not warm_up:
+            turns.append((setup.method.name, setup.clock.steps))
+        return simulate(setup, **warm_up)
 
     monkeypatch.setattr(module, "simulate", spy)
     other = tiny_case(dt_fraction=0.25, timed=True)
@@ -87,11 +88,18 @@ def test_methods_of_one_body_take_turns(results, monkeypatch):
     time_cases(results, "tiny", [KEPT, other, LOOSE], told.append)
     steps, finer = (prepare(case).setup.clock.steps for case in (KEPT, other))
     assert steps != finer
-    pairs = [turns[k : k + 2] for k in range(0, 2 * (module.REPEATS + 1), 2)]
+    pairs = [turns[k : k + 2] for k in range(0, 2 * module.REPEATS, 2)]
     assert all({name for name, _ in pair} == {"implicit_volume", "free"} for pair in pairs)
     assert {pair[0][0] for pair in pairs} == {"implicit_volume", "free"}  # each goes first now and then
-    assert turns[len(pairs) * 2 :] == [("implicit_volume", finer)] * (module.REPEATS + 1)
+    assert turns[len(pairs) * 2 :] == [("implicit_volume", finer)] * module.REPEATS
     assert sorted(told) == sorted([KEPT.name, other.name, LOOSE.name])
+
+
+def test_a_long_run_is_timed_less_often(monkeypatch):
+    setup = prepare(KEPT).setup
+    assert module.repeats_for(setup) == module.REPEATS
+    monkeypatch.setattr(module, "BUDGET", 1e-9)
+    assert module.repeats_for(setup) == module.FEWEST
 
 
 def test_a_run_that_breaks_off_while_timed_is_not_stored(results, monkeypatch):
