@@ -7,7 +7,7 @@ import numpy as np
 
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Model, Nodes, Workspace
 from massspring.kernels.arrays.volume_rows import VolumeRows
-from massspring.kernels.jit.stage_clock import StageTimes
+from massspring.kernels.jit.stage_clock import UNTIMED, StageTimes
 from massspring.kernels.jit.thread_team import ThreadTeam
 from massspring.kernels.points.arrays import PointRows
 from massspring.kernels.probe.arrays import Probing
@@ -62,7 +62,7 @@ class State:
         return replace(self, nodes=nodes)
 
 
-def new_diagnostics(obstacles: int, attachments: int, stage_times: StageTimes | None = None) -> FrameDiagnostics:
+def new_diagnostics(obstacles: int, attachments: int, stage_times: StageTimes = UNTIMED) -> FrameDiagnostics:
     """Diagnostics at zero; the stage times go on."""
     singular, limited, iterations = (np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
     return FrameDiagnostics(

@@ -67,8 +67,7 @@ class ImplicitSprings(Method):
         assert after.rows is not None  # start() made them
         after.rows.lam[:] = after.lam + after.model.rest_lam
         factor = after.memory.at(after.model, boundary.dt, boundary.damping)
-        if after.diagnostics.stage_times is not None:
-            end_stage(after.diagnostics.stage_times, BETWEEN_FRAMES)
+        end_stage(after.diagnostics.stage_times, BETWEEN_FRAMES)
         accuracy = Accuracy(self.tolerance, self.most_iterations)
         for step in range(len(boundary.position)):
             Step(after, boundary, step, factor, accuracy).take(self.passes)

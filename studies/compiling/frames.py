@@ -7,14 +7,13 @@ import numpy as np
 
 from massspring import METHODS, Attachment, Clock, Method, Plane, Probe, Setup, Trajectory, simulate, step_limit
 from massspring.body.body import NO_FACETS
-from massspring.kernels.jit.stage_clock import new_stage_times
 from massspring.layout.threads import shared
 from massspring.methods import VARIANTS
 from massspring.run.precision import Precision
 from studies.compiling.bodies import EDGE, KINDS, tiny_body
 
 FRAMES, STEPS = 2, 2
-PLAIN, CLOCK, PROBE, THREADS = "", "stage clock", "thin probe", "threads"
+PLAIN, PROBE, THREADS = "", "thin probe", "threads"
 OWN_TYPES = ("whole", "several", "quadratic")
 """Kinds of bodies whose types are not those of another. Options are compiled for them, in double precision; threads in
 single precision too."""
@@ -55,7 +54,7 @@ def variants_of(method: Method) -> Iterator[Variant]:
         if method.why_not(tiny_body(kind)) is not None:
             continue
         thin_probes = table.thin_probes and kind != "quadratic"  # beside which they are refused
-        supported = {CLOCK: True, PROBE: thin_probes, THREADS: table.threads}
+        supported = {PROBE: thin_probes, THREADS: table.threads}
         for precision in precisions:
             yield Variant(method, kind, precision)
             for option, yes in supported.items() if kind in OWN_TYPES else ():
@@ -71,14 +70,10 @@ def _rank(method: Method) -> int:
 def advance(variant: Variant) -> None:
     """Some frames of the variant: a rough plane presses the body, which is held below."""
     setup = setup_of(variant)
-    if variant.option in (PLAIN, PROBE):
+    if variant.option != THREADS:
         simulate(setup)
         return
-    state = setup.start()
-    if variant.option == CLOCK:
-        state = replace(state, diagnostics=state.diagnostics._replace(stage_times=new_stage_times()))
-    else:
-        state = shared(state, 2)  # asked for by name, whatever the number of cores
+    state = shared(setup.start(), 2)  # asked for by name, whatever the number of cores
     for frame in range(FRAMES):
         state = setup.method.advance(state, setup.boundary(frame))
 

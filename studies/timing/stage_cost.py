@@ -17,6 +17,7 @@ from massspring.kernels.jit.stage_clock import (
     BETWEEN_FRAMES,
     INTEGRATION,
     STAGES,
+    UNTIMED,
     StageTimes,
     end_stage,
     new_stage_times,
@@ -49,20 +50,20 @@ TimedFrames = tuple[np.ndarray, np.ndarray, State]
 """Time of each frame [ns], (F,); of its ROWS, less what timing them cost, (rows, F); the last state."""
 
 
-def run_frames(setup: Setup, state: State, times: StageTimes | None = None, frames: int | None = None) -> TimedFrames:
+def run_frames(setup: Setup, state: State, times: StageTimes = UNTIMED, frames: int | None = None) -> TimedFrames:
     """Runs the first `frames` of a set-up, or all. Raises MassSpringError for a run that breaks off."""
     state = replace(state, diagnostics=state.diagnostics._replace(stage_times=times))
     frames = setup.clock.frames if frames is None else frames
     frame_ns, stage_ns = np.zeros(frames), np.zeros((len(ROWS), frames))
-    price = end_stage_ns() if times is not None else 0.0
+    price = end_stage_ns() if times.on[0] else 0.0
     for frame in range(frames):
         boundary = setup.boundary(frame)
-        if times is not None:
+        if times.on[0]:
             times.spent[:], times.ended[:] = 0, 0
         begin = perf_counter_ns()
         state = setup.method.advance(state, boundary)
         frame_ns[frame] = perf_counter_ns() - begin
-        if times is not None:
+        if times.on[0]:
             # A stage of some nanoseconds may seem to cost less than its end.
             stage_ns[:BETWEEN_FRAMES, frame] = np.maximum(
                 times.spent[:BETWEEN_FRAMES] - price * times.ended[:BETWEEN_FRAMES], 0.0

@@ -13,7 +13,7 @@ from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.compiling import main, tasks
 from studies.compiling.bodies import EDGE, KINDS, tiny_block, tiny_body
-from studies.compiling.frames import CLOCK, OWN_TYPES, PLAIN, PROBE, THREADS, Variant, advance, setup_of, variants
+from studies.compiling.frames import OWN_TYPES, PLAIN, PROBE, THREADS, Variant, advance, setup_of, variants
 from studies.compiling.log import Compiled, listing, logged, summary
 
 
@@ -32,9 +32,7 @@ def test_every_method_is_there_in_each_form_that_it_supports():
         own = [variant for variant in found if variant.method == method()]
         table = method.capabilities
         assert {variant.option for variant in own} == {
-            option
-            for option, yes in ((PLAIN, True), (CLOCK, True), (PROBE, table.thin_probes), (THREADS, table.threads))
-            if yes
+            option for option, yes in ((PLAIN, True), (PROBE, table.thin_probes), (THREADS, table.threads)) if yes
         }
         assert {variant.precision for variant in own} == {"float64", "float32"} if table.float32 else {"float64"}
         kinds = {variant.kind for variant in own}
@@ -65,7 +63,7 @@ def test_the_tiny_block_is_upright_and_closed():
     assert np.einsum("ij,ij->i", np.cross(p, q), r).sum() / 6 == pytest.approx(EDGE**3, rel=1e-12)
 
 
-@pytest.mark.parametrize("option", [PLAIN, CLOCK, PROBE])
+@pytest.mark.parametrize("option", [PLAIN, PROBE])
 def test_a_variant_advances_a_body_that_is_pressed(option):
     variant = Variant(ImplicitVolume(), "whole", option=option)
     setup = setup_of(variant)

@@ -175,5 +175,5 @@ class FrameDiagnostics(NamedTuple):
     """Steps that made up for a part only of a wrong volume, (1,) int64."""
     iterations: np.ndarray
     """Iterations for the multipliers: their sum, and the most in one step, (2,) int64; 0 where they are direct."""
-    stage_times: StageTimes | None = None
-    """Where the time goes; None where it is not measured."""
+    stage_times: StageTimes
+    """Where the time goes, if it is measured."""

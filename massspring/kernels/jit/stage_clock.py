@@ -1,4 +1,4 @@
-"""A clock inside the frame loop: what each stage of a step costs. Without times `end_stage` compiles to nothing."""
+"""A clock inside the frame loop: what each stage of a step costs. Switched off, a stage costs one look at a flag."""
 
 from time import perf_counter_ns
 from typing import NamedTuple
@@ -36,11 +36,18 @@ class StageTimes(NamedTuple):
     """When the last stage ended [ns], (1,) int64."""
     ended: np.ndarray
     """How often each ended, (stages + 1,) int64."""
+    on: np.ndarray
+    """Whether anything is measured, (1,) bool."""
 
 
-def new_stage_times() -> StageTimes:
+def new_stage_times(on: bool = True) -> StageTimes:
     """Stage times at zero."""
-    return StageTimes(*(np.zeros(size, dtype=np.int64) for size in (len(STAGES) + 1, 1, len(STAGES) + 1)))
+    spent, last, ended = (np.zeros(size, dtype=np.int64) for size in (len(STAGES) + 1, 1, len(STAGES) + 1))
+    return StageTimes(spent, last, ended, np.array([on]))
+
+
+UNTIMED = new_stage_times(on=False)
+"""Of frames that are not measured."""
 
 
 @intrinsic
@@ -72,8 +79,8 @@ def _compiled_now():
 
 @njit_inlined
 def end_stage(times, stage):
-    """Books the time since the last stage ended on `stage`; nothing where `times` is None."""
-    if times is not None:
+    """Books the time since the last stage ended on `stage`; nothing where they are off."""
+    if times.on[0]:
         time = now()
         times.spent[stage] += time - times.last[0]
         times.ended[stage] += 1

@@ -75,8 +75,7 @@ class Step:
 
     def end_stage(self, stage: int) -> None:
         """Adds the time since the last stage ended to this one, if stages are timed."""
-        if self.diagnostics.stage_times is not None:
-            end_stage(self.diagnostics.stage_times, stage)
+        end_stage(self.diagnostics.stage_times, stage)
 
     def take(self, passes: int) -> None:
         """So many passes; then v⁺ = (x⁺ − x)/dt."""

@@ -18,6 +18,7 @@ from massspring.kernels.jit.stage_clock import (
     SEARCH,
     SPRINGS,
     STAGES,
+    UNTIMED,
     new_stage_times,
     now,
 )
@@ -43,7 +44,7 @@ def kept_body(row, request):
     return body_of(row[1], request)
 
 
-def run(setup, times=None):
+def run(setup, times=UNTIMED):
     """The last state, and how long the frames took [ns]."""
     state = setup.start()
     state = replace(state, diagnostics=state.diagnostics._replace(stage_times=times))
@@ -101,9 +102,9 @@ def test_stages_have_names_and_outside_is_none_of_them():
 @pytest.mark.slow
 def test_marks_run_without_the_compiler():
     program = """
-from massspring.kernels.jit.stage_clock import end_stage, new_stage_times, SPRINGS
+from massspring.kernels.jit.stage_clock import UNTIMED, end_stage, new_stage_times, SPRINGS
 times = new_stage_times()
-end_stage(None, SPRINGS)
+end_stage(UNTIMED, SPRINGS)
 end_stage(times, SPRINGS)
 end_stage(times, SPRINGS)
 assert times.ended[SPRINGS] == 2 and times.spent[SPRINGS] > 0
