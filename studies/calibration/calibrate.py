@@ -59,7 +59,7 @@ def calibrate(
     root, tried = Path(results), tuple(folds if folds is not None else folds_of(organ))
     start = starting_recipe(organ, body) if isinstance(body, str) else body
     parameters_of(start)  # refused before anything runs
-    scenes = list({scene.name: scene for fold in tried for scene in fold.scenes}.values())
+    scenes = _scenes_of(tried)
     tasks = pending(root, scenes, start)
     if tasks:
         bring_up_to_date(tasks, root, jobs, progress or Silent(), on_compile)
@@ -69,15 +69,27 @@ def calibrate(
     return found
 
 
+def _scenes_of(folds: Sequence[Fold]) -> list[Scene]:
+    """Every scene of the folds once. Raises StudyError for folds that lack one, a scene without a reference, and two
+    that share a name."""
+    if not folds or not all(fold.fitted and fold.judged for fold in folds):
+        raise StudyError("a calibration needs scenes to be fitted on and others to be judged on")
+    scenes: dict[str, Scene] = {}
+    for scene in (scene for fold in folds for scene in fold.scenes):
+        if scene.reference is None:
+            raise StudyError(f"scene '{scene.name}' has no reference to be fitted to or judged by")
+        if scenes.setdefault(scene.name, scene) != scene:
+            raise StudyError(f"two scenes of a calibration are called '{scene.name}'; rename one")
+    return list(scenes.values())
+
+
 def calibration(
     organ: str, start: BodyRecipe, folds: Sequence[Fold], runs: Measurements, progress: Progress
 ) -> Calibration:
     """A fit and its trial for every fold, and one fit on all scenes that were fitted on; not stored.
 
-    Raises StudyError for folds without scenes, and a scene in which the body ends badly before anything is fitted.
+    Raises StudyError for a scene in which the body ends badly before anything is fitted.
     """
-    if not folds or not all(fold.fitted and fold.judged for fold in folds):
-        raise StudyError("a calibration needs scenes to be fitted on and others to be judged on")
     progress.begin(FITTING, len(folds) + 1)
     trials = tuple(_trial(start, fold, runs, progress) for fold in folds)
     own = list({scene.name: scene for fold in folds for scene in fold.fitted}.values())
@@ -110,7 +122,7 @@ def _trial(start: BodyRecipe, fold: Fold, runs: Measurements, progress: Progress
     force, displacement = (_verdict(rows, quantity) for quantity in ("force", "displacement"))
     values = values_of(found.recipe, found.parameters)
     progress.advance(FITTING, " and ".join(scene.name for scene in fold.fitted))
-    return Trial(values, rows, force, displacement, tuple(_remarks(start, found, after)))
+    return Trial(values, rows, force, displacement, tuple(_remarks(start, fold, found, after)))
 
 
 def _errors(scene: Scene, fitted: bool, before: Judged, after: Judged | None) -> SceneErrors:
@@ -130,7 +142,11 @@ def _verdict(rows: Sequence[SceneErrors], quantity: str) -> Verdict | None:
     return verdict_of([pair for pair in own if pair], [pair for pair in others if pair])
 
 
-def _remarks(start: BodyRecipe, found: Fit, after: dict[str, Judged | None]) -> Iterable[str]:
+def _remarks(start: BodyRecipe, fold: Fold, found: Fit, after: dict[str, Judged | None]) -> Iterable[str]:
+    own = {scene.organ.shape for scene in fold.fitted}
+    others = dict.fromkeys(scene.organ.shape for scene in fold.judged if scene.organ.shape not in own)
+    if others:
+        yield f"judged on other organs ({', '.join(others)})"
     left = [parameter.name for parameter in parameters_of(start) if parameter not in found.parameters]
     if left:
         yield f"{' and '.join(left)} stayed: the scene compares fewer errors than the body has parameters"

@@ -12,14 +12,16 @@ from studies.metrics.wish import usual_wish
 from studies.runs.case import BodyRecipe
 from studies.scene.scene import Scene
 
-DIFFERENCE = 0.1
-"""Step of the differences in the logarithm of a parameter: above what contact adds by chance, below its curvature."""
-TOLERANCE = 1e-3
+DIFFERENCE = 0.05
+"""Step of the differences in the logarithm of a parameter: above what contact adds by chance. One-sided, so a parameter
+at the bottom of an error is known to half of it, where the error is flat."""
+TOLERANCE = 3e-3
 MOST = 15
 """Trial steps at most."""
 LOST = 1e3
 """What a run that ended badly counts, in goals: the search turns back from it."""
-NEAR_BOUND = 1.02
+NEAR_BOUND = 1.1
+"""A parameter this near to the end of its range, as a factor, ended there: the search stays inside."""
 
 Measure = Callable[[Scene, BodyRecipe], Judged | None]
 """The errors of a recipe in a scene; None where the run ended badly."""

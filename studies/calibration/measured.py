@@ -48,7 +48,7 @@ class Measurements:
 
     def __init__(self, root: Path, scenes: Iterable[Scene]) -> None:
         self.root = root
-        self.references = {scene.name: _reference(root, scene) for scene in scenes}
+        self.references: dict[str, Reference | None] = {scene.name: load_reference(root, scene) for scene in scenes}
         self.made = 0
         """Runs that were not there."""
 
@@ -73,10 +73,3 @@ class Measurements:
             run_case(self.root, STUDY, case)
             self.made += 1
         return Run(case, read_record(case_path(self.root, STUDY, case)), self.references[scene.name])
-
-
-def _reference(root: Path, scene: Scene) -> Reference:
-    found = load_reference(root, scene)
-    if found is None:
-        raise StudyError(f"scene '{scene.name}' has no reference to be fitted to or judged by")
-    return found

@@ -5,7 +5,7 @@ from textwrap import wrap
 
 from studies.calibration.parameters import parameters_of
 from studies.calibration.stored import Calibration, SceneErrors, Trial
-from studies.calibration.verdict import Compared, Verdict
+from studies.calibration.verdict import Compared, Verdict, worst
 from studies.metrics.cells import MINUS, MISSING
 
 WIDTH = 80
@@ -14,9 +14,9 @@ HEAD = (
     f"  {'scene':<14}{'':<8}{'before':>9}{'after':>8}{'±':>6}{'before':>11}{'after':>8}{'±':>6}",
 )
 SENTENCES = {
-    Verdict.HOLDS: "The fit holds: scenes that it has not seen gain at least half of what its own gain.",
-    Verdict.MEMORISES: "The fit memorises: scenes that it has not seen gain less than half of what its own gain.",
-    Verdict.UNRESOLVED: "Not resolvable: what the fit changes lies within the uncertainty of the reference.",
+    Verdict.HOLDS: "the fit holds, scenes that it has not seen gain at least half as much",
+    Verdict.MEMORISES: "the fit memorises, scenes that it has not seen gain less than half as much",
+    Verdict.UNRESOLVED: "not resolvable, the reference is too coarse for what the fit changes",
 }
 
 
@@ -26,7 +26,10 @@ def lines_of(found: Calibration) -> list[str]:
     lines = [f"{found.organ}: {start.series} body, {start.nodes:,} surface nodes", *HEAD]
     for trial in found.trials:
         lines += _trial(found, trial)
-    lines += _wrapped(SENTENCES[found.verdict], "")
+    for quantity in ("force", "displacement"):
+        told = [verdict for trial in found.trials if (verdict := getattr(trial, quantity)) is not None]
+        if told:
+            lines += _wrapped(f"{quantity}: {SENTENCES[worst(told)]}", "")
     own = " and ".join(found.fitted)
     return [*lines, *_wrapped(f"stored recipe, fitted on {own}: {_values(found, found.parameters)}", "")]
 
