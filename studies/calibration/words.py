@@ -16,7 +16,7 @@ HEAD = (
 SENTENCES = {
     Verdict.HOLDS: "the fit holds, scenes that it has not seen gain at least half as much",
     Verdict.MEMORISES: "the fit memorises, scenes that it has not seen gain less than half as much",
-    Verdict.UNRESOLVED: "not resolvable, the reference is too coarse for what the fit changes",
+    Verdict.UNRESOLVED: "not resolvable, the reference knows no finer than what the fit changes",
 }
 
 

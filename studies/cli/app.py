@@ -27,7 +27,7 @@ COMMANDS = {
             "calibrate",
             "calibrate",
             "calibrate",
-            "Fits few numbers of a body to the reference, judged in other scenes.",
+            "Fits few numbers of a body, judged in other scenes.",
         ),
         ("verify", "verify", "verify", "Holds the reference against closed forms and published numbers."),
         ("cost", "cost", "cost", "Microseconds per stage of a step, and what the scene leaves out."),
