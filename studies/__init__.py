@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from massspring.methods.xpbd import Xpbd
     from studies.advice.answer import Advice, Recommendation, advise, recommended
     from studies.base.errors import StudyError
+    from studies.calibration.calibrate import calibrate
+    from studies.calibration.stored import calibrated
     from studies.catalog import STUDIES
     from studies.catalog.study import Chart, Study
     from studies.geometry.api.organs import organ
@@ -101,6 +103,8 @@ _FACE = {
     "Tissue": "studies.scene.tissues",
     "Xpbd": "massspring.methods.xpbd",
     "advise": "studies.advice.answer",
+    "calibrate": "studies.calibration.calibrate",
+    "calibrated": "studies.calibration.stored",
     "load_runs": "studies.sweep.load",
     "measure": "studies.runs.run",
     "organ": "studies.geometry.api.organs",

@@ -23,6 +23,12 @@ COMMANDS = {
         ("replay", "replay", "replay", "Runs exactly that case again, and says whether it is the same."),
         ("publish", "publish", "publish", "Copies tables and charts to results/published, and the summary."),
         ("advise", "advise", "advise", "The cheapest recipe that is accurate enough for a scene."),
+        (
+            "calibrate",
+            "calibrate",
+            "calibrate",
+            "Fits few numbers of a body, judged in other scenes.",
+        ),
         ("verify", "verify", "verify", "Holds the reference against closed forms and published numbers."),
         ("cost", "cost", "cost", "Microseconds per stage of a step, and what the scene leaves out."),
         ("mesh", "mesh", "mesh", "Makes a mesh: of a synthetic organ, or from a file."),
