@@ -3,6 +3,7 @@
 from massspring.methods.barycentre import Barycentre
 from massspring.methods.baumgarte import Baumgarte
 from massspring.methods.element import Element
+from massspring.methods.elements.explicit_elements import ExplicitElements
 from massspring.methods.free import Free
 from massspring.methods.implicit_springs import ImplicitSprings
 from massspring.methods.implicit_volume import ImplicitVolume
@@ -31,6 +32,7 @@ METHODS: tuple[type[Method], ...] = (
     Xpbd,
     ImplicitSprings,
     SemiImplicit,
+    ExplicitElements,
 )
 
 VARIANTS: tuple[Method, ...] = (Element(hard=True), Xpbd(volumes="whole"))
