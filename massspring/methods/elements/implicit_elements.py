@@ -13,9 +13,9 @@ by Newton's method with the exact derivative of f, factored anew in every pass; 
 hold nodes as constraints C of each pass, with friction as in `implicit_springs`.
 
 Limits: linear tetrahedra lock, the more the larger K: held at both caps and pressed, a ball of 251 nodes takes 78 % too
-much force with a ratio of 50, 24 % with 10; a quadratic one of 350 nodes 19 % with 50. Long steps lose energy. Python runs once per pass. Obstacles touch nodes alone, which on
-quadratic facets are pressed unevenly. A step whose passes do not settle is counted among those with limited
-corrections.
+much force with a ratio of 50, 24 % with 10; a quadratic one of 350 nodes 19 % with 50. Long steps lose energy. Python
+runs once per pass. Obstacles touch nodes alone, which on quadratic facets are pressed unevenly. A step whose passes do
+not settle, as some with friction do, is counted among those with limited corrections.
 """
 
 from dataclasses import dataclass, replace

