@@ -17,7 +17,7 @@ BUDGETS = tuple(4 * vertices - 6 for vertices in VERTICES)
 """Nodes on its outer surface, mid-side nodes among them (Euler); of graded bodies too."""
 SHORT, LONG = 0.5, 0.8
 """Steps over the stability limit."""
-COARSE = BodyRecipe(nodes=150, law="cotangent", volumes="nodal"), BodyRecipe("quadratic", 394, contact="nodes")
+COARSE = BodyRecipe(nodes=150, law="cotangent", volumes="nodal"), BodyRecipe("quadratic", 294, contact="nodes")
 COARSE_STEPS = 0.001, 0.01
 """Bodies that implicit elements advance, and their steps [s]: a millisecond where a run takes less than a minute."""
 
