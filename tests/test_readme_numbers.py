@@ -18,8 +18,9 @@ from studies.scenes.ball_squeeze import RADIUS
 from studies.scenes.stress import STRESS_SCENES
 
 ROOT = Path(__file__).parent.parent
-WORDS = dict(zip(range(15), ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten",
-                             "eleven", "twelve", "thirteen", "fourteen"), strict=True))  # fmt: skip
+WORDS = dict(zip(range(17), ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten",
+                             "eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen"),
+                 strict=True))  # fmt: skip
 NODAL = "tetrahedral, nodal volumes"
 ONE_VOLUME = ("implicit_volume", "shake", "projection", "post_stabilization", "baumgarte", "penalty", "pressure",
               "pyramid", "xpbd whole iterations2", "implicit_springs")  # fmt: skip

@@ -3,6 +3,8 @@
 from massspring.methods.barycentre import Barycentre
 from massspring.methods.baumgarte import Baumgarte
 from massspring.methods.element import Element
+from massspring.methods.elements.explicit_elements import ExplicitElements
+from massspring.methods.elements.implicit_elements import ImplicitElements
 from massspring.methods.free import Free
 from massspring.methods.implicit_springs import ImplicitSprings
 from massspring.methods.implicit_volume import ImplicitVolume
@@ -31,6 +33,8 @@ METHODS: tuple[type[Method], ...] = (
     Xpbd,
     ImplicitSprings,
     SemiImplicit,
+    ExplicitElements,
+    ImplicitElements,
 )
 
 VARIANTS: tuple[Method, ...] = (Element(hard=True), Xpbd(volumes="whole"))

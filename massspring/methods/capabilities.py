@@ -8,9 +8,10 @@ import numpy as np
 from massspring.body.body import SAME_VOLUME, Body
 from massspring.body.points import PointVolumes
 
-Kept = Literal["none", "whole", "several", "tetrahedra", "points"]
+Kept = Literal["none", "whole", "several", "tetrahedra", "points", "elements"]
 """Volumes that a method keeps: none; the one inside the body's surface; one or several of any kind; the tissue,
-tetrahedron by tetrahedron; those over the points of quadratic elements alone."""
+tetrahedron by tetrahedron; those over the points of quadratic elements alone; those of the elements of an elastic
+solid, linear or quadratic, whose shear is in springs without length."""
 
 Correction = Literal["limited", "full", "penalty", "unbounded"]
 """How a step corrects a wrong volume. "limited": each volume moves a node by `correction_limit` at most (eq. 8.5),
@@ -48,6 +49,8 @@ class Capabilities:
     """Springs without rest length, balanced at rest by the pressure of the kept volumes."""
     point_volumes: Support = No("it has no sums over points")
     """Volumes over points of quadratic elements."""
+    facet_contact: Support = No("obstacles touch its nodes")
+    """Bodies that obstacles touch at points inside facets."""
     thin_probes: Support = No("its steps have no stage for them")
     """Thin probes, met in continuous time."""
     threads: Support = No("its steps are not divided among threads")
@@ -70,6 +73,10 @@ class Capabilities:
             )
         if isinstance(body.kept, PointVolumes) and isinstance(self.point_volumes, No):
             return f"it supports no quadratic body, {self.point_volumes.because}; take implicit_volume"
+        if len(body.contact_facets) and isinstance(self.facet_contact, No):
+            return f"it supports no contact inside facets, {self.facet_contact.because}; take contact 'nodes'"
+        if self.keeps == "elements":
+            return _why_not_elements(body)
         if self.keeps == "points":
             return _why_not_points(body)
         if self.keeps == "tetrahedra":
@@ -81,6 +88,12 @@ def _why_not_points(body: Body) -> str | None:
     if not isinstance(body.kept, PointVolumes):
         return "its springs must have no length and its volumes lie at points; take a quadratic body"
     return None if len(body.contact_facets) else "it meets obstacles inside facets, not at nodes; take contact 'facets'"
+
+
+def _why_not_elements(body: Body) -> str | None:
+    if body.rest_pressure:
+        return None
+    return "its springs must have no length; take law 'cotangent' with one volume per node, or a quadratic body"
 
 
 def _why_not_one_volume(body: Body) -> str | None:

@@ -172,7 +172,14 @@ class ImplicitVolume(Method):
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = 3e-4
     capabilities: ClassVar[Capabilities] = Capabilities(
-        "several", "limited", prestress=True, point_volumes=True, thin_probes=True, threads=True, float32=True
+        "several",
+        "limited",
+        prestress=True,
+        point_volumes=True,
+        facet_contact=True,
+        thin_probes=True,
+        threads=True,
+        float32=True,
     )
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:

@@ -45,7 +45,7 @@ class SemiImplicit(Method):
     volume_tol: ClassVar[float | None] = 3e-4
     conserves_angular_momentum: ClassVar[bool] = False
     capabilities: ClassVar[Capabilities] = Capabilities(
-        "points", "limited", conditionally_stable=False, prestress=True, point_volumes=True
+        "points", "limited", conditionally_stable=False, prestress=True, point_volumes=True, facet_contact=True
     )
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:

@@ -16,6 +16,7 @@ from reference_fem import crosscheck, equilibrium_path
 from reference_fem.crosscheck.bench import iteration_ratio
 from reference_fem.exact import BALL_BETWEEN_PLANES
 from studies.bench import meshes as geometry_bench
+from studies.bench.elements import element_lines
 from studies.bench.line import BenchLine
 from studies.bench.plain import plain_lines
 from studies.bench.slide import slide_lines
@@ -118,6 +119,7 @@ def main() -> None:
         large_lines,
         threads_lines,
         slide_lines,
+        element_lines,
         growth_lines,
         volumes_lines,
         volume_lines,

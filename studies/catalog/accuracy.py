@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Literal
 
-from massspring import ImplicitVolume
+from massspring import ExplicitElements, ImplicitElements, ImplicitVolume
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.inertia import why_inertia_matters
@@ -17,6 +17,9 @@ BUDGETS = tuple(4 * vertices - 6 for vertices in VERTICES)
 """Nodes on its outer surface, mid-side nodes among them (Euler); of graded bodies too."""
 SHORT, LONG = 0.5, 0.8
 """Steps over the stability limit."""
+COARSE = BodyRecipe(nodes=150, law="cotangent", volumes="nodal"), BodyRecipe("quadratic", 294, contact="nodes")
+COARSE_STEPS = 0.001, 0.01
+"""Bodies that implicit elements advance, and their steps [s]: a millisecond where a run takes less than a minute."""
 
 
 def judged_at_rest() -> tuple[Scene, ...]:
@@ -68,6 +71,16 @@ def quadratic_cases(scene: Scene) -> tuple[Case, ...]:
     return tuple(found)
 
 
+def element_cases(scene: Scene) -> tuple[Case, ...]:
+    """What is taken instead of mass-spring bodies: explicit elements on the larger linear body, and implicit ones on a
+    coarse linear and a coarse quadratic body, but where a lumen is filled, whose volume they do not keep."""
+    explicit = Case(scene, linear_bodies(scene)[-1], ExplicitElements(), dt_fraction=SHORT, timed=True)
+    if scene.filled:
+        return (explicit,)
+    pairs = zip(COARSE, COARSE_STEPS, strict=True)
+    return (explicit, *(Case(scene, body, ImplicitElements(), dt=dt, timed=True) for body, dt in pairs))
+
+
 def _mass(scene: Scene) -> Literal["lumped", "stiffness"]:
     return "lumped" if why_inertia_matters(scene) else "stiffness"
 
@@ -82,7 +95,11 @@ ACCURACY = Study(
     cases=tuple(
         case
         for scene in judged_at_rest()
-        for case in (*(_timed(scene, body, SHORT) for body in linear_bodies(scene)), *quadratic_cases(scene))
+        for case in (
+            *(_timed(scene, body, SHORT) for body in linear_bodies(scene)),
+            *quadratic_cases(scene),
+            *element_cases(scene),
+        )
     ),
     charts=(Chart("accuracy.png", "studies.plots.work_precision:draw"),),
     columns=(

@@ -57,14 +57,14 @@ def variants_of(method: Method) -> Iterator[Variant]:
         supported = {PROBE: thin_probes, THREADS: table.threads}
         for precision in precisions:
             yield Variant(method, kind, precision)
-            for option, yes in supported.items() if kind in OWN_TYPES else ():
+            for option, yes in supported.items() if kind in OWN_TYPES or table.keeps == "elements" else ():
                 if yes and (precision == "float64" or option == THREADS):
                     yield Variant(method, kind, precision, option)
 
 
 def _rank(method: Method) -> int:
     """The method that shares most with others comes first."""
-    return ("several", "whole", "tetrahedra", "points", "none").index(method.capabilities.keeps)
+    return ("several", "whole", "tetrahedra", "points", "elements", "none").index(method.capabilities.keeps)
 
 
 def advance(variant: Variant) -> None:

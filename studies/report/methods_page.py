@@ -26,8 +26,9 @@ momentum*: conserved to round-off in free flight.
 CAPABILITIES = """
 ## Capabilities
 
-*Keeps*: no volume; the **whole**, one volume inside the body's surface; **several** volumes of any kind; or every
-volume of the **tetrahedra**. *Correction* of a wrong volume: **limited**, a volume moves a node by a limited length in
+*Keeps*: no volume; the **whole**, one volume inside the body's surface; **several** volumes of any kind; every volume
+of the **tetrahedra**; those over the **points** of quadratic elements; or those of the **elements** of an elastic
+solid, linear or quadratic. *Correction* of a wrong volume: **limited**, a volume moves a node by a limited length in
 each step; **full**, the whole error in one step; **penalty**, by a force that the stable step bounds; **unbounded**, by
 a force that nothing bounds. *Stable*: below the stability limit, or at any step. What a method does not support it
 refuses with one sentence. Every method supports planes, spheres and capsules with friction, attachments, gravity and
@@ -41,6 +42,7 @@ OPTIONS: Mapping[str, str] = {
     "triangle_springs": "triangle springs (membranes)",
     "prestress": "springs without length",
     "point_volumes": "quadratic bodies",
+    "facet_contact": "contact inside facets",
     "thin_probes": "thin probes",
     "threads": "several threads",
     "float32": "float32",

@@ -15,9 +15,16 @@ CONTESTANTS: dict[str, Method] = {
 """Every method by default, and those with a switch the other way round."""
 KINDS = ("block", "ball", "hollow", "regions", "nodal")
 """Of bodies: fixture `kept_body`."""
-SUPPORTED = {"none": KINDS, "several": KINDS, "whole": ("block", "ball"), "tetrahedra": ("block",), "points": ()}
+SUPPORTED = {
+    "none": KINDS,
+    "several": KINDS,
+    "whole": ("block", "ball"),
+    "tetrahedra": ("block",),
+    "points": (),
+    "elements": (),
+}
 """What a method keeps -> the kinds of bodies that it can advance; test_capabilities.py holds it against `Setup`.
-Quadratic bodies have tests of their own (methods/test_quadratic_motion.py)."""
+Quadratic bodies have tests of their own (methods/test_quadratic_motion.py), and so have elements (elements)."""
 
 
 def kinds_of(method: Method) -> tuple[str, ...]:

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from massspring import Free
+from massspring import ExplicitElements, Free, ImplicitElements
 from studies.metrics.judged import front
 from studies.metrics.metrics import METRICS
 from studies.plots import work_precision as work
-from studies.plots.style.families import FAMILIES, PAPER, family_of
+from studies.plots.style.families import CONTESTANTS, FAMILIES, PAPER, family_of
 from studies.plots.style.style import BLACK, BLUE, GREY, VERMILLION
 from studies.scenes import JUDGED
 from studies.scenes.ball_clamped import BALL_CLAMPED
@@ -123,10 +123,16 @@ def test_every_scene_has_two_panels_below_one_another():
 
 
 def test_families_are_told_apart_without_colour():
-    looks = list(FAMILIES.values())
+    looks = [*FAMILIES.values(), *CONTESTANTS.values()]
     assert len({look.marker for look in looks}) == len({look.colour for look in looks}) == len(looks)
     assert family_of(LADDER[0].case).colour == BLACK and family_of(LADDER[1].case).colour == VERMILLION
     assert family_of(LADDER[3].case).colour == BLUE
+    for kind in ("tetrahedral", "quadratic"):
+        for method in (ExplicitElements(), ImplicitElements()):
+            drawn = at(0.5, 0.1, kind=kind, method=method, nodes=594)
+            look = family_of(drawn.case)
+            assert look.name.startswith(method.name.replace("_", " ")) and look.name in words(work.figure([drawn]))
+            assert len(markers(work.figure([drawn]).axes[0], look.marker)) == 1
     other = family_of(run(LIVER_PRESS, method=Free()).case)
     assert other.colour == GREY and other.name == "tetrahedral, free"
 

@@ -75,7 +75,7 @@ def volume_stiffness(body: Body, bulk_modulus: float) -> csr_array:
     return csr_array(np.sqrt(bulk_modulus / volume) * gradient.reshape(-1, 1))
 
 
-def check_modulus(method: str, name: str, value: float) -> None:
-    """Raises MassSpringError for a modulus that is not positive and finite."""
+def check_modulus(method: str, name: str, value: float, unit: str = "Pa") -> None:
+    """Raises MassSpringError for a modulus, in some unit, that is not positive and finite."""
     if not 0.0 < value < float("inf"):
-        raise MassSpringError(f"{method}'s {name} is {value} Pa; it must be positive and finite")
+        raise MassSpringError(f"{method}'s {name} is {value} {unit}; it must be positive and finite")

@@ -16,10 +16,10 @@ SLIP_RESOLUTION = 1e-11
 1e-15 to 1e-14 of it where a node sticks (measured), and friction would take its direction from that."""
 
 
-class ActiveSet:
-    """The directions that obstacles take in a step, as rows C of unit vectors at nodes, and their Schur complement."""
+class TouchedRows:
+    """The directions that obstacles take in a step, as rows C of unit vectors at nodes."""
 
-    def __init__(self, factor: Factor, nodes: Nodes, contacts: Contacts, surface_nodes: np.ndarray, dt: float) -> None:
+    def __init__(self, nodes: Nodes, contacts: Contacts, surface_nodes: np.ndarray, dt: float) -> None:
         mode = contacts.mode[surface_nodes]
         slides, on_edge, sticks = (surface_nodes[mode == kind].astype(np.int64) for kind in (SLIDES, ON_EDGE, STICKS))
         axes = np.tile(np.eye(3), (len(sticks), 1))
@@ -32,16 +32,23 @@ class ActiveSet:
         self.obstacle[second] = contacts.second[on_edge].astype(np.int64) - 1
         self.place = np.einsum("ci,ci->c", self.direction, nodes.x[self.nodes] + dt * contacts.v_target[self.nodes])
         """Where each row ends the step, along its direction [m], (c,)."""
+
+    def along(self, field: np.ndarray) -> np.ndarray:
+        """C u, (c,)."""
+        return np.einsum("ci,ci->c", self.direction, field[self.nodes])
+
+
+class ActiveSet(TouchedRows):
+    """The rows of the moment and their Schur complement, where the components of a response do not couple."""
+
+    def __init__(self, factor: Factor, nodes: Nodes, contacts: Contacts, surface_nodes: np.ndarray, dt: float) -> None:
+        super().__init__(nodes, contacts, surface_nodes, dt)
         if len(self.nodes):
             self._columns = factor.columns(self.nodes)
             schur = self._columns[:, self.nodes] * (self.direction @ self.direction.T)
             self._root, broken = FACTORED(schur, clean=0)
             if broken:  # C A⁻¹ Cᵀ is positive definite unless numbers are lost: then the run must end
                 self._root[:] = np.nan
-
-    def along(self, field: np.ndarray) -> np.ndarray:
-        """C u, (c,)."""
-        return np.einsum("ci,ci->c", self.direction, field[self.nodes])
 
     def impulses(self, missing: np.ndarray) -> np.ndarray:
         """γ = (C A⁻¹ Cᵀ)⁻¹ `missing` [kg m], (c,): what moves the rows by `missing` [m] (eq. 12.3)."""
@@ -61,15 +68,26 @@ class ActiveSet:
 class Contact:
     """The touched nodes of one step on their way to an active set."""
 
-    def __init__(self, model: Model, nodes: Nodes, contacts: Contacts, boundary: BoundaryConditions, step: int) -> None:
+    def __init__(
+        self,
+        model: Model,
+        nodes: Nodes,
+        contacts: Contacts,
+        boundary: BoundaryConditions,
+        step: int,
+        closer: float = 0.0,
+    ) -> None:
+        """`closer` [m]: obstacles reach so much farther at first, to find nodes that lie on them but for round-off."""
         self.model, self.nodes, self.contacts = model, nodes, contacts
         self.boundary, self.step = boundary, step
         self.friction_impulse = np.zeros_like(nodes.x)
         """Friction of the nodes that slip, times dt² [kg m], (n, 3)."""
         release_all(contacts)
+        self.boundary = _nearer(boundary, closer) if closer else boundary
         self._activate(np.empty(0, dtype=np.int64), nodes.v)
+        self.boundary = boundary
 
-    def revise(self, end: np.ndarray, active: ActiveSet, impulses: np.ndarray) -> bool:
+    def revise(self, end: np.ndarray, active: TouchedRows, impulses: np.ndarray) -> bool:
         """Releases nodes that an obstacle would pull, activates those that would enter one, and lets slip those that
         would stick too hard; whether any was (eq. 3.8, 12.4)."""
         contacts, nodes = self.contacts, active.nodes
@@ -101,25 +119,46 @@ class Contact:
         contacts.v_target[nodes] = np.einsum("ci,ci->c", normal, contacts.v_target[nodes])[:, None] * normal
         return len(nodes)
 
-    def apply_friction(self, end: np.ndarray, active: ActiveSet, impulses: np.ndarray) -> bool:
+    def apply_friction(self, end: np.ndarray, active: TouchedRows, impulses: np.ndarray) -> bool:
         """Friction against the slip of the last pass; a node that it would drive sticks: whether one does
         (eq. 12.4)."""
-        contacts, boundary = self.contacts, self.boundary
+        boundary = self.boundary
         if not boundary.rough:
             return False
-        slides = (contacts.mode[active.nodes] == SLIDES) & (boundary.friction[active.obstacle] > 0.0)
+        slides = self.rubbed(active)
         nodes, obstacle = active.nodes[slides], active.obstacle[slides]
-        normal, carried = contacts.normal[nodes], boundary.velocity[self.step][obstacle]
-        slip = _aside((end[nodes] - self.nodes.x[nodes]) / boundary.dt - carried, normal)
+        slip, carried = self.slip(end, nodes), boundary.velocity[self.step][obstacle]
         speed = np.linalg.norm(slip, axis=1)
         still = speed * boundary.dt <= SLIP_RESOLUTION * self.model.correction_limit
         driven = still | (np.einsum("ci,ci->c", slip, self.friction_impulse[nodes]) > 0.0)
         most = boundary.friction[obstacle] * np.maximum(impulses[slides], 0.0)
         self.friction_impulse[nodes[~driven]] = -(most[~driven] / speed[~driven])[:, None] * slip[~driven]
-        self._stick(nodes[driven], carried[driven])
+        self.stick(nodes[driven], carried[driven])
         return bool(driven.any())
 
-    def _stick(self, nodes: np.ndarray, carried: np.ndarray) -> None:
+    def book(self, active: TouchedRows, impulses: np.ndarray, given: np.ndarray) -> None:
+        """Adds what obstacles give, impulses [N s], to `given` (o, 3)."""
+        np.add.at(given, active.obstacle, impulses[:, None] / self.boundary.dt * active.direction)
+        if self.boundary.rough:
+            slipping = np.flatnonzero(self.friction_impulse.any(axis=1))
+            obstacle = self.contacts.contact_id[slipping].astype(np.int64) - 1
+            np.add.at(given, obstacle, self.friction_impulse[slipping] / self.boundary.dt)
+
+    def meet(self, nodes: np.ndarray, carried: np.ndarray) -> None:
+        """Nodes that come to a rough obstacle stick at first."""
+        self.stick(nodes, carried)
+
+    def rubbed(self, active: TouchedRows) -> np.ndarray:
+        """Which rows are those of nodes that slide on a rough obstacle, (c,) bool."""
+        return (self.contacts.mode[active.nodes] == SLIDES) & (self.boundary.friction[active.obstacle] > 0.0)
+
+    def slip(self, end: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+        """Speed of touched `nodes` (c,) past their obstacles in a step that ends at `end` (n, 3) [m/s], (c, 3)."""
+        contacts, boundary = self.contacts, self.boundary
+        carried = boundary.velocity[self.step][contacts.contact_id[nodes].astype(np.int64) - 1]
+        return _aside((end[nodes] - self.nodes.x[nodes]) / boundary.dt - carried, contacts.normal[nodes])
+
+    def stick(self, nodes: np.ndarray, carried: np.ndarray) -> None:
         """Nodes move along with what they touch, `carried` [m/s]."""
         contacts = self.contacts
         contacts.mode[nodes] = STICKS
@@ -140,11 +179,17 @@ class Contact:
             new = contacts.entering[:count].astype(np.int64)
             obstacle = contacts.contact_id[new].astype(np.int64) - 1
             rough = boundary.friction[obstacle] > 0.0
-            self._stick(new[rough], boundary.velocity[self.step][obstacle[rough]])
+            self.meet(new[rough], boundary.velocity[self.step][obstacle[rough]])
         if len(boundary.radius) > 1:
             count += activate_edges(self.model, self.nodes, contacts, boundary, self.step, unpushed)
             self.friction_impulse[contacts.mode == ON_EDGE] = 0.0
         return count
+
+
+def _nearer(boundary: BoundaryConditions, length: float) -> BoundaryConditions:
+    """Planes moved by `length` [m] towards the body, round obstacles thicker by it."""
+    position = boundary.position + np.where(boundary.is_plane[:, None], length * boundary.plane_normal, 0.0)
+    return boundary._replace(position=position, radius=np.where(boundary.is_plane, 0.0, boundary.radius + length))
 
 
 def _aside(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:

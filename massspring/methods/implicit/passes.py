@@ -213,14 +213,8 @@ class Step:
 
     def book(self, active: ActiveSet, impulses: np.ndarray) -> None:
         """Impulses of obstacles and attachments [N s] (eq. 3.6)."""
-        nodes, contacts, net, dt = self.nodes, self.contacts, self.model, self.boundary.dt
-        given = self.diagnostics.contact_impulse
-        np.add.at(given, active.obstacle, impulses[:, None] / dt * active.direction)
-        if self.boundary.rough:
-            slipping = np.flatnonzero(self.contact.friction_impulse.any(axis=1))
-            np.add.at(
-                given, contacts.contact_id[slipping].astype(np.int64) - 1, self.contact.friction_impulse[slipping] / dt
-            )
+        nodes, net, dt = self.nodes, self.model, self.boundary.dt
+        self.contact.book(active, impulses, self.diagnostics.contact_impulse)
         spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, nodes.force)
         push = Push(self.pushed(self.rows.lam), 1.0)
         add_held_impulse(net, nodes, push, dt, self.boundary.gravity, self.diagnostics.held_impulse)

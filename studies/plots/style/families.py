@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
+from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, MUTED, ORANGE, PURPLE, SKY, VERMILLION, YELLOW
 from studies.runs.case import Case
 
 PAPER = "the paper's body"
@@ -27,13 +27,23 @@ FAMILIES: dict[tuple[str, bool, str], Family] = {
     ("tetrahedral", True, "scene"): Family("tetrahedra, graded", GREEN, "v"),
 }
 """By kind of body, whether it is graded, and its volumes; colours by Okabe and Ito, no two markers alike."""
+CONTESTANTS: dict[tuple[str, str], Family] = {
+    ("explicit_elements", "tetrahedral"): Family("explicit elements, linear", MUTED[7], "<"),
+    ("explicit_elements", "quadratic"): Family("explicit elements, quadratic", MUTED[2], ">"),
+    ("implicit_elements", "tetrahedral"): Family("implicit elements, linear", YELLOW, "p"),
+    ("implicit_elements", "quadratic"): Family("implicit elements, quadratic", MUTED[1], "h"),
+}
+"""What is taken instead of mass-spring bodies, by method and kind of body."""
 WHOLE = "implicit_volume"
 """The method that needs no name."""
 
 
 def family_of(case: Case) -> Family:
-    """The family of a case; a body or a method that is none of the ladder is grey, under its own name."""
+    """The family of a case; what belongs neither to the ladder nor to the elements is grey, under its own name."""
     body = case.body
+    element = CONTESTANTS.get((case.method.name, body.kind))
+    if element is not None:
+        return element
     known = FAMILIES.get((body.kind, body.graded, body.volumes))
     if known is not None and case.method.name == WHOLE:
         return known

@@ -33,7 +33,9 @@ GREY, LIGHT, PALE = "#5A5A5A", "#B5B5B5", "#E4E4E4"
 METHOD_COLOURS = {"free": VERMILLION, "implicit_volume": BLUE}
 # Then the muted scheme of P. Tol, "Colour schemes", 2021.
 MUTED = ("#332288", "#999933", "#882255", "#44AA99", "#DDCC77", "#AA4499", "#117733", "#661100", "#88CCEE", "#CC6677")
-OTHER_METHODS = (GREEN, PURPLE, ORANGE, SKY, *MUTED)
+# And pear, light blue and olive of his light scheme, for the methods that came last.
+LIGHT_SCHEME = ("#BBCC33", "#77AADD", "#AAAA00")
+OTHER_METHODS = (GREEN, PURPLE, ORANGE, SKY, *MUTED, *LIGHT_SCHEME)
 BODY_LOOKS: dict[str, tuple[LineStyleType, str]] = {
     "tetrahedral": ("-", "o"),
     "surface": ((0, (4, 1.6)), "s"),

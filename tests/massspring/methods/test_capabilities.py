@@ -35,15 +35,16 @@ EACH = pytest.mark.parametrize("method", CONTESTANTS.values(), ids=CONTESTANTS.k
 MANY, NO_TETRAHEDRA = "it keeps one volume, the body keeps", "the body has none; fill its mesh"
 SHARE, LUMEN = "the body keeps a share of it", "the body keeps a lumen too"
 POINTS = "its volumes lie at points; take a quadratic body"
+ELASTIC = {"points": POINTS, "elements": "its springs must have no length"}
 REFUSED = {
-    "block": {"points": POINTS},
-    "ball": {"tetrahedra": NO_TETRAHEDRA, "points": POINTS},
-    "hollow": {"whole": MANY, "tetrahedra": MANY, "points": POINTS},
-    "regions": {"whole": MANY, "tetrahedra": MANY, "points": POINTS},
-    "nodal": {"whole": MANY, "tetrahedra": MANY, "points": POINTS},
-    "lumen": {"tetrahedra": LUMEN, "points": POINTS},
-    "share": {"whole": SHARE, "tetrahedra": SHARE, "points": POINTS},
-    "membrane": {"tetrahedra": NO_TETRAHEDRA, "points": POINTS},
+    "block": {**ELASTIC},
+    "ball": {"tetrahedra": NO_TETRAHEDRA, **ELASTIC},
+    "hollow": {"whole": MANY, "tetrahedra": MANY, **ELASTIC},
+    "regions": {"whole": MANY, "tetrahedra": MANY, **ELASTIC},
+    "nodal": {"whole": MANY, "tetrahedra": MANY, **ELASTIC},
+    "lumen": {"tetrahedra": LUMEN, **ELASTIC},
+    "share": {"whole": SHARE, "tetrahedra": SHARE, **ELASTIC},
+    "membrane": {"tetrahedra": NO_TETRAHEDRA, **ELASTIC},
     "prestressed": {"whole": "", "tetrahedra": "", "points": POINTS},
     "quadratic": {},
 }
@@ -51,7 +52,7 @@ REFUSED = {
 NEEDED = {
     "membrane": ("triangle_springs",),
     "prestressed": ("prestress",),
-    "quadratic": ("prestress", "point_volumes"),
+    "quadratic": ("prestress", "point_volumes", "facet_contact"),
 }
 """Kind of body -> the capabilities that it needs, in the order in which they are asked for."""
 
@@ -89,7 +90,8 @@ def body_of_any(kind, request):
 
 def block_for(method, request):
     """A block that the method advances."""
-    return body_of_any("quadratic" if method.capabilities.keeps == "points" else "block", request)
+    kinds = {"points": "quadratic", "elements": "prestressed"}
+    return body_of_any(kinds.get(method.capabilities.keeps, "block"), request)
 
 
 def runs(setup) -> bool:

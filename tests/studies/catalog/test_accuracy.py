@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from massspring import ImplicitVolume
 from studies.catalog import STUDIES
 from studies.catalog.accuracy import ACCURACY, can_be_graded, headline, judged_at_rest
 from studies.catalog.work_precision import WORK_PRECISION
@@ -57,10 +58,24 @@ def test_the_headline_has_half_its_step_and_a_finer_body(scene):
 
 @pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)
 def test_masses_and_contact_vary_where_the_scene_allows_it(scene):
-    quadratic = [case.body for case in of(scene) if case.body.kind == "quadratic"]
+    springs = [case.body for case in of(scene) if case.method == ImplicitVolume()]
+    quadratic = [body for body in springs if body.kind == "quadratic"]
     masses = {"lumped"} if why_inertia_matters(scene) else {"lumped", "stiffness"}
     assert {body.mass for body in quadratic} == masses
     assert {body.contact for body in quadratic} == ({"facets", "nodes"} if scene.obstacles else {"facets"})
+
+
+@pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)
+def test_elements_run_beside_the_springs(scene):
+    """Explicit ones on the larger linear body; implicit ones on coarse bodies, a linear one in steps of 1 ms, where no
+    lumen is filled."""
+    elements = [case for case in of(scene) if case.method != ImplicitVolume()]
+    explicit = [case.body for case in elements if case.method.name == "explicit_elements"]
+    implicit = {case.body.kind: case.dt for case in elements if case.method.name == "implicit_elements"}
+    linear = [case.body for case in of(scene) if case.body.volumes == "nodal"]
+    assert [body.nodes for body in explicit] == [max(body.nodes for body in linear)]
+    assert set(implicit) == (set() if scene.filled else {"tetrahedral", "quadratic"})
+    assert implicit.get("tetrahedral", 0.001) == 0.001 and len(elements) == 1 + len(implicit)
 
 
 def test_the_small_cut_holds_cases_of_the_campaign():

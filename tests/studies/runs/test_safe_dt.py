@@ -16,11 +16,17 @@ from tests.studies.tiny import tiny_case
 
 UNLIMITED = [method for method in METHODS if not method().capabilities.conditionally_stable]
 SHORT = replace(BALL_SQUEEZE, reference=None, duration=1.0, checkpoints=(1.0,))
+RECIPES = {"points": BodyRecipe("quadratic", 594), "elements": BodyRecipe(nodes=60, law="cotangent", volumes="nodal")}
+
+
+def recipe_for(method):
+    """A small body that the method advances."""
+    return RECIPES.get(method.capabilities.keeps, BodyRecipe("tetrahedral", 60))
 
 
 @pytest.mark.parametrize("method", [m for m in METHODS if m not in UNLIMITED], ids=lambda method: method.name)
 def test_below_holds_and_above_breaks(method):
-    found = safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60), method()))
+    found = safe_step(Case(SHORT, recipe_for(method), method()))
     if method is Xpbd:
         # The volumes of all cells take the stiffest modes away: the limit is longer than that of the springs.
         assert found.bracket is not None and found.limit.damped < found.bracket[1] and found.tried[0][1] == Status.OK
@@ -37,8 +43,7 @@ def test_below_holds_and_above_breaks(method):
 @pytest.mark.parametrize("method", UNLIMITED, ids=lambda method: method.name)
 def test_a_method_without_a_limit_says_so(method):
     """Twenty times the explicit limit, and the run holds; a claim that fails is found out."""
-    recipe = BodyRecipe("quadratic", 594) if method.capabilities.keeps == "points" else BodyRecipe("tetrahedral", 60)
-    found = safe_step(Case(SHORT, recipe, method()))
+    found = safe_step(Case(SHORT, recipe_for(method), method()))
     assert found.verified and "no stability limit" in found.verdict and "accuracy" in found.verdict
     assert found.tried[-1][0] > 15 * found.limit.damped
     assert not replace(found, tried=((0.1, Status.DIVERGED),)).verified

@@ -1,0 +1,237 @@
+"""One step of backward Euler for elastic elements: Newton passes with contact and friction inside (eq. 13.4–13.7)."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from massspring.body.body import Body
+from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Nodes, Push
+from massspring.kernels.forces.elements import Elements, add_element_stiffness, element_energy, element_forces_into
+from massspring.kernels.forces.springs import spring_energy, spring_forces_into
+from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, REVISION, SPRINGS, end_stage
+from massspring.kernels.step.attachments import add_held_impulse
+from massspring.layout.state import State
+from massspring.methods.elements.friction import RubbedContact
+from massspring.methods.elements.tangent import Pattern, Tangent, wanted_of
+from massspring.methods.implicit.contact import TouchedRows
+
+REVISIONS = 12
+"""Of the touched set in one pass; where nodes still come and go, the next pass goes on."""
+SUFFICIENT = 1e-4
+"""Of the decrease that the slope promises (Armijo)."""
+SHORTEST = 2.0**-10
+"""Part of a pass's motion that is taken at least."""
+TOUCHING = 1e-9
+"""Of the longest correction, 0.3 of an edge: a node this near to an obstacle begins a step on it."""
+ROUND_OFF = 1e-13
+"""Of the largest term of a potential."""
+
+
+class Rows(TouchedRows):
+    """The touched directions and their Schur complement with the tangent of a pass, C T⁻¹ Cᵀ."""
+
+    def __init__(self, tangent: Tangent, nodes: Nodes, contacts: Contacts, surface: np.ndarray, dt: float) -> None:
+        super().__init__(nodes, contacts, surface, dt)
+        if len(self.nodes):
+            self._columns = tangent.columns(self.nodes, self.direction)
+            self._lu = lu_factor(
+                np.einsum("cri,ri->rc", self._columns[:, self.nodes], self.direction), check_finite=False
+            )
+
+    def impulses(self, missing: np.ndarray) -> np.ndarray:
+        """γ = (C T⁻¹ Cᵀ)⁻¹ `missing` [kg m], (c,); T alone may be indefinite where obstacles press."""
+        return lu_solve(self._lu, missing, check_finite=False) if len(self.nodes) else missing
+
+    def moved_by(self, impulses: np.ndarray) -> np.ndarray:
+        """T⁻¹ Cᵀ γ [m], (n, 3)."""
+        return np.tensordot(impulses, self._columns, 1)
+
+    def pushes(self, impulses: np.ndarray, like: np.ndarray) -> np.ndarray:
+        """Cᵀ γ [kg m], in the shape of `like` (n, 3)."""
+        found = np.zeros_like(like)
+        np.add.at(found, self.nodes, impulses[:, None] * self.direction)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What a run makes once."""
+
+    body: Body
+    elements: Elements
+    pattern: Pattern
+    known: dict[tuple[float, float], np.ndarray]
+    """Step and damping -> data of the constant part of the tangent."""
+
+    def constant(self, state: State, boundary: BoundaryConditions) -> np.ndarray:
+        """Data of (1 + c dt) M + dt² K [kg]."""
+        key = boundary.dt, boundary.damping
+        if key not in self.known:
+            self.known[key] = self.pattern.constant(state.model, *key)
+        return self.known[key]
+
+    def resistance(self, state: State, boundary: BoundaryConditions) -> np.ndarray:
+        """The diagonal of that part [kg], (n,), 0 where held."""
+        found = np.zeros(len(state.model.mass))
+        found[self.pattern.free] = self.constant(state, boundary)[self.pattern.diagonal]
+        return found
+
+
+class Ending(NamedTuple):
+    """When the passes of a step end."""
+
+    tolerance: float
+    """Largest motion of a pass after which none is made [m]."""
+    most: int
+
+
+class NewtonStep:
+    """One step in the making."""
+
+    def __init__(self, state: State, boundary: BoundaryConditions, step: int) -> None:
+        self.state, self.boundary = state, boundary
+        self.model, self.nodes, self.contacts = state.model, state.nodes, state.contacts
+        self.prepared: Prepared = state.memory
+        filling = boundary.volume_target[step] / self.prepared.body.rest_volumes
+        self.elements = with_targets(self.prepared, filling)
+        self.weight = self.prepared.body.mass[:, None] * boundary.gravity
+        """m g of all nodes [N], (n, 3)."""
+        # Without gravity: a body at rest begins where it ends.
+        self.p = self.nodes.x + boundary.dt * self.nodes.v
+        held = self.model.held_nodes
+        self.p[held] = self.model.held_rest + boundary.held_displacement[step][self.model.held_group]
+        closer = TOUCHING * self.model.correction_limit
+        self.contact = RubbedContact(self.model, self.nodes, self.contacts, boundary, step, closer)
+        self.contact.resistance = self.prepared.resistance(state, boundary)
+        self.force, self.right = np.zeros_like(self.p), np.zeros_like(self.p)
+        self.rough = boundary.rough
+
+    def end_stage(self, stage: int) -> None:
+        """Adds the time since the last stage ended to this one, if stages are timed."""
+        if self.state.diagnostics.stage_times is not None:
+            end_stage(self.state.diagnostics.stage_times, stage)
+
+    def take(self, ending: Ending) -> None:
+        """Passes until the last one moves nothing any more; then v⁺ = (x⁺ − x)/dt."""
+        boundary, diagnostics = self.boundary, self.state.diagnostics
+        rows, impulses, count, settled = None, np.zeros(0), 0, False
+        while not settled and count < ending.most and np.isfinite(self.p).all():
+            if rows is not None:
+                self.contact.apply_friction(self.p, rows, impulses)
+            self.right = self.imbalance()
+            change, rows, impulses, agreed = self.newton_pass()
+            part = self.part_of(change, self.given(rows, impulses))
+            self.p += part * change
+            settled = agreed and part == 1.0 and not np.abs(change).max() > ending.tolerance
+            count += 1
+            self.end_stage(MULTIPLIER)
+        diagnostics.iterations[0] += count
+        diagnostics.iterations[1] = max(int(diagnostics.iterations[1]), count)
+        diagnostics.limited[0] += not settled
+        if rows is not None:
+            self.contact.book(rows, impulses, diagnostics.contact_impulse)
+        self.book_held()
+        self.nodes.v[:] = (self.p - self.nodes.x) / boundary.dt
+        self.nodes.x[:] = self.p
+        self.end_stage(INTEGRATION)
+
+    def newton_pass(self) -> tuple[np.ndarray, Rows, np.ndarray, bool]:
+        """(δ [m], touched rows, their impulses γ [kg m], whether obstacles agree) of one linear step from p."""
+        for exact in (True, False):
+            change, rows, impulses, agreed = self.linear_step(self.tangent(exact))
+            if float(np.vdot(self.right + self.given(rows, impulses), change)) >= 0.0:
+                break
+        return change, rows, impulses, agreed
+
+    def given(self, rows: Rows, impulses: np.ndarray) -> np.ndarray:
+        """What obstacles give [kg m], (n, 3)."""
+        return rows.pushes(impulses, self.p) + self.contact.friction_impulse
+
+    def linear_step(self, tangent: Tangent) -> tuple[np.ndarray, Rows, np.ndarray, bool]:
+        """The same with a tangent that need not be positive."""
+        free = tangent.respond(self.right)
+        self.end_stage(SPRINGS)
+        obstacles = len(self.boundary.radius) > 0
+        agreed = not obstacles
+        for revision in range(REVISIONS):
+            rows = Rows(tangent, self.nodes, self.contacts, self.model.surface_nodes, self.boundary.dt)
+            change, impulses = self.past_obstacles(free, tangent, rows)
+            if agreed or revision + 1 == REVISIONS:
+                break
+            agreed = not self.contact.revise(self.p + change, rows, impulses)
+            if agreed:
+                break
+        self.end_stage(REVISION)
+        return change, rows, impulses, agreed
+
+    def tangent(self, exact: bool) -> Tangent:
+        """T at p with what friction resists; not `exact`: without what the pressure turns, so that it is positive."""
+        pattern, data = self.prepared.pattern, self.prepared.constant(self.state, self.boundary).copy()
+        add_element_stiffness(self.elements, pattern.places, self.p, self.boundary.dt**2, exact, data)
+        if self.rough:
+            pattern.add_at_nodes(data, *self.contact.stiffness(self.p))
+        return Tangent(pattern, data)
+
+    def past_obstacles(self, free: np.ndarray, tangent: Tangent, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+        """(δ [m], γ [kg m]): the linear step with friction that ends on the obstacles."""
+        if self.rough and self.contact.friction_impulse.any():
+            free = free + tangent.respond(self.contact.friction_impulse)
+        if not len(rows.nodes):
+            return free, np.zeros(0)
+        impulses = rows.impulses(rows.place - rows.along(self.p + free))
+        return free + rows.moved_by(impulses), impulses
+
+    def imbalance(self) -> np.ndarray:
+        """dt M v + dt² (f(p) + m g) − (1 + c dt) M (p − x) [kg m], (n, 3), 0 where held (eq. 13.6)."""
+        model, nodes, dt = self.model, self.nodes, self.boundary.dt
+        spring_forces_into(self.p, model.ends, model.rest_length, model.stiffness, nodes.force)
+        self.idle = element_forces_into(self.elements, self.p, self.force)
+        moved = (1.0 + self.boundary.damping * dt) * (self.p - self.nodes.x)
+        right = model.mass[:, None] * (dt * nodes.v - moved) + dt * dt * (nodes.force + self.force + self.weight)
+        right[model.held_nodes] = 0.0
+        return right
+
+    def potential(self, p: np.ndarray) -> tuple[float, float]:
+        """What the step makes smallest [kg m²], whose slope is minus the imbalance, and the size of its terms."""
+        model, dt, moved = self.model, self.boundary.dt, p - self.nodes.x
+        mass = model.mass[:, None]
+        inertia = 0.5 * (1.0 + self.boundary.damping * dt) * float((mass * moved * moved).sum())
+        known = float((moved * (dt * mass * self.nodes.v + dt * dt * self.weight)).sum())
+        springs = dt * dt * float(spring_energy(p, model.ends, model.rest_length, model.stiffness))
+        volumes = dt * dt * float(element_energy(self.elements, p))
+        return inertia - known + springs + volumes, inertia + abs(known) + abs(springs) + abs(volumes)
+
+    def part_of(self, change: np.ndarray, given: np.ndarray) -> float:
+        """How much of a linear step is taken, 1, ½, …: the potential less what obstacles give must fall (eq. 13.7)."""
+        begun, size = self.potential(self.p)
+        slope = float(np.vdot(self.right + given, change))
+        part = 1.0
+        while part > SHORTEST:
+            gained = self.potential(self.p + part * change)[0] - begun - part * float(np.vdot(given, change))
+            if not gained > -SUFFICIENT * part * slope + ROUND_OFF * size:
+                break
+            part *= 0.5
+        return part
+
+    def book_held(self) -> None:
+        """Impulses of attachments [N s] at the end of the step (eq. 3.6), and whether a volume had no gradient."""
+        self.imbalance()
+        model, nodes, diagnostics = self.model, self.nodes, self.state.diagnostics
+        diagnostics.singular[0] += self.idle
+        # Weight is that of the mass, whatever resists motion.
+        nodes.force[:] += self.weight - model.mass[:, None] * self.boundary.gravity
+        push = Push(self.force, 1.0)
+        add_held_impulse(model, nodes, push, self.boundary.dt, self.boundary.gravity, diagnostics.held_impulse)
+        self.end_stage(HELD)
+
+
+def with_targets(prepared: Prepared, filling: np.ndarray) -> Elements:
+    """The elements with what the kept volumes want of their rest volumes, (m,)."""
+    return prepared.elements._replace(wanted=wanted_of(prepared.body, filling))
+
+
+def missing(prepared: Prepared, x: np.ndarray, filling: np.ndarray) -> np.ndarray:
+    """What the elements around each kept volume lack of what they should have, over their rest volume [1], (m,)."""
+    return filling - prepared.body.kept.measure(x) / prepared.body.rest_volumes
