@@ -88,8 +88,7 @@ class ImplicitElements(Method):
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
         after = begin_frame(state, boundary)
-        if after.diagnostics.stage_times is not None:
-            end_stage(after.diagnostics.stage_times, BETWEEN_FRAMES)
+        end_stage(after.diagnostics.stage_times, BETWEEN_FRAMES)
         prepared: Prepared = after.memory
         ending = Ending(self.tolerance * after.model.correction_limit / CORRECTION_LIMIT, self.most_passes)
         for step in range(len(boundary.position)):

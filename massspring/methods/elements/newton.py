@@ -110,8 +110,7 @@ class NewtonStep:
 
     def end_stage(self, stage: int) -> None:
         """Adds the time since the last stage ended to this one, if stages are timed."""
-        if self.state.diagnostics.stage_times is not None:
-            end_stage(self.state.diagnostics.stage_times, stage)
+        end_stage(self.state.diagnostics.stage_times, stage)
 
     def take(self, ending: Ending) -> None:
         """Passes until the last one moves nothing any more; then v⁺ = (x⁺ − x)/dt."""
