@@ -7,6 +7,7 @@ import numpy as np
 from massspring.body.axis import closest_virtual_node, virtual_nodes
 from massspring.body.body import Body, Material, check_positive
 from massspring.body.laws import Edges, laws_by_name
+from massspring.body.smoothed import SMOOTHED
 from massspring.body.springs import (
     EDGES_OF_TRIANGLE,
     SpringKind,
@@ -32,27 +33,35 @@ def tetrahedral_body(
     """Springs on the edges of a tetrahedral mesh.
 
     `points` (n, 3) [m]; `triangles` (f, 3), its boundary, outward; `tetrahedra` (k, 4), positive; `law` one of
-    `massspring.body.laws.LAWS`. "cotangent" needs one volume per node: `body.keeping(Volumes.nodal(body))`.
+    `massspring.body.laws.LAWS` or of `smoothed.SMOOTHED`. Those without rest length need one volume per node:
+    `body.keeping(Volumes.nodal(body))`.
     Raises MassSpringError.
     """
     tetrahedra = np.ascontiguousarray(tetrahedra, dtype=np.uint32)
     triangles = np.ascontiguousarray(triangles, dtype=np.uint32)
     points = np.ascontiguousarray(points, dtype=np.float64)
-    laws = laws_by_name()
-    if law not in laws:
-        raise MassSpringError(f"unknown stiffness law '{law}'; known: {', '.join(laws)}")
     edges = Edges(points, tetrahedra)
     check_positive(edges.volumes)
+    springs, taut = _springs_of(law, edges, material.shear_modulus)
     corner = np.repeat(edges.volumes, 4)
     mass = np.bincount(tetrahedra.ravel(), weights=corner, minlength=len(points)) * material.density / 4.0
-    springs = Springs(
-        np.ascontiguousarray(edges.ends, dtype=np.uint32),
-        edges.length if laws[law].rest_length else np.zeros_like(edges.length),
-        laws[law].stiffness(edges, material.shear_modulus),
-        np.full(len(edges.ends), SpringKind.SOLID, dtype=np.uint8),
-    )
-    pressure = 0.0 if laws[law].rest_length else material.shear_modulus
+    pressure = material.shear_modulus if taut else 0.0
     return Body(points, mass, springs, triangles, tetrahedra, law, rest_pressure=pressure)
+
+
+def _springs_of(law: str, edges: Edges, mu: float) -> tuple[Springs, bool]:
+    """The springs of a stiffness law, and whether they are taut at rest, without length."""
+    laws = laws_by_name()
+    if law not in (*laws, *SMOOTHED):
+        raise MassSpringError(f"unknown stiffness law '{law}'; known: {', '.join((*laws, *SMOOTHED))}")
+    if law in SMOOTHED:
+        ends, stiffness = SMOOTHED[law](edges, mu)
+    else:
+        ends, stiffness = edges.ends, laws[law].stiffness(edges, mu)
+    taut = law in SMOOTHED or not laws[law].rest_length
+    length = np.zeros(len(ends)) if taut else edges.length
+    kind = np.full(len(ends), SpringKind.SOLID, dtype=np.uint8)
+    return Springs(np.ascontiguousarray(ends, dtype=np.uint32), length, stiffness, kind), taut
 
 
 def surface_body(

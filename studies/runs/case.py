@@ -11,6 +11,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 from massspring import METHODS, ImplicitVolume, Method
 from massspring.body.laws import laws_by_name
 from massspring.body.membranes import MEMBRANE_LAWS
+from massspring.body.smoothed import SMOOTHED
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.runs.case_checks import check_recipe, check_settings
@@ -32,7 +33,7 @@ class BodyRecipe:
     """Nodes on the outer surface; of a quadratic body mid-side nodes too, so that it has a quarter of them as vertices,
     and of a graded one those that grading adds (within 5 %)."""
     law: str = "van_gelder"
-    """Stiffness law: of a tetrahedral body one of LAWS, where "cotangent", springs without length, needs nodal volumes;
+    """Stiffness law: of a tetrahedral body of LAWS or SMOOTHED, where springs without length need nodal volumes;
     of a membrane "delingette" or "lloyd"."""
     stiffness: float = 1.0
     """Factor on every spring; 1 matches the tissue's shear modulus."""
@@ -56,7 +57,7 @@ class BodyRecipe:
     """Where obstacles touch a quadratic body: at points inside its facets, or at its nodes, which is cheaper."""
 
     def __post_init__(self) -> None:
-        lookup(self.law, (*laws_by_name(), *MEMBRANE_LAWS), "stiffness law")
+        lookup(self.law, (*laws_by_name(), *SMOOTHED, *MEMBRANE_LAWS), "stiffness law")
         check_recipe(self)
 
     @property

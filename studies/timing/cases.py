@@ -19,8 +19,8 @@ from studies.store.staleness import is_current
 from studies.timing.protocol import FrameTiming, interleave, pinned
 from studies.timing.stage_cost import ROWS, stage_times
 
-REPEATS, FEWEST = 5, 2
-BUDGET = 10.0
+REPEATS, FEWEST = 5, 1
+BUDGET = 6.0
 """Of the repeats of a case [s]: a run of some seconds holds thousands of steps, and is repeated less often."""
 WARM_UP = 1.0
 """Of a run before anything is measured, at most [s]: it compiles what the case needs."""
