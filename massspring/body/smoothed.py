@@ -2,7 +2,7 @@
 
 Liu, Nguyen-Thoi (2010), Smoothed finite element methods: with F̃_s = Σ_t (V_t/ν) F_t/V_s in the domain s of an edge
 (ν = 6 domains a cell) or of a face (ν = 4), ½ mu Σ_s V_s |F̃_s|² = ½ mu xᵀ K̃ x with a constant K̃ between all nodes of
-the cells of a domain (docs/theory.md, eq. 4.10). Softer than linear elements: with one volume per node the error of the
+the cells of a domain (docs/theory.md, eq. 4.11). Softer than linear elements: with one volume per node the error of the
 force is about halved, and the stable step is longer.
 """
 
@@ -19,12 +19,12 @@ Smoothed = Callable[[Edges, float], tuple[np.ndarray, np.ndarray]]
 
 
 def edge_smoothed(edges: Edges, mu: float) -> tuple[np.ndarray, np.ndarray]:
-    """Ends (s, 2) and k_ij = −mu K̃_ij [N/m], (s,): deformation smoothed over the cells round each edge (eq. 4.10)."""
+    """Ends (s, 2) and k_ij = −mu K̃_ij [N/m], (s,): deformation smoothed over the cells round each edge (eq. 4.11)."""
     return _springs(edges, mu, EDGES_OF_TETRAHEDRON)
 
 
 def face_smoothed(edges: Edges, mu: float) -> tuple[np.ndarray, np.ndarray]:
-    """Ends (s, 2) and k_ij = −mu K̃_ij [N/m], (s,): deformation smoothed over the two cells at each face (eq. 4.10)."""
+    """Ends (s, 2) and k_ij = −mu K̃_ij [N/m], (s,): deformation smoothed over the two cells at each face (eq. 4.11)."""
     return _springs(edges, mu, FACES)
 
 

@@ -4,12 +4,13 @@ Ascher, Ruuth, Wetton (1995), implicit-explicit Euler: zero-length springs are l
 
     A v⁺ = M v + dt (−K x + Jᵀ lam + m g + f_c),   A = (1 + c dt) M + dt² K
 
-is solved exactly by one back-solve with a factor made once. Volumes are linearised at x as in HCJ05, with S = J A⁻¹ Jᵀ
-and a back-solve per iteration.
+(docs/theory.md, eq. 12.5) is solved exactly by one back-solve with a factor made once. Volumes are linearised at x as
+in HCJ05, with S = J A⁻¹ Jᵀ and a back-solve per iteration.
 
 Limits: the change of Jᵀ with x stays explicit, which bounds dt where pressures are far above mu; long steps lose energy
-and blur what happens within one; obstacles are met inside facets, as stiff as the step allows, so that long steps let
-them sink in for longer.
+and blur what happens within one. Obstacles are met inside facets, where a step moves a force by what the masses alone
+resist, ∝ 1/dt²: at twice the explicit limit a pressed block has 98 % of its force 0.4 s after the press, at ten times
+a third. It suits bodies that are held, filled or weighed, not pressed.
 """
 
 from dataclasses import dataclass, replace

@@ -32,7 +32,7 @@ from massspring.kernels.step.end import end_step
 
 
 class SpringFactor(NamedTuple):
-    """Springs without length taken at the end of the step: A = (1 + c dt) M + dt² K, factored once (eq. 12.1)."""
+    """Springs without length taken at the end of the step: A = (1 + c dt) M + dt² K, factored once (eq. 12.5)."""
 
     factor: Triangular
     start: np.ndarray
@@ -45,7 +45,7 @@ class SpringFactor(NamedTuple):
 
 @njit_inlined
 def take_springs_implicitly(frame, rows, implicit):
-    """v* = A⁻¹ (M (v*₀ + c dt v) − dt² K_h v_h), of the v*₀ that an explicit step predicts (eq. 4.9, 12.1)."""
+    """v* = A⁻¹ (M (v*₀ + c dt v) − dt² K_h v_h), of the v*₀ that an explicit step predicts (eq. 12.5)."""
     model, nodes, dt, field = frame.model, frame.nodes, frame.boundary.dt, rows.field
     keep = frame.boundary.damping * dt
     for i in range(field.shape[0]):
@@ -121,7 +121,7 @@ def point_volumes_frame(frame, rows, implicit, accuracy):
 
 @njit_inlined
 def end_implicitly(frame, rows, implicit):
-    """v⁺ = v* + dt A⁻¹ F and x⁺ (eq. 3.5, 12.1); books what attachments give."""
+    """v⁺ = v* + dt A⁻¹ F and x⁺ (eq. 3.5, 12.5); books what attachments give."""
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
     add_held_impulse(model, nodes, Push(rows.push, 1.0), boundary.dt, boundary.gravity, diagnostics.held_impulse)
     end_stage(diagnostics.stage_times, HELD)
