@@ -19,6 +19,7 @@ from studies.bench import meshes as geometry_bench
 from studies.bench.elements import element_lines
 from studies.bench.line import BenchLine
 from studies.bench.plain import plain_lines
+from studies.bench.plain_points import plain_points_lines
 from studies.bench.slide import slide_lines
 from studies.bench.solver import growth_lines, large_lines, step_lines, threads_lines, volumes_lines
 from studies.reference.problem import reference_problem, whole_forces
@@ -116,6 +117,7 @@ def main() -> None:
     stages: tuple[Callable[[], list[BenchLine]], ...] = (
         step_lines,
         plain_lines,
+        plain_points_lines,
         large_lines,
         threads_lines,
         slide_lines,
