@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from massspring import ImplicitVolume
 from studies.advice.campaign import Stored, stored
 from studies.advice.kinds import same_kind, worst_of
 from studies.base.errors import StudyError
@@ -20,8 +19,6 @@ from studies.timing.short import ShortTiming, short_timing
 
 PERCENT = 100.0
 ERRORS = ("force", "displacement")
-OWN = ImplicitVolume.name
-"""The method that is advised; others are on the chart of the campaign."""
 RESULTS = Path("results")
 
 
@@ -79,8 +76,7 @@ def advise(
     asked = lookup(scene, {known.name: known for known in SCENES}, "scene") if isinstance(scene, str) else scene
     named = Wish(_percent("force", force), _percent("displacement", displacement), _bound("budget", budget))
     found, alike = _known(asked, Path(results))
-    known = {name: [one for one in rows if one.case.method.name == OWN] for name, rows in found.found.items()}
-    rows = worst_of(asked, list(known.values())) if alike else known[asked.name]
+    rows = worst_of(asked, list(found.found.values())) if alike else found.found[asked.name]
     answer = replace(_chosen(asked, named, rows, found), alike=alike)
     return _timed(answer) if timing else _untimed(answer)
 

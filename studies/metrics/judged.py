@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring import ImplicitVolume
 from studies.metrics.metrics import Run
 from studies.metrics.table import metric
 from studies.metrics.wish import Wish
@@ -46,6 +47,11 @@ class Judged:
     """[s]."""
     timed_here: bool = False
     """Whether the cost is of this machine."""
+
+    @property
+    def advisable(self) -> bool:
+        """Whether it may be advised: a body by implicit_volume. Other methods stand beside it to be compared."""
+        return isinstance(self.case.method, ImplicitVolume)
 
     @property
     def compared(self) -> bool:
@@ -95,15 +101,15 @@ def cost_of_frames(frame_ns: np.ndarray, frame: float) -> Measured:
 
 
 def cheapest(found: Iterable[Judged], wish: Wish) -> Judged | None:
-    """The one of least cost that meets a wish; those of unknown cost come last. None where none does, or where the
+    """The advisable one of least cost that meets a wish; those of unknown cost come last. None where none does, or where the
     reference is less well known than is wished."""
-    meeting = [one for one in found if one.worst(wish) <= 1.0 and not one.untold(wish)]
+    meeting = [one for one in found if one.advisable and one.worst(wish) <= 1.0 and not one.untold(wish)]
     return min(meeting, key=by_cost, default=None)
 
 
 def nearest(found: Iterable[Judged], wish: Wish) -> Judged | None:
-    """The one that misses a wish by the smallest factor; None of those whose errors are not known."""
-    known = [one for one in found if one.worst(wish) < np.inf]
+    """The advisable one that misses a wish by the smallest factor; None of those whose errors are not known."""
+    known = [one for one in found if one.advisable and one.worst(wish) < np.inf]
     return min(known, key=lambda one: one.worst(wish), default=None)
 
 
