@@ -101,8 +101,8 @@ def cost_of_frames(frame_ns: np.ndarray, frame: float) -> Measured:
 
 
 def cheapest(found: Iterable[Judged], wish: Wish) -> Judged | None:
-    """The advisable one of least cost that meets a wish; those of unknown cost come last. None where none does, or where
-    the reference is less well known than is wished."""
+    """The advisable one of least cost that meets a wish; those of unknown cost come last. None where none does, or
+    where the reference is less well known than is wished."""
     meeting = [one for one in found if one.advisable and one.worst(wish) <= 1.0 and not one.untold(wish)]
     return min(meeting, key=by_cost, default=None)
 
