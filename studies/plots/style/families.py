@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from massspring.body.smoothed import edge_smoothed
 from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, MUTED, ORANGE, PURPLE, SKY, VERMILLION, YELLOW
 from studies.runs.case import Case
 
@@ -17,11 +18,15 @@ class Family:
     marker: str
 
 
+SMOOTH = "smooth"
+"""In place of its volumes: a body of smoothed springs, one volume per node."""
+
 FAMILIES: dict[tuple[str, bool, str], Family] = {
     ("surface", False, "scene"): Family(PAPER, BLACK, "s"),
     ("tetrahedral", False, "scene"): Family("tetrahedra, one volume", VERMILLION, "o"),
     ("tetrahedral", False, "regions"): Family("tetrahedra, some volumes", ORANGE, "D"),
     ("tetrahedral", False, "nodal"): Family("tetrahedra, a volume per node", PURPLE, "^"),
+    ("tetrahedral", False, SMOOTH): Family("tetrahedra, smoothed over edges", MUTED[0], "d"),
     ("quadratic", False, "scene"): Family("quadratic, even", SKY, "P"),
     ("quadratic", True, "scene"): Family("quadratic, graded", BLUE, "*"),
     ("tetrahedral", True, "scene"): Family("tetrahedra, graded", GREEN, "v"),
@@ -44,7 +49,8 @@ def family_of(case: Case) -> Family:
     element = CONTESTANTS.get((case.method.name, body.kind))
     if element is not None:
         return element
-    known = FAMILIES.get((body.kind, body.graded, body.volumes))
+    volumes = SMOOTH if body.law == edge_smoothed.__name__ else body.volumes
+    known = FAMILIES.get((body.kind, body.graded, volumes))
     if known is not None and case.method.name == WHOLE:
         return known
     own = "" if case.method.name == WHOLE else f", {case.method.name.replace('_', ' ')}"
