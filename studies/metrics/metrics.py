@@ -181,8 +181,7 @@ def frequency_error(run: Run) -> float:
     rest, weights, scene = run.field("rest")[run.material_nodes], run.surface_weights, run.case.scene
     t = run.field("t")[run.checkpoint_frames]
     own = run.field("snapshots")[:, run.material_nodes] - rest
-    truth = np.array([run.reference.displacement(rest, k) for k in range(len(t))])
-    times = np.array(scene.checkpoints)
+    times, truth = np.array(scene.checkpoints), run.reference.displacements(rest)
     found, wanted = (ringing_frequency(scene, at, rest, u, weights) for at, u in ((t, own), (times, truth)))
     return PERCENT * (found / wanted - 1)
 

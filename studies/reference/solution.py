@@ -54,10 +54,24 @@ class Solution:
         """
         key = (points.tobytes(), checkpoint)
         if key not in self._known:
-            sign = np.where(points < 0, -1.0, 1.0) if self.scene.symmetric else 1.0
-            found = self._evaluator.displacement(self.field("displacement")[checkpoint], sign * points)
-            self._known[key] = sign * found
+            self._known[key] = self._mirrored(self.field("displacement")[[checkpoint]], points)[0]
         return self._known[key]
+
+    def displacements(self, points: np.ndarray) -> np.ndarray:
+        """Displacement [m] of the material points `points` (m, 3) [m] at every checkpoint, (K, m, 3).
+
+        The points are found in the mesh once for all checkpoints.
+        """
+        return self._mirrored(self.field("displacement"), points)
+
+    def _mirrored(self, nodal: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Nodal fields (k, n, 3) [m] at points (m, 3) [m], (k, m, 3); those of an octant mirrored."""
+        sign = np.where(points < 0, -1.0, 1.0) if self.scene.symmetric else np.ones_like(points)
+        count, nodes, _ = nodal.shape
+        # One field of 3 k components: the evaluator takes any number of them.
+        columns = nodal.transpose(1, 0, 2).reshape(nodes, 3 * count)
+        found = self._evaluator.displacement(columns, sign * points).reshape(len(points), count, 3)
+        return sign * found.transpose(1, 0, 2)
 
     @cached_property
     def _known(self) -> dict[tuple[bytes, int], np.ndarray]:

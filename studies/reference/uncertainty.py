@@ -86,7 +86,7 @@ class Sample:
     def frequency(self) -> float:
         """Of the ringing [Hz]; NaN for a scene that does not start with a speed."""
         scene, points = self.solution.scene, self.at.points
-        moved = np.array([self.solution.displacement(points, k) for k in range(len(scene.checkpoints))])
+        moved = self.solution.displacements(points)
         return ringing_frequency(scene, np.array(scene.checkpoints), points, moved, self.at.areas)
 
     @property

@@ -48,7 +48,7 @@ def determinants(points, xi):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["spleen", "bladder"])
+@pytest.mark.parametrize("name", ["bladder", pytest.param("spleen", marks=pytest.mark.campaign)])
 def test_volume_converges_at_the_orders_claimed(name):
     family = organ_family(name, SIZES, regions={})
     exact = true_volume(SHAPES[name]())
@@ -93,12 +93,18 @@ def test_outlines_of_attachments_are_curves():
     assert np.abs(np.hypot(points[:, 0], points[:, 1]) - np.sqrt(RADIUS**2 - cap**2)).max() < 1e-13
 
 
-def test_the_paper_s_meshes_have_its_counts():
-    """Jung, Hong, Choi 2005: 550 nodes and 1,096 triangles for the stomach, 544 and 1,084 for the liver."""
-    for name, nodes, triangles in (("stomach", 550, 1096), ("liver", 544, 1084)):
-        mesh = organ(name, nodes, fill=False)
-        assert (mesh.outer_count, len(mesh.triangles)) == (nodes, triangles)
-        check_surface(mesh.points, mesh.triangles)
+@pytest.mark.parametrize(
+    ("name", "nodes", "triangles"),
+    [("liver", 544, 1084), pytest.param("stomach", 550, 1096, marks=pytest.mark.campaign)],
+)
+def test_the_paper_s_meshes_have_its_counts(name, nodes, triangles):
+    """Jung, Hong, Choi 2005: 544 nodes and 1,084 triangles for the liver, 550 and 1,096 for the stomach.
+
+    The count of the stomach's mesh with its wall is in tests/geometry/organs/test_organ_meshes.py.
+    """
+    mesh = organ(name, nodes, fill=False)
+    assert (mesh.outer_count, len(mesh.triangles)) == (nodes, triangles)
+    check_surface(mesh.points, mesh.triangles)
 
 
 def test_a_wall_folds_unless_its_inner_nodes_follow(small):

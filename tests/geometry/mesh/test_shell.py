@@ -135,7 +135,7 @@ def test_a_spoiled_node_is_mended_on_its_level_and_the_others_stay(shells):
         (lambda: hollow_ball(wall=0.0), "a wall of 0.0 m does not fit"),
         (lambda: hollow_ball(layers=0), "ball: 0 layers asked for its wall; choose 1 to 12"),
         (lambda: organ("ball", 300, layers=2), "ball: 2 layers asked for, but it is solid"),
-        (lambda: hollow_ball(wall=0.0499), r"its wall of 49\.9 mm folds or flattens an element"),
+        (lambda: hollow_ball(60, 1, wall=0.0499), r"its wall of 49\.9 mm folds or flattens an element"),
         (lambda: hollow_ball(wal=0.01), "unknown parameter of the ball 'wal'; did you mean 'wall'"),
         (lambda: organ("bal", 300), "unknown organ 'bal'; did you mean 'ball'"),
     ],

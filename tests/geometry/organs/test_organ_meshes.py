@@ -45,19 +45,35 @@ def test_surface_and_lumen_are_closed_and_of_genus_0(meshes, name):
 
 
 @pytest.mark.parametrize("name", ORGANS)
-def test_attachments_are_discs_of_their_true_size(meshes, name):
+def test_attachments_are_discs(meshes, name):
     mesh, shape = meshes[name], SHAPES[name]()
-    points, triangles = first_surface(replace(shape, cell=0.003))
     assert set(mesh.patches) == set(shape.regions) != set()
-    for patch, region in shape.regions.items():
+    for patch in shape.regions:
         faces = mesh.patch_triangles(patch)
         assert len(np.unique(faces)) - len(unique_edges(faces)) + len(faces) == 1  # one piece without holes
         assert mesh.patches[patch].max() < mesh.outer_count
+
+
+def check_areas(name, mesh, least):
+    """Attached areas of a mesh over the true ones, which a surface of 3 mm cells gives, are from `least` to 1.02."""
+    shape = SHAPES[name]()
+    points, triangles = first_surface(replace(shape, cell=0.003))
+    for patch, region in shape.regions.items():
         inside = (region.level(points) <= 0)[triangles].mean(axis=1)
         true = (inside * triangle_areas(points, triangles)).sum()
-        # Inscribed facets 11 mm wide on a tip of 14 mm radius lose 2 h^2 / (8 R^2), 15.4 per cent; twice as many half.
-        fine = organ(name, 1100, fill=False)
-        assert 0.92 * true < triangle_areas(fine.points, fine.patch_triangles(patch)).sum() < 1.02 * true
+        assert least * true < triangle_areas(mesh.points, mesh.patch_triangles(patch)).sum() < 1.02 * true
+
+
+# Inscribed facets 11 mm wide on a tip of 14 mm radius lose 2 h^2 / (8 R^2), 15.4 per cent; twice as many half.
+@pytest.mark.parametrize(("name", "least"), [(name, 0.83 if name == "stomach" else 0.92) for name in ORGANS])
+def test_attachments_have_their_true_size(meshes, name, least):
+    check_areas(name, meshes[name], least)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", ORGANS)
+def test_attachments_of_finer_meshes_are_nearer_to_their_true_size(mesh_cache, name):
+    check_areas(name, organ(name, 1100, fill=False), 0.92)
 
 
 @pytest.mark.parametrize(("name", "axis"), [("bladder", 0), ("kidney", 2)])

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -38,6 +39,27 @@ def judged(request):
 
 def small(scene, kind="tetrahedral", **changes) -> Case:
     return Case(scene, BodyRecipe(kind, THIN if scene.lumen else SMALL), frames=20).replaced(**changes)
+
+
+@cache
+def _by_name(name, kind):
+    return prepare(small(next(scene for scene in SCENES if scene.name == name), kind))
+
+
+def small_setup(scene, kind="tetrahedral"):
+    """The small case of a scene made ready, once for all tests, which only read it."""
+    return _by_name(scene.name, kind) if scene in SCENES else prepare(small(scene, kind))
+
+
+@cache
+def _problem_by_name(name):
+    scene = next(scene for scene in JUDGED if scene.name == name)
+    return reference_problem(scene, scene.reference.levels[0])
+
+
+def coarsest_problem(scene):
+    """The reference problem of a scene on its coarsest mesh, once for all tests, which only read it."""
+    return _problem_by_name(scene.name) if scene in JUDGED else reference_problem(scene, scene.reference.levels[0])
 
 
 def test_the_name_is_a_word_for_the_command_line_and_the_title_a_line(scene):
@@ -110,7 +132,7 @@ def test_a_skipped_method_is_refused_with_the_reason(scene):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_body_weighs_what_the_tissue_weighs(scene, kind):
-    prepared = prepare(small(scene, kind))
+    prepared = small_setup(scene, kind)
     body = prepared.setup.body
     # Sums of a few hundred terms: rounding stays far below 1e-12.
     assert body.mass.sum() == pytest.approx(scene.tissue.density * prepared.mesh.volume, rel=1e-12)
@@ -119,7 +141,7 @@ def test_body_weighs_what_the_tissue_weighs(scene, kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_obstacles_start_outside(scene, kind):
-    body = prepare(small(scene, kind)).setup.body
+    body = small_setup(scene, kind).setup.body
     for obstacle in scene.obstacles:
         assert obstacle.gap(body.rest, 0.0).min() >= -1e-9 * body.size
 
@@ -128,7 +150,7 @@ def test_obstacles_start_outside(scene, kind):
 def test_something_is_felt(scene, kind):
     """Every obstacle reaches the body, and the probed force is a press at the deepest point, or a lumen swells."""
     case = small(scene, kind)
-    prepared = prepare(case)
+    prepared = small_setup(scene, kind)
     history = simulate(prepared.setup, checkpoint_frames(case, prepared))
     assert history.outcome == "finished"
     last = checkpoint_frames(case, prepared)[-1] - 1
@@ -148,7 +170,7 @@ def test_something_is_felt(scene, kind):
 
 
 def test_reference_can_be_set_up_on_its_coarsest_mesh(judged):
-    problem = reference_problem(judged, judged.reference.levels[0])
+    problem = coarsest_problem(judged)
     System(problem, NewtonSettings()).solver.release()
     assert problem.material.mu == judged.tissue.shear_modulus
     assert problem.material.kappa == judged.tissue.shear_modulus * judged.tissue.bulk_over_shear
@@ -158,8 +180,7 @@ def test_reference_can_be_set_up_on_its_coarsest_mesh(judged):
 
 def load_gap(drive_scene, problem_scene) -> float:
     """Largest distance [m] between where the two solvers put their obstacles and held regions, over the whole clock."""
-    setup = prepare(small(drive_scene)).setup
-    problem = reference_problem(problem_scene, problem_scene.reference.levels[0])
+    setup, problem = small_setup(drive_scene).setup, coarsest_problem(problem_scene)
     kept = [drive_scene.obstacles.index(o) for o in kept_obstacles(drive_scene)]
     gaps = []
     for frame in range(setup.clock.frames):
@@ -184,7 +205,7 @@ def moves(scene) -> bool:
 
 
 def test_both_solvers_see_the_same_load_at_the_same_time(judged):
-    size = float(np.ptp(prepare(small(judged)).setup.body.rest))
+    size = float(np.ptp(small_setup(judged).setup.body.rest))
     # Times and positions agree to rounding.
     assert load_gap(judged, judged) < 1e-12 * size
     assert load_gap(judged, _later(judged)) > 1e-4 * size or not moves(judged)
@@ -203,7 +224,7 @@ def _later(scene):
 
 
 def test_both_solvers_see_the_same_obstacles(judged):
-    problem = reference_problem(judged, judged.reference.levels[0])
+    problem = coarsest_problem(judged)
     for obstacle, rigid in zip(kept_obstacles(judged), problem.obstacles, strict=True):
         if isinstance(obstacle, Plane):
             np.testing.assert_allclose(rigid.normal, obstacle.unit_normal, rtol=0, atol=1e-15)
@@ -219,7 +240,7 @@ def test_both_solvers_hold_the_same_region(judged):
     if judged.symmetric or not judged.held:
         return
     level = int(judged.reference.levels[0])
-    mesh, problem = mesh_for(judged, level), reference_problem(judged, level)
+    mesh, problem = mesh_for(judged, level), coarsest_problem(judged)
     for held, found in zip(judged.held, find_held(problem), strict=True):
         corners = found.nodes[found.nodes < len(mesh.points)]
         patch = patch_nodes(mesh, held.name, held.region)

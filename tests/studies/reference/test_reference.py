@@ -77,7 +77,9 @@ def added(solved, tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("levels", [(0.6, 0.5, 0.4), (0.5, 0.4, 0.32), (0.4, 0.32, 0.25)])
+@pytest.mark.parametrize(
+    "levels", [(0.6, 0.5, 0.4), (0.5, 0.4, 0.32), pytest.param((0.4, 0.32, 0.25), marks=pytest.mark.campaign)]
+)
 def test_the_error_bar_covers_the_true_error_and_is_not_idle(added, levels):
     """The ball between planes is known to 1e-4 (incompressible, converged): the bar holds it, within a factor 20."""
     scene = replace(SCENE, reference=ReferencePlan("octant", levels))
@@ -92,10 +94,18 @@ def test_the_error_bar_covers_the_true_error_and_is_not_idle(added, levels):
 
 
 @pytest.mark.slow
-def test_the_bar_of_even_meshes_holds_the_graded_solution(mesh_cache, tmp_path):
-    """A ball held at its caps, where the stress is singular: even meshes are 5 % off, and say so."""
-    even = replace(BALL_CLAMPED, reference=ReferencePlan("solid", (100, 150, 230), variants=()))
-    graded = replace(BALL_CLAMPED, reference=ReferencePlan("solid", (150, 230), at_outlines=(1, 2), variants=()))
+@pytest.mark.parametrize(
+    ("levels", "better"),
+    [
+        ((80, 110, 150), (80, 110)),
+        pytest.param((100, 150, 230), (150, 230), marks=pytest.mark.campaign),
+    ],
+    ids=["coarse", "finer"],
+)
+def test_the_bar_of_even_meshes_holds_the_graded_solution(mesh_cache, tmp_path, levels, better):
+    """A ball held at its caps, where the stress is singular: even meshes are 5 or 6 % off, and say so."""
+    even = replace(BALL_CLAMPED, reference=ReferencePlan("solid", levels, variants=()))
+    graded = replace(BALL_CLAMPED, reference=ReferencePlan("solid", better, at_outlines=(1, 2), variants=()))
     for scene in (even, graded):
         for reference_solve in reference_solves(scene):
             solve(tmp_path, reference_solve)
@@ -131,9 +141,9 @@ def test_displacement_is_mirrored(found):
 
 
 def test_displacement_at_a_node_is_the_stored_one(found):
-    np.testing.assert_allclose(
-        found.displacement(found.field("nodes")[:50]), found.field("displacement")[-1][:50], rtol=0, atol=1e-9 * RADIUS
-    )
+    nodes, stored = found.field("nodes")[:50], found.field("displacement")[:, :50]
+    np.testing.assert_allclose(found.displacement(nodes), stored[-1], rtol=0, atol=1e-9 * RADIUS)
+    np.testing.assert_allclose(found.displacements(nodes), stored, rtol=0, atol=1e-9 * RADIUS)
 
 
 def test_surface_is_whole_and_outward(found):

@@ -37,11 +37,12 @@ def test_the_truth_is_the_literature():
     assert pytest.approx((2.5011, 2.6656, 2.6399), abs=5e-5) == (TORSIONAL, INCOMPRESSIBLE, QUARTER)
 
 
-def test_the_cotangent_ball_rings_right_in_every_mode():
-    """All ten modes within 1 %; the shape-changing ones within 0.1 % already on 550 surface nodes."""
-    for family, truth in zip(families("cotangent", "nodal", 800), (TORSIONAL, INCOMPRESSIBLE), strict=True):
-        assert np.abs(family / truth - 1).max() < 0.01
-    assert np.abs(families("cotangent", "nodal")[1] / INCOMPRESSIBLE - 1).max() < 1e-3
+@pytest.mark.parametrize(("nodes", "most"), [(NODES, 0.011), pytest.param(800, 0.01, marks=pytest.mark.campaign)])
+def test_the_cotangent_ball_rings_right_in_every_mode(nodes, most):
+    """The twisting modes within 1.1 % on 550 surface nodes and 1 % on 800, the shape-changing ones within 0.1 %."""
+    torsional, spheroidal = families("cotangent", "nodal", nodes)
+    assert np.abs(torsional / TORSIONAL - 1).max() < most
+    assert np.abs(spheroidal / INCOMPRESSIBLE - 1).max() < 1e-3
 
 
 def test_it_does_so_better_on_finer_meshes():
@@ -64,7 +65,7 @@ def test_with_one_volume_they_ring_like_the_compressible_ball_they_are():
     assert families("uniform", "scene")[1].mean() / QUARTER - 1 < -0.03
 
 
-def rung(body: Body, periods: int = 8) -> float:
+def rung(body: Body, periods: int) -> float:
     """omega R/sqrt(mu/rho) of a ball thrown into the shape (−x, −y, 2 z), by its projection on that shape."""
     shape = body.rest * [-1.0, -1.0, 2.0]
     dt = 0.4 * step_limit(body).undamped
@@ -83,6 +84,7 @@ def rung(body: Body, periods: int = 8) -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["cotangent", "van_gelder"])
-def test_a_ball_let_go_rings_within_one_per_cent(law):
-    """The motion itself, eight periods of it, against the incompressible ball."""
-    assert rung(ball(law, "nodal")) == pytest.approx(INCOMPRESSIBLE, rel=0.01)
+@pytest.mark.parametrize("periods", [4, pytest.param(8, marks=pytest.mark.campaign)])
+def test_a_ball_let_go_rings_within_one_per_cent(law, periods):
+    """The motion itself, some periods of it, against the incompressible ball."""
+    assert rung(ball(law, "nodal"), periods) == pytest.approx(INCOMPRESSIBLE, rel=0.01)
