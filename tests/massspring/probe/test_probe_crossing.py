@@ -4,7 +4,6 @@ import itertools
 import re
 
 import numpy as np
-import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -106,27 +105,11 @@ def check_crossing(setup, share):
     return state, tip, tip, x
 
 
-FEW = settings(max_examples=12, deadline=None, derandomize=True)
-MANY = settings(max_examples=50, deadline=None, derandomize=True)
-
-
-def check_free(path):
-    """Nothing is attached: no tip is ever driven through."""
-    state = check_crossing(crossing_setup(**path), path["share"])[0]
-    assert not state.probing.passed.any()
-
-
-@FEW
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(**PATHS)
 def test_no_path_and_no_speed_lets_a_probe_through(**path):
-    check_free(path)
-
-
-@pytest.mark.campaign
-@MANY
-@given(**PATHS)
-def test_nor_does_any_of_many(**path):
-    check_free(path)
+    state = check_crossing(crossing_setup(**path), path["share"])[0]
+    assert not state.probing.passed.any()
 
 
 def apart(body, most):
@@ -139,7 +122,9 @@ def apart(body, most):
     return np.array(chosen)
 
 
-def check_single_nodes(path):
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(**PATHS)
+def test_nor_where_single_nodes_are_attached(**path):
     """Every other triangle has an attached corner, none has two. Their free corners go ahead of the tip.
 
     A tip that meets an attached node head-on has nowhere to push it: the run ends there, as the next test asks.
@@ -149,19 +134,6 @@ def check_single_nodes(path):
     assume(nearest(setup.probes[0], BALL.rest[held]) > 1e-6 * EDGE)
     state = check_crossing(setup, path["share"])[0]
     assert not state.probing.passed.any()
-
-
-@FEW
-@given(**PATHS)
-def test_nor_where_single_nodes_are_attached(**path):
-    check_single_nodes(path)
-
-
-@pytest.mark.campaign
-@MANY
-@given(**PATHS)
-def test_nor_does_any_of_many_where_single_nodes_are_attached(**path):
-    check_single_nodes(path)
 
 
 def nearest(probe, nodes):
@@ -178,7 +150,9 @@ def test_a_tip_that_meets_an_attached_node_ends_the_run():
     assert top in BALL.triangles[state.probing.passed[0] - 1]
 
 
-def check_cap(path):
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(**PATHS)
+def test_attached_tissue_stops_the_run_and_nothing_else_does(**path):
     """A cap is attached: a tip that is driven through it ends the run, in a triangle that has nothing else to move.
 
     Outside truth for the end: the attached triangle that is named lies across the straight way of the tip.
@@ -191,19 +165,6 @@ def check_cap(path):
         assert np.isin(corners, cap).all()
         still = BALL.rest[corners]
         assert len(crossed(still, still, before, after, np.array([[0, 1, 2]]), margin=-1e-9)) == 1
-
-
-@FEW
-@given(**PATHS)
-def test_attached_tissue_stops_the_run_and_nothing_else_does(**path):
-    check_cap(path)
-
-
-@pytest.mark.campaign
-@MANY
-@given(**PATHS)
-def test_attached_tissue_stops_many_runs_and_nothing_else_does(**path):
-    check_cap(path)
 
 
 def test_a_blocked_run_says_which_probe_and_where():

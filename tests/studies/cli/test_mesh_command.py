@@ -171,6 +171,6 @@ def test_a_person_is_asked_for_the_unit_and_before_large_files(organbench, egg, 
 def test_real_organs_by_the_command(organbench, tmp_path):
     path = real_surface("spleen_hra_550")
     target = tmp_path / "spleen.vtu"
-    code, _, err = organbench("mesh", "--from", path, "--unit", "mm", "--nodes", 150, "--smooth", 2, "-o", target)
+    code, _, err = organbench("mesh", "--from", path, "--unit", "mm", "--nodes", 300, "--smooth", 2, "-o", target)
     assert (code, err) == (0, "")
     assert read_mesh(target).volume == pytest.approx(189e-6, rel=0.05)
