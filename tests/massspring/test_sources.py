@@ -150,7 +150,7 @@ def compiled_modules() -> list[str]:
     return found
 
 
-DECORATORS = ("compiled", "njit_lean", "njit_inlined", "njit_ignoring_nan", "njit_reassociated")
+DECORATORS = ("compiled", "njit_lean", "njit_inlined", "njit_exposed", "njit_ignoring_nan", "njit_reassociated")
 
 
 def decorated(node: ast.AST) -> bool:

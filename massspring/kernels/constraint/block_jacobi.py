@@ -9,12 +9,12 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
 from massspring.kernels.arrays.volume_rows import SIZE
-from massspring.kernels.jit.decorators import njit_inlined
+from massspring.kernels.jit.decorators import njit_exposed
 from massspring.kernels.jit.row_sums import INLINED
 from massspring.kernels.jit.simd4 import plus, spread_over
 
 
-@njit_inlined
+@njit_exposed
 def scale_into(clusters, diagonal):
     """1/√S_rr of today's S: the inverse follows when volumes grow or obstacles take directions from their nodes."""
     for k in range(clusters.order.shape[0]):
@@ -54,7 +54,7 @@ def _compiled_answer(inverse, first, part):
     return lambda inverse, first, part: _answer(inverse, first, part)  # pyright: ignore[reportCallIssue]
 
 
-@njit_inlined
+@njit_exposed
 def precondition_into(clusters, residual, product):
     """z ≈ S⁻¹ residual, cluster by cluster (eq. 8.7), 0 for what nothing can push; returns residual · z."""
     order, scale, part = clusters.order, clusters.scale, clusters.part

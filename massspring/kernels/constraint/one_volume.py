@@ -4,7 +4,7 @@ import math
 
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part, taken_share
-from massspring.kernels.jit.decorators import njit_inlined, njit_lean
+from massspring.kernels.jit.decorators import njit_exposed, njit_inlined, njit_lean
 
 NEGLIGIBLE_MOBILITY = 1e-12
 """A mobility this much smaller than what it was taken from is round-off."""
@@ -39,7 +39,7 @@ def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
 
 
-@njit_inlined
+@njit_exposed
 def multiplier_of_sums(nodes, contacts, inverse_mass, volume_error, dt, flow, mobility):
     """The same from G·v* and G·W·G of all nodes, less what obstacles take of the few they touch (eq. 3.3, 3.4)."""
     mode, direction, v_target, gradient, v_star = (

@@ -10,7 +10,7 @@ from massspring.kernels.contact.gaps import gap_and_normal, predicted_gaps_into,
 from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from massspring.kernels.contact.node_contact import round_contact
 from massspring.kernels.jit.blocks import BLOCK, any_gap_within
-from massspring.kernels.jit.decorators import njit_inlined, njit_lean
+from massspring.kernels.jit.decorators import njit_exposed, njit_inlined, njit_lean
 from massspring.kernels.jit.thread_team import JOB_SEARCH, fork, join
 
 CONTACT_PASSES = 3
@@ -47,7 +47,7 @@ def activate(model, nodes, contacts, boundary, step, push, count):
                 contacts.v_target[i, 0], contacts.v_target[i, 1], contacts.v_target[i, 2] = a * n0, a * n1, a * n2
 
 
-@njit_inlined
+@njit_exposed
 def release_all(contacts):
     """No node is touched."""
     for k in range(contacts.active_count[0]):
@@ -93,7 +93,7 @@ def predict_gaps(model, nodes, contacts, boundary, step, push, team):
         join(team)
 
 
-@njit_inlined
+@njit_exposed
 def find_contacts(model, nodes, contacts, boundary, step, push, team):
     """Touched nodes of the step when the push of the last one acts on them: u = v* + dt W f (eq. 3.7)."""
     release_all(contacts)
@@ -155,7 +155,7 @@ def enters(model, nodes, boundary, step, push, i):
     return False
 
 
-@njit_inlined
+@njit_exposed
 def revise_contacts(model, nodes, contacts, boundary, step, push, reach):
     """Releases nodes that an obstacle would pull, adds nodes that would enter one; the number of changes (eq. 3.8).
 
@@ -188,7 +188,7 @@ def revise_contacts(model, nodes, contacts, boundary, step, push, reach):
     return changes + count
 
 
-@njit_inlined
+@njit_exposed
 def pressure_reach(lam_change, mobility, lightest, dt):
     """dt² |Δlam| √(max w · Σ w |G|²) ≥ dt² |Δlam| w_i |G_i| [m]: how far a change of pressure moves any free node."""
     return 1.0001 * dt * dt * abs(lam_change) * math.sqrt(max(lightest * mobility, 0.0))

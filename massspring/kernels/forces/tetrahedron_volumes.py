@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.forces.springs import SHORTEST
-from massspring.kernels.jit.decorators import compiled, njit_inlined
+from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlined
 
 
 class Cells(NamedTuple):
@@ -42,7 +42,7 @@ class Cells(NamedTuple):
     """Node vectors, scratch, (n, 3)."""
 
 
-@njit_inlined
+@njit_exposed
 def cell_slopes(x, a, b, c, d):
     """V_t [m³] and dV_t/dx of b, c, d [m²]: (1/6) (x_c − x_a) × (x_d − x_a) and its rotations (eq. 2.3, 10.11)."""
     b0, b1, b2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]

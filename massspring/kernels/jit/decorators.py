@@ -9,8 +9,11 @@ from massspring.compile_cache import kept
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True}
-"""Kept on disk; division follows IEEE: a zero gives inf, and the run has diverged; other threads run meanwhile."""
+OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
+"""Kept on disk; division follows IEEE: a zero gives inf, and the run has diverged; other threads run meanwhile. No
+wrapper is made for callers in C."""
+WITHIN: dict[str, Any] = {"_nrt": False, "forceinline": True, "no_cpython_wrapper": True}
+"""Part of the caller, and no wrapper for Python: to unpack tuples of sixty arrays is a third of all compiling."""
 
 
 def _jit(function: Function, **options: Any) -> Function:
@@ -32,15 +35,20 @@ def njit_lean(function: Function) -> Function:
 
 
 def njit_inlined(function: Function) -> Function:
-    """As `njit_lean`, and always part of its caller."""
+    """As `njit_lean`, and always part of its caller, which is compiled too: Python cannot call it."""
+    return _jit(function, **WITHIN)
+
+
+def njit_exposed(function: Function) -> Function:
+    """As `njit_inlined`, for what Python calls as well: a method in Python, a test."""
     return _jit(function, _nrt=False, forceinline=True)
 
 
 def njit_ignoring_nan(function: Function) -> Function:
     """As `njit_inlined`, for maxima along arrays: a vector register compares several. NaN makes them anything."""
-    return _jit(function, _nrt=False, forceinline=True, fastmath={"nnan", "nsz"})
+    return _jit(function, **WITHIN, fastmath={"nnan", "nsz"})
 
 
 def njit_reassociated(function: Function) -> Function:
     """As `njit_inlined`, for sums along arrays: terms may be added in any order, so a register adds several."""
-    return _jit(function, _nrt=False, forceinline=True, fastmath={"reassoc", "contract"})
+    return _jit(function, **WITHIN, fastmath={"reassoc", "contract"})

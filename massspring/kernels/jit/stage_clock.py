@@ -9,7 +9,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
-from massspring.kernels.jit.decorators import njit_inlined
+from massspring.kernels.jit.decorators import njit_exposed
 
 STAGES = (
     "springs and prediction",
@@ -77,7 +77,7 @@ def _compiled_now():
     return lambda: _clock()  # pyright: ignore[reportCallIssue]
 
 
-@njit_inlined
+@njit_exposed
 def end_stage(times, stage):
     """Books the time since the last stage ended on `stage`; nothing where they are off."""
     if times.on[0]:

@@ -13,7 +13,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
-from massspring.kernels.jit.decorators import njit_inlined
+from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
 
 LINE = 8
 """Numbers of a line of the cache: counters in one line would slow each other down."""
@@ -117,7 +117,7 @@ def wait_until_other_than(signal, at, value):
     return now
 
 
-@njit_inlined
+@njit_exposed
 def fork(team, job, step, factor):
     """Gives every other thread its part of a job."""
     team.signal[JOB], team.signal[STEP], team.signal[DONE] = job, step, 0
@@ -125,7 +125,7 @@ def fork(team, job, step, factor):
     raise_by_one(team.signal, ROUND)
 
 
-@njit_inlined
+@njit_exposed
 def join(team):
     """Waits until all parts of the job are done."""
     others = team.nodes.shape[0] - 2

@@ -8,7 +8,7 @@ from massspring.kernels.constraint.one_volume import limited_error, surely_short
 from massspring.kernels.constraint.schur import along, beyond, dot
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
-from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean, njit_reassociated
+from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlined, njit_lean, njit_reassociated
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.points.elements import push_elements, push_of, times_into
 
@@ -116,7 +116,7 @@ def product_of(row, vector):
     return total
 
 
-@njit_inlined
+@njit_exposed
 def precondition_into(rows, residual, product):
     """z = S⁻¹ residual with S at rest, which turning the body leaves as it is; returns residual · z."""
     scale, scaled, rho = rows.scale, rows.scaled, 0.0

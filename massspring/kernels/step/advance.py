@@ -3,7 +3,7 @@
 from massspring.kernels.contact.bookkeeping import book_contacts, settled
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.fused.padded import pad_positions
-from massspring.kernels.jit.decorators import njit_inlined
+from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.jit.thread_team import JOB_MOVE, fork, join
 
@@ -37,7 +37,7 @@ def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
                 x[i, axis] = padded[i, axis] + step * v[i, axis]
 
 
-@njit_inlined
+@njit_exposed
 def advance(frame, push):
     """The end of a step of all nodes (eq. 3.5); books the impulse of each obstacle, pads the new positions."""
     model, nodes, contacts, dt = frame.model, frame.nodes, frame.contacts, frame.boundary.dt

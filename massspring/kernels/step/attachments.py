@@ -1,6 +1,6 @@
 """Nodes whose motion is prescribed."""
 
-from massspring.kernels.jit.decorators import njit_inlined, njit_lean
+from massspring.kernels.jit.decorators import njit_exposed, njit_lean
 
 
 @njit_lean
@@ -13,7 +13,7 @@ def prescribe_velocity_into(x, held_nodes, held_group, held_rest, displacement, 
             v_star[i, axis] = (held_rest[h, axis] + displacement[g, axis] - x[i, axis]) / dt
 
 
-@njit_inlined
+@njit_exposed
 def prescribe(model, nodes, displacement, dt):
     """v* of held nodes (eq. 3.2); returns what that changes of G·v* [m³/s]."""
     held_nodes, groups, rest = model.held_nodes, model.held_group, model.held_rest
@@ -28,7 +28,7 @@ def prescribe(model, nodes, displacement, dt):
     return flow
 
 
-@njit_inlined
+@njit_exposed
 def add_held_impulse(model, nodes, push, dt, gravity, held_impulse):
     """I_g = −dt Σ_i∈g (f_i + push_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 3.6)."""
     held_nodes, groups, mass = model.held_nodes, model.held_group, model.mass

@@ -3,19 +3,19 @@
 from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, revise_contacts
 from massspring.kernels.fused.padded import pad_positions
 from massspring.kernels.fused.sweep import predict_from_places
-from massspring.kernels.jit.decorators import njit_inlined
+from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
 from massspring.kernels.jit.stage_clock import BETWEEN_FRAMES, HELD, MULTIPLIER, REVISION, SEARCH, SPRINGS, end_stage
 from massspring.kernels.step.attachments import prescribe, prescribe_velocity_into
 
 
-@njit_inlined
+@njit_exposed
 def open_frame(frame):
     """Books the time between two frames, and pads the positions for the first step."""
     end_stage(frame.diagnostics.stage_times, BETWEEN_FRAMES)
     pad_positions(frame.nodes, frame.work, 0, frame.nodes.x.shape[0])
 
 
-@njit_inlined
+@njit_exposed
 def begin_step(frame, step, keeps):
     """v* of springs, damping, gravity and held nodes (eq. 1.1, 3.1, 3.2) and, where one volume is kept, G.
 
@@ -43,7 +43,7 @@ def begin_summed_step(frame, step):
     return volume, flow, mobility
 
 
-@njit_inlined
+@njit_exposed
 def search_contacts(frame, step, push):
     """Finds the nodes that touch while the last known push acts (eq. 3.7); how many passes the active set may take."""
     if frame.boundary.radius.shape[0] == 0:

@@ -1,7 +1,7 @@
 """How every step ends: thin probes, what attachments and obstacles gave, and the motion of all nodes."""
 
 from massspring.kernels.arrays.layout import Push
-from massspring.kernels.jit.decorators import njit_inlined
+from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, PROBES, end_stage
 from massspring.kernels.probe.arrays import Stage
 from massspring.kernels.probe.stage import meet_probes
@@ -9,7 +9,7 @@ from massspring.kernels.step.advance import advance
 from massspring.kernels.step.attachments import add_held_impulse
 
 
-@njit_inlined
+@njit_exposed
 def end_step(frame, step, push, mobility, volumes):
     """Contact with thin probes, bookings, v⁺ and x⁺ (eq. 3.5, 3.6, 11.1–11.7).
 
