@@ -21,6 +21,7 @@ ARGUMENTS = (
     "massspring.kernels.arrays.volume_rows",
     "massspring.kernels.constraint.exact_volume",
     "massspring.kernels.constraint.ldl_solve",
+    "massspring.kernels.forces.elements",
     "massspring.kernels.forces.tetrahedron_volumes",
     "massspring.kernels.points.arrays",
     "massspring.kernels.step.frame",
