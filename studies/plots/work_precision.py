@@ -194,7 +194,7 @@ def words_of(body: BodyRecipe) -> str:
 def _notes(scenes: dict[str, list[Judged]]) -> list[str]:
     told = [
         "Green: force within 3 % and displacement within 1 % (hollow organs 6 and 3 %) in real time on one core. Bars: "
-        "uncertainty of the reference, and spread of five timings. Nothing is drawn below the uncertainty."
+        "uncertainty of the reference, and spread of up to five timings. Nothing is drawn below the uncertainty."
     ]
     best = {name: cheapest(found, usual_wish(found[0].case.scene)) for name, found in scenes.items()}
     named = [f"{readable(name)}: {words_of(one.case.body)}" for name, one in best.items() if one is not None]
