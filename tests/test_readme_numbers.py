@@ -132,7 +132,7 @@ def test_the_table_of_quadratic_bodies():
     assert len(found) == 9
     for scene, paper_force, paper_mean, nodes, graded, fraction, force, mean in found:
         body = {"kind": "quadratic", "nodes": int(nodes), "mass": "stiffness"} | ({"graded": True} if graded else {})
-        recipe = {"body": body, "dt_fraction": float(fraction)}
+        recipe = {"body": body} | ({} if fraction == "0.5" else {"dt_fraction": float(fraction)})  # 0.5 is the usual
         own = rows[(rows["scene"] == scene) & recipes.map(lambda r, wanted=recipe: r == wanted)]
         paper = rows[(rows["scene"] == scene) & (rows["body"] == "surface") & (rows["nodes"] == 550)]
         for said_so, row, name in (
