@@ -16,12 +16,10 @@ from massspring import ImplicitVolume, Setup, simulate
 from massspring.body.points import BARYCENTRIC, PointVolumes
 from massspring.kernels.points.arrays import PointRows
 from studies.bench.line import BenchLine
-from studies.bench.plain import SETTINGS, clamp
+from studies.bench.plain import SETTINGS, against_plain, clamp
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.timing.protocol import interleave, pinned
-from studies.timing.statistics import kernel_ns, ratio_with_spread
 
 SURFACE_NODES = (594, 794, 1194)
 FRAMES, ROUNDS, MOST = 40, 5, 200
@@ -43,6 +41,10 @@ class PlainPoints(NamedTuple):
     rest_volume: np.ndarray
     scale: np.ndarray
     inverse: np.ndarray
+    rho: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    lam: np.ndarray
     cofactor: np.ndarray
     """Scratch: w_q cof F_q [m³], (k, 4, 3, 3)."""
     own: np.ndarray
@@ -61,8 +63,9 @@ def add_springs(ends, stiffness, x, force):
 
 
 @numba.njit(**SETTINGS)
-def measure(plain, x, rho, volume):
+def measure(plain, volume):
     """w_q cof F_q, −b (J_q − 1) and the volumes of the vertices (eq. 8.8–8.10, 8.12)."""
+    x, rho = plain.x, plain.rho
     volume[:] = 0.0
     for k in range(plain.cells.shape[0]):
         for q in range(4):
@@ -88,13 +91,13 @@ def measure(plain, x, rho, volume):
 
 
 @numba.njit(**SETTINGS)
-def add_push(plain, p, rho, with_own, force):
+def add_push(plain, p, with_own, force):
     """Jᵀ p and, `with_own`, the points' own pressures (eq. 8.11, 8.12) [N]."""
     for k in range(plain.cells.shape[0]):
         for q in range(4):
             pressure = plain.own[k, q] if with_own else 0.0
             for r in range(4):
-                pressure += rho[q, r] * p[plain.corner[k, r]]
+                pressure += plain.rho[q, r] * p[plain.corner[k, r]]
             for a in range(10):
                 i, g, c = plain.cells[k, a], plain.slopes[k, q, a], plain.cofactor[k, q]
                 for row in range(3):
@@ -102,7 +105,7 @@ def add_push(plain, p, rho, with_own, force):
 
 
 @numba.njit(**SETTINGS)
-def flow_into(plain, u, rho, product):
+def flow_into(plain, u, product):
     """J u [m³/s], (m,) (eq. 8.11)."""
     product[:] = 0.0
     for k in range(plain.cells.shape[0]):
@@ -113,12 +116,13 @@ def flow_into(plain, u, rho, product):
                 for row in range(3):
                     total += u[i, row] * (c[row, 0] * g[0] + c[row, 1] * g[1] + c[row, 2] * g[2])
             for r in range(4):
-                product[plain.corner[k, r]] += rho[q, r] * total
+                product[plain.corner[k, r]] += plain.rho[q, r] * total
 
 
 @numba.njit(**SETTINGS)
-def solve(plain, residual, allowed, rho, lam):
+def solve(plain, residual, allowed):
     """lam += S⁻¹ residual by conjugate gradients (eq. 8.4, 8.13)."""
+    lam = plain.lam
     search, image = np.zeros_like(lam), np.zeros_like(lam)
     force, before = np.zeros((plain.inverse_mass.shape[0], 3)), np.inf
     for _ in range(MOST):
@@ -128,11 +132,11 @@ def solve(plain, residual, allowed, rho, lam):
         product = np.dot(residual, z)
         search = z + product / before * search
         force[:] = 0.0
-        add_push(plain, search, rho, False, force)
+        add_push(plain, search, False, force)
         for i in range(force.shape[0]):
             for axis in range(3):
                 force[i, axis] *= plain.inverse_mass[i]
-        flow_into(plain, force, rho, image)
+        flow_into(plain, force, image)
         step = product / np.dot(search, image)
         lam += step * search
         residual -= step * image
@@ -140,25 +144,26 @@ def solve(plain, residual, allowed, rho, lam):
 
 
 @numba.njit(**SETTINGS)
-def plain_frame(plain, x, v, lam, points, normals, dt, damping, rho):
-    """As many steps as `points` (q, o, 3) of the planes; `lam` [Pa] with the rest pressure comes in and goes out."""
+def plain_frame(plain, points, normals, dt, damping):
+    """As many steps as `points` (q, o, 3) of the planes; x, v and lam [Pa], with the rest pressure, go on."""
+    x, v, lam = plain.x, plain.v, plain.lam
     force, product, volume = np.zeros_like(x), np.zeros_like(lam), np.zeros_like(lam)
     moved, w = np.zeros_like(x), plain.inverse_mass
     for q in range(points.shape[0]):
         force[:] = 0.0
         add_springs(plain.ends, plain.stiffness, x, force)
-        measure(plain, x, rho, volume)
+        measure(plain, volume)
         moved[:] = 0.0
-        add_push(plain, lam, rho, True, moved)
+        add_push(plain, lam, True, moved)
         for i in range(x.shape[0]):
             for axis in range(3):
                 v[i, axis] = (1.0 - damping * dt) * v[i, axis] + dt * w[i] * force[i, axis]
                 moved[i, axis] = v[i, axis] + dt * w[i] * moved[i, axis]
-        flow_into(plain, moved, rho, product)
+        flow_into(plain, moved, product)
         residual = ((plain.rest_volume - volume) / dt - product) / dt
-        solve(plain, residual, TOLERANCE * plain.rest_volume / dt**2, rho, lam)
+        solve(plain, residual, TOLERANCE * plain.rest_volume / dt**2)
         force[:] = 0.0
-        add_push(plain, lam, rho, True, force)
+        add_push(plain, lam, True, force)
         for i in range(x.shape[0]):
             for axis in range(3):
                 v[i, axis] += dt * w[i] * force[i, axis]
@@ -187,20 +192,20 @@ def plain_points_run(setup: Setup) -> tuple[np.ndarray, np.ndarray]:
         body.rest_volumes,
         rows.scale,
         rows.inverse,
+        BARYCENTRIC,
+        body.rest.copy(),
+        np.zeros_like(body.rest) if setup.velocity is None else np.array(setup.velocity, dtype=np.float64),
+        body.rest_lam.copy(),
         np.zeros((*volumes.weight.shape, 3, 3)),
         np.zeros(volumes.weight.shape),
     )
-    x, lam = body.rest.copy(), body.rest_lam.copy()
-    v = np.zeros_like(x) if setup.velocity is None else np.array(setup.velocity, dtype=np.float64)
     times = np.zeros(setup.clock.frames)
     for frame in range(setup.clock.frames):
         boundary = setup.boundary(frame)
         begin = perf_counter_ns()
-        plain_frame(
-            plain, x, v, lam, boundary.position, boundary.plane_normal, boundary.dt, boundary.damping, BARYCENTRIC
-        )
+        plain_frame(plain, boundary.position, boundary.plane_normal, boundary.dt, boundary.damping)
         times[frame] = perf_counter_ns() - begin
-    return times, x
+    return times, plain.x
 
 
 def pressed_ball(nodes: int) -> Setup:
@@ -214,12 +219,7 @@ def plain_points_lines() -> list[BenchLine]:
     lines = []
     for nodes in SURFACE_NODES:
         setup = pressed_ball(nodes)
-        runs = {"plain": lambda s=setup: plain_points_run(s)[0], "ours": lambda s=setup: simulate(s).frame_ns}
-        with pinned():
-            times = {name: ns[:, FRAMES // 4 :] for name, ns in interleave(runs, ROUNDS).items()}
-        ratio = ratio_with_spread(times["plain"], times["ours"])
-        plain, ours = (1e-3 * kernel_ns(times[name]) / setup.clock.steps for name in ("plain", "ours"))
-        note = f"{plain:.3g} over {ours:.3g} µs a step; rounds {ratio.low:.3g} to {ratio.high:.3g}"
+        runs = {"plain": lambda s=setup: plain_points_run(s)[0], "own": lambda s=setup: simulate(s).frame_ns}
         what = f"plain quadratic step over quadratic step, {setup.body.node_count} nodes"
-        lines.append(BenchLine(what, ratio.median, "1", TARGET, at_most=False, note=note))
+        lines.append(against_plain(what, setup, runs, ROUNDS, TARGET))
     return lines
