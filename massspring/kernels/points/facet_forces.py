@@ -8,7 +8,7 @@ along the facet.
 import math
 
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
-from massspring.kernels.points.facets import add_at_point, at_point, begin_touch, force_at, forget, list_near
+from massspring.kernels.points.facets import LEFT, add_at_point, at_point, begin_touch, force_at, forget, list_near
 
 SWEEPS = 40
 """At most."""
@@ -21,16 +21,13 @@ SETTLED = 1e-4
 
 
 @njit_inlined
-def rub(facets, f, q, k, most, place):
+def rub(facets, f, q, k, most, slip):
     """Moves the force along the obstacle [N] towards where friction holds the point: Coulomb's, at most `most`.
 
-    `k` [N/m] takes back a whole way within the step; `place` (3) [m]: where the point would end the step, seen from the
-    obstacle.
+    `k` [N/m] takes back a whole way within the step; `slip` (3) [m]: the way to take back.
     """
-    drag, anchor, normal = facets.dragging, facets.anchor, facets.normal
-    t0 = drag[f, q, 0] - k * (place[0] - anchor[f, q, 0])
-    t1 = drag[f, q, 1] - k * (place[1] - anchor[f, q, 1])
-    t2 = drag[f, q, 2] - k * (place[2] - anchor[f, q, 2])
+    drag, normal = facets.dragging, facets.normal
+    t0, t1, t2 = drag[f, q, 0] - k * slip[0], drag[f, q, 1] - k * slip[1], drag[f, q, 2] - k * slip[2]
     inward = t0 * normal[f, q, 0] + t1 * normal[f, q, 1] + t2 * normal[f, q, 2]
     t0, t1, t2 = t0 - inward * normal[f, q, 0], t1 - inward * normal[f, q, 1], t2 - inward * normal[f, q, 2]
     size = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
@@ -68,9 +65,14 @@ def press(facets, boundary, step, f, q):
         begin_touch(facets, boundary, step, (start[0], start[1], start[2]), o, (f, q))
     facets.pressing[f, q] = force
     if boundary.friction[o] > 0.0:
-        c = boundary.position[step, o]
-        end = start[0] + dt * u[q, 0] - c[0], start[1] + dt * u[q, 1] - c[1], start[2] + dt * u[q, 2] - c[2]
-        rub(facets, f, q, k, boundary.friction[o] * force, end)
+        c, v, a = boundary.position[step, o], boundary.velocity[step, o], facets.anchor[f, q]
+        s0, s1, s2 = start[0] - c[0] - a[0], start[1] - c[1] - a[1], start[2] - c[2] - a[2]
+        slip = (
+            s0 + dt * u[q, 0] - LEFT * (s0 + dt * v[0]),
+            s1 + dt * u[q, 1] - LEFT * (s1 + dt * v[1]),
+            s2 + dt * u[q, 2] - LEFT * (s2 + dt * v[2]),
+        )
+        rub(facets, f, q, k, boundary.friction[o] * force, slip)
 
 
 @njit_inlined

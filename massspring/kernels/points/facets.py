@@ -9,9 +9,9 @@ import math
 from massspring.kernels.contact.gaps import gap_and_normal
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
-LEFT = 0.8
-"""Of what is inside at the start of a step that may be inside at its end: pressures answer a step later, and to push
-all of it out at once would shake the body."""
+LEFT = 0.95
+"""Of what is inside, or has slipped, at the start of a step that may be so at its end: pressures answer a step later,
+and to push all of it out at once would shake the body (eq. 9.7)."""
 
 
 @njit_inlined

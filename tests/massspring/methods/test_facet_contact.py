@@ -27,8 +27,11 @@ DEPTH = 0.15 * RADIUS
 """What each plane travels."""
 PRESSED, HELD = 0.25, 0.75
 """Seconds of pressing, and to the end."""
-INSIDE, MOVING = 1e-4, 2e-3
-"""Of the radius that points may be inside: half a second after the press, and during it."""
+INSIDE, MOVING = 1e-4, 6e-3
+"""Of the radius that points may be inside: half a second after the press, and while a plane moves by 0.6 radii a
+second, as pressures follow a growing load one step late."""
+STEADY = 1e-3
+"""Of the force of a wide contact, what it may sway by."""
 EDGE = 0.04
 """Of the block that slides [m]."""
 CREEP = 5e-5
@@ -92,13 +95,45 @@ def test_a_squeezed_ball_comes_to_rest_between_equal_forces(fraction):
     assert np.abs(history.volume / ball().rest_volumes - 1.0).max() < 1e-5
 
 
+@pytest.mark.parametrize("friction", [0.0, FRICTION])
+def test_a_wide_contact_stands_still(friction):
+    """A flat block between planes that cover its sides, where volumes undo most of what contact does (eq. 9.6); with
+    the part 0.8 of eq. 9.3 the force sways by a tenth."""
+    body = quadratic_body(*quadratic_block((4, 4, 2), distortion=0.1), SOFT, inertia="stiffness")
+    dt = 0.8 * step_limit(body).undamped
+    low, high = body.rest[:, 2].min(), body.rest[:, 2].max()
+    down = Trajectory((0.0, 800 * dt), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.2 * (high - low))))
+    planes = Plane((0, 0, high), (0, 0, -1), down, friction), Plane((0, 0, low), (0, 0, 1), friction=friction)
+    history = simulate(Setup(body, ImplicitVolume(), Clock(10 * dt, 150, 10), planes, damping=5.0))
+    force = history.contact_force[-20:, 0, 2]
+    assert history.outcome == "finished" and force.mean() < -1.0
+    assert np.ptp(force) < STEADY * -force.mean()
+
+
+def growth(left_free: float, theta: float) -> float:
+    """Largest growth in a step of eq. 9.6 without elasticity; `left_free`: σ²."""
+    sigma = np.sqrt(left_free)
+
+    def step(y: float, v: float, force: float) -> tuple[float, float, float]:
+        force = (1.0 - left_free) * force - sigma * v - (1.0 - theta) * sigma * y
+        return y + v + sigma * force, v + sigma * force, force
+
+    return float(np.abs(np.linalg.eigvals(np.array([step(*unit) for unit in np.eye(3)]).T)).max())
+
+
+@pytest.mark.parametrize("left_free", [0.01, 0.05, 0.1])
+def test_late_pressures_need_a_part_that_is_left(left_free):
+    """Eq. 9.7: the mode grows below θ = 1 − σ² and fades above."""
+    assert growth(left_free, 1.0 - 2.0 * left_free) > 1.0 > growth(left_free, 1.0 - 0.5 * left_free)
+
+
 def test_the_force_does_not_depend_on_the_step():
     forces = [squeezed(fraction)[1].contact_force[-1, 1, 2] for fraction in (0.25, 0.5, 0.85)]
     assert np.ptp(forces) < 3e-3 * forces[0]
 
 
 @pytest.mark.parametrize("fraction", [0.25, 0.5, 0.85])
-def test_a_moving_plane_enters_by_two_thousandths_of_the_radius_at_most(fraction):
+def test_a_moving_plane_enters_by_little(fraction):
     """At the end of the press, where the load grows fastest."""
     planes, history = squeezed(fraction)
     deepest = -planes[1].gap(places(ball(), history.snapshots[0]), float(history.t[14])).min()
@@ -147,14 +182,8 @@ def test_a_block_slides_above_the_angle_of_friction():
     assert force[:, 2].mean() == pytest.approx(slab().mass.sum() * WEAK * np.cos(np.radians(40.0)), rel=0.03)
 
 
-SHAKES = pytest.mark.xfail(
-    strict=True, reason="a block held without slip shakes by more than a hundredth of its weight"
-)
-
-
 @pytest.mark.parametrize(
-    ("angle", "friction"),
-    [pytest.param(20.0, FRICTION, id="Coulomb"), pytest.param(30.0, "no_slip", id="no slip", marks=SHAKES)],
+    ("angle", "friction"), [pytest.param(20.0, FRICTION, id="Coulomb"), pytest.param(30.0, "no_slip", id="no slip")]
 )
 def test_a_block_rests_below_the_angle_and_without_slip(angle, friction):
     """The force along the plane is the weight's part, and nothing creeps. Gravity begins at once: there is a first slip
