@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from studies.catalog.study import Chart, Study
     from studies.geometry.api.organs import organ
     from studies.geometry.organs import SHAPES
-    from studies.metrics.metrics import METRICS, Metric
+    from studies.metrics.metric import Metric
+    from studies.metrics.metrics import METRICS
     from studies.metrics.run import Run
     from studies.metrics.table import study_table
     from studies.runs.case import BodyRecipe, Case
@@ -84,7 +85,7 @@ _FACE = {
     "InitialConditions": "studies.scene.start",
     "Lumen": "studies.scene.scene",
     "Method": "massspring.methods.method",
-    "Metric": "studies.metrics.metrics",
+    "Metric": "studies.metrics.metric",
     "Organ": "studies.scene.scene",
     "Penalty": "massspring.methods.penalty",
     "PostStabilization": "massspring.methods.post_stabilization",

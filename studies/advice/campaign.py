@@ -12,7 +12,7 @@ from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.accuracy import ACCURACY
 from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, judged
-from studies.metrics.metrics import Metric
+from studies.metrics.metric import Metric
 from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.runs.recipe_text import case_of_recipe, recipe_text

@@ -16,7 +16,7 @@ VERTICES = (150, 200, 300)
 BUDGETS = tuple(4 * vertices - 6 for vertices in VERTICES)
 """Nodes on its outer surface, mid-side nodes among them (Euler); of graded bodies too."""
 SHORT, LONG = 0.5, 0.8
-"""Steps over the stability limit."""
+"""Steps over the stability limit: of linear bodies, and of quadratic ones."""
 COARSE = BodyRecipe(nodes=150, law="cotangent", volumes="nodal"), BodyRecipe("quadratic", 294, contact="nodes")
 COARSE_STEP = 0.01
 """Bodies that implicit elements advance, and their step [s]: they are not limited by stability."""
@@ -58,24 +58,17 @@ def can_be_graded(scene: Scene) -> bool:
 
 
 def quadratic_cases(scene: Scene) -> tuple[Case, ...]:
-    """Even bodies at the long step, graded ones at the short one: masses by stiffness leave less of the limit to their
-    small elements under a wide contact. Of the even middle size also the short step; of the headline half its step, the
-    other masses and the other contact, and among the graded bodies the next finer one."""
+    """Even bodies in all sizes and graded ones from the middle size on, at the long step. Of the headline also half its
+    step, the other masses and the other contact, and among the graded bodies the next finer one."""
     even = [BodyRecipe("quadratic", nodes, mass=_mass(scene)) for nodes in BUDGETS]
     graded = [replace(body, graded=True) for body in even[1:] if can_be_graded(scene)]
     head = headline(scene)
-    found = [_timed(scene, body, step_of(body)) for body in (*even, *graded)]
-    found += [_timed(scene, even[1], SHORT), _timed(scene, head, step_of(head) / 2)]
-    if _mass(scene) != "lumped":
-        found.append(_timed(scene, replace(head, mass="lumped"), step_of(head)))
+    others = [replace(head, mass="lumped")] if _mass(scene) != "lumped" else []
     if scene.obstacles:
-        found.append(_timed(scene, replace(head, contact="nodes"), step_of(head)))
+        others.append(replace(head, contact="nodes"))
+    found = [_timed(scene, body, LONG) for body in (*even, *graded, *others)]
+    found.append(_timed(scene, head, LONG / 2))
     return tuple({case.key: case for case in found}.values())
-
-
-def step_of(body: BodyRecipe) -> float:
-    """The step of a quadratic body over its stability limit."""
-    return SHORT if body.graded else LONG
 
 
 def element_cases(scene: Scene) -> tuple[Case, ...]:
@@ -123,5 +116,7 @@ ACCURACY = Study(
         "lumen_pressure_error",
         "volume_worst",
         "min_j",
+        "alternation",
+        "sway",
     ),
 )

@@ -1,7 +1,7 @@
 """How much accuracy does run time buy: with the paper's body, one volume, and quadratic elements?"""
 
 from massspring import ImplicitVolume
-from studies.catalog.accuracy import BUDGETS, SHORT, headline, linear_bodies, step_of
+from studies.catalog.accuracy import BUDGETS, LONG, SHORT, headline, linear_bodies
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.scene import Scene
@@ -14,7 +14,7 @@ def cases(scene: Scene) -> tuple[Case, ...]:
     headline."""
     plain = [body for body in linear_bodies(scene) if body.volumes == "scene"]
     even = BodyRecipe("quadratic", BUDGETS[0], mass=headline(scene).mass)
-    chosen = [*((body, SHORT) for body in plain), *((body, step_of(body)) for body in (even, headline(scene)))]
+    chosen = [*((body, SHORT) for body in plain), *((body, LONG) for body in (even, headline(scene)))]
     return tuple(Case(scene, body, ImplicitVolume(), dt_fraction=step, timed=True) for body, step in chosen)
 
 

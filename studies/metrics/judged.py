@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring import ImplicitVolume
-from studies.metrics.metrics import Run
+from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.metrics.wish import Wish
 from studies.runs.case import Case

@@ -5,7 +5,9 @@ from collections.abc import Sequence
 import pandas as pd
 
 from studies.base.lookup import lookup
-from studies.metrics.metrics import METRICS, Metric, Run
+from studies.metrics.metric import Metric
+from studies.metrics.metrics import METRICS
+from studies.metrics.run import Run
 from studies.runs.recipe_text import recipe_text
 
 UNRESOLVED = "doubtful"

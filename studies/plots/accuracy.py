@@ -8,7 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.metrics.metrics import METRICS, RESOLVED_SHARE, Metric, Run
+from studies.metrics.metric import RESOLVED_SHARE, Metric
+from studies.metrics.metrics import METRICS
+from studies.metrics.run import Run
 from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
     band_handle,

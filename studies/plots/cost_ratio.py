@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from massspring import Free
-from studies.metrics.metrics import Run
+from studies.metrics.run import Run
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, finish, grouped, page
 from studies.plots.style.style import BLACK, GREY, NORMAL, heading, method_colour, readable, save, styled

@@ -9,7 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from massspring import Trajectory
-from studies.metrics.metrics import COMPARABLE, METRICS, Run, force_end
+from studies.metrics.metric import COMPARABLE
+from studies.metrics.metrics import METRICS, force_end
+from studies.metrics.run import Run
 from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
     band_handle,

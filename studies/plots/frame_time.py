@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from studies.metrics.metrics import Run
+from studies.metrics.run import Run
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import band_handle, blank, finish, grouped, log_axis, page, panels, remarks
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, save, styled

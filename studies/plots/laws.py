@@ -10,7 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
-from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run
+from studies.metrics.metric import COMPARABLE, Metric
+from studies.metrics.metrics import METRICS
+from studies.metrics.run import Run
 from studies.plots.style.page import (
     band_handle,
     blank,

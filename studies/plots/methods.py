@@ -9,7 +9,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from massspring import Method
-from studies.metrics.metrics import COMPARABLE, METRICS, Metric, Run, real_time
+from studies.metrics.metric import COMPARABLE, Metric
+from studies.metrics.metrics import METRICS, real_time
+from studies.metrics.run import Run
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import (
     blank,

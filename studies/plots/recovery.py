@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from studies.metrics.metrics import Run
+from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import blank, by_scene, finish, good_frames, grouped, has_frames, log_axis, page, panels

@@ -10,7 +10,9 @@ from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull
 
 from massspring import Plane
-from studies.metrics.metrics import COMPARABLE, Run, force_end, volume_end, volume_worst
+from studies.metrics.metric import COMPARABLE
+from studies.metrics.metrics import force_end, volume_end, volume_worst
+from studies.metrics.run import Run
 from studies.plots.style.page import blank, finish, page, panels
 from studies.plots.style.render import Camera, draw_surface, frame, scale_bar, uniform
 from studies.plots.style.style import BLACK, GREY, NORMAL, SMALL, method_colour, readable, save, styled

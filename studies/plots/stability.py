@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from studies.metrics.metrics import Run
+from studies.metrics.run import Run
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, finish, grouped, log_axis, page, panels
 from studies.plots.style.style import BLACK, STATUS_LOOKS, heading, readable, save, styled

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
-from studies.metrics.metrics import COMPARABLE, Run
+from studies.metrics.metric import COMPARABLE
+from studies.metrics.run import Run
 from studies.plots.style.bodies import body_looks, body_method_handles
 from studies.plots.style.page import (
     blank,

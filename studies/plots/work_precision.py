@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, front, judged
-from studies.metrics.metrics import Metric, Run
+from studies.metrics.metric import Metric
+from studies.metrics.run import Run
 from studies.metrics.wish import usual_wish
 from studies.plots.style.families import PAPER, Family, family_of
 from studies.plots.style.page import (

@@ -9,7 +9,7 @@ import pandas as pd
 from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
-from studies.metrics.metrics import COMPARABLE
+from studies.metrics.metric import COMPARABLE
 from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.store.record import read_record

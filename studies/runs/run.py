@@ -13,6 +13,7 @@ from studies.base.compile_watch import watching
 from studies.base.errors import DoesNotApply, StudyError
 from studies.runs.case import Case, case_from_json
 from studies.runs.current import case_path, run_fingerprint
+from studies.runs.indicators import indicators, remarks
 from studies.runs.limits import TIME_LIMIT
 from studies.runs.prepare import LUMEN, Prepared, prepare
 from studies.store.new_record import new_fields, new_record
@@ -49,7 +50,9 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
         except (StudyError, MassSpringError) as error:
             return _record(case, Status.FAILED, str(error), {"warnings": _said(caught)}, {})
     status, message = judge(case, prepared, history)
-    attributes = {**_attributes(prepared, history), "warnings": _said(caught)}
+    found = indicators(case.scene, prepared.setup.body, history, _lumen_column(prepared))
+    said = "; ".join(filter(None, [_said(caught), *remarks(found)]))
+    attributes = {**_attributes(prepared, history), **found, "warnings": said}
     return _record(case, status, message, attributes, _fields(case, prepared, history))
 
 
@@ -111,8 +114,13 @@ def _attributes(prepared: Prepared, history: History) -> dict[str, float | int |
         "skipped_steps": history.singular_steps,
         "capped_steps": history.limited_corrections,
         "volumes": setup.body.kept.count,
-        "lumen_column": setup.body.kept.names.index(LUMEN) if LUMEN in setup.body.kept.names else -1,
+        "lumen_column": _lumen_column(prepared),
     }
+
+
+def _lumen_column(prepared: Prepared) -> int:
+    names = prepared.setup.body.kept.names
+    return names.index(LUMEN) if LUMEN in names else -1
 
 
 def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field]:

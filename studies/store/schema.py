@@ -119,7 +119,10 @@ RUN_ATTRIBUTES: dict[str, AttributeSpec] = SECONDS | {
     "capped_steps": AttributeSpec(INDEX, "1", "steps that made up for a part of a wrong volume"),
     "volumes": AttributeSpec(INDEX, "1", "kept volumes", length="m"),
     "lumen_column": AttributeSpec(INDEX, "1", "which kept volume is a lumen; -1: none"),
-    "warnings": AttributeSpec(TEXT, "", "what preparing the case warned of"),
+    "unknowns_per_volume": AttributeSpec(NUMBER, "1", "coordinates for each kept volume", optional=True),
+    "alternation": AttributeSpec(NUMBER, "1", "rms jump of pressure between volumes, over mu", optional=True),
+    "sway": AttributeSpec(NUMBER, "1", "range of the force at rest about its trend, over its mean", optional=True),
+    "warnings": AttributeSpec(TEXT, "", "what preparing the case warned of, and what its indicators tell"),
 }
 
 REFERENCE_FIELDS: dict[str, FieldSpec] = {

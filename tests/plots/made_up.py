@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from massspring import Free, ImplicitVolume
-from studies.metrics.metrics import Run
+from studies.metrics.run import Run
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from studies.metrics.metrics import METRICS, Run
+from studies.metrics.metrics import METRICS
+from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_clamped import BALL_CLAMPED
@@ -49,6 +50,9 @@ ATTRIBUTES = {
     "capped_steps": 0,
     "volumes": 1,
     "lumen_column": -1,
+    "unknowns_per_volume": 81.0,
+    "alternation": 0.25,
+    "sway": 0.04,
     "warnings": "",
 }
 

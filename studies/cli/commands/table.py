@@ -9,7 +9,8 @@ import typer
 from studies.base.lookup import lookup
 from studies.cli.terminal import Results, StudyName, console, say, warn
 from studies.metrics.cells import MISSING, UNRESOLVED_MARK, plain, value_cell
-from studies.metrics.metrics import METRICS, Metric
+from studies.metrics.metric import Metric
+from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED, study_table
 from studies.scene.quantities import ALWAYS
 from studies.store.csv_table import write_table

@@ -8,7 +8,7 @@ from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
-from studies.metrics.metrics import Run
+from studies.metrics.run import Run
 from studies.plots.style.page import by_scene
 from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, readable
 from studies.runs.case import BodyRecipe

@@ -12,7 +12,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
 from studies.metrics.cells import UNRESOLVED_MARK
-from studies.metrics.metrics import Metric, Run
+from studies.metrics.metric import Metric
+from studies.metrics.run import Run
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, readable, remark, styled
 
 ROW, LINE, MARGIN = 0.25, 0.19, 0.12

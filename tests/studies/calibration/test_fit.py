@@ -11,7 +11,7 @@ from studies.base.errors import StudyError
 from studies.calibration.fit import DIFFERENCE, fit
 from studies.calibration.measured import Measurements
 from studies.calibration.parameters import INNER_WEIGHT, STIFFNESS, parameters_of, scaled, weights_of
-from studies.metrics.metrics import Run
+from studies.metrics.run import Run
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from studies.catalog import STUDIES
-from studies.metrics.metrics import METRICS, Metric
+from studies.metrics.metric import Metric
+from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED, metric, study_table
 from studies.scene.quantities import ALWAYS, GAUGE_FREE
 from studies.scenes import JUDGED

@@ -7,7 +7,7 @@ import pytest
 
 from massspring import Free, simulate
 from studies.base.errors import StudyError
-from studies.metrics.metrics import Run
+from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.runs.current import case_path
 from studies.runs.prepare import prepare

@@ -1,0 +1,88 @@
+"""What tells that an answer should not be believed although the run ended well: a body that may lock, pressures that
+alternate between neighbours, a force that sways while nothing outside moves."""
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from massspring import Body, History
+from massspring.body.points import PointVolumes
+from massspring.body.volumes import Volumes
+from studies.scene.scene import Scene
+
+ALTERNATES = 0.3
+"""Of the shear modulus: nodal volumes on a pressed liver differ by .5 to .7 from volume to volume, patches and
+quadratic bodies by .13."""
+SWAYS = 0.01
+"""Of the force."""
+STILL_FRAMES = 20
+"""At the end of a run, over which a force may sway."""
+LOCKS = 2.0
+"""Unknowns for each kept volume: the continuum has three, a volume for each tetrahedron leaves .6."""
+
+
+def indicators(scene: Scene, body: Body, history: History, lumen: int) -> dict[str, float]:
+    """Attributes of a run (RUN_ATTRIBUTES); NaN where they mean nothing. lumen: its column, or −1."""
+    pressure = history.pressure[history.good_frames - 1] if history.good_frames else history.pressure[:0]
+    alternation = jumps(pressure, neighbours(body.kept, lumen)) if len(pressure) else np.nan
+    return {
+        "unknowns_per_volume": 3.0 * body.node_count / body.kept.count,
+        "alternation": float(alternation / scene.tissue.shear_modulus),
+        "sway": sway(scene, history),
+    }
+
+
+def remarks(found: dict[str, float]) -> list[str]:
+    """A sentence for each indicator that is beyond its bound."""
+    said = []
+    if found["unknowns_per_volume"] < LOCKS:
+        each = found["unknowns_per_volume"]
+        said.append(f"there are {each:.2g} unknowns for each kept volume; below {LOCKS:g} a body locks, keep fewer")
+    if found["alternation"] > ALTERNATES:
+        part = found["alternation"]
+        said.append(f"pressures alternate by {part:.2g} of the shear modulus between neighbouring volumes; smooth them")
+    if found["sway"] > SWAYS:
+        percent = 100 * found["sway"]
+        said.append(f"the force sways by {percent:.2g} % at the end while nothing outside moves; halve the step")
+    return said
+
+
+def neighbours(kept: Volumes | PointVolumes, lumen: int) -> np.ndarray:
+    """Pairs of volumes of the tissue that share an element or a triangle, (e, 2)."""
+    if isinstance(kept, PointVolumes):
+        corner = np.asarray(kept.corner_volume)
+        pairs = np.concatenate([corner[:, [i, j]] for i in range(4) for j in range(i)])
+    else:
+        shares = csr_array(kept.share != 0).astype(np.int64)
+        together = (shares @ shares.T).tocoo()
+        pairs = np.column_stack([together.row, together.col])
+    pairs = np.unique(np.sort(pairs, axis=1), axis=0)
+    return pairs[(pairs[:, 0] != pairs[:, 1]) & ~(pairs == lumen).any(axis=1)]
+
+
+def jumps(pressure: np.ndarray, pairs: np.ndarray) -> float:
+    """Root mean square of the differences of `pressure` (m,) over `pairs` (e, 2), in its unit; NaN without a pair."""
+    if not len(pairs):
+        return float("nan")
+    return float(np.sqrt(np.mean((pressure[pairs[:, 0]] - pressure[pairs[:, 1]]) ** 2)))
+
+
+def sway(scene: Scene, history: History) -> float:
+    """Range of the probed force about its straight trend, over its mean [1], in the last frames of those in which
+    nothing outside moves; NaN where there are fewer than three, or no such force."""
+    rests = history.t > still_from(scene)
+    last = np.flatnonzero(rests & (np.arange(len(history.t)) < history.good_frames))[-STILL_FRAMES:]
+    among = history.contact_force if scene.probed.what == "obstacle" else history.held_force
+    if len(last) < 3 or not scene.probed.number < among.shape[1]:
+        return float("nan")
+    force = scene.output_force(history.contact_force, history.held_force)[last]
+    trend, mean = np.polynomial.Polynomial.fit(last, force, 1), abs(float(force.mean()))
+    return float(np.ptp(force - trend(last))) / mean if mean > 0.0 else float("nan")
+
+
+def still_from(scene: Scene) -> float:
+    """When the last path and the filling of a scene end [s]; infinity for one that starts in motion."""
+    if scene.start is not None:
+        return float("inf")
+    paths = [moving.path.times for moving in (*scene.obstacles, *scene.held)]
+    filling = [scene.lumen.filling.times] if scene.lumen is not None else []
+    return max((times[-1] for times in (*paths, *filling) if len(times)), default=0.0)

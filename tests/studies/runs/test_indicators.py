@@ -1,0 +1,93 @@
+"""What tells that an answer should not be believed, on histories and bodies whose numbers are known."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from massspring import History, Sphere, Trajectory, Volumes, quadratic_body, tetrahedral_body
+from studies.runs.indicators import SWAYS, indicators, jumps, neighbours, remarks, still_from, sway
+from studies.runs.run import measure
+from tests.massspring.conftest import SOFT, block
+from tests.massspring.quadratic import quadratic_block
+from tests.studies.tiny import SQUEEZE, tiny_case
+
+GOOD = {"unknowns_per_volume": 3.0, "alternation": 0.1, "sway": 1e-3}
+
+
+def history(force, good_frames=50, pressure=None) -> History:
+    """Frames of which the last 25 come after the planes stand still, with a force [N] of the first plane."""
+    t = np.linspace(0.0, 6.0, 51)[1:]
+    contact = np.zeros((50, 2, 3))
+    contact[:, 0, 2] = -force(t)
+    made = SimpleNamespace(
+        t=t,
+        contact_force=contact,
+        held_force=np.zeros((50, 0, 3)),
+        good_frames=good_frames,
+        pressure=np.zeros((50, 1)) if pressure is None else pressure,
+    )
+    return cast(History, made)
+
+
+def test_a_trend_is_no_sway_but_a_swing_is():
+    assert sway(SQUEEZE, history(lambda t: 2.0 + 0.3 * t)) < 1e-12
+    swing = history(lambda t: 2.0 + 0.1 * np.cos(2 * np.pi * 25 * t / 6.0))
+    assert sway(SQUEEZE, swing) == pytest.approx(0.1, rel=0.15)
+
+
+def test_frames_under_way_do_not_count():
+    """Nor those after an early end, nor a scene that starts in motion."""
+    fast = history(lambda t: np.where(t > 3.0, 1.0, np.cos(40 * t)))
+    assert still_from(SQUEEZE) == 3.0 and sway(SQUEEZE, fast) < 1e-12
+    assert np.isnan(sway(SQUEEZE, history(np.ones_like, good_frames=26)))
+    assert np.isnan(sway(SQUEEZE, history(np.zeros_like)))
+    late = Sphere((0, 0, 1.0), 0.1, Trajectory((0.0, 5.9), ((0, 0, 0), (0, 0, -0.1))))
+    assert np.isnan(sway(replace(SQUEEZE, obstacles=(late,)), history(np.ones_like)))
+
+
+def test_neighbours_share_an_element():
+    """Of nodal volumes and of those of vertices: the edges of the mesh."""
+    points, triangles, cells = block((2, 1, 1))
+    edges = {tuple(sorted(cell[[i, j]])) for cell in cells for i in range(4) for j in range(i)}
+    body = tetrahedral_body(points, triangles, cells, SOFT, "cotangent")
+    found = neighbours(Volumes.nodal(body), -1)
+    assert {tuple(pair) for pair in found} >= edges
+    quadratic = quadratic_body(*quadratic_block((2, 1, 1)), SOFT)
+    assert len(neighbours(quadratic.kept, -1)) == len(edges)
+    assert not (neighbours(quadratic.kept, 3) == 3).any()
+
+
+def test_jumps_are_those_between_neighbours():
+    assert jumps(np.array([1.0, 4.0, 4.0]), np.array([[0, 1], [1, 2]])) == pytest.approx(3.0 / np.sqrt(2.0))
+    assert np.isnan(jumps(np.array([1.0]), np.zeros((0, 2), dtype=int)))
+
+
+@pytest.mark.parametrize(
+    ("changed", "word"),
+    [({"unknowns_per_volume": 0.6}, "locks"), ({"alternation": 0.6}, "alternate"), ({"sway": 2 * SWAYS}, "sways")],
+)
+def test_each_indicator_is_told_beyond_its_bound(changed, word):
+    assert remarks(GOOD) == [] and remarks(dict.fromkeys(GOOD, np.nan)) == []
+    (said,) = remarks(GOOD | changed)
+    assert word in said
+
+
+def test_a_record_has_them(mesh_cache):
+    """A run of five frames has too few at rest; nodal volumes of a coarse ball alternate."""
+    case = tiny_case()
+    nodal = case.replaced(body=replace(case.body, law="cotangent", volumes="nodal"))
+    record = measure(nodal)
+    assert record.attributes["unknowns_per_volume"] == 3.0 and np.isnan(record.attributes["sway"])
+    assert record.attributes["alternation"] > 0.0
+    assert ("alternate" in record.attributes["warnings"]) == (record.attributes["alternation"] > 0.3)
+
+
+def test_pressures_are_those_of_the_last_good_frame():
+    body = quadratic_body(*quadratic_block((1, 1, 1)), SOFT)
+    pressure = np.full((50, body.kept.count), np.nan)
+    pressure[1] = 7.0
+    ended = history(np.ones_like, good_frames=2, pressure=pressure)
+    assert indicators(SQUEEZE, body, ended, -1)["alternation"] == 0.0
