@@ -22,8 +22,6 @@ SLOWEST, FASTEST = 1.0, 3.0
 """Range of orders that are believed: where a held patch ends the displacement goes as √r, which leaves order 1 in the
 force (energy) and in the displacement however small the elements; 3 is the order of the displacement of quadratic
 elements. A family whose elements there shrink as the others do has SLOWEST for both (order_at_outlines)."""
-HALVING = 2.0 ** (1.0 / 3.0)
-"""Factor on the size of elements that are halved once: three times, and each edge is halved."""
 ORDERS = 81
 """Orders tried for a field, at most 0.025 apart: the error bar then changes by under 1 % from one to the next."""
 ALIKE = 0.5
@@ -47,17 +45,19 @@ class MeshError:
         return self.order == self.order
 
 
-def order_at_outlines(ratio: float, more: int) -> float:
-    """Largest order to believe where √r leaves order 1 in the elements there, within SLOWEST to FASTEST.
+def order_at_outlines(ratio: float, at_outlines: float) -> float:
+    """Largest order to believe where √r leaves order 1 in the elements at an outline, within SLOWEST to FASTEST.
 
-    ratio: size of a mesh over that of the next finer, away from the outline; more: times that the finer mesh has its
-    elements at the outline halved more often. They shrink by ratio · HALVING^more, which is ratio^order.
+    ratio: size of a mesh over that of the next finer, away from the outline; at_outlines: the same of the elements
+    there, measured. Their error a h_o falls by at_outlines, which is ratio^order.
     Raises SolveError for meshes of no different size.
     """
-    if not ratio > 1:
-        raise SolveError(f"two meshes with element sizes in the ratio {ratio:.3g} have no order: it must exceed 1")
-    order = 1.0 + more * float(np.log(HALVING) / np.log(ratio))
-    return min(FASTEST, max(SLOWEST, order))
+    if not (ratio > 1 and at_outlines > 0):
+        raise SolveError(
+            f"two meshes with element sizes in the ratio {ratio:.3g}, at outlines {at_outlines:.3g}, have no order: "
+            f"the first must exceed 1, the second 0"
+        )
+    return float(np.clip(np.log(at_outlines) / np.log(ratio), SLOWEST, FASTEST))
 
 
 def observed_order(sizes: Sequence[float], coarse_change: float, fine_change: float, fastest: float = FASTEST) -> float:

@@ -16,12 +16,13 @@ from reference_fem import (
     motion_path,
     nodes,
 )
+from reference_fem.model.problem import find_held
 from studies.base.errors import StudyError
 from studies.reference.checkpoints import drop, keep, kept
 from studies.reference.fields import fields_of
 from studies.reference.problem import reference_problem
 from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint
-from studies.reference.size import element_size
+from studies.reference.size import element_size, outline_size
 from studies.store.new_record import new_record
 from studies.store.record import Status, write_record
 
@@ -117,11 +118,13 @@ def motion(
 
 
 def _attributes(reference_solve: ReferenceSolve, problem: Problem, found: list[Equilibrium], seconds: float) -> dict:
+    held = [] if reference_solve.scene.symmetric else find_held(problem)  # planes of symmetry hold no region
     return {
         "scene": reference_solve.scene.name,
         "level": float(reference_solve.level),
         "variant": reference_solve.variant,
         "size": element_size(reference_solve.scene, reference_solve.level),
+        "outline_size": outline_size(problem.mesh, held),
         "unknowns": 3 * len(nodes(problem.mesh)) + problem.mesh.nvertices,
         "steps_done": len(found),
         "seconds": seconds,

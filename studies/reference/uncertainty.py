@@ -97,12 +97,18 @@ class Sample:
     @property
     def element_size(self) -> float:
         """Of the mesh before elements were halved [m]. Raises StudyError for a record of older code."""
+        return self._told("size", "its element size")
+
+    @property
+    def outline_size(self) -> float:
+        """Of the elements at the outlines of held regions [m], NaN without one. Raises StudyError likewise."""
+        return self._told("outline_size", "the size of its elements at outlines")
+
+    def _told(self, name: str, words: str) -> float:
         known = self.solution.record.attributes
-        if "size" not in known:
-            raise StudyError(
-                f"the reference {self.solution.record.name} does not tell its element size; solve it again"
-            )
-        return float(known["size"])
+        if name not in known:
+            raise StudyError(f"the reference {self.solution.record.name} does not tell {words}; solve it again")
+        return float(known[name])
 
     def series(self, name: str) -> np.ndarray:
         """A stored series of numbers, (K,)."""
@@ -237,11 +243,8 @@ def fastest_order(family: Sequence[Sample], sizes: Sequence[float]) -> float:
     Observed orders are not enough: what converges fast shows first, and the singularity is left (docs, section 6).
     """
     scene = family[0].solution.scene
-    plan = scene.reference
-    assert plan is not None  # it was solved
     if not scene.held or scene.symmetric:
         return FASTEST
-    halved = [plan.bisections(float(sample.solution.record.attributes["level"]))[0] for sample in family]
-    ratios = [coarse / fine for fine, coarse in pairwise(sizes)]
-    more = [fine - coarse for fine, coarse in pairwise(halved)]
-    return min(order_at_outlines(ratio, count) for ratio, count in zip(ratios, more, strict=True))
+    at_outlines = [sample.outline_size for sample in family]
+    pairs = zip(pairwise(sizes), pairwise(at_outlines), strict=True)
+    return min(order_at_outlines(coarse / fine, rim / near) for (fine, coarse), (near, rim) in pairs)

@@ -35,5 +35,5 @@ STOMACH_PROBE = Scene(
     lumen=Lumen(),
     probed=ForceOutput("obstacle", 0, INWARD),
     damping=8.0,
-    reference=ReferencePlan("solid", (280, 430, 620), at_outlines=(1, 2, 3), at_contact=2),
+    reference=ReferencePlan("solid", (430, 620, 800), at_outlines=(2, 3, 4), at_contact=3),
 )

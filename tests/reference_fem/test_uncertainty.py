@@ -68,22 +68,23 @@ def test_a_fast_change_of_the_coarse_pair_does_not_hide_the_slow_one():
     assert mesh_error(sizes, values).order == FASTEST
     assert mesh_error(sizes, values).uncertainty < 0.8 * values[0]
     assert field_error(sizes, field, WEIGHTS).uncertainty < 0.6 * left
-    fastest = order_at_outlines(1.2, 0)
+    fastest = order_at_outlines(1.2, 1.2)
     assert values[0] < mesh_error(sizes, values, fastest).uncertainty < 4 * values[0]
     assert left < field_error(sizes, field, WEIGHTS, fastest).uncertainty < 2 * left
 
 
 @pytest.mark.parametrize(
-    ("ratio", "more", "order"), [(1.2, 0, 1.0), (2.0, 3, 2.0), (1.2, -2, SLOWEST), (1.2, 9, FASTEST)]
+    ("ratio", "at_outlines", "order"), [(1.2, 1.2, 1.0), (2.0, 4.0, 2.0), (1.2, 1.1, SLOWEST), (1.2, 3.0, FASTEST)]
 )
-def test_an_outline_allows_the_order_at_which_its_elements_shrink(ratio, more, order):
-    """Halved three times more often at half the size elsewhere: a quarter of the size, which is order 2."""
-    assert order_at_outlines(ratio, more) == pytest.approx(order, rel=1e-12)
+def test_an_outline_allows_the_order_at_which_its_elements_shrink(ratio, at_outlines, order):
+    """A quarter of the size there at half the size elsewhere: what is of order 1 there is of order 2 in the size."""
+    assert order_at_outlines(ratio, at_outlines) == pytest.approx(order, rel=1e-12)
 
 
-def test_one_size_has_no_order():
+@pytest.mark.parametrize(("ratio", "at_outlines"), [(1.0, 1.4), (1.2, float("nan")), (1.2, 0.0)])
+def test_one_size_has_no_order(ratio, at_outlines):
     with pytest.raises(SolveError, match="must exceed 1"):
-        order_at_outlines(1.0, 1)
+        order_at_outlines(ratio, at_outlines)
 
 
 SLOPES, WEIGHTS = np.array([[0.3, -0.1], [0.2, 0.5], [0.0, 0.1]]), np.array([1.0, 4.0, 0.5])

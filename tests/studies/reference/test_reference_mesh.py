@@ -18,7 +18,7 @@ from studies.grading.held_mesh import rim_sides, with_patches
 from studies.reference.mesh import reference_mesh
 from studies.reference.outlines import LEAST, SHARE, drawn_to_outlines
 from studies.reference.problem import reference_problem
-from studies.reference.size import element_size
+from studies.reference.size import element_size, outline_size
 from studies.scenes.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.scenes.liver_probe import LIVER_PROBE
@@ -165,3 +165,22 @@ def test_the_size_of_a_mesh_is_told_before_it_is_halved(mesh_cache):
     assert coarse / fine == pytest.approx(2.0, rel=0.15)
     assert element_size(planned(BALL_CLAMPED, at_outlines=0), 400) == fine
     assert element_size(BALL_SQUEEZE, 0.16) == pytest.approx(0.16 * 0.05)
+
+
+def rim_of(times):
+    problem = reference_problem(planned(BALL_CLAMPED, at_outlines=times), 100)
+    return outline_size(problem.mesh, find_held(problem))
+
+
+def test_elements_at_outlines_shrink_by_more_than_their_volume_is_halved(mesh_cache):
+    """Two halvings take half of each side there, not three: neighbours that must be halved too lie there as well."""
+    sizes = [rim_of(times) for times in range(5)]
+    shrink = (sizes[4] / sizes[0]) ** (1 / 4)
+    assert shrink == pytest.approx(2 ** (-1 / 2), rel=0.04)
+    assert shrink < 2 ** (-1 / 3) * 0.95
+    assert sizes[0] == pytest.approx(element_size(BALL_CLAMPED, 100), rel=0.2)
+
+
+def test_a_body_that_is_held_nowhere_has_no_elements_at_outlines():
+    mesh, _ = edge_of_a_cube()
+    assert np.isnan(outline_size(mesh, []))
