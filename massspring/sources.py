@@ -20,8 +20,8 @@ from massspring.errors import MassSpringError
 
 OWN = ("massspring", "reference_fem", "studies")
 """The packages of this distribution, installed side by side; other packages are known by their versions."""
-APART = ("massspring.compile_cache", "massspring.sources")
-"""Own modules that keep account of code and change no result."""
+APART = ("massspring.compile_cache", "massspring.sources", "studies.store")
+"""Own modules that keep account of code, or files, and change no result: a record has a schema number of its own."""
 ROOT = Path(__file__).parents[1]
 FACE = "_FACE"
 """A package that loads its names when they are asked for lists them under this name: {name: module}."""
@@ -52,7 +52,7 @@ def source_fingerprint(*modules: str, within: tuple[str, ...] = OWN) -> str:
         if name in known:
             continue
         known[name] = _source(name)
-        waiting += [other for other in _followed(known[name]) if _is_within(other, within) and other not in APART]
+        waiting += [other for other in _followed(known[name]) if _counts(other, within)]
     _remembered().keep()
     digest = hashlib.sha256()
     for name in sorted(known):
@@ -79,6 +79,10 @@ def own_modules() -> tuple[str, ...]:
     """All modules of this distribution, by dotted name: for what depends on more than imports say."""
     files = [file for package in OWN for file in sorted((ROOT / package).rglob("*.py"))]
     return tuple(".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for file in files)
+
+
+def _counts(module: str, within: tuple[str, ...]) -> bool:
+    return _is_within(module, within) and not _is_within(module, APART)
 
 
 def _is_within(module: str, within: tuple[str, ...]) -> bool:

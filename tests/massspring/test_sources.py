@@ -93,6 +93,19 @@ def test_within_leaves_the_rest_out(checkout):
     assert fresh("studies.ask", within=("studies",)) == before != fresh("studies.ask")
 
 
+def test_how_files_are_written_makes_no_result_stale(checkout, monkeypatch):
+    """A record has a schema number of its own."""
+    before = fresh("studies.ask")
+    with (checkout / "studies" / "ask.py").open("a") as file:
+        file.write("\nfrom studies.store import record\n")
+    (checkout / "studies" / "store").mkdir()
+    for name in ("__init__", "record"):
+        (checkout / "studies" / "store" / f"{name}.py").write_text("x = 1\n")
+    first = fresh("studies.ask")
+    (checkout / "studies" / "store" / "record.py").write_text("x = 2\n")
+    assert fresh("studies.ask") == first != before
+
+
 def test_a_damaged_or_unwritable_memory_costs_time_only(checkout):
     before = fresh("studies.ask")
     memory = checkout / "cache" / "organbench" / "sources.json"
