@@ -15,13 +15,20 @@ from reference_fem.errors import SolveError
 
 SAFETY, TWO_MESHES = 1.25, 3.0
 """Factors on the extrapolated error, of three meshes and of two, whose order is a guess (Roache)."""
+UNCONFIRMED = 2.0
+"""The same of three meshes that come together faster than any order that is believed: parts of either sign may cancel
+in the finest two. The clamped ball was 1.3 times farther off than SAFETY would allow (docs, section 6)."""
 SCATTER = 2.0
 """Factor on the spread of values that go to and fro: the range of three is on average 1.7 of their standard deviation,
 and the finest may be two of these off."""
 SLOWEST, FASTEST = 1.0, 3.0
-"""Range of orders that are believed: where a held patch ends the displacement goes as √r, which leaves order 1 in the
-force (energy) and in the displacement however small the elements; 3 is the order of the displacement of quadratic
-elements. A family whose elements there shrink as the others do has SLOWEST for both (order_at_outlines)."""
+"""Range of orders in the element size that are believed; 3 is that of the displacement of quadratic elements."""
+SLOWEST_AT_OUTLINES, FASTEST_AT_OUTLINES = 0.5, 1.0
+"""The same in the size of the elements where a held patch ends: the displacement goes as √r, which they hold to order
+½, and that leaves order 1 in energy, force and displacement elsewhere, however small they are."""
+Range = tuple[float, float]
+"""Slowest and fastest order that are believed."""
+BELIEVED: Range = (SLOWEST, FASTEST)
 ORDERS = 81
 """Orders tried for a field, at most 0.025 apart: the error bar then changes by under 1 % from one to the next."""
 ALIKE = 0.5
@@ -37,7 +44,7 @@ class MeshError:
     shift: float
     """Extrapolated minus finest value, for fields the size of it; 0 where nothing can be extrapolated."""
     order: float
-    """Observed, within SLOWEST to FASTEST; NaN where the values go to and fro: the spread then counts."""
+    """Observed, of those that are believed; NaN where the values go to and fro: the spread then counts."""
 
     @property
     def monotone(self) -> bool:
@@ -45,64 +52,65 @@ class MeshError:
         return self.order == self.order
 
 
-def order_at_outlines(ratio: float, at_outlines: float) -> float:
-    """Largest order to believe where √r leaves order 1 in the elements at an outline, within SLOWEST to FASTEST.
+def orders_at_outlines(sizes: Sequence[float], at_outlines: Sequence[float]) -> Range:
+    """Range of orders q to believe of errors ~ at_outlines^q, of meshes fine to coarse.
 
-    ratio: size of a mesh over that of the next finer, away from the outline; at_outlines: the same of the elements
-    there, measured. Their error a h_o falls by at_outlines, which is ratio^order.
-    Raises SolveError for meshes of no different size.
+    sizes: of the elements away from outlines [m]; at_outlines: of those there, measured [m]. The error at an outline
+    has order ½ to 1 there; what is left elsewhere falls no faster than sizes^FASTEST, however fast the elements at
+    outlines shrink.
+    Raises SolveError for sizes that do not grow.
     """
-    if not (ratio > 1 and at_outlines > 0):
-        raise SolveError(
-            f"two meshes with element sizes in the ratio {ratio:.3g}, at outlines {at_outlines:.3g}, have no order: "
-            f"the first must exceed 1, the second 0"
-        )
-    return float(np.clip(np.log(at_outlines) / np.log(ratio), SLOWEST, FASTEST))
+    pairs = zip(_ratios(sizes), _ratios(at_outlines), strict=True)
+    fastest = min(FASTEST_AT_OUTLINES, *(FASTEST * np.log(ratio) / np.log(outline) for ratio, outline in pairs))
+    return min(SLOWEST_AT_OUTLINES, float(fastest)), float(fastest)
 
 
-def observed_order(sizes: Sequence[float], coarse_change: float, fine_change: float, fastest: float = FASTEST) -> float:
-    """Order p of |f − f_h| ~ h^p from the sizes h1 < h2 < h3 and |f3 − f2|, |f2 − f1|, within SLOWEST to `fastest`.
+def observed_order(
+    sizes: Sequence[float], coarse_change: float, fine_change: float, believed: Range = BELIEVED
+) -> float:
+    """Order p of |f − f_h| ~ h^p from the sizes h1 < h2 < h3 and |f3 − f2|, |f2 − f1|, within what is believed.
 
     With r = h2/h1, R = h3/h2 the changes are in the ratio r^p (R^p − 1)/(r^p − 1), which grows with p.
     Raises SolveError for sizes that are not three different ones.
     """
     r, R = _ratios(sizes)
+    slowest, fastest = believed
 
     def miss(p: float) -> float:
         return np.log(r**p * (R**p - 1) / (r**p - 1)) - np.log(coarse_change / fine_change)
 
     if fine_change == 0.0:
         return fastest
-    if coarse_change == 0.0 or miss(SLOWEST) >= 0:
-        return SLOWEST
-    return fastest if miss(fastest) <= 0 else float(root_scalar(miss, bracket=(SLOWEST, fastest), xtol=1e-12).root)
+    if coarse_change == 0.0 or miss(slowest) >= 0:
+        return slowest
+    return fastest if miss(fastest) <= 0 else float(root_scalar(miss, bracket=believed, xtol=1e-12).root)
 
 
-def mesh_error(sizes: Sequence[float], values: Sequence, fastest: float = FASTEST) -> MeshError:
+def mesh_error(sizes: Sequence[float], values: Sequence, believed: Range = BELIEVED) -> MeshError:
     """Error of the finest of two or three values of a number, or of a series of them (n,), fine to coarse.
 
-    sizes: h1 < h2 (< h3) [m]; fastest: largest order that is believed. Changes that go the same way: the grid
+    sizes: h1 < h2 (< h3) [m]; believed: range of orders. Changes that go the same way: the grid
     convergence index SAFETY |f2 − f1|/(r^p − 1). Otherwise SCATTER times the spread, the largest difference of two.
     A fine change that is small by chance does not make the bar small: |f3 − f1|/((rR)^p − 1), R = h3/h2, counts where
-    it is larger, as it is for an order faster than believed. Two values: order SLOWEST, safety TWO_MESHES.
+    it is larger, as it is for an order faster than believed. Two values: the slowest order, safety TWO_MESHES.
     Raises SolveError for sizes that do not grow, and values that are not finite.
     """
     values = _finite(values)
     near, ratios = values[1] - values[0], _ratios(sizes)
     change, sign = _norm(near), -float(np.sign(near[0])) if near.size == 1 else 1.0
     if len(values) == 2:
-        shift = change / (ratios[0] ** SLOWEST - 1)
-        return MeshError(TWO_MESHES * shift, sign * shift, SLOWEST)
+        shift = change / (ratios[0] ** believed[0] - 1)
+        return MeshError(TWO_MESHES * shift, sign * shift, believed[0])
     far = values[2] - values[1]
     if _dot(near, far) < ALIKE * change * _norm(far):
         return MeshError(SCATTER * max(change, _norm(far), _norm(values[2] - values[0])), 0.0, float("nan"))
-    order = observed_order(sizes, _norm(far), change, fastest)
+    order = observed_order(sizes, _norm(far), change, believed)
     shift = change / (ratios[0] ** order - 1)
     whole = _norm(values[2] - values[0]) / ((ratios[0] * ratios[1]) ** order - 1)
-    return MeshError(SAFETY * max(shift, whole), sign * shift, order)
+    return MeshError(_safety(order, believed) * max(shift, whole), sign * shift, order)
 
 
-def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray, fastest: float = FASTEST) -> MeshError:
+def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray, believed: Range = BELIEVED) -> MeshError:
     """Error of the finest of two or three fields (n, c) at the same n points of weight (n,), fine to coarse.
 
     Over hundreds of points two parts can be separated: f_i = f + a h_i^p + b_i, where a is the same field on every
@@ -111,7 +119,7 @@ def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray, f
         |f2 − f1|² = a² (h2^p − h1^p)² + b² (h1^2p + h2^2p), |f3 − f2|² alike,
         (f2 − f1)·(f3 − f2) = a² (h2^p − h1^p) (h3^p − h2^p) − b² h2^2p,
 
-    three equations for p, a², b², solved by least squares with p from SLOWEST to `fastest` and a², b² >= 0. The error
+    three equations for p, a², b², solved by least squares with a believed p and a², b² >= 0. The error
     is SAFETY √(a² + b²) h1^p; without b this is the grid convergence index. Fields that come no closer have SCATTER
     times the spread. The shift is the size of the part that could be extrapolated. Two fields: as mesh_error.
     Raises SolveError for sizes that do not grow, and values that are not finite.
@@ -120,14 +128,20 @@ def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray, f
     scaled = [(value * root).ravel() for value in _finite(values)]
     ratios = _ratios(sizes)
     if len(scaled) == 2:
-        return mesh_error(sizes, scaled)
+        return mesh_error(sizes, scaled, believed)
     near, far = scaled[1] - scaled[0], scaled[2] - scaled[1]
     known = np.array([_dot(near, near), _dot(far, far), _dot(near, far)])
     if known[0] >= known[1]:
         return MeshError(SCATTER * max(_norm(near), _norm(far), _norm(scaled[2] - scaled[0])), 0.0, float("nan"))
-    fits = [(*_parts(order, ratios, known), order) for order in np.linspace(SLOWEST, fastest, ORDERS)]
+    fits = [(*_parts(order, ratios, known), order) for order in np.linspace(*believed, ORDERS)]
     _, (common, own), order = min(fits, key=lambda fit: fit[0])
-    return MeshError(SAFETY * float(np.sqrt(common + own)), float(np.sqrt(common)), float(order))
+    safety = _safety(float(order), believed)
+    return MeshError(safety * float(np.sqrt(common + own)), float(np.sqrt(common)), float(order))
+
+
+def _safety(order: float, believed: Range) -> float:
+    """Factor on an extrapolated error: one whose order is the fastest that is believed was not confirmed."""
+    return SAFETY if order < believed[1] else UNCONFIRMED
 
 
 def _parts(order: float, ratios: Sequence[float], known: np.ndarray) -> tuple[float, np.ndarray]:

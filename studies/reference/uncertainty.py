@@ -7,18 +7,18 @@ that a mesh refined somewhere does not count more there.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reference_fem.uncertainty import (
-    FASTEST,
+    BELIEVED,
     MeshError,
+    Range,
     combined,
     field_error,
     mesh_error,
-    order_at_outlines,
+    orders_at_outlines,
     setting_error,
 )
 from studies.base.errors import StudyError
@@ -222,29 +222,30 @@ def uncertainties(
 
 
 def _of_mesh(name: str, family: Sequence[Sample]) -> MeshError:
-    """What the meshes leave, relative to the size of the quantity."""
-    sizes = [sample.element_size for sample in family]
-    fastest = fastest_order(family, sizes)
+    """What the meshes leave, relative to the size of the quantity; the order is that in the element size."""
+    sizes, believed, per_size = judged_by(family)
     if name in NUMBERS:
         values = [NUMBERS[name][1](sample) for sample in family]
         size = 1.0 if name == "volume" else float(np.linalg.norm(values[0]))
-        error, sign = mesh_error(sizes, values, fastest), float(np.sign(values[0][0]))
-        return MeshError(error.uncertainty / size, sign * error.shift / size, error.order)
+        error, sign = mesh_error(sizes, values, believed), float(np.sign(values[0][0]))
+        return MeshError(error.uncertainty / size, sign * error.shift / size, per_size * error.order)
     weights = FIELDS[name if name in FIELDS else "surface"][1](family[0].at)
-    field = field_error(sizes, [sample.u for sample in family], weights, fastest)
+    field = field_error(sizes, [sample.u for sample in family], weights, believed)
     change = np.sqrt(weights @ ((family[1].u - family[0].u) ** 2).sum(axis=1))
     scale = QUANTITIES[name](family[1], family[0]) / change if change else 0.0
-    return MeshError(scale * field.uncertainty, scale * field.shift, field.order)
+    return MeshError(scale * field.uncertainty, scale * field.shift, per_size * field.order)
 
 
-def fastest_order(family: Sequence[Sample], sizes: Sequence[float]) -> float:
-    """Largest order to believe of meshes, fine to coarse, of `sizes` [m]: what the outlines of held regions allow.
+def judged_by(family: Sequence[Sample]) -> tuple[list[float], Range, float]:
+    """The sizes [m] of meshes, fine to coarse, that their errors are powers of; the orders in them that are believed;
+    and such an order in the element size for one in these sizes, of the finer two.
 
-    Observed orders are not enough: what converges fast shows first, and the singularity is left (docs, section 6).
+    Where a region is held, those of the elements at its outline, where the slowest error comes from: what converges
+    fast shows first in an order, and the singularity is left (docs, section 6).
     """
-    scene = family[0].solution.scene
+    scene, sizes = family[0].solution.scene, [sample.element_size for sample in family]
     if not scene.held or scene.symmetric:
-        return FASTEST
-    at_outlines = [sample.outline_size for sample in family]
-    pairs = zip(pairwise(sizes), pairwise(at_outlines), strict=True)
-    return min(order_at_outlines(coarse / fine, rim / near) for (fine, coarse), (near, rim) in pairs)
+        return sizes, BELIEVED, 1.0
+    outlines = [sample.outline_size for sample in family]
+    per_size = np.log(outlines[1] / outlines[0]) / np.log(sizes[1] / sizes[0])
+    return outlines, orders_at_outlines(sizes, outlines), float(per_size)

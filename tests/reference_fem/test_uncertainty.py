@@ -10,11 +10,12 @@ from reference_fem.uncertainty import (
     SCATTER,
     SLOWEST,
     TWO_MESHES,
+    UNCONFIRMED,
     combined,
     field_error,
     mesh_error,
     observed_order,
-    order_at_outlines,
+    orders_at_outlines,
     setting_error,
 )
 
@@ -48,10 +49,10 @@ def test_an_order_that_is_too_low_is_not_believed():
 def test_a_fine_change_that_is_small_by_chance_makes_no_small_bar(fine_change, fastest):
     """The coarsest mesh is 0.3 (h3^p − 1) off the finest, and what that leaves is the bar."""
     coarse = 7.0 + 0.3 * (1.9**fastest - 1)
-    error = mesh_error(SIZES, [7.0, 7.0 + fine_change, coarse], fastest)
+    error = mesh_error(SIZES, [7.0, 7.0 + fine_change, coarse], (SLOWEST, fastest))
     assert error.order == fastest
     assert error.shift == pytest.approx(-fine_change / (1.3**fastest - 1), rel=1e-9)
-    assert error.uncertainty == pytest.approx(SAFETY * 0.3, rel=1e-9)
+    assert error.uncertainty == pytest.approx(UNCONFIRMED * 0.3, rel=1e-9)
 
 
 def fast_then_slow(h):
@@ -60,31 +61,57 @@ def fast_then_slow(h):
 
 
 def test_a_fast_change_of_the_coarse_pair_does_not_hide_the_slow_one():
-    """The observed order is 3 and its bar smaller than what is left; the order that an outline allows covers it."""
+    """The observed order is 3 and its bar smaller than what is left; the orders at an outline cover it."""
     sizes = (1.0, 1.2, 1.45)
     values = [fast_then_slow(h) for h in sizes]
     field = [SLOPES * value for value in values]
     left = np.sqrt(WEIGHTS @ (SLOPES**2).sum(axis=1)) * values[0]
     assert mesh_error(sizes, values).order == FASTEST
-    assert mesh_error(sizes, values).uncertainty < 0.8 * values[0]
-    assert field_error(sizes, field, WEIGHTS).uncertainty < 0.6 * left
-    fastest = order_at_outlines(1.2, 1.2)
-    assert values[0] < mesh_error(sizes, values, fastest).uncertainty < 4 * values[0]
-    assert left < field_error(sizes, field, WEIGHTS, fastest).uncertainty < 2 * left
+    assert field_error(sizes, field, WEIGHTS).uncertainty < left
+    believed = orders_at_outlines(sizes, sizes)
+    assert believed == (0.5, 1.0)
+    assert 1.2 * values[0] < mesh_error(sizes, values, believed).uncertainty < 6 * values[0]
+    assert 1.2 * left < field_error(sizes, field, WEIGHTS, believed).uncertainty < 3 * left
 
 
 @pytest.mark.parametrize(
-    ("ratio", "at_outlines", "order"), [(1.2, 1.2, 1.0), (2.0, 4.0, 2.0), (1.2, 1.1, SLOWEST), (1.2, 3.0, FASTEST)]
+    ("sizes", "at_outlines", "believed"),
+    [
+        ((1.0, 1.2, 1.5), (1.0, 1.2, 1.5), (0.5, 1.0)),
+        ((1.0, 1.2, 1.5), (1.0, 1.7, 2.9), (0.5, 1.0)),
+        ((1.0, 2.0, 4.0), (1.0, 16.0, 64.0), (0.5, 0.75)),
+        ((1.0, 1.1), (1.0, 2.0), (3 * np.log2(1.1), 3 * np.log2(1.1))),
+    ],
 )
-def test_an_outline_allows_the_order_at_which_its_elements_shrink(ratio, at_outlines, order):
-    """A quarter of the size there at half the size elsewhere: what is of order 1 there is of order 2 in the size."""
-    assert order_at_outlines(ratio, at_outlines) == pytest.approx(order, rel=1e-12)
+def test_what_lies_elsewhere_bounds_the_order_at_outlines(sizes, at_outlines, believed):
+    """Sixteen times smaller there, half elsewhere: order 3 elsewhere is ¾ there, and no more is believed."""
+    assert orders_at_outlines(sizes, at_outlines) == pytest.approx(believed, rel=1e-12)
 
 
-@pytest.mark.parametrize(("ratio", "at_outlines"), [(1.0, 1.4), (1.2, float("nan")), (1.2, 0.0)])
-def test_one_size_has_no_order(ratio, at_outlines):
-    with pytest.raises(SolveError, match="must exceed 1"):
-        order_at_outlines(ratio, at_outlines)
+@pytest.mark.parametrize("order", [0.5, 0.7, 0.95])
+def test_an_error_at_outlines_is_judged_by_their_elements(order):
+    """Elements there shrink unevenly from mesh to mesh: in the size elsewhere the same values seem to converge fast."""
+    sizes, outlines = (1.0, 1.29, 1.66), (1.0, 1.98, 5.5)
+    values = [0.3 * h**order for h in outlines]
+    error = mesh_error(outlines, values, orders_at_outlines(sizes, outlines))
+    known = min(order, orders_at_outlines(sizes, outlines)[1])
+    assert error.order == pytest.approx(known, rel=1e-9)
+    assert error.uncertainty >= SAFETY * 0.3 * (1 - 1e-9)
+    assert abs(mesh_error(sizes, values).shift) < 0.8 * 0.3 < abs(error.shift) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(("sizes", "at_outlines"), [((1.0, 1.0), (1.0, 1.4)), ((1.0, 1.2), (1.0, 1.0))])
+def test_one_size_has_no_order(sizes, at_outlines):
+    with pytest.raises(SolveError, match="different size"):
+        orders_at_outlines(sizes, at_outlines)
+
+
+def test_meshes_that_come_together_too_fast_have_a_larger_factor():
+    """Errors +2 and −0.1 cancel on the finest pair: their change says nothing of what is left."""
+    slow, fast = mesh_error(SIZES, law(2.9)), mesh_error(SIZES, law(3.1))
+    assert slow.uncertainty == pytest.approx(SAFETY * 0.3, rel=1e-9)
+    assert fast.order == FASTEST
+    assert fast.uncertainty > UNCONFIRMED * 0.3
 
 
 SLOPES, WEIGHTS = np.array([[0.3, -0.1], [0.2, 0.5], [0.0, 0.1]]), np.array([1.0, 4.0, 0.5])
