@@ -124,7 +124,7 @@ def _attributes(reference_solve: ReferenceSolve, problem: Problem, found: list[E
         "level": float(reference_solve.level),
         "variant": reference_solve.variant,
         "size": element_size(reference_solve.scene, reference_solve.level),
-        "outline_size": outline_size(problem.mesh, held),
+        "outline_size": outline_size(problem.mesh, held),  # pyright: ignore[reportArgumentType]
         "unknowns": 3 * len(nodes(problem.mesh)) + problem.mesh.nvertices,
         "steps_done": len(found),
         "seconds": seconds,

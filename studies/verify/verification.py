@@ -12,7 +12,9 @@ import pandas as pd
 from reference_fem import SolveError, oracles
 from reference_fem.oracles import Check, Curve, Oracle, Outcome, kappa
 from studies.base.atomic import write_whole
+from studies.base.errors import StudyError
 from studies.plots import verify as convergence
+from studies.verify.second_judge import second_judges
 from studies.verify.second_opinion import second_opinions
 
 FOLDER = "verify"
@@ -34,10 +36,11 @@ class Verdict:
         return tuple(check for check in self.outcome.checks if not check.met)
 
 
-def run_pack(fast: bool, on_verdict: Callable[[Verdict], None]) -> list[Verdict]:
-    """Measures every oracle (`fast`: the fast half), cheap ones first; on_verdict sees each as it is found."""
+def run_pack(root: Path, fast: bool, on_verdict: Callable[[Verdict], None]) -> list[Verdict]:
+    """Measures every oracle (`fast`: the fast half), cheap ones first, and the references of scenes below `root` that
+    have a second judge; on_verdict sees each as it is found."""
     verdicts = []
-    for oracle in sorted(ORACLES, key=lambda oracle: not oracle.fast):
+    for oracle in sorted((*ORACLES, *second_judges(root)), key=lambda oracle: not oracle.fast):
         if fast and not oracle.fast:
             continue
         start = time.perf_counter()
@@ -51,7 +54,7 @@ def measured(oracle: Oracle) -> Outcome:
     """What an oracle finds; one that cannot be solved fails by a NaN, and the others still have their say."""
     try:
         return oracle.measure()
-    except SolveError as problem:
+    except (SolveError, StudyError) as problem:
         return Outcome((Check(f"not solved: {problem}", "1", 1.0, math.nan, 0.01, "none", 0),))
 
 

@@ -22,7 +22,7 @@ def verify(
     ] = Path("results"),
 ) -> None:
     """Holds the reference against closed forms, published numbers and other codes (exit code 1: a number is off)."""
-    verdicts = run_pack(fast, show)
+    verdicts = run_pack(results, fast, show)
     root = results / FAST if fast else results
     written = write_verdicts(root / FOLDER, verdicts)
     if not fast:

@@ -21,8 +21,9 @@ def oracle(name, got, fast=True, **options):
 
 @pytest.fixture
 def run(monkeypatch, tmp_path):
-    def invoke(pack, *words):
+    def invoke(pack, *words, judges=()):
         monkeypatch.setattr(verification, "ORACLES", tuple(pack))
+        monkeypatch.setattr(verification, "second_judges", lambda root: tuple(judges))
         monkeypatch.setattr(verification.kappa, "dependence", lambda: {"force": 1.0 + 1.0 / np.array(kappa.RATIOS)})
         return CliRunner().invoke(cli.app, ["verify", "--results", str(tmp_path), *words])
 
@@ -73,3 +74,10 @@ def test_an_oracle_that_cannot_be_solved_fails_without_silencing_the_others(run,
     assert result.exit_code == 1
     assert "off: stuck: not solved: no equilibrium found" in result.stdout
     assert list(pd.read_csv(tmp_path / "verify" / "verify.csv")["met"]) == ["NO", "yes"]
+
+
+def test_a_reference_that_its_second_judge_contradicts_fails_the_command(run, tmp_path):
+    result = run([oracle("right", 2.0)], judges=[oracle("judge", 2.1, fast=False)])
+    assert result.exit_code == 1
+    assert "off: judge: force" in result.stdout
+    assert list(pd.read_csv(tmp_path / "verify" / "verify.csv")["oracle"]) == ["right", "judge"]
