@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from studies.catalog import STUDIES
-from studies.report.publish import BEGIN, END, EXTRAS, PUBLISHED
+from studies.report.publish import EXTRAS, PUBLISHED
+from studies.report.summary import SUMMARIES
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("massspring", "reference_fem", "studies")
@@ -40,10 +41,11 @@ def test_the_example_of_readme_runs(capsys):
     assert float(kept.split()[-1]) == pytest.approx(1.0, abs=1e-5)
 
 
-def test_the_table_of_readme_is_the_stored_one():
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    shown = text.split(BEGIN)[1].split(END)[0].strip()
-    assert shown == (ROOT / PUBLISHED / "summary.md").read_text(encoding="utf-8").strip()
+@pytest.mark.parametrize("summary", SUMMARIES, ids=lambda summary: summary.name)
+def test_the_tables_of_the_pages_are_the_stored_ones(summary):
+    begin, end = summary.marks
+    shown = (ROOT / summary.page).read_text(encoding="utf-8").split(begin)[1].split(end)[0].strip()
+    assert shown == (ROOT / PUBLISHED / summary.file).read_text(encoding="utf-8").strip()
 
 
 def test_readme_names_only_charts_that_are_made():

@@ -1,6 +1,5 @@
 """What is stored of the campaign: its runs below the results folder, and the table that is published."""
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.runs.recipe_text import case_of_recipe, recipe_text
 from studies.scene.scene import Scene
-from studies.store.machine import machine_id
+from studies.store.machine import machine_id, machine_of
 from studies.store.record import Status
 from studies.sweep.load import load_runs
 
@@ -81,7 +80,7 @@ def _published(results: Path, scene: Scene) -> list[Judged]:
         return []
     try:
         rows = pd.read_csv(path)
-        here = _machine_of(results) == machine_id()
+        here = machine_of(results / PUBLISHED) == machine_id()
         chosen = rows.loc[(rows["scene"] == scene.name) & (rows["status"] == Status.OK)]
         return [_judged_row(scene, row, here) for row in chosen.to_dict("records")]
     except (KeyError, ValueError, OSError) as error:
@@ -90,12 +89,6 @@ def _published(results: Path, scene: Scene) -> list[Judged]:
         raise StudyError(
             f"{path} cannot be read ({error}); `organbench run {ACCURACY.name}` and `organbench publish` write it anew"
         ) from error
-
-
-def _machine_of(results: Path) -> str | None:
-    """Id of the machine that the published times are of."""
-    path = results / PUBLISHED / "machine.json"
-    return json.loads(path.read_text(encoding="utf-8")).get("id") if path.is_file() else None
 
 
 def _judged_row(scene: Scene, row: dict[Any, Any], here: bool) -> Judged:

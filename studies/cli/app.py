@@ -19,9 +19,9 @@ COMMANDS = {
         ("show", "show", "show", "What is in a results file: status, numbers, fields with units."),
         ("table", "table", "table", "One row per case, with the metrics of the study."),
         ("plot", "plot", "plot", "Draws the charts and the table of a study from what is stored."),
-        ("report", "report", "report", "All charts and tables, and the summary; names what it wrote."),
+        ("report", "report", "report", "All charts and tables, and the summaries; names what it wrote."),
         ("replay", "replay", "replay", "Runs exactly that case again, and says whether it is the same."),
-        ("publish", "publish", "publish", "Copies tables and charts to results/published, and the summary."),
+        ("publish", "publish", "publish", "Copies tables and charts to results/published, and the summaries."),
         ("advise", "advise", "advise", "The cheapest recipe that is accurate enough for a scene."),
         (
             "calibrate",

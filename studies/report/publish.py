@@ -1,4 +1,4 @@
-"""What the repository shows: tables, charts and README's summary, copied from results that the present code made."""
+"""What the repository shows: tables, charts and the summaries on its pages, from results that the present code made."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,7 +6,9 @@ from pathlib import Path
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.catalog import Study
-from studies.report.results import FIGURES, report
+from studies.report.results import FIGURES, refresh, report
+from studies.report.summary import SUMMARIES
+from studies.store.machine import machine_id, machine_of
 from studies.store.stamps import is_stamped
 from studies.sweep.standings import standings
 from studies.timing.cases import timing_is_current
@@ -14,8 +16,6 @@ from studies.verify.verification import FOLDER as VERIFY
 
 PUBLISHED = Path("results") / "published"
 """Below the folder of README.md; the only part of results/ that git keeps."""
-BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
-"""Between these lines of README.md stands the summary."""
 EXTRAS = {
     VERIFY: "organbench verify",
     FIGURES: "organbench report --figures",
@@ -27,7 +27,7 @@ SUFFIXES = (".csv", ".md", ".png", ".json")
 
 
 def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path], list[str]]:
-    """Copies all tables and charts below `root` to `home`/results/published and the summary into `home`/README.md.
+    """Copies all tables and charts below `root` to `home`/results/published and the summaries into the pages of `home`.
 
     The published files, and the names of EXTRAS that were not made below `root` and stay as they are. Files that
     nothing makes any more go. Raises StudyError, before anything is written to `home`, unless every piece of every
@@ -41,15 +41,59 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
         raise StudyError(f"not published, something is missing: {remarks[0]}")
     sources = [*written, root / "machine.json"]
     sources += [file for name in EXTRAS for file in _files(root / name)]
+    show_summaries(root, studies, home)
     target = home / PUBLISHED
-    write_readme(home / "README.md", (root / "summary.md").read_text(encoding="utf-8"))
-    copies = {target / source.relative_to(root): source for source in sources}
-    for copy, source in copies.items():
-        write_whole(copy, source.read_bytes())
-    for file in _files(target):
-        if file not in copies and file.relative_to(target).parts[0] not in absent:
-            file.unlink()
-    return list(copies), absent
+    copies = _copy(sources, root, target)
+    _remove([file for file in _files(target) if file.relative_to(target).parts[0] not in absent], copies)
+    return copies, absent
+
+
+def publish_some(root: Path, studies: Sequence[Study], home: Path) -> list[Path]:
+    """The same for the tables, charts and summaries of some studies; all else stays as published.
+
+    Raises StudyError as `publish` does, and where the rest was measured on another machine.
+    """
+    check_studies(root, studies)
+    if machine_of(home / PUBLISHED) not in (None, machine_id()):
+        raise StudyError("not published: the other tables are of another machine; publish all studies together")
+    sources = []
+    for study in studies:
+        written, missing = refresh(root, study)
+        if missing:
+            raise StudyError(f"not published, something is missing: {study.name}: {missing[0]}")
+        sources += written
+    show_summaries(root, studies, home)
+    target = home / PUBLISHED
+    copies = _copy(sources, root, target)
+    _remove([file for study in studies for file in _files(target / study.name)], copies)
+    return copies
+
+
+def _copy(sources: Sequence[Path], root: Path, target: Path) -> list[Path]:
+    for source in sources:
+        write_whole(target / source.relative_to(root), source.read_bytes())
+    return [target / source.relative_to(root) for source in sources]
+
+
+def _remove(files: Sequence[Path], kept: Sequence[Path]) -> None:
+    for file in set(files) - set(kept):
+        file.unlink()
+
+
+def show_summaries(root: Path, studies: Sequence[Study], home: Path) -> None:
+    """Puts the summaries of studies between their marks in the pages below `home`.
+
+    Raises StudyError, before anything is written, where a page or its marks are missing.
+    """
+    names = [study.name for study in studies]
+    told = [summary for summary in SUMMARIES if summary.study in names]
+    pages = dict[Path, str]()
+    for summary in told:
+        page = home / summary.page
+        text = (root / summary.file).read_text(encoding="utf-8")
+        pages[page] = between(pages.get(page) or _read(page), summary.marks, text, page)
+    for page, text in pages.items():
+        write_whole(page, text.encode())
 
 
 def check_studies(root: Path, studies: Sequence[Study]) -> None:
@@ -89,13 +133,16 @@ def _files(place: Path) -> list[Path]:
     return [file for file in found if file.is_file() and file.suffix in SUFFIXES]
 
 
-def write_readme(readme: Path, summary: str) -> None:
-    """Replaces what stands between the marks in README.md. Raises StudyError when the marks are missing."""
-    if not readme.is_file():
-        raise StudyError(f"there is no file {readme} to put the table into; run the command where it lies")
-    text = readme.read_text(encoding="utf-8")
-    if BEGIN not in text or END not in text:
-        raise StudyError(f"{readme} has no lines '{BEGIN}' and '{END}' to put the table between")
-    head, rest = text.split(BEGIN, 1)
-    tail = rest.split(END, 1)[1]
-    write_whole(readme, f"{head}{BEGIN}\n{summary.strip()}\n{END}{tail}".encode())
+def _read(page: Path) -> str:
+    if not page.is_file():
+        raise StudyError(f"there is no file {page} to put the table into; run the command where it lies")
+    return page.read_text(encoding="utf-8")
+
+
+def between(text: str, marks: tuple[str, str], table: str, page: Path) -> str:
+    """`text` of a page with `table` between its marks. Raises StudyError when a mark is missing."""
+    begin, end = marks
+    if begin not in text or end not in text:
+        raise StudyError(f"{page} has no lines '{begin}' and '{end}' to put the table between")
+    head, rest = text.split(begin, 1)
+    return f"{head}{begin}\n{table.strip()}\n{end}{rest.split(end, 1)[1]}"

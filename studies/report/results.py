@@ -1,7 +1,7 @@
 """What people look at: charts, tables as CSV, the summary of results that README shows."""
 
 import json
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +10,15 @@ from studies.base.errors import StudyError
 from studies.base.study_file import fault_of_study_file, is_of_study_file
 from studies.catalog.study import Study
 from studies.geometry import SHAPES, organ
-from studies.metrics.cells import UNRESOLVED_MARK, value_cell
 from studies.metrics.run import Run
-from studies.metrics.table import UNRESOLVED, study_table
+from studies.metrics.table import study_table
 from studies.plots.figures import paper_ball, paper_slide
 from studies.plots.figures.organ_springs import draw_organ_springs
 from studies.plots.figures.organs import draw_organs
 from studies.reference.reference_solves import reference_solves
 from studies.report.kept_volume import kept_volumes
 from studies.report.references import refresh_uncertainty, state_of
+from studies.report.summary import SUMMARIES
 from studies.runs.current import case_path
 from studies.runs.paper import play, slide_case, squeezed_balls
 from studies.store.csv_table import write_table
@@ -32,8 +32,6 @@ FIGURES = "figures"
 FIGURE_NODES = 550
 PAPER_NODES = {"liver": 544, "stomach": 550}
 """Surface nodes of the organs in Figure 1 of Jung, Hong and Choi (2005)."""
-HEADLINE = "volume_loss"
-"""The study that the summary is read off."""
 
 
 def draw_charts(root: Path, study: Study, runs: Sequence[Run]) -> list[Path]:
@@ -68,7 +66,7 @@ def make_folder(folder: Path) -> None:
 
 
 def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
-    """Charts and tables of all studies, the summary and machine.json; paths, and what is missing in sentences.
+    """Charts and tables of all studies, the summaries and machine.json; paths, and what is missing in sentences.
 
     A study of which nothing is stored keeps the charts that are there.
     """
@@ -98,8 +96,8 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
     folder = study_folder(root, study.name)
     table = folder / f"{study.name}.csv"
     paths = [*(folder / chart.file for chart in study.charts), table]
-    if study.name == HEADLINE:
-        paths.append(root / "summary.md")
+    told = [summary for summary in SUMMARIES if summary.study == study.name]
+    paths += [root / summary.file for summary in told]
     stamp = root / "cache" / f"{study.name}.drawn.json"
     shown = {"inputs": inputs_of(root, study), "remarks": []}
     before = _stamped(stamp)
@@ -107,8 +105,8 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
         return paths, before["remarks"]
     runs, shown["remarks"] = load_runs(root, study)
     write_table(table, study_table(runs, study.columns))
-    if study.name == HEADLINE:
-        write_whole(root / "summary.md", (summary_of({HEADLINE: runs}) + "\n").encode())
+    for summary in told:
+        write_whole(root / summary.file, (summary.text(runs) + "\n").encode())
     draw_charts(root, study, runs)
     write_whole(stamp, json.dumps(shown).encode())
     return paths, shown["remarks"]
@@ -150,54 +148,3 @@ def draw_paper(folder: Path) -> list[Path]:
     paper_ball.draw(squeezed_balls(), squeezed, volume)
     paper_slide.draw(play(slide_case()), slide)
     return [squeezed, volume, slide]
-
-
-def summary_of(runs_of: dict[str, list[Run]]) -> str:
-    """The headline table in Markdown: accuracy of each scene, body and method, beside the floor of the reference."""
-    rows = study_table(runs_of.get("volume_loss", []), SUMMARY_METRICS)
-    if rows.empty:
-        return "No results yet: run `make study`."
-    rows = rows.loc[~(rows["dt/dt_c"] <= 0.25)]  # a case that failed has no step, and stays
-    lines = [
-        "| scene | body | method | " + " | ".join(SUMMARY_HEADS) + " |",
-        "|---|---|---|" + "---|" * len(SUMMARY_HEADS),
-    ]
-    for row in rows.to_dict("records"):
-        cells = [_cell(row, name) for name in SUMMARY_COLUMNS]
-        lines.append(f"| {row['scene']} | {row['body']} | {row['method']} | " + " | ".join(cells) + " |")
-    if any(UNRESOLVED_MARK in line for line in lines):
-        lines += ["", f"{UNRESOLVED_MARK} the reference is not ten times better than this error"]
-    return "\n".join(lines)
-
-
-SUMMARY_METRICS = ("volume_worst", "force_end", "interior_error", "mean_error", "silhouette_error", "min_j")
-SUMMARY_COLUMNS = (
-    "volume_worst [%]",
-    "force_end [%]",
-    "interior_error [%]",
-    "mean_error [%]",
-    "silhouette_error [%]",
-    "min_j [1]",
-)
-SUMMARY_HEADS = (
-    "worst \\|V/V0 − 1\\| [%]",
-    "force [%]",
-    "interior rel. L2 [%]",
-    "surface mean / max u [%]",
-    "silhouette / size [%]",
-    "min J",
-)
-
-
-def _cell(row: Mapping[Hashable, Any], column: str) -> str:
-    """A value with the uncertainty of its reference, or a dash."""
-    value = float(row[column])
-    if value != value:
-        return "–"
-    if column.startswith("min_j"):
-        return f"{value:.2f}"
-    if column.startswith("volume"):
-        return f"{value:.2g}"
-    uncertainty = float(row.get(column.replace(" [", " floor ["), float("nan")))
-    unresolved = column.split(" [")[0] in str(row.get(UNRESOLVED, "")).split()
-    return value_cell(value, uncertainty, signed=column.startswith("force"), unresolved=unresolved)

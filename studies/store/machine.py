@@ -66,6 +66,12 @@ def machine_id() -> str:
     return this_machine().id
 
 
+def machine_of(folder: Path) -> str | None:
+    """The short id of the machine whose results lie in a folder; None where nothing says so."""
+    path = folder / "machine.json"
+    return json.loads(path.read_text(encoding="utf-8")).get("id") if path.is_file() else None
+
+
 def write_machine(path: Path) -> None:
     """Writes this machine as JSON (results/machine.json); an equal file is left untouched.
 

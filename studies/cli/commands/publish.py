@@ -1,19 +1,28 @@
 """`organbench publish`: what the repository shows becomes what is stored."""
 
 from pathlib import Path
+from typing import Annotated
 
+import typer
+
+from studies.base.lookup import lookup
 from studies.catalog import STUDIES
-from studies.cli.terminal import Results, console
+from studies.cli.terminal import Results, say
 from studies.report import publish as publishing
 
 
 def publish(
+    studies: Annotated[list[str] | None, typer.Argument(help="these alone; all else stays as published")] = None,
     results: Results = Path("results"),
 ) -> None:
-    """Copies tables and charts to results/published, and the summary into README.md; refuses stale results."""
-    copies, absent = publishing.publish(results, STUDIES, Path("."))
+    """Copies tables and charts to results/published, and the summaries into README and docs; refuses stale results."""
+    if studies:
+        chosen = [lookup(name, {study.name: study for study in STUDIES}, "study") for name in studies]
+        copies, absent = publishing.publish_some(results, chosen, Path(".")), []
+    else:
+        copies, absent = publishing.publish(results, STUDIES, Path("."))
     for path in copies:
-        console.print(str(path), markup=False, highlight=False)
+        say(path)
     if absent:
         again = "; ".join(f"{name}: {publishing.EXTRAS[name]}" for name in absent)
-        console.print(f"not made again, stays as published: {again}", markup=False, highlight=False)
+        say(f"not made again, stays as published: {again}")

@@ -14,7 +14,7 @@ def report(
     results: Results = Path("results"),
     figures: Annotated[bool, typer.Option(help="also the pictures of organs and of the squeezed ball")] = False,
 ) -> None:
-    """All charts and tables, and the summary; names what it wrote."""
+    """All charts and tables, and the summaries; names what it wrote."""
     written, remarks = reports.report(results, STUDIES)
     if figures:
         written += reports.draw_figures(results)

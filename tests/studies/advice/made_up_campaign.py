@@ -33,7 +33,7 @@ def row(scene: Scene, body: BodyRecipe, numbers: tuple[float, float, float], **c
         "scene": scene.name,
         "dt [ms]": 2.0,
         "status": "ok",
-        "recipe": recipe_text(Case(scene, body, dt_fraction=0.5)),
+        "recipe": recipe_text(Case(scene, body, dt_fraction=0.8)),
         "force_end [%]": force,
         "force_end floor [%]": 0.5,
         "mean_error [%]": displacement,

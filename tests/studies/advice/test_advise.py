@@ -124,7 +124,7 @@ def stored_runs(monkeypatch, *runs):
     monkeypatch.setattr("studies.advice.campaign.load_runs", lambda root, study: (list(runs), []))
 
 
-GRADED_RUN = {"nodes": 794, "fraction": 0.5, "frame_ms": 10.0, "recipe": {"graded": True, "mass": "stiffness"}}
+GRADED_RUN = {"nodes": 794, "fraction": 0.8, "frame_ms": 10.0, "recipe": {"graded": True, "mass": "stiffness"}}
 
 
 def test_a_run_replaces_its_published_row_and_the_others_stay(results, monkeypatch, never_timed):

@@ -11,7 +11,8 @@ from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Chart
 from studies.cli.commands import publish as command
 from studies.cli.commands import report as report_command
-from studies.report.publish import BEGIN, END, EXTRAS, PUBLISHED, publish, write_readme
+from studies.report.publish import EXTRAS, PUBLISHED, between, publish, publish_some
+from studies.report.summary import SUMMARIES
 from studies.runs import current as runs
 from studies.runs.current import case_path
 from studies.store.stamps import is_stamped, set_stamp
@@ -19,6 +20,7 @@ from studies.timing.cases import timing_file
 from tests.studies.tiny import tiny_case, tiny_study
 
 REPOSITORY = Path(__file__).parents[3]
+BEGIN, END = MARKS = SUMMARIES[0].marks
 HEADLINE = replace(
     tiny_study(charts=(Chart("one.png", lambda runs, path: path.write_bytes(b"a picture")),)), name="volume_loss"
 )
@@ -154,25 +156,45 @@ def test_git_sees_what_is_published_and_nothing_else_below_results(tmp_path):
     assert asked == paths[: len(own)]
 
 
-def test_readme_takes_the_summary_between_its_marks(tmp_path):
-    readme = tmp_path / "README.md"
-    readme.write_text(f"# Title\n{BEGIN}\nold\n{END}\ntail\n")
-    write_readme(readme, "\n| new |\n")
-    assert readme.read_text() == f"# Title\n{BEGIN}\n| new |\n{END}\ntail\n"
-    write_readme(readme, "| new |")
-    assert readme.read_text().count("new") == 1
+def test_a_table_goes_between_its_marks():
+    text = f"# Title\n{BEGIN}\nold\n{END}\ntail\n"
+    once = between(text, MARKS, "\n| new |\n", Path("README.md"))
+    assert once == f"# Title\n{BEGIN}\n| new |\n{END}\ntail\n"
+    assert between(once, MARKS, "| new |", Path("README.md")) == once
+    with pytest.raises(StudyError, match=r"README.md has no lines"):
+        between("# Title\n", MARKS, "| new |", Path("README.md"))
 
 
-def test_readme_without_marks_or_missing_is_left_alone(tmp_path):
-    readme = tmp_path / "README.md"
-    with pytest.raises(StudyError, match="there is no file"):
-        write_readme(readme, "| new |")
-    readme.write_text("# Title\n")
-    with pytest.raises(StudyError, match="has no lines"):
-        write_readme(readme, "| new |")
-    assert readme.read_text() == "# Title\n"
+def test_some_studies_are_published_and_all_else_stays(current, home, organbench, monkeypatch):
+    monkeypatch.chdir(home)
+    for name in ("other/other.csv", "volume_loss/older.png", "kept_volume.csv"):
+        (home / PUBLISHED / name).parent.mkdir(parents=True, exist_ok=True)
+        (home / PUBLISHED / name).write_text("old")
+    monkeypatch.setattr(command, "STUDIES", (HEADLINE,))
+    code, out, _ = organbench("publish", "volume_loss", "--results", current)
+    assert code == 0 and "one.png" in out and "old" not in (home / "README.md").read_text()
+    left = {path.relative_to(home / PUBLISHED).as_posix() for path in (home / PUBLISHED).rglob("*") if path.is_file()}
+    assert left == {
+        "other/other.csv",
+        "kept_volume.csv",
+        "summary.md",
+        "volume_loss/one.png",
+        "volume_loss/volume_loss.csv",
+    }
+    assert organbench("publish", "volume_los", "--results", current)[0] == 2
 
 
-def test_the_readme_of_the_project_has_the_marks():
-    text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
-    assert text.index(BEGIN) < text.index(END)
+def test_times_of_two_machines_are_not_published_side_by_side(current, home):
+    (home / PUBLISHED).mkdir(parents=True)
+    (home / PUBLISHED / "machine.json").write_text('{"id": "another"}')
+    before = shown(home)
+    with pytest.raises(StudyError, match="of another machine"):
+        publish_some(current, [HEADLINE], home)
+    assert shown(home) == before
+
+
+@pytest.mark.parametrize("summary", SUMMARIES, ids=lambda summary: summary.name)
+def test_the_pages_of_the_project_have_the_marks(summary):
+    text = (REPOSITORY / summary.page).read_text(encoding="utf-8")
+    begin, end = summary.marks
+    assert text.index(begin) < text.index(end)

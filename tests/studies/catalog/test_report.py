@@ -11,7 +11,9 @@ import pandas as pd
 import pytest
 
 from studies.catalog import Chart
-from studies.report.results import UNRESOLVED_MARK, draw_charts, refresh, report, summary_of
+from studies.metrics.cells import UNRESOLVED_MARK
+from studies.report.results import draw_charts, refresh, report
+from studies.report.summary import results_of
 from studies.runs.current import case_path
 from studies.store.csv_table import write_table
 from studies.store.machine import machine_id
@@ -22,7 +24,7 @@ from tests.studies.tiny import tiny_case, tiny_study
 
 def headline(runs) -> list[list[str]]:
     """Rows of the summary, cell by cell, without the two lines of its head."""
-    lines = summary_of({"volume_loss": runs}).splitlines()
+    lines = results_of(runs).splitlines()
     assert all(line.count("|") - line.count("\\|") == lines[1].count("|") for line in lines)
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines[2:]]
 
@@ -67,7 +69,7 @@ def test_studies_that_were_not_run_are_named_in_one_line(results):
 
 
 def test_summary_without_results():
-    assert "make study" in summary_of({})
+    assert "make study" in results_of([])
 
 
 def test_summary_shows_numbers_or_a_dash(finished_sweep):
@@ -81,10 +83,10 @@ def test_summary_shows_numbers_or_a_dash(finished_sweep):
 
 def test_summary_marks_what_the_reference_does_not_know_well_enough(finished_sweep, monkeypatch):
     runs, _ = load_runs(finished_sweep, tiny_study())
-    assert UNRESOLVED_MARK not in summary_of({"volume_loss": runs})
+    assert UNRESOLVED_MARK not in results_of(runs)
     uncertainty = dict.fromkeys(("force_end", "silhouette", "force", "volume", "surface_mean"), 0.02)
     truth = SimpleNamespace(total_uncertainty=uncertainty, force=np.array([1.0]), displacement=lambda x: 0 * x)
-    text = summary_of({"volume_loss": [replace(runs[0], reference=truth)]})
+    text = results_of([replace(runs[0], reference=truth)])
     assert f"± 2 {UNRESOLVED_MARK} |" in text.replace("2.0", "2")
     assert text.endswith("the reference is not ten times better than this error")
 

@@ -1,0 +1,166 @@
+"""Tables for people to read, in Markdown: what `make study` found, which body is recommended, and what each rung of the
+ladder of bodies is worth."""
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from studies.metrics.cells import MISSING, UNRESOLVED_MARK, value_cell
+from studies.metrics.judged import Judged, Measured, cheapest, judged, nearest
+from studies.metrics.run import Run
+from studies.metrics.table import UNRESOLVED, study_table
+from studies.metrics.wish import usual_wish
+from studies.runs.case import BodyRecipe
+
+PAPER = 550
+"""Surface nodes of the paper's body where it stands beside others."""
+LADDER_SCENES = ("ball_clamped", "liver_press")
+"""Scenes in which every rung has a force and a displacement."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A text that is read off a study, and the page that shows it between its marks."""
+
+    study: str
+    file: str
+    """Below the results folder."""
+    page: str
+    """Below the folder of README.md."""
+    name: str
+    """In the marks."""
+    text: Callable[[Sequence[Run]], str]
+
+    @property
+    def marks(self) -> tuple[str, str]:
+        """The lines of the page between which it stands."""
+        return f"<!-- {self.name}: begin -->", f"<!-- {self.name}: end -->"
+
+
+def results_of(runs: Sequence[Run]) -> str:
+    """Accuracy of each scene, body and method, beside the floor of the reference."""
+    rows = study_table(runs, SUMMARY_METRICS)
+    if rows.empty:
+        return "No results yet: run `make study`."
+    rows = rows.loc[~(rows["dt/dt_c"] <= 0.25)]  # a case that failed has no step, and stays
+    lines = [
+        "| scene | body | method | " + " | ".join(SUMMARY_HEADS) + " |",
+        "|---|---|---|" + "---|" * len(SUMMARY_HEADS),
+    ]
+    for row in rows.to_dict("records"):
+        cells = [_cell(row, name) for name in SUMMARY_COLUMNS]
+        lines.append(f"| {row['scene']} | {row['body']} | {row['method']} | " + " | ".join(cells) + " |")
+    if any(UNRESOLVED_MARK in line for line in lines):
+        lines += ["", f"{UNRESOLVED_MARK} the reference is not ten times better than this error"]
+    return "\n".join(lines)
+
+
+SUMMARY_METRICS = ("volume_worst", "force_end", "interior_error", "mean_error", "silhouette_error", "min_j")
+SUMMARY_COLUMNS = (
+    "volume_worst [%]",
+    "force_end [%]",
+    "interior_error [%]",
+    "mean_error [%]",
+    "silhouette_error [%]",
+    "min_j [1]",
+)
+SUMMARY_HEADS = (
+    "worst \\|V/V0 − 1\\| [%]",
+    "force [%]",
+    "interior rel. L2 [%]",
+    "surface mean / max u [%]",
+    "silhouette / size [%]",
+    "min J",
+)
+
+
+def _cell(row: Mapping[Hashable, Any], column: str) -> str:
+    """A value with the uncertainty of its reference, or a dash."""
+    value = float(row[column])
+    if value != value:
+        return MISSING
+    if column.startswith("min_j"):
+        return f"{value:.2f}"
+    if column.startswith("volume"):
+        return f"{value:.2g}"
+    uncertainty = float(row.get(column.replace(" [", " floor ["), float("nan")))
+    unresolved = column.split(" [")[0] in str(row.get(UNRESOLVED, "")).split()
+    return value_cell(value, uncertainty, signed=column.startswith("force"), unresolved=unresolved)
+
+
+def recommended_of(runs: Sequence[Run]) -> str:
+    """Of every scene the paper's body and the body that `organbench advise` chooses for the usual wish: the cheapest
+    that meets it, else the nearest, marked."""
+    lines = [
+        "| scene | the paper's body: force [%] | mean [%] | recommended: body, surface nodes, step / limit | force [%] "
+        "| mean [%] | simulated / computing time |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    marked = False
+    for name, found in _by_scene(runs).items():
+        wish = usual_wish(found[0].case.scene)
+        best = cheapest(found, wish)
+        chosen = best or nearest(found, wish)
+        paper = next((one for one in found if _is_paper(one.case.body)), None)
+        if chosen is None or paper is None:
+            continue
+        marked |= best is None
+        words = f"{_words(chosen.case.body)}, {chosen.case.dt_fraction:g}{'' if best else ' ‡'}"
+        cells = [*_errors(paper), words, *_errors(chosen), _real_time(chosen)]
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    if marked:
+        lines += ["", "‡ the nearest: no body meets the usual wish there, or the reference is too coarse to tell"]
+    return "\n".join(lines)
+
+
+def ladder_of(runs: Sequence[Run]) -> str:
+    """Every body of LADDER_SCENES by *implicit_volume*, from the paper's to graded quadratic ones."""
+    lines = [
+        "| scene | body, surface nodes | kept volumes | step / limit | force [%] | mean [%] "
+        "| simulated / computing time |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    volumes = {run.case.key: int(run.record.attributes.get("volumes", 0)) for run in runs}
+    for name, found in _by_scene(runs).items():
+        for one in found:
+            if name in LADDER_SCENES and one.advisable:
+                cells = [_words(one.case.body), str(volumes[one.case.key]), f"{one.case.dt_fraction:g}"]
+                lines.append(f"| {name} | " + " | ".join([*cells, *_errors(one), _real_time(one)]) + " |")
+    return "\n".join(lines)
+
+
+SUMMARIES = (
+    Summary("volume_loss", "summary.md", "README.md", "results", results_of),
+    Summary("accuracy", "accuracy/recommended.md", "README.md", "recommended", recommended_of),
+    Summary("accuracy", "accuracy/ladder.md", "docs/paper.md", "ladder", ladder_of),
+)
+
+
+def _by_scene(runs: Sequence[Run]) -> dict[str, list[Judged]]:
+    """Name of a scene -> its runs that ended well and of which an error is known, in their order."""
+    found: dict[str, list[Judged]] = {}
+    for one in map(judged, runs):
+        if one is not None and one.compared:
+            found.setdefault(one.case.scene.name, []).append(one)
+    return found
+
+
+def _is_paper(body: BodyRecipe) -> bool:
+    return body.kind == "surface" and body.nodes == PAPER
+
+
+def _words(body: BodyRecipe) -> str:
+    law = "" if body.law in ("van_gelder", "cotangent") else f", {body.law}"
+    return f"{body.series}{law}, {body.nodes}"
+
+
+def _errors(one: Judged) -> list[str]:
+    return [_percent(one.force, signed=True), _percent(one.displacement, signed=False)]
+
+
+def _percent(error: Measured, signed: bool) -> str:
+    return value_cell(error.value, error.uncertainty, signed=signed)
+
+
+def _real_time(one: Judged) -> str:
+    return value_cell(1.0 / one.cost.value) if one.cost.known else MISSING

@@ -1,0 +1,69 @@
+"""Tables for README and docs: which body is named, with which numbers, and what marks one that does not suffice."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from studies.report.summary import ladder_of, recommended_of
+from studies.runs.case import BodyRecipe
+from studies.scenes.spleen_sag import SPLEEN_SAG
+from studies.store.record import Status
+from tests.studies import made_up_run
+
+PAPER = BodyRecipe("surface", 550)
+EVEN = BodyRecipe("quadratic", 594, mass="stiffness")
+GRADED = BodyRecipe("quadratic", 794, graded=True, mass="stiffness")
+DEVIATION = {PAPER: -0.7, EVEN: -0.02, GRADED: 0.01}
+FRAME_NS = {PAPER: 1e7, EVEN: 1e8, GRADED: 5e8}
+FLOORS = 0.001
+
+
+def run(body, deviation, *, uncertainty=FLOORS, **changes):
+    """A body whose force is off by `deviation` and whose displacement is right; a frame is a second."""
+    truth = made_up_run.reference()
+    truth.total_uncertainty = dict.fromkeys(truth.total_uncertainty, uncertainty)
+    force = np.array([0.5, 1.0, 1.5, 2.0]) * (1.0 + deviation)
+    made = made_up_run.run(force=force, reference=truth, attributes={"volumes": 7}, **changes)
+    timing = SimpleNamespace(frame_ns=np.full((3, 4), FRAME_NS[body]))
+    return replace(made, case=replace(made.case, body=body, dt_fraction=0.8), timing=timing)
+
+
+def runs(**changes):
+    return [run(body, deviation, **changes) for body, deviation in DEVIATION.items()]
+
+
+def test_the_cheapest_body_that_suffices_stands_beside_the_papers():
+    (row,) = recommended_of(runs()).splitlines()[2:]
+    assert row == (
+        "| ball_clamped | −70.0 ± 0.1 | 0.0 ± 0.1 "
+        "| quadratic, masses by stiffness, 594, 0.8 | −2.0 ± 0.1 | 0.0 ± 0.1 | 10 |"
+    )
+
+
+@pytest.mark.parametrize(
+    ("found", "named"),
+    [
+        ([run(PAPER, -0.7), run(EVEN, -0.05)], "594"),
+        ([run(PAPER, -0.7), run(GRADED, 0.01, uncertainty=0.2)], "794"),
+    ],
+    ids=["none suffices", "the reference cannot tell"],
+)
+def test_the_nearest_is_marked(found, named):
+    row, note = (line for line in recommended_of(found).splitlines()[2:] if line)
+    assert f"{named}, 0.8 ‡" in row and note.startswith("‡")
+
+
+def test_what_ended_badly_is_not_named():
+    bad = run(EVEN, -0.02, status=Status.INVERTED)
+    assert "794" in recommended_of([run(PAPER, -0.7), bad, run(GRADED, 0.01)])
+    assert "594" not in ladder_of([bad, run(GRADED, 0.01)])
+
+
+def test_the_ladder_has_every_body_of_its_scenes_in_order():
+    rows = ladder_of(runs()).splitlines()[2:]
+    assert [row.split(" | ")[1].split(", ")[-1] for row in rows] == ["550", "594", "794"]
+    assert all(" | 7 | 0.8 | " in row for row in rows)
+    elsewhere = [replace(one, case=replace(one.case, scene=SPLEEN_SAG)) for one in runs()]
+    assert ladder_of(elsewhere).splitlines()[2:] == []
