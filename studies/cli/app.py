@@ -21,6 +21,7 @@ COMMANDS = {
         ("plot", "plot", "plot", "Draws the charts and the table of a study from what is stored."),
         ("report", "report", "report", "All charts and tables, and the summaries; names what it wrote."),
         ("replay", "replay", "replay", "Runs exactly that case again, and says whether it is the same."),
+        ("compare", "compare", "compare", "Every number that two results folders share, and which moved."),
         ("publish", "publish", "publish", "Copies tables and charts to results/published, and the summaries."),
         ("advise", "advise", "advise", "The cheapest recipe that is accurate enough for a scene."),
         (

@@ -25,6 +25,8 @@ class Metric:
     of: Callable[[Run], float]
     quantity: str | None = None
     """Of the reference: the name of its floor, and what the scene must allow to be compared."""
+    spread: Callable[[Run], float] | None = None
+    """Of a number that needs no reference: how well it is known, in its unit."""
 
     @property
     def description(self) -> str:
@@ -38,7 +40,10 @@ class Metric:
         return float(self.of(run))
 
     def uncertainty(self, run: Run) -> float:
-        """Uncertainty of the reference in the metric's unit; NaN without one or where nothing may be compared."""
+        """Uncertainty of the reference in the metric's unit, or the spread of the number; NaN without one or where
+        nothing may be compared."""
+        if self.spread is not None:
+            return float(self.spread(run))
         if self.quantity is None or run.reference is None or not self._allowed(run):
             return float("nan")
         return PERCENT * run.reference.total_uncertainty[self.quantity]

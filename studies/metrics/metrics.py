@@ -1,5 +1,8 @@
 """Numbers read off a run: functions Run -> float, each with its unit, direction and the floor of its reference."""
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
@@ -176,6 +179,18 @@ def real_time(run: Run) -> float:
     return float(run.record.attributes["frame"]) / (1e-9 * _timing(run, 0.5))
 
 
+def _time_spread(metric: Callable[[Run], float]) -> Callable[[Run], float]:
+    """Half the range of a metric of frame times over the repeats, in its unit; NaN where the case was timed once."""
+
+    def spread(run: Run) -> float:
+        if run.timing is None or len(run.timing.frame_ns) < 2:
+            return float("nan")
+        alone = [replace(run, timing=replace(run.timing, frame_ns=frames[None])) for frames in run.timing.frame_ns]
+        return float(np.ptp([metric(one) for one in alone])) / 2
+
+    return spread
+
+
 METRICS: tuple[Metric, ...] = (
     Metric("volume_worst", "%", "lower", volume_worst, "volume"),
     Metric("volume_end", "%", "-", volume_end, "volume"),
@@ -195,8 +210,8 @@ METRICS: tuple[Metric, ...] = (
     Metric("penetration", "%", "lower", penetration),
     Metric("alternation", "%", "lower", alternation),
     Metric("sway", "%", "lower", sway),
-    Metric("step_time", "µs", "lower", step_time),
-    Metric("frame_time", "ms", "lower", frame_time),
-    Metric("frame_time_p99", "ms", "lower", frame_time_p99),
-    Metric("real_time", "s/s", "higher", real_time),
+    Metric("step_time", "µs", "lower", step_time, spread=_time_spread(step_time)),
+    Metric("frame_time", "ms", "lower", frame_time, spread=_time_spread(frame_time)),
+    Metric("frame_time_p99", "ms", "lower", frame_time_p99, spread=_time_spread(frame_time_p99)),
+    Metric("real_time", "s/s", "higher", real_time, spread=_time_spread(real_time)),
 )

@@ -1,0 +1,165 @@
+"""The tables of two results folders, row by row: the same study, scene and recipe, metric by metric."""
+
+import re
+from collections.abc import Hashable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from studies.base.errors import StudyError
+from studies.compare.verdict import Verdict, verdict_of
+from studies.runs.case import case_from_json
+from studies.runs.recipe_text import recipe_text
+from studies.store.paths import record_files
+from studies.store.record import Record, read_record
+
+Key = tuple[str, str]
+"""Scene and recipe."""
+Row = dict[Hashable, Any]
+METRIC = re.compile(r"^(?P<name>\w+) \[(?P<unit>[^\]]+)\]$")
+STATUS = "status"
+
+
+class Named(NamedTuple):
+    """A case as tables name it."""
+
+    study: str
+    scene: str
+    body: str
+    method: str
+    recipe: str
+
+
+@dataclass(frozen=True)
+class Change:
+    """A number of a case in both folders."""
+
+    case: Named
+    metric: str
+    unit: str
+    old: float | str
+    new: float | str
+    floor: float
+    """How well it is known, the larger of both, in its unit; NaN where it is not said."""
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All that two folders share, and how many rows they do not."""
+
+    changes: list[Change]
+    only_old: int
+    only_new: int
+
+    @property
+    def moved(self) -> list[Change]:
+        """What moved."""
+        return [change for change in self.changes if change.verdict == Verdict.MOVED]
+
+    def table(self) -> pd.DataFrame:
+        """A row per change."""
+        return pd.DataFrame([change.case._asdict() | _numbers(change) for change in self.changes])
+
+    def counts(self) -> dict[Verdict, int]:
+        """How many changes there are of each verdict, in the order of Verdict."""
+        return {verdict: sum(change.verdict == verdict for change in self.changes) for verdict in Verdict}
+
+
+def _numbers(change: Change) -> dict[str, object]:
+    return {field.name: getattr(change, field.name) for field in fields(change) if field.name != "case"}
+
+
+def compare(old: Path, new: Path) -> Comparison:
+    """Every metric of every case that both folders have in the table of a study.
+
+    Raises StudyError for a folder that is not there or has no table, for a table that lacks what names its rows, and
+    for two folders without a common case.
+    """
+    mine, theirs = tables_of(old), tables_of(new)
+    changes, only_old, only_new = list[Change](), 0, 0
+    for study in sorted(set(mine) & set(theirs)):
+        before, after = mine[study], theirs[study]
+        common = [key for key in before if key in after]
+        only_old, only_new = only_old + len(before) - len(common), only_new + len(after) - len(common)
+        same = equal_records(old, new, study)
+        for key in common:
+            changes += changes_of(study, before[key], after[key], key in same)
+    if not changes:
+        raise StudyError(f"{old} and {new} have no case in common; compare folders in which the same study has run")
+    return Comparison(changes, only_old, only_new)
+
+
+def tables_of(folder: Path) -> dict[str, dict[Key, Row]]:
+    """Name of a study -> its rows by scene and recipe. Raises StudyError as `compare`."""
+    if not folder.is_dir():
+        raise StudyError(f"there is no folder {folder}")
+    files = {path.parent.name: path for path in sorted(folder.glob("*/*.csv")) if path.stem == path.parent.name}
+    found = {study: rows for study, path in files.items() if (rows := _read(path))}
+    if not found:
+        raise StudyError(
+            f"{folder} holds no table of a study whose rows name their recipe; `organbench report --results {folder}` "
+            "writes it from the runs"
+        )
+    return found
+
+
+def _read(path: Path) -> dict[Key, Row]:
+    """Nothing where its rows name no recipe."""
+    try:
+        table = pd.read_csv(path)
+    except (ValueError, OSError) as error:
+        again = "write it anew with `organbench report`"
+        raise StudyError(f"{path} cannot be read as a table ({str(error).strip()}); {again}") from error
+    if not {"scene", "recipe"} <= set(table.columns):
+        return {}
+    return {(str(row["scene"]), str(row["recipe"])): row for row in table.to_dict("records")}
+
+
+def changes_of(study: str, old: Row, new: Row, same_bits: bool) -> list[Change]:
+    """How a case ended and all its metrics that one of the folders has."""
+    case = Named(study, *(str(new.get(name, "")) for name in ("scene", "body", "method", "recipe")))
+    found = []
+    if old.get(STATUS) != new.get(STATUS):
+        before, after = str(old.get(STATUS)), str(new.get(STATUS))
+        found.append(Change(case, STATUS, "", before, after, np.nan, Verdict.MOVED))
+    for column in [column for column in old if column in new]:
+        named = METRIC.match(str(column))
+        before, after = old[column], new[column]
+        if named is None or named["name"] == "dt" or (pd.isna(before) and pd.isna(after)):
+            continue
+        name, unit = named["name"], named["unit"]
+        floor = max(_floor(old, name, unit), _floor(new, name, unit))
+        verdict = verdict_of(float(before), float(after), floor, same_bits)
+        found.append(Change(case, name, unit, float(before), float(after), floor, verdict))
+    return found
+
+
+def _floor(row: Row, name: str, unit: str) -> float:
+    return float(row.get(f"{name} floor [{unit}]", np.nan))
+
+
+def equal_records(old: Path, new: Path, study: str) -> set[Key]:
+    """(scene, recipe) of the cases whose records both folders hold, with equal fields. Records that cannot be read, or
+    of a scene that there is no more, count as different."""
+    mine, theirs = ({path.name: path for path in record_files(folder, study)} for folder in (old, new))
+    found = set()
+    for name in sorted(set(mine) & set(theirs)):
+        try:
+            records = read_record(mine[name]), read_record(theirs[name])
+            case = case_from_json(records[0].key)
+        except StudyError:
+            continue
+        if _equal(*records):
+            found.add((case.scene.name, recipe_text(case)))
+    return found
+
+
+def _equal(one: Record, other: Record) -> bool:
+    return set(one.fields) == set(other.fields) and all(
+        np.array_equal(field.values, other.fields[name].values, equal_nan=field.values.dtype.kind == "f")
+        for name, field in one.fields.items()
+    )

@@ -1,0 +1,39 @@
+"""What a change of a number means, given how well the number is known."""
+
+from enum import StrEnum
+
+ROUND_OFF = 1e-5
+"""Relative: tables have six digits."""
+
+
+class Verdict(StrEnum):
+    """How a number of one folder stands to that of the other."""
+
+    SAME_BITS = "same bits"
+    ROUND_OFF = "round-off"
+    WITHIN_FLOOR = "within floor"
+    MOVED = "moved"
+    NOT_RESOLVABLE = "not resolvable"
+
+
+MEANING: dict[Verdict, str] = {
+    Verdict.SAME_BITS: "the records of both folders are equal to the last bit, and so are the numbers",
+    Verdict.ROUND_OFF: f"equal to a relative {ROUND_OFF:g}, which is what a table shows",
+    Verdict.WITHIN_FLOOR: "the change is not larger than what is not known: the reference's uncertainty, or the "
+    "spread of the timing",
+    Verdict.MOVED: "the change is larger than that",
+    Verdict.NOT_RESOLVABLE: "nothing says how well the number is known, or one folder lacks it",
+}
+
+
+def verdict_of(old: float, new: float, floor: float, same_bits: bool) -> Verdict:
+    """The verdict on a number that was `old` and is `new`. floor: how well it is known, NaN where that is not said;
+    same_bits: whether the records that it was read off are equal."""
+    change = abs(new - old)
+    if change != change:
+        return Verdict.NOT_RESOLVABLE
+    if change <= ROUND_OFF * max(abs(old), abs(new)):
+        return Verdict.SAME_BITS if same_bits and change == 0.0 else Verdict.ROUND_OFF
+    if floor != floor:
+        return Verdict.NOT_RESOLVABLE
+    return Verdict.WITHIN_FLOOR if change <= floor else Verdict.MOVED

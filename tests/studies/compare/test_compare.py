@@ -1,0 +1,149 @@
+"""What moved between two results folders: verdicts, rows that belong together, folders that cannot be compared."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies.base.errors import StudyError
+from studies.compare.folders import compare, equal_records
+from studies.compare.verdict import MEANING, ROUND_OFF, Verdict, verdict_of
+from studies.store.csv_table import write_table
+from studies.store.paths import record_files
+from studies.store.record import read_record, write_record
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "floor", "same", "verdict"),
+    [
+        (2.0, 2.0, 0.1, True, Verdict.SAME_BITS),
+        (2.0, 2.0, 0.1, False, Verdict.ROUND_OFF),
+        (2.0, 2.0 * (1 + 0.5 * ROUND_OFF), NAN, False, Verdict.ROUND_OFF),
+        (2.0, 2.05, 0.1, False, Verdict.WITHIN_FLOOR),
+        (2.0, 1.85, 0.1, False, Verdict.MOVED),
+        (2.0, 2.05, 0.1, True, Verdict.WITHIN_FLOOR),
+        (2.0, 2.05, NAN, False, Verdict.NOT_RESOLVABLE),
+        (NAN, 2.0, 0.1, False, Verdict.NOT_RESOLVABLE),
+        (0.0, 0.0, NAN, False, Verdict.ROUND_OFF),
+    ],
+)
+def test_a_change_is_held_against_what_is_known(old, new, floor, same, verdict):
+    assert verdict_of(old, new, floor, same) == verdict
+
+
+def test_every_verdict_has_its_meaning():
+    assert list(MEANING) == list(Verdict)
+
+
+def rows(**changes):
+    """Two cases of a study."""
+    first = {"scene": "ball", "body": "surface", "method": "free", "status": "ok", "recipe": "{}"}
+    first |= {"dt [ms]": 1.0, "force_end [%]": -30.0, "force_end floor [%]": 0.5, "min_j [1]": 0.5, "doubtful": ""}
+    return [first | changes, first | {"recipe": '{"dt_fraction": 0.1}'}]
+
+
+def folder(path, table, study="made_up"):
+    (path / study).mkdir(parents=True)
+    write_table(path / study / f"{study}.csv", pd.DataFrame(table))
+    return path
+
+
+def told(found, metric="force_end"):
+    return [change.verdict for change in found.changes if change.metric == metric]
+
+
+def test_each_case_is_compared_with_itself(tmp_path):
+    old, new = folder(tmp_path / "old", rows()), folder(tmp_path / "new", rows(**{"force_end [%]": -31.0})[::-1])
+    found = compare(old, new)
+    assert told(found) == [Verdict.MOVED, Verdict.ROUND_OFF] or told(found) == [Verdict.ROUND_OFF, Verdict.MOVED]
+    (moved,) = found.moved
+    assert (moved.case.recipe, moved.old, moved.new, moved.floor, moved.unit) == ("{}", -30.0, -31.0, 0.5, "%")
+    assert {change.metric for change in found.changes} == {"force_end", "min_j"}
+    assert sum(found.counts().values()) == len(found.changes) == 4
+
+
+def test_the_larger_floor_of_both_counts(tmp_path):
+    old = folder(tmp_path / "old", rows())
+    new = folder(tmp_path / "new", rows(**{"force_end [%]": -31.0, "force_end floor [%]": 2.0}))
+    assert compare(old, new).moved == []
+
+
+def test_a_case_that_ends_otherwise_moved(tmp_path):
+    old, new = folder(tmp_path / "old", rows()), folder(tmp_path / "new", rows(status="diverged"))
+    (moved,) = compare(old, new).moved
+    assert (moved.metric, moved.old, moved.new) == ("status", "ok", "diverged")
+
+
+def test_rows_of_one_folder_are_counted(tmp_path):
+    old, new = folder(tmp_path / "old", rows()[:1]), folder(tmp_path / "new", rows())
+    found = compare(old, new)
+    assert (found.only_old, found.only_new) == (0, 1)
+
+
+def test_records_are_compared_to_the_last_bit(results, tmp_path):
+    other = tmp_path / "other"
+    shutil.copytree(results, other)
+    before = equal_records(results, other, "tiny")
+    assert len(before) == len(record_files(results, "tiny"))
+    path = record_files(other, "tiny")[0]
+    record = read_record(path)
+    volume = record.fields["volume"]
+    nudged = replace(volume, values=np.nextafter(volume.values, 1.0))
+    write_record(path, replace(record, fields={**record.fields, "volume": nudged}))
+    assert len(equal_records(results, other, "tiny")) == len(before) - 1
+    path.write_bytes(b"cut off")
+    assert len(equal_records(results, other, "tiny")) == len(before) - 1
+
+
+def without(path):
+    return path / "nowhere"
+
+
+def empty(path):
+    (path / "empty").mkdir()
+    return path / "empty"
+
+
+def no_recipes(path):
+    return folder(path / "old", [{"a": 1}])
+
+
+def other_study(path):
+    return folder(path / "old", rows(), study="another")
+
+
+def no_table(path):
+    made = folder(path / "old", rows())
+    (made / "made_up" / "made_up.csv").write_bytes(b"")
+    return made
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (without, "there is no folder"),
+        (empty, "holds no table of a study"),
+        (no_recipes, "holds no table of a study"),
+        (other_study, "have no case in common"),
+        (no_table, "cannot be read as a table"),
+    ],
+)
+def test_folders_that_cannot_be_compared_are_refused_in_a_sentence(tmp_path, make, sentence):
+    new = folder(tmp_path / "new", rows())
+    with pytest.raises(StudyError, match=sentence):
+        compare(make(tmp_path), new)
+
+
+def test_the_command_prints_markdown_and_ends_with_one_where_something_moved(tmp_path, organbench):
+    old, new = folder(tmp_path / "old", rows()), folder(tmp_path / "new", rows(**{"force_end [%]": -31.0}))
+    code, out, _ = organbench("compare", old, new, "--csv", tmp_path / "all.csv")
+    assert code == 1 and "| made_up | ball | surface, free | force_end [%] | −30 | −31 | −1 | 0.5 |" in out
+    assert len(pd.read_csv(tmp_path / "all.csv")) == 4
+    code, out, _ = organbench("compare", old, old)
+    assert code == 0 and "Nothing moved." in out
+    code, _, err = organbench("compare", tmp_path / "nowhere", new)
+    assert code == 2 and err.count("\n") == 1
