@@ -3,10 +3,9 @@
 Augmented Lagrangian (Alart & Curnier 1991; Wriggers, Computational Contact Mechanics, 2006, ch. 6): the nominal
 pressure is t = max(0, m - eps g), m the multiplier [Pa], g the gap [m], eps the penalty [Pa/m], and the potential
 sum w (t² - m²) / (2 eps). Never at the vertices of a six-node facet: an even pressure loads them with zero.
-
-No slip: a point that touched at the end of a load step is stuck from then on to the place of the obstacle it touched,
-by the traction T = m_T - eps s, s its slip across the obstacle's normal there; it is let go when its pressure ends.
-The place is known to the length of a load step: shorter steps for a contact that spreads over what it grips.
+No slip: a point that touched at the end of a load step sticks to the place of the obstacle that it touched, by the
+traction T = m_T - eps s, s its slip across the normal there; it is let go when its pressure ends. The place is known to
+the length of a load step: shorter steps for a contact that spreads over what it grips.
 
 Order 4 has as many points to a facet as nodes. More points ask for more than the nodes can give where a facet is
 partly in contact; between fewer the body sinks in, three to thirty times deeper than a thousandth at three points.
@@ -33,8 +32,6 @@ class Grip(NamedTuple):
 
 
 NO_GRIP = Grip(np.zeros((0, 0, 0), dtype=bool), np.zeros((0, 0, 0, 3)), np.zeros((0, 0, 0, 3)))
-
-
 NO_GUESS = np.zeros((0, 0, 0))
 
 

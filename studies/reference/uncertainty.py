@@ -1,7 +1,7 @@
 """How far each quantity of a reference may be from the truth: shares of the mesh, load steps, contact and kappa.
 
-Differences of solutions are taken at the vertices of the coarsest mesh, weighted with their rest volume or area, so
-that a mesh refined somewhere does not count more there.
+Differences of solutions are taken at the vertices of the coarsest mesh, weighted with their rest volume or area: a mesh
+refined somewhere counts no more there.
 """
 
 from collections.abc import Callable, Sequence

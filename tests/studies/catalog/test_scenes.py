@@ -7,17 +7,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from massspring import METHODS, Capsule, Plane, Ramp, Trajectory, simulate
+from massspring import METHODS, simulate
 from reference_fem import NewtonSettings
-from reference_fem.model.problem import find_held
 from reference_fem.system.saddle_point import System
 from studies.base.errors import StudyError
-from studies.reference.problem import anchor, kept_obstacles, reference_problem
+from studies.reference.problem import reference_problem
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames
 from studies.scene.as_json import scene_from_dict, scene_to_json
-from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scenes import JUDGED, SCENES, InitialConditions
 from studies.scenes.stress import STRESS_SCENES
 
@@ -176,84 +174,3 @@ def test_reference_can_be_set_up_on_its_coarsest_mesh(judged):
     assert problem.material.kappa == judged.tissue.shear_modulus * judged.tissue.bulk_over_shear
     assert problem.density == judged.tissue.density
     assert tuple(problem.gravity) == judged.gravity
-
-
-def load_gap(drive_scene, problem_scene) -> float:
-    """Largest distance [m] between where the two solvers put their obstacles and held regions, over the whole clock."""
-    setup, problem = small_setup(drive_scene).setup, coarsest_problem(problem_scene)
-    kept = [drive_scene.obstacles.index(o) for o in kept_obstacles(drive_scene)]
-    gaps = []
-    for frame in range(setup.clock.frames):
-        boundary, t = setup.boundary(frame), (frame + 1) * setup.clock.frame
-        for number, rigid in zip(kept, problem.obstacles, strict=True):
-            start = rigid.point if hasattr(rigid, "normal") else rigid.center
-            gaps.append(boundary.position[-1, number] - (np.asarray(start) + rigid.motion(t)))
-        if not drive_scene.symmetric:
-            for number, held in enumerate(problem.held):
-                gaps.append(boundary.held_displacement[-1, number] - held.motion(t))
-        for cavity in problem.cavities:
-            lumen = setup.body.kept.names.index("lumen")
-            factor = boundary.volume_target[-1, lumen] / setup.body.rest_volumes[lumen]
-            gaps.append(np.full(3, factor - cavity.volume(t)) * np.cbrt(setup.body.rest_volumes[lumen]))
-    return float(np.abs(gaps).max(initial=0.0))
-
-
-def moves(scene) -> bool:
-    """Whether anything but gravity acts."""
-    paths = [o.path for o in scene.obstacles] + [h.path for h in scene.held]
-    return any(len(path.times) > 1 for path in paths) or (scene.filled and len(scene.lumen.filling.times) > 1)
-
-
-def test_both_solvers_see_the_same_load_at_the_same_time(judged):
-    size = float(np.ptp(small_setup(judged).setup.body.rest))
-    # Times and positions agree to rounding.
-    assert load_gap(judged, judged) < 1e-12 * size
-    assert load_gap(judged, _later(judged)) > 1e-4 * size or not moves(judged)
-
-
-def _later(scene):
-    """A mutant whose paths lag a tenth of a second behind."""
-    late = lambda path: Trajectory(tuple(t + 0.1 for t in path.times), path.displacements)  # noqa: E731
-    filling = scene.lumen.filling if scene.lumen else None
-    return replace(
-        scene,
-        lumen=filling and replace(scene.lumen, filling=Ramp(tuple(t + 0.1 for t in filling.times), filling.values)),
-        obstacles=tuple(replace(o, path=late(o.path)) for o in scene.obstacles),
-        held=tuple(replace(h, path=late(h.path)) for h in scene.held),
-    )
-
-
-def test_both_solvers_see_the_same_obstacles(judged):
-    problem = coarsest_problem(judged)
-    for obstacle, rigid in zip(kept_obstacles(judged), problem.obstacles, strict=True):
-        if isinstance(obstacle, Plane):
-            np.testing.assert_allclose(rigid.normal, obstacle.unit_normal, rtol=0, atol=1e-15)
-        else:
-            assert rigid.radius == obstacle.radius
-    # An octant keeps one of two mirrored obstacles; nothing else is left out.
-    dropped = [o for o in judged.obstacles if o not in kept_obstacles(judged)]
-    mirrored = [np.abs(anchor(o)).tolist() for o in dropped]
-    assert all(any(np.allclose(m, anchor(k)) for k in kept_obstacles(judged)) for m in mirrored)
-
-
-def test_both_solvers_hold_the_same_region(judged):
-    if judged.symmetric or not judged.held:
-        return
-    level = int(judged.reference.levels[0])
-    mesh, problem = mesh_for(judged, level), coarsest_problem(judged)
-    for held, found in zip(judged.held, find_held(problem), strict=True):
-        corners = found.nodes[found.nodes < len(mesh.points)]
-        patch = patch_nodes(mesh, held.name, held.region)
-        # The reference may leave out a node of the outline that no whole facet of the region reaches.
-        assert set(corners) <= set(patch)
-        assert len(corners) >= 0.95 * len(patch)
-        assert (held.region.level(mesh.points[patch]) <= 1e-3 * np.ptp(mesh.points)).all()
-
-
-@pytest.mark.parametrize(
-    "obstacle", [Plane((0, 0, 1), (0, 0, -1), friction=0.2), Capsule((0, 0, 1), (0, 0, 2), 0.1, friction=0.5)]
-)
-def test_an_obstacle_that_the_reference_does_not_know_is_refused(obstacle):
-    liver = next(s for s in SCENES if s.name == "liver_press")
-    with pytest.raises(StudyError, match="the reference knows contact without friction"):
-        reference_problem(replace(liver, obstacles=(obstacle,)), liver.reference.levels[0])

@@ -4,13 +4,11 @@ import errno
 import io
 import json
 import os
-import re
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
@@ -18,91 +16,9 @@ from studies.cli.commands import table
 from studies.runs.current import case_path
 from studies.store.paths import record_files
 from studies.store.record import Status, read_record, write_record
-from studies.timing.cases import timing_file
 from tests.studies.tiny import TINY, content, cube, tiny_case, write_obj
 
 REPOSITORY = Path(__file__).parents[3]
-BROKEN = {
-    "no STUDY": ("CASES = 3\n", "defines no STUDY of type studies.catalog.Study"),
-    "another type": ("STUDY = 'volume_loss'\n", "defines no STUDY of type studies.catalog.Study"),
-    "syntax": ("import os\nSTUDY = (\n", "SyntaxError in line 2: '(' was never closed"),
-    "import": ("\nimport massspringg\n", "ModuleNotFoundError in line 2: No module named 'massspringg'"),
-    "name": ("def f():\n    return nothing\nf()\n", "NameError in line 2: name 'nothing' is not defined"),
-    "misspelt setting": (
-        "from studies.runs.case import Case\nfrom studies.scenes import SCENES\nSTUDY = Case(SCENES[0], dtt=1)\n",
-        "TypeError in line 3",
-    ),
-    "dt zero": (
-        "from tests.studies.tiny import *\nSTUDY = tiny_study(cases=(tiny_case(dt=0.0),))\n",
-        "dt is 0.0 s; it must be",
-    ),
-    "dt negative": (
-        "from tests.studies.tiny import *\nSTUDY = tiny_study(cases=(tiny_case(dt=-1),))\n",
-        "dt is -1 s; it must be",
-    ),
-    "obstacle": (
-        "from massspring import Plane\nPlane((0, 0, 0), (0, 0, 0))\n",
-        "in line 2: the plane normal is (0, 0, 0); it needs a direction",
-    ),
-    "metric": (
-        "from tests.studies.tiny import *\nSTUDY = tiny_study(columns=('volume_wort',))\n",
-        "unknown metric 'volume_wort'; did you mean 'volume_worst'",
-    ),
-    "study name": (
-        "from tests.studies.tiny import *\nSTUDY = tiny_study(name='../elsewhere')\n",
-        "'../elsewhere' cannot name a study",
-    ),
-    "own method": (
-        "from dataclasses import dataclass\nfrom massspring import Free\nfrom tests.studies.tiny import *\n\n"
-        "@dataclass(frozen=True)\nclass Mine(Free):\n    name = 'frei'\n\n"
-        "STUDY = tiny_study(cases=(tiny_case(method=Mine()),))\n",
-        "unknown method 'frei'; did you mean 'free'",
-    ),
-}
-
-
-OWN = "from studies.catalog import Chart\nfrom massspring import Free\nfrom tests.studies.tiny import *\n"
-BROKEN |= {
-    "sys.exit": ("import sys\nsys.exit(3)\n", "cannot be loaded: SystemExit in line 2: 3"),
-    "BaseException": ("raise BaseException\n", "cannot be loaded: BaseException in line 1; mend it"),
-    "method class": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(method=Free),))\n",
-        "in line 4: the method is Free",
-    ),
-    "no body": (
-        OWN + "STUDY = tiny_study(cases=(Case(SQUEEZE, None),))\n",
-        "in line 4: a case needs a BodyRecipe, not None",
-    ),
-    "no scene": (OWN + "STUDY = tiny_study(cases=(tiny_case(scene=None),))\n", "a case needs a Scene, not None"),
-    "nan": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(stiffness=float('nan'))),))\n",
-        "body.stiffness = nan cannot be stored and read back",
-    ),
-    "text for a number": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes='100')),))\n",
-        "body.nodes = '100' cannot be stored and read back",
-    ),
-    "half a node": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes=100.5)),))\n",
-        "nodes = '100.5': Input should be a valid integer",
-    ),
-    "columns": (OWN + "STUDY = tiny_study(columns='volume_worst')\n", "columns is 'volume_worst'; give a tuple"),
-    "no case": (OWN + "STUDY = tiny_study(cases=(3,))\n", "cases holds 3, which is no Case"),
-    "reserved": (OWN + "STUDY = tiny_study(name='cache')\n", "a study cannot be called 'cache'"),
-    "chart elsewhere": (
-        OWN + "STUDY = tiny_study(charts=(Chart('../../a.png', print),))\n",
-        "a chart cannot be called",
-    ),
-    "zero byte": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(scene=replace(SQUEEZE, name='a\\0b')),))\n",
-        "has a name with characters that cannot be printed",
-    ),
-    "recorded": (OWN + "STUDY = tiny_study(cases=(tiny_case(recorded='kinetic'),))\n", "recorded is 'kinetic'; give"),
-}
-CHARTS = {
-    "lambda r, p: 1/0": "chart a.png is not drawn, mine.py fails: ZeroDivisionError in line 4: division by zero",
-    "lambda r: 1": "chart a.png is not drawn, its function fails: TypeError",
-}
 
 
 @pytest.mark.parametrize(
@@ -137,82 +53,6 @@ def test_unknown_words_get_the_nearest_match(refused, tmp_path, monkeypatch, wor
         monkeypatch.setattr(table, "load_runs", lambda root, study: ([], []))
     assert told in refused(*words)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("fault", BROKEN)
-def test_a_study_file_that_is_wrong(refused, tmp_path, fault):
-    text, told = BROKEN[fault]
-    path = tmp_path / "mine.py"
-    path.write_text(text)
-    for command in ("run", "table"):
-        assert told in refused(command, path, "--results", tmp_path / "results")
-    assert not (tmp_path / "results").exists()
-
-
-@pytest.mark.parametrize("draw", CHARTS)
-def test_a_chart_that_fails_is_a_sentence_after_all_else_is_done(refused, results, tmp_path, draw):
-    path = tmp_path / "mine.py"
-    other = "Chart('b.txt', lambda r, p: p.write_text('drawn'))"
-    path.write_text(OWN + f"STUDY = tiny_study(charts=(Chart('a.png', {draw}), {other}))\n")
-    assert CHARTS[draw] in refused("plot", path, "--results", results)
-    assert (results / "tiny" / "b.txt").read_text() == "drawn"
-    assert (results / "tiny" / "tiny.csv").exists()
-
-
-def damage(kind, good: bytes, path: Path):
-    if kind == "foreign":
-        with h5py.File(path, "w") as file:
-            file["x"] = np.arange(3)
-    elif kind == "old schema":
-        path.write_bytes(good)
-        with h5py.File(path, "r+") as file:
-            file.attrs["schema"] = 0
-    else:
-        path.write_bytes({"cut off": good[: len(good) // 2], "text": b"volume 1.0\n", "empty": b""}[kind])
-    return path
-
-
-@pytest.mark.parametrize("kind", ["cut off", "foreign", "text", "empty", "old schema"])
-@pytest.mark.parametrize("command", ["show", "replay"])
-def test_a_file_that_is_no_result(refused, finished_sweep, tmp_path, kind, command):
-    good = case_path(finished_sweep, "tiny", tiny_case()).read_bytes()
-    path = damage(kind, good, tmp_path / "odd.h5")
-    assert str(path) in refused(command, path)
-
-
-def test_a_cut_off_file_hides_no_other(organbench, tiny_file, results):
-    path = case_path(results, "tiny", tiny_case())
-    path.write_bytes(path.read_bytes()[:3000])
-    code, out, err = organbench("table", tiny_file, "--results", results)
-    assert code == 0
-    assert len(err.splitlines()) == 1
-    assert path.name in err
-    assert "free" in out
-
-
-@pytest.mark.parametrize("fault", ["the key", "a field", "a number", "the timing"])
-def test_one_damaged_file_costs_one_case(organbench, tiny_file, results, fault):
-    path = case_path(results, "tiny", tiny_case())
-    whole = path.read_bytes()
-    if fault == "the key":
-        place = whole.index(b'"dt_fraction"')
-        path.write_bytes(whole[:place] + b"#" + whole[place + 1 :])
-    elif fault == "the timing":
-        path = timing_file(results, "tiny", tiny_case(timed=True))
-        path.write_bytes(path.read_bytes()[:-1])
-    else:
-        with h5py.File(path, "r+") as file:
-            if fault == "a field":
-                del file["volume"]
-            else:
-                file["volume"][-1, 0] *= 1.5
-    code, out, err = organbench("table", tiny_file, "--results", results)
-    assert code == 0 and path.name in err and len(err.splitlines()) == 1
-    rows = [line for line in out.splitlines() if line.startswith(("  free ", "  implicit_volume "))]
-    assert len(rows) == (3 if fault == "the timing" else 2)
-    code, out, _ = organbench("status", tiny_file, "--results", results)
-    assert code == 0 and (fault == "the timing" or {"1 ok", "1 stale"} < set(re.findall(r"\d \w+", out)))
-    assert ("its file is damaged" in out) == (fault != "the timing")
 
 
 def test_a_terminal_without_the_letters_shows_question_marks(organbench, monkeypatch):

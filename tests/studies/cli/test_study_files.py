@@ -1,0 +1,109 @@
+"""Study files of a user that are wrong: one sentence with the line that is at fault."""
+
+import pytest
+
+BROKEN = {
+    "no STUDY": ("CASES = 3\n", "defines no STUDY of type studies.catalog.Study"),
+    "another type": ("STUDY = 'volume_loss'\n", "defines no STUDY of type studies.catalog.Study"),
+    "syntax": ("import os\nSTUDY = (\n", "SyntaxError in line 2: '(' was never closed"),
+    "import": ("\nimport massspringg\n", "ModuleNotFoundError in line 2: No module named 'massspringg'"),
+    "name": ("def f():\n    return nothing\nf()\n", "NameError in line 2: name 'nothing' is not defined"),
+    "misspelt setting": (
+        "from studies.runs.case import Case\nfrom studies.scenes import SCENES\nSTUDY = Case(SCENES[0], dtt=1)\n",
+        "TypeError in line 3",
+    ),
+    "dt zero": (
+        "from tests.studies.tiny import *\nSTUDY = tiny_study(cases=(tiny_case(dt=0.0),))\n",
+        "dt is 0.0 s; it must be",
+    ),
+    "dt negative": (
+        "from tests.studies.tiny import *\nSTUDY = tiny_study(cases=(tiny_case(dt=-1),))\n",
+        "dt is -1 s; it must be",
+    ),
+    "obstacle": (
+        "from massspring import Plane\nPlane((0, 0, 0), (0, 0, 0))\n",
+        "in line 2: the plane normal is (0, 0, 0); it needs a direction",
+    ),
+    "metric": (
+        "from tests.studies.tiny import *\nSTUDY = tiny_study(columns=('volume_wort',))\n",
+        "unknown metric 'volume_wort'; did you mean 'volume_worst'",
+    ),
+    "study name": (
+        "from tests.studies.tiny import *\nSTUDY = tiny_study(name='../elsewhere')\n",
+        "'../elsewhere' cannot name a study",
+    ),
+    "own method": (
+        "from dataclasses import dataclass\nfrom massspring import Free\nfrom tests.studies.tiny import *\n\n"
+        "@dataclass(frozen=True)\nclass Mine(Free):\n    name = 'frei'\n\n"
+        "STUDY = tiny_study(cases=(tiny_case(method=Mine()),))\n",
+        "unknown method 'frei'; did you mean 'free'",
+    ),
+}
+
+
+OWN = "from studies.catalog import Chart\nfrom massspring import Free\nfrom tests.studies.tiny import *\n"
+
+
+BROKEN |= {
+    "sys.exit": ("import sys\nsys.exit(3)\n", "cannot be loaded: SystemExit in line 2: 3"),
+    "BaseException": ("raise BaseException\n", "cannot be loaded: BaseException in line 1; mend it"),
+    "method class": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(method=Free),))\n",
+        "in line 4: the method is Free",
+    ),
+    "no body": (
+        OWN + "STUDY = tiny_study(cases=(Case(SQUEEZE, None),))\n",
+        "in line 4: a case needs a BodyRecipe, not None",
+    ),
+    "no scene": (OWN + "STUDY = tiny_study(cases=(tiny_case(scene=None),))\n", "a case needs a Scene, not None"),
+    "nan": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(stiffness=float('nan'))),))\n",
+        "body.stiffness = nan cannot be stored and read back",
+    ),
+    "text for a number": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes='100')),))\n",
+        "body.nodes = '100' cannot be stored and read back",
+    ),
+    "half a node": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes=100.5)),))\n",
+        "nodes = '100.5': Input should be a valid integer",
+    ),
+    "columns": (OWN + "STUDY = tiny_study(columns='volume_worst')\n", "columns is 'volume_worst'; give a tuple"),
+    "no case": (OWN + "STUDY = tiny_study(cases=(3,))\n", "cases holds 3, which is no Case"),
+    "reserved": (OWN + "STUDY = tiny_study(name='cache')\n", "a study cannot be called 'cache'"),
+    "chart elsewhere": (
+        OWN + "STUDY = tiny_study(charts=(Chart('../../a.png', print),))\n",
+        "a chart cannot be called",
+    ),
+    "zero byte": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(scene=replace(SQUEEZE, name='a\\0b')),))\n",
+        "has a name with characters that cannot be printed",
+    ),
+    "recorded": (OWN + "STUDY = tiny_study(cases=(tiny_case(recorded='kinetic'),))\n", "recorded is 'kinetic'; give"),
+}
+
+
+CHARTS = {
+    "lambda r, p: 1/0": "chart a.png is not drawn, mine.py fails: ZeroDivisionError in line 4: division by zero",
+    "lambda r: 1": "chart a.png is not drawn, its function fails: TypeError",
+}
+
+
+@pytest.mark.parametrize("fault", BROKEN)
+def test_a_study_file_that_is_wrong(refused, tmp_path, fault):
+    text, told = BROKEN[fault]
+    path = tmp_path / "mine.py"
+    path.write_text(text)
+    for command in ("run", "table"):
+        assert told in refused(command, path, "--results", tmp_path / "results")
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize("draw", CHARTS)
+def test_a_chart_that_fails_is_a_sentence_after_all_else_is_done(refused, results, tmp_path, draw):
+    path = tmp_path / "mine.py"
+    other = "Chart('b.txt', lambda r, p: p.write_text('drawn'))"
+    path.write_text(OWN + f"STUDY = tiny_study(charts=(Chart('a.png', {draw}), {other}))\n")
+    assert CHARTS[draw] in refused("plot", path, "--results", results)
+    assert (results / "tiny" / "b.txt").read_text() == "drawn"
+    assert (results / "tiny" / "tiny.csv").exists()
