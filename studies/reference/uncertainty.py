@@ -1,7 +1,6 @@
 """How far each quantity of a reference may be from the truth: shares of the mesh, load steps, contact and kappa.
 
-Differences of solutions are taken at the vertices of the coarsest mesh, weighted with their rest volume or area: a mesh
-refined somewhere counts no more there.
+Differences of solutions are taken at the vertices of the coarsest mesh, weighted with their rest volume or area.
 """
 
 from collections.abc import Callable, Sequence
