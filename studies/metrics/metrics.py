@@ -151,7 +151,9 @@ def alternation(run: Run) -> float:
 
 
 def sway(run: Run) -> float:
-    """100 × range of the force about its trend in the last frames at rest, over its mean [%]."""
+    """100 × range of the force about its trend in the last frames at rest, over its mean [%]; NaN without a force."""
+    if "force" not in run.case.scene.quantities:
+        return float("nan")
     return PERCENT * float(run.record.attributes.get("sway", np.nan))
 
 
