@@ -9,8 +9,10 @@ import numpy as np
 
 from studies.base.errors import StudyError
 from studies.geometry.api.organs import fill as fill_mesh
-from studies.geometry.files.reading import cells_of, parse, weld
-from studies.geometry.files.units import UNITS, settled_unit
+from studies.geometry.files.content import Content
+from studies.geometry.files.opening import opened
+from studies.geometry.files.reading import weld
+from studies.geometry.files.units import LARGEST, SMALLEST, Source, as_source, check_range
 from studies.geometry.mesh.checks import check_finite, check_one_part, check_surface, check_volume
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
 from studies.geometry.mesher.jobs import mesh_from
@@ -18,7 +20,7 @@ from studies.geometry.surface.repair import Mended, border, mend
 
 
 def scan(
-    path: str | Path,
+    path: str | Path | Source,
     nodes: int | None = None,
     *,
     unit: str | None = None,
@@ -30,27 +32,23 @@ def scan(
 ) -> OrganMesh:
     """A body from the surface in a file: welded, its largest part kept, oriented, and remeshed to `nodes` nodes.
 
-    nodes: None keeps the file's own triangles. unit: of the file, "m", "cm" or "mm"; None where only metres make an
-    organ of it. smooth: see scan_shape [m]; needs `nodes`. holes: close borders first. wall: thickness [m] of the wall
-    of a hollow organ, in `layers` of elements; needs `nodes`. fill: with tetrahedra. Warns of every change to the
-    surface. Raises StudyError for what cannot be read, mended or meshed.
+    path: a file, or a Source, which also has a scale or a part. nodes: None keeps the file's own triangles. unit: of
+    the file, one of UNITS; None: what the file says, or metres where only they make an organ of it. smooth: see
+    scan_shape [m]; needs `nodes`. holes: close borders first. wall: thickness [m] of the wall of a hollow organ, in
+    `layers` of elements; needs `nodes`. fill: with tetrahedra. Warns of every change to the surface. Raises StudyError
+    for what cannot be read, mended or meshed.
     """
-    path = Path(path)
-    points, triangles = raw_surface(path)
-    unit = settled_unit(path.name, float(np.ptp(points, axis=0).max()), unit)
-    points = points * UNITS[unit]
+    source = as_source(path, unit)
+    path = source.path
+    content = opened(source)
+    points, triangles = in_metres(source, content)
     mended = mend(*weld(points, triangles), path.name, holes)
     for sentence in mended.remarks:
         warnings.warn(f"{path.name}: {sentence}", stacklevel=2)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    recipe: dict[str, Any] = {
-        "kind": "file",
-        "name": path.stem,
-        "file": path.name,
-        "sha256": digest,
-        "unit": unit,
-        "holes": bool(holes),
-    }
+    said = source.unit or content.unit or "m"
+    recipe: dict[str, Any] = {"kind": "file", "name": path.stem, "file": path.name, "sha256": digest, "unit": said}
+    recipe |= {"holes": bool(holes)} | source.recipe
     if nodes is None:
         if smooth or wall is not None:
             raise StudyError(
@@ -80,18 +78,23 @@ def raw_surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
     Raises StudyError for a file without them or with coordinates that are not finite.
     """
-    raw = parse(path)
-    points = np.asarray(raw.points, float)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise StudyError(f"{path.name}: points have shape {points.shape}; a body needs three coordinates per point")
-    check_finite(points, path.name)
-    tetrahedra, triangles = cells_of(raw, path.name)
-    return points, boundary_triangles(tetrahedra) if len(tetrahedra) else triangles
+    return surface_of(opened(Source(path)), path.name)
 
 
-def longest_side(path: Path) -> float:
-    """Longest side of the bounding box of a surface in a file, in the file's unit."""
-    return float(np.ptp(raw_surface(path)[0], axis=0).max())
+def surface_of(content: Content, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Points and triangles of what a file holds; see raw_surface."""
+    check_finite(content.points, name)
+    solid = len(content.tetrahedra) > 0
+    return content.points, boundary_triangles(content.tetrahedra) if solid else content.triangles
+
+
+def in_metres(source: Source, content: Content) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) [m] and triangles (t, 3). Raises StudyError for no organ's size."""
+    name = source.path.name
+    points, triangles = surface_of(content, name)
+    metres = source.metres(content.longest_side, content.unit)
+    check_range(metres * content.longest_side, name, SMALLEST, LARGEST)
+    return points * metres, triangles
 
 
 def as_it_is(mended: Mended, recipe: dict[str, Any], fill: bool) -> OrganMesh:

@@ -52,7 +52,8 @@ def _size_sentence(m: dict[str, Any]) -> str:
 
 
 def _wrong_size(m: dict[str, Any]) -> int:
-    return int(m["unit_said"] and bool(m.get("size")) and not likely_units(max(m["size"])).count("m"))
+    side = max(m.get("size", [0.0]))
+    return int(m["unit_said"] and side > 0 and "m" not in likely_units(side))
 
 
 def _sliver_sentence(m: dict[str, Any]) -> str:
@@ -78,7 +79,12 @@ RULES: tuple[Rule, ...] = (
         lambda m: f"{m['bad_points']} points are not numbers (NaN or infinite)",
         EXPORT,
     ),
-    ("unit", lambda m: int(not m["unit_said"]), _unit_sentence, "say --unit mm, --unit cm or --unit m"),
+    (
+        "unit",
+        lambda m: int(not m["unit_said"] and "size" in m),
+        _unit_sentence,
+        "say --unit mm, cm or m, or --longest-side 19cm",
+    ),
     ("size", _wrong_size, _size_sentence, "say another --unit"),
     (
         "duplicate_points",

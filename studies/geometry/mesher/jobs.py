@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from massspring.sources import ROOT, source_fingerprint
+from massspring.sources import cache_folder as user_cache
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import OrganMesh
 from studies.geometry.shape.regions import ON_CURVE, region_from_dict
@@ -26,6 +27,8 @@ from studies.geometry.shape.regions import ON_CURVE, region_from_dict
 TIME_LIMIT = 300.0
 """Seconds after which a meshing job is given up: 20 times what the largest one takes; gmsh hangs without a word."""
 
+NAME_BYTES = 80
+"""Of a mesh's name that stand in the name of its file: file systems allow 255 in all."""
 PARTS = ("points", "triangles", "tetrahedra", "surface_count", "outer_count")
 """What the worker makes and the cache keeps."""
 
@@ -53,7 +56,8 @@ def cached(
     make: Callable[[], dict[str, np.ndarray]],
 ) -> dict[str, np.ndarray]:
     """The arrays called `parts` for a recipe: from the cache, or made and stored there."""
-    path = cache_folder() / f"{recipe['name']}-{recipe_hash(recipe, arrays)}.npz"
+    name = recipe["name"].encode()[:NAME_BYTES].decode(errors="ignore")
+    path = cache_folder() / f"{name}-{recipe_hash(recipe, arrays)}.npz"
     result = read_cached(path, parts)
     if result is None:
         result = make()
@@ -85,8 +89,11 @@ def patches_of(mesh: OrganMesh, regions: dict[str, dict[str, Any]]) -> dict[str,
 
 
 def cache_folder() -> Path:
-    """ORGANBENCH_CACHE when set, else results/cache/meshes under the current folder."""
-    return Path(os.environ.get("ORGANBENCH_CACHE") or Path.cwd() / "results" / "cache" / "meshes")
+    """ORGANBENCH_CACHE when set, else results/cache/meshes where the current folder has results, else the user's."""
+    given, results = os.environ.get("ORGANBENCH_CACHE"), Path.cwd() / "results"
+    if given:
+        return Path(given)
+    return results / "cache" / "meshes" if results.is_dir() else user_cache() / "meshes"
 
 
 def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:

@@ -84,10 +84,20 @@ def test_a_cache_that_cannot_be_written_gets_a_sentence(tmp_path, monkeypatch):
         ball(150)
 
 
-def test_the_default_cache_lies_under_results(tmp_path, monkeypatch):
+def test_the_default_cache_lies_under_results_where_there_are_any_and_else_is_the_users(tmp_path, monkeypatch):
     monkeypatch.delenv("ORGANBENCH_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
     monkeypatch.chdir(tmp_path)
+    assert jobs.cache_folder() == tmp_path / "user" / "organbench" / "meshes"
+    (tmp_path / "results").mkdir()
     assert jobs.cache_folder() == tmp_path / "results" / "cache" / "meshes"
+
+
+def test_a_long_name_of_a_file_fits_into_the_cache(own_cache):
+    name = "é" * 240
+    assert len(mesh_from(RECIPE | {"name": name, "fill": False}).points) == 150
+    (path,) = own_cache.glob("*.npz")
+    assert len(path.name.encode()) < 120
 
 
 def test_fill_keeps_surface_and_patches(balls):

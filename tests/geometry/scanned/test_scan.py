@@ -157,7 +157,7 @@ def test_units_are_never_guessed(block, tmp_path):
         scan(path, 200)
     assert str(caught.value) == (
         "block.vtu does not say its unit; its longest side is 60, the size of an organ in centimetres or millimetres; "
-        "say --unit mm (or another of m, cm, mm)"
+        "say --unit mm (or another of m, cm, mm, in), or --longest-side 19cm"
     )
     with pytest.raises(StudyError, match="no organ's size in m, cm or mm; say --unit mm"):
         scan(write(tmp_path / "huge.ply", 1e3 * points, faces), 200)

@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 import pytest
 
-from studies.cli.commands import mesh as commands
+from studies.cli import mesh_files as commands
 from studies.geometry import read_mesh
 from studies.geometry.mesh.organ_mesh import signed_volume
 from tests.geometry.boxes import box, split, together
@@ -109,7 +109,7 @@ def refusals(folder):
         "both": (("mesh", "ball", "--from", egg, *out), "say what to mesh"),
         "unknown organ": (("mesh", "livr", *out), "did you mean 'liver'"),
         "unit": (("mesh", "--from", egg, *out), "does not say its unit; its longest side is 60"),
-        "odd unit": (("mesh", "--from", egg, "--unit", "in", *out), "unit 'in' is not known"),
+        "odd unit": (("mesh", "--from", egg, "--unit", "ft", *out), "unit 'ft' is not known"),
         "itself": ((*scan, "-o", egg), "egg.ply is the file that is read"),
         "suffix": ((*scan, "-o", folder / "out.xyz"), "choose one of these suffixes"),
         "filled stl": ((*scan, "--fill", "-o", folder / "out.stl"), "holds triangles only"),

@@ -1,0 +1,60 @@
+"""Mesh files on the command line: how their numbers are to be taken, and what is asked before they are read."""
+
+import sys
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from studies.base.errors import StudyError
+from studies.cli.terminal import errors
+from studies.geometry.files.estimate import size_warning
+from studies.geometry.files.faults import check_promises
+from studies.geometry.files.opening import opened
+from studies.geometry.files.units import UNITS, Source, check_unit, length_of, likely_units, unit_question
+
+Unit = Annotated[str | None, typer.Option(help="of the file's coordinates: m, cm, mm or in")]
+Scale = Annotated[float, typer.Option(help="the file's coordinates are multiplied by this first")]
+LongestSide = Annotated[str | None, typer.Option(help="of the body, such as 19cm, instead of a unit and a scale")]
+Part = Annotated[str | None, typer.Option(help="of several in a file: its name or number, or a label of a mask")]
+Yes = Annotated[bool, typer.Option("--yes", "--force", help="read a very large file without asking")]
+
+
+def source_of(path: Path, unit: str | None, scale: float, longest_side: str | None, part: str | None) -> Source:
+    """The options of a file together. Raises StudyError for those that do not go together."""
+    return Source(path, unit, scale, None if longest_side is None else length_of(longest_side), part)
+
+
+def ask_before_large(path: Path, yes: bool) -> None:
+    """Warn of a large file before reading it: go on when --yes or an answer allows it, else raise StudyError."""
+    if path.is_file():
+        check_promises(path)
+    sentence = size_warning(path) if path.is_file() else None
+    if sentence is None:
+        return
+    if yes:
+        errors.print(f"warning: {sentence}", markup=False, highlight=False)
+    elif not (sys.stdin.isatty() and typer.confirm(f"{sentence}. Go on?")):
+        raise StudyError(f"{sentence}; say --yes to go on, or thin it out in the program that made it")
+
+
+def asked_unit(source: Source) -> Source:
+    """With the unit asked for at the terminal, where one is needed and there is a terminal."""
+    path = source.path
+    if source.unit or source.longest_side or not sys.stdin.isatty() or not path.is_file():
+        return source
+    content = opened(source)
+    side = source.scale * content.longest_side
+    if content.unit is not None or likely_units(side) == ["m"]:
+        return source
+    likely = (likely_units(side) or ["mm"])[-1]
+    answer = typer.prompt(f"{unit_question(path.name, side)}. Which unit is it ({', '.join(UNITS)})?", default=likely)
+    check_unit(answer)
+    return replace(source, unit=str(answer))
+
+
+def working(what: str) -> Any:
+    """A line that moves while something takes long; nothing where there is no terminal."""
+    return errors.status(f"{what} …") if errors.is_terminal else nullcontext()
