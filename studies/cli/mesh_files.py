@@ -1,12 +1,17 @@
 """Mesh files on the command line: how their numbers are to be taken, and what is asked before they are read."""
 
+import logging
 import sys
-from contextlib import nullcontext
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
+from rich.markup import escape
+from rich.status import Status
 
 from studies.base.errors import StudyError
 from studies.cli.terminal import errors
@@ -14,6 +19,7 @@ from studies.geometry.files.estimate import size_warning
 from studies.geometry.files.faults import check_promises
 from studies.geometry.files.opening import opened
 from studies.geometry.files.units import UNITS, Source, check_unit, length_of, likely_units, unit_question
+from studies.geometry.mesher.progress import BEAT, WAITING
 
 Unit = Annotated[str | None, typer.Option(help="of the file's coordinates: m, cm, mm or in")]
 Scale = Annotated[float, typer.Option(help="the file's coordinates are multiplied by this first")]
@@ -55,6 +61,32 @@ def asked_unit(source: Source) -> Source:
     return replace(source, unit=str(answer))
 
 
-def working(what: str) -> Any:
-    """A line that moves while something takes long; nothing where there is no terminal."""
-    return errors.status(f"{what} …") if errors.is_terminal else nullcontext()
+class Telling(logging.Handler):
+    """Shows what the mesher is at: beside the moving line of a terminal, elsewhere as a line now and then."""
+
+    def __init__(self, what: str, status: Status | None):
+        """what: the work as a whole; status: the terminal's moving line."""
+        super().__init__()
+        self.what, self.status, self.told = what, status, time.monotonic()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Called for each stage."""
+        if self.status is not None:
+            self.status.update(escape(f"{self.what} … {record.getMessage()}"))
+        elif time.monotonic() - self.told > 2 * BEAT:
+            self.told = time.monotonic()
+            errors.print(f"{self.what} … {record.getMessage()}", markup=False, highlight=False)
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Tells what is going on while something takes long: a line that moves, or lines where there is no terminal."""
+    with errors.status(escape(f"{what} …")) if errors.is_terminal else nullcontext() as status:
+        handler, level = Telling(what, status), WAITING.level
+        WAITING.addHandler(handler)
+        WAITING.setLevel(logging.INFO)
+        try:
+            yield
+        finally:
+            WAITING.removeHandler(handler)
+            WAITING.setLevel(level)

@@ -70,7 +70,7 @@ def mesh(
             }
         )
         with working(f"meshing the {name}"):
-            made = synthetic(name, nodes or NODES, seed, wall, filled)
+            made = synthetic(name, nodes or NODES, seed, wall, filled, exact=order == 1)
     else:
         if seed is not None:
             raise StudyError("--seed varies synthetic organs; a file comes as it is, leave it out")
@@ -82,6 +82,8 @@ def mesh(
             made = scan(given, nodes, wall=None if wall is None else wall * MM, **options)
     with working("curving" if order == 2 else "writing"):
         write_mesh(made, output, write_unit, curved(made) if order == 2 else None)
+    for line in nearness(made):
+        console.print(line, markup=False, highlight=False)
     console.print(f"{summary(made)}; written to {output} in {NAMES[write_unit]}", markup=False, highlight=False)
 
 
@@ -92,8 +94,9 @@ def refuse_file_options(given: dict[str, bool]) -> None:
         raise StudyError(f"{' and '.join(wrong)} are for files (--from); a synthetic organ needs none of it")
 
 
-def synthetic(name: str, nodes: int, seed: int | None, wall: float | None, filled: bool) -> OrganMesh:
-    """An organ of SHAPES, varied by its seed, with a wall [mm] if it can have one."""
+def synthetic(name: str, nodes: int, seed: int | None, wall: float | None, filled: bool, exact: bool) -> OrganMesh:
+    """An organ of SHAPES, varied by its seed, with a wall [mm] if it can have one; `exact`: with flat sides and yet its
+    true volume."""
     lookup(name, SHAPES, "organ")
     parameters: dict[str, float] = {} if seed is None else dict(vary(name, seed))
     if wall is not None:
@@ -102,7 +105,23 @@ def synthetic(name: str, nodes: int, seed: int | None, wall: float | None, fille
             raise StudyError(f"the {name} is solid; --wall is for {', '.join(hollow)}, or for a file (--from)")
         # The ball's parameters are in metres, the organs' in millimetres.
         parameters["wall"] = wall * MM if name == "ball" else wall
-    return organ(name, nodes, fill=filled, parameters=parameters)
+    return organ(name, nodes, fill=filled, parameters=parameters, exact=exact)
+
+
+def nearness(made: OrganMesh) -> list[str]:
+    """How near a mesh is to its file, a line for each direction and one for the volume; none for other meshes."""
+    lost = made.losses
+    if not lost:
+        return []
+    rows = []
+    for key, way in (("file_to_mesh", "file to mesh"), ("mesh_to_file", "mesh to file")):
+        mean, most, far = (1e3 * lost[key][kind] for kind in ("mean", "p95", "max"))
+        where = ", ".join(f"{1e3 * x:.4g}" for x in lost[key]["where"])
+        largest = f"largest {far:.3g} mm ({0.1 * far / lost['diagonal']:.2g} % of the diagonal) at ({where}) mm"
+        rows.append(f"{way}: mean {mean:.2g} mm, 95 % within {most:.2g} mm, {largest}")
+    before, after = lost["volume_file"], lost["volume_mesh"]
+    change = 100 * (after / before - 1)
+    return [*rows, f"volume: file {1e6 * before:.5g} mL, mesh {1e6 * after:.5g} mL ({change:+.3f} %)"]
 
 
 def summary(made: OrganMesh) -> str:

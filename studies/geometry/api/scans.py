@@ -2,12 +2,14 @@
 
 import hashlib
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from studies.base.errors import StudyError
+from studies.geometry.api.organs import attach
 from studies.geometry.api.organs import fill as fill_mesh
 from studies.geometry.files.content import Content
 from studies.geometry.files.opening import opened
@@ -16,6 +18,8 @@ from studies.geometry.files.units import LARGEST, SMALLEST, Source, as_source, c
 from studies.geometry.mesh.checks import check_finite, check_one_part, check_surface, check_volume
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
 from studies.geometry.mesher.jobs import mesh_from
+from studies.geometry.scanned.fidelity import warnings_of
+from studies.geometry.shape.regions import Region, region_to_dict
 from studies.geometry.surface.repair import Mended, border, mend
 
 
@@ -29,14 +33,16 @@ def scan(
     wall: float | None = None,
     layers: int | None = None,
     fill: bool = True,
+    regions: Mapping[str, Region] | None = None,
 ) -> OrganMesh:
     """A body from the surface in a file: welded, its largest part kept, oriented, and remeshed to `nodes` nodes.
 
     path: a file, or a Source, which also has a scale or a part. nodes: None keeps the file's own triangles. unit: of
     the file, one of UNITS; None: what the file says, or metres where only they make an organ of it. smooth: see
     scan_shape [m]; needs `nodes`. holes: close borders first. wall: thickness [m] of the wall of a hollow organ, in
-    `layers` of elements; needs `nodes`. fill: with tetrahedra. Warns of every change to the surface. Raises StudyError
-    for what cannot be read, mended or meshed.
+    `layers` of elements; needs `nodes`. fill: with tetrahedra. regions: attachments; with `nodes` their outlines lie on
+    edges. With `nodes` the mesh has the volume of the surface, and `losses` says how near it is to the file. Warns of
+    every change to the surface. Raises StudyError for what cannot be read, mended or meshed.
     """
     source = as_source(path, unit)
     path = source.path
@@ -54,15 +60,20 @@ def scan(
             raise StudyError(
                 f"{path.name}: smoothing and a wall need a new surface; say how many nodes it shall have (--nodes)"
             )
-        return as_it_is(mended, recipe, fill)
+        body = as_it_is(mended, recipe, fill)
+        return attach(body, regions) if regions else body
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{path.name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
     check_watertight(mended, path.name)
     check_lengths(path.name, smooth, wall)
     if wall is not None:
         recipe |= {"wall": float(wall)} | ({} if layers is None else {"layers": int(layers)})
-    recipe |= {"kind": "scan", "nodes": int(nodes), "smooth": float(smooth), "fill": bool(fill), "regions": {}}
-    return mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles})
+    outlines = {key: region_to_dict(region) for key, region in (regions or {}).items()}
+    recipe |= {"kind": "scan", "nodes": int(nodes), "smooth": float(smooth), "fill": bool(fill), "regions": outlines}
+    mesh = mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles})
+    for sentence in warnings_of(mesh.losses):
+        warnings.warn(f"{path.name}: {sentence}", stacklevel=2)
+    return mesh
 
 
 def check_lengths(name: str, smooth: float, wall: float | None) -> None:
