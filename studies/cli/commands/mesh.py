@@ -40,6 +40,7 @@ def mesh(
     wall: Annotated[float | None, typer.Option(help="hollow, with a wall of so many millimetres")] = None,
     seed: Annotated[int | None, typer.Option(help="a random but plausible variation of the organ")] = None,
     smooth: Annotated[float, typer.Option(help="close folds, level bumps of so many millimetres (--from)")] = 0.0,
+    solid: Annotated[float | None, typer.Option(help="fill a shell, openings of so many mm closed (--from)")] = None,
     close_holes: Annotated[bool, typer.Option("--close-holes", help="put flat lids on holes (--from)")] = False,
     unit: Unit = None,
     scale: Scale = 1.0,
@@ -63,6 +64,7 @@ def mesh(
             {
                 "--smooth": bool(smooth),
                 "--close-holes": close_holes,
+                "--solid": solid is not None,
                 "--unit": unit is not None,
                 "--scale": scale != 1.0,
                 "--longest-side": longest_side is not None,
@@ -77,14 +79,24 @@ def mesh(
         given = source_of(source, unit, scale, longest_side, part)
         ask_before_large(source, yes)
         given = asked_unit(given)
-        options: dict[str, Any] = {"smooth": smooth * MM, "holes": close_holes, "fill": filled}
+        options: dict[str, Any] = {
+            "smooth": smooth * MM,
+            "holes": close_holes,
+            "solid": in_metres(solid),
+            "fill": filled,
+        }
         with working(f"meshing {source.name}"):
-            made = scan(given, nodes, wall=None if wall is None else wall * MM, **options)
+            made = scan(given, nodes, wall=in_metres(wall), **options)
     with working("curving" if order == 2 else "writing"):
         write_mesh(made, output, write_unit, curved(made) if order == 2 else None)
     for line in nearness(made):
         console.print(line, markup=False, highlight=False)
     console.print(f"{summary(made)}; written to {output} in {NAMES[write_unit]}", markup=False, highlight=False)
+
+
+def in_metres(millimetres: float | None) -> float | None:
+    """A length of the command line."""
+    return None if millimetres is None else millimetres * MM
 
 
 def refuse_file_options(given: dict[str, bool]) -> None:

@@ -30,6 +30,7 @@ def scan(
     unit: str | None = None,
     smooth: float = 0.0,
     holes: bool = False,
+    solid: float | None = None,
     wall: float | None = None,
     layers: int | None = None,
     fill: bool = True,
@@ -39,16 +40,19 @@ def scan(
 
     path: a file, or a Source, which also has a scale or a part. nodes: None keeps the file's own triangles. unit: of
     the file, one of UNITS; None: what the file says, or metres where only they make an organ of it. smooth: see
-    scan_shape [m]; needs `nodes`. holes: close borders first. wall: thickness [m] of the wall of a hollow organ, in
-    `layers` of elements; needs `nodes`. fill: with tetrahedra. regions: attachments; with `nodes` their outlines lie on
-    edges. With `nodes` the mesh has the volume of the surface, and `losses` says how near it is to the file. Warns of
-    every change to the surface. Raises StudyError for what cannot be read, mended or meshed.
+    scan_shape [m]; needs `nodes`. holes: close borders first. solid: fill what the surface encloses, openings up to
+    that width [m] closed, for capsules and double walls; needs `nodes`. wall: thickness [m] of the wall of a hollow
+    organ, in `layers` of elements; needs `nodes`. fill: with tetrahedra. regions: attachments; with `nodes` their
+    outlines lie on edges. With `nodes` the mesh has the volume of the surface, and `losses` says how near it is to the
+    file. Warns of every change to the surface. Raises StudyError for what cannot be read, mended or meshed.
     """
     source = as_source(path, unit)
     path = source.path
     content = opened(source)
     points, triangles = in_metres(source, content)
-    mended = mend(*weld(points, triangles), path.name, holes)
+    welded = weld(points, triangles)
+    # What a shell encloses needs no closed surface, and all parts of it.
+    mended = mend(*welded, path.name, holes) if solid is None else Mended(*welded, ())
     for sentence in mended.remarks:
         warnings.warn(f"{path.name}: {sentence}", stacklevel=2)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
@@ -56,16 +60,19 @@ def scan(
     recipe: dict[str, Any] = {"kind": "file", "name": path.stem, "file": path.name, "sha256": digest, "unit": said}
     recipe |= {"holes": bool(holes)} | source.recipe
     if nodes is None:
-        if smooth or wall is not None:
+        if smooth or wall is not None or solid is not None:
             raise StudyError(
-                f"{path.name}: smoothing and a wall need a new surface; say how many nodes it shall have (--nodes)"
+                f"{path.name}: smoothing, a wall and a filled shell need a new surface; say how many nodes it shall "
+                "have (--nodes)"
             )
         body = as_it_is(mended, recipe, fill)
         return attach(body, regions) if regions else body
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{path.name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
-    check_watertight(mended, path.name)
-    check_lengths(path.name, smooth, wall)
+    if solid is None:
+        check_watertight(mended, path.name)
+    check_lengths(path.name, smooth, wall, solid)
+    recipe |= {} if solid is None else {"solid": float(solid)}
     if wall is not None:
         recipe |= {"wall": float(wall)} | ({} if layers is None else {"layers": int(layers)})
     outlines = {key: region_to_dict(region) for key, region in (regions or {}).items()}
@@ -76,10 +83,12 @@ def scan(
     return mesh
 
 
-def check_lengths(name: str, smooth: float, wall: float | None) -> None:
+def check_lengths(name: str, smooth: float, wall: float | None, solid: float | None) -> None:
     """Raise StudyError unless the lengths [m] are such."""
     if not 0 <= smooth < np.inf:
         raise StudyError(f"{name}: smoothing over {1e3 * smooth:g} mm asked for; give 0 or a few millimetres")
+    if solid is not None and not 0 <= solid < np.inf:
+        raise StudyError(f"{name}: openings up to {1e3 * solid:g} mm shall be closed; give 0 or some millimetres")
     if wall is not None and not 0 < wall < np.inf:
         raise StudyError(f"{name}: a wall of {1e3 * wall:g} mm asked for; give a thickness above 0")
 

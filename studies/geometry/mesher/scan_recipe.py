@@ -15,6 +15,7 @@ from studies.geometry.mesher.progress import stage
 from studies.geometry.mesher.worker import Arrays, work
 from studies.geometry.scanned.fidelity import TOLD, fidelity, spread
 from studies.geometry.scanned.scan_shape import Surface, cell_for, faithful, levelled
+from studies.geometry.scanned.shells import solidified
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region, region_from_dict
 from studies.geometry.surface.family import enclosed_volume
@@ -27,16 +28,19 @@ def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     """The shape that a given surface pictures, with `nodes` nodes, some of them where even ones would cut corners, its
     volume and the outlines of its regions; and what was lost on the way."""
     file = arrays["points"], arrays["triangles"]
-    cell, smooth, name = cell_for(*file, recipe["nodes"]), recipe["smooth"], recipe["name"]
+    smooth, name = recipe["smooth"], recipe["name"]
     stage("distances to the surface of the file")
-    source = levelled(*file, cell, smooth, name) if smooth > 0 else file
+    body = file if recipe.get("solid") is None else solidified(*file, recipe["solid"], name)
+    cell = cell_for(*body, recipe["nodes"])
+    source = levelled(*body, cell, smooth, name) if smooth > 0 else body
     shape, start = faithful(*source, cell, name)
     regions = [region_from_dict(data) for data in recipe["regions"].values()]
     points, triangles = scan_mesh(shape, start, recipe["nodes"], regions)
     points = with_volume(points, triangles, wanted_volume(source, shape), shape.level, regions)
     made = finish(replace(shape, wall=recipe.get("wall")), points, triangles, recipe)
     stage("distances between mesh and file")
-    return made | {"losses": np.array(json.dumps(fidelity(file, (points, triangles))))}
+    losses = fidelity(file, (points, triangles)) | {"volume_file": signed_volume(*body)}
+    return made | {"losses": np.array(json.dumps(losses))}
 
 
 NEARNESS = (0.2, 0.1, 0.3)

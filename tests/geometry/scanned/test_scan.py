@@ -94,7 +94,7 @@ def test_without_nodes_the_triangles_stay(block):
     assert (mesh.points == points * MM).all() and (mesh.triangles == faces).all() and not len(mesh.tetrahedra)
     filled = scan(path, unit="mm")
     assert (filled.points[: len(points)] == points * MM).all() and len(filled.tetrahedra)
-    with pytest.raises(StudyError, match="smoothing and a wall need a new surface; say how many nodes"):
+    with pytest.raises(StudyError, match="smoothing, a wall and a filled shell need a new surface; say how many nodes"):
         scan(path, unit="mm", smooth=0.002)
 
 
