@@ -29,7 +29,7 @@ def solidified(points: np.ndarray, triangles: np.ndarray, opening: float, name: 
     regions = np.asarray(label(away > reach)[0])
     inside = cell * distance_transform_edt(regions != regions[0, 0, 0]) > reach
     # Half a cell: the border lies between the last cell of one side and the first of the other.
-    steps = cell * (distance_transform_edt(inside) + distance_transform_edt(~inside) - 0.5)
+    steps = cell * (np.asarray(distance_transform_edt(inside)) + np.asarray(distance_transform_edt(~inside)) - 0.5)
     values = np.where(inside, -1.0, 1.0) * np.minimum(away, steps)
     if not inside.any() or not (away[inside] > 2 * cell).any():
         raise StudyError(
