@@ -111,8 +111,7 @@ def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:
 @lru_cache
 def code_hash(kind: str) -> str:
     """Hash of the code that makes a kind of recipe, and of the versions of the libraries that decide a mesh."""
-    names = ("gmsh", "scikit-image", "numpy", "scipy", *(("mmgpy",) if kind == "scan" else ()))
-    versions = " ".join(version(name) for name in names)
+    versions = " ".join(version(name) for name in ("gmsh", "mmgpy", "scikit-image", "numpy", "scipy"))
     return f"{source_fingerprint(maker(kind))} {versions}"
 
 

@@ -1,6 +1,7 @@
 """Making a mesh from its recipe, inside the worker process. The same recipe gives the same mesh bit for bit."""
 
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.geometry.mesh.wall_layers import fill_wall
 from studies.geometry.mesher.fill import fill_surface
 from studies.geometry.mesher.gmsh_calls import Remesher, fresh_model
+from studies.geometry.mesher.mmg_calls import EvenRemesher
 from studies.geometry.mesher.octant import build_octant
 from studies.geometry.mesher.progress import stage
 from studies.geometry.mesher.worker import Arrays, work
@@ -23,6 +25,9 @@ from studies.geometry.surface.intersections import crossing_triangles
 from studies.geometry.surface.node_count import Surface, surface_with
 from studies.geometry.surface.snap import relax, snap_region
 from studies.geometry.surface.volume import with_volume
+
+NEARNESS = 0.2
+"""Distance to the first triangulation, over the size, that MMG keeps to."""
 
 
 def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
@@ -87,11 +92,21 @@ def mesh_surface(shape: Shape, nodes: int, regions: list[Region]) -> Surface:
         region.level(start_points[:1])  # a region that is none is refused here, not inside the mesher
     with fresh_model():
         remesher = Remesher(start_points, start_triangles)
-        surface = snap_if_it_fits(shape, *surface_with(nodes, area, remesher.mesh, shape), regions)
+        start = start_points, start_triangles
+        surface = snap_if_it_fits(shape, *well_shaped(shape, start, nodes, area, remesher.mesh), regions)
         if surface is None:
             remesher.finer_in(regions)
             surface = snap_all(shape, *surface_with(nodes, area, remesher.mesh, shape), regions)
     return surface
+
+
+def well_shaped(shape: Shape, start: Surface, nodes: int, area: float, mesh_at: Callable[[float], Surface]) -> Surface:
+    """An even surface of `nodes` nodes by `mesh_at`; where it makes none, by MMG from the first triangulation."""
+    try:
+        return surface_with(nodes, area, mesh_at, shape)
+    except StudyError:
+        # Not lost: MMG makes one, or gives a sentence of the same kind.
+        return surface_with(nodes, area, EvenRemesher(*start, NEARNESS).mesh, shape)
 
 
 def snap_if_it_fits(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region]) -> Surface | None:
@@ -117,11 +132,15 @@ def snap_all(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: l
     return outlined(shape, points, triangles, regions)
 
 
-def outlined(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region]) -> Surface:
-    """The surface with every region's outline on its edges; earlier outlines stay where they are."""
+def outlined(
+    shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region], near: float = np.inf
+) -> Surface:
+    """The surface with every region's outline on its edges; earlier outlines stay where they are, and so does what is
+    farther from an outline than `near` [m]."""
     fixed = np.zeros(len(points), bool)
     for region in regions:
-        points, triangles, on_curve = snap_region(shape, points, triangles, region, fixed)
+        far = np.abs(region.level(points)) > near
+        points, triangles, on_curve = snap_region(shape, points, triangles, region, fixed | far)
         fixed |= on_curve
     return points, triangles
 

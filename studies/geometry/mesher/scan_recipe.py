@@ -9,6 +9,7 @@ import numpy as np
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas
+from studies.geometry.mesh.wall_layers import mean_edge
 from studies.geometry.mesher.mmg_calls import EvenRemesher
 from studies.geometry.mesher.organ_recipe import finish, outlined
 from studies.geometry.mesher.progress import stage
@@ -45,6 +46,8 @@ def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
 NEARNESS = (0.2, 0.1, 0.3)
 """Distances over the size that the remesher keeps to, tried in turn: which one serves a thin margin best is chance."""
+BESIDE = 2.5
+"""Edges beside an outline within which the surface is evened out again: elsewhere it lies where its margins need it."""
 NEAR = 0.01
 """Distance over the diagonal at which no other is tried; half of what a person is told of."""
 
@@ -61,7 +64,8 @@ def scan_mesh(shape: Shape, start: Surface, nodes: int, regions: list[Region]) -
         mesh_at = EvenRemesher(*start, nearness).mesh
         try:
             points, triangles = surface_with(evenly_spread(nodes), area, mesh_at, shape, handles)
-            made = outlined(shape, *followed(shape, points, triangles, start[0], nodes), regions)
+            points, triangles = followed(shape, points, triangles, start[0], nodes)
+            made = outlined(shape, points, triangles, regions, BESIDE * mean_edge(points, triangles))
         except StudyError as error:
             refusals.append(error)
             continue
