@@ -26,7 +26,8 @@ def solidified(points: np.ndarray, triangles: np.ndarray, opening: float, name: 
     low = used.min(axis=0) - margin
     shape = np.ceil((used.max(axis=0) + margin - low) / cell).astype(int) + 1
     away = cell * np.sqrt(squared_distance((points[triangles] - low) / cell, tuple(shape)))
-    regions = np.asarray(label(away > reach)[0])
+    regions = np.empty(away.shape, np.int32)
+    label(away > reach, output=regions)
     inside = cell * np.asarray(distance_transform_edt(regions != regions[0, 0, 0])) > reach
     # Half a cell: the border lies between the last cell of one side and the first of the other.
     steps = cell * (np.asarray(distance_transform_edt(inside)) + np.asarray(distance_transform_edt(~inside)) - 0.5)

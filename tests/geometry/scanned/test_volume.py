@@ -89,6 +89,8 @@ def test_nodes_go_as_far_as_the_surface_is_cut_off(balls):
     moved = with_volume(mesh.points, mesh.triangles, true, level)
     check_surface(moved, mesh.triangles)
     assert signed_volume(moved, mesh.triangles) == pytest.approx(true, rel=1e-6)
+    went = np.linalg.norm(moved, axis=1) - np.linalg.norm(mesh.points, axis=1)
+    assert np.corrcoef(went, above)[0, 1] > 0.95  # farther where the triangles around are larger
     # Part of the chords' depth is outside now: nearer to the sphere than before.
     off = [max(np.abs(level(np.vstack([x, x[mesh.triangles].mean(axis=1)])))) for x in (mesh.points, moved)]
     assert off[1] < 0.9 * off[0]
