@@ -33,7 +33,8 @@ COMMANDS = {
         ("verify", "verify", "verify", "Holds the reference against closed forms and published numbers."),
         ("cost", "cost", "cost", "Microseconds per stage of a step, and what the scene leaves out."),
         ("mesh", "mesh", "mesh", "Makes a mesh: of a synthetic organ, or from a file."),
-        ("check", "mesh", "check", "Tells what is wrong with a mesh and what mends it."),
+        ("check", "check", "check", "Tells what is wrong with a mesh and what mends it."),
+        ("place", "place", "place", "Proposes hold and probe for a scan, and writes a scene file."),
         ("safe-dt", "safe_dt", "safe_dt", "The stability limit of a scene, predicted and verified by runs."),
     )
 }

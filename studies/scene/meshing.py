@@ -5,10 +5,13 @@ import numpy as np
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.geometry import OrganMesh, fill, organ, read_mesh, scan
+from studies.geometry.files.units import Source
 from studies.geometry.organs import SHAPES
 from studies.scene.scene import Organ, Scene
 
-FILE_PARAMETERS = ("path", "unit", "remesh", "smooth", "wall")
+SOURCE_PARAMETERS = ("path", "unit", "scale", "longest_side", "part")
+"""How a file is to be taken."""
+FILE_PARAMETERS = (*SOURCE_PARAMETERS, "remesh", "smooth", "wall")
 """Of the organ "file"."""
 
 
@@ -21,16 +24,17 @@ def mesh_for(scene: Scene, nodes: int, filled: bool = True, layers: int | None =
     if lookup(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
         return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters, layers)
     parameters = scene.organ.parameters
-    if "path" not in parameters or "unit" not in parameters:
+    for key in parameters:
+        lookup(key, FILE_PARAMETERS, "parameter of an organ from a file")
+    if "path" not in parameters or not {"unit", "longest_side"} & set(parameters):
         raise StudyError(
             f"scene '{scene.name}': an organ from a file needs a path and a unit, it has {dict(parameters)}"
         )
-    for key in parameters:
-        lookup(key, FILE_PARAMETERS, "parameter of an organ from a file")
+    source = Source(**{key: parameters[key] for key in SOURCE_PARAMETERS if key in parameters})
     asked = {key: parameters[key] for key in ("smooth", "wall") if key in parameters}
     if remeshed(scene.organ):
-        return scan(parameters["path"], nodes, unit=parameters["unit"], fill=filled, layers=layers, **asked)
-    mesh = read_mesh(parameters["path"], unit=parameters["unit"])
+        return scan(source, nodes, fill=filled, layers=layers, regions=scene.regions, **asked)
+    mesh = read_mesh(source)
     return fill(mesh) if filled and not len(mesh.tetrahedra) else mesh
 
 

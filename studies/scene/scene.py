@@ -23,8 +23,9 @@ class Organ:
     shape: str
     """A name of `studies.geometry`, or "file"."""
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    """Of the shape; for "file": {"path": …, "unit": "m" or "mm"}, and "remesh": true, "smooth" or "wall" [m] for a new
-    surface with the nodes that are asked for."""
+    """Of the shape; for "file": {"path": …, "unit": "m", "cm", "mm" or "in"}, "scale", "longest_side" [m] or "part" as
+    in studies.geometry.files.units.Source, and "remesh": true, "smooth" or "wall" [m] for a new surface with the nodes
+    that are asked for, the outlines of held regions on its edges."""
 
 
 @dataclass(frozen=True)

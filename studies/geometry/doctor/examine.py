@@ -9,8 +9,11 @@ import numpy as np
 
 from studies.geometry.doctor.findings import Finding, findings_of
 from studies.geometry.doctor.measures import describe_surface, describe_tetrahedra, describe_welding, springs_see
-from studies.geometry.files.reading import cells_of, parse, weld
-from studies.geometry.files.units import UNITS, check_unit, likely_units
+from studies.geometry.files.content import Content
+from studies.geometry.files.opening import opened
+from studies.geometry.files.parts import Part, parts_in
+from studies.geometry.files.reading import weld
+from studies.geometry.files.units import UNITS, Source, as_source, check_range, likely_units
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
 
 TISSUE = 1800.0, 1060.0
@@ -38,44 +41,46 @@ class Findings:
 
 
 def examine(
-    source: str | Path | OrganMesh, *, unit: str | None = None, tissue: tuple[float, float] = TISSUE
+    source: str | Path | Source | OrganMesh, *, unit: str | None = None, tissue: tuple[float, float] = TISSUE
 ) -> Findings:
     """What is to be known about a mesh file or an OrganMesh.
 
-    unit: of the file, "m", "cm" or "mm"; None: the likely one is taken for the numbers, and that is a finding. tissue:
-    shear modulus [Pa] and density [kg/m^3] for the time step. Raises StudyError for a file that holds no mesh.
+    source: a Source has also a scale or a part. unit: of the file, one of UNITS; None: the likely one is taken for the
+    numbers, and that is a finding. tissue: shear modulus [Pa] and density [kg/m^3] for the time step. Raises StudyError
+    for a file that holds no mesh, or one of a size beyond all measure.
     """
     if isinstance(source, OrganMesh):
         cells = source.tetrahedra if len(source.tetrahedra) else source.triangles
         return examine_cells(source.name, source.points, cells, {"unit": "m", "unit_said": True}, tissue)
-    path = Path(source)
-    raw = parse(path)
-    points = np.asarray(raw.points, float)
-    tetrahedra, triangles = cells_of(raw, path.name)
-    if unit is not None:
-        check_unit(unit)
-    used = {"unit": unit or guessed_unit(points), "unit_said": unit is not None or only_metres(points)}
-    cells = tetrahedra if len(tetrahedra) else triangles
+    asked = as_source(source, unit)
+    content = opened(asked)
+    used, metres = how_long(asked, content)
+    check_range(content.longest_side * metres, asked.path.name)
     # An STL file repeats the corners of every triangle: nothing to report.
-    found = describe_welding(points, cells, repeats=path.suffix.lower() == ".stl")
+    repeats = asked.path.suffix.lower() == ".stl"
+    found = describe_welding(content.points, content.cells, repeats)
+    found["part_list"] = [] if found["bad_points"] else [row_of(part, metres) for part in parts_in(content)]
+    points, cells = content.points, content.cells
     points, cells = (points, cells) if found["bad_points"] else weld(points, cells)
-    return examine_cells(path.name, points * UNITS[used["unit"]], cells, used | found, tissue)
+    return examine_cells(asked.path.name, points * metres, cells, used | found, tissue)
 
 
-def guessed_unit(points: np.ndarray) -> str:
-    """The smallest unit that makes an organ of the points, for showing numbers only."""
-    return (likely_units(longest_side(points)) or ["m"])[-1]
+def how_long(source: Source, content: Content) -> tuple[dict[str, Any], float]:
+    """The unit, whether it was said, and metres per unit of the file."""
+    side = source.scale * content.longest_side
+    said = source.unit or content.unit
+    likely = likely_units(side)
+    # The smallest unit that makes an organ of the points, for showing numbers only.
+    unit = said or ("m" if source.longest_side is not None else (likely or ["m"])[-1])
+    known = said is not None or source.longest_side is not None or likely == ["m"]
+    metres = source.metres(content.longest_side, unit) if known else source.scale * UNITS[unit]
+    return {"unit": unit, "unit_said": known}, metres
 
 
-def only_metres(points: np.ndarray) -> bool:
-    """Whether the file is an organ in metres and in nothing else."""
-    return likely_units(longest_side(points)) == ["m"]
-
-
-def longest_side(points: np.ndarray) -> float:
-    """Longest side of the bounding box of the finite points."""
-    finite = points[np.isfinite(points).all(axis=1)]
-    return float(np.ptp(finite, axis=0).max()) if len(finite) else 0.0
+def row_of(part: Part, metres: float) -> dict[str, Any]:
+    """A part in metres, JSON-able."""
+    size = [metres * side for side in part.size]
+    return {"number": part.number, "name": part.name, "triangles": part.triangles, "size": size}
 
 
 def examine_cells(
@@ -83,7 +88,7 @@ def examine_cells(
 ) -> Findings:
     """Findings about points (n, 3) [m] and triangles (t, 3) or tetrahedra (k, 4); `known` is put in front."""
     solid = cells.shape[1] == 4
-    measures: dict[str, Any] = {"kind": "tetrahedra" if solid else "surface", **known}
+    measures: dict[str, Any] = {"kind": "tetrahedra" if solid else "surface", "part_list": [], **known}
     measures = {"bad_points": int((~np.isfinite(points).all(axis=1)).sum())} | measures
     if not measures["bad_points"]:
         triangles = boundary_triangles(cells) if solid else cells

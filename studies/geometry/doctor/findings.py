@@ -10,7 +10,9 @@ from studies.geometry.mesh.quality import MIN_DIHEDRAL
 POOR_TRIANGLE = 0.1
 """Radius ratio of a triangle under which springs on it are stiff and the fill gets slivers."""
 
-REMESH = "organbench mesh --from FILE --nodes N makes a new, even surface"
+SHELL = 0.02
+"""Thickness 2 V / A over the diagonal under which a closed surface is a shell and no body; a ball has 0.19."""
+REMESH = "try organbench mesh --from FILE --nodes N: it makes a new, even surface"
 EXPORT = "export the file again from the program that made it"
 
 
@@ -52,7 +54,8 @@ def _size_sentence(m: dict[str, Any]) -> str:
 
 
 def _wrong_size(m: dict[str, Any]) -> int:
-    return int(m["unit_said"] and bool(m.get("size")) and not likely_units(max(m["size"])).count("m"))
+    side = max(m.get("size", [0.0]))
+    return int(m["unit_said"] and side > 0 and "m" not in likely_units(side))
 
 
 def _sliver_sentence(m: dict[str, Any]) -> str:
@@ -71,6 +74,10 @@ def _tet_sliver_sentence(m: dict[str, Any]) -> str:
     )
 
 
+def _is_shell(m: dict[str, Any]) -> int:
+    return int(bool(m.get("closed")) and 0 < m["thickness"] < SHELL * m["diagonal"])
+
+
 RULES: tuple[Rule, ...] = (
     (
         "bad_points",
@@ -78,7 +85,12 @@ RULES: tuple[Rule, ...] = (
         lambda m: f"{m['bad_points']} points are not numbers (NaN or infinite)",
         EXPORT,
     ),
-    ("unit", lambda m: int(not m["unit_said"]), _unit_sentence, "say --unit mm, --unit cm or --unit m"),
+    (
+        "unit",
+        lambda m: int(not m["unit_said"] and "size" in m),
+        _unit_sentence,
+        "say --unit mm, cm or m, or --longest-side 19cm",
+    ),
     ("size", _wrong_size, _size_sentence, "say another --unit"),
     (
         "duplicate_points",
@@ -111,7 +123,16 @@ RULES: tuple[Rule, ...] = (
             f"the surface has {m['holes']} holes ({m['open_edges']} edges with one triangle only), so it has no "
             "inside and no volume"
         ),
-        "organbench mesh --from FILE --close-holes puts flat lids on them",
+        "organbench mesh --from FILE --close-holes puts flat lids on them; for large ones try --nodes N --solid L [mm]",
+    ),
+    (
+        "shell",
+        _is_shell,
+        lambda m: (
+            f"it is a thin shell, {1e3 * m['thickness']:.2g} mm thick (2 V / A) on {1e3 * m['diagonal']:.3g} mm: a "
+            "capsule or a double wall, and no body"
+        ),
+        "try organbench mesh --from FILE --nodes N --solid 5: it fills what the shell encloses, holes of 5 mm closed",
     ),
     (
         "crowded",
@@ -156,7 +177,7 @@ RULES: tuple[Rule, ...] = (
         "handles",
         lambda m: max(0, m.get("genus") or 0),
         lambda m: f"the surface has {m['genus']} handles or tunnels, as a ring has one; organs have none",
-        "organbench mesh --from FILE --nodes N --smooth 3 closes narrow ones",
+        "try organbench mesh --from FILE --nodes N --smooth 3: it closes narrow ones",
     ),
     (
         "self_intersections",
@@ -192,7 +213,7 @@ RULES: tuple[Rule, ...] = (
         "tetrahedron_slivers",
         _poor("dihedral_angle", "min", MIN_DIHEDRAL),
         _tet_sliver_sentence,
-        "organbench mesh --from FILE --nodes N makes a new body",
+        "try organbench mesh --from FILE --nodes N: it makes a new body",
     ),
 )
 

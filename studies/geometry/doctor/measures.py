@@ -112,6 +112,7 @@ def describe_size(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
         "diagonal": float(np.linalg.norm(size)),
         "area": float(areas.sum()),
         "volume": signed_volume(points, triangles) if len(triangles) else 0.0,
+        "thickness": 2.0 * abs(signed_volume(points, triangles)) / float(areas.sum()) if areas.sum() > 0 else 0.0,
         "edge": spread(lengths),
         "triangle_radius_ratio": spread(ratio),
         "worst_triangle": int(ratio.argmin()) if len(ratio) else None,

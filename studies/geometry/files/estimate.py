@@ -32,6 +32,11 @@ def is_ascii_stl(head: bytes) -> bool:
     return head.lstrip().startswith(b"solid") and (b"facet" in head or b"endsolid" in head)
 
 
+def is_text(head: bytes) -> bool:
+    """Whether all bytes are printable ones or white space."""
+    return all(byte >= ord(" ") or chr(byte).isspace() for byte in head) and max(head, default=0) < 0x80
+
+
 def check_whole(path: Path) -> None:
     """Raise StudyError for a binary STL file that is shorter than its header says."""
     if path.suffix.lower() != ".stl":
@@ -43,8 +48,8 @@ def check_whole(path: Path) -> None:
         return
     count = int.from_bytes(head[80:84], "little")
     promised = HEADER + PER_TRIANGLE * count
-    # Text that is no STL at all has letters where the count is: its last byte says over 150 million triangles.
-    if size < promised and head[83] < ord("\t"):
+    # Text that is no STL at all has letters where the count is.
+    if size < promised and not is_text(head[:HEADER]):
         raise StudyError(
             f"{path.name} is cut short: its header promises {count:,} triangles in {promised:,} bytes, "
             f"but it has {size:,}; copy or export it again"

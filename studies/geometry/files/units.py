@@ -1,11 +1,79 @@
 """Units of length in files that do not name theirs: recognised by the size of organs, never taken without a word."""
 
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
 from studies.base.errors import StudyError
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+GUESSED = ("m", "cm", "mm")
+"""Units that a size is compared with; inches only when they are asked for."""
 ORGAN = 0.02, 0.6
 """Longest side [m] of an organ: from a foetal kidney to the lungs of an adult."""
-NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres"}
+LARGEST, SMALLEST = 5.0, 1e-3
+"""Longest side [m] beyond which nothing is an organ."""
+ABSURD = 1e6, 1e-9
+"""Longest side [m] beyond which a file is not even examined: squares and cubes of it would leave the numbers' range."""
+NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches"}
+
+
+@dataclass(frozen=True)
+class Source:
+    """A mesh file, and how its numbers are to be taken."""
+
+    path: Path
+    unit: str | None = None
+    """Of the coordinates, one of UNITS; None: what the file says, or metres where only they make an organ of it."""
+    scale: float = 1.0
+    """The coordinates are multiplied by this first."""
+    longest_side: float | None = None
+    """Of the body [m], instead of a unit and a scale."""
+    part: str | None = None
+    """Name or number of the part, or label of the mask; None: the largest, and of a mask the only one."""
+
+    def __post_init__(self) -> None:
+        """Refuses what is no length."""
+        object.__setattr__(self, "path", Path(self.path))
+        name = self.path.name
+        if self.unit is not None:
+            check_unit(self.unit)
+        if not 0.0 < self.scale < np.inf:
+            raise StudyError(f"{name}: a scale of {self.scale:g} is asked for; give a number above 0")
+        if self.longest_side is None:
+            return
+        if not SMALLEST <= self.longest_side <= LARGEST:
+            raise StudyError(
+                f"{name}: a longest side of {self.longest_side:.4g} m is asked for; an organ has 1 mm to 5 m"
+            )
+        if self.unit is not None or self.scale != 1.0:
+            raise StudyError(f"{name}: give the longest side, or a unit and a scale, but not both")
+
+    def metres(self, side: float, said: str | None) -> float:
+        """Metres per unit of the file, whose longest side is `side` and whose header has `said` a unit or None.
+
+        Raises StudyError where the unit has to be given.
+        """
+        if self.longest_side is not None:
+            return self.longest_side / side if side > 0 else 1.0
+        return self.scale * UNITS[settled_unit(self.path.name, self.scale * side, self.unit or said)]
+
+    @property
+    def recipe(self) -> dict[str, object]:
+        """What of it decides a mesh beside the content of the file, JSON-able, without the place of the file."""
+        given = {"scale": None if self.scale == 1.0 else self.scale, "longest_side": self.longest_side}
+        return {key: value for key, value in (given | {"part": self.part}).items() if value is not None}
+
+
+def as_source(path: "str | Path | Source", unit: str | None) -> Source:
+    """A path and a unit as a Source. Raises StudyError for a unit beside a Source."""
+    if not isinstance(path, Source):
+        return Source(Path(path), unit)
+    if unit is not None:
+        raise StudyError(f"{path.path.name}: its unit stands in the Source; leave it out here")
+    return path
 
 
 def check_unit(unit: str) -> None:
@@ -14,9 +82,31 @@ def check_unit(unit: str) -> None:
         raise StudyError(f"unit {unit!r} is not known; use one of {', '.join(UNITS)}")
 
 
+def check_range(side: float, name: str, low: float = ABSURD[1], high: float = ABSURD[0]) -> None:
+    """Raise StudyError for a longest side [m] that no organ has; 0 and what is no number pass (others tell of them)."""
+    if side > high:
+        raise StudyError(
+            f"{name}: the longest side is {side:.3g} m; no organ is larger than {LARGEST:g} m: correct the unit or the "
+            "scale, or export the file again"
+        )
+    if 0 < side < low:
+        raise StudyError(
+            f"{name}: the longest side is {side:.3g} m; no organ is smaller than {1e3 * SMALLEST:g} mm: correct the "
+            "unit or the scale, or export the file again"
+        )
+
+
+def length_of(text: str) -> float:
+    """Metres of a length such as "19cm" or "190 mm". Raises StudyError for anything else."""
+    found = re.fullmatch(r"\s*([0-9.]+(?:[eE][-+]?\d+)?)\s*([a-z]+)\s*", text)
+    if not found or found[2] not in UNITS or found[1].count(".") > 1 or found[1] == ".":
+        raise StudyError(f"'{text}' is no length; give a number and its unit ({', '.join(UNITS)}), such as 19cm")
+    return float(found[1]) * UNITS[found[2]]
+
+
 def likely_units(side: float) -> list[str]:
     """The units in which a longest side of `side` is that of an organ, the largest first."""
-    return [unit for unit, factor in UNITS.items() if ORGAN[0] <= side * factor <= ORGAN[1]]
+    return [unit for unit in GUESSED if ORGAN[0] <= side * UNITS[unit] <= ORGAN[1]]
 
 
 def unit_question(name: str, side: float) -> str:
@@ -36,4 +126,6 @@ def settled_unit(name: str, side: float, unit: str | None) -> str:
     if likely_units(side) == ["m"]:
         return "m"
     likely = (likely_units(side) or ["mm"])[-1]
-    raise StudyError(f"{unit_question(name, side)}; say --unit {likely} (or another of {', '.join(UNITS)})")
+    raise StudyError(
+        f"{unit_question(name, side)}; say --unit {likely} (or another of {', '.join(UNITS)}), or --longest-side 19cm"
+    )

@@ -60,7 +60,25 @@ def write_mesh(mesh: OrganMesh, path: Path, unit: str = "m", curved: CurvedMesh 
         # meshio does not read whole numbers back, and writes text that it cannot read: hence binary, and real numbers.
         patches: dict[str, Any] = {name: np.asarray(values, float) for name, values in written.point_data.items()}
         written.point_data = patches
-    write_whole(path, content(written, path.suffix.lower()))
+    data = content(written, path.suffix.lower())
+    write_whole(path, with_losses(data, mesh.losses) if path.suffix.lower() == ".vtu" and mesh.losses else data)
+
+
+def with_losses(data: bytes, losses: dict[str, Any]) -> bytes:
+    """The bytes of a VTU file with what the mesh lost on the way from its file as field data, SI units."""
+    numbers: dict[str, list[float]] = {}
+    for key, value in losses.items():
+        if isinstance(value, dict):
+            numbers |= {f"{key}_{name}": np.ravel(part).tolist() for name, part in value.items()}
+        else:
+            numbers[key] = [float(value)]
+    arrays = "".join(
+        f'<DataArray type="Float64" Name="{name}" NumberOfTuples="{len(values)}" format="ascii">'
+        f"{' '.join(map(repr, values))}</DataArray>\n"
+        for name, values in numbers.items()
+    )
+    tag = b"<UnstructuredGrid>"
+    return data.replace(tag, tag + f"<FieldData>\n{arrays}</FieldData>\n".encode(), 1)
 
 
 def straight_cells(mesh: OrganMesh, tetrahedra: bool) -> meshio.Mesh:

@@ -3,13 +3,11 @@
 import hashlib
 import json
 import os
-import subprocess
 import sys
 import tempfile
 import warnings
 import zipfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
@@ -18,14 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from massspring.sources import ROOT, source_fingerprint
+from massspring.sources import cache_folder as user_cache
+from massspring.sources import source_fingerprint
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import OrganMesh
+from studies.geometry.mesher.process import STOPPED, followed
 from studies.geometry.shape.regions import ON_CURVE, region_from_dict
 
 TIME_LIMIT = 300.0
-"""Seconds after which a meshing job is given up: 20 times what the largest one takes; gmsh hangs without a word."""
-
+"""Seconds of processor time after which a meshing job is given up: 20 times what the largest one takes."""
+NAME_BYTES = 80
+"""Of a mesh's name that stand in the name of its file: file systems allow 255 in all."""
 PARTS = ("points", "triangles", "tetrahedra", "surface_count", "outer_count")
 """What the worker makes and the cache keeps."""
 
@@ -40,10 +41,11 @@ def mesh_from(
 ) -> OrganMesh:
     """The mesh of a JSON-able recipe (and the arrays it refers to), cached.
 
-    limit: seconds the worker may take. Raises StudyError when the mesh cannot be made.
+    limit: seconds of processor time the worker may take. Raises StudyError when the mesh cannot be made.
     """
     given = arrays or {}
-    return to_mesh(recipe, cached(recipe, given, PARTS, lambda: run_worker(recipe, given, limit)))
+    parts = (*PARTS, "losses") if recipe["kind"] == "scan" else PARTS
+    return to_mesh(recipe, cached(recipe, given, parts, lambda: run_worker(recipe, given, limit)))
 
 
 def cached(
@@ -53,7 +55,8 @@ def cached(
     make: Callable[[], dict[str, np.ndarray]],
 ) -> dict[str, np.ndarray]:
     """The arrays called `parts` for a recipe: from the cache, or made and stored there."""
-    path = cache_folder() / f"{recipe['name']}-{recipe_hash(recipe, arrays)}.npz"
+    name = recipe["name"].encode()[:NAME_BYTES].decode(errors="ignore")
+    path = cache_folder() / f"{name}-{recipe_hash(recipe, arrays)}.npz"
     result = read_cached(path, parts)
     if result is None:
         result = make()
@@ -62,10 +65,12 @@ def cached(
 
 
 def to_mesh(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> OrganMesh:
-    """The mesh with its patches."""
+    """The mesh with its patches, and what a scan's way from its file lost."""
     count, outer = int(arrays["surface_count"]), int(arrays["outer_count"])
     cells = arrays["triangles"], arrays["tetrahedra"]
-    mesh = OrganMesh(recipe["name"], arrays["points"], *cells, count, recipe=recipe, outer_count=outer)
+    losses = json.loads(str(arrays["losses"])) if "losses" in arrays else {}
+    points = arrays["points"]
+    mesh = OrganMesh(recipe["name"], points, *cells, count, recipe=recipe, outer_count=outer, losses=losses)
     return replace(mesh, patches=patches_of(mesh, recipe.get("regions", {})))
 
 
@@ -85,8 +90,11 @@ def patches_of(mesh: OrganMesh, regions: dict[str, dict[str, Any]]) -> dict[str,
 
 
 def cache_folder() -> Path:
-    """ORGANBENCH_CACHE when set, else results/cache/meshes under the current folder."""
-    return Path(os.environ.get("ORGANBENCH_CACHE") or Path.cwd() / "results" / "cache" / "meshes")
+    """ORGANBENCH_CACHE when set, else results/cache/meshes where the current folder has results, else the user's."""
+    given, results = os.environ.get("ORGANBENCH_CACHE"), Path.cwd() / "results"
+    if given:
+        return Path(given)
+    return results / "cache" / "meshes" if results.is_dir() else user_cache() / "meshes"
 
 
 def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:
@@ -103,7 +111,7 @@ def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:
 @lru_cache
 def code_hash(kind: str) -> str:
     """Hash of the code that makes a kind of recipe, and of the versions of the libraries that decide a mesh."""
-    versions = " ".join(version(name) for name in ("gmsh", "scikit-image", "numpy", "scipy"))
+    versions = " ".join(version(name) for name in ("gmsh", "mmgpy", "scikit-image", "numpy", "scipy"))
     return f"{source_fingerprint(maker(kind))} {versions}"
 
 
@@ -138,46 +146,29 @@ def write_cached(path: Path, arrays: dict[str, np.ndarray]) -> None:
         ) from error
 
 
-@contextmanager
-def pipe_to_here() -> Iterator[int]:
-    """Standard input for a process that is to end with this one: nothing comes, and it closes when this one ends."""
-    reading, writing = os.pipe()
-    try:
-        yield reading
-    finally:
-        os.close(reading)
-        os.close(writing)
-
-
 def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: float) -> dict[str, np.ndarray]:
-    """Run the worker on a job and read what it made; raises StudyError for its sentence, a crash or a time-out."""
+    """Run the worker on a job and read what it made; raises StudyError for its sentence, a crash, or when it has used
+    `limit` seconds of processor time."""
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder, "job.npz"), Path(folder, "out.npz")
         np.savez(job, allow_pickle=False, recipe=np.array(json.dumps(recipe)), **arrays)
-        root = str(ROOT)
-        paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
-        environment = os.environ | {
-            "PYTHONPATH": os.pathsep.join(paths),
-            "OMP_NUM_THREADS": "1",
-            "OPENBLAS_NUM_THREADS": "1",
-        }
-        command = [sys.executable, "-m", maker(recipe["kind"]), str(job), str(out)]
-        try:
-            with pipe_to_here() as alive:
-                done = subprocess.run(
-                    command, env=environment, stdin=alive, capture_output=True, text=True, timeout=limit, check=False
-                )
-        except subprocess.TimeoutExpired as error:
-            raise StudyError(
-                f"{recipe['name']}: the mesher did not finish within {limit:g} s and was stopped; "
-                "try another node count"
-            ) from error
-        if not out.exists():
-            last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-            raise StudyError(
-                f"{recipe['name']}: the mesher ended with code {done.returncode} ({last}); try another node count"
-            )
-        with np.load(out, allow_pickle=False) as data:
-            if "error" in data.files:
-                raise StudyError(str(data["error"]))
-            return {key: data[key] for key in data.files}
+        command = [sys.executable, "-m", maker(recipe["kind"]), str(job), str(out), repr(limit)]
+        code, stage, last = followed(command, recipe["name"], limit)
+        if out.exists():
+            with np.load(out, allow_pickle=False) as data:
+                if "error" in data.files:
+                    raise StudyError(str(data["error"]))
+                return {key: data[key] for key in data.files}
+    at = f" at: {stage}" if stage else ""
+    if code in STOPPED:
+        raise StudyError(
+            f"{recipe['name']}: the mesher was stopped after {limit:g} s of processor time{at}; {wayout(recipe)}"
+        )
+    raise StudyError(f"{recipe['name']}: the mesher ended with code {code}{at} ({last}); {wayout(recipe)}")
+
+
+def wayout(recipe: dict[str, Any]) -> str:
+    """What a person can do about a mesh that could not be made."""
+    if recipe["kind"] == "scan":
+        return "smooth the surface (--smooth 3), or ask for another node count"
+    return "mend the surface, or make a new one (--nodes N)" if recipe["kind"] == "fill" else "try another node count"

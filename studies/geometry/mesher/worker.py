@@ -6,6 +6,8 @@ own kind because their compiled distances take half a second to import, which ot
 
 import json
 import os
+import signal
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -17,12 +19,19 @@ from studies.base.interrupts import end_after
 Arrays = dict[str, np.ndarray]
 
 
-def work(build: Callable[[dict[str, Any], Arrays], Arrays], job_path: str, out_path: str) -> int:
+LEAST = 1e-3
+"""Seconds that a clock needs to be started with."""
+
+
+def work(build: Callable[[dict[str, Any], Arrays], Arrays], job_path: str, out_path: str, limit: str) -> int:
     """Reads the job, writes the mesh of `build` or the sentence of its StudyError; the exit code, 0 or 2.
 
-    Standard input is a pipe that the caller holds open: the process ends with it.
+    Standard input is a pipe that the caller holds open: the process ends with it. It also ends after `limit` seconds of
+    processor time, whatever library it is in.
     """
     end_after(lambda: os.read(0, 1))
+    if hasattr(signal, "setitimer"):  # not on Windows, where the caller's clock alone decides
+        signal.setitimer(signal.ITIMER_PROF, max(float(limit) - time.process_time(), LEAST))
     with np.load(job_path, allow_pickle=False) as job:
         arrays = {key: job[key] for key in job.files if key != "recipe"}
         recipe = json.loads(str(job["recipe"]))

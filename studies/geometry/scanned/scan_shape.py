@@ -6,16 +6,22 @@ from scipy.optimize import root_scalar
 from skimage.measure import marching_cubes
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import signed_volume, unique_edges
+from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.scanned.distance_grid import DistanceGrid, box_of, distance_grid
 from studies.geometry.shape.levelset import Shape
+from studies.geometry.surface.distance import distance_to_surface
 from studies.geometry.surface.first_surface import first_surface
+from studies.geometry.surface.node_count import handles_of
 from studies.geometry.surface.repair import largest_part
 
 COARSEST, FINEST = 1 / 40, 1 / 160
 """Cells of the grid over the diagonal of the box: enough for the thin parts of an organ, and at most 20 s of work."""
 CELLS_PER_EDGE = 2.5
 """Cells along an edge of the wanted mesh, between these limits."""
+MISSED, FINER = 0.01, 1.6
+"""Distance over the diagonal at which the grid is made so many times finer: half of what a person is told of."""
+ASKED = 5000
+"""Nodes of the file at which that is looked at."""
 ROOM = 4
 """Cells between the surface and the walls of the grid: the mesher's steps stay inside."""
 
@@ -25,40 +31,72 @@ Surface = tuple[np.ndarray, np.ndarray]
 def scan_shape(points: np.ndarray, triangles: np.ndarray, nodes: int, smooth: float = 0.0, name: str = "scan") -> Shape:
     """The shape of which the closed outward triangulation points (n, 3) [m], triangles (t, 3) is a picture.
 
-    nodes: of the mesh that is wanted, which decides the grid. smooth: length [m]; folds narrower than twice as much are
-    closed (Serra's morphological closing: out by that length and back in) and finer bumps are levelled (a Gaussian of
-    half that length on the signed distance), the volume after closing being kept; 0: only the facets of the file are
+    nodes: of the mesh that is wanted, which decides the grid. smooth: see levelled; 0: only the facets of the file are
     rounded, within a cell. Raises StudyError when nothing of the shape is left on the grid.
     """
+    cell = cell_for(points, triangles, nodes)
+    if smooth > 0:
+        points, triangles = levelled(points, triangles, cell, smooth, name)
+    return shape_on(points, triangles, cell, name)
+
+
+def cell_for(points: np.ndarray, triangles: np.ndarray, nodes: int) -> float:
+    """Edge [m] of the grid's cells for a mesh of so many nodes."""
     diagonal, area = box_of(points, triangles)
     edge = np.sqrt(4.0 / np.sqrt(3.0) * area / (2.0 * nodes))
-    cell = float(np.clip(edge / CELLS_PER_EDGE, FINEST * diagonal, COARSEST * diagonal))
-    if smooth > 0:
-        if smooth >= 0.25 * diagonal:
-            raise StudyError(
-                f"{name}: smoothing over {1e3 * smooth:.3g} mm would leave nothing of a body of "
-                f"{1e3 * diagonal:.3g} mm; use a few millimetres"
-            )
-        fine = min(cell, max(smooth / 2.0, FINEST * diagonal))
-        points, triangles = smoothed(points, triangles, fine, smooth, name)
+    return float(np.clip(edge / CELLS_PER_EDGE, FINEST * diagonal, COARSEST * diagonal))
+
+
+def levelled(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: float, name: str) -> Surface:
+    """The surface without what is finer than the length `smooth` [m].
+
+    Folds narrower than twice as much are closed (Serra's morphological closing: out by that length and back in) and
+    finer bumps are levelled (a Gaussian of half that length on the signed distance), the volume after closing being
+    kept. cell: the coarsest grid [m]. Raises StudyError when nothing of the shape is left.
+    """
+    diagonal, _ = box_of(points, triangles)
+    if smooth >= 0.25 * diagonal:
+        raise StudyError(
+            f"{name}: smoothing over {1e3 * smooth:.3g} mm would leave nothing of a body of "
+            f"{1e3 * diagonal:.3g} mm; use a few millimetres"
+        )
+    return smoothed(points, triangles, min(cell, max(smooth / 2.0, FINEST * diagonal)), smooth, name)
+
+
+def shape_on(points: np.ndarray, triangles: np.ndarray, cell: float, name: str) -> Shape:
+    """The signed distance to the surface on a grid of cells of edge `cell` [m]."""
     grid = distance_grid(points, triangles, cell, ROOM * cell)
     low, high = tuple(map(float, grid.low)), tuple(map(float, grid.high))
     return Shape(name, grid.level(), low, high, cell=cell)  # pyright: ignore[reportArgumentType]
 
 
-def scan_surface(shape: Shape) -> Surface:
-    """The first triangulation of a scan: its largest part, without what broke off in parts thinner than a cell.
+def faithful(points: np.ndarray, triangles: np.ndarray, cell: float, name: str) -> tuple[Shape, Surface]:
+    """The shape of a surface and its first triangulation, on a grid as fine as keeps its thin parts.
 
-    Raises StudyError when it has handles, on which the mesher would stall.
+    Where the triangulation misses more than MISSED of the diagonal, the cells, at first `cell` [m], get finer, down to
+    FINEST. A finer one with more handles is not used: they are holes of the grid in what is too thin for it.
     """
-    points, triangles = largest_part(*first_surface(shape))
-    handles = 1 - (len(points) - len(unique_edges(triangles)) + len(triangles)) // 2
-    if handles:
-        raise StudyError(
-            f"{shape.name}: the body has {handles} handles or tunnels, and only bodies without are remeshed; "
-            "close narrow ones with --smooth, or keep the file's own triangles (no --nodes)"
-        )
-    return points, triangles
+    diagonal, _ = box_of(points, triangles)
+    shape = shape_on(points, triangles, cell, name)
+    start = scan_surface(shape)
+    while cell > 1.01 * FINEST * diagonal and missed(points, triangles, start) > MISSED * diagonal:
+        cell = max(cell / FINER, FINEST * diagonal)
+        finer = shape_on(points, triangles, cell, name)
+        fine = scan_surface(finer)
+        if handles_of(*fine) <= handles_of(*start):
+            shape, start = finer, fine
+    return shape, start
+
+
+def missed(points: np.ndarray, triangles: np.ndarray, start: Surface) -> float:
+    """Largest distance [m] of the nodes of a surface to a triangulation of it, those of large files thinned out."""
+    used = np.unique(triangles)
+    return float(distance_to_surface(points[used[:: -(-len(used) // ASKED)]], *start).max())
+
+
+def scan_surface(shape: Shape) -> Surface:
+    """The first triangulation of a scan: its largest part, without what broke off in parts thinner than a cell."""
+    return largest_part(*first_surface(shape))
 
 
 def smoothed(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: float, name: str) -> Surface:

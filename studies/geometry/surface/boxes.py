@@ -15,6 +15,8 @@ def overlapping_boxes(low: np.ndarray, high: np.ndarray) -> Iterator[np.ndarray]
     The boxes are put in order along a Z-curve; halves of halves of that order have boxes of their own (a tree without
     pointers), and pairs of tree nodes are followed downwards as long as their boxes touch.
     """
+    if not len(low):
+        return
     order = np.argsort(z_curve((low + high) / 2.0), kind="stable")
     levels = tree(low[order], high[order])
     waiting = [(0, np.zeros((1, 2), np.int64))]

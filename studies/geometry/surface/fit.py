@@ -49,7 +49,9 @@ def refined(points: np.ndarray, triangles: np.ndarray, samples: np.ndarray, node
     """
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     middles = points
-    while len(points) < nodes:
+    # Only what is far may get farther away; fine samples are many.
+    samples = samples[distance_to_surface(samples, points, triangles) > 0.5 * ALLOWED * diagonal]
+    while len(points) < nodes and len(samples):
         away = distance_to_surface(samples, points, triangles)
         order = np.argsort(-away)[: nodes - len(points)]
         if away[order[0]] <= ALLOWED * diagonal:

@@ -22,10 +22,13 @@ QUALITY = 0.2
 """Smallest radius ratio of a triangle that is accepted; below it the fill has slivers whatever the optimiser does."""
 
 
-def surface_with(nodes: int, area: float, mesh_at: Callable[[float], Surface], shape: Shape) -> Surface:
+def surface_with(
+    nodes: int, area: float, mesh_at: Callable[[float], Surface], shape: Shape, handles: int = 0
+) -> Surface:
     """A good closed surface on f = 0 with exactly `nodes` nodes, or within TOLERANCE where single edits cannot do it.
 
-    nodes: wanted number; area: of the true surface [m^2]; mesh_at(size [m]) -> points, triangles of edges of that size.
+    nodes: wanted number; area: of the true surface [m^2]; mesh_at(size [m]) -> points, triangles of edges of that size;
+    handles: that the surface has, as a ring has one.
     Raises StudyError when no try within TOLERANCE is closed, unfolded and well shaped.
     """
     if not FEWEST <= nodes <= MOST:
@@ -38,7 +41,7 @@ def surface_with(nodes: int, area: float, mesh_at: Callable[[float], Surface], s
         if miss <= max(TOLERANCE, 5.0 / nodes):
             edited, triangles = with_node_count(points, triangles, nodes)
             surface = project(shape, edited), triangles
-            if is_good(*surface):
+            if is_good(*surface, handles):
                 found.append((miss, surface))
                 if miss <= CLOSE and len(edited) == nodes:
                     break
@@ -52,8 +55,13 @@ def surface_with(nodes: int, area: float, mesh_at: Callable[[float], Surface], s
     return min(found, key=lambda item: (len(item[1][0]) != nodes, item[0]))[1]
 
 
-def is_good(points: np.ndarray, triangles: np.ndarray) -> bool:
-    """Whether a surface is one closed sphere-like sheet, outward, and without slivers."""
-    if len(points) - len(unique_edges(triangles)) + len(triangles) != 2 or signed_volume(points, triangles) <= 0:
+def is_good(points: np.ndarray, triangles: np.ndarray, handles: int = 0) -> bool:
+    """Whether a surface is one closed sheet, outward, with so many handles and without slivers."""
+    if handles_of(points, triangles) != handles or signed_volume(points, triangles) <= 0:
         return False
     return bool(triangle_radius_ratio(points, triangles).min() > QUALITY)
+
+
+def handles_of(points: np.ndarray, triangles: np.ndarray) -> int:
+    """Handles of a closed sheet on points (n, 3) that are all used: 1 - (V - E + F) / 2."""
+    return 1 - (len(points) - len(unique_edges(triangles)) + len(triangles)) // 2

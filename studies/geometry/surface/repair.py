@@ -120,7 +120,7 @@ def oriented(triangles: np.ndarray, name: str) -> tuple[np.ndarray, int]:
     label = connected_components(graph, directed=False)[1]
     if (label[:count] == label[count:]).any():
         raise StudyError(f"{name}: the surface has only one side, like a Moebius band; export it again")
-    turn = label[:count] != label[0]
+    turn = label[:count] != label[:1]
     if 2 * turn.sum() > count:
         turn = ~turn
     return np.where(turn[:, None], triangles[:, ::-1], triangles), int(turn.sum())

@@ -1,11 +1,15 @@
 """Meshes are made in a process of their own, once, and the same every time."""
 
+import logging
+import sys
+import time
+
 import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
 from studies.geometry import HalfSpace, ball, fill
-from studies.geometry.mesher import jobs
+from studies.geometry.mesher import jobs, process
 from studies.geometry.mesher.jobs import mesh_from, recipe_hash
 
 RECIPE = {"kind": "organ", "name": "ball", "organ": "ball", "nodes": 150, "parameters": {}, "regions": {}, "fill": True}
@@ -66,9 +70,27 @@ def test_the_code_of_a_mesh_is_what_its_kind_needs():
 
 
 def test_a_mesher_that_hangs_is_stopped(own_cache):
-    with pytest.raises(StudyError, match=r"ball: the mesher did not finish within 0\.05 s and was stopped"):
+    with pytest.raises(StudyError, match=r"ball: the mesher was stopped after 0\.05 s of processor time"):
         mesh_from(RECIPE, limit=0.05)
     assert not list(own_cache.glob("*"))
+
+
+def test_the_limit_counts_work_and_not_waiting(own_cache, monkeypatch):
+    """A process that sleeps uses no processor time; by the clock it may take PATIENCE times as long."""
+    monkeypatch.setattr(process, "PATIENCE", 4.0)
+    sleeper = [sys.executable, "-c", "import time; print('asleep', flush=True); time.sleep(60)"]
+    start = time.monotonic()
+    code, stage, _ = process.followed(sleeper, "body", 0.5)
+    assert code in process.STOPPED and stage == "asleep" and 1.5 < time.monotonic() - start < 20
+
+
+def test_stages_are_told_and_a_sign_of_life_where_one_takes_long(own_cache, monkeypatch, caplog):
+    monkeypatch.setattr(process, "BEAT", 0.2)
+    talker = [sys.executable, "-c", "import time; print('filling', flush=True); time.sleep(1)"]
+    with caplog.at_level(logging.INFO, logger="organbench.mesher"):
+        assert process.followed(talker, "body", 30.0)[:2] == (0, "filling")
+    told = [record.getMessage() for record in caplog.records]
+    assert "body: filling" in told and any(line.startswith("body: filling, for ") for line in told)
 
 
 def test_a_mesher_that_dies_is_reported(own_cache):
@@ -84,10 +106,20 @@ def test_a_cache_that_cannot_be_written_gets_a_sentence(tmp_path, monkeypatch):
         ball(150)
 
 
-def test_the_default_cache_lies_under_results(tmp_path, monkeypatch):
+def test_the_default_cache_lies_under_results_where_there_are_any_and_else_is_the_users(tmp_path, monkeypatch):
     monkeypatch.delenv("ORGANBENCH_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
     monkeypatch.chdir(tmp_path)
+    assert jobs.cache_folder() == tmp_path / "user" / "organbench" / "meshes"
+    (tmp_path / "results").mkdir()
     assert jobs.cache_folder() == tmp_path / "results" / "cache" / "meshes"
+
+
+def test_a_long_name_of_a_file_fits_into_the_cache(own_cache):
+    name = "é" * 240
+    assert len(mesh_from(RECIPE | {"name": name, "fill": False}).points) == 150
+    (path,) = own_cache.glob("*.npz")
+    assert len(path.name.encode()) < 120
 
 
 def test_fill_keeps_surface_and_patches(balls):

@@ -94,7 +94,7 @@ def test_without_nodes_the_triangles_stay(block):
     assert (mesh.points == points * MM).all() and (mesh.triangles == faces).all() and not len(mesh.tetrahedra)
     filled = scan(path, unit="mm")
     assert (filled.points[: len(points)] == points * MM).all() and len(filled.tetrahedra)
-    with pytest.raises(StudyError, match="smoothing and a wall need a new surface; say how many nodes"):
+    with pytest.raises(StudyError, match="smoothing, a wall and a filled shell need a new surface; say how many nodes"):
         scan(path, unit="mm", smooth=0.002)
 
 
@@ -115,19 +115,44 @@ def test_a_surface_that_crosses_itself_becomes_a_body(block, tmp_path):
     top = points[:, 2].argmax()
     points[top] += (18, 0, -3)  # over its neighbours and into the body
     path = write(tmp_path / "crossing.vtu", points, faces)
-    with pytest.raises(StudyError, match="could not be filled"):
+    with pytest.raises(StudyError, match=r"pairs of triangles cut through each other, .* could not be filled; make a"):
         scan(path, unit="mm")
     mesh = scan(path, 200, unit="mm")
     check_tetrahedra(mesh.points, mesh.tetrahedra)
     assert mesh.volume == pytest.approx(volume_of(block), rel=0.06)
 
 
-def test_handles_are_refused(block, tmp_path):
-    points, faces = split(*box(high=(60, 50, 40)), times=3)
-    points[np.argmin(np.linalg.norm(points - (30, 25, 40), axis=1))] = (30, 25, -20)  # a dent right through
-    path = write(tmp_path / "ring.vtu", points, faces)
-    with pytest.raises(StudyError, match=r"ring: the body has 1 handles .* --smooth"):
-        scan(path, 300, unit="mm")
+@pytest.mark.filterwarnings("ignore:.*has something there that the")
+def test_handles_are_kept_and_told(tmp_path):
+    square = [np.array([[x, y] for x, y in ((a, a), (b, a), (b, b), (a, b))], float) for a, b in ((0, 60), (20, 40))]
+    points = np.vstack([np.column_stack([ring, np.full(4, z)]) for z in (0.0, 20.0) for ring in square])
+    faces = []
+    for k in range(4):
+        m, up = (k + 1) % 4, 8
+        for i, j in (((k, m)), ((m + 4, k + 4))):  # outer and inner sides
+            faces += [[i, j, j + up], [i, j + up, i + up]]
+        faces += [[k, k + 4, m + 4], [k, m + 4, m], [k + up, m + up, m + 4 + up], [k + up, m + 4 + up, k + 4 + up]]
+    path = write(tmp_path / "ring.vtu", points, np.array(faces))
+    with pytest.warns(UserWarning, match=r"ring\.vtu: the body has 1 handles or tunnels, .* with --smooth"):
+        mesh = scan(path, 200, unit="mm", fill=False)
+    check_surface(mesh.points, mesh.triangles)
+    assert mesh.volume == pytest.approx((60 * 60 - 20 * 20) * 20e-9, rel=1e-3) and mesh.losses["handles"] == 1
+
+
+def test_a_thin_flap_is_kept_or_told(tmp_path):
+    """A plate of 3 mm on an egg: a third of it is thinner than the cells of the first grid."""
+    egg = split(*box((-1, -1, -1), (1, 1, 1)), times=4)
+    points = egg[0] * (30, 25, 20) / np.linalg.norm(egg[0], axis=1, keepdims=True)
+    near = (np.abs(points[:, 2]) < 2.6) & (points[:, 1] > 10)
+    points[near, 1] += 15 * np.clip(1 - (np.abs(points[near, 0]) / 12) ** 4, 0, 1)  # pulled out to a flap
+    path = write(tmp_path / "flap.vtu", points, egg[1])
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        mesh = scan(path, 550, unit="mm", fill=False)
+    far = mesh.losses["file_to_mesh"]
+    assert far["max"] < 0.02 * mesh.losses["diagonal"] or any("up to" in str(w.message) for w in said)
+    assert far["max"] < 0.5 * 15e-3, "the flap is there"
+    assert mesh.volume == pytest.approx(signed_volume(points * MM, egg[1]), rel=1e-3)
 
 
 def test_a_wall_makes_it_hollow(block):
@@ -157,7 +182,7 @@ def test_units_are_never_guessed(block, tmp_path):
         scan(path, 200)
     assert str(caught.value) == (
         "block.vtu does not say its unit; its longest side is 60, the size of an organ in centimetres or millimetres; "
-        "say --unit mm (or another of m, cm, mm)"
+        "say --unit mm (or another of m, cm, mm, in), or --longest-side 19cm"
     )
     with pytest.raises(StudyError, match="no organ's size in m, cm or mm; say --unit mm"):
         scan(write(tmp_path / "huge.ply", 1e3 * points, faces), 200)

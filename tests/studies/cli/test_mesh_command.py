@@ -2,12 +2,13 @@
 
 import json
 import os
+import re
 
 import meshio
 import numpy as np
 import pytest
 
-from studies.cli.commands import mesh as commands
+from studies.cli import mesh_files as commands
 from studies.geometry import read_mesh
 from studies.geometry.mesh.organ_mesh import signed_volume
 from tests.geometry.boxes import box, split, together
@@ -52,8 +53,14 @@ def test_a_file_is_mended_remeshed_and_filled(organbench, tmp_path):
     assert code == 0 and "150 outer nodes" in out
     assert "scan.stl: 1 of 2 separate parts are left out" in err and "inside out and is turned round" in err
     made = read_mesh(target)
-    assert made.volume == pytest.approx(1e-9 * signed_volume(POINTS, FACES), rel=0.05)
+    assert made.volume == pytest.approx(1e-9 * signed_volume(POINTS, FACES), rel=1e-3)
     assert organbench("check", target)[0] == 0
+    # What was lost is printed, and stored in the mesh.
+    assert "file to mesh: mean 0." in out and "mesh to file: mean 0." in out and "% of the diagonal) at (" in out
+    assert re.search(r"volume: file (\S+) mL, mesh \1 mL \([+-]0\.00", out)
+    stored_numbers = meshio.read(target).field_data
+    assert stored_numbers["volume_mesh"] == pytest.approx(made.volume, rel=1e-9)
+    assert 0 < stored_numbers["file_to_mesh_max"] < 0.02 * stored_numbers["diagonal"]
 
 
 def test_a_scan_can_be_hollow_and_in_millimetres(organbench, egg, tmp_path):
@@ -109,7 +116,7 @@ def refusals(folder):
         "both": (("mesh", "ball", "--from", egg, *out), "say what to mesh"),
         "unknown organ": (("mesh", "livr", *out), "did you mean 'liver'"),
         "unit": (("mesh", "--from", egg, *out), "does not say its unit; its longest side is 60"),
-        "odd unit": (("mesh", "--from", egg, "--unit", "in", *out), "unit 'in' is not known"),
+        "odd unit": (("mesh", "--from", egg, "--unit", "ft", *out), "unit 'ft' is not known"),
         "itself": ((*scan, "-o", egg), "egg.ply is the file that is read"),
         "suffix": ((*scan, "-o", folder / "out.xyz"), "choose one of these suffixes"),
         "filled stl": ((*scan, "--fill", "-o", folder / "out.stl"), "holds triangles only"),

@@ -1,0 +1,115 @@
+"""What is wrong with a file that cannot be read, in words: nobody should have to know the reader's own errors."""
+
+import gzip
+import lzma
+import re
+import struct
+import zlib
+from pathlib import Path
+from xml.etree.ElementTree import ParseError
+
+from studies.base.errors import StudyError
+from studies.geometry.files.estimate import check_whole, is_ascii_stl
+
+KNOWN = "STL, PLY, OBJ, OFF, VTK, VTU, VTP, MSH, glTF, or a label mask in NIfTI or NRRD"
+"""What can be given instead."""
+HEAD = 65_536
+"""Bytes in which a header stands."""
+OTHER_KINDS = {
+    b"\x89PNG": "a PNG picture",
+    b"\xff\xd8\xff": "a JPEG picture",
+    b"%PDF": "a PDF document",
+    b"PK\x03\x04": "a zip archive: unpack it first",
+    b"\x89HDF": "an HDF5 file",
+    b"<!DOCTYPE html": "a web page: the download has failed",
+    b"<html": "a web page: the download has failed",
+    b"version https://git-lfs": "a Git LFS pointer: the file itself was not downloaded",
+}
+"""First bytes of files that are no meshes."""
+PACKED = b"\x1f\x8b"
+PROMISES = {
+    ".ply": rb"element (vertex|face)\s+(\d+)",
+    ".off": rb"^\s*(?:ST|C|N|4)*OFF\s+(?:#.*\n\s*)*()(\d+)",
+    ".vtk": rb"\n(POINTS|CELLS|POLYGONS)\s+(\d+)",
+    ".vtu": rb'NumberOf(Points|Cells)\s*=\s*"(\d+)"',
+    ".vtp": rb'NumberOf(Points|Polys)\s*=\s*"(\d+)"',
+    ".msh": rb"\$(Nodes|Elements)\s+(\d+)\s",
+}
+"""Where a header says how much of what will follow."""
+LEAST_BYTES = {".vtu": 1e-3, ".vtp": 1e-3}
+"""Bytes that one of them takes at the very least: zlib packs a thousand to one. In the other formats two."""
+ENDS = {".vtu": b"</VTKFile>", ".vtp": b"</VTKFile>", ".msh": b"$EndElements"}
+"""What a whole file has near its end."""
+
+
+def check_promises(path: Path) -> None:
+    """Raise StudyError for a file that is empty, of another kind, or shorter than its header says."""
+    size = path.stat().st_size
+    if not size:
+        raise unreadable(path, "it is empty")
+    check_whole(path)
+    with open(path, "rb") as file:
+        head = file.read(HEAD)
+    for first, kind in OTHER_KINDS.items():
+        if head.lstrip().lower().startswith(first.lower()):
+            raise unreadable(path, f"it is {kind}")
+    if head.startswith(PACKED) and not path.name.lower().endswith((".nii.gz", ".nrrd.gz")):
+        raise unreadable(path, "it is packed by gzip: unpack it first")
+    suffix = path.suffix.lower()
+    for what, count in re.findall(PROMISES.get(suffix, rb"(?!)()()"), head):
+        if int(count) * LEAST_BYTES.get(suffix, 2.0) > size:
+            kind = str(what.decode()).lower()
+            things = "points" if kind in ("", "vertex", "nodes") else kind
+            raise unreadable(path, f"its header promises {int(count):,} {things}, but it has only {size:,} bytes")
+
+
+def unreadable(path: Path, reason: str) -> StudyError:
+    """The sentence for a file that is no mesh."""
+    return StudyError(f"{path.name} is not a mesh that can be read ({reason}); give {KNOWN}")
+
+
+def reason_of(path: Path, error: BaseException, said: str) -> str:
+    """Why a reader stumbled over the file, from the file first, then from what the reader `said`, then its error."""
+    end = ENDS.get(path.suffix.lower())
+    if (end and end not in tail(path)) or is_open_stl(path):
+        return "it is cut short: its end is missing"
+    told = sentence_in(said) or (sentence_in(str(error)) if "ReadError" in type(error).__name__ else "")
+    return told or next((words for kinds, words in WORDS if isinstance(error, kinds)), OTHERWISE)
+
+
+OTHERWISE = "its content does not follow its format"
+WORDS: tuple[tuple[tuple[type[BaseException], ...], str], ...] = (
+    ((MemoryError, OverflowError), "it promises more than fits into the memory"),
+    ((UnicodeError,), "it holds bytes that are no text where text must stand"),
+    ((ParseError,), "its XML breaks off or is damaged"),
+    ((EOFError, struct.error, zlib.error, gzip.BadGzipFile, lzma.LZMAError), "it is cut short, or damaged"),
+    ((PermissionError,), "it may not be read: change its permissions"),
+    ((FileNotFoundError,), "a file that belongs to it is missing beside it"),
+    ((IndexError, KeyError), "it breaks off, or names what is not there"),
+    ((ValueError, AssertionError), "something in it is no number, or numbers are missing"),
+)
+
+
+def sentence_in(said: str) -> str:
+    """The first line of a reader's own words that a person understands; "" where there is none."""
+    for line in said.splitlines():
+        line = " ".join(line.split()).removeprefix("Error: ").rstrip(".")
+        if line and not re.search(r"Couldn't read|\w+Error\b|\w+Exception\b|Traceback|<class|0x[0-9a-f]{6}|/", line):
+            return line[:120]
+    return ""
+
+
+def tail(path: Path) -> bytes:
+    """The last bytes of a file; after the mesh itself further data may stand."""
+    with open(path, "rb") as file:
+        file.seek(max(0, path.stat().st_size - (1 << 26)))
+        return file.read()
+
+
+def is_open_stl(path: Path) -> bool:
+    """Whether it is a text STL that does not end."""
+    if path.suffix.lower() != ".stl":
+        return False
+    with open(path, "rb") as file:
+        head = file.read(HEAD)
+    return is_ascii_stl(head) and b"endsolid" not in tail(path)

@@ -1,0 +1,182 @@
+"""Label masks, the segmentation itself: the surface of one label of a NIfTI or NRRD image."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import find_objects, gaussian_filter
+
+from studies.base.errors import StudyError
+from studies.geometry.files.content import Content
+from studies.geometry.mesh.organ_mesh import signed_volume
+
+NIFTI, NRRD = (".nii", ".nii.gz"), (".nrrd", ".nhdr")
+MOST_LABELS = 300
+"""More different values are grey levels and no labels."""
+BLUR = 0.8
+"""Width of the Gaussian, in voxels, that rounds the staircase of the voxels; the volume is kept."""
+ROOM = 5
+"""Voxels around the label: the blurred one ends well inside."""
+LONG_NAMES = {"mm": "mm", "millimeter": "mm", "millimetre": "mm", "cm": "cm", "m": "m", "meter": "m", "metre": "m"}
+FEW = 65_536
+"""Labels below this are counted in a table."""
+OTHERS = 6
+"""Labels that a sentence lists."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mask:
+    """An image of labels.
+
+    labels: integers, shape (a, b, c), 0 outside of everything
+    affine: shape (4, 4), from the index of a voxel to its middle in the file's unit
+    unit: what the header says, or None
+    names: name of a label where the file gives it one
+    """
+
+    labels: np.ndarray
+    affine: np.ndarray
+    unit: str | None
+    names: dict[int, str]
+
+    @property
+    def voxel(self) -> float:
+        """Volume of a voxel in the file's unit."""
+        return float(abs(np.linalg.det(self.affine[:3, :3])))
+
+
+def is_mask(path: Path) -> bool:
+    """Whether the name is one of an image."""
+    return path.name.lower().endswith((*NIFTI, *NRRD))
+
+
+def read_mask(path: Path, wanted: str | None) -> tuple[Content, str | None]:
+    """The surface of the label `wanted`, by number or name, or of the only one; and a remark where the image cuts it.
+
+    Raises StudyError for an image that is no mask, a label that it does not hold, or several labels and none wanted.
+    """
+    mask = load_nrrd(path) if path.name.lower().endswith(NRRD) else load_nifti(path)
+    label = chosen_label(mask, wanted, path.name)
+    points, triangles, cut = label_surface(mask, label)
+    name = mask.names.get(label, str(label))
+    remark = f"label {name} reaches the edge of the image: the organ is cut off flat there" if cut else None
+    return Content(points, triangles, np.empty((0, 4), np.int64), unit=mask.unit), remark
+
+
+def load_nifti(path: Path) -> Mask:
+    """A NIfTI image as a mask."""
+    try:
+        import nibabel
+    except ImportError as error:
+        raise missing("nibabel", path) from error
+    image: Any = nibabel.load(path)
+    said = image.header.get_xyzt_units()[0] if hasattr(image.header, "get_xyzt_units") else ""
+    return Mask(whole_numbers(np.asanyarray(image.dataobj), path), np.asarray(image.affine, float), unit_of(said), {})
+
+
+def load_nrrd(path: Path) -> Mask:
+    """An NRRD image as a mask; segments of 3D Slicer have their names."""
+    try:
+        import nrrd
+    except ImportError as error:
+        raise missing("pynrrd", path) from error
+    data, header = nrrd.read(str(path))
+    affine = np.eye(4)
+    directions = np.asarray(header.get("space directions", np.diag(header.get("spacings", np.ones(3)))), float)
+    if directions.shape == (3, 3):
+        affine[:3, :3] = directions.T
+    affine[:3, 3] = np.asarray(header.get("space origin", np.zeros(3)), float)
+    names = {}
+    for key, value in header.items():
+        found = re.fullmatch(r"Segment(\d+)_LabelValue", key)
+        if found:
+            names[int(value)] = str(header.get(f"Segment{found[1]}_Name", value))
+    said = str(next(iter(header.get("space units", [])), "")).strip('"')
+    return Mask(whole_numbers(data, path), affine, unit_of(said), names)
+
+
+def missing(name: str, path: Path) -> StudyError:
+    """What to say where the reader of an image is not installed."""
+    return StudyError(
+        f"{path.name} is a label mask, and {name}, which reads it, is not installed; "
+        "run pip install 'organbench[masks]'"
+    )
+
+
+def unit_of(said: str) -> str | None:
+    """One of our units, or None where the header does not say or says another."""
+    return LONG_NAMES.get(said.lower())
+
+
+def whole_numbers(data: np.ndarray, path: Path) -> np.ndarray:
+    """The image as labels (a, b, c). Raises StudyError for one of other dimensions or of grey levels."""
+    data = np.squeeze(data)
+    if data.ndim != 3:
+        raise StudyError(
+            f"{path.name} has {data.ndim} dimensions, and a label mask has 3; export one label map of one time"
+        )
+    if data.dtype.kind == "f":
+        if not np.isfinite(data).all() or (data != np.round(data)).any():
+            raise StudyError(f"{path.name} holds fractions: it is an image and no label mask; give the segmentation")
+        data = data.astype(np.int64)
+    if data.dtype.kind not in "iub":
+        raise StudyError(f"{path.name} holds colours or records: it is no label mask; give the segmentation")
+    return data
+
+
+def chosen_label(mask: Mask, wanted: str | None, name: str) -> int:
+    """The label asked for, by number or name. Raises StudyError where it cannot be told."""
+    known = voxels_of(mask.labels)
+    if not known:
+        raise StudyError(f"{name} holds no label: every voxel is 0; give the segmentation")
+    if len(known) > MOST_LABELS:
+        raise StudyError(f"{name} holds {len(known):,} different values: it is an image and no label mask")
+    if wanted is None and len(known) == 1:
+        return next(iter(known))
+    by_name = {mask.names.get(k, str(k)).lower(): k for k in known} | {str(k): k for k in known}
+    if wanted is not None and wanted.lower() in by_name:
+        return by_name[wanted.lower()]
+    told = f"{name} holds {len(known)} label{'s' * (len(known) > 1)}: {listed(mask, known)}"
+    raise StudyError(
+        f"{told}; choose one by --part" if wanted is None else f"{told}; there is no {wanted!r} among them"
+    )
+
+
+def voxels_of(labels: np.ndarray) -> dict[int, int]:
+    """Number of voxels of each label but 0."""
+    if labels.size and labels.min() >= 0 and labels.max() < FEW:  # counted, which is faster than sorted
+        counts = np.bincount(labels.ravel())
+        return {int(k): int(counts[k]) for k in np.flatnonzero(counts) if k}
+    numbers, counts = np.unique(labels, return_counts=True)
+    return {int(k): int(n) for k, n in zip(numbers, counts, strict=True) if k != 0}
+
+
+def listed(mask: Mask, known: dict[int, int]) -> str:
+    """Labels with the number of their voxels, the largest first."""
+    order = sorted(known, key=lambda k: -known[k])
+    rows = [f"{k}{f' ({mask.names[k]})' if k in mask.names else ''} of {known[k]:,} voxels" for k in order[:OTHERS]]
+    return ", ".join(rows) + (f" and {len(order) - OTHERS} more" if len(order) > OTHERS else "")
+
+
+def label_surface(mask: Mask, label: int) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Points (n, 3) in the file's unit and outward triangles (t, 3) around a label; whether the image cuts it off.
+
+    The label is blurred by BLUR voxels; the level that bounds it is the one that leaves as many voxels inside.
+    """
+    from skimage.measure import marching_cubes  # loads slowly, and few files need it
+
+    inside = mask.labels == label
+    box = find_objects(inside.astype(np.int8))[0]
+    part = np.pad(inside[box], ROOM).astype(np.float32)
+    cut = any(s.start == 0 or s.stop == size for s, size in zip(box, inside.shape, strict=True))
+    blurred = gaussian_filter(part, BLUR)
+    count = int(part.sum())
+    above, below = -np.partition(-blurred.ravel(), [count - 1, count])[[count - 1, count]]
+    corners, triangles, _, _ = marching_cubes(blurred, 0.5 * float(above + below), allow_degenerate=False)
+    first = np.array([s.start for s in box]) - ROOM
+    points = (corners.astype(float) + first) @ mask.affine[:3, :3].T + mask.affine[:3, 3]
+    triangles = triangles.astype(np.int64)
+    outward = triangles if signed_volume(points, triangles) > 0 else triangles[:, ::-1].copy()
+    return points, outward, cut

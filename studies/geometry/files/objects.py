@@ -1,0 +1,79 @@
+"""Files read by trimesh: OFF, OBJ and glTF (geometry alone, no materials, no motion), with the objects they name."""
+
+import io
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from studies.geometry.files.content import Content
+
+NONE = np.empty((0, 4), np.int64)
+METRES = (".glb", ".gltf")
+"""The standard of glTF says metres."""
+OBJECT = re.compile(rb"^o[ \t]+(\S.*?)\s*$", re.MULTILINE)
+"""Where an object of an OBJ file begins."""
+
+
+def read_objects(path: Path) -> Content:
+    """All triangles of a file, each object where the file puts it and with its own number.
+
+    Khronos Group: glTF 2.0 specification, 2021. Raises whatever trimesh raises for a broken file.
+    """
+    scene = scene_of(path)
+    points, triangles, part, names = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [np.empty(0, np.int64)], []
+    count = 0
+    for node in in_order(scene, path):
+        placed, name = scene.graph[node]
+        shape = scene.geometry[name]
+        faces = np.asarray(getattr(shape, "faces", []), np.int64).reshape(-1, 3)
+        if not len(faces):
+            continue  # lines and points bound nothing
+        points.append(np.asarray(shape.vertices, float) @ placed[:3, :3].T + placed[:3, 3])
+        # A mirrored object would be inside out.
+        triangles.append((faces[:, ::-1] if np.linalg.det(placed[:3, :3]) < 0 else faces) + count)
+        part.append(np.full(len(faces), len(names)))
+        names.append(str(name))
+        count += len(points[-1])
+    numbers, several = np.concatenate(part), len(names) > 1
+    return Content(
+        np.concatenate(points),
+        np.concatenate(triangles),
+        NONE,
+        names=tuple(names) if several else (),
+        part=numbers if several else numbers[:0],
+        unit="m" if path.suffix.lower() in METRES else None,
+    )
+
+
+def scene_of(path: Path) -> Any:
+    """The file as trimesh holds it, its points neither merged nor reordered."""
+    import trimesh  # takes a second to load, and few files need it
+
+    if path.suffix.lower() != ".obj":
+        return trimesh.load_scene(path, process=False)
+    text = io.BytesIO(counted_from_one(path.read_bytes()))
+    return trimesh.load_scene(text, file_type="obj", process=False, skip_materials=True, split_objects=True)
+
+
+def in_order(scene: Any, path: Path) -> list[str]:
+    """Nodes of the scene that hold geometry, in the file's order."""
+    names = list(scene.geometry)
+    if path.suffix.lower() == ".obj":
+        names = [name.decode(errors="ignore") for name in OBJECT.findall(path.read_bytes())] + names
+    return sorted(scene.graph.nodes_geometry, key=lambda node: names.index(scene.graph[node][1]))
+
+
+def counted_from_one(text: bytes) -> bytes:
+    """The text of an OBJ with the corners of its faces counted from its first point: negative ones count back."""
+    if not re.search(rb"^f\b.*-\d", text, re.MULTILINE):
+        return text
+    lines, points = [], 0
+    for line in text.splitlines():
+        points += line.startswith((b"v ", b"v\t"))
+        if line.startswith((b"f ", b"f\t")):
+            corners = [int(word.split(b"/")[0]) for word in line.split()[1:]]
+            line = b"f " + b" ".join(b"%d" % (k + 1 + points if k < 0 else k) for k in corners)
+        lines.append(line)
+    return b"\n".join(lines) + b"\n"

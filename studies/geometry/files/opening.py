@@ -1,0 +1,86 @@
+"""A mesh file of any format, opened: what it holds, or in words why it cannot be read."""
+
+import contextlib
+import io
+import tempfile
+import warnings
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.geometry.files.content import Content, check_content, fans
+from studies.geometry.files.faults import check_promises, reason_of, unreadable
+from studies.geometry.files.masks import is_mask, read_mask
+from studies.geometry.files.objects import read_objects
+from studies.geometry.files.parts import chosen
+from studies.geometry.files.polydata import is_legacy_polydata, read_legacy
+from studies.geometry.files.units import Source
+from studies.geometry.files.vtk_xml import as_grid, with_arrays
+
+OBJECTS = (".off", ".obj", ".glb", ".gltf")
+
+
+def opened(source: Source) -> Content:
+    """What a file holds of the part that is wanted, in the file's unit.
+
+    STL, PLY, VTK, VTU, MSH and more by meshio, OFF, OBJ and glTF by trimesh, VTP and surfaces in legacy VTK, label
+    masks in NIfTI and NRRD. Raises StudyError for what cannot be read, without cells, or without that part.
+    """
+    path = source.path
+    if not path.is_file():
+        raise StudyError(f"there is no mesh file {path}; check the name")
+    output = io.StringIO()
+    try:
+        check_promises(path)
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            content, remark = read(path, source.part)
+    except StudyError:
+        raise
+    # Foreign parsers raise whatever a broken file makes them trip over, and meshio even exits the process.
+    except (Exception, SystemExit) as error:
+        raise unreadable(path, reason_of(path, error, output.getvalue())) from error
+    if remark:
+        warnings.warn(f"{path.name}: {remark}", stacklevel=3)
+    content = check_content(content, path.name)
+    return content if is_mask(path) else chosen(content, source.part, path.name)
+
+
+def read(path: Path, part: str | None) -> tuple[Content, str | None]:
+    """The file by its format, and a remark. Raises whatever its reader raises."""
+    suffix = path.suffix.lower()
+    if is_mask(path):
+        return read_mask(path, part)
+    if suffix in OBJECTS:
+        return read_objects(path), None
+    if suffix == ".vtk" and is_legacy_polydata(path):
+        points, triangles = read_legacy(path)
+        return Content(points, triangles, np.empty((0, 4), np.int64)), None
+    if suffix in (".vtp", ".vtu"):
+        data = path.read_bytes()
+        with tempfile.TemporaryDirectory() as folder:
+            grid = Path(folder, "surface.vtu")
+            grid.write_bytes(as_grid(data) if suffix == ".vtp" else with_arrays(data))
+            return content_of(meshio.read(grid), path.name), None
+    return content_of(meshio.read(path), path.name), None
+
+
+def content_of(raw: meshio.Mesh, name: str) -> Content:
+    """Tetrahedra and triangles of a mesh, polygons cut up; raises StudyError for cells of other kinds."""
+    tetrahedra, triangles = [np.empty((0, 4), np.int64)], [np.empty((0, 3), np.int64)]
+    for block in raw.cells:
+        if block.type in ("vertex", "line"):
+            continue
+        data = np.asarray(block.data).astype(np.int64)
+        if block.type == "tetra":
+            tetrahedra.append(data)
+        elif block.type in ("triangle", "quad", "polygon"):
+            triangles.append(fans(data))
+        else:
+            raise StudyError(
+                f"{name}: cells of kind {block.type!r} are not supported; convert to triangles or tetrahedra"
+            )
+    data = {key: np.asarray(values) for key, values in raw.point_data.items()}
+    return Content(np.asarray(raw.points, float), np.vstack(triangles), np.vstack(tetrahedra), data)

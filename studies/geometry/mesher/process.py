@@ -1,0 +1,84 @@
+"""A process that makes a mesh: followed stage by stage, and stopped when it never ends."""
+
+import os
+import queue
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from massspring.sources import ROOT
+from studies.geometry.mesher.progress import BEAT, WAITING
+
+PATIENCE = 20.0
+"""Times as many seconds by the clock, for a process that waits for ever and uses none."""
+STOPPED = (-signal.SIGKILL, -getattr(signal, "SIGPROF", signal.SIGKILL)) if hasattr(signal, "SIGKILL") else (1,)
+"""Exit codes of a process whose time was up."""
+
+
+@contextmanager
+def pipe_to_here() -> Iterator[int]:
+    """Standard input for a process that is to end with this one: nothing comes, and it closes when this one ends."""
+    reading, writing = os.pipe()
+    try:
+        yield reading
+    finally:
+        os.close(reading)
+        os.close(writing)
+
+
+def followed(command: list[str], name: str, limit: float) -> tuple[int, str, str]:
+    """Run a command to its end, telling of each stage it prints and that it lives: exit code, last stage, last error.
+
+    Its processor time is its own affair; by the clock it may take PATIENCE times `limit` [s].
+    """
+    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    environment = os.environ | one_thread | {"PYTHONPATH": os.pathsep.join(paths)}
+    lines: queue.Queue[str | None] = queue.Queue()
+    with tempfile.TemporaryFile("w+") as complaints, pipe_to_here() as alive:
+        process = subprocess.Popen(
+            command, env=environment, stdin=alive, stdout=subprocess.PIPE, stderr=complaints, text=True
+        )
+        killer = threading.Timer(PATIENCE * limit, process.kill)
+        reader = threading.Thread(target=read_lines, args=(process, lines), daemon=True)
+        killer.start()
+        reader.start()
+        try:
+            stage = told(lines, name)
+            code = process.wait()
+        finally:
+            killer.cancel()
+            process.kill()  # when Ctrl-C came: else it has ended
+            process.wait()
+            reader.join()
+            if process.stdout is not None:
+                process.stdout.close()
+        complaints.seek(0)
+        return code, stage, (complaints.read().strip().splitlines() or ["no message"])[-1]
+
+
+def read_lines(process: subprocess.Popen[str], lines: queue.Queue[str | None]) -> None:
+    """Every line that a process prints, then None."""
+    if process.stdout is not None:
+        for line in process.stdout:
+            lines.put(line.strip())
+    lines.put(None)
+
+
+def told(lines: queue.Queue[str | None], name: str) -> str:
+    """Tells of the stages as they come, and of the time they take, until the last one, which it returns."""
+    stage, since = "", time.monotonic()
+    while True:
+        try:
+            line = lines.get(timeout=BEAT)
+        except queue.Empty:
+            WAITING.info("%s: %s, for %.0f s", name, stage or "starting", time.monotonic() - since)
+            continue
+        if line is None:
+            return stage
+        stage, since = line, time.monotonic()
+        WAITING.info("%s: %s", name, stage)

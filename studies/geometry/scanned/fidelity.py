@@ -1,0 +1,92 @@
+"""What a mesh of a scan lost: distances to the file and back, volume, thin parts."""
+
+from typing import Any
+
+import numpy as np
+
+from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas, unique_edges
+from studies.geometry.surface.distance import distance_to_surface
+from studies.geometry.surface.node_count import handles_of
+
+MOST = 40_000
+"""Places of a surface that are measured: more are thinned out evenly."""
+TOLD = 0.02
+"""Largest distance over the diagonal, and change of the volume, beyond which a person is told."""
+
+Surface = tuple[np.ndarray, np.ndarray]
+
+
+def fidelity(file: Surface, mesh: Surface) -> dict[str, Any]:
+    """How near a mesh is to the surface of a file, both as points (n, 3) [m] and closed triangles (t, 3); JSON-able.
+
+    file_to_mesh, mesh_to_file: mean, p95, max [m] and where the largest is [m]; volume_file, volume_mesh [m^3];
+    diagonal, edge: of the file's box and the mean one of the mesh [m]; handles: of the mesh.
+    """
+    edges = unique_edges(mesh[1])
+    return {
+        "file_to_mesh": spread(file, mesh),
+        "mesh_to_file": spread(mesh, file),
+        "volume_file": signed_volume(*file),
+        "volume_mesh": signed_volume(*mesh),
+        "diagonal": float(np.linalg.norm(np.ptp(file[0][np.unique(file[1])], axis=0))),
+        "handles": handles_of(mesh[0][np.unique(mesh[1])], mesh[1]),
+        "edge": float(np.linalg.norm(mesh[0][edges[:, 0]] - mesh[0][edges[:, 1]], axis=1).mean()),
+    }
+
+
+def spread(one: Surface, other: Surface) -> dict[str, Any]:
+    """Distances [m] from a surface to another, seen from its nodes, the middles of its edges and its triangles.
+
+    Mean and 95th percentile are weighted by area.
+    """
+    places, weights = samples(*one)
+    away = distance_to_surface(places, *other)
+    order = np.argsort(away)
+    share = np.cumsum(weights[order]) / weights.sum()
+    farthest = int(order[-1])
+    return {
+        "mean": float((weights * away).sum() / weights.sum()),
+        "p95": float(away[order[min(int(np.searchsorted(share, 0.95)), len(order) - 1)]]),
+        "max": float(away[farthest]),
+        "where": [float(x) for x in places[farthest]],
+    }
+
+
+def samples(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (m, 3) [m] on a surface and the area [m^2] that each stands for: nodes, middles of edges, centroids."""
+    corners, areas = points[triangles], triangle_areas(points, triangles)
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
+    places = np.concatenate([corners.mean(axis=1), middles.reshape(-1, 3), points[np.unique(triangles)]])
+    at_nodes = np.bincount(triangles.ravel(), np.repeat(areas, 3) / 6.0, len(points))[np.unique(triangles)]
+    weights = np.concatenate([areas / 4.0, np.repeat(areas / 12.0, 3), at_nodes])
+    step = -(-len(places) // MOST)
+    return places[::step], weights[::step]
+
+
+def warnings_of(lost: dict[str, Any]) -> list[str]:
+    """Sentences for what a person has to know; none where all is near."""
+    told = []
+    for key, what in (
+        ("file_to_mesh", "the file has something there that the mesh has not"),
+        ("mesh_to_file", "the mesh has something there that the file has not"),
+    ):
+        far, place = lost[key]["max"], lost[key]["where"]
+        if far > min(TOLD * lost["diagonal"], lost["edge"]):
+            where = ", ".join(f"{1e3 * x:.4g}" for x in place)
+            share = f"{100 * far / lost['diagonal']:.2g} % of the diagonal"
+            told.append(
+                f"the surface is up to {1e3 * far:.3g} mm off ({share}) at ({where}) mm: {what}; use more nodes, or "
+                "smooth it away knowingly (--smooth)"
+            )
+    if lost["handles"]:
+        told.append(
+            f"the body has {lost['handles']} handles or tunnels, as a ring has one; organs have none: close narrow "
+            "ones with --smooth"
+        )
+    change = lost["volume_mesh"] / lost["volume_file"] - 1.0
+    if abs(change) > TOLD:
+        told.append(
+            f"the volume is {1e6 * lost['volume_mesh']:.4g} mL, that of the file {1e6 * lost['volume_file']:.4g} mL "
+            f"({100 * change:+.2g} %)"
+        )
+    return told

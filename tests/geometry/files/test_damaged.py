@@ -1,0 +1,134 @@
+"""Damaged files of every format: a mesh or one sentence in words, at once, never the name of a Python type."""
+
+import re
+import warnings
+
+import meshio
+import nibabel
+import numpy as np
+import pytest
+
+from studies.base.errors import StudyError
+from studies.geometry.doctor.examine import examine
+from studies.geometry.files.opening import opened
+from studies.geometry.files.units import Source
+from studies.geometry.mesh.organ_mesh import signed_volume
+from tests.geometry.boxes import box, split
+from tests.geometry.files import writers
+
+POINTS, FACES = split(*box((-0.03, -0.02, -0.01), (0.03, 0.02, 0.01)), times=1)
+PYTHON = re.compile(r"\w+Error\b|\w+Exception\b|SystemExit|Traceback|<class|object at 0x|NoneType|ndarray")
+MANY = (4_000_000_000, 2**32 - 1)
+
+
+def whole(folder):
+    """A sound file of each format, by its name."""
+    made = {}
+    for suffix in ("ply", "off", "vtu", "vtk", "msh"):
+        path = folder / f"whole.{suffix}"
+        meshio.write_points_cells(path, POINTS, [("triangle", FACES)])
+        made[suffix] = path.read_bytes()
+    for name, binary in (("stl", True), ("text.stl", False)):
+        path = folder / f"whole.{name}"
+        meshio.write_points_cells(path, POINTS, [("triangle", FACES)], file_format="stl", binary=binary)
+        made[name] = path.read_bytes()
+    made["obj"] = writers.obj([("one", POINTS, FACES)])
+    made["poly.vtk"] = writers.legacy_vtk(POINTS, FACES, binary=True)
+    made["text.vtk"] = writers.legacy_vtk(POINTS, FACES, binary=False, modern=True)
+    for mode in ("text", "packed", "raw"):
+        made[f"{mode}.vtp"] = writers.vtp(POINTS, FACES, mode)
+    made["glb"] = writers.glb([("one", POINTS, FACES, (0, 0, 0))])
+    labels = np.zeros((12, 12, 12), np.uint8)
+    labels[3:9, 3:9, 3:9] = 1
+    path = folder / "whole.nii"
+    nibabel.save(nibabel.Nifti1Image(labels, np.diag([5.0, 5, 5, 1])), path)
+    made["nii"] = path.read_bytes()
+    return made
+
+
+def damaged(content, seed):
+    """Kinds of damage: cut short, bytes flipped, a piece lost, numbers promised, other content."""
+    rng = np.random.default_rng(seed)
+    yield "empty", b""
+    for share in (0.02, 0.3, 0.6, 0.95):
+        yield f"cut at {share}", content[: int(share * len(content))]
+    for count in (1, 3, 30):
+        flipped = np.frombuffer(content, np.uint8).copy()
+        flipped[rng.integers(0, len(content), count)] ^= rng.integers(1, 256, count).astype(np.uint8)
+        yield f"{count} bytes flipped", flipped.tobytes()
+    middle = len(content) // 2
+    yield "a piece lost", content[:middle] + content[middle + len(content) // 7 :]
+    for number in MANY:
+        size = str(len(POINTS)).encode()
+        yield f"promises {number}", content.replace(size, str(number).encode())
+        if content[80:84] == np.uint32(len(FACES)).tobytes():
+            yield f"says {number}", content[:80] + np.uint32(min(number, 2**32 - 1)).tobytes() + content[84:]
+    yield "numbers that are none", re.sub(rb"0\.0[0-9]", b"nan", content)
+    yield "text", b"this is no mesh at all\n" * 20
+    yield "a picture", b"\x89PNG\r\n\x1a\n" + bytes(200)
+    yield "zeros", bytes(len(content))
+
+
+def test_every_whole_file_is_read(tmp_path):
+    for name, content in whole(tmp_path).items():
+        path = tmp_path / f"again.{name}"
+        path.write_bytes(content)
+        found = opened(Source(path))
+        want, near = (216 * 5.0**3, 0.15) if name == "nii" else (4.8e-5, 1e-5)
+        assert signed_volume(found.points, found.triangles) == pytest.approx(want, rel=near), name
+
+
+def test_damaged_files_get_a_sentence_in_words(tmp_path):
+    tried, refused = 0, []
+    for seed, (name, content) in enumerate(whole(tmp_path).items()):
+        for what, spoilt in damaged(content, seed):
+            path = tmp_path / f"bad.{name}"
+            path.write_bytes(spoilt)
+            tried += 1
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    examine(path, unit=None if name == "nii" else "m")
+            except StudyError as error:
+                refused.append(f"{name}, {what}: {error}")
+                assert "\n" not in str(error) and not PYTHON.search(str(error)), refused[-1]
+                assert path.name in str(error), refused[-1]
+    assert tried > 200 and len(refused) > tried / 2
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("a.ply", b"", "(it is empty)"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 4000000000\nend_header\n", "promises 4,000,000,000 points"),
+        ("a.off", b"OFF\n4000000000 12 0\n0 0 0\n", "promises 4,000,000,000 points"),
+        ("a.vtu", b'<VTKFile type="UnstructuredGrid"><Piece NumberOfPoints="4000000000"', "4,000,000,000 points"),
+        ("a.stl", bytes(80) + b"\xff\xff\xff\xff" + bytes(50), "a.stl is cut short: its header promises 4,294,967,295"),
+        ("a.stl", b"<!DOCTYPE html><html>no such page</html>", "it is a web page: the download has failed"),
+        ("a.stl", b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "a Git LFS pointer"),
+        ("a.obj", b"PK\x03\x04" + bytes(90), "it is a zip archive: unpack it first"),
+        ("a.vtk", b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\n", "a.vtk"),
+        ("a.vtp", b'<VTKFile type="PolyData"><PolyData><Piece NumberOfPoints="3"', "it is cut short"),
+        ("a.stl", b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "it is cut short: its end is missing"),
+    ],
+)
+def test_the_reason_is_the_true_one(tmp_path, name, content, told):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(StudyError) as caught:
+        opened(Source(path))
+    assert told in str(caught.value)
+
+
+@pytest.mark.parametrize("suffix", ["obj", "stl", "off"])
+def test_surfaces_without_a_usable_triangle_are_findings(tmp_path, suffix):
+    path = tmp_path / f"flat.{suffix}"
+    meshio.write_points_cells(path, np.zeros((3, 3)), [("triangle", np.array([[0, 1, 2]]))])
+    found = examine(path, unit="mm")
+    assert "collapsed" in [finding.code for finding in found.findings]
+
+
+def test_a_closed_surface_with_a_hole_in_its_numbers_is_a_finding_without_a_unit(tmp_path):
+    path = tmp_path / "nan.off"
+    path.write_text("OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\nnan 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n")
+    assert [finding.code for finding in examine(path).findings] == ["bad_points"]

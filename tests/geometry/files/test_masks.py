@@ -1,0 +1,120 @@
+"""Label masks: the surface of one label, as large as its voxels, in the place that the header gives it."""
+
+import builtins
+
+import nibabel
+import nrrd
+import numpy as np
+import pytest
+
+from studies.base.errors import StudyError
+from studies.geometry import check_surface, read_mesh, scan
+from studies.geometry.files.opening import opened
+from studies.geometry.files.units import Source
+
+SPACING = (1.0, 1.5, 2.0)
+AXES = (28.0, 24.0, 20.0)
+"""Half axes of an ellipsoid [mm]."""
+MIDDLE = (40.0, -12.0, 7.0)
+
+
+def ellipsoid(shift=0.0):
+    """Labels: 1 in the ellipsoid, 2 in a block beside it; the affine places its middle at MIDDLE [mm]."""
+    shape = (70, 45, 30)
+    grid = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) * SPACING
+    away = (grid - 0.5 * np.array(shape) * SPACING - (shift, 0, 0)) / AXES
+    labels = ((away**2).sum(axis=-1) < 1).astype(np.uint8)
+    labels[2:5, 2:5, 2:5] = 2
+    affine = np.diag([*SPACING, 1.0])
+    affine[:3, 3] = np.array(MIDDLE) - 0.5 * np.array(shape) * SPACING
+    return labels, affine
+
+
+def nifti(path, labels, affine, unit="mm"):
+    image = nibabel.Nifti1Image(labels, affine)
+    image.header.set_xyzt_units(xyz=unit)
+    nibabel.save(image, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def mask(tmp_path_factory):
+    return nifti(tmp_path_factory.mktemp("mask") / "liver.nii.gz", *ellipsoid())
+
+
+def test_a_label_becomes_a_surface_of_its_volume_in_its_place(mask):
+    surface = scan(Source(mask, part="1"), fill=False)
+    check_surface(surface.points, surface.triangles)
+    labels, _ = ellipsoid()
+    assert surface.volume == pytest.approx(1e-9 * np.prod(SPACING) * (labels == 1).sum(), rel=0.01)
+    np.testing.assert_allclose(1e3 * surface.points.mean(axis=0), MIDDLE, atol=0.5)
+    np.testing.assert_allclose(1e3 * np.ptp(surface.points, axis=0), 2 * np.array(AXES), rtol=0.05)
+    # Near the true ellipsoid everywhere, and not a staircase of voxels.
+    away = np.linalg.norm((1e3 * surface.points - MIDDLE) / AXES, axis=1) - 1
+    assert np.abs(away).max() * min(AXES) < 0.75 * max(SPACING)
+
+
+def test_a_mirrored_image_still_looks_outward(tmp_path):
+    labels, affine = ellipsoid()
+    path = nifti(tmp_path / "turned.nii", labels, np.diag([-1.0, 1, 1, 1]) @ affine)
+    surface = read_mesh(Source(path, part="1"))
+    assert surface.volume > 0 and surface.points[:, 0].mean() == pytest.approx(-1e-3 * MIDDLE[0], abs=1e-3)
+
+
+def test_segments_of_slicer_have_names(tmp_path):
+    labels, affine = ellipsoid()
+    header = {
+        "space": "left-posterior-superior",
+        "space directions": affine[:3, :3],
+        "space origin": affine[:3, 3],
+        "space units": ["mm", "mm", "mm"],
+        "Segment0_Name": "Liver",
+        "Segment0_LabelValue": "1",
+        "Segment1_Name": "stone",
+        "Segment1_LabelValue": "2",
+    }
+    path = tmp_path / "case.seg.nrrd"
+    nrrd.write(str(path), labels, header)
+    assert read_mesh(Source(path, part="liver")).volume == read_mesh(Source(path, part="1")).volume > 1e-5
+    with pytest.raises(StudyError, match=r"holds 2 labels: 1 \(Liver\) of .* voxels, 2 \(stone\) of 27 voxels; choose"):
+        read_mesh(path)
+
+
+def test_an_organ_cut_off_by_the_image_is_told(tmp_path):
+    labels, affine = ellipsoid(shift=30.0)
+    path = nifti(tmp_path / "cut.nii", labels, affine)
+    with pytest.warns(UserWarning, match=r"cut\.nii: label 1 reaches the edge of the image"):
+        check_surface(*(lambda c: (c.points, c.triangles))(opened(Source(path, part="1"))))
+
+
+def test_what_is_no_mask_gets_a_sentence(tmp_path, mask):
+    labels, affine = ellipsoid()
+    grey = np.random.default_rng(0).integers(0, 4000, labels.shape).astype(np.int16)
+    half = tmp_path / "half.nii.gz"
+    half.write_bytes(mask.read_bytes()[:900])
+    cases = {
+        "liver.nii.gz holds 2 labels: .*; there is no '7' among them": Source(mask, part="7"),
+        "holds 2 labels: 1 of .* voxels, 2 of 27 voxels; choose one by --part": Source(mask),
+        "different values: it is an image and no label mask": Source(nifti(tmp_path / "grey.nii", grey, affine)),
+        "holds fractions": Source(nifti(tmp_path / "soft.nii", (0.3 * labels).astype(np.float32), affine)),
+        "holds no label: every voxel is 0": Source(nifti(tmp_path / "no.nii", 0 * labels, affine)),
+        "has 4 dimensions": Source(nifti(tmp_path / "two.nii", np.stack([labels, labels], axis=-1), affine)),
+        "half.nii.gz is not a mesh that can be read .it is cut short": Source(half),
+    }
+    for told, source in cases.items():
+        with pytest.raises(StudyError, match=told) as caught:
+            opened(source)
+        assert "\n" not in str(caught.value)
+
+
+def test_without_the_reader_the_sentence_says_how_to_install_it(mask, monkeypatch):
+    load = builtins.__import__
+
+    def without(name, *rest, **options):
+        if name in ("nibabel", "nrrd"):
+            raise ImportError(name)
+        return load(name, *rest, **options)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(StudyError, match=r"nibabel, which reads it, is not installed; run pip install .organbench"):
+        opened(Source(mask))
