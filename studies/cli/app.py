@@ -22,6 +22,7 @@ COMMANDS = {
         ("report", "report", "report", "All charts and tables, and the summaries; names what it wrote."),
         ("replay", "replay", "replay", "Runs exactly that case again, and says whether it is the same."),
         ("compare", "compare", "compare", "Every number that two results folders share, and which moved."),
+        ("view", "view", "view", "Writes cases and their reference to one file for ParaView."),
         ("publish", "publish", "publish", "Copies tables and charts to results/published, and the summaries."),
         ("advise", "advise", "advise", "The cheapest recipe that is accurate enough for a scene."),
         (

@@ -1,0 +1,39 @@
+"""`organbench view`: stored cases beside their reference in one file for ParaView."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.cli.terminal import Results, say, warn
+from studies.view.listing import listing
+from studies.view.side_by_side import side_by_side
+from studies.view.viewing import view as viewed
+from studies.view.vtkhdf import SUFFIX, check_target, write_grid
+
+
+def view(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="[SCENE|CASE]...", help="a scene: all of its cases; or a results file")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help=f"{SUFFIX}; SCENE{SUFFIX} without")] = None,
+    results: Results = Path("results"),
+) -> None:
+    """Writes cases and their reference, side by side in all steps, to a file for ParaView; alone: what there is."""
+    if not names:
+        lines, remarks = listing(results)
+        warn(remarks)
+        for line in lines:
+            say(line)
+        return
+    if output is not None:
+        check_target(output)
+    found = viewed(results, names)
+    warn(found.remarks)
+    path = output if output is not None else Path(found.scene.name + SUFFIX)
+    size = write_grid(path, side_by_side(found.times, found.bodies))
+    steps = f"{len(found.times)} steps from {found.times[0]:g} to {found.times[-1]:g} s"
+    count = "1 body" if len(found.bodies) == 1 else f"{len(found.bodies)} bodies"
+    say(f"{path}: {count}, {steps}, {size / 1e6:.1f} MB")
+    for number, body in enumerate(found.bodies):
+        say(f"  {number}  {body.name}")

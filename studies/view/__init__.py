@@ -1,0 +1,1 @@
+"""Stored cases beside their reference in one file for ParaView."""

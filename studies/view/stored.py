@@ -1,0 +1,106 @@
+"""What is stored and can be viewed: runs, and the reference of their scene."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from studies.base.errors import StudyError
+from studies.base.lookup import lookup
+from studies.reference.reference_solves import STUDY as REFERENCES
+from studies.reference.reference_solves import reference_solves
+from studies.scene.scene import Scene
+from studies.scenes import SCENES
+from studies.store.paths import readable, record_files, study_folder
+from studies.store.record import Record, Status, peek
+from studies.store.schema import WITHOUT_FIELDS
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """The file of a run with something to see in it."""
+
+    path: Path
+    header: Record
+    """Without fields."""
+
+    @cached_property
+    def scene_data(self) -> dict[str, Any]:
+        """The scene of the case, JSON-able."""
+        return json.loads(self.header.key)["scene"]
+
+    @property
+    def scene(self) -> str:
+        """Its name."""
+        return str(self.scene_data["name"])
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """What it is called: the name of its case, which several may share, and its file's, which none does."""
+        return self.header.name, self.path.stem
+
+
+def stored_runs(root: Path) -> tuple[list[Stored], list[str]]:
+    """All runs in the folders of `root` that can be viewed, the same one of several studies once; and a sentence for
+    each file that cannot be read. Raises StudyError where there is no such folder."""
+    if not root.is_dir():
+        raise StudyError(f"there is no folder {root}; --results names the folder of the results")
+    studies = [folder.name for folder in sorted(root.iterdir()) if folder.is_dir() and folder.name != REFERENCES]
+    found, problems = dict[tuple[str, str], Stored](), []
+    for path in (path for study in studies for path in record_files(root, study)):
+        try:
+            entry = stored_run(path)
+        except StudyError as problem:
+            problems.append(str(problem))
+            continue
+        if entry is not None:
+            found.setdefault((entry.header.key, entry.header.fingerprint), entry)
+    return sorted(found.values(), key=lambda run: run.path.stem), problems
+
+
+def stored_run(path: Path) -> Stored | None:
+    """The run in a file; None of another kind of record, or one that never started. Raises StudyError as `peek`."""
+    header = peek(path)
+    if header.kind != "run" or header.status in WITHOUT_FIELDS:
+        return None
+    return Stored(path, header)
+
+
+def finest_reference(root: Path, scene: Scene) -> Path | None:
+    """The file of the finest mesh of a scene's reference; None where it is not stored, or did not converge.
+
+    Keys are compared as numbers: a scene read back from a record has 350.0 where it was defined with 350.
+    """
+    family = [solve for solve in reference_solves(scene) if not solve.variant]
+    if not family:
+        return None
+    wanted = json.loads(family[-1].key)
+    for path in sorted(study_folder(root, REFERENCES).glob(f"{readable(family[-1].name)}-*.h5")):
+        header = peek(path)
+        if header.status == Status.OK and json.loads(header.key) == wanted:
+            return path
+    return None
+
+
+def chosen_runs(words: Sequence[str], runs: Sequence[Stored]) -> list[Stored]:
+    """The runs that words name: a scene (all of its runs), a case, or a results file.
+
+    Raises StudyError for a word that names nothing, and for a file without a run to see.
+    """
+    known: dict[str, list[Stored]] = {scene.name: [] for scene in SCENES}
+    for run in runs:
+        for word in dict.fromkeys((run.scene, *run.words)):
+            known.setdefault(word, []).append(run)
+    found = [run for word in words for run in (_in_file(word) or lookup(word, known, "scene or stored case"))]
+    return list({run.path.resolve(): run for run in found}.values())
+
+
+def _in_file(word: str) -> list[Stored]:
+    if not word.endswith(".h5"):
+        return []
+    run = stored_run(Path(word))
+    if run is None:
+        raise StudyError(f"{word} holds no run with something to see in it; `organbench show` tells what it holds")
+    return [run]
