@@ -68,11 +68,11 @@ def jumps(pressure: np.ndarray, pairs: np.ndarray) -> float:
 
 def sway(scene: Scene, history: History) -> float:
     """Range of the probed force about its straight trend, over its mean [1], in the last frames of those in which
-    nothing outside moves; NaN where there are fewer than three, or no such force."""
+    nothing outside moves; NaN where there are fewer than three, or no force to compare."""
     rests = history.t > still_from(scene)
     last = np.flatnonzero(rests & (np.arange(len(history.t)) < history.good_frames))[-STILL_FRAMES:]
     among = history.contact_force if scene.probed.what == "obstacle" else history.held_force
-    if len(last) < 3 or not scene.probed.number < among.shape[1]:
+    if "force" not in scene.quantities or len(last) < 3 or not scene.probed.number < among.shape[1]:
         return float("nan")
     force = scene.output_force(history.contact_force, history.held_force)[last]
     trend, mean = np.polynomial.Polynomial.fit(last, force, 1), abs(float(force.mean()))

@@ -44,6 +44,7 @@ def test_frames_under_way_do_not_count():
     assert still_from(SQUEEZE) == 3.0 and sway(SQUEEZE, fast) < 1e-12
     assert np.isnan(sway(SQUEEZE, history(np.ones_like, good_frames=26)))
     assert np.isnan(sway(SQUEEZE, history(np.zeros_like)))
+    assert np.isnan(sway(replace(SQUEEZE, quantities=("volume",)), history(np.ones_like)))
     late = Sphere((0, 0, 1.0), 0.1, Trajectory((0.0, 5.9), ((0, 0, 0), (0, 0, -0.1))))
     assert np.isnan(sway(replace(SQUEEZE, obstacles=(late,)), history(np.ones_like)))
 
