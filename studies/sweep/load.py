@@ -1,6 +1,6 @@
 """The stored runs of a study, beside their references and frame times."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -39,10 +39,10 @@ def load_runs(root: Path, study: Study) -> tuple[list[Run], list[str]]:
         if record is not None:
             timing = tried(partial(read_timing, root, study.name, case)) if case.timed else None
             runs.append(Run(case, record, references[case.scene.name], timing))
-    return runs, _remarks(problems)
+    return runs, remarks_of(problems)
 
 
-def _remarks(problems: list[StudyError]) -> list[str]:
+def remarks_of(problems: Sequence[StudyError]) -> list[str]:
     """A sentence each, but one for all files of another version: after an update these are all files."""
     others = [str(problem) for problem in problems if isinstance(problem, OtherVersion)]
     more = f" (and {len(others) - 1} more files)" if len(others) > 1 else ""

@@ -7,6 +7,7 @@ from studies.base.errors import StudyError
 from studies.runs.case import case_from_json
 from studies.scenes import SCENES
 from studies.store.record import Status
+from studies.sweep.load import remarks_of
 from studies.view.stored import Stored, finest_reference, stored_runs
 
 
@@ -26,10 +27,10 @@ def listing(root: Path) -> tuple[list[str], list[str]]:
             lines += [f"  {_line(case)}" for case in cases]
     if not lines:
         raise StudyError(f"nothing to view is stored in {root}: `organbench run` does that")
-    return lines, problems
+    return lines, remarks_of(problems)
 
 
-def _reference(root: Path, name: str, cases: list[Stored]) -> tuple[str, list[str]]:
+def _reference(root: Path, name: str, cases: list[Stored]) -> tuple[str, list[StudyError]]:
     """The stored reference of a scene, as its cases or this version know it; and what cannot be read."""
     different = {json.dumps(case.scene_data): case for case in cases}.values()
     try:
@@ -39,7 +40,7 @@ def _reference(root: Path, name: str, cases: list[Stored]) -> tuple[str, list[st
             if path is not None:
                 return f"reference {path.stem}", []
     except StudyError as problem:
-        return "", [str(problem)]
+        return "", [problem]
     return "", []
 
 

@@ -42,18 +42,18 @@ class Stored:
         return self.header.name, self.path.stem
 
 
-def stored_runs(root: Path) -> tuple[list[Stored], list[str]]:
-    """All runs in the folders of `root` that can be viewed, the same one of several studies once; and a sentence for
-    each file that cannot be read. Raises StudyError where there is no such folder."""
+def stored_runs(root: Path) -> tuple[list[Stored], list[StudyError]]:
+    """All runs in the folders of `root` that can be viewed, the same one of several studies once; and what is wrong
+    with each file that cannot be read. Raises StudyError where there is no such folder."""
     if not root.is_dir():
         raise StudyError(f"there is no folder {root}; --results names the folder of the results")
     studies = [folder.name for folder in sorted(root.iterdir()) if folder.is_dir() and folder.name != REFERENCES]
-    found, problems = dict[tuple[str, str], Stored](), []
+    found, problems = dict[tuple[str, str], Stored](), list[StudyError]()
     for path in (path for study in studies for path in record_files(root, study)):
         try:
             entry = stored_run(path)
         except StudyError as problem:
-            problems.append(str(problem))
+            problems.append(problem)
             continue
         if entry is not None:
             found.setdefault((entry.header.key, entry.header.fingerprint), entry)

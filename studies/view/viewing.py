@@ -13,6 +13,7 @@ from studies.runs.case import case_from_json
 from studies.scene.scene import Scene
 from studies.scenes import SCENES
 from studies.store.record import Status, read_record
+from studies.sweep.load import remarks_of
 from studies.view.body import Shown
 from studies.view.from_records import shown_reference, shown_run
 from studies.view.stored import Stored, chosen_runs, finest_reference, stored_runs
@@ -65,14 +66,15 @@ def view(root: Path, words: Sequence[str]) -> View:
     where nothing can be read.
     """
     files = all(word.endswith(".h5") for word in words)
-    runs, remarks = ([], []) if files else stored_runs(root)
+    runs, problems = ([], []) if files else stored_runs(root)
     references = _References()
     loaded = []
     for stored in chosen_runs(words, runs):
         try:
             loaded.append((stored, _run(stored)))
         except StudyError as problem:
-            remarks.append(str(problem))
+            problems.append(problem)
+    remarks = remarks_of(problems)
     scene = _one_scene(root, words, [run for _, run in loaded], remarks)
     cases = [_shown(stored, run, references) for stored, run in loaded]
     if not loaded:

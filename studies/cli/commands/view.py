@@ -32,8 +32,12 @@ def view(
     warn(found.remarks)
     path = output if output is not None else Path(found.scene.name + SUFFIX)
     size = write_grid(path, side_by_side(found.times, found.bodies))
-    steps = f"{len(found.times)} steps from {found.times[0]:g} to {found.times[-1]:g} s"
-    count = "1 body" if len(found.bodies) == 1 else f"{len(found.bodies)} bodies"
-    say(f"{path}: {count}, {steps}, {size / 1e6:.1f} MB")
+    times = " ".join(f"{t:g}" for t in found.times)
+    say(f"{path}: {counted(len(found.bodies), 'body', 'bodies')} at {times} s, {size / 1e6:.1f} MB")
     for number, body in enumerate(found.bodies):
         say(f"  {number}  {body.name}")
+
+
+def counted(number: int, one: str, several: str) -> str:
+    """ "1 body", "2 bodies"."""
+    return f"{number} {one if number == 1 else several}"

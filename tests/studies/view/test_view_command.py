@@ -1,5 +1,7 @@
 """`organbench view`: which cases words name, what is listed, what is missing, and bad input."""
 
+import shutil
+import time
 from dataclasses import replace
 
 import h5py
@@ -9,13 +11,16 @@ import pytest
 from massspring import Free
 from studies.scenes import BALL_CLAMPED, BALL_RINGING
 from studies.store.record import Status, read_record, write_record
+from studies.view.listing import listing
 from tests.studies.made_up_run import SCENE
 from tests.studies.view.made import stored_case, stored_reference
 
 
 @pytest.fixture
-def root(tmp_path):
-    """A reference, two cases of it, one of which a second study has too, and one that did not start."""
+def root(tmp_path, monkeypatch):
+    """A reference, two cases of it, one of which a second study has too, and one that did not start. What is written
+    without a name lands beside it."""
+    monkeypatch.chdir(tmp_path)
     root = tmp_path / "results"
     stored_reference(root)
     kept = stored_case(root)
@@ -45,7 +50,7 @@ def test_a_scene_is_all_of_its_cases_beside_the_reference(root, tmp_path, organb
     assert reference.startswith("reference ball_clamped-350-")
     assert cases == [f"{stem(root, 'free')} (inverted)", stem(root, "implicit_volume")]
     first, *lines = out.splitlines()
-    assert first.startswith(f"{path}: 3 bodies, 2 steps from 2 to 4 s, ")
+    assert first.startswith(f"{path}: 3 bodies at 2 4 s, ")
     assert [line.split(maxsplit=1)[1] for line in lines] == names_in(path)
     with h5py.File(path) as file:
         root_group = file["VTKHDF"]
@@ -55,8 +60,7 @@ def test_a_scene_is_all_of_its_cases_beside_the_reference(root, tmp_path, organb
     assert np.abs(error[0, case == 1]).max() > 0.01 and np.abs(error[1, case == 1]).max() < 1e-12
 
 
-def test_cases_are_named_by_name_file_or_path_once_each(root, tmp_path, organbench, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_cases_are_named_by_name_file_or_path_once_each(root, organbench):
     by_file, by_path = stem(root, "free"), root / "made" / f"{stem(root, 'free')}.h5"
     for words in ([by_file], [by_path], [by_file.rsplit("-", 1)[0], by_file, by_path]):
         code, out, err = organbench("view", *words, "--results", root)
@@ -79,7 +83,7 @@ def test_what_is_missing_is_said_and_the_rest_is_shown(root, tmp_path, organbenc
     (root / "made" / f"{stem(root, 'free')}.h5").write_bytes(b"cut off")
     code, out, err = organbench("view", "ball_clamped", "-o", tmp_path / "a.vtkhdf", "--results", root)
     damaged, missing = err.splitlines()
-    assert code == 0 and ": 1 body, 2 steps" in out
+    assert code == 0 and ": 1 body at 2 4 s, " in out
     assert "is not an HDF5 file" in damaged and "the reference of 'ball_clamped' is not stored" in missing
     with h5py.File(tmp_path / "a.vtkhdf") as file:
         assert "error" not in file["VTKHDF/PointData"]
@@ -123,3 +127,23 @@ def test_what_does_not_belong_in_one_file_is_refused(root, refused):
 def test_files_of_other_kinds_are_refused(root, refused):
     (reference,) = (root / "reference").iterdir()
     assert "holds no run with something to see" in refused("view", reference, "--results", root)
+
+
+def test_files_of_an_earlier_version_are_one_warning(root, organbench):
+    with h5py.File(root / "made" / "old-00000001.h5", "w") as file:
+        file.attrs["schema"] = 1
+    shutil.copy(root / "made" / "old-00000001.h5", root / "made" / "old-00000002.h5")
+    code, out, err = organbench("view", "--results", root)
+    assert code == 0 and out.startswith("ball_clamped: 2 cases, ")
+    assert len(err.splitlines()) == 1 and "(and 1 more files)" in err
+
+
+def test_two_hundred_files_are_listed_in_five_seconds(tmp_path):
+    """Of this process; every file is read and held to its checksums, and as they are equal they are one case."""
+    path = stored_case(tmp_path)
+    for number in range(199):
+        shutil.copy(path, path.with_name(f"copy-{number:08d}.h5"))
+    begun = time.process_time()
+    (head, _), problems = listing(tmp_path)
+    assert time.process_time() - begun < 5.0
+    assert head.startswith("ball_clamped: 1 case, ") and problems == []
