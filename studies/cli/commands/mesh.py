@@ -3,7 +3,6 @@
 import json
 import sys
 import warnings
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,7 +12,7 @@ from rich.table import Table
 
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.cli.terminal import console, errors
+from studies.cli.terminal import console, errors, working
 from studies.geometry import OrganMesh, curved, organ, scan, vary
 from studies.geometry.api.scans import longest_side
 from studies.geometry.doctor.examine import TISSUE, Findings, examine
@@ -172,11 +171,6 @@ def asked_unit(path: Path) -> str | None:
     answer = typer.prompt(f"{unit_question(path.name, side)}. Which unit is it ({', '.join(UNITS)})?", default=likely)
     check_unit(answer)
     return str(answer)
-
-
-def working(what: str) -> Any:
-    """A line that moves while something takes long; nothing where there is no terminal."""
-    return errors.status(f"{what} …") if errors.is_terminal else nullcontext()
 
 
 def summary(made: OrganMesh) -> str:
