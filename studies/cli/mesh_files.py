@@ -4,7 +4,7 @@ import logging
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.status import Status
 
 from studies.base.errors import StudyError
-from studies.cli.terminal import errors
+from studies.cli.terminal import busy, errors
 from studies.geometry.files.estimate import size_warning
 from studies.geometry.files.faults import check_promises
 from studies.geometry.files.opening import opened
@@ -81,7 +81,7 @@ class Telling(logging.Handler):
 @contextmanager
 def working(what: str) -> Iterator[None]:
     """Tells what is going on while something takes long: a line that moves, or lines where there is no terminal."""
-    with errors.status(escape(f"{what} …")) if errors.is_terminal else nullcontext() as status:
+    with busy(escape(what)) as status:
         handler, level = Telling(what, status), WAITING.level
         WAITING.addHandler(handler)
         WAITING.setLevel(logging.INFO)

@@ -1,7 +1,8 @@
 """What all commands share: where they print, and the words for results and studies."""
 
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -22,3 +23,8 @@ def warn(sentences: list[str]) -> None:
     """Warnings on standard error, a line each."""
     for sentence in sentences:
         errors.print(f"warning: {sentence}", markup=False, highlight=False)
+
+
+def busy(what: str) -> Any:
+    """A line that moves while something takes long; nothing where there is no terminal."""
+    return errors.status(f"{what} …") if errors.is_terminal else nullcontext()

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from studies.cli.terminal import Results, say, warn
+from studies.cli.terminal import Results, busy, say, warn
 from studies.view.listing import listing
 from studies.view.side_by_side import side_by_side
 from studies.view.viewing import view as viewed
@@ -28,7 +28,8 @@ def view(
         return
     if output is not None:
         check_target(output)
-    found = viewed(results, names)
+    with busy(f"reading {' '.join(names)}"):
+        found = viewed(results, names)
     warn(found.remarks)
     path = output if output is not None else Path(found.scene.name + SUFFIX)
     size = write_grid(path, side_by_side(found.times, found.bodies))
