@@ -1,6 +1,5 @@
 """Every number that README states of a study is read off the published tables again."""
 
-import json
 import re
 from pathlib import Path
 
@@ -120,31 +119,3 @@ def test_meshes_and_settings_of_every_reference():
 def test_the_number_of_methods():
     (count,) = said(r"(\w+) methods, from springs alone to XPBD and implicit springs")
     assert count.lower() == WORDS[len(METHODS)]
-
-
-def test_the_table_of_quadratic_bodies():
-    """Each row against the case with its recipe in the published table of the campaign."""
-    rows = table("accuracy")
-    recipes = rows["recipe"].map(json.loads)
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    row = r"^\| (\w+) \| ([^|]+) \| ([^|]+) \| (\d+)( graded)?, (0\.\d) \| ([^|]+) \| ([^|]+) \|$"
-    found = re.findall(row, text, re.M)
-    assert len(found) == 9
-    for scene, paper_force, paper_mean, nodes, graded, fraction, force, mean in found:
-        body = {"kind": "quadratic", "nodes": int(nodes), "mass": "stiffness"} | ({"graded": True} if graded else {})
-        recipe = {"body": body} | ({} if fraction == "0.5" else {"dt_fraction": float(fraction)})  # 0.5 is the usual
-        own = rows[(rows["scene"] == scene) & recipes.map(lambda r, wanted=recipe: r == wanted)]
-        paper = rows[(rows["scene"] == scene) & (rows["body"] == "surface") & (rows["nodes"] == 550)]
-        for said_so, row, name in (
-            (paper_force, paper, "force_end"),
-            (paper_mean, paper, "mean_error"),
-            (force, own, "force_end"),
-            (mean, own, "mean_error"),
-        ):
-            assert len(row) == 1
-            value, floor = row[f"{name} [%]"].item(), row[f"{name} floor [%]"].item()
-            if said_so == "–":
-                assert value != value
-            else:
-                numbers = [float(x.replace("−", "-")) for x in said_so.split(" ± ")]
-                assert numbers == pytest.approx([value, floor], abs=0.051)

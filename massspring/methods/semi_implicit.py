@@ -9,8 +9,8 @@ in HCJ05, with S = J A⁻¹ Jᵀ and a back-solve per iteration.
 
 Limits: the change of Jᵀ with x stays explicit, which bounds dt where pressures are far above mu; long steps lose energy
 and blur what happens within one. Obstacles are met inside facets, where a step moves a force by what the masses alone
-resist, ∝ 1/dt²: at twice the explicit limit a pressed block has 98 % of its force 0.4 s after the press, at ten times
-a third. It suits bodies that are held, filled or weighed, not pressed.
+resist, ∝ 1/dt²: at twice the explicit limit a pressed block has 84 % of its force 0.4 s after the press, at ten times
+a sixth. It suits bodies that are held, filled or weighed, not pressed.
 """
 
 from dataclasses import dataclass, replace

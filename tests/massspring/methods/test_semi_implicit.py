@@ -115,7 +115,7 @@ def test_a_press_comes_to_the_force_of_explicit_steps(block, kind):
     short = pressed(block, ImplicitVolume(), 0.5 * limit_of(block), obstacle)
     assert short.outcome == "finished"
     force = short.contact_force[:, 0]
-    for fraction, short_by in ((0.5, 1e-3), (2.0, 0.05)):
+    for fraction, short_by in ((0.5, 1e-3), (2.0, 0.2)):
         long = pressed(block, SemiImplicit(), fraction * limit_of(block), obstacle)
         missing = np.abs(force - long.contact_force[:, 0]).max(axis=1) / np.abs(force[-1]).max()
         assert long.outcome == "finished" and missing[-1] < short_by

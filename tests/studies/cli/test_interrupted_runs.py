@@ -15,6 +15,10 @@ from studies.sweep.standings import standings
 from tests.studies.cli.test_interrupts import REPOSITORY, SAID
 from tests.studies.tiny import Silent, tiny_case, tiny_study
 
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="signals and process groups"),
+    pytest.mark.usefixtures("heard"),
+]
 SLOW_STUDY = """
 from tests.studies.tiny import tiny_case, tiny_study
 

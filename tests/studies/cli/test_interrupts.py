@@ -13,25 +13,20 @@ import pytest
 from studies.base import interrupts
 from studies.base.errors import StudyError
 from studies.cli import app as cli
-from studies.geometry.mesher import jobs
+from studies.geometry.mesher import process
 from studies.sweep.run_studies import perform
 from tests.studies.tiny import Silent
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and process groups")
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="signals and process groups"),
+    pytest.mark.usefixtures("heard"),
+]
 REPOSITORY = Path(__file__).parents[3]
 SAID = "organbench: interrupted; what is finished is stored, the same command goes on from there"
 
 
 def press():
     os.kill(os.getpid(), signal.SIGINT)
-
-
-@pytest.fixture(autouse=True)
-def heard():
-    """A shell's background job, and what it starts, ignores the signal; here it is meant."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 class PressedInWorker:
@@ -114,7 +109,7 @@ def test_workers_end_when_the_main_process_is_killed(tmp_path):
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no list of processes in /proc")
 def test_a_process_whose_parent_is_gone_before_it_listens_ends_too():
     """The mesher's way: a pipe that only the parent holds open, closed here before the process has begun."""
-    with jobs.pipe_to_here() as reading:
+    with process.pipe_to_here() as reading:
         worker = subprocess.Popen([sys.executable, "-c", MESHER], cwd=REPOSITORY, stdin=reading)
         assert worker.poll() is None
     assert worker.wait(timeout=60) == 1

@@ -12,7 +12,7 @@ from studies.runs.case import BodyRecipe
 from studies.runs.current import why_case_is_stale
 from studies.runs.run import measure, run_case
 from studies.scene.meshing import mesh_for
-from studies.scenes import Held
+from studies.scenes import Held, Organ
 from studies.store.record import Status, read_record
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
 
@@ -100,7 +100,11 @@ def test_millimetres_read_as_metres_warn_with_the_box(tmp_path):
         ({"scene": file_scene("/nowhere/organ.stl")}, "no mesh file"),
         (
             {"scene": replace(file_scene("organ.stl"), organ=replace(SQUEEZE.organ, shape="file"))},
-            "needs a path and a unit",
+            "unknown parameter of an organ from a file 'radius'",
+        ),
+        (
+            {"scene": replace(file_scene("organ.stl"), organ=Organ("file"))},
+            "a path and a unit",
         ),
         ({"scene": file_scene("organ.stl", unit="inch")}, "'inch' is not known"),
         ({"scene": replace(SQUEEZE, organ=replace(SQUEEZE.organ, shape="bal"))}, "did you mean 'ball'"),
