@@ -61,18 +61,11 @@ def quadratic_body(
     cells = np.ascontiguousarray(cells, dtype=np.uint32)
     slopes, weight = gradients(points, cells)
     _check_folds(points, cells, weight)
-    ends, product = _pairs(cells, np.einsum("kq,kqai,kqbi->kab", weight, slopes, slopes), len(points))
-    springs = Springs(
-        ends,
-        np.zeros(len(ends)),
-        -material.shear_modulus * product,
-        np.full(len(ends), SpringKind.SOLID, dtype=np.uint8),
-    )
+    springs = _springs(cells, weight, slopes, material.shear_modulus, len(points))
     mass = material.density * _lumped(cells, weight.sum(axis=1), len(points))
     parts = flat_parts(points, cells)
     outside = boundary_facets(cells)
-    _, corner_volume = np.unique(cells[:, :4], return_inverse=True)
-    volumes = PointVolumes(cells, slopes, weight, corner_volume.reshape(-1, 4))
+    volumes = PointVolumes(cells, slopes, weight, _numbered_corners(cells))
     body = Body(
         points,
         mass,
@@ -86,10 +79,25 @@ def quadratic_body(
         contact_facets=_touching(contact, outside),
         inertia=_inertia(inertia, mass, springs),
     )
-    if lumen is None:
-        return body
+    return body if lumen is None else _with_lumen(body, volumes, lumen)
+
+
+def _numbered_corners(cells: np.ndarray) -> np.ndarray:
+    """The corners (k, 4) of the cells, numbered among the corners alone."""
+    return np.unique(cells[:, :4], return_inverse=True)[1].reshape(-1, 4)
+
+
+def _with_lumen(body: Body, volumes: PointVolumes, lumen: np.ndarray) -> Body:
+    """The body that keeps also the volume inside the facets `lumen` (f, 6)."""
     inside = Volumes.closed_surfaces(body, {"lumen": parts_of_facets(lumen)})
     return body.keeping(replace(volumes, closed=inside))
+
+
+def _springs(cells: np.ndarray, weight: np.ndarray, slopes: np.ndarray, shear_modulus: float, nodes: int) -> Springs:
+    """The springs of zero length that are -mu K, K = sum of w grad N_a . grad N_b over the points."""
+    ends, product = _pairs(cells, np.einsum("kq,kqai,kqbi->kab", weight, slopes, slopes), nodes)
+    kinds = np.full(len(ends), SpringKind.SOLID, dtype=np.uint8)
+    return Springs(ends, np.zeros(len(ends)), -shear_modulus * product, kinds)
 
 
 def boundary_facets(cells: np.ndarray) -> np.ndarray:

@@ -33,23 +33,9 @@ def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
         (np.repeat(terms.data, 3)[by_entry] / 6.0, np.repeat(triangle, 3)[by_entry], _starts(place, len(entries))),
         shape=(len(entries), len(volumes.triangles)),
     )
-    chains, edges = edge_chains(sums, volumes.triangles)
-    chains.sort_indices()
-    summed, twin = _twins(chains)
-    ring, corner, share = quadrangles(chains[summed], edges)
-    sizes = np.bincount(ring, minlength=len(summed))
-    # Alike ones one after the other: the processor then knows what comes.
-    order = np.lexsort((sizes, twin != summed))
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    by_order = np.argsort(rank[ring], kind="stable")
-    place = np.argsort(by_node)
     dense = m if m <= DENSE_UP_TO else 0
     return VolumeRows(
-        target=np.column_stack([summed, place[summed], twin, place[twin]])[order].astype(np.uint32),
-        ring_start=np.concatenate([[0], np.cumsum(sizes[order])]).astype(np.uint32),
-        corner=corner[by_order],
-        corner_share=share[by_order],
+        **_rings(sums, volumes.triangles, np.argsort(by_node)),
         row_start=_starts(row, m),
         column=column.astype(np.uint32),
         node_start=_starts(column, nodes),
@@ -63,6 +49,26 @@ def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
         clusters=each_alone(0 if dense else m),
         **{name: np.zeros(m) for name in OF_EACH_VOLUME},
     )
+
+
+def _rings(sums: csr_array, triangles: np.ndarray, place: np.ndarray) -> dict[str, np.ndarray]:
+    """The quadrangles that make each entry of J, entry after entry, and where the entry goes: by row, and by node."""
+    chains, edges = edge_chains(sums, triangles)
+    chains.sort_indices()
+    summed, twin = _twins(chains)
+    ring, corner, share = quadrangles(chains[summed], edges)
+    sizes = np.bincount(ring, minlength=len(summed))
+    # Alike ones one after the other: the processor then knows what comes.
+    order = np.lexsort((sizes, twin != summed))
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    by_order = np.argsort(rank[ring], kind="stable")
+    return {
+        "target": np.column_stack([summed, place[summed], twin, place[twin]])[order].astype(np.uint32),
+        "ring_start": np.concatenate([[0], np.cumsum(sizes[order])]).astype(np.uint32),
+        "corner": corner[by_order],
+        "corner_share": share[by_order],
+    }
 
 
 def _twins(chains: csr_array) -> tuple[np.ndarray, np.ndarray]:

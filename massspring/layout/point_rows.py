@@ -17,8 +17,7 @@ REAL = np.dtype(np.float64)
 def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> PointRows:
     """The arrays of `volumes` on `body`; `inverse_mass` (n,) [1/kg] is 0 at held nodes."""
     m, n, blocks = volumes.count, body.node_count, -(-len(volumes.cells) // BLOCK)
-    rows = volumes.jacobian(body.rest)
-    diagonal, scale, inverse = inverse_at_rest(csr_array(rows @ diags_array(np.repeat(inverse_mass, 3)) @ rows.T))
+    diagonal, scale, inverse = inverse_at_rest(_compliance(volumes.jacobian(body.rest), inverse_mass))
     closed = np.empty((0, 3), dtype=np.uint32) if volumes.closed is None else volumes.closed.triangles
     node_start, node_entry = _entries(volumes.cells, n, 3)
     volume_start, volume_entry = _entries(volumes.corner_volume, volumes.vertex_count, 1)
@@ -55,6 +54,11 @@ def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> P
         facets=facet_rows(body.contact_facets, body.rest, inverse_mass),
         **{name: np.zeros(m) for name in ("volume", "lam", "right", "search", "image", "allowed")},
     )
+
+
+def _compliance(rows: csr_array, inverse_mass: np.ndarray) -> csr_array:
+    """J W Jᵀ of the rows (m, 3n) of J."""
+    return csr_array(rows @ diags_array(np.repeat(inverse_mass, 3)) @ rows.T)
 
 
 def _in_blocks(table: np.ndarray, padding: int | None = None) -> np.ndarray:

@@ -188,8 +188,7 @@ def slices_of(springs: Springs, triangles: np.ndarray, inverse_mass: np.ndarray,
     slots = _slots(*_lists_of(springs, triangles, len(rest)), along_curve(rest))
     node, slices = slots.node, len(slots.node)
     ring_rows, rest_rows = _rows(slots.ring, slices), _rows(slots.rest, slices)
-    rows = np.cumsum(ring_rows + rest_rows)
-    start = np.r_[0, rows]
+    start = np.r_[0, np.cumsum(ring_rows + rest_rows)]
     neighbour, rest_length, stiffness = _springs_by_lane(slots, springs, start, ring_rows, real)
     used = np.arange(LANES) < slots.lanes[:, None]
     in_a_row = used.all(axis=1) & (np.diff(node, axis=1) == 1).all(axis=1)

@@ -33,6 +33,12 @@ def source_of(path: Path, unit: str | None, scale: float, longest_side: str | No
     return Source(path, unit, scale, None if longest_side is None else length_of(longest_side), part)
 
 
+def settled(source: Source, yes: bool) -> Source:
+    """The file once it may be read and its unit is known: asks at the terminal, or raises StudyError."""
+    ask_before_large(source.path, yes)
+    return asked_unit(source)
+
+
 def ask_before_large(path: Path, yes: bool) -> None:
     """Warn of a large file before reading it: go on when --yes or an answer allows it, else raise StudyError."""
     if path.is_file():

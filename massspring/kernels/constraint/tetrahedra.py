@@ -125,15 +125,8 @@ def solve_cells(nodes, contacts, inverse_mass, cells, dt, compliance, accuracy):
         worst = max(worst, abs(residual[t]) / cells.rest_volume[t])
     iteration = 0
     while worst > accuracy.tolerance and iteration < accuracy.most_iterations:
-        rho = 0.0
-        for t in range(residual.shape[0]):
-            if cells.diagonal[t] > 0.0:
-                rho += residual[t] * residual[t] / cells.diagonal[t]
-        keep = rho / before if iteration > 0 else 0.0
+        rho = next_search_into(cells, before, iteration)
         before = rho
-        for t in range(residual.shape[0]):
-            if cells.diagonal[t] > 0.0:
-                search[t] = residual[t] / cells.diagonal[t] + keep * search[t]
         apply_cells(contacts, inverse_mass, cells, search, scale, compliance, image)
         curvature = 0.0
         for t in range(residual.shape[0]):
@@ -147,6 +140,21 @@ def solve_cells(nodes, contacts, inverse_mass, cells, dt, compliance, accuracy):
             worst = max(worst, abs(residual[t]) / cells.rest_volume[t])
         iteration += 1
     return iteration
+
+
+@compiled
+def next_search_into(cells, before, iteration):
+    """The next direction of conjugate gradients, preconditioned by the diagonal; r·D⁻¹r, which was `before`."""
+    residual, search = cells.right, cells.search
+    rho = 0.0
+    for t in range(residual.shape[0]):
+        if cells.diagonal[t] > 0.0:
+            rho += residual[t] * residual[t] / cells.diagonal[t]
+    keep = rho / before if iteration > 0 else 0.0
+    for t in range(residual.shape[0]):
+        if cells.diagonal[t] > 0.0:
+            search[t] = residual[t] / cells.diagonal[t] + keep * search[t]
+    return rho
 
 
 @compiled

@@ -66,6 +66,21 @@ def release_slipping(model, nodes, contacts, boundary, push):
     return changes
 
 
+@njit_inlined
+def onto_edge(contacts, i, a, b, edge):
+    """Node i moves along `edge` alone: v_target = alpha n + beta m with n·v_target = a and m·v_target = b."""
+    n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
+    m0, m1, m2 = contacts.second_normal[i, 0], contacts.second_normal[i, 1], contacts.second_normal[i, 2]
+    e0, e1, e2 = edge
+    square = e0 * e0 + e1 * e1 + e2 * e2
+    cosine, root = n0 * m0 + n1 * m1 + n2 * m2, math.sqrt(square)
+    alpha, beta = (a - cosine * b) / square, (b - cosine * a) / square
+    contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2] = e0 / root, e1 / root, e2 / root
+    contacts.v_target[i, 0] = alpha * n0 + beta * m0
+    contacts.v_target[i, 1] = alpha * n1 + beta * m1
+    contacts.v_target[i, 2] = alpha * n2 + beta * m2
+
+
 @njit_lean
 def activate_edges(model, nodes, contacts, boundary, step, push):
     """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 9.2); how many.
@@ -93,20 +108,10 @@ def activate_edges(model, nodes, contacts, boundary, step, push):
             square = e0 * e0 + e1 * e1 + e2 * e2
             if gap < deepest and square > PARALLEL:
                 deepest = gap
-                # v_target = α n + β m with n·v_target = a and m·v_target = b.
                 a, b = n0 * u0 + n1 * u1 + n2 * u2, m0 * u0 + m1 * u1 + m2 * u2 - gap / dt
-                cosine, root = n0 * m0 + n1 * m1 + n2 * m2, math.sqrt(square)
-                alpha, beta = (a - cosine * b) / square, (b - cosine * a) / square
                 contacts.second[i] = o + 1
                 contacts.second_normal[i, 0], contacts.second_normal[i, 1], contacts.second_normal[i, 2] = m0, m1, m2
-                contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2] = (
-                    e0 / root,
-                    e1 / root,
-                    e2 / root,
-                )
-                contacts.v_target[i, 0] = alpha * n0 + beta * m0
-                contacts.v_target[i, 1] = alpha * n1 + beta * m1
-                contacts.v_target[i, 2] = alpha * n2 + beta * m2
+                onto_edge(contacts, i, a, b, (e0, e1, e2))
         if deepest < 0.0:
             contacts.mode[i] = ON_EDGE
             changes += 1

@@ -99,16 +99,7 @@ class Step:
             if number == 0:
                 self.cap(begun)
             most = CONTACT_REVISIONS if number + 1 < passes else LAST_REVISIONS
-            for revision in range(most):
-                change, impulses = self.solve(free, active)
-                self.end_stage(MULTIPLIER)
-                if not obstacles or revision + 1 == most:
-                    break
-                revised = self.contact.revise(self.p + change, active, impulses)
-                active = self.active_set() if revised else active
-                self.end_stage(REVISION)
-                if not revised:
-                    break
+            change, impulses, active = self.revised(free, active, most if obstacles else 1)
             self.p += change
             self.rows.lam[:] += self.rows.search
             if self.far_off:
@@ -119,6 +110,20 @@ class Step:
         self.nodes.v[:] = (self.p - self.nodes.x) / self.boundary.dt
         self.nodes.x[:] = self.p
         self.end_stage(INTEGRATION)
+
+    def revised(self, free: np.ndarray, active: ActiveSet, most: int) -> tuple[np.ndarray, np.ndarray, ActiveSet]:
+        """Change of the positions, impulses and the active set they belong to, after at most so many solves."""
+        change, impulses = self.solve(free, active)
+        self.end_stage(MULTIPLIER)
+        for _ in range(most - 1):
+            revised = self.contact.revise(self.p + change, active, impulses)
+            active = self.active_set() if revised else active
+            self.end_stage(REVISION)
+            if not revised:
+                break
+            change, impulses = self.solve(free, active)
+            self.end_stage(MULTIPLIER)
+        return change, impulses, active
 
     def active_set(self) -> ActiveSet:
         """The touched nodes of the moment, and how volumes answer their pressures past them."""

@@ -1,1 +1,1 @@
-"""One command per module; studies.cli.app loads the one that is called."""
+"""Commands in rooms, one per module; studies.cli.app loads the one that is called."""

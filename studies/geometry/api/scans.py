@@ -3,6 +3,7 @@
 import hashlib
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,74 +24,94 @@ from studies.geometry.shape.regions import Region, region_to_dict
 from studies.geometry.surface.repair import Mended, border, mend
 
 
+@dataclass(frozen=True)
+class Remeshing:
+    """What is done to the surface of a file on its way to a body; lengths in metres."""
+
+    smooth: float = 0.0
+    """Folds are closed and bumps levelled up to about this size, see scan_shape; needs a number of nodes."""
+    holes: bool = False
+    """Borders are closed with flat lids first."""
+    solid: float | None = None
+    """What the surface encloses is filled, openings up to that width closed, for capsules and double walls."""
+    wall: float | None = None
+    """Thickness of the wall of a hollow organ; needs a number of nodes."""
+    layers: int | None = None
+    """Of elements in the wall."""
+
+    def check(self, name: str) -> None:
+        """Raise StudyError unless the lengths are such; name: of the file."""
+        if not 0 <= self.smooth < np.inf:
+            raise StudyError(f"{name}: smoothing over {1e3 * self.smooth:g} mm asked for; give 0 or a few millimetres")
+        if self.solid is not None and not 0 <= self.solid < np.inf:
+            millimetres = 1e3 * self.solid
+            raise StudyError(f"{name}: openings up to {millimetres:g} mm shall be closed; give 0 or some millimetres")
+        if self.wall is not None and not 0 < self.wall < np.inf:
+            raise StudyError(f"{name}: a wall of {1e3 * self.wall:g} mm asked for; give a thickness above 0")
+
+    @property
+    def recipe(self) -> dict[str, Any]:
+        """What of it decides a remeshed body, JSON-able."""
+        thickness = {} if self.wall is None else {"wall": float(self.wall)}
+        count = {} if self.wall is None or self.layers is None else {"layers": int(self.layers)}
+        return ({} if self.solid is None else {"solid": float(self.solid)}) | thickness | count
+
+
 def scan(
     path: str | Path | Source,
     nodes: int | None = None,
     *,
     unit: str | None = None,
-    smooth: float = 0.0,
-    holes: bool = False,
-    solid: float | None = None,
-    wall: float | None = None,
-    layers: int | None = None,
     fill: bool = True,
     regions: Mapping[str, Region] | None = None,
+    **how: Any,
 ) -> OrganMesh:
     """A body from the surface in a file: welded, its largest part kept, oriented, and remeshed to `nodes` nodes.
 
     path: a file, or a Source, which also has a scale or a part. nodes: None keeps the file's own triangles. unit: of
-    the file, one of UNITS; None: what the file says, or metres where only they make an organ of it. smooth: see
-    scan_shape [m]; needs `nodes`. holes: close borders first. solid: fill what the surface encloses, openings up to
-    that width [m] closed, for capsules and double walls; needs `nodes`. wall: thickness [m] of the wall of a hollow
-    organ, in `layers` of elements; needs `nodes`. fill: with tetrahedra. regions: attachments; with `nodes` their
-    outlines lie on edges. With `nodes` the mesh has the volume of the surface, and `losses` says how near it is to the
-    file. Warns of every change to the surface. Raises StudyError for what cannot be read, mended or meshed.
+    the file, one of UNITS; None: what the file says, or metres where only they make an organ of it. fill: with
+    tetrahedra. regions: attachments; with `nodes` their outlines lie on edges. how: the fields of Remeshing. With
+    `nodes` the mesh has the volume of the surface, and `losses` says how near it is to the file. Warns of every change
+    to the surface. Raises StudyError for what cannot be read, mended or meshed, TypeError for an unknown field.
     """
-    source = as_source(path, unit)
-    path = source.path
-    content = opened(source)
-    points, triangles = in_metres(source, content)
-    welded = weld(points, triangles)
-    # What a shell encloses needs no closed surface, and all parts of it.
-    mended = mend(*welded, path.name, holes) if solid is None else Mended(*welded, ())
-    for sentence in mended.remarks:
-        warnings.warn(f"{path.name}: {sentence}", stacklevel=2)
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    said = source.unit or content.unit or "m"
-    recipe: dict[str, Any] = {"kind": "file", "name": path.stem, "file": path.name, "sha256": digest, "unit": said}
-    recipe |= {"holes": bool(holes)} | source.recipe
+    source, remeshing = as_source(path, unit), Remeshing(**how)
+    name = source.path.name
+    mended, recipe = mended_surface(source, remeshing)
     if nodes is None:
-        if smooth or wall is not None or solid is not None:
+        if remeshing.smooth or remeshing.wall is not None or remeshing.solid is not None:
             raise StudyError(
-                f"{path.name}: smoothing, a wall and a filled shell need a new surface; say how many nodes it shall "
+                f"{name}: smoothing, a wall and a filled shell need a new surface; say how many nodes it shall "
                 "have (--nodes)"
             )
         body = as_it_is(mended, recipe, fill)
         return attach(body, regions) if regions else body
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
-        raise StudyError(f"{path.name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
-    if solid is None:
-        check_watertight(mended, path.name)
-    check_lengths(path.name, smooth, wall, solid)
-    recipe |= {} if solid is None else {"solid": float(solid)}
-    if wall is not None:
-        recipe |= {"wall": float(wall)} | ({} if layers is None else {"layers": int(layers)})
+        raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
+    if remeshing.solid is None:
+        check_watertight(mended, name)
+    remeshing.check(name)
     outlines = {key: region_to_dict(region) for key, region in (regions or {}).items()}
-    recipe |= {"kind": "scan", "nodes": int(nodes), "smooth": float(smooth), "fill": bool(fill), "regions": outlines}
+    recipe |= remeshing.recipe | {"kind": "scan", "nodes": int(nodes), "smooth": float(remeshing.smooth)}
+    recipe |= {"fill": bool(fill), "regions": outlines}
     mesh = mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles})
     for sentence in warnings_of(mesh.losses):
-        warnings.warn(f"{path.name}: {sentence}", stacklevel=2)
+        warnings.warn(f"{name}: {sentence}", stacklevel=2)
     return mesh
 
 
-def check_lengths(name: str, smooth: float, wall: float | None, solid: float | None) -> None:
-    """Raise StudyError unless the lengths [m] are such."""
-    if not 0 <= smooth < np.inf:
-        raise StudyError(f"{name}: smoothing over {1e3 * smooth:g} mm asked for; give 0 or a few millimetres")
-    if solid is not None and not 0 <= solid < np.inf:
-        raise StudyError(f"{name}: openings up to {1e3 * solid:g} mm shall be closed; give 0 or some millimetres")
-    if wall is not None and not 0 < wall < np.inf:
-        raise StudyError(f"{name}: a wall of {1e3 * wall:g} mm asked for; give a thickness above 0")
+def mended_surface(source: Source, remeshing: Remeshing) -> tuple[Mended, dict[str, Any]]:
+    """The surface of a file, welded and mended, and the recipe of the file. Warns of every change."""
+    path = source.path
+    content = opened(source)
+    welded = weld(*in_metres(source, content))
+    # What a shell encloses needs no closed surface, and all parts of it.
+    mended = mend(*welded, path.name, remeshing.holes) if remeshing.solid is None else Mended(*welded, ())
+    for sentence in mended.remarks:
+        warnings.warn(f"{path.name}: {sentence}", stacklevel=3)
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    said = source.unit or content.unit or "m"
+    recipe: dict[str, Any] = {"kind": "file", "name": path.stem, "file": path.name, "sha256": digest, "unit": said}
+    return mended, recipe | {"holes": bool(remeshing.holes)} | source.recipe
 
 
 def raw_surface(path: Path) -> tuple[np.ndarray, np.ndarray]:

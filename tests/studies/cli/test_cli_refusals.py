@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.cli.commands import table
+from studies.cli.commands.results import table
 from studies.runs.current import case_path
 from studies.store.paths import record_files
 from studies.store.record import Status, read_record, write_record

@@ -8,7 +8,7 @@ import typer
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
-from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, ask_before_large, asked_unit, source_of, working
+from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, settled, source_of, working
 from studies.cli.terminal import say
 from studies.geometry import scan
 from studies.plots.place import draw_placing
@@ -36,9 +36,7 @@ def place(
         raise StudyError(f"{output.name}: a scene file is Python; give it a name that ends in .py")
     if picture is not None and picture.suffix.lower() != ".png":
         raise StudyError(f"{picture.name}: the picture is a PNG; give it a name that ends in .png")
-    source = source_of(path, unit, scale, longest_side, part)
-    ask_before_large(path, yes)
-    source = asked_unit(source)
+    source = settled(source_of(path, unit, scale, longest_side, part), yes)
     with working(f"meshing {path.name}"):
         mesh = scan(source, nodes, smooth=smooth * MM, fill=False)
     if source.longest_side is None:

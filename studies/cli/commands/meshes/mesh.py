@@ -1,7 +1,8 @@
 """`organbench mesh`: from a name or a file to a mesh."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -14,12 +15,11 @@ from studies.cli.mesh_files import (
     Scale,
     Unit,
     Yes,
-    ask_before_large,
-    asked_unit,
+    settled,
     source_of,
     working,
 )
-from studies.cli.terminal import console
+from studies.cli.terminal import say
 from studies.geometry import OrganMesh, curved, organ, scan, vary
 from studies.geometry.files.units import NAMES, check_unit
 from studies.geometry.files.writing import SURFACES, VOLUMES, check_target, holds_tetrahedra, write_mesh
@@ -50,48 +50,37 @@ def mesh(
     yes: Yes = False,
 ) -> None:
     """Makes a mesh: of a synthetic organ, or from a file (welded, oriented, remeshed, filled)."""
+    check_unit(write_unit)
+    check_target(output, source)
+    filled = check_filling(output, fill, order)
     if bool(name) == (source is not None):
         raise StudyError("say what to mesh: the name of an organ (see `organbench list`), or --from FILE")
-    check_target(output, source)
-    check_unit(write_unit)
-    filled = holds_tetrahedra(output) if fill is None else fill
-    if filled and not holds_tetrahedra(output):
-        raise StudyError(f"{output.name}: {output.suffix} holds triangles only; use .vtu, or leave --fill out")
-    if order == 2 and not filled:
-        raise StudyError("curved elements (--order 2) fill a body; leave --surface out, and write .vtu, .vtk or .msh")
     if source is None:
-        refuse_file_options(
-            {
-                "--smooth": bool(smooth),
-                "--close-holes": close_holes,
-                "--solid": solid is not None,
-                "--unit": unit is not None,
-                "--scale": scale != 1.0,
-                "--longest-side": longest_side is not None,
-                "--part": part is not None,
-            }
-        )
+        given = {"--smooth": smooth, "--close-holes": close_holes, "--solid": solid, "--unit": unit}
+        refuse_file_options(given | {"--scale": scale != 1.0, "--longest-side": longest_side, "--part": part})
         with working(f"meshing the {name}"):
             made = synthetic(name, nodes or NODES, seed, wall, filled, exact=order == 1)
     else:
         if seed is not None:
             raise StudyError("--seed varies synthetic organs; a file comes as it is, leave it out")
-        given = source_of(source, unit, scale, longest_side, part)
-        ask_before_large(source, yes)
-        given = asked_unit(given)
-        options: dict[str, Any] = {
-            "smooth": smooth * MM,
-            "holes": close_holes,
-            "solid": in_metres(solid),
-            "fill": filled,
-        }
+        file = settled(source_of(source, unit, scale, longest_side, part), yes)
+        lengths = {"smooth": smooth * MM, "solid": in_metres(solid), "wall": in_metres(wall)}
         with working(f"meshing {source.name}"):
-            made = scan(given, nodes, wall=in_metres(wall), **options)
+            made = scan(file, nodes, fill=filled, holes=close_holes, **lengths)
     with working("curving" if order == 2 else "writing"):
         write_mesh(made, output, write_unit, curved(made) if order == 2 else None)
-    for line in nearness(made):
-        console.print(line, markup=False, highlight=False)
-    console.print(f"{summary(made)}; written to {output} in {NAMES[write_unit]}", markup=False, highlight=False)
+    for line in (*nearness(made), f"{summary(made)}; written to {output} in {NAMES[write_unit]}"):
+        say(line)
+
+
+def check_filling(output: Path, fill: bool | None, order: int) -> bool:
+    """Whether the body gets tetrahedra: as asked, or as its file can hold them. Raises StudyError where it cannot."""
+    filled = holds_tetrahedra(output) if fill is None else fill
+    if filled and not holds_tetrahedra(output):
+        raise StudyError(f"{output.name}: {output.suffix} holds triangles only; use .vtu, or leave --fill out")
+    if order == 2 and not filled:
+        raise StudyError("curved elements (--order 2) fill a body; leave --surface out, and write .vtu, .vtk or .msh")
+    return filled
 
 
 def in_metres(millimetres: float | None) -> float | None:
@@ -99,9 +88,9 @@ def in_metres(millimetres: float | None) -> float | None:
     return None if millimetres is None else millimetres * MM
 
 
-def refuse_file_options(given: dict[str, bool]) -> None:
-    """Raise StudyError for options that only a file can have, by name and whether they are given."""
-    wrong = [option for option, used in given.items() if used]
+def refuse_file_options(given: Mapping[str, object]) -> None:
+    """Raise StudyError for options that only a file can have, by name; None, False and 0 are not given."""
+    wrong = [option for option, value in given.items() if value not in (None, False)]
     if wrong:
         raise StudyError(f"{' and '.join(wrong)} are for files (--from); a synthetic organ needs none of it")
 

@@ -1,0 +1,1 @@
+"""Commands that answer a question: which recipe, which parameters, is the reference right."""

@@ -1,0 +1,1 @@
+"""Commands about meshes of organs: made, examined, placed."""

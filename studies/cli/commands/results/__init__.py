@@ -1,0 +1,1 @@
+"""Commands that read, draw, compare and publish what is stored."""

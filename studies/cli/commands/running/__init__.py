@@ -1,0 +1,1 @@
+"""Commands that run cases, and tell what a run will cost."""
