@@ -48,7 +48,7 @@ class ReferenceSolve:
         if plan.dt is None:
             plain = replace(plain, damping=0.0, start=None)
         data = {"scene": json.loads(scene_to_json(plain)), "level": self.level, "variant": self.variant}
-        return json.dumps(data, sort_keys=True, ensure_ascii=False)
+        return json.dumps(_with_floats(data), sort_keys=True, ensure_ascii=False)
 
     @property
     def moves(self) -> bool:
@@ -85,6 +85,15 @@ class ReferenceSolve:
     def weight(self) -> float:
         """What it costs, roughly: unknowns."""
         return self.level if self.level > 1 else self.level**-3
+
+
+def _with_floats(value: object) -> object:
+    """JSON-able data with every number as a float: a scene read back from a record has 350.0 for 350."""
+    if isinstance(value, dict):
+        return {key: _with_floats(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_with_floats(inner) for inner in value]
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
 def reference_solves(scene: Scene) -> list[ReferenceSolve]:

@@ -13,7 +13,7 @@ from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import reference_solves
 from studies.scene.scene import Scene
 from studies.scenes import SCENES
-from studies.store.paths import readable, record_files, study_folder
+from studies.store.paths import record_files
 from studies.store.record import Record, Status, peek
 from studies.store.schema import WITHOUT_FIELDS
 
@@ -69,19 +69,12 @@ def stored_run(path: Path) -> Stored | None:
 
 
 def finest_reference(root: Path, scene: Scene) -> Path | None:
-    """The file of the finest mesh of a scene's reference; None where it is not stored, or did not converge.
-
-    Keys are compared as numbers: a scene read back from a record has 350.0 where it was defined with 350.
-    """
+    """The file of the finest mesh of a scene's reference; None where it is not stored, or did not converge."""
     family = [solve for solve in reference_solves(scene) if not solve.variant]
     if not family:
         return None
-    wanted = json.loads(family[-1].key)
-    for path in sorted(study_folder(root, REFERENCES).glob(f"{readable(family[-1].name)}-*.h5")):
-        header = peek(path)
-        if header.status == Status.OK and json.loads(header.key) == wanted:
-            return path
-    return None
+    path = family[-1].path(root)
+    return path if path.is_file() and peek(path).status == Status.OK else None
 
 
 def chosen_runs(words: Sequence[str], runs: Sequence[Stored]) -> list[Stored]:

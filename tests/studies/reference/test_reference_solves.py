@@ -16,7 +16,8 @@ from studies.reference.load import load_reference
 from studies.reference.reference_solves import ReferenceSolve, reference_solves, standing_of
 from studies.reference.solve import solve
 from studies.report.references import refresh_uncertainty
-from studies.scenes import ReferencePlan
+from studies.scene.as_json import scene_from_json, scene_to_json
+from studies.scenes import SCENES, ReferencePlan
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.store.record import Status, read_record
 from studies.sweep.load import load_runs
@@ -44,6 +45,13 @@ def test_a_mesh_is_the_same_in_every_plan_that_halves_it_as_often():
     assert ReferenceSolve(each, 150).key != ReferenceSolve(replace(each, reference=alike.reference), 150).key
     smoke = each.reference.coarsest(2)
     assert (smoke.levels, smoke.at_outlines, smoke.at_contact) == ((150, 230), (1, 2), 0)
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+def test_a_scene_read_back_from_a_record_has_the_same_pieces(scene):
+    """JSON turns the level 350 into 350.0; the solution is the same."""
+    back = scene_from_json(scene_to_json(scene))
+    assert [piece.key for piece in reference_solves(back)] == [piece.key for piece in reference_solves(scene)]
 
 
 @pytest.mark.parametrize("times", [(1, 2), (1, 2, 3, 4), (0, -1, 2), -1])
