@@ -6,6 +6,8 @@ from studies.runs.case import BodyRecipe, Case
 from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE
 
 TETRAHEDRAL, SURFACE = BodyRecipe("tetrahedral"), BodyRecipe("surface")
+REPLAYED = (BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE)
+"""The scenes of which all bodies can be seen move (studies.runs.surface_frames)."""
 FINE_STEP = 0.05
 """The headline is repeated at a tenth of the step, so that it is seen not to depend on it."""
 
@@ -14,7 +16,7 @@ VOLUME_LOSS = Study(
     question=__doc__ or "",
     cases=(
         *(
-            Case(scene, body, method)
+            Case(scene, body, method, recorded=("surface",) if scene in REPLAYED else ())
             for scene in (BALL_SQUEEZE, BALL_CLAMPED, LIVER_PRESS, LIVER_PROBE)
             for body in (TETRAHEDRAL, SURFACE)
             for method in (Free(), ImplicitVolume())

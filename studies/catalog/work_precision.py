@@ -1,7 +1,7 @@
 """How much accuracy does run time buy: with the paper's body, one volume, and quadratic elements?"""
 
 from massspring import ImplicitVolume
-from studies.catalog.accuracy import BUDGETS, LONG, SHORT, headline, linear_bodies
+from studies.catalog.accuracy import BUDGETS, LONG, SHORT, headline_case, linear_bodies
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.scene import Scene
@@ -13,9 +13,10 @@ def cases(scene: Scene) -> tuple[Case, ...]:
     """Of the study accuracy: the paper's body and one volume in two sizes, the coarsest even quadratic body and the
     headline."""
     plain = [body for body in linear_bodies(scene) if body.volumes == "scene"]
-    even = BodyRecipe("quadratic", BUDGETS[0], mass=headline(scene).mass)
-    chosen = [*((body, SHORT) for body in plain), *((body, LONG) for body in (even, headline(scene)))]
-    return tuple(Case(scene, body, ImplicitVolume(), dt_fraction=step, timed=True) for body, step in chosen)
+    even = BodyRecipe("quadratic", BUDGETS[0], mass=headline_case(scene).body.mass)
+    chosen = [*((body, SHORT) for body in plain), (even, LONG)]
+    others = [Case(scene, body, ImplicitVolume(), dt_fraction=step, timed=True) for body, step in chosen]
+    return (*others, headline_case(scene))
 
 
 WORK_PRECISION = Study(

@@ -43,7 +43,7 @@ def kept_volumes(root: Path, studies: Sequence[Study]) -> pd.DataFrame:
             if record is None or record.status not in COMPARABLE:
                 continue
             worst = worst_volume(record.fields["volume"].values, record.fields["volume_target"].values)
-            rows[case.key] = {
+            rows[case.replaced(recorded=()).key] = {
                 "scene": case.scene.name,
                 "body": case.body.series,
                 "nodes": case.body.nodes,

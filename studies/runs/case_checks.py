@@ -9,6 +9,9 @@ from massspring.run.history import EXTRA
 from massspring.run.precision import check_precision
 from studies.base.errors import StudyError
 
+RECORDABLE = (*EXTRA, "surface")
+"""What a case may ask for beside what metrics read: energies, and positions of the outer surface for a replay."""
+
 
 def check_recipe(recipe: Any) -> None:
     """Raises StudyError for settings of a `studies.runs.case.BodyRecipe` that do not go together."""
@@ -42,9 +45,9 @@ def check_settings(case: Any) -> None:
         raise StudyError(str(error)) from error
     if not isinstance(case.recorded, tuple):
         raise StudyError(f"recorded is {case.recorded!r}; give a tuple, such as ({EXTRA[0]!r},)")
-    unknown = sorted(set(case.recorded) - set(EXTRA))
+    unknown = sorted(set(case.recorded) - set(RECORDABLE))
     if unknown:
-        raise StudyError(f"no extra field is called '{unknown[0]}'; there are {', '.join(EXTRA)}")
+        raise StudyError(f"no extra field is called '{unknown[0]}'; there are {', '.join(RECORDABLE)}")
 
 
 def _positive(value: object) -> bool:

@@ -9,8 +9,10 @@ from studies.scene.scene import Scene
 
 
 def recipe_text(case: Case) -> str:
-    """JSON of the settings that are not those of `Case(scene)`: '{"body": {"kind": "quadratic", "nodes": 794}}'."""
-    usual, given = _parts(Case(case.scene)), _parts(case)
+    """JSON of the settings that are not those of `Case(scene)`: '{"body": {"kind": "quadratic", "nodes": 794}}'.
+
+    What is recorded beside is left out: it changes no number of a table."""
+    usual, given = _parts(Case(case.scene)), _parts(case.replaced(recorded=()))
     differing = {name: value for name, value in given.items() if value != usual.get(name)}
     return json.dumps({name: _chosen(value, usual.get(name)) for name, value in differing.items()})
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from massspring import History, MassSpringError, simulate
+from massspring.run.history import EXTRA
 from studies.base.compile_watch import watching
 from studies.base.errors import DoesNotApply, StudyError
 from studies.runs.case import Case, case_from_json
@@ -16,6 +17,7 @@ from studies.runs.current import case_path, run_fingerprint
 from studies.runs.indicators import indicators, remarks
 from studies.runs.limits import TIME_LIMIT
 from studies.runs.prepare import LUMEN, Prepared, prepare
+from studies.runs.surface_frames import moments, surface_fields
 from studies.store.new_record import new_fields, new_record
 from studies.store.record import Field, Record, Status, read_record, write_record
 from studies.store.schema import RUN_FIELDS
@@ -44,7 +46,8 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
         try:
             prepared = prepare(case)
             # Attachments that overlap, or hold no node, show only when the run starts.
-            history = simulate(prepared.setup, checkpoint_frames(case, prepared), on_frame, TIME_LIMIT, case.recorded)
+            extra = [name for name in case.recorded if name in EXTRA]
+            history = simulate(prepared.setup, snapshot_frames(case, prepared), on_frame, TIME_LIMIT, extra)
         except DoesNotApply as reason:
             return _record(case, Status.SKIPPED, str(reason), {"warnings": _said(caught)}, {})
         except (StudyError, MassSpringError) as error:
@@ -64,6 +67,12 @@ def checkpoint_frames(case: Case, prepared: Prepared) -> list[int]:
     """Numbers (1 … F) of the frames that end at the scene's checkpoints."""
     clock = prepared.setup.clock
     return [min(clock.frames, max(1, round(t / clock.frame))) for t in case.scene.checkpoints]
+
+
+def snapshot_frames(case: Case, prepared: Prepared) -> list[int]:
+    """Numbers of the frames after which positions are kept: at checkpoints, and where the surface is recorded."""
+    at = checkpoint_frames(case, prepared)
+    return moments(prepared.setup.clock.frames, at) if "surface" in case.recorded else at
 
 
 def judge(case: Case, prepared: Prepared, history: History) -> tuple[Status, str]:
@@ -125,6 +134,7 @@ def _lumen_column(prepared: Prepared) -> int:
 
 def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field]:
     body = prepared.setup.body
+    at = np.isin(history.snapshot_frames, checkpoint_frames(case, prepared))
     values = {
         "t": history.t,
         "volume": history.volume,
@@ -135,14 +145,17 @@ def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field
         "held_force": history.held_force,
         "iterations": history.iterations,
         "min_j": history.min_j,
-        "snapshot_frame": history.snapshot_frames,
-        "snapshots": history.snapshots,
+        "snapshot_frame": history.snapshot_frames[at],
+        "snapshots": history.snapshots[at],
         "rest": body.rest,
         "mass": body.mass,
         "triangles": body.triangles,
         "tetrahedra": body.tetrahedra,
     }
-    return new_fields(RUN_FIELDS, values | {name: getattr(history, name) for name in case.recorded})
+    values |= {name: getattr(history, name) for name in case.recorded if name in EXTRA}
+    if "surface" in case.recorded:
+        values |= surface_fields(prepared, history)
+    return new_fields(RUN_FIELDS, values)
 
 
 def replay(path: Path) -> tuple[Record, Record, str | None]:

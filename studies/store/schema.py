@@ -74,6 +74,8 @@ LENGTHS: dict[str, str] = {
     "o": "obstacles",
     "g": "held regions",
     "K": "checkpoints reached; of a reference, all",
+    "P": "moments of a replay: about 60 and the checkpoints",
+    "v": "nodes of the outer surface",
     "n": "nodes; of a reference, of second order",
     "s": "surface triangles",
     "c": "tetrahedra",
@@ -99,8 +101,13 @@ RUN_FIELDS: dict[str, FieldSpec] = {
     "tetrahedra": FieldSpec("c 4", INDEX, "1", "nodes of each tetrahedron"),
     "kinetic": FieldSpec("F", NUMBER, "J", "kinetic energy", optional=True),
     "elastic": FieldSpec("F", NUMBER, "J", "energy of the springs", optional=True),
+    "surface_frame": FieldSpec("P", INDEX, "1", "frames before each position of the surface, 0 at the start", True),
+    "surface_node": FieldSpec("v", INDEX, "1", "nodes of the outer surface", True),
+    "surface": FieldSpec("P v 3", NUMBER, "m", "their positions, float32", True),
 }
-"""Of a run. Entries after an early end are NaN; the energies are there where the case asks (`recorded`)."""
+"""Of a run. Entries after an early end are NaN; what is optional is there where the case asks (`recorded`)."""
+SURFACE = ("surface_frame", "surface_node", "surface")
+"""Fields of a run that the word "surface" asks for."""
 
 SECONDS = {"seconds": AttributeSpec(NUMBER, "s", "wall time without compiling, for estimates", optional=True)}
 RUN_ATTRIBUTES: dict[str, AttributeSpec] = SECONDS | {

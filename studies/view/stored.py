@@ -37,6 +37,13 @@ class Stored:
         return str(self.scene_data["name"])
 
     @property
+    def physics(self) -> str:
+        """Its case but for what is recorded beside: the same for runs with the same numbers."""
+        data = json.loads(self.header.key)
+        data.pop("recorded", None)
+        return json.dumps(data, sort_keys=True)
+
+    @property
     def words(self) -> tuple[str, str]:
         """What it is called: the name of its case, which several may share, and its file's, which none does."""
         return self.header.name, self.path.stem
@@ -56,7 +63,7 @@ def stored_runs(root: Path) -> tuple[list[Stored], list[StudyError]]:
             problems.append(problem)
             continue
         if entry is not None:
-            found.setdefault((entry.header.key, entry.header.fingerprint), entry)
+            found.setdefault((entry.physics, entry.header.fingerprint), entry)
     return sorted(found.values(), key=lambda run: run.path.stem), problems
 
 

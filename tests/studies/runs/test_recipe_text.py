@@ -13,7 +13,7 @@ from studies.scenes.liver_press import LIVER_PRESS
 @pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
 def test_every_case_of_the_catalogue_comes_back(study):
     for case in study.cases:
-        assert case_of_recipe(case.scene, recipe_text(case)) == case.replaced(timed=False)
+        assert case_of_recipe(case.scene, recipe_text(case)) == case.replaced(timed=False, recorded=())
 
 
 def test_only_what_was_chosen_is_named():

@@ -67,7 +67,7 @@ def test_a_record_with_energies_replays_with_them(tmp_path, mesh_cache):
 
 
 def test_an_unknown_field_is_refused():
-    with pytest.raises(StudyError, match="no extra field is called 'enstrophy'; there are kinetic, elastic"):
+    with pytest.raises(StudyError, match="no extra field is called 'enstrophy'; there are kinetic, elastic, surface"):
         tiny_case().replaced(recorded=("enstrophy",))
 
 

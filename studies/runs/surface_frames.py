@@ -1,0 +1,32 @@
+"""Positions of the outer surface at moments of a run, where a case asks for them: what a replay shows."""
+
+import numpy as np
+
+from massspring import History
+from studies.runs.prepare import Prepared
+from studies.store.schema import SURFACE
+
+MOMENTS = 60
+"""Over the duration, in even steps; beside these the start, the checkpoints and the last frame."""
+
+
+def moments(frames: int, checkpoints: list[int]) -> list[int]:
+    """Numbers (1 … F) of the frames after which the surface is kept, ascending: at most MOMENTS and the checkpoints."""
+    even = {max(1, round(frames * part / MOMENTS)) for part in range(1, MOMENTS + 1)}
+    return sorted(even.union(checkpoints))
+
+
+def surface_fields(prepared: Prepared, history: History) -> dict[str, np.ndarray]:
+    """The fields SURFACE of a run whose snapshots are at `moments`: from the start to the last good frame.
+
+    Positions (P, v, 3) [m] are rounded to float32, to 6e-8 of their distance from the origin.
+    """
+    setup = prepared.setup
+    nodes = np.unique(prepared.mesh.outer_triangles)
+    start = setup.body.rest if setup.positions is None else setup.positions
+    frames, seen = [0, *history.snapshot_frames], [start[nodes], *history.snapshots[:, nodes]]
+    if frames[-1] < history.good_frames:  # an early end between two moments
+        frames.append(history.good_frames)
+        seen.append(history.final[nodes])
+    values = np.array(frames, dtype=np.int64), nodes.astype(np.int64), np.array(seen).astype(np.float32)
+    return dict(zip(SURFACE, values, strict=True))

@@ -1,0 +1,130 @@
+"""A recorded surface is where the run was: at the same steps, from the start to the end, and only where asked."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import simulate
+from studies.catalog import STUDIES, Study
+from studies.report.kept_volume import kept_volumes
+from studies.runs import surface_frames
+from studies.runs.case import BodyRecipe, Case, case_from_json
+from studies.runs.prepare import prepare
+from studies.runs.run import checkpoint_frames, measure, replay, run_case
+from studies.runs.surface_frames import MOMENTS, moments
+from studies.scenes import STOMACH_PRESS
+from studies.scenes.stress import STRESS_SCENES
+from studies.store.record import Status, read_record
+from studies.store.schema import SURFACE
+from studies.timing.cases import time_cases
+from studies.view.stored import stored_runs
+from tests.studies.tiny import NODES, diverging_case, tiny_case
+
+FRAMES = 130
+"""More than there are moments, and no multiple of them."""
+CASE = tiny_case(frames=FRAMES, recorded=("surface",))
+
+
+@pytest.fixture(scope="module")
+def stored(mesh_cache, tmp_path_factory):
+    """A run with its surface, and where it lies."""
+    path = run_case(tmp_path_factory.mktemp("surface"), "tiny", CASE)
+    return path, read_record(path)
+
+
+@pytest.fixture(scope="module")
+def every_frame(mesh_cache):
+    """The positions of the same run after every frame, kept in memory."""
+    prepared = prepare(CASE)
+    return prepared, simulate(prepared.setup, range(1, FRAMES + 1), extra=())
+
+
+def test_the_frames_are_the_run_s_own_positions(stored, every_frame):
+    record, (prepared, history) = stored[1], every_frame
+    frames, nodes, surface = (record.fields[name].values for name in SURFACE)
+    assert surface.dtype == np.float32 and surface.shape == (len(frames), len(nodes), 3)
+    own = np.concatenate([prepared.setup.body.rest[None], history.snapshots])
+    assert np.array_equal(surface, own[frames][:, nodes].astype(np.float32))
+    # Ends, checkpoints and about 60 more.
+    assert frames[0] == 0 and frames[-1] == FRAMES and np.all(np.diff(frames) > 0)
+    assert set(checkpoint_frames(CASE, prepared)) <= set(frames) and len(frames) <= MOMENTS + 1 + 7
+    assert np.diff(frames).max() == -(-FRAMES // MOMENTS)
+
+
+def test_the_nodes_are_those_of_the_surface_and_fewer_than_all(stored):
+    record = stored[1]
+    nodes = record.fields["surface_node"].values
+    assert np.array_equal(nodes, np.unique(record.fields["triangles"].values)) and len(nodes) == NODES
+    assert record.attributes["nodes"] > NODES
+
+
+def test_nothing_else_changes_and_nothing_is_recorded_unasked(stored):
+    plain, full = measure(CASE.replaced(recorded=())), stored[1]
+    assert set(full.fields) - set(plain.fields) == set(SURFACE)
+    for name, field in plain.fields.items():
+        assert np.array_equal(field.values, full.fields[name].values, equal_nan=field.values.dtype.kind == "f"), name
+
+
+def test_it_replays_and_its_case_survives_json(stored):
+    _, new, gap = replay(stored[0])
+    assert gap is None and set(SURFACE) <= set(new.fields)
+    assert case_from_json(CASE.key) == CASE
+
+
+def test_timed_runs_keep_no_surface(tmp_path, monkeypatch):
+    """A run that is timed keeps no positions, whatever its case records."""
+    asked = []
+
+    def watched(setup, snapshots=(), **options):
+        asked.append(tuple(snapshots))
+        return simulate(setup, snapshots, **options)
+
+    monkeypatch.setattr("studies.timing.cases.simulate", watched)
+    monkeypatch.setattr("studies.timing.cases.BUDGET", 0.0)
+    time_cases(tmp_path, "tiny", [tiny_case(recorded=("surface",), timed=True)], lambda name: None)
+    assert len(asked) >= 2 and set(asked) == {()}
+
+
+def test_an_early_end_is_the_last_frame_and_a_start_of_its_own_the_first():
+    cut = measure(diverging_case().replaced(frames=FRAMES, recorded=("surface",)))
+    assert cut.status == Status.DIVERGED
+    frames, surface = cut.fields["surface_frame"].values, cut.fields["surface"].values
+    assert frames[-1] == cut.attributes["good_frames"] < FRAMES and np.isfinite(surface).all()
+    shrunk = next(scene for scene in STRESS_SCENES if scene.name == "stress_shrunk")
+    record = measure(Case(shrunk, BodyRecipe(nodes=NODES), dt_fraction=0.2, frames=4, recorded=("surface",)))
+    first = record.fields["surface"].values[0]
+    assert np.ptp(first, axis=0).max() < 0.01 * np.ptp(record.fields["rest"].values, axis=0).max()
+
+
+def test_a_lumen_is_not_seen():
+    scene = replace(STOMACH_PRESS, reference=None)
+    record = measure(Case(scene, BodyRecipe(nodes=400), frames=1, dt_fraction=0.5, recorded=("surface",)))
+    nodes, triangles = record.fields["surface_node"].values, record.fields["triangles"].values
+    assert len(nodes) < len(np.unique(triangles))
+    inside = np.isin(triangles, nodes).all(axis=1)
+    assert 0 < inside.sum() < len(triangles) and np.array_equal(np.unique(triangles[inside]), nodes)
+
+
+def test_moments_are_few_and_never_before_the_first_frame():
+    assert moments(5, [5]) == [1, 2, 3, 4, 5]
+    assert len(moments(80_000, [1, 777])) == MOMENTS + 2
+    assert moments(1, [1]) == [1] and surface_frames.MOMENTS == 60
+
+
+def test_main_studies_can_be_replayed():
+    """Each main study that judges accuracy has cases to look at, and the results grow by 10 MB at most."""
+    asked = [case for study in STUDIES if study.main for case in study.cases if case.recorded == ("surface",)]
+    assert {case.scene.name for case in asked} == {"ball_squeeze", "liver_press", "liver_probe", "ball_clamped"}
+    assert {case.body.kind for case in asked} == {"tetrahedral", "surface", "quadratic"}
+    assert sum(12 * case.body.nodes * (MOMENTS + 8) for case in asked) <= 10e6
+
+
+def test_the_same_run_with_and_without_its_surface_is_seen_once(stored, tmp_path):
+    """Two studies may hold it: what lists runs of all studies tells their physics apart, not what is recorded."""
+    kinds = {"one": CASE.replaced(recorded=()), "two": CASE}
+    assert len({run_case(tmp_path, study, case).name for study, case in kinds.items()}) == 2
+    runs, problems = stored_runs(tmp_path)
+    assert problems == [] and len(runs) == 1
+    studies = [Study(study, "Once?", (case,), (), ()) for study, case in kinds.items()]
+    assert len(kept_volumes(tmp_path, studies)) == 1
