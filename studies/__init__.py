@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from studies.metrics.run import Run
     from studies.metrics.table import study_table
     from studies.runs.case import BodyRecipe, Case
+    from studies.runs.own import own_law
     from studies.runs.run import measure
     from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
     from studies.scene.start import InitialConditions
@@ -109,6 +110,7 @@ _FACE = {
     "load_runs": "studies.sweep.load",
     "measure": "studies.runs.run",
     "organ": "studies.geometry.api.organs",
+    "own_law": "studies.runs.own",
     "read_record": "studies.store.record",
     "recommended": "studies.advice.answer",
     "run_studies": "studies.sweep.run_studies",

@@ -4,29 +4,42 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
+from studies.reference.uncertainty import QUANTITIES
 from studies.runs.recipe_text import recipe_text
 
 UNRESOLVED = "doubtful"
 """Column with the metrics of which the reference knows the truth less than ten times better than the model."""
 
 
-def metric(name: str) -> Metric:
-    """The metric called `name`. Raises StudyError with the nearest match."""
-    return lookup(name, {m.name: m for m in METRICS}, "metric")
+def metric(name: str | Metric) -> Metric:
+    """The metric called `name`, or the one of a user's own that is given.
+
+    Raises StudyError with the nearest match; for one of a user's own whose name is taken, or whose quantity no
+    reference has.
+    """
+    if isinstance(name, str):
+        return lookup(name, {m.name: m for m in METRICS}, "metric")
+    if name not in METRICS and name.name in [m.name for m in METRICS]:
+        raise StudyError(f"metric '{name.name}' is one of the project's own; give yours another name")
+    if name.quantity is not None:
+        lookup(name.quantity, QUANTITIES, f"quantity of a reference in metric '{name.name}':")
+    return name
 
 
-def check_columns(names: Sequence[str]) -> None:
-    """Raises StudyError for a name that is no metric, before minutes are spent on a table without it."""
+def check_columns(names: Sequence[str | Metric]) -> None:
+    """Raises StudyError for what is no metric, before minutes are spent on a table without it."""
     for name in names:
         metric(name)
 
 
-def study_table(runs: Sequence[Run], columns: Sequence[str]) -> pd.DataFrame:
-    """Metrics `columns` of `runs`; a column "… floor" follows where the reference has an uncertainty of its own."""
+def study_table(runs: Sequence[Run], columns: Sequence[str | Metric]) -> pd.DataFrame:
+    """Metrics `columns`, by name or as they are, of `runs`; a column "… floor" follows where the reference has an
+    uncertainty of its own."""
     metrics = [metric(name) for name in columns]
     rows = [_row(run, metrics) for run in runs]
     known = {name for row in rows for name, value in row.items() if " floor [" not in name or value == value}

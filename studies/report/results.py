@@ -7,11 +7,12 @@ from typing import Any
 
 from studies.base.atomic import is_there, write_whole
 from studies.base.errors import StudyError
-from studies.base.study_file import fault_of_study_file, is_of_study_file
+from studies.base.own_file import file_of
+from studies.base.study_file import fault_of_study_file
 from studies.catalog.study import Study
 from studies.geometry import SHAPES, organ
 from studies.metrics.run import Run
-from studies.metrics.table import study_table
+from studies.metrics.table import metric, study_table
 from studies.plots.figures import paper_ball, paper_slide
 from studies.plots.figures.organ_springs import draw_organ_springs
 from studies.plots.figures.organs import draw_organs
@@ -45,7 +46,7 @@ def draw_charts(root: Path, study: Study, runs: Sequence[Run]) -> list[Path]:
             chart.draw(runs, folder / chart.file)
         except Exception as error:  # a user's own chart may fail in any way
             own = fault_of_study_file(error)
-            if own is None and is_of_study_file(chart.draw):  # it could not even be called
+            if own is None and file_of(chart.draw) is not None:  # it could not even be called
                 own = f"its function fails: {type(error).__name__}: {error}"
             if own is None:
                 raise
@@ -123,12 +124,15 @@ def _stamped(stamp: Path) -> dict[str, Any]:
 
 
 def inputs_of(root: Path, study: Study) -> str:
-    """Hash of all that charts and tables are made from: result files with their sizes and times, and the code."""
+    """Hash of all that charts and tables are made from: result files with their sizes and times, and the code, that of
+    the user's files too."""
     files = [case_path(root, study.name, case) for case in study.cases]
     files += [timing_file(root, study.name, case) for case in study.cases if case.timed]
-    return state_of(
-        [*files, *(reference_solve.path(root) for scene in study.scenes for reference_solve in reference_solves(scene))]
-    )
+    references = [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
+    metrics = [metric(column) for column in study.columns]
+    shown = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
+    own = {file.sha256[:16] for file in map(file_of, shown) if file is not None}
+    return "-".join([state_of([*files, *references]), *(entry.name for entry in metrics), *sorted(own)])
 
 
 def draw_figures(root: Path) -> list[Path]:

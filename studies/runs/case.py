@@ -8,13 +8,11 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 
-from massspring import METHODS, ImplicitVolume, Method
-from massspring.body.laws import laws_by_name
-from massspring.body.membranes import MEMBRANE_LAWS
-from massspring.body.smoothed import SMOOTHED
+from massspring import ImplicitVolume, Method
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.runs.case_checks import check_recipe, check_settings
+from studies.runs.own import law_names, methods_by_name
 from studies.scene.as_json import _scene_adapter, scene_from_dict
 from studies.scene.scene import Scene
 
@@ -33,8 +31,8 @@ class BodyRecipe:
     """Nodes on the outer surface; of a quadratic body mid-side nodes too, so that it has a quarter of them as vertices,
     and of a graded one those that grading adds (within 5 %)."""
     law: str = "van_gelder"
-    """Stiffness law: of a tetrahedral body of LAWS or SMOOTHED, where springs without length need nodal volumes;
-    of a membrane "delingette" or "lloyd"."""
+    """Stiffness law: of a tetrahedral body of LAWS, of SMOOTHED or of one's own (`studies.runs.own.own_law`), where
+    springs without length need nodal volumes; of a membrane "delingette" or "lloyd"."""
     stiffness: float = 1.0
     """Factor on every spring; 1 matches the tissue's shear modulus."""
     volumes: Literal["scene", "whole", "regions", "patches", "nodal"] = "scene"
@@ -57,7 +55,7 @@ class BodyRecipe:
     """Where obstacles touch a quadratic body: at points inside its facets, or at its nodes, which is cheaper."""
 
     def __post_init__(self) -> None:
-        lookup(self.law, (*laws_by_name(), *SMOOTHED, *MEMBRANE_LAWS), "stiffness law")
+        lookup(self.law, law_names(), "stiffness law")
         check_recipe(self)
 
     @property
@@ -211,7 +209,7 @@ def case_from_json(text: str) -> Case:
 
 def method_from_dict(data: Mapping[str, Any]) -> Method:
     """The method of {"name": …, "settings": {…}}; an unknown setting is an error. Raises StudyError."""
-    kind = lookup(data["name"], {method.name: method for method in METHODS}, "method")
+    kind = lookup(data["name"], methods_by_name(), "method")
     unknown = set(data["settings"]) - set(kind.__dataclass_fields__)  # pyright: ignore[reportAttributeAccessIssue]
     if unknown:
         raise StudyError(f"method '{kind.name}' has no setting {', '.join(sorted(unknown))}")

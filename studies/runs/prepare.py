@@ -25,6 +25,7 @@ from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.grading.quadratic_mesh import QuadraticMesh
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.limits import check_size
+from studies.runs.own import own_laws, sprung_by
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scene.scene import Scene
@@ -67,6 +68,9 @@ def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh) 
         body = surface_body(
             outside.points[: outside.outer_count], outside.triangles, material, recipe.axis, recipe.weights
         )
+    elif recipe.law in own_laws():
+        body = tetrahedral_body(mesh.points, mesh.triangles, mesh.tetrahedra, material)
+        body = sprung_by(body, own_laws()[recipe.law], material.shear_modulus)
     else:
         body = tetrahedral_body(mesh.points, mesh.triangles, mesh.tetrahedra, material, recipe.law)
     if recipe.stiffness != 1.0:

@@ -1,5 +1,6 @@
 """One case: prepared, simulated, judged, stored. Whatever happens is a result; only a full disk is not."""
 
+import json
 import time
 import warnings
 from collections.abc import Callable
@@ -12,16 +13,20 @@ from massspring import History, MassSpringError, simulate
 from massspring.run.history import EXTRA
 from studies.base.compile_watch import watching
 from studies.base.errors import DoesNotApply, StudyError
+from studies.base.own_file import fault_of_own
 from studies.runs.case import Case, case_from_json
-from studies.runs.current import case_path, run_fingerprint
+from studies.runs.current import case_fingerprint, case_path
 from studies.runs.indicators import indicators, remarks
 from studies.runs.limits import TIME_LIMIT
+from studies.runs.own import files_of
 from studies.runs.prepare import LUMEN, Prepared, prepare
 from studies.runs.surface_frames import moments, surface_fields
 from studies.store.new_record import new_fields, new_record
 from studies.store.record import Field, Record, Status, read_record, write_record
 from studies.store.schema import RUN_FIELDS
 
+OWN_FILES = "own_files"
+"""Attribute of a run: the user's files that it was made with, as JSON {path: SHA-256}."""
 DRIFT = 0.01
 """A method that keeps the volume and is this far from it has drifted: thirty times what the worst claims allow."""
 
@@ -52,6 +57,11 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
             return _record(case, Status.SKIPPED, str(reason), {"warnings": _said(caught)}, {})
         except (StudyError, MassSpringError) as error:
             return _record(case, Status.FAILED, str(error), {"warnings": _said(caught)}, {})
+        except Exception as error:  # code of a user may fail in any way
+            own = fault_of_own(error)
+            if own is None:
+                raise
+            return _record(case, Status.FAILED, own, {"warnings": _said(caught)}, {})
     status, message = judge(case, prepared, history)
     found = indicators(case.scene, prepared.setup.body, history, _lumen_column(prepared))
     said = "; ".join(filter(None, [_said(caught), *remarks(found)]))
@@ -94,14 +104,15 @@ def judge(case: Case, prepared: Prepared, history: History) -> tuple[Status, str
 
 
 def _record(case: Case, status: Status, message: str, attributes: dict, fields: dict[str, Field]) -> Record:
+    own = {str(file.path): file.sha256 for file in files_of(case.method, case.body.law)}
     return new_record(
         kind="run",
         key=case.key,
         name=case.name,
         status=status,
         message=message,
-        fingerprint=run_fingerprint(),
-        attributes=attributes,
+        fingerprint=case_fingerprint(case),
+        attributes=attributes | ({OWN_FILES: json.dumps(own)} if own else {}),
         fields=fields,
     )
 
@@ -156,6 +167,11 @@ def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field
     if "surface" in case.recorded:
         values |= surface_fields(prepared, history)
     return new_fields(RUN_FIELDS, values)
+
+
+def own_files_of(record: Record) -> dict[str, str]:
+    """The user's files that a run was made with: path -> SHA-256 of its content then."""
+    return json.loads(str(record.attributes.get(OWN_FILES) or "{}"))
 
 
 def replay(path: Path) -> tuple[Record, Record, str | None]:

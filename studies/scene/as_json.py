@@ -5,8 +5,9 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
+from studies.base.errors import StudyError
 from studies.scene.scene import Scene
 
 
@@ -18,6 +19,14 @@ def scene_to_json(scene: Scene) -> str:
 def scene_from_dict(data: Mapping[str, Any]) -> Scene:
     """The scene of a JSON-able form; pydantic checks every type."""
     return _scene_adapter().validate_python(data)
+
+
+def scene_of_key(key: str) -> Scene:
+    """The scene of a stored case, whose method or law may be in a file that is not at hand. Raises StudyError."""
+    try:
+        return scene_from_dict(json.loads(key)["scene"])
+    except (ValueError, KeyError, TypeError, ValidationError) as error:
+        raise StudyError(f"the text is no stored case, it has no scene: {str(error).splitlines()[0]}") from error
 
 
 @cache

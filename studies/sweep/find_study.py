@@ -1,17 +1,14 @@
 """A study by name: of the catalogue, or of a Python file of the user."""
 
-import importlib.util
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from studies.base import interrupts
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.base.study_file import MODULE, what_failed
 from studies.catalog import STUDIES, Study
 from studies.runs.case import Case, case_from_json, case_to_dict
+from studies.sweep.own_files import load_file
 
 MAIN = "main"
 """Stands for the main studies of the catalogue; no study has this name."""
@@ -23,7 +20,7 @@ def find_study(name: str) -> Study:
         return lookup(name, {study.name: study for study in STUDIES}, "study")
     if not Path(name).is_file():
         raise StudyError(f"there is no study file {name}; give a Python file that defines STUDY")
-    study = _load(Path(name).resolve())
+    study = getattr(load_file(Path(name)), "STUDY", None)
     if not isinstance(study, Study):
         raise StudyError(f"{name} defines no STUDY of type studies.catalog.Study; see CONTRIBUTING.md")
     for case in study.cases:
@@ -62,18 +59,3 @@ def _difference(given: Any, back: Any, where: str = "") -> str | None:
     else:
         return None if type(given) is type(back) and given == back else f"{where} = {given!r}"
     return next((odd for odd in (_difference(a, b, path) for path, a, b in pairs) if odd), None)
-
-
-def _load(path: Path) -> object:
-    spec = importlib.util.spec_from_file_location(MODULE, path)
-    assert spec is not None  # the name ends in .py
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[MODULE] = module  # its own dataclasses look themselves up there
-    try:
-        spec.loader.exec_module(module)
-    except BaseException as error:  # the file of a user may fail in any way, and may leave by sys.exit
-        if isinstance(error, KeyboardInterrupt) and (interrupts.pressed() or not interrupts.are_heard()):
-            raise
-        raise StudyError(f"{path.name} cannot be loaded: {what_failed(path, error)}; mend it and run again") from error
-    return getattr(module, "STUDY", None)

@@ -7,7 +7,7 @@ from pathlib import Path
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.reference.reference_solves import ReferenceSolve
-from studies.runs.current import run_fingerprint
+from studies.runs.current import case_fingerprint
 from studies.store.record import peek
 from studies.store.staleness import why_stale
 from studies.sweep.tasks import Task, tasks_of
@@ -45,7 +45,7 @@ def plan(root: Path, study: Study, wanted: Callable[[Task], bool] | None = None)
         if not case.timed or (wanted is not None and case.name not in runs):
             continue
         file = timing_file(root, study.name, case)
-        why = why_stale(file, case.key, run_fingerprint())
+        why = why_stale(file, case.key, case_fingerprint(case))
         if why is not None and (case.name in runs or can_be_timed(root, study.name, case)):
             found.append(Planned(TIMING, "timing", case.name, why, _seconds(file)))
     return found

@@ -21,8 +21,10 @@ from studies.base.interrupts import die_quietly, died_of_it, held_back
 from studies.catalog.study import Study
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
+from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.runs.run import run_case
+from studies.sweep.own_files import Given, given_files, load_given
 from studies.sweep.tasks import Task, tasks_of
 from studies.timing.cases import time_cases, timing_is_current
 
@@ -76,9 +78,10 @@ def told_by_workers(on_compile: Told) -> Iterator[Connection]:
         thread.join()
 
 
-def begin_worker(writer: Connection | None) -> None:
-    """What every process does first: it ends quietly, and tells what it compiles."""
+def begin_worker(writer: Connection | None, files: tuple[Given, ...] = ()) -> None:
+    """What every process does first: it ends quietly, loads the user's `files`, and tells what it compiles."""
     die_quietly()
+    load_given(files)
     if writer is not None:
         event.register("numba:compile", CompileWatch(writer.send))
 
@@ -89,15 +92,17 @@ def perform(
     progress: Progress,
     do: Callable[[Task], Path] = do,
     writer: Connection | None = None,
+    files: tuple[Given, ...] = (),
 ) -> None:
-    """Runs the tasks in `jobs` processes. Ctrl-C keeps what is stored; a process that dies is reported by name."""
+    """Runs the tasks in `jobs` processes, which load the user's `files`. Ctrl-C keeps what is stored; a process that
+    dies is reported by name."""
     if not tasks:
         return
     progress.begin("physics", len(tasks))
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # read by the libraries when a worker loads them
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=begin_worker, initargs=(writer,))
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=begin_worker, initargs=(writer, files))
     workers: list[BaseProcess] = []
     try:
         with held_back():
@@ -143,8 +148,9 @@ def run_studies(
     todo = [task for task in tasks_of(root, studies) if rule(task)]
     if todo:
         check_writable(root)
+        files = given_files(task.work for task in todo if isinstance(task.work, Case))
         with told_by_workers(on_compile) as writer:
-            perform(todo, jobs, progress, writer=writer)
+            perform(todo, jobs, progress, writer=writer, files=files)
     measured, ran = 0, {task.path() for task in todo}
     for study in studies:
         pending = [

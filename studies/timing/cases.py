@@ -9,7 +9,7 @@ from studies.base.atomic import is_there
 from studies.base.compile_watch import watching
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.runs.case import Case
-from studies.runs.current import case_path, run_fingerprint
+from studies.runs.current import case_fingerprint, case_path
 from studies.runs.prepare import prepare
 from studies.store.machine import machine_id
 from studies.store.new_record import new_record
@@ -45,7 +45,7 @@ def timing_is_current(root: Path, study: str, case: Case) -> bool:
     """Whether this machine has timed this case with this code, or never will."""
     if not can_be_timed(root, study, case):
         return True
-    return is_current(timing_file(root, study, case), case.key, run_fingerprint())
+    return is_current(timing_file(root, study, case), case.key, case_fingerprint(case))
 
 
 def read_timing(root: Path, study: str, case: Case) -> FrameTiming | None:
@@ -57,7 +57,7 @@ def read_timing(root: Path, study: str, case: Case) -> FrameTiming | None:
     if not is_there(path):
         return None
     record = read_record(path)
-    if canonical(record.key) != canonical(case.key) or record.fingerprint != run_fingerprint():
+    if canonical(record.key) != canonical(case.key) or record.fingerprint != case_fingerprint(case):
         return None
     attributes = record.attributes
     return FrameTiming(record.fields["frame_ns"].values, attributes["core"], attributes["threads"])
@@ -105,7 +105,7 @@ def write_timing(root: Path, study: str, case: Case, timing: FrameTiming, second
         name=case.name,
         status=Status.OK,
         message="",
-        fingerprint=run_fingerprint(),
+        fingerprint=case_fingerprint(case),
         attributes={**timing.attributes(), "seconds": seconds},
         fields=timing.fields(),
     )

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from studies.base.errors import StudyError
-from studies.runs.case import case_from_json
+from studies.scene.as_json import scene_of_key
 from studies.scenes import SCENES
 from studies.store.record import Status
 from studies.sweep.load import remarks_of
@@ -34,7 +34,7 @@ def _reference(root: Path, name: str, cases: list[Stored]) -> tuple[str, list[St
     """The stored reference of a scene, as its cases or this version know it; and what cannot be read."""
     different = {json.dumps(case.scene_data): case for case in cases}.values()
     try:
-        scenes = [case_from_json(case.header.key).scene for case in different]
+        scenes = [scene_of_key(case.header.key) for case in different]
         for scene in scenes or [scene for scene in SCENES if scene.name == name]:
             path = finest_reference(root, scene)
             if path is not None:

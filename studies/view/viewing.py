@@ -9,7 +9,8 @@ import numpy as np
 from studies.base.errors import StudyError
 from studies.metrics.run import Run
 from studies.reference.solution import Solution
-from studies.runs.case import case_from_json
+from studies.runs.case import Case
+from studies.scene.as_json import scene_of_key
 from studies.scene.scene import Scene
 from studies.scenes import SCENES
 from studies.store.record import Status, read_record
@@ -87,7 +88,7 @@ def view(root: Path, words: Sequence[str]) -> View:
 
 def _run(stored: Stored) -> Run:
     record = read_record(stored.path)
-    return Run(case_from_json(record.key), record)
+    return Run(Case(scene_of_key(record.key)), record)  # of the case only its scene is shown
 
 
 def _shown(stored: Stored, run: Run, references: _References) -> Shown:

@@ -93,7 +93,7 @@ def leave_an_old_bench(root, monkeypatch):
     [
         (miss, r"is missing; run `organbench run volume_loss` and publish again"),
         (miss_a_timing, r"the frame time of tiny_squeeze\S+ is missing or stale; run `organbench run volume_loss`"),
-        (change_the_code, r"is stale, and 2 more are missing or stale; run `organbench run volume_loss`"),
+        (change_the_code, r"is stale, and 4 more are missing or stale; run `organbench run volume_loss`"),
         (leave_an_old_bench, r"bench.csv was made by other code; run `make bench`"),
     ],
 )

@@ -54,7 +54,7 @@ def test_measured_frames_make_the_time_metrics_numbers(results):
 
 def test_current_until_the_code_changes_or_on_another_machine(results, monkeypatch):
     assert timing_is_current(results, "tiny", KEPT)
-    monkeypatch.setattr(module, "run_fingerprint", lambda: "edited")
+    monkeypatch.setattr(module, "case_fingerprint", lambda case: "edited")
     assert not timing_is_current(results, "tiny", KEPT)
     assert read_timing(results, "tiny", KEPT) is None
     monkeypatch.undo()

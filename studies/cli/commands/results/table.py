@@ -12,6 +12,7 @@ from studies.metrics.cells import MISSING, UNRESOLVED_MARK, plain, value_cell
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED, study_table
+from studies.metrics.table import metric as metric_of
 from studies.scene.quantities import ALWAYS
 from studies.store.csv_table import write_table
 from studies.sweep.find_study import find_study
@@ -31,11 +32,12 @@ def table(
 ) -> None:
     """One row per case, with the metrics of the study; ± is the uncertainty of the reference."""
     entry = find_study(study)
-    names = [name.strip() for name in metrics.split(",")] if metrics else list(entry.columns)
-    chosen = [lookup(name, {m.name: m for m in METRICS}, "metric") for name in names]
+    own = [metric_of(column) for column in entry.columns]
+    known = {m.name: m for m in (*METRICS, *own)}
+    chosen = [lookup(name.strip(), known, "metric") for name in metrics.split(",")] if metrics else own
     runs, remarks = load_runs(results, entry)
     warn(remarks)
-    frame = study_table(runs, names)
+    frame = study_table(runs, chosen)
     if csv is not None:
         say(write_table(csv, frame))
         return
