@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
     from massspring.world.trajectories import Ramp, Trajectory
 
+    __version__: str
+
 _FACE = {
     "Attachment": "massspring.world.obstacles",
     "Body": "massspring.body.body",
@@ -59,6 +61,8 @@ if not TYPE_CHECKING:
                 "Method",
                 *(method.__name__ for method in methods),
             ]
+        if name == "__version__":
+            return import_module("importlib.metadata").version("organbench")
         if name.startswith("_") or not hasattr(home := import_module(_FACE.get(name, _FACE["*"])), name):
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         value = globals()[name] = getattr(home, name)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from reference_fem.statics.equilibrium import Checkpoint, Equilibrium, equilibrium_path
     from reference_fem.system.state import NewtonSettings, State
 
+    __version__: str
+
 _FACE = {
     "ELEMENTS": "reference_fem.elements.table",
     "BodyForce": "reference_fem.model.loads",
@@ -57,6 +59,8 @@ if not TYPE_CHECKING:
     __all__ = list(_FACE)
 
     def __getattr__(name: str) -> Any:
+        if name == "__version__":
+            return import_module("importlib.metadata").version("organbench")
         if name not in _FACE:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         value = globals()[name] = getattr(import_module(_FACE[name]), name)

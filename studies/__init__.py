@@ -54,6 +54,8 @@ if TYPE_CHECKING:
     from studies.sweep.load import load_runs
     from studies.sweep.run_studies import run_studies
 
+    __version__: str
+
 _FACE = {
     "BALL_CLAMPED": "studies.scenes.ball_clamped",
     "BALL_RINGING": "studies.scenes.ball_ringing",

@@ -3,12 +3,15 @@
 import io
 import sys
 import warnings
+from typing import Annotated
 
 import typer
 
+import studies
 from studies.base import interrupts
 from studies.cli.endings import complain, flushed, message
 from studies.cli.group import Entry, lazy_group
+from studies.cli.terminal import say
 
 COMMANDS = {
     name: Entry(f"studies.cli.commands.{module}", function, line)
@@ -31,14 +34,26 @@ COMMANDS = {
         ("mesh", "meshes.mesh", "mesh", "Makes a mesh: of a synthetic organ, or from a file."),
         ("check", "meshes.check", "check", "Tells what is wrong with a mesh and what mends it."),
         ("place", "meshes.place", "place", "Proposes hold and probe for a scan, and writes a scene file."),
+        ("doctor", "house.doctor", "doctor", "What is missing on this machine, and what mends it."),
         ("safe-dt", "running.safe_dt", "safe_dt", "The stability limit of a scene, predicted and verified by runs."),
     )
 }
-app = typer.Typer(cls=lazy_group(COMMANDS), no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(cls=lazy_group(COMMANDS), no_args_is_help=True, pretty_exceptions_enable=False)
+
+
+def show_version(asked: bool) -> None:
+    """Prints the version and ends."""
+    if asked:
+        say(f"organbench {studies.__version__}")
+        raise typer.Exit
 
 
 @app.callback()
-def organbench() -> None:
+def organbench(
+    version: Annotated[
+        bool, typer.Option("--version", callback=show_version, is_eager=True, help="Show the version and end.")
+    ] = False,
+) -> None:
     """How accurate, how fast and how stable are volume-preserving mass-spring organs, against finite elements."""
 
 

@@ -1,5 +1,6 @@
 """A group of commands that loads the module of the command that is called, and of no other."""
 
+from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -7,6 +8,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from studies.base.lookup import lookup
+from studies.cli.completing import unloaded
 
 
 class Entry(NamedTuple):
@@ -35,6 +37,9 @@ def lazy_group(entries: dict[str, Entry]) -> type[TyperGroup]:
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
             """The command that the words call, with its module loaded. Raises StudyError with the nearest match."""
             name, *rest = args
+            if ctx.resilient_parsing:  # a shell completes a line: a wrong name there is no error
+                entry = entries.get(name)
+                return name, None if entry is None else unloaded(name, partial(loaded, name, entry)), rest
             return name, loaded(name, lookup(name, entries, "command")), rest
 
     return LazyGroup
