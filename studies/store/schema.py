@@ -127,7 +127,9 @@ RUN_ATTRIBUTES: dict[str, AttributeSpec] = SECONDS | {
     "volumes": AttributeSpec(INDEX, "1", "kept volumes", length="m"),
     "lumen_column": AttributeSpec(INDEX, "1", "which kept volume is a lumen; -1: none"),
     "unknowns_per_volume": AttributeSpec(NUMBER, "1", "coordinates for each kept volume", optional=True),
-    "alternation": AttributeSpec(NUMBER, "1", "rms jump of pressure between volumes, over mu", optional=True),
+    "alternation": AttributeSpec(
+        NUMBER, "1", "rms of pressure less the mean of its neighbours', over mu", optional=True
+    ),
     "sway": AttributeSpec(NUMBER, "1", "range of the force at rest about its trend, over its mean", optional=True),
     "warnings": AttributeSpec(TEXT, "", "what preparing the case warned of, and what its indicators tell"),
     "own_files": AttributeSpec(
