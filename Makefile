@@ -5,7 +5,7 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study verify smoke test check lint docs figures bench clean distclean compiled compiled-essential setup-run \
+.PHONY: help study verify smoke test check lint docs figures stress bench clean distclean compiled compiled-essential setup-run \
 	setup-test setup-dev FORCE
 
 help: ## this list
@@ -43,6 +43,9 @@ lint: setup-dev ## ruff, pyright and the import contracts alone
 
 docs: setup-dev ## the documentation as a site: open site/index.html; a broken link is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python docs/site/build.py
+
+stress: setup-run ## ten thousand random trials that try to break every method (minutes)
+	$(BIN)/organbench stress --cases 10000
 
 figures: setup-run ## draw the charts again from the stored results
 	$(BIN)/organbench report --figures
