@@ -79,6 +79,8 @@ def fitting(parts: Parts, cases: dict[str, Any], machine: dict[str, Any]) -> tup
         if gone:
             content = page(parts, cases, machine)
             told.append(f"report.html holds no {what} of {gone} of {len(holding)} cases, to stay below {LIMIT:,} bytes")
+    if len(content) > LIMIT:
+        told.append(f"report.html has {len(content):,} bytes, more than {LIMIT:,}: its charts and its table are large")
     return content, told
 
 

@@ -32,7 +32,7 @@ function listen() {
   });
   byId("play").addEventListener("click", () => play(!state.playing));
   byId("home").addEventListener("click", home);
-  byId("time").addEventListener("input", (event) => { play(false); goTo(event.target.value * state.given.duration); });
+  byId("time").addEventListener("input", (event) => { play(false); goTo(event.target.value / event.target.max * state.given.duration); });
   byId("one-scale").addEventListener("change", () => { scaleColours(); draw(); });
   byId("chosen").addEventListener("change", (event) => choose(event.target.value));
   document.addEventListener("theme", draw);

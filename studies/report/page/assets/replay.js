@@ -53,7 +53,7 @@ function bodiesAt(shown, t) {
 
 function draw() {
   if (state.given) {
-    byId("time").value = state.t / state.given.duration;
+    byId("time").value = byId("time").max * state.t / state.given.duration;
     const words = `${state.t.toFixed(2)} s of ${state.given.duration} s`;
     byId("clock").textContent = words;
     byId("time").setAttribute("aria-valuetext", words);
