@@ -114,6 +114,7 @@ function tellColours(given) {
 
 async function showReplay(given) {
   state.shown = null;
+  delete byId("canvas").dataset.shown;
   byId("replay").hidden = !given.replay || !paint;
   const why = given.replay ? "This browser offers no WebGL2, so the moving body cannot be shown; the histories below do without." : given.why;
   byId("no-replay").textContent = given.replay && paint ? "" : why;
