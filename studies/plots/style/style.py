@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib.style
 from matplotlib.axes import Axes
@@ -101,7 +101,7 @@ SHEET = {
 }
 
 
-VECTOR = {"svg.fonttype": "none", "svg.hashsalt": "organbench", "path.simplify_threshold": 0.3}
+VECTOR: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "organbench", "path.simplify_threshold": 0.3}
 """Of SVG: letters stay letters, names in the file stay the same, and lines keep what a third of a pixel shows."""
 
 

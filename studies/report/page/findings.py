@@ -1,20 +1,22 @@
 """What the tables of a results folder say, in a sentence each, with the numbers and how well they are known."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-import pandas as pd
+from studies.metrics.cells import plain, value_cell
 
-from studies.metrics.cells import MINUS, plain, value_cell
-
-Tables = Mapping[str, pd.DataFrame]
+Row = Mapping[str, Any]
+"""Of a table as `study_table` makes it; None where a number is not known."""
+Tables = Mapping[str, Sequence[Row]]
 VOLUME, FORCE, MEAN = "volume_worst [%]", "force_end [%]", "mean_error [%]"
 FRAME, REAL = "frame_time [ms]", "real_time [s/s]"
-RECIPE = ["scene", "body", "law", "nodes", "stiffness"]
+RECIPE = ("scene", "body", "law", "nodes", "stiffness")
 """What a body with and without a constraint share."""
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+KEPT, FREE = "implicit_volume", "free"
 HALF = 0.51
-"""Share of the step limit up to which a step is the usual one [1]."""
+"""Share of the step limit up to which a step is the usual one, and above whose half it is no fine one [1]."""
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Finding:
 
 
 def findings(tables: Tables) -> list[Finding]:
-    """Those that the tables of the studies (by name; columns as `study_table`) bear; each from rows that ended well."""
+    """Those that the tables of the studies, by name, bear; each from rows that ended well."""
     found = (volume(tables), one_volume(tables), nearest_force(tables), cost(tables), real_time(tables), limit(tables))
     return [finding for finding in found if finding is not None]
 
@@ -35,88 +37,82 @@ def findings(tables: Tables) -> list[Finding]:
 def volume(tables: Tables) -> Finding | None:
     """How well volumes are kept, and what the same bodies lose without."""
     pairs = _pairs(_joined(tables, VOLUME))
-    if pairs.empty:
+    if not pairs:
         return None
-    kept, lost = (pairs.loc[pairs[f"{VOLUME} {which}"].idxmax()] for which in ("kept", "free"))
+    kept = max((kept for kept, _ in pairs), key=lambda row: row[VOLUME])
+    lost = max((free for _, free in pairs), key=lambda row: row[VOLUME])
     return Finding(
         "How well volumes are kept",
-        f"{_small(kept[f'{VOLUME} kept'])} %",
-        f"is the farthest that a volume kept by implicit_volume is off in {len(pairs)} pairs of runs ({_name(kept)}). "
-        f"Without the constraint the same bodies are off by up to {_plain(lost[f'{VOLUME} free'])} % ({_name(lost)}). "
+        f"{_small(kept[VOLUME])} %",
+        f"is the farthest that a volume kept by {KEPT} is off in {len(pairs)} pairs of runs ({_name(kept)}). "
+        f"Without the constraint the same bodies are off by up to {plain(lost[VOLUME])} % ({_name(lost)}). "
         "A volume is compared with the body's own at rest, which rounding alone blurs.",
     )
 
 
 def one_volume(tables: Tables) -> Finding | None:
     """What forces are worth in bodies that keep one volume."""
-    rows = _ended_well(tables.get("volume_loss"), FORCE)
-    rows = rows[rows["method"] == "implicit_volume"] if len(rows) else rows
-    if rows.empty:
+    rows = [row for row in _ended_well(tables.get("volume_loss", ()), FORCE) if row["method"] == KEPT]
+    if not rows:
         return None
-    said = [f"{_range(part, FORCE)} in {_kind(kind)}" for kind, part in rows.groupby("body", sort=False)]
-    worst = rows.loc[rows[FORCE].abs().idxmax()]
+    kinds = dict.fromkeys(row["body"] for row in rows)
+    said = [f"{_range([row for row in rows if row['body'] == kind], FORCE)} in {_kind(kind)}" for kind in kinds]
+    worst = max(rows, key=lambda row: abs(row[FORCE]))
     return Finding(
         "Forces of bodies with one volume",
         f"{_measured(worst, FORCE)} %",
         f"is the largest error of a force at the deepest point ({_name(worst)}). Bodies that keep one volume are off "
-        f"by {' and by '.join(said)}, over {rows['scene'].nunique()} scenes.",
+        f"by {' and by '.join(said)}, over {len({row['scene'] for row in rows})} scenes.",
     )
-
-
-def _kind(body: object) -> str:
-    return "the paper's surface bodies" if body == "surface" else f"{body} bodies"
 
 
 def nearest_force(tables: Tables) -> Finding | None:
     """How near forces come to the reference, scene by scene."""
-    rows = _joined(tables, FORCE, MEAN)
-    rows = rows[rows["method"] == "implicit_volume"] if len(rows) else rows
-    if rows.empty:
+    best: dict[str, Row] = {}
+    for row in _joined(tables, FORCE, MEAN):
+        if row["method"] == KEPT and abs(row[FORCE]) < abs(best.get(row["scene"], {FORCE: float("inf")})[FORCE]):
+            best[row["scene"]] = row
+    if not best:
         return None
-    best = rows.loc[rows[FORCE].abs().groupby(rows["scene"], sort=False).idxmin()]
     said = [
         f"{_measured(row, FORCE)} % in {row['scene']} ({row['body']}, {row['nodes']} nodes; displacement on the mean "
         f"{_measured(row, MEAN, signed=False)} %)"
-        for _, row in best.iterrows()
+        for row in best.values()
     ]
     return Finding(
         "The force nearest to the reference",
-        _range(best, FORCE),
+        _range(list(best.values()), FORCE),
         f"is how far the best body of each scene that keeps its volume is off: {'; '.join(said)}.",
     )
 
 
 def cost(tables: Tables) -> Finding | None:
     """What keeping one volume adds to a frame."""
-    pairs = _pairs(_ended_well(tables.get("frame_rate"), FRAME))
-    if pairs.empty:
+    pairs = _pairs(_ended_well(tables.get("frame_rate", ()), FRAME))
+    if not pairs:
         return None
-    kept, free = (pairs[f"{FRAME} {which}"] for which in ("kept", "free"))
-    added = 100 * (kept / free - 1)
-    spread = 100 * kept / free * (_spread(pairs, "kept") / kept + _spread(pairs, "free") / free)
-    cells = [value_cell(a, s, signed=True) for a, s in zip(added, spread, strict=True)]
-    least, most = int(added.to_numpy().argmin()), int(added.to_numpy().argmax())
-    row = pairs.iloc[most]
+    added = sorted((_added(kept, free) for kept, free in pairs), key=lambda one: one[0])
+    cells = [value_cell(percent, spread, signed=True) for percent, spread in added]
+    kept, free = max(pairs, key=lambda pair: pair[0][FRAME] / pair[1][FRAME])
     return Finding(
         "What keeping a volume costs",
-        f"{cells[least]} to {cells[most]} %",
-        f"is what implicit_volume adds to the time of a frame in {len(pairs)} pairs of runs. The most is in "
-        f"{_name(row)}: {value_cell(kept.iloc[most], _spread(pairs, 'kept').iloc[most])} ms against "
-        f"{value_cell(free.iloc[most], _spread(pairs, 'free').iloc[most])} ms. In {int((spread > added.abs()).sum())} "
-        "pairs the repeats spread by more than the difference.",
+        f"{cells[0]} to {cells[-1]} %",
+        f"is what {KEPT} adds to the time of a frame in {len(pairs)} pairs of runs. The most is in {_name(kept)}: "
+        f"{_measured(kept, FRAME, signed=False)} ms against {_measured(free, FRAME, signed=False)} ms. In "
+        f"{sum(spread > abs(percent) for percent, spread in added)} pairs the repeats spread by more than the "
+        "difference.",
     )
 
 
 def real_time(tables: Tables) -> Finding | None:
     """How many bodies keep up with the clock."""
-    rows = _joined(tables, REAL)
-    if rows.empty:
+    rows = list({_key(row, "method", "dt [ms]"): row for row in _joined(tables, REAL)}.values())
+    if not rows:
         return None
-    rows = rows.drop_duplicates([*RECIPE, "method", "dt [ms]"])
-    slowest = rows.loc[rows[REAL].idxmin()]
+    slowest = min(rows, key=lambda row: row[REAL])
     return Finding(
         "Speed",
-        f"{int((rows[REAL] > 1).sum())} of {len(rows)}",
+        f"{sum(row[REAL] > 1 for row in rows)} of {len(rows)}",
         "timed bodies simulate more than a second in a second of computing on one core. The slowest, "
         f"{_name(slowest)} by {slowest['method']}, simulates {_measured(slowest, REAL, signed=False)} s.",
     )
@@ -124,59 +120,65 @@ def real_time(tables: Tables) -> Finding | None:
 
 def limit(tables: Tables) -> Finding | None:
     """Whether the step limit says where runs break."""
-    rows = tables.get("stability_map")
-    if rows is None or rows.empty or "dt/dt_c" not in rows:
+    rows = [row for row in tables.get("stability_map", ()) if row.get("dt/dt_c") is not None]
+    if not rows:
         return None
-    rows = rows[rows["dt/dt_c"].notna()]
-    below, above = rows[rows["dt/dt_c"] < 1], rows[rows["dt/dt_c"] >= 1]
-    broken, held = int((below["status"] == "diverged").sum()), int((above["status"] != "diverged").sum())
+    below, above = ([row["status"] for row in rows if (row["dt/dt_c"] < 1) == side] for side in (True, False))
     return Finding(
         "The limit of the time step",
-        f"{broken} of {len(below)}",
-        f"runs below the predicted limit of the time step diverge; above it {held} of {len(above)} do not. These are "
-        "counts of single runs.",
+        f"{below.count('diverged')} of {len(below)}",
+        f"runs below the predicted limit of the time step diverge; above it {len(above) - above.count('diverged')} of "
+        f"{len(above)} do not. These are counts of single runs.",
     )
 
 
-def _joined(tables: Tables, *columns: str) -> pd.DataFrame:
-    """Rows that ended well of all tables with these columns; without those far below the usual step."""
-    parts = [part for part in (_ended_well(table, *columns) for table in tables.values()) if len(part)]
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+def _joined(tables: Tables, *columns: str) -> list[Row]:
+    return [row for table in tables.values() for row in _ended_well(table, *columns)]
 
 
-def _ended_well(table: pd.DataFrame | None, *columns: str) -> pd.DataFrame:
-    if table is None or table.empty or not {"method", "status", *columns} <= set(table.columns):
-        return pd.DataFrame()
-    known = table[list(columns)].notna().all(axis=1)
-    return table[known & (table["status"] == "ok")].reset_index(drop=True)
+def _ended_well(table: Sequence[Row], *columns: str) -> list[Row]:
+    """Rows with numbers in all these columns."""
+    return [row for row in table if row["status"] == "ok" and all(row.get(name) is not None for name in columns)]
 
 
-def _pairs(rows: pd.DataFrame) -> pd.DataFrame:
-    """implicit_volume ("… kept") beside free ("… free") on the same body at about the same share of the step limit."""
-    if rows.empty:
-        return rows
-    usual = rows[rows["dt/dt_c"].between(HALF / 2, HALF)].drop_duplicates([*RECIPE, "method"])
-    kept, free = (usual[usual["method"] == name] for name in ("implicit_volume", "free"))
-    return kept.merge(free, on=RECIPE, suffixes=(" kept", " free"))
+def _pairs(rows: Sequence[Row]) -> list[tuple[Row, Row]]:
+    """Rows of the same body with the constraint and without, both at about the same share of the step limit."""
+    usual = [row for row in rows if HALF / 2 <= (row["dt/dt_c"] or 0.0) <= HALF]
+    kept, free = ({_key(row): row for row in reversed(usual) if row["method"] == name} for name in (KEPT, FREE))
+    return [(kept[key], free[key]) for key in reversed(kept) if key in free]
 
 
-def _spread(pairs: pd.DataFrame, which: str) -> pd.Series:
-    name = f"{FRAME.replace(' [', ' floor [')} {which}"
-    return pairs[name].fillna(0.0) if name in pairs else 0.0 * pairs[f"{FRAME} {which}"]
+def _added(kept: Row, free: Row) -> tuple[float, float]:
+    """What the constraint adds to a frame, and how far the repeats of both spread [%]."""
+    ratio = kept[FRAME] / free[FRAME]
+    spread = sum((_floor(row, FRAME) or 0.0) / row[FRAME] for row in (kept, free))
+    return 100 * (ratio - 1), 100 * ratio * spread
 
 
-def _measured(row: pd.Series, column: str, signed: bool = True) -> str:
+def _key(row: Row, *more: str) -> tuple[Any, ...]:
+    return tuple(row[name] for name in (*RECIPE, *more))
+
+
+def _floor(row: Row, column: str) -> float | None:
+    return row.get(column.replace(" [", " floor ["))
+
+
+def _measured(row: Row, column: str, signed: bool = True) -> str:
     """A value beside its uncertainty."""
-    return value_cell(row[column], row.get(column.replace(" [", " floor ["), float("nan")), signed=signed)
+    floor = _floor(row, column)
+    return value_cell(row[column], float("nan") if floor is None else floor, signed=signed)
 
 
-def _range(rows: pd.DataFrame, column: str) -> str:
-    by_size = rows.loc[rows[column].abs().sort_values().index]
-    ends = dict.fromkeys(_measured(row, column) for _, row in by_size.iloc[[0, -1]].iterrows())
-    return " to ".join(ends) + " %"
+def _range(rows: Sequence[Row], column: str) -> str:
+    by_size = sorted(rows, key=lambda row: abs(row[column]))
+    return " to ".join(dict.fromkeys(_measured(row, column) for row in (by_size[0], by_size[-1]))) + " %"
 
 
-def _name(row: pd.Series) -> str:
+def _kind(body: str) -> str:
+    return "the paper's surface bodies" if body == "surface" else f"{body} bodies"
+
+
+def _name(row: Row) -> str:
     return f"{row['scene']}, {row['body']}, {row['nodes']} nodes"
 
 
@@ -184,7 +186,3 @@ def _small(value: float) -> str:
     """Two digits: 0.41, or 2.8 × 10⁻⁵ where that is shorter."""
     digits, _, power = f"{value:.2g}".partition("e")
     return f"{digits} × 10{str(int(power)).translate(RAISED)}" if power else digits
-
-
-def _plain(value: float) -> str:
-    return plain(value).replace("-", MINUS)

@@ -88,7 +88,7 @@ def page(parts: Parts, cases: dict[str, Any], machine: dict[str, Any]) -> bytes:
     """The file."""
     rows = [{"study": study.name, **row} for study, part in parts for row in part["rows"]]
     shown = joined_rows(rows)
-    tables = {study.name: pd.DataFrame(part["rows"]) for study, part in parts}
+    tables = {study.name: part["rows"] for study, part in parts}
     names = [study.name for study, _ in parts]
     script = "\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)
     text = Template((ASSETS / "page.html").read_text(encoding="utf-8")).substitute(
