@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from massspring import Capsule, Obstacle, Plane
 from studies.metrics.metric import PERCENT
 from studies.metrics.run import Run
 from studies.plots.style.style import readable
@@ -108,6 +109,7 @@ def replay_of(run: Run, truths: Truths) -> dict[str, Any]:
         "times": [float(f"{t:.6g}") for t in times],
         "triangles": pack_indices(place[triangles[np.isin(triangles, nodes).all(axis=1)]]),
         "positions": packed,
+        "obstacles": [obstacle_of(obstacle, times) for obstacle in run.case.scene.obstacles],
         "rounding": f"{PERCENT * max(0.5 * STEP, 0.5 * packed['step'] / run.size):.2g} %",
     }
     if run.reference is None:
@@ -124,6 +126,15 @@ def replay_of(run: Run, truths: Truths) -> dict[str, Any]:
         "comparable": comparable,
         "largest": largest,
     }
+
+
+def obstacle_of(obstacle: Obstacle, times: np.ndarray) -> dict[str, Any]:
+    """Where it is at `times` (P,) [s]; of a plane the unit normal, of all others radius and length of the axis [m]."""
+    at = {"at": [[float(f"{x:.6g}") for x in obstacle.anchor + obstacle.path(float(t))] for t in times]}
+    if isinstance(obstacle, Plane):
+        return at | {"normal": obstacle.unit_normal.tolist()}
+    span = obstacle.span.tolist() if isinstance(obstacle, Capsule) else [0.0, 0.0, 0.0]
+    return at | {"radius": obstacle.radius, "span": span}
 
 
 def largest_error(run: Run, truth: np.ndarray) -> float:

@@ -22,7 +22,7 @@ LIMIT = 3_000_000
 """Bytes."""
 NO_ROOM = "Its replay had no room in this file."
 ASSETS = Path(__file__).parent / "assets"
-SCRIPTS = ("data.js", "table.js", "tabs.js", "histories.js", "bodies.js", "replay.js", "controls.js")
+SCRIPTS = ("data.js", "table.js", "tabs.js", "histories.js", "bodies.js", "obstacles.js", "replay.js", "controls.js")
 """In this order they make one script."""
 
 

@@ -258,3 +258,21 @@ def test_without_motion_the_body_jumps_from_frame_to_frame(visit):
         page.fill("#time", "61")
         pictures[motion] = (picture(page) == frame).all()
     assert pictures == {"reduce": True, "no-preference": False}
+
+
+def test_obstacles_are_round_and_where_the_scene_says(visit):
+    page = visit()
+    names = page.locator("#chosen option").all_inner_texts()
+    page.locator("#chosen").select_option(label=next(name for name in names if name.startswith("ball squeeze · tetra")))
+    page.wait_for_selector("#canvas[data-shown]")
+    to_time(page, "End")
+    pressed = picture(page)
+    discs = page.evaluate("veilsAt(state.shown, state.t).map((veil) => [...veil.x])")
+    heights = sorted({round(float(z), 4) for disc in discs for z in disc[2::3]})
+    assert heights == pytest.approx([-0.035, 0.035], abs=0.001)  # two planes, 15 mm each into a ball of 50 mm
+    page.evaluate("() => { state.shown.obstacles = []; draw(); }")
+    assert (np.abs(picture(page) - pressed).max(axis=2) > 10).sum() > 1000
+    for span in ([0, 0, 0], [0.3, -0.4, 1.2]):
+        x = np.array(page.evaluate("(span) => capsule(0.5, span).x", span)).reshape(-1, 3)
+        share = np.clip(x @ np.array(span) / max(np.dot(span, span), 1e-300), 0, 1)
+        assert np.allclose(np.linalg.norm(x - share[:, None] * span, axis=1), 0.5)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from studies.report.page.case_data import BINS, thinned
+from massspring import Capsule, Plane, Sphere, Trajectory
+from studies.report.page.case_data import BINS, obstacle_of, thinned
 from studies.report.page.pack import pack_frames, pack_series, unpack_frames, unpack_series
 
 RANDOM = np.random.default_rng(5)
@@ -50,3 +51,14 @@ def test_a_thinned_history_keeps_its_ends_and_peaks():
     assert len(shown) <= 2 * BINS + 2 and shown[0] == 0 and shown[-1] == 4998 and np.all(np.diff(shown) > 0)
     assert {1234, 3456} <= set(shown) and kept.max() == 9.0 and kept.min() == -9.0
     assert np.array_equal(thinned(t[:50], values[:50])[0], t[:50])
+
+
+def test_obstacles_move_as_the_scene_says():
+    path, times = Trajectory((0.0, 2.0), ((0, 0, 0), (0, 0, -0.01))), np.array([0.0, 1.0, 3.0])
+    moved = [[0.0, 0.0, 0.1 - z] for z in (0.0, 0.005, 0.01)]
+    plane = obstacle_of(Plane((0.0, 0.0, 0.1), (0.0, 0.0, -2.0), path), times)
+    assert plane["normal"] == [0.0, 0.0, -1.0] and np.allclose(plane["at"], moved)
+    ball = obstacle_of(Sphere((0.0, 0.0, 0.1), 0.02, path), times)
+    assert (ball["radius"], ball["span"]) == (0.02, [0.0, 0.0, 0.0]) and np.allclose(ball["at"], moved)
+    rod = obstacle_of(Capsule((0.0, 0.0, 0.1), (0.3, 0.0, 0.1), 0.02, path), times)
+    assert np.allclose(rod["span"], [0.3, 0.0, 0.0]) and np.allclose(rod["at"], moved)

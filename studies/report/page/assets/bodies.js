@@ -2,6 +2,7 @@
 
 // YlOrRd of C. Brewer, colorbrewer2.org: safe for colour-blind readers, darker is more.
 const RAMP = ["#ffffcc", "#ffeda0", "#fed976", "#feb24c", "#fd8d3c", "#fc4e2a", "#e31a1c", "#bd0026", "#800026"];
+const VEIL = "#7f93ab";
 
 const VERTEX = `#version 300 es
 in vec3 position; in vec3 normal; in float level;
@@ -11,7 +12,7 @@ void main() { gl_Position = view * vec4(position, 1.0); facing = turn * normal; 
 const FRAGMENT = `#version 300 es
 precision highp float;
 in vec3 facing; in float value;
-uniform vec3 ramp[${RAMP.length}]; uniform vec3 plain;
+uniform vec3 ramp[${RAMP.length}]; uniform vec3 plain; uniform float cover;
 out vec4 colour;
 void main() {
   vec3 n = normalize(facing) * (gl_FrontFacing ? 1.0 : -1.0);
@@ -19,7 +20,7 @@ void main() {
   float place = clamp(value, 0.0, 1.0) * ${(RAMP.length - 1).toFixed(1)};
   int low = min(int(place), ${RAMP.length - 2});
   vec3 tint = value < 0.0 ? plain : mix(ramp[low], ramp[low + 1], place - float(low));
-  colour = vec4(tint * light, 1.0);
+  colour = vec4(tint * light * cover, cover);
 }`;
 
 const rgb = (text) => [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16) / 255);
@@ -75,6 +76,8 @@ function painter(canvas) {
   const buffers = Object.fromEntries([...Object.keys(names), "triangles"].map((name) => [name, gl.createBuffer()]));
   gl.useProgram(shaders);
   gl.enable(gl.DEPTH_TEST);
+  gl.enable(gl.BLEND);
+  gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   gl.uniform3fv(at("ramp"), RAMP.flatMap(rgb));
 
   function fill(body) {
@@ -90,7 +93,16 @@ function painter(canvas) {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, body.triangles, gl.DYNAMIC_DRAW);
   }
 
-  return function paint(bodies, camera, centre, radius, plain) {
+  function drawOne(body, colour, cover) {
+    gl.uniform3fv(at("plain"), rgb(colour));
+    gl.uniform1f(at("cover"), cover);
+    gl.depthMask(cover === 1);
+    fill(body);
+    gl.drawElements(gl.TRIANGLES, body.triangles.length, gl.UNSIGNED_SHORT, 0);
+  }
+
+  /** Each of `bodies` in a window of its own, with the `veils` around it, which hide nothing. */
+  return function paint(bodies, veils, camera, centre, radius, plain) {
     const dots = Math.min(2, devicePixelRatio || 1);
     canvas.width = Math.max(2, Math.round(dots * canvas.clientWidth));
     canvas.height = Math.max(2, Math.round(dots * canvas.clientHeight));
@@ -100,11 +112,11 @@ function painter(canvas) {
     const { view, turn } = matrices(camera, centre, radius, wide / canvas.height);
     gl.uniformMatrix4fv(at("view"), false, view);
     gl.uniformMatrix3fv(at("turn"), false, turn);
-    gl.uniform3fv(at("plain"), rgb(plain));
     bodies.forEach((body, i) => {
       gl.viewport(i * wide, 0, wide, canvas.height);
-      fill(body);
-      gl.drawElements(gl.TRIANGLES, body.triangles.length, gl.UNSIGNED_SHORT, 0);
+      drawOne(body, plain, 1);
+      for (const veil of veils) drawOne(veil, VEIL, 0.3);
     });
+    gl.depthMask(true);
   };
 }

@@ -11,7 +11,7 @@ let paint = null;
 async function unpacked(replay) {
   const positions = await frames(replay.positions), triangles = await indices(replay.triangles);
   const truth = replay.reference && await frames(replay.reference);
-  const found = { ...replay, positions, triangles, truth, errors: null };
+  const found = { ...replay, positions, triangles, truth, errors: null, shapes: shapes(replay) };
   if (truth && replay.comparable) {
     const end = replay.times[replay.times.length - 1];
     found.reached = replay.checkpoints.filter((t) => t < 1.000001 * end + 1e-9); // a run may end early
@@ -41,13 +41,18 @@ function bounds(list) {
   return { centre, radius };
 }
 
-/** What is drawn at time t: without motion the nearest recorded frame, else what lies between two. */
+/** The moment that is drawn: for readers who want no motion that of the nearest recorded frame. */
+function steadied(shown) {
+  const nearer = (best, time) => (Math.abs(time - state.t) < Math.abs(best - state.t) ? time : best);
+  return calm.matches ? shown.times.reduce(nearer) : state.t;
+}
+
+/** The body of the case, and that of the reference where there is one. */
 function bodiesAt(shown, t) {
-  const steady = calm.matches ? shown.times.reduce((best, time) => Math.abs(time - t) < Math.abs(best - t) ? time : best) : t;
-  const x = blended(shown.positions, shown.times, steady), none = new Float32Array(x.length / 3).fill(-1);
-  const levels = shown.errors ? blended(shown.errors, shown.reached, steady).map((value) => value / shown.most) : none;
+  const x = blended(shown.positions, shown.times, t), none = new Float32Array(x.length / 3).fill(-1);
+  const levels = shown.errors ? blended(shown.errors, shown.reached, t).map((value) => value / shown.most) : none;
   const bodies = [{ x, triangles: shown.triangles, levels }];
-  if (shown.truth) bodies.push({ x: blended(shown.truth, shown.checkpoints, steady), triangles: shown.triangles, levels: none });
+  if (shown.truth) bodies.push({ x: blended(shown.truth, shown.checkpoints, t), triangles: shown.triangles, levels: none });
   return bodies;
 }
 
@@ -61,7 +66,7 @@ function draw() {
   }
   const shown = state.shown, canvas = byId("canvas");
   if (!shown || !paint) return;
-  paint(bodiesAt(shown, state.t), state.camera, shown.centre, shown.radius, plainColour());
+  paint(bodiesAt(shown, steadied(shown)), veilsAt(shown, steadied(shown)), state.camera, shown.centre, shown.radius, plainColour());
   canvas.dataset.shown = state.t.toFixed(3);
 }
 
