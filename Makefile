@@ -5,7 +5,8 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study verify smoke test check lint docs figures stress bench clean distclean compiled compiled-essential setup-run \
+.PHONY: help study report verify smoke test check lint docs figures stress bench clean distclean compiled \
+	compiled-essential setup-run \
 	setup-test setup-dev FORCE
 
 help: ## this list
@@ -20,6 +21,9 @@ study: compiled-essential ## run the main studies, then the charts and tables (t
 study-%: setup-run ## run one study and draw it: make study-volume_loss
 	$(BIN)/organbench run $*
 	$(BIN)/organbench plot $*
+
+report: setup-run ## charts, tables and report.html, one page that opens anywhere, from the stored results
+	$(BIN)/organbench report
 
 verify: setup-test ## the reference against closed forms, published numbers and other codes; test campaigns (minutes)
 	$(BIN)/organbench verify

@@ -40,7 +40,7 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
     written, remarks = report(root, studies)
     if remarks:
         raise StudyError(f"not published, something is missing: {remarks[0]}")
-    sources = [*written, root / "machine.json"]
+    sources = [*(file for file in written if file.suffix in SUFFIXES), root / "machine.json"]
     sources += [file for name in EXTRAS for file in _files(root / name)]
     show_summaries(root, studies, home)
     target = home / PUBLISHED
