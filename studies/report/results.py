@@ -10,6 +10,7 @@ from studies.base.errors import StudyError
 from studies.base.own_file import file_of
 from studies.base.study_file import fault_of_study_file
 from studies.catalog.study import Study
+from studies.exchange.entry import entries_beside, entry_files
 from studies.geometry import SHAPES, organ
 from studies.metrics.run import Run
 from studies.metrics.table import metric, study_table
@@ -105,10 +106,12 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
     if before.get("inputs") == shown["inputs"] and all(path.exists() for path in paths):
         return paths, before["remarks"]
     runs, shown["remarks"] = load_runs(root, study)
-    write_table(table, study_table(runs, study.columns))
+    entries, unreadable = entries_beside(root, study.scenes, runs)
+    shown["remarks"] += unreadable
+    write_table(table, study_table([*runs, *entries], study.columns))
     for summary in told:
         write_whole(root / summary.file, (summary.text(runs) + "\n").encode())
-    draw_charts(root, study, runs)
+    draw_charts(root, study, [*runs, *entries])
     write_whole(stamp, json.dumps(shown).encode())
     return paths, shown["remarks"]
 
@@ -128,6 +131,7 @@ def inputs_of(root: Path, study: Study) -> str:
     the user's files too."""
     files = [case_path(root, study.name, case) for case in study.cases]
     files += [timing_file(root, study.name, case) for case in study.cases if case.timed]
+    files += entry_files(root)
     references = [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
     metrics = [metric(column) for column in study.columns]
     shown = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
