@@ -26,6 +26,8 @@ COMMANDS = {
         ("replay", "running.replay", "replay", "Runs exactly that case again, and says whether it is the same."),
         ("compare", "results.compare", "compare", "Every number that two results folders share, and which moved."),
         ("view", "results.view", "view", "Writes cases and their reference to one file for ParaView."),
+        ("export", "exchange.export", "export", "Writes a scene for another program, with how to hand results in."),
+        ("judge", "exchange.judge", "judge", "Judges what another program computed, as our own runs are."),
         ("publish", "results.publish", "publish", "Copies tables and charts to results/published, and the summaries."),
         ("advise", "answers.advise", "advise", "The cheapest recipe that is accurate enough for a scene."),
         ("calibrate", "answers.calibrate", "calibrate", "Fits few numbers of a body, judged in other scenes."),

@@ -162,8 +162,8 @@ def _timing(run: Run, quantile: float) -> float:
 
 
 def step_time(run: Run) -> float:
-    """Median frame time over the steps in a frame [µs]."""
-    return 1e-3 * _timing(run, 0.5) / run.record.attributes["steps"]
+    """Median frame time over the steps in a frame [µs]; NaN where these are not known."""
+    return 1e-3 * _timing(run, 0.5) / (run.record.attributes["steps"] or float("nan"))
 
 
 def frame_time(run: Run) -> float:

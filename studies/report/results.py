@@ -10,6 +10,7 @@ from studies.base.errors import StudyError
 from studies.base.own_file import file_of
 from studies.base.study_file import fault_of_study_file
 from studies.catalog.study import Study
+from studies.exchange.entry import entries_beside, entry_files
 from studies.geometry import SHAPES, organ
 from studies.metrics.run import Run
 from studies.metrics.table import metric, study_table
@@ -114,13 +115,15 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
     if before.get("inputs") == shown["inputs"] and all(path.exists() for path in (*paths, part_path(root, study))):
         return paths, before["remarks"]
     runs, shown["remarks"] = load_runs(root, study)
-    rows = study_table(runs, study.columns)
+    entries, unreadable = entries_beside(root, study.scenes, runs)
+    shown["remarks"] += unreadable
+    rows = study_table([*runs, *entries], study.columns)
     write_table(table, rows)
     for summary in told:
         write_whole(root / summary.file, (summary.text(runs) + "\n").encode())
     with svg_copies() as pictures:
-        draw_charts(root, study, runs)
-    write_part(root, study, runs, rows, pictures)
+        draw_charts(root, study, [*runs, *entries])
+    write_part(root, study, [*runs, *entries], rows, pictures)
     write_whole(stamp, json.dumps(shown).encode())
     return paths, shown["remarks"]
 
@@ -140,6 +143,7 @@ def inputs_of(root: Path, study: Study) -> str:
     the user's files too."""
     files = [case_path(root, study.name, case) for case in study.cases]
     files += [shown_timing_file(root, study.name, case) for case in study.cases if case.timed]
+    files += entry_files(root)
     references = [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
     metrics = [metric(column) for column in study.columns]
     shown = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]

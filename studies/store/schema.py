@@ -125,6 +125,12 @@ RUN_ATTRIBUTES: dict[str, AttributeSpec] = SECONDS | {
     ),
     "sway": AttributeSpec(NUMBER, "1", "range of the force at rest about its trend, over its mean", optional=True),
     "warnings": AttributeSpec(TEXT, "", "what preparing the case warned of, and what its indicators tell"),
+    "entry": AttributeSpec(
+        TEXT, "", "of an entry from outside: its file, with the SHA-256 of its positions", optional=True
+    ),
+    "entry_seconds": AttributeSpec(
+        NUMBER, "s/s", "of an entry from outside: computing time for a simulated second", optional=True
+    ),
     "own_files": AttributeSpec(
         TEXT, "", "files of the user with the method and the law: JSON, path to SHA-256", optional=True
     ),

@@ -2,8 +2,21 @@
 
 from dataclasses import dataclass
 
+from massspring import METHODS
 from massspring.body.smoothed import edge_smoothed
-from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, MUTED, ORANGE, PURPLE, SKY, VERMILLION, YELLOW
+from studies.plots.style.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    YELLOW,
+    method_colour,
+)
 from studies.runs.case import Case
 
 PAPER = "the paper's body"
@@ -39,6 +52,7 @@ CONTESTANTS: dict[tuple[str, str], Family] = {
     ("implicit_elements", "quadratic"): Family("implicit elements, quadratic", MUTED[1], "h"),
 }
 """What is taken instead of mass-spring bodies, by method and kind of body."""
+OUR_METHODS = tuple(method.name for method in METHODS)
 WHOLE = "implicit_volume"
 """The method that needs no name."""
 
@@ -53,5 +67,7 @@ def family_of(case: Case) -> Family:
     known = FAMILIES.get((body.kind, body.graded, volumes))
     if known is not None and case.method.name == WHOLE:
         return known
+    if known is not None and case.method.name not in OUR_METHODS:  # an entry from outside, or a method of one's own
+        return Family(f"{case.method.name.replace('_', ' ')}, {body.kind}", method_colour(case.method.name), "X")
     own = "" if case.method.name == WHOLE else f", {case.method.name.replace('_', ' ')}"
     return Family(f"{body.series}{own}", GREY, "X" if known is None else known.marker)

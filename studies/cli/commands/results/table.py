@@ -8,6 +8,7 @@ import typer
 
 from studies.base.lookup import lookup
 from studies.cli.terminal import Results, StudyName, console, say, warn
+from studies.exchange.entry import entries_beside
 from studies.metrics.cells import MISSING, UNRESOLVED_MARK, plain, value_cell
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
@@ -38,7 +39,9 @@ def table(
     known = {m.name: m for m in (*METRICS, *own)}
     chosen = [lookup(name.strip(), known, "metric") for name in metrics.split(",")] if metrics else own
     runs, remarks = load_runs(results, entry)
-    warn(remarks)
+    entries, unreadable = entries_beside(results, entry.scenes, runs)
+    runs += entries
+    warn([*remarks, *unreadable])
     frame = study_table(runs, chosen)
     written = [write(path, frame) for write, path in ((write_table, csv), (write_parquet, parquet)) if path is not None]
     for path in written:

@@ -7,6 +7,7 @@ import typer
 
 from studies.base.errors import StudyError
 from studies.cli.terminal import say
+from studies.exchange.entry import ENTRY
 from studies.runs.run import own_files_of
 from studies.runs.run import replay as replay_run
 from studies.store.record import peek
@@ -39,7 +40,10 @@ def load_own_files(path: Path, moved: list[Path]) -> None:
 
     Raises StudyError for one that is not there any more.
     """
-    wanted = [Path(name) for name in own_files_of(peek(path))]
+    record = peek(path)
+    if record.attributes.get(ENTRY) is not None:
+        raise StudyError(f"{path} is an entry from outside: only the program that made it can run it again")
+    wanted = [Path(name) for name in own_files_of(record)]
     instead = {file.name: file for file in moved}
     if len(wanted) == len(moved) == 1:
         instead = {wanted[0].name: moved[0]}

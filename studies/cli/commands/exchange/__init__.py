@@ -1,0 +1,1 @@
+"""Scenes for other programs, and what these hand in."""

@@ -1,0 +1,132 @@
+"""A scene as scene.json: all that another program needs, in SI units, numbers beside words."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from massspring import Capsule, Obstacle, Plane, Sphere, Trajectory
+from studies.exchange.meshes import GivenMesh
+from studies.exchange.words import (
+    DAMPING,
+    DAMPING_OF_MOTION,
+    MATERIAL,
+    PATHS,
+    force_words,
+    friction_words,
+    lumen_words,
+    moved,
+    obstacle_words,
+    start_words,
+)
+from studies.metrics.metric import Metric
+from studies.metrics.metrics import METRICS
+from studies.scene.quantities import allowed
+from studies.scene.scene import Scene
+
+SCHEMA, VERSION = "organbench-scene", 1
+"""Raised when a reader of the old one would misread the new one."""
+OURS = ("alternation", "step_time", "frame_time", "frame_time_p99")
+"""Metrics of what is inside of this program alone."""
+HELD, OUTER, LUMEN = "held_", "outer", "lumen"
+"""Point data of the meshes: 1 at the nodes of a held region, of the outer surface, of the lumen's, else 0."""
+FILES = {"straight": "straight.vtu", "curved": "curved.vtu", "surface": "surface.vtu", "paths": "paths.csv"}
+
+
+def judged_metrics(scene: Scene) -> list[Metric]:
+    """What an entry in this scene is judged by."""
+    metrics = [metric for metric in METRICS if metric.name not in OURS]
+    return [m for m in metrics if m.quantity is None or allowed(scene, m.quantity)]
+
+
+def description(scene: Scene, meshes: Sequence[GivenMesh], why_not_curved: str) -> dict[str, Any]:
+    """The content of scene.json, JSON-able."""
+    return {
+        "schema": SCHEMA,
+        "version": VERSION,
+        "name": scene.name,
+        "title": scene.title,
+        "units": {"length": "m", "time": "s", "mass": "kg", "force": "N", "pressure": "Pa"},
+        "meshes": {mesh.kind: mesh_entry(mesh) for mesh in meshes},
+        "why_no_curved_mesh": why_not_curved,
+        "material": material(scene),
+        "gravity": list(scene.gravity),
+        "damping": {"rate": scene.damping, "words": DAMPING_OF_MOTION if moves(scene) else DAMPING},
+        "start": {"words": start_words(scene), "speed": scene.start and scene.start.speed},
+        "duration": scene.duration,
+        "frames": scene.frames,
+        "checkpoints": list(scene.checkpoints),
+        "held": [
+            {"name": held.name, "point_data": HELD + held.name, "path": path_entry(held.path)} for held in scene.held
+        ],
+        "obstacles": [obstacle_entry(obstacle) for obstacle in scene.obstacles],
+        "paths": {"file": FILES["paths"], "words": PATHS},
+        "lumen": lumen_entry(scene),
+        "force": {"of": scene.probed.what, "number": scene.probed.number, "direction": list(scene.probed.direction)}
+        | {"words": force_words(scene)},
+        "judged": [metric_entry(metric) for metric in judged_metrics(scene)],
+    }
+
+
+def moves(scene: Scene) -> bool:
+    """Whether its reference is a motion."""
+    return scene.reference is not None and scene.reference.dt is not None
+
+
+def material(scene: Scene) -> dict[str, Any]:
+    """The tissue."""
+    tissue = scene.tissue
+    return {
+        "shear_modulus": tissue.shear_modulus,
+        "bulk_modulus": tissue.shear_modulus * tissue.bulk_over_shear,
+        "density": tissue.density,
+        "words": MATERIAL,
+        "source": tissue.source,
+    }
+
+
+def mesh_entry(mesh: GivenMesh) -> dict[str, Any]:
+    """A mesh: its file and its sizes."""
+    return {
+        "file": FILES[mesh.kind],
+        "cells": "quadratic tetrahedra, VTK's order" if mesh.cells.shape[1] == 10 else "tetrahedra",
+        "nodes": len(mesh.points),
+        "outer_nodes": int(mesh.mesh.outer_count),
+        "tetrahedra": len(mesh.cells),
+        "volumes": dict(zip(mesh.volumes.names, mesh.volumes.measure(mesh.points).tolist(), strict=True)),
+    }
+
+
+def path_entry(path: Trajectory) -> dict[str, Any]:
+    """Key times and displacements, and the same in words."""
+    return {"times": list(path.times), "displacements": np.array(path.displacements).tolist(), "words": moved(path)}
+
+
+def obstacle_entry(obstacle: Obstacle) -> dict[str, Any]:
+    """An obstacle as numbers by kind, and in words."""
+    entry: dict[str, Any] = {"kind": type(obstacle).__name__.lower(), "friction": getattr(obstacle, "friction", 0.0)}
+    if isinstance(obstacle, Plane):
+        entry |= {"point": list(obstacle.point), "normal": obstacle.unit_normal.tolist()}
+    elif isinstance(obstacle, Sphere):
+        entry |= {"centre": list(obstacle.centre), "radius": obstacle.radius}
+    elif isinstance(obstacle, Capsule):
+        entry |= {"start": list(obstacle.start), "end": list(obstacle.end), "radius": obstacle.radius}
+    else:
+        entry |= {"tip": list(obstacle.tip), "radius": obstacle.radius}
+    words = {"friction_words": friction_words(obstacle), "words": obstacle_words(obstacle)}
+    return entry | {"path": path_entry(obstacle.path)} | words
+
+
+def lumen_entry(scene: Scene) -> dict[str, Any] | None:
+    """What fills a hollow organ; None for a solid one."""
+    lumen = scene.lumen
+    if lumen is None:
+        return None
+    filling = {"times": list(lumen.filling.times), "factors": list(lumen.filling.values)}
+    return {"content": lumen.content, "volume": filling, "words": lumen_words(lumen)}
+
+
+def metric_entry(metric: Metric) -> dict[str, Any]:
+    """What a metric is."""
+    better = {"lower": "lower is better", "higher": "higher is better", "-": "nearer to 0 is better"}[metric.better]
+    return {"name": metric.name, "unit": metric.unit, "definition": metric.description, "better": better}

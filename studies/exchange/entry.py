@@ -1,0 +1,116 @@
+"""An entry from outside as a record like those of our own runs, stored under its own name and read back."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from massspring import METHODS, Method
+from massspring.kernels.arrays.layout import BoundaryConditions
+from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities
+from studies.base.errors import StudyError
+from studies.metrics.run import Run
+from studies.reference.load import Reference
+from studies.runs.case import BodyRecipe, Case
+from studies.scene.as_json import scene_of_key, scene_to_json
+from studies.scene.scene import Scene
+from studies.store.paths import readable, record_files, record_path
+from studies.store.record import Record, read_record
+from studies.timing.protocol import FrameTiming
+
+FOLDER = "entries"
+"""Of the results."""
+ENTRY, SECONDS = "entry", "entry_seconds"
+"""Attributes of its record."""
+
+
+@dataclass(frozen=True)
+class Outside(Method):
+    """What another program did; it cannot be run here. Each entry is a class of its own, for its name."""
+
+    name: ClassVar[str] = "outside"
+    order: ClassVar[int] = 0
+    volume_tol: ClassVar[float | None] = None
+    capabilities: ClassVar[Capabilities] = Capabilities("none")
+
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
+        """Raises StudyError."""
+        raise StudyError(f"'{self.name}' is an entry from outside: only the program that made it can run it")
+
+
+@cache
+def outside(name: str) -> Outside:
+    """The method that stands for an entry. Raises StudyError for a name that is a method's, or that is no name."""
+    if name in [method.name for method in METHODS]:
+        raise StudyError(f"'{name}' is a method of this program; give your entry another name (--name)")
+    if not name or readable(name) != name:
+        raise StudyError(f"{name!r} cannot name an entry; use letters, digits, '.', '_' and '-' (--name)")
+    return dataclass(frozen=True)(type(name, (Outside,), {"name": name, "__module__": __name__}))()
+
+
+def is_entry(case: Case) -> bool:
+    """Whether a case is an entry from outside."""
+    return isinstance(case.method, Outside)
+
+
+def entry_path(root: Path, case: Case) -> Path:
+    """Where the record of an entry lies."""
+    return record_path(root, FOLDER, entry_name(case), case.key)
+
+
+def entry_name(case: Case) -> str:
+    """SCENE-MESH-NODES-NAME."""
+    mesh = "curved" if case.body.kind == "quadratic" else "straight"
+    return f"{case.scene.name}-{mesh}-{case.body.nodes}-{case.method.name}"
+
+
+def case_of_entry(record: Record) -> Case:
+    """The case of an entry's record. Raises StudyError for a record that is none."""
+    if record.attributes.get(ENTRY) is None:
+        raise StudyError(f"'{record.name}' is no entry from outside")
+    data = json.loads(record.key)
+    recipe = BodyRecipe(data["body"]["kind"], int(data["body"]["nodes"]))
+    return Case(scene_of_key(record.key), recipe, outside(data["method"]["name"]))
+
+
+def run_of_entry(record: Record, reference: Reference | None) -> Run:
+    """An entry beside what it is judged by."""
+    seconds = record.attributes.get(SECONDS)
+    timing = None
+    if seconds is not None:
+        frame_ns = 1e9 * seconds * record.attributes["frame"]
+        timing = FrameTiming(np.full((1, int(record.attributes["frames"])), frame_ns))
+    return Run(case_of_entry(record), record, reference, timing)
+
+
+def entry_files(root: Path) -> list[Path]:
+    """The records of all entries, sorted."""
+    return record_files(root, FOLDER)
+
+
+def entries_beside(root: Path, scenes: Iterable[Scene], runs: Iterable[Run]) -> tuple[list[Run], list[str]]:
+    """The entries in `scenes`, judged by the references that the `runs` in them have; and what cannot be read, a
+    sentence each. A scene is the same whatever its reference's meshes and its number of frames."""
+    references = {run.case.scene.name: run.reference for run in runs}
+    wanted = {_same(scene): scene for scene in scenes}
+    found, problems = [], []
+    for path in entry_files(root):
+        try:
+            record = read_record(path)
+            run = run_of_entry(record, references.get(scene_of_key(record.key).name))
+        except StudyError as problem:
+            problems.append(str(problem))
+            continue
+        scene = wanted.get(_same(run.case.scene))
+        if scene is not None:
+            found.append(replace(run, case=run.case.replaced(scene=scene)))
+    return found, problems
+
+
+def _same(scene: Scene) -> str:
+    return scene_to_json(replace(scene, reference=None, frames=1))

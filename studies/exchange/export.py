@@ -1,0 +1,80 @@
+"""A scene in a folder, so that another program can run it without this one."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from studies.base.atomic import write_whole
+from studies.base.errors import StudyError
+from studies.exchange.description import FILES, HELD, LUMEN, OUTER, description
+from studies.exchange.meshes import STRAIGHT, GivenMesh, given_meshes
+from studies.exchange.readme import readme
+from studies.geometry.files.grids import write_grid_file
+from studies.geometry.mesh.organ_mesh import OrganMesh
+from studies.scene.scene import Scene
+
+DESCRIPTION, README = "scene.json", "README.md"
+
+
+def export(scene: Scene, folder: Path, nodes: int) -> tuple[list[Path], str]:
+    """Writes the scene into `folder` with `nodes` vertices on its outer surface; the files, and why there is no curved
+    mesh (nothing where there is one). Raises StudyError for a folder that is a file, and a mesh that cannot be made."""
+    if folder.exists() and not folder.is_dir():
+        raise StudyError(f"{folder} is a file; give the name of a folder")
+    meshes, why_not = given_meshes(scene, nodes)
+    written = [_write_mesh(mesh, folder) for mesh in meshes]
+    written.append(_write_surface(meshes, folder / FILES["surface"]))
+    written.append(folder / FILES["paths"])
+    write_whole(written[-1], paths_table(scene).to_csv(index=False).encode())
+    found = description(scene, meshes, why_not)
+    for name, text in ((DESCRIPTION, json.dumps(found, indent=1) + "\n"), (README, readme(found, nodes))):
+        written.append(folder / name)
+        write_whole(written[-1], text.encode())
+    return written, why_not
+
+
+def _write_mesh(mesh: GivenMesh, folder: Path) -> Path:
+    path = folder / FILES[mesh.kind]
+    write_grid_file(path, mesh.points, {"tetra10" if mesh.cells.shape[1] == 10 else "tetra": mesh.cells}, marks(mesh))
+    return path
+
+
+def marks(mesh: GivenMesh) -> dict[str, np.ndarray]:
+    """Point data, 1 or 0, (n,): outer surface, lumen and held regions."""
+    number = np.arange(len(mesh.points))
+    outer = number < mesh.mesh.outer_count
+    found = {OUTER: outer}
+    if mesh.mesh.hollow:
+        found[LUMEN] = ~outer & (number < mesh.mesh.surface_count)
+    for name, nodes in mesh.held_nodes().items():
+        found[HELD + name] = np.isin(number, nodes)
+    return {name: values.astype(np.int32) for name, values in found.items()}
+
+
+def _write_surface(meshes: Sequence[GivenMesh], path: Path) -> Path:
+    (straight,) = [mesh for mesh in meshes if mesh.kind == STRAIGHT]
+    assert isinstance(straight.mesh, OrganMesh)  # linear
+    count = straight.mesh.outer_count
+    data = {name: values[:count] for name, values in marks(straight).items() if name.startswith(HELD)}
+    write_grid_file(path, straight.points[:count], {"triangle": straight.mesh.outer_triangles}, data)
+    return path
+
+
+def paths_table(scene: Scene) -> pd.DataFrame:
+    """Time [s] and displacements [m] of obstacles and held regions, and the factor of the lumen's volume, at the end of
+    every frame of the scene and at every key time."""
+    moving = {f"obstacle_{number}": obstacle.path for number, obstacle in enumerate(scene.obstacles)}
+    moving |= {HELD + held.name: held.path for held in scene.held}
+    keys = [t for path in moving.values() for t in path.times] + list(scene.checkpoints)
+    if scene.lumen is not None:
+        keys += scene.lumen.filling.times
+    t = np.unique(np.concatenate([np.linspace(0.0, scene.duration, scene.frames + 1), keys]))
+    columns = {"t": t}
+    for name, path in moving.items():
+        columns |= {f"{name}_{axis}": values for axis, values in zip("xyz", path(t).T, strict=True)}
+    if scene.lumen is not None:
+        columns["lumen_volume_factor"] = scene.lumen.filling(t)
+    return pd.DataFrame(columns)

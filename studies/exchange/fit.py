@@ -1,0 +1,139 @@
+"""Whether what was handed in fits the scene: the same mesh, node by node, in metres, at every checkpoint."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from studies.base.errors import StudyError
+from studies.exchange.description import FILES
+from studies.exchange.handed import Handed
+from studies.exchange.meshes import GivenMesh
+from studies.geometry.files.units import NAMES, UNITS
+from studies.scene.scene import Scene
+
+SAME = 1e-6
+"""Of the body: rest positions that differ by less are the same, though stored as 32-bit floats."""
+SAME_TIME = 1e-6
+"""Of the scene's duration."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitting:
+    """Steps on a mesh of the scene, all after t = 0."""
+
+    mesh: GivenMesh
+    t: np.ndarray
+    """[s], (F,), ascending, every checkpoint among them."""
+    positions: np.ndarray
+    """[m], (F, n, 3)."""
+    histories: dict[str, np.ndarray]
+    """Of handed.OPTIONAL what there is, (F,) each."""
+
+
+def fitted(handed: Handed, scene: Scene, meshes: Sequence[GivenMesh]) -> Fitting:
+    """What was handed in, on the mesh that it is of. Raises StudyError, in a sentence, for what does not fit."""
+    name, x = handed.name, handed.positions
+    if x.ndim != 3 or x.shape[2] != 3:
+        raise StudyError(f"{name}: positions have shape {x.shape}; they must be (steps, nodes, 3)")
+    t = _times(handed, scene)
+    _check_finite(name, "positions", t, x)
+    mesh = _mesh_of(name, x.shape[1], meshes)
+    _check_rest(name, x[0], mesh)
+    for key, values in handed.histories.items():
+        if values.shape != t.shape:
+            raise StudyError(f"{name}: {key} has shape {values.shape} for {len(t)} steps; give one number for each")
+        _check_finite(name, key, t[1:], values[1:])
+    return Fitting(mesh, t[1:], x[1:], {key: values[1:] for key, values in handed.histories.items()})
+
+
+def force_at(name: str, t: np.ndarray, times: np.ndarray, force: np.ndarray, scene: Scene) -> np.ndarray:
+    """The forces [N] that a table (times, force) has at the steps t (F,), (F,).
+
+    Raises StudyError for a step that is missing there, and for one without a number.
+    """
+    if not len(times):
+        raise StudyError(f"{name} holds no force")
+    nearest = np.abs(times[None] - t[:, None]).argmin(axis=1)
+    missing = np.abs(times[nearest] - t) > SAME_TIME * scene.duration
+    if missing.any():
+        raise StudyError(f"{name} has no force at t = {_list(t[missing])} s, where positions were handed in")
+    _check_finite(name, "force", t, force[nearest])
+    return force[nearest]
+
+
+def _times(handed: Handed, scene: Scene) -> np.ndarray:
+    """The times of all steps, the first 0 (F + 1,)."""
+    name, steps, wanted = handed.name, len(handed.positions), np.array([0.0, *scene.checkpoints])
+    t = wanted if handed.t is None else np.asarray(handed.t)
+    if t.shape != (steps,):
+        what = "files" if handed.t is None else "steps"
+        raise StudyError(f"{name}: {steps} {what} for {t.size} times; hand in rest and {len(wanted) - 1} checkpoints")
+    if not np.isfinite(t).all() or (np.diff(t) <= 0).any():
+        raise StudyError(f"{name}: the times of the steps must be numbers that ascend")
+    near = SAME_TIME * scene.duration
+    if len(t) > 1 and abs(t[-1] / 1e3 - scene.duration) <= near:
+        raise StudyError(f"{name}: the times go to {t[-1]:g}, the scene to {scene.duration:g} s: give seconds, not ms")
+    missing = wanted[[np.abs(t - one).min() > near for one in wanted]]
+    if len(missing):
+        rest = " (t = 0 is the rest shape)" if missing[0] == 0.0 else ""
+        raise StudyError(f"{name}: steps are missing at t = {_list(missing)} s{rest}; hand in all of {_list(wanted)}")
+    if t[0] < -near or abs(t[0]) > near:
+        raise StudyError(f"{name}: the first step is at t = {t[0]:g} s; begin with the rest shape at t = 0")
+    return t
+
+
+def _list(times: np.ndarray) -> str:
+    return ", ".join(f"{t:g}" for t in times)
+
+
+def _check_finite(name: str, what: str, t: np.ndarray, values: np.ndarray) -> None:
+    """Raises StudyError naming the first step, and node, whose value is no finite number."""
+    wrong = np.argwhere(~np.isfinite(values))
+    if len(wrong):
+        step, *rest = (int(part) for part in wrong[0])
+        where = f" of node {rest[0]}" if rest else ""
+        raise StudyError(f"{name}: {what}{where} at t = {t[step]:g} s is not a finite number")
+
+
+def _mesh_of(name: str, count: int, meshes: Sequence[GivenMesh]) -> GivenMesh:
+    for mesh in meshes:
+        if len(mesh.points) == count:
+            return mesh
+    known = " and ".join(f"{FILES[mesh.kind]} {len(mesh.points)}" for mesh in meshes)
+    raise StudyError(
+        f"{name}: positions of {count} nodes, but {known} at this number of vertices; it is of another mesh (--nodes "
+        "says with how many vertices the scene was exported)"
+    )
+
+
+def _check_rest(name: str, rest: np.ndarray, mesh: GivenMesh) -> None:
+    """Raises StudyError for a rest shape that is not that of the mesh, and says in what it differs."""
+    file, points = FILES[mesh.kind], mesh.points
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    if _gap(rest, points) <= SAME * size:
+        return
+    tree = KDTree(points)
+    for unit, metres in UNITS.items():
+        scaled = metres * rest
+        distance, nearest = (np.asarray(found) for found in tree.query(scaled))
+        if distance.max() > SAME * size:
+            continue
+        if metres != 1.0:
+            raise StudyError(f"{name}: the rest positions are those of {file} in {NAMES[unit]}; hand them in in metres")
+        if len(np.unique(nearest)) == len(points):
+            odd = int(np.flatnonzero(nearest != np.arange(len(points)))[0])
+            raise StudyError(
+                f"{name}: the nodes are those of {file} in another order (number {odd} is its number {nearest[odd]}); "
+                "hand them in in the order of the file"
+            )
+    gap = _gap(rest, points)
+    raise StudyError(
+        f"{name}: the positions at t = 0 are up to {gap:.3g} m from those of {file}; it is of another rest mesh, or "
+        "not at rest"
+    )
+
+
+def _gap(one: np.ndarray, other: np.ndarray) -> float:
+    return float(np.linalg.norm(one - other, axis=1).max())

@@ -1,0 +1,163 @@
+"""What another program hands in, read from its file as it stands."""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+
+from studies.base.errors import StudyError
+from studies.geometry.files.grids import SUFFIX, read_points
+
+DISPLACEMENT = "displacement"
+"""Point data of a grid that stands still."""
+OPTIONAL = ("force", "pressure", "lumen_pressure")
+"""Histories that a npz file may hold beside the positions, one number for each step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Handed:
+    """Steps of a body, as its file has them."""
+
+    name: str
+    """Of the file."""
+    t: np.ndarray | None
+    """[s], (F,); None where the file has no times."""
+    positions: np.ndarray
+    """[m], (F, n, 3)."""
+    histories: dict[str, np.ndarray]
+    """Of OPTIONAL what there is, (F,) each."""
+
+
+def read_handed(path: Path) -> Handed:
+    """The steps in a file (npz, CSV, VTKHDF, PVD), in a folder of VTU files, or in those that a pattern names.
+
+    Raises StudyError for a file of another kind, and for one that cannot be read or lacks something.
+    """
+    if path.is_dir() or "*" in path.name:
+        return _read_series(path)
+    if path.suffix.lower() not in READERS:
+        raise StudyError(f"{path.name}: entries are read from {', '.join(READERS)} or a folder of {SUFFIX} files")
+    if not path.is_file():
+        raise StudyError(f"there is no file {path}")
+    try:
+        return READERS[path.suffix.lower()](path)
+    except StudyError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError, EOFError, ElementTree.ParseError) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise StudyError(
+            f"{path.name} cannot be read ({reason}); README.md of the scene says what it must hold"
+        ) from error
+
+
+def read_force(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and forces [N] of a CSV file with the columns t and force, (q,) each. Raises StudyError."""
+    table = _table(path, ("t", "force"))
+    return table["t"].to_numpy(np.float64), table["force"].to_numpy(np.float64)
+
+
+def _table(path: Path, columns: Sequence[str]) -> pd.DataFrame:
+    if not path.is_file():
+        raise StudyError(f"there is no file {path}")
+    try:
+        table = pd.read_csv(path, dtype=str, skipinitialspace=True)  # as floats some would lose their last bit
+        missing = [name for name in columns if name not in table.columns]
+        if missing:
+            raise StudyError(f"{path.name} lacks the column {missing[0]!r}; it needs {', '.join(columns)}")
+        return pd.DataFrame({name: table[name].to_numpy(object).astype(np.float64) for name in columns})
+    except (ValueError, OSError) as error:
+        if isinstance(error, StudyError):
+            raise
+        raise StudyError(f"{path.name} cannot be read as a table ({str(error).splitlines()[0]})") from error
+
+
+def _read_npz(path: Path) -> Handed:
+    with np.load(path, allow_pickle=False) as file:
+        missing = [name for name in ("t", "positions") if name not in file]
+        if missing:
+            raise StudyError(f"{path.name} lacks {missing[0]!r}; it needs t (F) and positions (F, n, 3)")
+        found = {name: np.asarray(file[name], np.float64) for name in ("t", "positions", *OPTIONAL) if name in file}
+    return Handed(path.name, found.pop("t"), found.pop("positions"), found)
+
+
+def _read_csv(path: Path) -> Handed:
+    table = _table(path, ("t", "node", "x", "y", "z")).sort_values(["t", "node"], kind="stable")
+    t, counts = np.unique(table["t"], return_counts=True)
+    nodes = table["node"].to_numpy()
+    if len(set(counts.tolist())) != 1:
+        odd = int(np.argmin(counts))
+        raise StudyError(f"{path.name}: step t = {t[odd]:g} s has {counts[odd]} nodes, others have {counts.max()}")
+    if not np.array_equal(nodes, np.tile(np.arange(counts[0]), len(t))):
+        raise StudyError(f"{path.name}: nodes are numbered {nodes.min():g} to {nodes.max():g}; number them from 0 on")
+    positions = table[["x", "y", "z"]].to_numpy(np.float64).reshape(len(t), counts[0], 3)
+    return Handed(path.name, t, positions, {})
+
+
+def _read_vtkhdf(path: Path) -> Handed:
+    with h5py.File(path, "r") as file:
+        root: Any = file["VTKHDF"]
+        steps = root.get("Steps")
+        if steps is None:
+            raise StudyError(f"{path.name} holds no steps; write them all into one file, or as VTU files")
+        t, count = np.asarray(steps["Values"], np.float64), np.asarray(root["NumberOfPoints"], np.int64)
+        if "NumberOfParts" in steps and (np.asarray(steps["NumberOfParts"]) != 1).any():
+            raise StudyError(f"{path.name} holds its grid in several parts; write it in one")
+        part = np.asarray(steps["PartOffsets"] if "PartOffsets" in steps else np.zeros(len(t)), np.int64)
+        sizes = count[part]
+        begins = np.asarray(steps["PointOffsets"], np.int64)
+        data = root.get(f"PointData/{DISPLACEMENT}")
+        points = [root["Points"][b : b + n].astype(np.float64) for b, n in zip(begins, sizes, strict=True)]
+        fields: list[np.ndarray | None] = [None] * len(t)
+        if data is not None and f"PointDataOffsets/{DISPLACEMENT}" in steps:
+            begins = np.asarray(steps[f"PointDataOffsets/{DISPLACEMENT}"], np.int64)
+            fields = [data[b : b + n] for b, n in zip(begins, sizes, strict=True)]
+    return Handed(path.name, t, _stacked(path.name, points, fields), {})
+
+
+def _read_pvd(path: Path) -> Handed:
+    sets = ElementTree.parse(path).getroot().iter("DataSet")
+    rows = sorted((float(entry.attrib["timestep"]), entry.attrib["file"]) for entry in sets)
+    if not rows:
+        raise StudyError(f"{path.name} names no files")
+    found = [read_points(path.parent / name) for _, name in rows]
+    return Handed(path.name, np.array([t for t, _ in rows]), _of_grids(path.name, found), {})
+
+
+def _read_series(path: Path) -> Handed:
+    folder, pattern = (path, f"*{SUFFIX}") if path.is_dir() else (path.parent, path.name)
+    files = sorted(folder.glob(pattern))
+    if not files:
+        raise StudyError(f"{folder} holds no file {pattern}")
+    return Handed(path.name, None, _of_grids(path.name, [read_points(file) for file in files]), {})
+
+
+def _of_grids(name: str, grids: Sequence[tuple[np.ndarray, dict[str, np.ndarray]]]) -> np.ndarray:
+    return _stacked(name, [points for points, _ in grids], [data.get(DISPLACEMENT) for _, data in grids])
+
+
+def _stacked(name: str, points: Sequence[np.ndarray], moved: Sequence[np.ndarray | None]) -> np.ndarray:
+    """Positions of all steps: the points, or where these stand still, points and displacements."""
+    if len({rows.shape for rows in points}) > 1:
+        raise StudyError(f"{name}: the number of nodes changes from step to step; hand in one mesh that moves")
+    still = all(np.array_equal(rows, points[0]) for rows in points)
+    fields = [row for row in moved if row is not None]
+    if not still or not fields:
+        return np.stack(points)
+    if len(fields) != len(points) or any(np.shape(row) != points[0].shape for row in fields):
+        raise StudyError(f"{name}: '{DISPLACEMENT}' must be there in every step, three numbers for each node")
+    return np.stack([rows + row for rows, row in zip(points, fields, strict=True)])
+
+
+READERS: dict[str, Callable[[Path], Handed]] = {
+    ".npz": _read_npz,
+    ".csv": _read_csv,
+    ".vtkhdf": _read_vtkhdf,
+    ".hdf": _read_vtkhdf,
+    ".pvd": _read_pvd,
+}
+"""By suffix."""

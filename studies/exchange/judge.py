@@ -1,0 +1,154 @@
+"""Judges what another program computed: volumes, elements and contacts are measured as in our own runs, and the same
+metrics read the record."""
+
+import hashlib
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+
+from massspring import History
+from massspring.kernels.forces.tetrahedra import smallest_ratio, tetrahedron_volumes_into
+from massspring.layout.probe_arrays import tip_depth
+from massspring.sources import source_fingerprint
+from massspring.world.obstacles import Obstacle, Probe
+from studies.base.errors import StudyError
+from studies.exchange.entry import ENTRY, SECONDS, entry_name, outside
+from studies.exchange.fit import Fitting, fitted, force_at
+from studies.exchange.handed import read_force, read_handed
+from studies.exchange.meshes import given_meshes
+from studies.runs.case import Case
+from studies.runs.indicators import sway
+from studies.runs.prepare import LUMEN
+from studies.scene.scene import Scene
+from studies.store.new_record import new_fields, new_record
+from studies.store.record import Record, Status
+from studies.store.schema import RUN_FIELDS
+
+
+def entry_record(
+    scene: Scene, path: Path, name: str, nodes: int, force: Path | None = None, seconds: float | None = None
+) -> Record:
+    """The record of what another program handed in.
+
+    path: as handed.read_handed takes it; name: of the entry; nodes: vertices on the outer surface with which the scene
+    was exported; force: a CSV file with the probed force; seconds: computing time for a simulated second [s/s].
+    Raises StudyError for whatever does not fit the scene.
+    """
+    method = outside(name)
+    if seconds is not None and not 0.0 < seconds < np.inf:
+        raise StudyError(f"{seconds} s of computing for a simulated second is no time; give a positive number")
+    handed = read_handed(path)
+    fitting = fitted(handed, scene, given_meshes(scene, nodes)[0])
+    if force is not None:
+        if "force" in fitting.histories:
+            raise StudyError(f"{handed.name} holds the force already; leave {force.name} out")
+        fitting.histories["force"] = force_at(force.name, fitting.t, *read_force(force), scene)
+    case = Case(scene, fitting.mesh.recipe, method)
+    values = measured(fitting)
+    inverted = values["min_j"][-1] <= 0.0
+    return new_record(
+        kind="run",
+        key=case.key,
+        name=entry_name(case),
+        status=Status.INVERTED if inverted else Status.OK,
+        message="a tetrahedron ends inside out" if inverted else "",
+        fingerprint=source_fingerprint(__name__),
+        attributes=_attributes(fitting) | _sway(fitting, values) | {ENTRY: _named(path, fitting), SECONDS: seconds},
+        fields=new_fields(RUN_FIELDS, values),
+    )
+
+
+def measured(fitting: Fitting) -> dict[str, np.ndarray]:
+    """The fields of a record: what a run records of itself, read off the positions."""
+    mesh, t, x = fitting.mesh, fitting.t, fitting.positions
+    scene, body, steps = mesh.scene, mesh.body, len(fitting.t)
+    at = [int(np.argmin(np.abs(t - wanted))) for wanted in scene.checkpoints]
+    surface, names = body.surface_nodes, mesh.volumes.names
+    depth = [[_depth(obstacle, each, surface, body.triangles, float(when)) for obstacle in scene.obstacles]
+             for when, each in zip(t, x, strict=True)]  # fmt: skip
+    pressure = np.zeros((steps, len(names)))
+    for column, name in enumerate(names):
+        pressure[:, column] = fitting.histories.get("lumen_pressure" if name == LUMEN else "pressure", 0.0)
+    return {
+        "t": t,
+        "volume": np.array([mesh.volumes.measure(each) for each in x]),
+        "volume_target": mesh.volume_targets(t),
+        "pressure": pressure,
+        **_forces(scene, fitting.histories.get("force"), steps),
+        "penetration": np.array(depth).reshape(steps, len(scene.obstacles)),
+        "iterations": np.zeros((steps, 2), dtype=np.int64),
+        "min_j": _smallest_j(body.rest, body.tetrahedra, x),
+        "snapshot_frame": np.array(at) + 1,
+        "snapshots": x[at],
+        "rest": body.rest,
+        "mass": body.mass,
+        "triangles": body.triangles,
+        "tetrahedra": body.tetrahedra,
+    }
+
+
+def _depth(obstacle: Obstacle, x: np.ndarray, surface: np.ndarray, triangles: np.ndarray, t: float) -> float:
+    """How deep the deepest surface node lies in an obstacle [m]."""
+    if isinstance(obstacle, Probe):
+        return max(0.0, tip_depth(obstacle, x, triangles, t))
+    return max(0.0, -float(obstacle.gap(x[surface], t).min()))
+
+
+def _forces(scene: Scene, force: np.ndarray | None, steps: int) -> dict[str, np.ndarray]:
+    """The probed force along its direction; unknown where none was handed in, and so are the others."""
+    contact, held = (np.full((steps, len(things), 3), np.nan) for things in (scene.obstacles, scene.held))
+    if force is not None:
+        direction = np.asarray(scene.probed.direction)
+        among = contact if scene.probed.what == "obstacle" else held
+        among[:, scene.probed.number] = force[:, None] * direction / (direction @ direction)
+    return {"contact_force": contact, "held_force": held}
+
+
+def _smallest_j(rest: np.ndarray, cells: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Smallest volume ratio of a tetrahedron at each step, (F,)."""
+    at_rest, now = np.empty(len(cells)), np.empty(len(cells))
+    tetrahedron_volumes_into(rest, cells, at_rest)
+    found = []
+    for each in x:
+        tetrahedron_volumes_into(np.ascontiguousarray(each), cells, now)
+        found.append(smallest_ratio(now, at_rest))
+    return np.array(found)
+
+
+def _attributes(fitting: Fitting) -> dict[str, Any]:
+    mesh, steps = fitting.mesh, len(fitting.t)
+    names = mesh.volumes.names
+    return {
+        "rest_volume": mesh.body.volume,
+        "dt": float("nan"),
+        "dt_limit": float("nan"),
+        "steps": 0,
+        "frame": mesh.scene.duration / steps,
+        "frames": steps,
+        "good_frames": steps,
+        "nodes": len(mesh.points),
+        "springs": 0,
+        "triangles": len(mesh.body.triangles),
+        "law": "",
+        "skipped_steps": 0,
+        "capped_steps": 0,
+        "volumes": len(names),
+        "lumen_column": names.index(LUMEN) if LUMEN in names else -1,
+        "warnings": "",
+    }
+
+
+def _sway(fitting: Fitting, values: dict[str, np.ndarray]) -> dict[str, float]:
+    """How much the force sways at the end, where it is known."""
+    if "force" not in fitting.histories:
+        return {}
+    read = {name: values[name] for name in ("t", "contact_force", "held_force")}
+    # What `sway` reads of a history.
+    return {"sway": sway(fitting.mesh.scene, cast(History, SimpleNamespace(good_frames=len(fitting.t), **read)))}
+
+
+def _named(path: Path, fitting: Fitting) -> str:
+    digest = hashlib.sha256(np.ascontiguousarray(fitting.positions).tobytes()).hexdigest()
+    return f"{path.name} sha256:{digest}"

@@ -1,0 +1,99 @@
+"""The meshes on which positions are handed in: the straight and the curved one of a scene's organ."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from massspring import Body
+from massspring.body.volumes import Volumes
+from studies.base.errors import StudyError
+from studies.geometry import OrganMesh
+from studies.grading.graded_mesh import mesh_at
+from studies.grading.quadratic_mesh import QuadraticMesh
+from studies.runs.case import BodyRecipe
+from studies.runs.prepare import LUMEN, body_for
+from studies.scene.meshing import mesh_for, patch_nodes
+from studies.scene.scene import Scene
+
+STRAIGHT, CURVED = "straight", "curved"
+NODES = 550
+"""Vertices on the outer surface where nobody says how many."""
+
+
+@dataclass(frozen=True, eq=False)
+class GivenMesh:
+    """A mesh of a scene's organ, and the body that stands on it where it is measured."""
+
+    scene: Scene
+    kind: str
+    """STRAIGHT: linear tetrahedra; CURVED: quadratic ones, on the true surface where it is known."""
+    mesh: OrganMesh | QuadraticMesh
+
+    @property
+    def points(self) -> np.ndarray:
+        """Rest positions [m], (n, 3)."""
+        return self.mesh.points
+
+    @property
+    def cells(self) -> np.ndarray:
+        """Nodes of the tetrahedra in VTK's order, (k, 4) or (k, 10)."""
+        return self.mesh.cells if isinstance(self.mesh, QuadraticMesh) else self.mesh.tetrahedra
+
+    @cached_property
+    def recipe(self) -> BodyRecipe:
+        """Of the body: its nodes are those of the outer surface."""
+        kind = "quadratic" if self.kind == CURVED else "tetrahedral"
+        return BodyRecipe(kind, int(self.mesh.outer_count))
+
+    @cached_property
+    def body(self) -> Body:
+        """The masses, triangles and tetrahedra by which it is measured."""
+        return body_for(self.scene, self.recipe, self.mesh)
+
+    @cached_property
+    def volumes(self) -> Volumes:
+        """What is measured: the volume of the tissue as a whole, and that of a lumen that is filled."""
+        kept = self.body.kept
+        if isinstance(kept, Volumes):
+            return kept
+        if not self.scene.filled:
+            return Volumes.whole(self.body)
+        inner = (self.body.triangles >= self.mesh.outer_count).all(axis=1)
+        surfaces = {"wall": self.body.triangles, LUMEN: self.body.triangles[inner][:, ::-1]}
+        return Volumes.closed_surfaces(self.body, surfaces)
+
+    def held_nodes(self) -> dict[str, np.ndarray]:
+        """The nodes of each held region."""
+        mesh = self.mesh
+        if isinstance(mesh, QuadraticMesh):
+            return {held.name: mesh.patches[held.name] for held in self.scene.held}
+        return {held.name: patch_nodes(mesh, held.name, held.region) for held in self.scene.held}
+
+    def volume_targets(self, t: np.ndarray) -> np.ndarray:
+        """What each measured volume should be at times t (F,) [s], (F, m) [m³]."""
+        lumen = self.scene.lumen
+        filling = np.ones(len(t)) if lumen is None else lumen.filling(t)
+        factors = [filling if name == LUMEN else np.ones(len(t)) for name in self.volumes.names]
+        return np.column_stack(factors) * self.volumes.measure(self.points)
+
+
+def given_mesh(scene: Scene, nodes: int, kind: str) -> GivenMesh:
+    """The mesh of a kind with `nodes` vertices on its outer surface. Raises StudyError where it cannot be made."""
+    if kind == STRAIGHT:
+        return GivenMesh(scene, kind, mesh_for(scene, nodes))
+    made = mesh_at(scene, nodes, 0, 0, True)
+    assert isinstance(made, QuadraticMesh)  # it was asked for
+    return GivenMesh(scene, kind, made)
+
+
+def given_meshes(scene: Scene, nodes: int) -> tuple[list[GivenMesh], str]:
+    """The straight mesh and, where it can be made, the curved one; and why there is no curved one.
+
+    Raises StudyError where not even the straight one can be made.
+    """
+    straight = given_mesh(scene, nodes, STRAIGHT)
+    try:
+        return [straight, given_mesh(scene, nodes, CURVED)], ""
+    except StudyError as problem:
+        return [straight], str(problem)

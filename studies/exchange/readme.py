@@ -1,0 +1,112 @@
+"""README.md of an exported scene: what the files are, in which units, and how to hand results in."""
+
+from collections.abc import Mapping
+from typing import Any
+
+TEXT = """# {name}
+
+{title}.
+
+Everything is in SI units: metres, seconds, kilograms, newtons, pascals. `scene.json` holds all numbers of this page and
+more, each beside words; {version_words}.
+
+## Files
+
+| file | content |
+|---|---|
+{meshes}
+| surface.vtu | the outer surface: triangles, turned outward, with the first nodes of straight.vtu |
+| paths.csv | displacement [m] of every obstacle and held region{lumen_column} over time [s] |
+| scene.json | material, loads, checkpoints, what is judged |
+
+Point data of the meshes is 1 or 0: {point_data}.
+
+## The scene
+
+- **Material.** mu = {mu:g} Pa, kappa = {kappa:g} Pa, density {rho:g} kg/m3. {material}
+- **Start.** {start}
+- **Gravity** {gravity} m/s2. **Damping** {damping:g} 1/s: {damping_words}
+{loads}
+- **Lumen.** {lumen}
+- **Time.** {duration:g} s; positions are judged at {checkpoints} s.
+- **Force.** {force}
+
+## What is judged
+
+| metric | unit | definition | |
+|---|---|---|---|
+{metrics}
+
+Errors of displacement and force are against a finite-element reference whose uncertainty is known. The *last
+checkpoint* is t = {last:g} s.
+
+## Handing results in
+
+Positions [m] of **all nodes of one of the meshes, in the order of its file**. Whatever mesh or method computed them
+will do: interpolate to these nodes. Steps: t = 0 with the rest positions, every checkpoint, and any others; volume,
+smallest J and penetration are taken over all steps that are handed in. Store 64-bit floats.
+
+| file | what must be in it |
+|---|---|
+| NAME.npz | `t` (F), `positions` (F, n, 3); where asked `force` (F), `pressure` (F), `lumen_pressure` (F) |
+| NAME.csv | columns t, node, x, y, z: a row for each node and step |
+| NAME.vtkhdf | an unstructured grid that moves in steps, or stands still with the point data `displacement` |
+| NAME.pvd | VTU files with their times (`timestep`), points or `displacement` as above |
+| a folder | VTU files in order of their names: rest and every checkpoint, nothing else |
+
+    organbench judge {name} FILE --nodes {nodes} --name NAME --force FORCE.csv --seconds S
+
+FORCE.csv has the columns t and force [N]. S is the computing time [s] for one simulated second, on one core where you
+can. `pressure` is positive in compression.
+"""
+
+
+def readme(found: Mapping[str, Any], nodes: int) -> str:
+    """The text for what `description` gives; nodes: vertices on the outer surface."""
+    return TEXT.format(
+        name=found["name"],
+        title=found["title"],
+        version_words=f'its layout is "{found["schema"]}" {found["version"]}',
+        meshes="\n".join(_mesh_rows(found)),
+        lumen_column=", and the factor of the lumen's volume," if found["lumen"] else "",
+        point_data=", ".join(f"`{name}`" for name in _point_data(found)),
+        mu=found["material"]["shear_modulus"],
+        kappa=found["material"]["bulk_modulus"],
+        rho=found["material"]["density"],
+        material=found["material"]["words"],
+        start=found["start"]["words"],
+        gravity=tuple(found["gravity"]),
+        damping=found["damping"]["rate"],
+        damping_words=found["damping"]["words"],
+        loads="\n".join(_loads(found)),
+        lumen=found["lumen"]["words"] if found["lumen"] else "None: the organ is solid.",
+        duration=found["duration"],
+        checkpoints=", ".join(f"{t:g}" for t in found["checkpoints"]),
+        force=found["force"]["words"],
+        metrics="\n".join(_metric_rows(found)),
+        last=found["checkpoints"][-1],
+        nodes=nodes,
+    )
+
+
+def _mesh_rows(found: Mapping[str, Any]) -> list[str]:
+    rows = [
+        f"| {mesh['file']} | {mesh['nodes']} nodes, {mesh['tetrahedra']} {mesh['cells']} |"
+        for mesh in found["meshes"].values()
+    ]
+    why = found["why_no_curved_mesh"]
+    return [*rows, f"| (no curved mesh) | {why} |"] if why else rows
+
+
+def _point_data(found: Mapping[str, Any]) -> list[str]:
+    return ["outer", *(["lumen"] if found["lumen"] else []), *(held["point_data"] for held in found["held"])]
+
+
+def _loads(found: Mapping[str, Any]) -> list[str]:
+    rows = [f"- **Held region {h['name']}**: its nodes move together; it {h['path']['words']}." for h in found["held"]]
+    return rows + [f"- **Obstacle {number}.** {o['words']}" for number, o in enumerate(found["obstacles"])]
+
+
+def _metric_rows(found: Mapping[str, Any]) -> list[str]:
+    rows = [(m["name"], m["unit"], m["definition"].replace("|", "\\|"), m["better"]) for m in found["judged"]]
+    return [f"| {' | '.join(row)} |" for row in rows]

@@ -1,0 +1,140 @@
+"""An exported scene, read with meshio, json and csv alone: all that another program needs is there and right."""
+
+import csv
+import json
+from dataclasses import replace
+
+import meshio
+import numpy as np
+import pytest
+
+from massspring import Capsule, Probe
+from studies.exchange.description import description, judged_metrics
+from studies.exchange.export import paths_table
+from studies.exchange.words import obstacle_words
+from studies.scenes import SCENES
+from studies.scenes.ball_clamped import BALL_CLAMPED, CAP, PUSH, RADIUS
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+
+NODES = 150
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, mesh_cache):
+    return tmp_path_factory.mktemp("export") / "scene"
+
+
+@pytest.fixture
+def exported(organbench, folder):
+    """The clamped ball, by the command line."""
+    code, out, err = organbench("export", "ball_clamped", "-o", folder, "--nodes", NODES)
+    assert code == 0 and not err
+    assert sorted(out.split()) == sorted(str(path) for path in folder.iterdir())
+    return folder
+
+
+def volume(points, cells):
+    a, b, c, d = points[cells].transpose(1, 0, 2)
+    return np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6
+
+
+def test_meshes_fit_the_ball_and_each_other(exported):
+    found = json.loads((exported / "scene.json").read_text())
+    straight, curved = (meshio.read(exported / found["meshes"][kind]["file"]) for kind in ("straight", "curved"))
+    (cells,), (quadratic,) = ([block.data for block in mesh.cells] for mesh in (straight, curved))
+    assert [block.type for block in (*straight.cells, *curved.cells)] == ["tetra", "tetra10"]
+    assert (volume(straight.points, cells) > 0).all() and (volume(curved.points, quadratic[:, :4]) > 0).all()
+    assert volume(straight.points, cells).sum() == pytest.approx(found["meshes"]["straight"]["volumes"]["whole"])
+    # Each middle node lies between the right corners, bent outward by the height of its arc at most.
+    for middle, (i, j) in enumerate([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)], 4):
+        ends = curved.points[quadratic[:, [i, j]]]
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        assert (np.linalg.norm(curved.points[quadratic[:, middle]] - ends.mean(axis=1), axis=1) < 0.3 * length).all()
+    for mesh in (straight, curved):
+        outer = mesh.point_data["outer"] == 1
+        assert np.linalg.norm(mesh.points[outer], axis=1) == pytest.approx(RADIUS, rel=1e-6)
+        assert (np.linalg.norm(mesh.points[~outer], axis=1) < 0.999 * RADIUS).all()
+
+
+def test_held_nodes_are_the_caps_and_move_as_the_scene_says(exported):
+    found = json.loads((exported / "scene.json").read_text())
+    bottom, top = found["held"]
+    for mesh in (meshio.read(exported / name) for name in ("straight.vtu", "curved.vtu", "surface.vtu")):
+        z = mesh.points[:, 2]
+        outer = mesh.point_data.get("outer", np.ones(len(z)))
+        for region, height in ((bottom, -z), (top, z)):
+            marked = mesh.point_data[region["point_data"]] == 1
+            assert marked.sum() >= 5 and (height[marked] > (CAP - 1e-6) * RADIUS).all()
+            assert not ((height > (CAP + 1e-6) * RADIUS) & (outer == 1) & ~marked).any()
+    assert top["path"]["displacements"][-1] == pytest.approx([0, 0, -PUSH * RADIUS])
+    assert "(0, 0, -0.0125) m at 3 s" in top["path"]["words"] and "does not move" in bottom["path"]["words"]
+    with (exported / "paths.csv").open() as file:
+        rows = {float(row["t"]): float(row["held_top_z"]) for row in csv.DictReader(file)}
+    assert set(found["checkpoints"]) <= set(rows)
+    assert {t: rows[t] for t in (0.0, 1.5, 3.0, 4.0)} == pytest.approx({0: 0, 1.5: -0.00625, 3: -0.0125, 4: -0.0125})
+
+
+def test_the_surface_is_closed_and_shares_its_nodes(exported):
+    surface, straight = (meshio.read(exported / f"{name}.vtu") for name in ("surface", "straight"))
+    ((_, triangles),) = [(block.type, block.data) for block in surface.cells]
+    assert np.array_equal(surface.points, straight.points[: len(surface.points)])
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    a, b, c = surface.points[triangles].transpose(1, 0, 2)
+    assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a + b + c) > 0).all()
+
+
+def test_material_times_and_what_is_judged_are_said(exported):
+    found = json.loads((exported / "scene.json").read_text())
+    assert (found["schema"], found["version"]) == ("organbench-scene", 1)
+    assert found["material"]["shear_modulus"] == 1800.0 and found["material"]["bulk_modulus"] == 5000 * 1800.0
+    assert found["material"]["density"] == 1060.0 and found["damping"]["rate"] == 15.0
+    assert found["checkpoints"] == list(BALL_CLAMPED.checkpoints)
+    judged = {metric["name"]: metric for metric in found["judged"]}
+    assert {"force_end", "surface_error", "volume_worst"} <= set(judged) and "frequency_error" not in judged
+    assert all(metric["unit"] and "[" in metric["definition"] for metric in judged.values())
+    page = (exported / "README.md").read_text()
+    assert "organbench judge ball_clamped FILE --nodes 150" in page and "{" not in page
+    for said in ("metres", "mu = 1800 Pa", "held_top", *judged, "positive in compression"):
+        assert said in page
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+def test_every_scene_has_words_for_all_that_happens(scene):
+    found = description(scene, [], "")
+    assert json.loads(json.dumps(found)) == json.loads(json.dumps(found)) and found["force"]["words"]
+    assert len(found["obstacles"]) == len(scene.obstacles) and all(entry["words"] for entry in found["obstacles"])
+    assert [metric["name"] for metric in found["judged"]] == [metric.name for metric in judged_metrics(scene)]
+    assert ("lumen_volume_factor" in paths_table(scene)) == (scene.lumen is not None)
+
+
+def test_words_of_obstacles_tell_shape_friction_and_path():
+    plane = BALL_SQUEEZE.obstacles[0]
+    assert "plane through (0, 0, 0.05) m with normal (0, 0, -1)" in obstacle_words(plane)
+    assert "no slip" in obstacle_words(replace(plane, friction="no_slip"))
+    assert "coefficient 0.3" in obstacle_words(replace(plane, friction=0.3))
+    assert "capsule of radius 0.01 m from (0, 0, 0) m to (0, 0, 1) m" in obstacle_words(
+        Capsule((0, 0, 0), (0, 0, 1), 0.01)
+    )
+    assert "thin probe" in obstacle_words(Probe((0, 0, 1)))
+
+
+OWN = "from dataclasses import replace\nfrom studies import BALL_SQUEEZE\nSCENE = replace(BALL_SQUEEZE, name='mine')\n"
+
+
+def test_a_scene_of_one_s_own_is_exported_too(organbench, tmp_path, mesh_cache):
+    path = tmp_path / "mine.py"
+    path.write_text(OWN)
+    code, _, err = organbench("export", path, "-o", tmp_path / "out", "--nodes", NODES)
+    assert code == 0, err
+    assert json.loads((tmp_path / "out" / "scene.json").read_text())["name"] == "mine"
+
+
+def test_what_cannot_be_exported_is_refused(refused, tmp_path):
+    assert "unknown scene 'ball_squeze'; did you mean" in refused("export", "ball_squeze")
+    (tmp_path / "taken").write_text("")
+    assert "is a file; give the name of a folder" in refused("export", "ball_squeeze", "-o", tmp_path / "taken")
+    assert "there is no file" in refused("export", tmp_path / "none.py")
+    (tmp_path / "empty.py").write_text("")
+    assert "defines no SCENE" in refused("export", tmp_path / "empty.py")
+    assert "nodes" in refused("export", "ball_squeeze", "-o", tmp_path / "few", "--nodes", 3)
