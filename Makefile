@@ -45,7 +45,7 @@ lint: setup-dev ## ruff, pyright and the import contracts alone
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
 
-docs: setup-dev ## the documentation as a site: open site/index.html; a broken link is an error
+docs: setup-dev compiled-essential ## the documentation as a site: open site/index.html; a broken link is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python docs/site/build.py
 
 stress: setup-run ## ten thousand random trials that try to break every method (minutes)
