@@ -1,10 +1,12 @@
 """`organbench stress`: random trials that try to break every method, and what came of each."""
 
+import gzip
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from studies.base.atomic import write_whole
 from studies.cli.progress import TerminalProgress
 from studies.cli.terminal import Results, console, errors, say
 from studies.plots.breaking import draw as draw_chart
@@ -14,7 +16,7 @@ from studies.stress.campaign import counts, drawn, run_trials, table_of
 from studies.stress.outcome import UNEXPLAINED, Outcome, simplest, tried
 from studies.stress.trial import draw
 
-FOLDER = "breaking"
+FOLDER, TRIALS = "breaking", "trials.csv.gz"
 WHAT = "trials"
 
 
@@ -35,8 +37,8 @@ def stress(
             progress.begin(WHAT, cases)
             found = run_trials(drawn(seed, cases), jobs, lambda outcome: progress.advance(WHAT, outcome.status))
         table = table_of(found)
-        for name, content in (("trials.csv", table), ("counts.csv", counts(table).reset_index())):
-            say(write_table(results / FOLDER / name, content))
+        say(write_table(results / FOLDER / "counts.csv", counts(table).reset_index()))
+        write_whole(results / FOLDER / TRIALS, gzip.compress(table.to_csv(index=False).encode(), mtime=0))
         draw_chart(table, results / FOLDER / "breaking.png")
         set_stamp(results, FOLDER)
         console.print(counts(table).to_string(), markup=False, highlight=False)
