@@ -5,7 +5,7 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study verify smoke test check lint docs figures bench clean distclean compiled compiled-essential setup-run \
+.PHONY: help study study-peers verify smoke test check lint docs figures bench clean distclean compiled compiled-essential setup-run \
 	setup-test setup-dev FORCE
 
 help: ## this list
@@ -20,6 +20,12 @@ study: compiled-essential ## run the main studies, then the charts and tables (t
 study-%: setup-run ## run one study and draw it: make study-volume_loss
 	$(BIN)/organbench run $*
 	$(BIN)/organbench plot $*
+
+study-peers: setup-run ## other programs beside our methods on the same ball and liver: the extra `peers` (minutes)
+	$(BIN)/python -m pip install -q -c constraints.txt -e ".[peers]"
+	$(BIN)/organbench run studies/peers/study.py
+	$(BIN)/python -m studies.peers.main
+	$(BIN)/organbench plot studies/peers/study.py
 
 verify: setup-test ## the reference against closed forms, published numbers and other codes; test campaigns (minutes)
 	$(BIN)/organbench verify

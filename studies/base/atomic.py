@@ -3,6 +3,8 @@
 import errno
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from studies.base.errors import StudyError
@@ -18,18 +20,27 @@ def write_whole(path: Path, content: bytes) -> None:
     Each process has its own .part, so two that write the same file do not mix; the last one wins.
     What stood at `path` stays untouched until the rename. Raises StudyError when it cannot be written.
     """
+    with part_beside(path, len(content)) as part:
+        part.write_bytes(content)
+
+
+@contextmanager
+def part_beside(path: Path, size: int | None = None) -> Iterator[Path]:
+    """Inside, a `.part` file to fill, in any way; at the end it is flushed to disk and becomes `path`.
+
+    size: bytes that will be written, where that is known. Raises as write_whole; another error leaves nothing.
+    """
     path = Path(path)
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with open(part, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
+        yield part
+        _flush(part)
         os.replace(part, path)
-        _flush_folder(path.parent)
+        if os.name == "posix":  # elsewhere a folder cannot be opened
+            _flush(path.parent)
     except OSError as problem:
-        raise StudyError(_sentence(path, len(content), problem)) from problem
+        raise StudyError(_sentence(path, size, problem)) from problem
     finally:
         _remove(part)
 
@@ -84,20 +95,20 @@ def _remove(part: Path) -> None:
         return
 
 
-def _flush_folder(folder: Path) -> None:
-    if os.name != "posix":  # elsewhere a folder cannot be opened
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
+def _flush(path: Path) -> None:
+    """To the disk: of a file what was written, of a folder its names."""
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
 
 
-def _sentence(path: Path, size: int, problem: OSError) -> str:
+def _sentence(path: Path, size: int | None, problem: OSError) -> str:
     if problem.errno in (errno.ENOSPC, errno.EDQUOT):
+        megabytes = "" if size is None else f" ({size / 1e6:.1f} MB)"
         return (
-            f"{path} ({size / 1e6:.1f} MB) was not written, the disk is full: free some space and run again; "
+            f"{path}{megabytes} was not written, the disk is full: free some space and run again; "
             "everything stored before is kept"
         )
     reason = problem.strerror or str(problem)

@@ -11,7 +11,7 @@ from studies.scene.kind import has_wall, load_of
 from studies.scene.scene import Scene
 from studies.scenes import JUDGED
 
-VERTICES = (150, 200, 300)
+VERTICES = (150, 200, 250, 300)
 """On the outer surface of an even quadratic body."""
 BUDGETS = tuple(4 * vertices - 6 for vertices in VERTICES)
 """Nodes on its outer surface, mid-side nodes among them (Euler); of graded bodies too."""
@@ -48,7 +48,7 @@ def linear_bodies(scene: Scene) -> tuple[BodyRecipe, ...]:
 
 
 def headline(scene: Scene) -> BodyRecipe:
-    """Graded, of the middle size, with the masses that allow the longest step."""
+    """Graded, of the second size, with the masses that allow the longest step."""
     return BodyRecipe("quadratic", BUDGETS[1], graded=can_be_graded(scene), mass=_mass(scene))
 
 
@@ -63,7 +63,7 @@ def can_be_graded(scene: Scene) -> bool:
 
 
 def quadratic_cases(scene: Scene) -> tuple[Case, ...]:
-    """Even bodies in all sizes and graded ones from the middle size on, at the long step. Of the headline also half its
+    """Even bodies in all sizes and graded ones from the second size on, at the long step. Of the headline also half its
     step, the other masses and the other contact, and among the graded bodies the next finer one."""
     even = [BodyRecipe("quadratic", nodes, mass=_mass(scene)) for nodes in BUDGETS]
     graded = [replace(body, graded=True) for body in even[1:] if can_be_graded(scene)]

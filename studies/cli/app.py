@@ -36,6 +36,7 @@ COMMANDS = {
         ("mesh", "meshes.mesh", "mesh", "Makes a mesh: of a synthetic organ, or from a file."),
         ("check", "meshes.check", "check", "Tells what is wrong with a mesh and what mends it."),
         ("place", "meshes.place", "place", "Proposes hold and probe for a scan, and writes a scene file."),
+        ("archive", "house.archive", "archive", "Packs records, tables, charts and code into one zip file."),
         ("doctor", "house.doctor", "doctor", "What is missing on this machine, and what mends it."),
         ("safe-dt", "running.safe_dt", "safe_dt", "The stability limit of a scene, predicted and verified by runs."),
     )

@@ -15,6 +15,7 @@ KIND = {
     "table": "studies",
     "plot": "studies",
     "publish": "studies",
+    "archive": "studies",
     "advise": "scenes",
     "cost": "scenes",
     "safe-dt": "scenes",

@@ -40,6 +40,7 @@ class Peer:
 PEERS: tuple[Peer, ...] = (
     Peer("mujoco", "studies.peers.mujoco_flex"),
     Peer("felupe", "studies.peers.felupe_quadratic", "curved"),
+    Peer("newton", "studies.peers.newton_vbd"),
 )
 
 

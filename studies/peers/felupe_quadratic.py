@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-import felupe
+import felupe  # pyright: ignore[reportMissingImports]
 import numpy as np
 from pypardiso import spsolve
 

@@ -7,7 +7,7 @@ is that of the scene, on every degree of freedom. Planes are bodies that are mov
 import time
 from pathlib import Path
 
-import mujoco
+import mujoco  # pyright: ignore[reportMissingImports]
 import numpy as np
 
 from studies.peers.scene_folder import SceneFolder, hand_in, moved

@@ -1,17 +1,17 @@
 """Newton (Warp on the CPU): vertex block descent on linear tetrahedra, stable neo-Hookean, single precision.
 
-Volume is kept as its documentation has it, by the second Lame constant; here 49 mu, for stiffer ones converge in too few
-sweeps only. Planes are static shapes that are moved by hand and push by a penalty; the force is read off its depth.
+Volume is kept as its documentation has it, by the second Lame constant; here 49 mu, for stiffer ones need more sweeps. Planes are static shapes that are moved by hand and push by a penalty; the force is read off its depth.
 Damping is that of the scene, on every velocity after a step.
 """
 
 import time
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import newton
+import newton  # pyright: ignore[reportMissingImports]
 import numpy as np
-import warp as wp
+import warp as wp  # pyright: ignore[reportMissingImports]
 
 from studies.peers.scene_folder import SceneFolder, hand_in, moved
 
@@ -68,7 +68,7 @@ def run(scene: SceneFolder, out: Path, shorter: float = 1.0) -> None:
     positions, forces, sampled, spent = [scene.points], [0.0], [], 0.0
     steps = np.round(scene.times / dt).astype(int)
     _step(solver, pipeline, contacts, now, after, control, dt)  # compiles; the body is at rest
-    for begin, end in zip(steps[:-1], steps[1:], strict=True):
+    for begin, end in pairwise(steps):
         started = time.process_time()
         for step in range(begin + 1, end + 1):
             _place(model, planes, scene, step * dt)

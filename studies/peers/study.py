@@ -3,7 +3,7 @@
 No study of the catalogue: what others compute needs the extra `peers`. `make study-peers` runs both sides.
 """
 
-from massspring import Free, ImplicitElements, ImplicitVolume, Xpbd
+from massspring import Free, ImplicitVolume, Xpbd
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes import BALL_SQUEEZE, LIVER_PRESS
@@ -11,16 +11,18 @@ from studies.scenes import BALL_SQUEEZE, LIVER_PRESS
 SCENES = (BALL_SQUEEZE, LIVER_PRESS)
 NODES = (150, 300)
 """Vertices on the outer surface."""
-METHODS = (Free(), Xpbd(), ImplicitVolume(), ImplicitElements())
+STRAIGHT = tuple(BodyRecipe("tetrahedral", nodes) for nodes in NODES)
+CURVED = tuple(BodyRecipe("quadratic", 4 * nodes - 6) for nodes in NODES)
+"""The same number of vertices, and the nodes between them."""
 
 STUDY = Study(
     name="peers",
     question=__doc__ or "",
     cases=tuple(
-        Case(scene, BodyRecipe(kind, nodes if kind == "tetrahedral" else 4 * nodes - 6), method, timed=True)
+        Case(scene, body, method, timed=True)
         for scene in SCENES
-        for nodes in NODES
-        for kind, methods in (("tetrahedral", METHODS), ("quadratic", METHODS[2:]))
+        for bodies, methods in ((STRAIGHT, (Free(), Xpbd(), ImplicitVolume())), (CURVED, (ImplicitVolume(),)))
+        for body in bodies
         for method in methods
     ),
     charts=(Chart("peers.png", "studies.plots.peers:draw"),),

@@ -96,8 +96,9 @@ def show_summaries(root: Path, studies: Sequence[Study], home: Path) -> None:
         write_whole(page, text.encode())
 
 
-def check_studies(root: Path, studies: Sequence[Study]) -> None:
-    """Raises StudyError when a piece of a study is missing or stale, a timing of this machine too."""
+def check_studies(root: Path, studies: Sequence[Study], done: str = "published") -> None:
+    """Raises StudyError when a piece of a study is missing or stale, a timing of this machine too; done: what is not
+    done then."""
     behind: dict[str, list[str]] = {}
     for study in studies:
         pieces = [s for s in standings(root, study) if s.status in ("missing", "stale")]
@@ -112,8 +113,8 @@ def check_studies(root: Path, studies: Sequence[Study]) -> None:
     if behind:
         count, first = sum(map(len, behind.values())), next(iter(behind.values()))[0]
         raise StudyError(
-            f"not published: {first}" + (f", and {count - 1} more are missing or stale" if count > 1 else "") + "; "
-            f"run `organbench run {' '.join(behind)}` and publish again"
+            f"not {done}: {first}" + (f", and {count - 1} more are missing or stale" if count > 1 else "") + "; "
+            f"run `organbench run {' '.join(behind)}` first"
         )
 
 

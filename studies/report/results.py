@@ -23,12 +23,13 @@ from studies.report.references import refresh_uncertainty, state_of
 from studies.report.summary import SUMMARIES
 from studies.runs.current import case_path
 from studies.runs.paper import play, slide_case, squeezed_balls
+from studies.store.archived import is_archive
 from studies.store.csv_table import write_table
 from studies.store.machine import write_machine
 from studies.store.paths import study_folder
 from studies.store.stamps import set_stamp
 from studies.sweep.load import load_runs
-from studies.timing.cases import timing_file
+from studies.timing.cases import shown_timing_file
 
 FIGURES = "figures"
 FIGURE_NODES = 550
@@ -84,7 +85,8 @@ def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]
     kept = kept_volumes(root, studies)
     if len(kept):
         written.append(write_table(root / "kept_volume.csv", kept))
-    write_machine(root / "machine.json")
+    if not is_archive(root):
+        write_machine(root / "machine.json")
     if absent:
         remarks.append(f"not run here, what is drawn of them stays: {', '.join(absent)}; make study-NAME runs one")
     return written, remarks
@@ -130,7 +132,7 @@ def inputs_of(root: Path, study: Study) -> str:
     """Hash of all that charts and tables are made from: result files with their sizes and times, and the code, that of
     the user's files too."""
     files = [case_path(root, study.name, case) for case in study.cases]
-    files += [timing_file(root, study.name, case) for case in study.cases if case.timed]
+    files += [shown_timing_file(root, study.name, case) for case in study.cases if case.timed]
     files += entry_files(root)
     references = [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
     metrics = [metric(column) for column in study.columns]

@@ -17,8 +17,9 @@ from studies.base.atomic import write_whole
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.base.lookup import lookup
 from studies.store.checksums import BLOCK, attribute_digest, field_digest, manifest, plain, sealed
+from studies.store.faults import fault
 from studies.store.opening import AGAIN, open_results
-from studies.store.schema import Status, fault
+from studies.store.schema import Status
 
 INDEX_KIND = "index"
 """Of the file that holds links to a study's records and none of their parts."""

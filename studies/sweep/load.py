@@ -11,6 +11,7 @@ from studies.catalog.study import Study
 from studies.metrics.run import Run
 from studies.reference.load import load_reference
 from studies.runs.current import case_path
+from studies.store.archived import is_archive
 from studies.store.record import read_record
 from studies.timing.cases import read_timing
 
@@ -33,7 +34,8 @@ def load_runs(root: Path, study: Study) -> tuple[list[Run], list[str]]:
     for case in study.cases:
         path = case_path(root, study.name, case)
         if not is_there(path):
-            problems.append(StudyError(f"case {case.name} has not run"))
+            what = "is missing in the archive" if is_archive(root) else "has not run"
+            problems.append(StudyError(f"case {case.name} {what}"))
             continue
         record = tried(partial(read_record, path))
         if record is not None:

@@ -24,6 +24,7 @@ from studies.reference.solve import solve
 from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.runs.run import run_case
+from studies.store.archived import check_no_archive
 from studies.sweep.own_files import Given, given_files, load_given
 from studies.sweep.tasks import Task, tasks_of
 from studies.timing.cases import time_cases, timing_is_current
@@ -142,8 +143,9 @@ def run_studies(
     """Brings the studies up to date below `root`; the number of pieces that had to run.
 
     `wanted` replaces the rule "what is not current". `on_compile` hears what is being compiled, from any thread.
-    Raises StudyError when results cannot be written.
+    Raises StudyError when results cannot be written, and for a root that is an archive.
     """
+    check_no_archive(root)
     rule = wanted or (lambda task: not task.is_current())
     todo = [task for task in tasks_of(root, studies) if rule(task)]
     if todo:

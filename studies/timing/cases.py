@@ -11,6 +11,7 @@ from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.runs.case import Case
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.prepare import prepare
+from studies.store.archived import is_archive, shown_machine
 from studies.store.machine import machine_id
 from studies.store.new_record import new_record
 from studies.store.paths import timing_path
@@ -31,6 +32,11 @@ def timing_file(root: Path, study: str, case: Case) -> Path:
     return timing_path(case_path(root, study, case), machine_id())
 
 
+def shown_timing_file(root: Path, study: str, case: Case) -> Path:
+    """Where the frame times lie that tables and charts show: this machine's, in an archive those of its machine."""
+    return timing_path(case_path(root, study, case), shown_machine(root))
+
+
 def can_be_timed(root: Path, study: str, case: Case) -> bool:
     """Whether the case ran to its end: a run that broke off has no comparable frames, and one that cannot be read
     has none yet."""
@@ -49,15 +55,16 @@ def timing_is_current(root: Path, study: str, case: Case) -> bool:
 
 
 def read_timing(root: Path, study: str, case: Case) -> FrameTiming | None:
-    """This machine's frame times of a case; None where it has none from this code.
+    """This machine's frame times of a case; None where it has none from this code. An archive shows its own.
 
     Raises StudyError when they cannot be read.
     """
-    path = timing_file(root, study, case)
+    path = shown_timing_file(root, study, case)
     if not is_there(path):
         return None
     record = read_record(path)
-    if canonical(record.key) != canonical(case.key) or record.fingerprint != case_fingerprint(case):
+    stale = record.fingerprint != case_fingerprint(case) and not is_archive(root)
+    if stale or canonical(record.key) != canonical(case.key):
         return None
     attributes = record.attributes
     return FrameTiming(record.fields["frame_ns"].values, attributes["core"], attributes["threads"])

@@ -124,19 +124,20 @@ def test_a_surface_that_crosses_itself_becomes_a_body(block, tmp_path):
 
 @pytest.mark.filterwarnings("ignore:.*has something there that the")
 def test_handles_are_kept_and_told(tmp_path):
-    square = [np.array([[x, y] for x, y in ((a, a), (b, a), (b, b), (a, b))], float) for a, b in ((0, 60), (20, 40))]
-    points = np.vstack([np.column_stack([ring, np.full(4, z)]) for z in (0.0, 20.0) for ring in square])
-    faces = []
-    for k in range(4):
-        m, up = (k + 1) % 4, 8
-        for i, j in (((k, m)), ((m + 4, k + 4))):  # outer and inner sides
-            faces += [[i, j, j + up], [i, j + up, i + up]]
-        faces += [[k, k + 4, m + 4], [k, m + 4, m], [k + up, m + up, m + 4 + up], [k + up, m + 4 + up, k + 4 + up]]
-    path = write(tmp_path / "ring.vtu", points, np.array(faces))
+    round_it, round_tube = 24, 12
+    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(round_it), np.arange(round_tube), indexing="ij"))
+    a, b = 2 * np.pi * i / round_it, 2 * np.pi * j / round_tube
+    far = 25 + 9 * np.cos(b)
+    points = np.column_stack([far * np.cos(a), far * np.sin(a), 9 * np.sin(b)])
+    own, on, aside, both = (
+        (i + di) % round_it * round_tube + (j + dj) % round_tube for di, dj in ((0, 0), (1, 0), (0, 1), (1, 1))
+    )
+    faces = np.vstack([np.column_stack([own, on, both]), np.column_stack([own, both, aside])])
+    path = write(tmp_path / "ring.vtu", points, faces)
     with pytest.warns(UserWarning, match=r"ring\.vtu: the body has 1 handles or tunnels, .* with --smooth"):
         mesh = scan(path, 200, unit="mm", fill=False)
     check_surface(mesh.points, mesh.triangles)
-    assert mesh.volume == pytest.approx((60 * 60 - 20 * 20) * 20e-9, rel=1e-3) and mesh.losses["handles"] == 1
+    assert mesh.volume == pytest.approx(signed_volume(points * MM, faces), rel=1e-3) and mesh.losses["handles"] == 1
 
 
 def test_a_thin_flap_is_kept_or_told(tmp_path):

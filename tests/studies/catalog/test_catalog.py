@@ -1,6 +1,5 @@
 """Every study is held to this: a question, cases that can be made, names that exist, and a smoke version."""
 
-from collections import Counter
 from dataclasses import replace
 
 import pytest
@@ -86,15 +85,10 @@ def kind(case):
 
 
 def representatives(cases):
-    """Of each kind the first case in the scene taken least often so far, then one case of each scene left out."""
-    kinds, scenes = {}, Counter()
-    for case in cases:
-        kinds.setdefault(kind(case), []).append(case)
-    chosen = []
-    for alike in kinds.values():
-        chosen.append(min(alike, key=lambda case: scenes[case.scene.name]))
-        scenes[chosen[-1].scene.name] += 1
-    left = {case.scene.name: case for case in reversed(cases) if not scenes[case.scene.name]}
+    """Of each kind the first case, which share their meshes, then one case of each scene left out."""
+    chosen = list({kind(case): case for case in reversed(cases)}.values())
+    taken = {case.scene.name for case in chosen}
+    left = {case.scene.name: case for case in reversed(cases) if case.scene.name not in taken}
     return [*chosen, *left.values()]
 
 

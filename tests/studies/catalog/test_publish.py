@@ -91,7 +91,7 @@ def leave_an_old_bench(root, monkeypatch):
 @pytest.mark.parametrize(
     ("spoil", "sentence"),
     [
-        (miss, r"is missing; run `organbench run volume_loss` and publish again"),
+        (miss, r"is missing; run `organbench run volume_loss` first"),
         (miss_a_timing, r"the frame time of tiny_squeeze\S+ is missing or stale; run `organbench run volume_loss`"),
         (change_the_code, r"is stale, and 4 more are missing or stale; run `organbench run volume_loss`"),
         (leave_an_old_bench, r"bench.csv was made by other code; run `make bench`"),

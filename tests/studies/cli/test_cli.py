@@ -1,6 +1,7 @@
 """The command line: words in, tables and charts out."""
 
 import re
+import sys
 from dataclasses import replace
 
 import h5py
@@ -15,12 +16,14 @@ from studies.cli import app as cli
 from studies.cli.commands.running.status import SHOWN
 from studies.geometry.organs import SHAPES
 from studies.metrics.metrics import METRICS
+from studies.metrics.table import study_table
 from studies.reference.reference_solves import reference_solves
 from studies.runs.current import case_path
 from studies.scenes import SCENES
 from studies.store.paths import index_path
 from studies.store.record import Field, read_record, write_record
-from tests.studies.tiny import content, diverging_case, tiny_case
+from studies.sweep.load import load_runs
+from tests.studies.tiny import content, diverging_case, tiny_case, tiny_study
 
 
 def test_list_names_everything():
@@ -134,6 +137,22 @@ def test_table_on_screen_and_as_csv(organbench, tiny_file, results, tmp_path):
     assert 0 <= kept < free
     assert np.isnan(lost)
     assert table["step_time [µs]"].notna().tolist() == [True, True, False]
+
+
+def test_table_as_parquet_keeps_digits_and_types(organbench, tiny_file, results, tmp_path):
+    pytest.importorskip("pyarrow", reason="the extra parquet is not installed")
+    target = tmp_path / "new" / "table.parquet"
+    code, out, _ = organbench("table", tiny_file, "--results", results, "--parquet", target)
+    assert (code, out.strip()) == (0, str(target))
+    stored, expected = pd.read_parquet(target), study_table(load_runs(results, tiny_study())[0], tiny_study().columns)
+    pd.testing.assert_frame_equal(stored, expected, check_exact=True)
+    assert stored["nodes"].dtype == np.int64 and stored["volume_worst [%]"].dtype == np.float64
+
+
+def test_parquet_without_its_package_is_one_sentence(refused, tiny_file, results, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    said = refused("table", tiny_file, "--results", results, "--parquet", tmp_path / "t.parquet")
+    assert "needs the package pyarrow" in said and not (tmp_path / "t.parquet").exists()
 
 
 def test_table_of_chosen_metrics(organbench, tiny_file, results):

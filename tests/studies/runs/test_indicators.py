@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from massspring import History, Sphere, Trajectory, Volumes, quadratic_body, tetrahedral_body
-from studies.runs.indicators import SWAYS, indicators, jumps, neighbours, remarks, still_from, sway
+from studies.runs.indicators import SWAYS, indicators, neighbours, remarks, still_from, sway, unlike_neighbours
 from studies.runs.run import measure
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.quadratic import quadratic_block
@@ -61,9 +61,14 @@ def test_neighbours_share_an_element():
     assert not (neighbours(quadratic.kept, 3) == 3).any()
 
 
-def test_jumps_are_those_between_neighbours():
-    assert jumps(np.array([1.0, 4.0, 4.0]), np.array([[0, 1], [1, 2]])) == pytest.approx(3.0 / np.sqrt(2.0))
-    assert np.isnan(jumps(np.array([1.0]), np.zeros((0, 2), dtype=int)))
+def test_a_checkerboard_counts_and_a_gradient_does_not():
+    ring = np.column_stack([np.arange(40), np.roll(np.arange(40), -1)])
+    checkers, wave = (-1.0) ** np.arange(40), np.sin(2 * np.pi * np.arange(40) / 40)
+    assert unlike_neighbours(checkers, ring) == pytest.approx(2.0)
+    assert unlike_neighbours(wave, ring) == pytest.approx((1 - np.cos(2 * np.pi / 40)) / np.sqrt(2.0))
+    # What has no neighbour, as a lumen, has nothing to differ from.
+    assert unlike_neighbours(np.r_[checkers, 50.0], ring) == pytest.approx(2.0)
+    assert np.isnan(unlike_neighbours(np.array([1.0]), np.zeros((0, 2), dtype=int)))
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from studies.metrics.table import UNRESOLVED, study_table
 from studies.metrics.table import metric as metric_of
 from studies.scene.quantities import ALWAYS
 from studies.store.csv_table import write_table
+from studies.store.parquet_table import write_parquet
 from studies.sweep.find_study import find_study
 from studies.sweep.load import load_runs
 
@@ -28,6 +29,7 @@ def table(
     study: StudyName,
     results: Results = Path("results"),
     csv: Annotated[Path | None, typer.Option(help="write it there instead of printing it, with all columns")] = None,
+    parquet: Annotated[Path | None, typer.Option(help="the same as Parquet: all digits, typed columns")] = None,
     metrics: Annotated[str, typer.Option(help="names with commas, instead of the study's own")] = "",
     every: Annotated[bool, typer.Option("--all", help="all metrics, below one another where they do not fit")] = False,
 ) -> None:
@@ -41,8 +43,10 @@ def table(
     runs += entries
     warn([*remarks, *unreadable])
     frame = study_table(runs, chosen)
-    if csv is not None:
-        say(write_table(csv, frame))
+    written = [write(path, frame) for write, path in ((write_table, csv), (write_parquet, parquet)) if path is not None]
+    for path in written:
+        say(path)
+    if written:
         return
     rows = frame.to_dict("records")
     if not rows:

@@ -17,7 +17,7 @@ from studies.scene.proposal import HELD, proposal
 from studies.store.record import Status
 from tests.geometry.boxes import box, split, together
 
-PAGE = Path(__file__).parents[3] / "docs" / "own-organ.md"
+PAGE = Path(__file__).parents[4] / "docs" / "own-organ.md"
 COMMANDS = re.findall(r"^    organbench (.+)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
 CODES = {"check scan.ply": 1}
 """Exit codes other than 0."""

@@ -21,7 +21,7 @@ pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="signals and process groups"),
     pytest.mark.usefixtures("heard"),
 ]
-REPOSITORY = Path(__file__).parents[3]
+REPOSITORY = Path(__file__).parents[4]
 SAID = "organbench: interrupted; what is finished is stored, the same command goes on from there"
 
 

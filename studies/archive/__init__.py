@@ -1,0 +1,1 @@
+"""Results that can be handed on and kept: one file that draws its own charts again."""

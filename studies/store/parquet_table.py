@@ -1,0 +1,22 @@
+"""Tables for other programs: every digit, with the types of the columns."""
+
+import io
+from pathlib import Path
+
+import pandas as pd
+
+from studies.base.atomic import write_whole
+from studies.base.errors import StudyError
+
+
+def write_parquet(path: Path, table: pd.DataFrame) -> Path:
+    """A table as Parquet; whole or not at all. Raises StudyError where pyarrow, of the extra parquet, is missing."""
+    image = io.BytesIO()
+    try:
+        table.to_parquet(image, engine="pyarrow", index=False)
+    except ImportError as error:
+        raise StudyError(
+            f"{path} needs the package pyarrow, which is not installed: pip install 'pyarrow>=18', or write --csv"
+        ) from error
+    write_whole(path, image.getvalue())
+    return path

@@ -1,0 +1,241 @@
+"""An archive holds all that its charts need, says what each file is, and notices when one is not what was packed."""
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from studies.archive.checking import check
+from studies.archive.citation import citation
+from studies.archive.packing import chosen, pack
+from studies.archive.versions import pins
+from studies.base.errors import StudyError
+from studies.catalog import Chart
+from studies.report.results import draw_charts, refresh
+from studies.runs.current import case_path
+from studies.store import archived, machine
+from studies.store.record import read_record, write_record
+from studies.sweep.load import load_runs
+from studies.sweep.run_studies import run_studies
+from studies.timing import cases as timed
+from tests.studies.tiny import Silent, tiny_case, tiny_study
+
+ROOT = Path(__file__).parents[3]
+DAY = "2026-11-22"
+STUDY = replace(
+    tiny_study(columns=("volume_worst", "step_time", "real_time")),
+    charts=(Chart("volume.png", "studies.plots.volume_history:draw"),),
+)
+
+
+@pytest.fixture(scope="module")
+def packed(finished_sweep, tmp_path_factory):
+    """The archive of the tiny study, with a chart; to be read, not changed."""
+    target = tmp_path_factory.mktemp("archive") / "tiny.zip"
+    pack(finished_sweep, [STUDY], target, DAY)
+    return target
+
+
+@pytest.fixture
+def unpacked(packed, tmp_path):
+    """A folder that it was unpacked to."""
+    folder = tmp_path / "unpacked"
+    with zipfile.ZipFile(packed) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+def test_what_is_in_it(unpacked, finished_sweep):
+    names = {path.relative_to(unpacked).as_posix() for path in unpacked.rglob("*") if path.is_file()}
+    records = {case_path(Path(), "tiny", case).as_posix() for case in STUDY.cases}
+    frame_times = {timed.timing_file(Path(), "tiny", case).as_posix() for case in STUDY.cases[:2]}
+    drawn = {"tiny/tiny.csv", "tiny/volume.png", "tiny/tiny.h5", "kept_volume.csv"}
+    about = {"README.md", "CITATION.cff", "constraints.txt", "machine.json", archived.CRATE, archived.MANIFEST}
+    assert {name for name in names if not name.startswith("code/")} == records | frame_times | drawn | about
+    for name in records:
+        assert (unpacked / name).read_bytes() == (finished_sweep / name).read_bytes()
+
+
+def test_charts_and_tables_are_drawn_again_on_another_machine_by_other_code(unpacked, monkeypatch):
+    table, chart = unpacked / "tiny" / "tiny.csv", unpacked / "tiny" / "volume.png"
+    before = table.read_bytes(), chart.read_bytes()
+    assert pd.read_csv(table)["step_time [µs]"].notna().tolist() == [True, True, False]
+    table.unlink()
+    chart.unlink()
+    for module in (machine, archived, timed):
+        monkeypatch.setattr(module, "machine_id", lambda: "00000000")
+    monkeypatch.setattr(timed, "case_fingerprint", lambda case: "of other code")
+    assert refresh(unpacked, STUDY)[1] == []
+    assert (table.read_bytes(), chart.read_bytes()) == before
+
+
+def test_the_code_in_it_draws_by_itself(unpacked, tmp_path):
+    """A process that knows no other code of organbench."""
+    table = unpacked / "tiny" / "tiny.csv"
+    before = table.read_bytes()
+    table.unlink()
+    file = tmp_path / "tiny_file.py"
+    file.write_text(STUDY_FILE)
+    env = {**os.environ, "PYTHONPATH": str(unpacked / "code")}
+    program = "import studies.__main__ as m; assert 'unpacked' in m.__file__, m.__file__; m.main()"
+    command = [sys.executable, "-c", program, "plot", str(file), "--results", str(unpacked)]
+    subprocess.run(command, cwd=tmp_path, env=env, check=True, capture_output=True)
+    assert table.read_bytes() == before
+
+
+STUDY_FILE = f"""
+import sys
+sys.path.append({str(ROOT)!r})
+from tests.studies.archive.test_archive import STUDY
+"""
+
+
+def test_the_manifest_names_every_file(unpacked):
+    lines = (unpacked / archived.MANIFEST).read_text().splitlines()
+    digests = {name: digest for digest, name in (line.split("  ") for line in lines)}
+    files = {path.relative_to(unpacked).as_posix(): path for path in unpacked.rglob("*") if path.is_file()}
+    del files[archived.MANIFEST]
+    assert digests == {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
+
+
+def test_the_metadata_are_those_of_a_crate(unpacked):
+    """The rules of RO-Crate 1.1 that a reader relies on."""
+    data = json.loads((unpacked / archived.CRATE).read_text())
+    assert data["@context"] == "https://w3id.org/ro/crate/1.1/context"
+    entities = {entity["@id"]: entity for entity in data["@graph"]}
+    assert len(entities) == len(data["@graph"])
+    head, root = entities[archived.CRATE], entities["./"]
+    assert head["about"] == {"@id": "./"} and head["conformsTo"]["@id"].endswith("/ro/crate/1.1")
+    assert root["datePublished"] == DAY and {"name", "description", "license"} <= root.keys()
+    parts = [part["@id"] for part in root["hasPart"]]
+    assert all((unpacked / part).exists() for part in parts) and "tiny/tiny.csv" in parts
+    for value in (value for entity in data["@graph"] for value in entity.values()):
+        for link in value if isinstance(value, list) else [value]:
+            if isinstance(link, dict):
+                assert link["@id"] in entities or link["@id"].startswith("https://w3id.org/")
+    assert entities["tiny/tiny.csv"]["encodingFormat"] == "text/csv"
+    assert {"@id": "tiny/volume.png"} in entities["#run-tiny"]["result"]
+
+
+def test_equal_results_are_equal_bytes(packed, finished_sweep, tmp_path):
+    pack(finished_sweep, [STUDY], tmp_path / "again.zip", DAY)
+    assert (tmp_path / "again.zip").read_bytes() == packed.read_bytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["again.zip"]
+
+
+def test_a_whole_archive_is_said_to_be_one(organbench, packed, unpacked):
+    count = check(packed)
+    assert check(unpacked) == count > 500
+    assert organbench("archive", "--check", packed)[:2] == (0, f"{packed}: {count} files, each as it was packed\n")
+
+
+def test_a_file_that_is_missing_or_changed_is_named(refused, unpacked):
+    path = case_path(unpacked, "tiny", tiny_case())
+    content = path.read_bytes()
+    path.write_bytes(content[:-1] + b"?")
+    said = refused("archive", "--check", unpacked)
+    assert f"tiny/{path.name} is not what was packed: get the archive again" in said
+    path.unlink()
+    assert f"{unpacked} lacks tiny/{path.name}" in refused("archive", "--check", unpacked)
+    runs, remarks = load_runs(unpacked, STUDY)
+    assert len(runs) == 2 and remarks == [f"case {tiny_case().name} is missing in the archive"]
+
+
+@pytest.mark.parametrize("keep", [0.999, 0.5, 0.0])
+def test_an_archive_that_was_cut_off_is_one_sentence(refused, packed, tmp_path, keep):
+    content = packed.read_bytes()
+    (tmp_path / "cut.zip").write_bytes(content[: int(keep * len(content))])
+    assert "cut.zip is cut off or damaged" in refused("archive", "--check", tmp_path / "cut.zip")
+
+
+def test_a_bit_that_flips_is_noticed(refused, packed, tmp_path):
+    with zipfile.ZipFile(packed) as archive:
+        entry = archive.getinfo("tiny/volume.png")
+    content = bytearray(packed.read_bytes())
+    content[entry.header_offset + 60 + entry.compress_size // 2] ^= 1
+    (tmp_path / "bit.zip").write_bytes(content)
+    assert "tiny/volume.png" in refused("archive", "--check", tmp_path / "bit.zip")
+
+
+def test_what_is_no_archive_is_one_sentence(refused, tmp_path):
+    with zipfile.ZipFile(tmp_path / "other.zip", "w") as other:
+        other.writestr("a.txt", "")
+    assert "is no archive of organbench" in refused("archive", "--check", tmp_path / "other.zip")
+    assert "is no archive of organbench" in refused("archive", "--check", tmp_path)
+    assert "there is no archive" in refused("archive", "--check", tmp_path / "none.zip")
+
+
+def test_what_is_missing_damaged_or_stale_is_not_packed(results, tmp_path):
+    path, target = case_path(results, "tiny", tiny_case()), tmp_path / "new.zip"
+    record = read_record(path)
+    for spoil, said in (
+        (lambda: write_record(path, replace(record, fingerprint="0")), "is stale"),
+        (lambda: path.write_bytes(path.read_bytes()[:-9]), "is stale"),
+        (path.unlink, "is missing"),
+    ):
+        spoil()
+        with pytest.raises(StudyError, match=rf"not archived: {tiny_case().name} {said}.*organbench run tiny"):
+            pack(results, [STUDY], target, DAY)
+    assert not target.exists() and not list(tmp_path.glob("new-*"))
+
+
+def test_nothing_runs_in_an_archive_and_none_is_packed_again(unpacked, tmp_path):
+    with pytest.raises(StudyError, match="is an unpacked archive, which stays as it is"):
+        run_studies(unpacked, [STUDY], 1, Silent())
+    with pytest.raises(StudyError, match="is an unpacked archive"):
+        pack(unpacked, [STUDY], tmp_path / "again.zip", DAY)
+
+
+@pytest.mark.parametrize("content", [None, "{", "[]", "{}"])
+def test_an_archive_that_lost_its_machine_is_one_sentence(unpacked, content):
+    path = unpacked / "machine.json"
+    path.unlink() if content is None else path.write_text(content)
+    remarks = load_runs(unpacked, STUDY)[1]
+    assert remarks and all("machine.json is" in remark for remark in remarks)
+
+
+def test_bad_words_are_one_sentence(refused, tmp_path):
+    assert "nothing is stored in" in refused("archive", "--results", tmp_path)
+    assert "unknown study 'stres'" in refused("archive", "stres", "--results", tmp_path)
+    assert "an archive ends in .zip" in refused("archive", "stress", "-o", tmp_path / "a.tar", "--results", tmp_path)
+
+
+def test_all_that_is_stored_is_chosen(finished_sweep):
+    assert chosen(finished_sweep, [STUDY, replace(STUDY, name="other")]) == [STUDY]
+
+
+def test_a_study_file_is_packed_with_its_records(organbench, results, tiny_file, tmp_path):
+    organbench("run", tiny_file, "--results", results)
+    target = tmp_path / "new" / "tiny.zip"
+    code, out, err = organbench("archive", tiny_file, "-o", target, "--results", results)
+    assert (code, err) == (0, "") and out.startswith(f"{target}: ")
+    with zipfile.ZipFile(target) as archive:
+        assert archive.read(tiny_file.name) == tiny_file.read_bytes()
+        assert archive.read("tiny/picture.txt") == b"3 runs"
+
+
+def test_the_versions_are_those_installed():
+    lines = pins().splitlines()
+    assert lines[0].startswith(f"# organbench {version('organbench')}, Python 3.")
+    assert f"numpy=={version('numpy')}" in lines and f"llvmlite=={version('llvmlite')}" in lines
+    assert not any(line.startswith("pytest==") for line in lines)
+
+
+def test_the_repository_is_cited_as_its_archives():
+    assert (ROOT / "CITATION.cff").read_text(encoding="utf-8") == citation(version("organbench"))
+
+
+def test_charts_are_drawn_into_the_folder_that_is_named(packed, tmp_path):
+    """The chart of the archive shows its records: drawn of other runs it is another one."""
+    with zipfile.ZipFile(packed) as archive:
+        shown = archive.read("tiny/volume.png")
+    (path,) = draw_charts(tmp_path, STUDY, [])
+    assert path.read_bytes() != shown
