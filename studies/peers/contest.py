@@ -16,16 +16,14 @@ from studies.exchange.entry import entry_path, outside
 from studies.exchange.export import export
 from studies.exchange.judge import entry_record, unfinished_record
 from studies.exchange.meshes import given_mesh
+from studies.peers.scene_folder import CANNOT, MISSING
+from studies.plots.peers import HALF_STEP
 from studies.runs.case import Case
 from studies.scene.scene import Scene
 from studies.store.record import Record, Status, write_record
 
 TIME_LIMIT = 600.0
 """Of a run [s]; then its process is ended."""
-CANNOT, MISSING = 3, 4
-"""Exit codes of studies.peers.run: it has no means for the scene; its package is not installed."""
-HALF = "half_step"
-"""Part of the name of an entry with steps half as long, which shows whether the answer hangs on the step."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class Attempt:
     @property
     def name(self) -> str:
         """Of the entry."""
-        return self.peer.name if self.shorter == 1.0 else f"{self.peer.name}-{HALF}"
+        return self.peer.name if self.shorter == 1.0 else self.peer.name + HALF_STEP
 
 
 def contest(root: Path, attempts: Sequence[Attempt], folder: Path, limit: float = TIME_LIMIT) -> Iterator[Record]:

@@ -1,7 +1,8 @@
 """Newton (Warp on the CPU): vertex block descent on linear tetrahedra, stable neo-Hookean, single precision.
 
-Volume is kept as its documentation has it, by the second Lame constant; here 49 mu, for stiffer ones need more sweeps. Planes are static shapes that are moved by hand and push by a penalty; the force is read off its depth.
-Damping is that of the scene, on every velocity after a step.
+Volume is kept as its documentation has it, by the second Lame constant; here 49 mu, for stiffer ones need more sweeps.
+Planes are static shapes that are moved by hand and push by a penalty; the force is read off its depth. Damping is that
+of the scene, on every velocity after a step.
 """
 
 import time

@@ -4,8 +4,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from studies.peers.contest import CANNOT, MISSING
-from studies.peers.scene_folder import CannotDo, SceneFolder
+from studies.peers.scene_folder import CANNOT, MISSING, CannotDo, SceneFolder
 
 
 def main(module: str, folder: str, out: str, mesh: str, shorter: str) -> int:

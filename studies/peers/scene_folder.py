@@ -11,6 +11,8 @@ import numpy as np
 from studies.base.errors import StudyError
 from studies.geometry.files.grids import read_cells, read_points
 
+CANNOT, MISSING = 3, 4
+"""Exit codes of studies.peers.run: a program has no means for the scene; its package is not installed."""
 CELLS = {"straight": "tetra", "curved": "tetra10"}
 
 

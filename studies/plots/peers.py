@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from studies.exchange.entry import is_entry, outside
 from studies.metrics.judged import FORCE, cost_of
 from studies.metrics.metric import COMPARABLE
 from studies.metrics.run import Run
@@ -21,6 +22,8 @@ ROWS = {FORCE: "error of the force [%]", VOLUME: "volume off by [%]"}
 LOWEST = {FORCE: 0.1, VOLUME: 1e-5}
 """What is smaller is drawn there [%]."""
 ROOM = 2.0
+HALF_STEP = "-half_step"
+"""End of the name of an entry with steps half as long, which shows whether the answer hangs on the step."""
 NAMED = 2
 """Runs without a number that a note names."""
 
@@ -44,7 +47,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     for panel in axes[-1]:
         panel.set_xlabel("computing time / simulated time [s/s]")
     log_axis(axes[-1, 0].xaxis)
-    looks = dict.fromkeys(family_of(run.case) for run in timed)
+    looks = dict.fromkeys(look_of(run) for run in timed)
     return finish(sheet, TITLE, [*map(_handle, looks), _real_time()], [*_notes(), *_unfinished(runs)], columns=3)
 
 
@@ -56,11 +59,12 @@ def _draw(panel: Axes, group: Sequence[Run], row: int) -> None:
         panel.axhspan(LOWEST[entry], max(uncertainty, LOWEST[entry]), color=GREY, alpha=0.3, linewidth=0)
     drawn = 0
     for run in group:
-        value, look = entry(run), family_of(run.case)
+        value, look = entry(run), look_of(run)
         if value == value:
             drawn += 1
             height = max(abs(value), LOWEST[entry])
-            panel.plot(cost_of(run).value, height, **_marks(look))
+            face = "white" if run.case.method.name.endswith(HALF_STEP) else look.colour
+            panel.plot(cost_of(run).value, height, **_marks(look), markerfacecolor=face)
     if not drawn:
         remark(panel, "no reference, no error")
     panel.set_xscale("log")
@@ -68,8 +72,16 @@ def _draw(panel: Axes, group: Sequence[Run], row: int) -> None:
     panel.set_ylim(bottom=LOWEST[entry] / ROOM)
 
 
+def look_of(run: Run) -> Family:
+    """The family of a run; one with half the step looks like the other."""
+    name = run.case.method.name
+    return family_of(
+        run.case.replaced(method=outside(name.removesuffix(HALF_STEP))) if is_entry(run.case) else run.case
+    )
+
+
 def _marks(look: Family) -> dict:
-    return {"color": look.colour, "marker": look.marker, "linestyle": "", "markersize": 8, "markeredgecolor": "white"}
+    return {"color": look.colour, "marker": look.marker, "linestyle": "", "markersize": 8}
 
 
 def _handle(look: Family) -> Line2D:
@@ -82,9 +94,9 @@ def _real_time() -> Line2D:
 
 def _notes() -> list[str]:
     return [
-        "Two sizes of mesh each. Grey: uncertainty of the reference. Ours: median frame on one core. Others: processor "
-        "time of the whole run; a path of equilibria has no frames, and is as long as its load steps are few. Volume: "
-        "the worst over all steps handed in, of ours over all frames."
+        "Two sizes of mesh each; hollow: with half the step. Grey: uncertainty of the reference. Ours: median frame on "
+        "one core. Others: processor time of the whole run; a path of equilibria has no frames, and is as long as its "
+        "load steps are few. Volume: the worst over all steps handed in, of ours over all frames."
     ]
 
 
