@@ -21,7 +21,7 @@ study-%: setup-run ## run one study and draw it: make study-volume_loss
 	$(BIN)/organbench run $*
 	$(BIN)/organbench plot $*
 
-study-peers: setup-run ## other programs beside our methods on the same ball and liver: the extra `peers` (minutes)
+study-peers: setup-run ## other programs beside ours on the same ball and liver: the extra `peers` (minutes)
 	$(BIN)/python -m pip install -q -c constraints.txt -e ".[peers]"
 	$(BIN)/organbench run studies/peers/study.py
 	$(BIN)/python -m studies.peers.main
