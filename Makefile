@@ -5,7 +5,8 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study study-peers verify smoke test check lint docs figures bench clean distclean compiled compiled-essential setup-run \
+.PHONY: help study study-peers report verify smoke test check lint docs figures stress bench clean distclean compiled \
+	compiled-essential setup-run \
 	setup-test setup-dev FORCE
 
 help: ## this list
@@ -20,6 +21,9 @@ study: compiled-essential ## run the main studies, then the charts and tables (t
 study-%: setup-run ## run one study and draw it: make study-volume_loss
 	$(BIN)/organbench run $*
 	$(BIN)/organbench plot $*
+
+report: setup-run ## charts, tables and report.html, one page that opens anywhere, from the stored results
+	$(BIN)/organbench report
 
 study-peers: setup-run ## other programs beside ours on the same ball and liver: the extra `peers` (minutes)
 	$(BIN)/python -m pip install -q -c constraints.txt -e ".[peers]"
@@ -47,8 +51,11 @@ lint: setup-dev ## ruff, pyright and the import contracts alone
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
 
-docs: setup-dev ## the documentation as a site: open site/index.html; a broken link is an error
+docs: setup-dev compiled-essential ## the documentation as a site: open site/index.html; a broken link is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python docs/site/build.py
+
+stress: setup-run ## ten thousand random trials that try to break every method (minutes)
+	$(BIN)/organbench stress --cases 10000
 
 figures: setup-run ## draw the charts again from the stored results
 	$(BIN)/organbench report --figures

@@ -1,7 +1,8 @@
 """Builds the documentation site: `python docs/site/build.py`, then open site/index.html (no network needed).
 
-Pages: README, CONTRIBUTING, CHANGELOG and docs/*.md as they stand, and one for every folder of the three packages with
-the docstrings of its modules, which are read from the sources, not imported. A broken link ends with exit code 1.
+Pages: README, CONTRIBUTING, CHANGELOG and docs/*.md as they stand, the notebooks of docs/gallery with what they show,
+and one for every folder of the three packages with the docstrings of its modules, which are read from the sources, not
+imported. A broken link ends with exit code 1, and so does a notebook that fails.
 """
 
 import json
@@ -15,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "docs" / "site"
 STAGE = ROOT / "build" / "docs"
 PACKAGES = ("massspring", "reference_fem", "studies")
-FIRST = ("how-a-run-works", "theory", "notation", "methods", "results", "own-organ", "meshes", "paper")
+FIRST = ("how-a-run-works", "theory", "notation", "methods", "results", "breaking", "own-organ", "meshes", "paper")
 """Pages of docs/ in the order of the menu; further ones follow."""
 LINK = re.compile(r"\]\((?:\.\./)?(results/[^)#\s]+)\)")
 """A link or picture in results/."""
@@ -43,6 +44,13 @@ def copy_pages() -> list:
     names = sorted((page.stem for page in STAGE.glob("docs/*.md")), key=lambda name: (*FIRST, name).index(name))
     pages = [STAGE / "docs" / f"{name}.md" for name in names] + [STAGE / "CONTRIBUTING.md", STAGE / "CHANGELOG.md"]
     return [{"organbench": "README.md"}] + [{title(page): str(page.relative_to(STAGE))} for page in pages]
+
+
+def gallery_pages() -> list:
+    """Runs the notebooks and writes their pages; their part of the menu. Raises BrokenNotebook."""
+    from gallery import gallery  # its libraries are needed for this alone
+
+    return [{title(page): str(page.relative_to(STAGE))} for page in gallery(STAGE / "docs" / "gallery")]
 
 
 def section(module: str, **options: bool) -> str:
@@ -87,7 +95,7 @@ def main() -> int:
         "INHERIT": str(SITE / "config.yml"),
         "docs_dir": str(STAGE),
         "site_dir": str(ROOT / "site"),
-        "nav": [*copy_pages(), {"API": api_pages()}],
+        "nav": [*copy_pages(), {"Gallery": gallery_pages()}, {"API": api_pages()}],
         "plugins": {"mkdocstrings": {"custom_templates": str(SITE / "templates")}},
     }
     file = ROOT / "build" / "mkdocs.yml"

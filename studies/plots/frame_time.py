@@ -71,7 +71,9 @@ def _draw_history(axes: Axes, body: Sequence[Run], span: tuple[float, float], na
         assert run.timing is not None  # figure() chose those
         frames, t = run.timing.frame_ns / NS_PER_MS, run.field("t")
         colour = method_colour(run.case.method.name)
-        axes.fill_between(t, frames.min(axis=0), frames.max(axis=0), color=colour, alpha=0.35, linewidth=0)
+        low, high = frames.min(axis=0), frames.max(axis=0)
+        # As a picture also in an SVG: the band has an edge at every frame.
+        axes.fill_between(t, low, high, color=colour, alpha=0.35, linewidth=0, rasterized=True)
         axes.plot(t, np.median(frames, axis=0), color=colour, linewidth=1.1)
     for deadline in DEADLINES_MS:
         axes.axhline(deadline, color=GREY, linewidth=1, linestyle=DASHES)

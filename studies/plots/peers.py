@@ -1,6 +1,7 @@
 """Other programs beside our methods: error of the force and lost volume against computing time."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -9,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from studies.exchange.entry import is_entry, outside
 from studies.metrics.judged import FORCE, cost_of
-from studies.metrics.metric import COMPARABLE
+from studies.metrics.metric import COMPARABLE, Metric
 from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.plots.style.families import Family, family_of
@@ -24,6 +25,8 @@ LOWEST = {FORCE: 0.1, VOLUME: 1e-5}
 ROOM = 2.0
 HALF_STEP = "-half_step"
 """End of the name of an entry with steps half as long, which shows whether the answer hangs on the step."""
+SPARE = ("s", "^", "D", "v", "h", "d", "<", ">")
+"""Markers of families that would look alike."""
 NAMED = 2
 """Runs without a number that a note names."""
 
@@ -37,29 +40,33 @@ def figure(runs: Sequence[Run]) -> Figure:
     scenes = by_scene(timed)
     sheet = page(4.4 * len(scenes) + 0.6, 6.4)
     axes = panels(sheet, 2, len(scenes), sharex=True, sharey="row")
+    looks = looks_of(timed)
     for column, (name, group) in enumerate(scenes.items()):
         axes[0, column].set_title(heading(name))
         for row, entry in enumerate(ROWS):
-            _draw(axes[row, column], group, row)
-            axes[row, 0].set_ylabel(ROWS[entry])
+            _draw(axes[row, column], group, entry, looks)
+    for row, entry in enumerate(ROWS):
+        values = [abs(value) for run in timed if (value := entry(run)) == value]
+        axes[row, 0].set_ylim(LOWEST[entry] / ROOM, ROOM * max([1.0, *values]))
+        axes[row, 0].set_ylabel(ROWS[entry])
     for panel in axes[:, 0]:
         log_axis(panel.yaxis)
     for panel in axes[-1]:
         panel.set_xlabel("computing time / simulated time [s/s]")
     log_axis(axes[-1, 0].xaxis)
-    looks = dict.fromkeys(look_of(run) for run in timed)
-    return finish(sheet, TITLE, [*map(_handle, looks), _real_time()], [*_notes(), *_unfinished(runs)], columns=3)
+    return finish(
+        sheet, TITLE, [*map(_handle, looks.values()), _real_time()], [*_notes(), *_unfinished(runs)], columns=3
+    )
 
 
-def _draw(panel: Axes, group: Sequence[Run], row: int) -> None:
-    entry = list(ROWS)[row]
+def _draw(panel: Axes, group: Sequence[Run], entry: Metric, looks: dict[str, Family]) -> None:
     panel.axvline(1.0, color=BLACK, linewidth=1.2)
     uncertainty = entry.uncertainty(group[0]) if entry is FORCE else float("nan")
     if uncertainty == uncertainty:
         panel.axhspan(LOWEST[entry], max(uncertainty, LOWEST[entry]), color=GREY, alpha=0.3, linewidth=0)
     drawn = 0
     for run in group:
-        value, look = entry(run), look_of(run)
+        value, look = entry(run), looks[family_name(run)]
         if value == value:
             drawn += 1
             height = max(abs(value), LOWEST[entry])
@@ -69,15 +76,28 @@ def _draw(panel: Axes, group: Sequence[Run], row: int) -> None:
         remark(panel, "no reference, no error")
     panel.set_xscale("log")
     panel.set_yscale("log")
-    panel.set_ylim(bottom=LOWEST[entry] / ROOM)
 
 
-def look_of(run: Run) -> Family:
-    """The family of a run; one with half the step looks like the other."""
-    name = run.case.method.name
-    return family_of(
-        run.case.replaced(method=outside(name.removesuffix(HALF_STEP))) if is_entry(run.case) else run.case
-    )
+def looks_of(runs: Sequence[Run]) -> dict[str, Family]:
+    """The look of each family by its name, no two alike while there are markers; with half the step it is the same."""
+    spare, looks = iter(SPARE), dict[str, Family]()
+    for run in runs:
+        look, used = _family(run), {(other.colour, other.marker) for other in looks.values()}
+        if look.name not in looks:
+            alike = (look.colour, look.marker) in used
+            looks[look.name] = replace(look, marker=next(spare, look.marker)) if alike else look
+    return looks
+
+
+def family_name(run: Run) -> str:
+    """Of the family of a run."""
+    return _family(run).name
+
+
+def _family(run: Run) -> Family:
+    if is_entry(run.case):
+        return family_of(run.case.replaced(method=outside(run.case.method.name.removesuffix(HALF_STEP))))
+    return family_of(run.case)
 
 
 def _marks(look: Family) -> dict:

@@ -20,6 +20,7 @@ EXTRAS = {
     VERIFY: "organbench verify",
     FIGURES: "organbench report --figures",
     "bench.csv": "make bench",
+    "breaking": "make stress",
     "geometry.csv": "python -m studies.bench.meshes",
 }
 """Results that belong to no study, and the command that makes each. What was not made again stays as published."""
@@ -39,7 +40,7 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
     written, remarks = report(root, studies)
     if remarks:
         raise StudyError(f"not published, something is missing: {remarks[0]}")
-    sources = [*written, root / "machine.json"]
+    sources = [*(file for file in written if file.suffix in SUFFIXES), root / "machine.json"]
     sources += [file for name in EXTRAS for file in _files(root / name)]
     show_summaries(root, studies, home)
     target = home / PUBLISHED

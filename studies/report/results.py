@@ -17,8 +17,11 @@ from studies.metrics.table import metric, study_table
 from studies.plots.figures import paper_ball, paper_slide
 from studies.plots.figures.organ_springs import draw_organ_springs
 from studies.plots.figures.organs import draw_organs
+from studies.plots.style.style import svg_copies
 from studies.reference.reference_solves import reference_solves
 from studies.report.kept_volume import kept_volumes
+from studies.report.page.part import part_path, write_part
+from studies.report.page.write import write_page
 from studies.report.references import refresh_uncertainty, state_of
 from studies.report.summary import SUMMARIES
 from studies.runs.current import case_path
@@ -69,7 +72,8 @@ def make_folder(folder: Path) -> None:
 
 
 def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
-    """Charts and tables of all studies, the summaries and machine.json; paths, and what is missing in sentences.
+    """Charts and tables of all studies, the summaries, machine.json and report.html, which shows all of it in one
+    page; paths, and what is missing in sentences.
 
     A study of which nothing is stored keeps the charts that are there.
     """
@@ -87,6 +91,9 @@ def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]
         written.append(write_table(root / "kept_volume.csv", kept))
     if not is_archive(root):
         write_machine(root / "machine.json")
+    page, sentences = write_page(root, studies)
+    written += [] if page is None else [page]
+    remarks += sentences
     if absent:
         remarks.append(f"not run here, what is drawn of them stays: {', '.join(absent)}; make study-NAME runs one")
     return written, remarks
@@ -105,15 +112,18 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
     stamp = root / "cache" / f"{study.name}.drawn.json"
     shown = {"inputs": inputs_of(root, study), "remarks": []}
     before = _stamped(stamp)
-    if before.get("inputs") == shown["inputs"] and all(path.exists() for path in paths):
+    if before.get("inputs") == shown["inputs"] and all(path.exists() for path in (*paths, part_path(root, study))):
         return paths, before["remarks"]
     runs, shown["remarks"] = load_runs(root, study)
     entries, unreadable = entries_beside(root, study.scenes, runs)
     shown["remarks"] += unreadable
-    write_table(table, study_table([*runs, *entries], study.columns))
+    rows = study_table([*runs, *entries], study.columns)
+    write_table(table, rows)
     for summary in told:
         write_whole(root / summary.file, (summary.text(runs) + "\n").encode())
-    draw_charts(root, study, [*runs, *entries])
+    with svg_copies() as pictures:
+        draw_charts(root, study, [*runs, *entries])
+    write_part(root, study, runs, rows.head(len(runs)), pictures)
     write_whole(stamp, json.dumps(shown).encode())
     return paths, shown["remarks"]
 

@@ -6,7 +6,8 @@ from massspring import Body, StepLimit
 from studies.base.errors import StudyError
 
 TIME_LIMIT = 600.0
-"""Wall time after which a run is given up [s]: ten times the longest case of the catalogue. Checked between frames."""
+"""Processor time after which a run is given up [s], checked between frames: ten times the longest case of the
+catalogue."""
 MOST_STEPS = 1e8
 """A step takes a microsecond or more, whatever the body."""
 MOST_BYTES = 5e8

@@ -31,8 +31,7 @@ def open_results(path: Path) -> Iterator[tuple[h5py.File, bool]]:
     try:
         seal = seal_of(path)
         _check(path, seal)
-        # Stored files never change, so no lock is needed; some network folders cannot give one.
-        with h5py.File(path, "r", locking=False) as file:
+        with _without_lock(path) as file:
             yield file, seal is Seal.WHOLE
     except StudyError:
         raise
@@ -40,6 +39,17 @@ def open_results(path: Path) -> Iterator[tuple[h5py.File, bool]]:
         raise StudyError(f"{path} may not be read by this user: change its permissions") from problem
     except Exception as problem:  # a damaged file brings HDF5, h5py and numpy to errors of every type
         raise DamagedFile(_sentence(path, "is cut off or damaged")) from problem
+
+
+def _without_lock(path: Path) -> h5py.File:
+    """Stored files never change, so no lock is needed; some network folders cannot give one. A file that this process
+    already has open, as by a link of the study's index, is opened as it is open there."""
+    try:
+        return h5py.File(path, "r", locking=False)
+    except OSError as problem:
+        if "locking flag values don't match" not in str(problem):
+            raise
+        return h5py.File(path, "r")
 
 
 def _check(path: Path, seal: Seal) -> None:

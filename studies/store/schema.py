@@ -30,8 +30,8 @@ STATUSES: dict[Status, str] = {
     Status.DRIFTED: "a kept volume more than 1 % off",
     Status.NOT_CONVERGED: "the reference found no equilibrium at a checkpoint",
     Status.BLOCKED: "a thin probe was driven through tissue that had nowhere to go",
-    Status.TIMED_OUT: "took longer than a run may",
-    Status.FAILED: "could not start; the message says why",
+    Status.TIMED_OUT: "took more processor time than a run may",
+    Status.FAILED: "could not start, or its process died three times; the message says why",
     Status.SKIPPED: "the method does not apply to the scene or the body; the message says why",
 }
 WITHOUT_FIELDS = (Status.FAILED, Status.SKIPPED)

@@ -3,11 +3,10 @@
 import multiprocessing
 import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from functools import partial
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from threading import Event, Thread
 from typing import Protocol
@@ -16,19 +15,24 @@ from numba.core import event
 
 from studies.base.atomic import write_whole
 from studies.base.compile_watch import CompileWatch, watching
-from studies.base.errors import StudyError
-from studies.base.interrupts import die_quietly, died_of_it, held_back
+from studies.base.interrupts import die_quietly
 from studies.catalog.study import Study
+from studies.geometry.mesher.jobs import cache_folder
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.runs.run import run_case
 from studies.store.archived import check_no_archive
+from studies.sweep.failures import Failures, store_failure
 from studies.sweep.own_files import Given, given_files, load_given
 from studies.sweep.tasks import Task, tasks_of
+from studies.sweep.workers import done_or_dead
+from studies.timing.alone import alone
 from studies.timing.cases import time_cases, timing_is_current
 
+COMPILED = "NUMBA_CACHE_DIR"
+"""Where the user may want compiled code."""
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Every process computes on one core: the cores are shared out by cases, not inside them."""
 
@@ -46,7 +50,9 @@ class Progress(Protocol):
 
 
 def do(task: Task) -> Path:
-    """Does a piece of work; where its record lies."""
+    """Does a piece of work, unless another command has meanwhile; where its record lies."""
+    if task.done_meanwhile():
+        return task.path()
     if isinstance(task.work, ReferenceSolve):
         return solve(task.root, task.work)
     return run_case(task.root, task.study, task.work)
@@ -94,37 +100,32 @@ def perform(
     do: Callable[[Task], Path] = do,
     writer: Connection | None = None,
     files: tuple[Given, ...] = (),
+    on_death: Callable[[Task, str], object] = store_failure,
 ) -> None:
-    """Runs the tasks in `jobs` processes, which load the user's `files`. Ctrl-C keeps what is stored; a process that
-    dies is reported by name."""
+    """Runs the tasks in `jobs` processes, which load the user's `files`. Ctrl-C keeps what is stored. A task whose
+    process dies is tried twice again, then given to `on_death` with the cause, and the rest goes on."""
     if not tasks:
         return
     progress.begin("physics", len(tasks))
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # read by the libraries when a worker loads them
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=begin_worker, initargs=(writer, files))
-    workers: list[BaseProcess] = []
+    begin = partial(begin_worker, writer, files)
+    with environment_of_workers(), closing(done_or_dead(tasks, jobs, do, begin)) as ended:
+        for task, cause in ended:
+            if cause is not None:
+                on_death(task, cause)
+            progress.advance("physics", task.label)
+
+
+@contextmanager
+def environment_of_workers() -> Iterator[None]:
+    """Inside, processes that start get one thread, and the caches of this process wherever they work."""
+    wanted = {**dict.fromkeys(ONE_THREAD, "1"), "ORGANBENCH_CACHE": str(cache_folder().absolute())}
+    if os.environ.get(COMPILED):
+        wanted[COMPILED] = str(Path(os.environ[COMPILED]).absolute())
+    before = {name: os.environ.get(name) for name in wanted}
+    os.environ.update(wanted)  # read by the libraries when a worker loads them
     try:
-        with held_back():
-            futures: dict[Future[Path], Task] = {pool.submit(do, task): task for task in tasks}
-            workers = multiprocessing.active_children()
-        for future in as_completed(futures):
-            future.result()
-            progress.advance("physics", futures[future].label)
-    except BrokenProcessPool as error:
-        pool.shutdown()  # waits until every exit code is known
-        if any(died_of_it(worker.exitcode) for worker in workers):
-            raise KeyboardInterrupt from error  # the interrupt of this process is still being handled
-        raise StudyError(
-            "a computing process died (out of memory, or killed); what is finished is stored, run the command again"
-        ) from error
-    except KeyboardInterrupt:
-        for worker in workers:  # a signal to this process alone did not reach them
-            worker.terminate()
-        raise
+        yield
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
         for name, value in before.items():
             if value is None:
                 os.environ.pop(name, None)
@@ -139,34 +140,50 @@ def run_studies(
     progress: Progress,
     wanted: Callable[[Task], bool] | None = None,
     on_compile: Told = lambda name: None,
+    failures: Failures | None = None,
 ) -> int:
     """Brings the studies up to date below `root`; the number of pieces that had to run.
 
     `wanted` replaces the rule "what is not current". `on_compile` hears what is being compiled, from any thread.
-    Raises StudyError when results cannot be written, and for a root that is an archive.
+    `failures` hears of pieces whose process died; they are stored as failed. Another command may work on the same
+    folder. Raises StudyError when results cannot be written, and for a root that is an archive.
     """
     check_no_archive(root)
+    root = root.absolute()
     rule = wanted or (lambda task: not task.is_current())
-    todo = [task for task in tasks_of(root, studies) if rule(task)]
+    todo = [replace(task, seen=task.state()) for task in tasks_of(root, studies) if rule(task)]
     if todo:
         check_writable(root)
         files = given_files(task.work for task in todo if isinstance(task.work, Case))
         with told_by_workers(on_compile) as writer:
-            perform(todo, jobs, progress, writer=writer, files=files)
-    measured, ran = 0, {task.path() for task in todo}
-    for study in studies:
-        pending = [
+            on_death = (failures or Failures()).add
+            perform(todo, jobs, progress, writer=writer, files=files, on_death=on_death)
+    ran = {task.path() for task in todo}
+    measured = sum(
+        measure_times(root, study, progress, on_compile, None if wanted is None else ran) for study in studies
+    )
+    return len(todo) + measured
+
+
+def measure_times(root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
+    """Times what is not timed yet, of `among` where given, when no other command does; how many that were."""
+
+    def pending() -> list[Case]:
+        return [
             case
             for case in study.cases
             if case.timed and not timing_is_current(root, study.name, case)
-            if wanted is None or case_path(root, study.name, case) in ran
+            if among is None or case_path(root, study.name, case) in among
         ]
-        measured += len(pending)
-        if pending:
-            progress.begin("timing", len(pending))
-            with watching(on_compile):
-                time_cases(root, study.name, pending, lambda name: progress.advance("timing", name))
-    return len(todo) + measured
+
+    if not pending():
+        return 0
+    with alone(root), watching(on_compile):
+        left = pending()  # another command may have done it meanwhile
+        if left:
+            progress.begin("timing", len(left))
+            time_cases(root, study.name, left, lambda name: progress.advance("timing", name))
+    return len(left)
 
 
 def check_writable(root: Path) -> None:

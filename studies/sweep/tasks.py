@@ -1,9 +1,10 @@
 """The pieces of work that studies are made of."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from studies.base.atomic import is_there
 from studies.catalog.study import Study
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import Case
@@ -17,6 +18,8 @@ class Task:
     root: Path
     study: str
     work: Case | ReferenceSolve
+    seen: tuple[int, ...] | None = field(default=None, compare=False)
+    """State of its file when it was found that it must run; None where there was none."""
 
     @property
     def weight(self) -> float:
@@ -39,6 +42,17 @@ class Task:
         if isinstance(self.work, ReferenceSolve):
             return self.work.why_stale(self.root)
         return why_case_is_stale(self.root, self.study, self.work)
+
+    def state(self) -> tuple[int, ...] | None:
+        """What tells its file from any later one; None where there is none."""
+        if not is_there(self.path()):
+            return None
+        found = self.path().stat()
+        return found.st_ino, found.st_size, found.st_mtime_ns
+
+    def done_meanwhile(self) -> bool:
+        """Whether another command has stored its result since it was found that it must run."""
+        return self.state() != self.seen and self.is_current()
 
     def path(self) -> Path:
         """Where its record lies."""

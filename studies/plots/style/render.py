@@ -89,6 +89,7 @@ def draw_faces(
     line, width = (EDGE * lit, edges) if edges else (lit, HAIR)
     polygons = PolyCollection(seen[order][:, :, :2], facecolors=lit, edgecolors=line, linewidths=width)  # pyright: ignore[reportArgumentType]
     polygons.set_joinstyle("round")
+    polygons.set_rasterized(True)  # thousands of faces are a small picture, but a large SVG
     axes.add_collection(polygons, autolim=False)
 
 

@@ -3,9 +3,11 @@
 import functools
 import io
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib.style
 from matplotlib.axes import Axes
@@ -99,6 +101,10 @@ SHEET = {
 }
 
 
+VECTOR: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "organbench", "path.simplify_threshold": 0.3}
+"""Of SVG: letters stay letters, names in the file stay the same, and lines keep what a third of a pixel shows."""
+
+
 def styled(build: Callable[P, R]) -> Callable[P, R]:
     """Runs `build` under matplotlib's defaults and SHEET, whatever the user's own settings are."""
 
@@ -112,11 +118,36 @@ def styled(build: Callable[P, R]) -> Callable[P, R]:
 
 @styled
 def save(figure: Figure, path: Path, dpi: int = DPI) -> None:
-    """Writes a PNG, whole or not at all; the same figure gives the same bytes. Raises StudyError when it cannot."""
+    """Writes a PNG, whole or not at all; the same figure gives the same bytes. Inside `svg_copies` it is
+    also kept as SVG. Raises StudyError when it cannot be written."""
     image = io.BytesIO()
     FigureCanvasAgg(figure)
     figure.savefig(image, format="png", dpi=dpi, metadata={"Software": None}, facecolor="white")
     write_whole(path, image.getvalue())
+    copies = _copies.get()
+    if copies is not None:
+        copies[path.name] = _svg(figure, dpi)
+
+
+@contextmanager
+def svg_copies() -> Iterator[dict[str, str]]:
+    """Inside, every chart that is saved is also kept as SVG: name of its file -> text, the same for the same figure."""
+    kept: dict[str, str] = {}
+    token = _copies.set(kept)
+    try:
+        yield kept
+    finally:
+        _copies.reset(token)
+
+
+_copies: ContextVar[dict[str, str] | None] = ContextVar("copies", default=None)
+
+
+def _svg(figure: Figure, dpi: int) -> str:
+    text = io.StringIO()
+    with matplotlib.rc_context(VECTOR):
+        figure.savefig(text, format="svg", dpi=dpi, metadata=dict.fromkeys(("Creator", "Date")), facecolor="white")
+    return text.getvalue()
 
 
 def method_colour(name: str) -> str:

@@ -1,5 +1,7 @@
 """The largest frequency, the limit it sets, and what a run does on either side of it."""
 
+from time import sleep
+
 import numpy as np
 import pytest
 
@@ -139,6 +141,14 @@ def test_a_run_that_diverges_ends_with_nan_tails_and_says_where(ball_body):
 def test_a_run_ends_at_its_time_limit(ball_body):
     history = simulate(Setup(ball_body, Free(), Clock(0.01, 50, 20)), time_limit=0.0)
     assert history.outcome == "timed-out" and history.good_frames == 1
+
+
+def test_waiting_does_not_count_for_the_time_limit(ball_body):
+    """As where several runs share a processor."""
+    setup = Setup(ball_body, Free(), Clock(0.01, 5, 20))
+    simulate(setup)  # compiles
+    history = simulate(setup, on_frame=lambda frame: sleep(0.05), time_limit=0.1)
+    assert history.outcome == "finished"
 
 
 def test_bad_damping_is_refused(ball_body):

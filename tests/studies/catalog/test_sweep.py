@@ -1,9 +1,7 @@
 """A sweep does what is missing or stale, once; what is finished stays, whatever happens to the rest."""
 
 import os
-import signal
 from dataclasses import replace
-from operator import methodcaller
 
 import h5py
 import pytest
@@ -128,20 +126,6 @@ def test_results_that_cannot_be_written_are_told_before_anything_runs(tmp_path, 
     monkeypatch.setattr(module, "perform", lambda *_: pytest.fail("nothing may run"))
     with pytest.raises(StudyError, match="choose a results folder that can be written to"):
         run_studies(tmp_path / "file", [tiny_study()], 1, Silent())
-
-
-class Doomed:
-    """A task whose process is killed, as by a system out of memory."""
-
-    label = "doomed"
-
-    def perform(self):
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
-def test_a_process_that_dies_is_one_sentence(tmp_path):
-    with pytest.raises(StudyError, match=r"process died .* what is finished is stored"):
-        perform([Doomed()], 1, Silent(), do=methodcaller("perform"))
 
 
 def test_the_number_of_threads_is_given_back(monkeypatch, tmp_path):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import studies.base.atomic
-from studies.base.atomic import sweep_parts, write_whole
+from studies.base.atomic import part_path, sweep_parts, write_whole
 from studies.base.errors import StudyError
 
 ROOT = Path(__file__).parents[3]
@@ -36,9 +36,10 @@ def test_a_full_disk_keeps_what_was_stored(tmp_path, monkeypatch, call):
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
-def test_a_truly_full_device(tmp_path):
-    part = tmp_path / f"a.h5.{os.getpid()}.part"
+def test_a_truly_full_device(tmp_path, monkeypatch):
+    part = tmp_path / "a.h5.part"
     part.symlink_to("/dev/full")
+    monkeypatch.setattr(studies.base.atomic, "part_path", lambda path: part)
     with pytest.raises(StudyError, match="the disk is full"):
         write_whole(tmp_path / "a.h5", b"new")
     assert list(tmp_path.iterdir()) == []
@@ -91,12 +92,28 @@ def test_old_leftovers_are_swept_and_fresh_ones_kept(tmp_path):
 @pytest.mark.skipif(os.name != "posix", reason="processes by number")
 def test_parts_of_the_dead_go_after_a_minute_and_of_the_living_after_an_hour(tmp_path):
     gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
-    dead, living = (tmp_path / f"a.h5.{number}.part" for number in (int(gone.stdout), os.getpid()))
-    for part in (dead, living):
+    host = part_path(tmp_path / "a.h5").name.split(".")[2].split("-")[0]
+    names = [f"{host}-{int(gone.stdout)}-1", f"{host}-{os.getpid()}-1", f"0badcafe-{int(gone.stdout)}-1"]
+    dead, living, elsewhere = parts = [tmp_path / f"a.h5.{name}.part" for name in names]
+    for part in parts:
         part.write_bytes(b"")
-    assert sweep_parts(tmp_path) == 0, "it may be another machine's"
-    for part in (dead, living):
+    assert sweep_parts(tmp_path) == 0, "it may be renamed in this moment"
+    for part in parts:
         os.utime(part, (time.time() - 120,) * 2)
-    assert sweep_parts(tmp_path) == 1 and living.exists()
-    os.utime(living, (time.time() - 7200,) * 2)
-    assert sweep_parts(tmp_path) == 1
+    assert sweep_parts(tmp_path) == 1 and living.exists() and elsewhere.exists() and not dead.exists()
+    for part in (living, elsewhere):
+        os.utime(part, (time.time() - 7200,) * 2)
+    assert sweep_parts(tmp_path) == 2
+
+
+def test_no_two_writers_have_one_part(tmp_path, monkeypatch):
+    """Neither two threads, nor two processes of one number on hosts that share the folder."""
+    here = {part_path(tmp_path / "a.h5") for _ in range(2)}
+    monkeypatch.setattr(studies.base.atomic.platform, "node", lambda: "another")
+    studies.base.atomic._host.cache_clear()
+    monkeypatch.setattr(studies.base.atomic, "_NUMBERS", iter((1, 2)))
+    try:
+        there = {part_path(tmp_path / "a.h5") for _ in range(2)}
+    finally:
+        studies.base.atomic._host.cache_clear()
+    assert len(here | there) == 4 and not any("another" in part.name for part in there)

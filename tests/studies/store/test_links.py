@@ -64,6 +64,14 @@ def test_timing_files_are_siblings_and_no_records(tmp_path):
         timing_path(path, "../x")
 
 
+def test_a_record_that_is_open_by_its_link_can_be_read(tmp_path):
+    path = store(tmp_path, "ball", "{}")
+    link_study(tmp_path, "volume_loss")
+    with h5py.File(index_path(tmp_path, "volume_loss")) as file:
+        case = file["ball"]
+        assert read_record(path).attributes == {"worst": 1.25e-4} and case["volume"].shape == (3,)
+
+
 def test_the_index_opens_every_case_by_its_name_and_can_be_moved(tmp_path):
     one, two = store(tmp_path, "ball/free", '{"a": 1}'), store(tmp_path, "ball/implicit", '{"a": 2}')
     shutil.copy(one, timing_path(one, "01234567"))

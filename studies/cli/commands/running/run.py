@@ -19,6 +19,7 @@ from studies.report.results import refresh
 from studies.store.links import link_study
 from studies.store.paths import study_folder
 from studies.store.staleness import MISSING
+from studies.sweep.failures import Failures
 from studies.sweep.find_study import find_studies
 from studies.sweep.plan import plan
 from studies.sweep.run_studies import run_studies
@@ -44,6 +45,7 @@ def run(
     """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
     wanted = _filter(only)
     root = results / SMOKE if smoke else results
+    failures = Failures()
     for found in _checked(studies or []):
         study = found.smoke() if smoke else found
         if case:
@@ -51,7 +53,10 @@ def run(
         if dry:
             dry_run(console, study.name, plan(root, study, wanted), jobs)
         else:
-            _bring_up_to_date(root, study, jobs, wanted, not case)
+            _bring_up_to_date(root, study, jobs, wanted, not case, failures)
+    if failures.causes:
+        warn([failures.sentence(f"organbench run {' '.join(studies or [])}".rstrip() + " --only failed")])
+        raise typer.Exit(1)
 
 
 def _case_alone(study: Study, name: str) -> Study:
@@ -60,9 +65,9 @@ def _case_alone(study: Study, name: str) -> Study:
     return replace(study, cases=(chosen,))
 
 
-def _bring_up_to_date(root: Path, study: Study, jobs: int, wanted: Wanted, drawn: bool = True) -> None:
+def _bring_up_to_date(root: Path, study: Study, jobs: int, wanted: Wanted, drawn: bool, failures: Failures) -> None:
     with TerminalProgress(console, plan(root, study, wanted), jobs) as progress:
-        count = run_studies(root, [study], jobs, progress, wanted, progress.compiling)
+        count = run_studies(root, [study], jobs, progress, wanted, progress.compiling, failures)
     for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
         sweep_parts(folder)
     warn(link_study(root, study.name))

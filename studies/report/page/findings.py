@@ -1,0 +1,188 @@
+"""What the tables of a results folder say, in a sentence each, with the numbers and how well they are known."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from studies.metrics.cells import plain, value_cell
+
+Row = Mapping[str, Any]
+"""Of a table as `study_table` makes it; None where a number is not known."""
+Tables = Mapping[str, Sequence[Row]]
+VOLUME, FORCE, MEAN = "volume_worst [%]", "force_end [%]", "mean_error [%]"
+FRAME, REAL = "frame_time [ms]", "real_time [s/s]"
+RECIPE = ("scene", "body", "law", "nodes", "stiffness")
+"""What a body with and without a constraint share."""
+KEPT, FREE = "implicit_volume", "free"
+HALF = 0.51
+"""Share of the step limit up to which a step is the usual one, and above whose half it is no fine one [1]."""
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A number and what it says."""
+
+    title: str
+    number: str
+    text: str
+
+
+def findings(tables: Tables) -> list[Finding]:
+    """Those that the tables of the studies, by name, bear; each from rows that ended well."""
+    found = (volume(tables), one_volume(tables), nearest_force(tables), cost(tables), real_time(tables), limit(tables))
+    return [finding for finding in found if finding is not None]
+
+
+def volume(tables: Tables) -> Finding | None:
+    """How well volumes are kept, and what the same bodies lose without."""
+    pairs = _pairs(_joined(tables, VOLUME))
+    if not pairs:
+        return None
+    kept = max((kept for kept, _ in pairs), key=lambda row: row[VOLUME])
+    lost = max((free for _, free in pairs), key=lambda row: row[VOLUME])
+    return Finding(
+        "How well volumes are kept",
+        f"{_small(kept[VOLUME])} %",
+        f"is the farthest that a volume kept by {KEPT} is off in {len(pairs)} pairs of runs ({_name(kept)}). "
+        f"Without the constraint the same bodies are off by up to {plain(lost[VOLUME])} % ({_name(lost)}). "
+        "A volume is compared with the body's own at rest, which rounding alone blurs.",
+    )
+
+
+def one_volume(tables: Tables) -> Finding | None:
+    """What forces are worth in bodies that keep one volume."""
+    rows = [row for row in _ended_well(tables.get("volume_loss", ()), FORCE) if row["method"] == KEPT]
+    if not rows:
+        return None
+    kinds = dict.fromkeys(row["body"] for row in rows)
+    said = [f"{_range([row for row in rows if row['body'] == kind], FORCE)} in {_kind(kind)}" for kind in kinds]
+    worst = max(rows, key=lambda row: abs(row[FORCE]))
+    return Finding(
+        "Forces of bodies with one volume",
+        f"{_measured(worst, FORCE)} %",
+        f"is the largest error of a force at the deepest point ({_name(worst)}). Bodies that keep one volume are off "
+        f"by {' and by '.join(said)}, over {len({row['scene'] for row in rows})} scenes.",
+    )
+
+
+def nearest_force(tables: Tables) -> Finding | None:
+    """How near forces come to the reference, scene by scene."""
+    best: dict[str, Row] = {}
+    for row in _joined(tables, FORCE, MEAN):
+        if row["method"] == KEPT and abs(row[FORCE]) < abs(best.get(row["scene"], {FORCE: float("inf")})[FORCE]):
+            best[row["scene"]] = row
+    if not best:
+        return None
+    said = [
+        f"{_measured(row, FORCE)} % in {row['scene']} ({row['body']}, {row['nodes']} nodes; displacement on the mean "
+        f"{_measured(row, MEAN, signed=False)} %)"
+        for row in best.values()
+    ]
+    return Finding(
+        "The force nearest to the reference",
+        _range(list(best.values()), FORCE),
+        f"is how far the best body of each scene that keeps its volume is off: {'; '.join(said)}.",
+    )
+
+
+def cost(tables: Tables) -> Finding | None:
+    """What keeping one volume adds to a frame."""
+    pairs = _pairs(_ended_well(tables.get("frame_rate", ()), FRAME))
+    if not pairs:
+        return None
+    added = sorted((_added(kept, free) for kept, free in pairs), key=lambda one: one[0])
+    cells = [value_cell(percent, spread, signed=True) for percent, spread in added]
+    kept, free = max(pairs, key=lambda pair: pair[0][FRAME] / pair[1][FRAME])
+    return Finding(
+        "What keeping a volume costs",
+        f"{cells[0]} to {cells[-1]} %",
+        f"is what {KEPT} adds to the time of a frame in {len(pairs)} pairs of runs. The most is in {_name(kept)}: "
+        f"{_measured(kept, FRAME, signed=False)} ms against {_measured(free, FRAME, signed=False)} ms. In "
+        f"{sum(spread > abs(percent) for percent, spread in added)} pairs the repeats spread by more than the "
+        "difference.",
+    )
+
+
+def real_time(tables: Tables) -> Finding | None:
+    """How many bodies keep up with the clock."""
+    rows = list({_key(row, "method", "dt [ms]"): row for row in _joined(tables, REAL)}.values())
+    if not rows:
+        return None
+    slowest = min(rows, key=lambda row: row[REAL])
+    return Finding(
+        "Speed",
+        f"{sum(row[REAL] > 1 for row in rows)} of {len(rows)}",
+        "timed bodies simulate more than a second in a second of computing on one core. The slowest, "
+        f"{_name(slowest)} by {slowest['method']}, simulates {_measured(slowest, REAL, signed=False)} s.",
+    )
+
+
+def limit(tables: Tables) -> Finding | None:
+    """Whether the step limit says where runs break."""
+    rows = [row for row in tables.get("stability_map", ()) if row.get("dt/dt_c") is not None]
+    if not rows:
+        return None
+    below, above = ([row["status"] for row in rows if (row["dt/dt_c"] < 1) == side] for side in (True, False))
+    return Finding(
+        "The limit of the time step",
+        f"{below.count('diverged')} of {len(below)}",
+        f"runs below the predicted limit of the time step diverge; above it {len(above) - above.count('diverged')} of "
+        f"{len(above)} do not. These are counts of single runs.",
+    )
+
+
+def _joined(tables: Tables, *columns: str) -> list[Row]:
+    return [row for table in tables.values() for row in _ended_well(table, *columns)]
+
+
+def _ended_well(table: Sequence[Row], *columns: str) -> list[Row]:
+    """Rows with numbers in all these columns."""
+    return [row for row in table if row["status"] == "ok" and all(row.get(name) is not None for name in columns)]
+
+
+def _pairs(rows: Sequence[Row]) -> list[tuple[Row, Row]]:
+    """Rows of the same body with the constraint and without, both at about the same share of the step limit."""
+    usual = [row for row in rows if HALF / 2 <= (row["dt/dt_c"] or 0.0) <= HALF]
+    kept, free = ({_key(row): row for row in reversed(usual) if row["method"] == name} for name in (KEPT, FREE))
+    return [(kept[key], free[key]) for key in reversed(kept) if key in free]
+
+
+def _added(kept: Row, free: Row) -> tuple[float, float]:
+    """What the constraint adds to a frame, and how far the repeats of both spread [%]."""
+    ratio = kept[FRAME] / free[FRAME]
+    spread = sum((_floor(row, FRAME) or 0.0) / row[FRAME] for row in (kept, free))
+    return 100 * (ratio - 1), 100 * ratio * spread
+
+
+def _key(row: Row, *more: str) -> tuple[Any, ...]:
+    return tuple(row[name] for name in (*RECIPE, *more))
+
+
+def _floor(row: Row, column: str) -> float | None:
+    return row.get(column.replace(" [", " floor ["))
+
+
+def _measured(row: Row, column: str, signed: bool = True) -> str:
+    """A value beside its uncertainty."""
+    floor = _floor(row, column)
+    return value_cell(row[column], float("nan") if floor is None else floor, signed=signed)
+
+
+def _range(rows: Sequence[Row], column: str) -> str:
+    by_size = sorted(rows, key=lambda row: abs(row[column]))
+    return " to ".join(dict.fromkeys(_measured(row, column) for row in (by_size[0], by_size[-1]))) + " %"
+
+
+def _kind(body: str) -> str:
+    return "the paper's surface bodies" if body == "surface" else f"{body} bodies"
+
+
+def _name(row: Row) -> str:
+    return f"{row['scene']}, {row['body']}, {row['nodes']} nodes"
+
+
+def _small(value: float) -> str:
+    """Two digits: 0.41, or 2.8 × 10⁻⁵ where that is shorter."""
+    digits, _, power = f"{value:.2g}".partition("e")
+    return f"{digits} × 10{str(int(power)).translate(RAISED)}" if power else digits

@@ -1,0 +1,68 @@
+"""Arrays as text of a page: series in two bytes a number, positions as deflated differences between frames.
+
+assets/data.js reads both.
+"""
+
+import base64
+import zlib
+from typing import Any
+
+import numpy as np
+
+LEVELS = 65534
+"""Highest level of a series; the one above stands for no number."""
+STEP = 1.8e-4
+"""Between levels of positions, over the size of the body [1]: rounding moves a coordinate by half of that at most."""
+DEEPEST = 30_000
+"""Most levels of positions, so that a difference fits into two bytes."""
+
+
+def pack_series(values: np.ndarray) -> dict[str, Any]:
+    """Numbers (n,), NaN and infinities as missing, each rounded to 1/131,000 of their range."""
+    known = np.isfinite(values)
+    low, high = (float(end) for end in (values[known].min(), values[known].max())) if known.any() else (0.0, 0.0)
+    # Where all are equal, or a float apart, every level means the same.
+    scale = LEVELS / (high - low) if high - low > np.finfo(float).tiny * LEVELS else 0.0
+    levels = np.full(len(values), LEVELS + 1)
+    levels[known] = np.rint((values[known] - low) * scale).astype(int)
+    return {"low": low, "high": high, "data": _text(levels.astype("<u2").tobytes())}
+
+
+def unpack_series(packed: dict[str, Any]) -> np.ndarray:
+    """What the page reads, (n,)."""
+    levels = np.frombuffer(base64.b64decode(packed["data"]), "<u2")
+    values = packed["low"] + (packed["high"] - packed["low"]) * (levels / LEVELS)
+    return np.where(levels > LEVELS, np.nan, values)
+
+
+def pack_frames(positions: np.ndarray, size: float) -> dict[str, Any]:
+    """Positions (P, n, 3) [m] of a body of `size` [m]; the step of the grid that they are rounded to stands beside."""
+    low = positions.min(axis=(0, 1)).astype(float)
+    extent = float((positions.max(axis=(0, 1)) - low).max())
+    step = max(STEP * size, extent / DEEPEST)
+    levels = np.rint((positions - low) / step).astype(np.int64)
+    # The way of one coordinate of one node after the other, low bytes before high ones: like stands beside like.
+    change = np.ascontiguousarray(np.diff(levels, axis=0, prepend=0).astype("<i2").transpose(2, 1, 0))
+    planes = change.view(np.uint8).reshape(-1, 2).T.tobytes()
+    return {"shape": list(positions.shape[:2]), "low": low.tolist(), "step": step, "data": _deflated(planes)}
+
+
+def unpack_frames(packed: dict[str, Any]) -> np.ndarray:
+    """What the page reads, (P, n, 3) [m]."""
+    planes = np.frombuffer(zlib.decompress(base64.b64decode(packed["data"])), np.uint8).reshape(2, -1)
+    count, nodes = packed["shape"]
+    change = np.ascontiguousarray(planes.T).view("<i2").reshape(3, nodes, count).transpose(2, 1, 0)
+    return np.asarray(packed["low"]) + packed["step"] * np.cumsum(change, axis=0, dtype=np.int64)
+
+
+def pack_indices(indices: np.ndarray) -> str:
+    """Whole numbers below 65,536, in their order."""
+    return _deflated(indices.astype("<u2").tobytes())
+
+
+def _deflated(content: bytes) -> str:
+    return _text(zlib.compress(content, 9))
+
+
+def _text(content: bytes) -> str:
+    return base64.b64encode(content).decode("ascii")

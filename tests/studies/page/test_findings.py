@@ -1,0 +1,87 @@
+"""Findings are what the tables say, number by number; without tables there are none."""
+
+import pytest
+
+from studies.report.page.findings import findings
+
+BODY = {"scene": "ball", "law": "van_gelder", "nodes": 550, "stiffness": 1.0}
+COMMON = BODY | {"dt [ms]": 1.0, "dt/dt_c": 0.5, "status": "ok"}
+
+
+def row(body="tetrahedral", method="implicit_volume", **values):
+    return COMMON | {"body": body, "method": method} | values
+
+
+def loss(body, method, volume, force, mean=4.0, **values):
+    known = {"volume_worst [%]": volume, "force_end [%]": force, "force_end floor [%]": 0.2, "mean_error [%]": mean}
+    return row(body, method, **known, **{"mean_error floor [%]": 0.3}, **values)
+
+
+TABLES = {
+    "volume_loss": [
+        loss("tetrahedral", "free", 8.3, -50.8),
+        loss("tetrahedral", "implicit_volume", 3.1e-6, -35.3),
+        loss("surface", "free", 18.0, -98.9),
+        loss("surface", "implicit_volume", 8.7e-6, -83.8),
+        loss("surface", "implicit_volume", 99.0, 1.0, status="diverged"),
+        loss("quadratic", "implicit_volume", 2e-7, 1.1, mean=0.8, scene="liver"),
+    ],
+    "frame_rate": [
+        row(method=method, **{"frame_time [ms]": ms, "frame_time floor [ms]": 0.01, "real_time [s/s]": fast})
+        for method, ms, fast in (("free", 0.2, 30.0), ("implicit_volume", 0.25, 0.9))
+    ],
+    "stability_map": [
+        row(status=status, **{"dt/dt_c": dt}) for status, dt in (("ok", 0.9), ("diverged", 0.8), ("diverged", 1.2))
+    ],
+}
+
+
+@pytest.fixture(scope="module")
+def told():
+    return {finding.title: finding for finding in findings(TABLES)}
+
+
+def test_volumes(told):
+    finding = told["How well volumes are kept"]
+    assert finding.number == "8.7 × 10⁻⁶ %" and "2 pairs" in finding.text
+    assert "up to 18 % (ball, surface, 550 nodes)" in finding.text
+
+
+def test_forces_and_their_uncertainty(told):
+    one = told["Forces of bodies with one volume"]
+    assert one.number == "−83.8 ± 0.2 %" and "−35.3 ± 0.2 % in tetrahedral bodies" in one.text
+    best = told["The force nearest to the reference"]
+    assert best.number == "+1.1 ± 0.2 to −35.3 ± 0.2 %"
+    assert "+1.1 ± 0.2 % in liver (quadratic, 550 nodes; displacement on the mean 0.8 ± 0.3 %)" in best.text
+
+
+def test_times_and_their_spread(told):
+    cost = told["What keeping a volume costs"]
+    assert cost.number == "+25 ± 11 to +25 ± 11 %" and "0.25 ± 0.01 ms against 0.20 ± 0.01 ms" in cost.text
+    assert told["Speed"].number == "1 of 2" and "0.9 s" in told["Speed"].text
+
+
+def test_counts_of_the_map(told):
+    limit = told["The limit of the time step"]
+    assert limit.number == "1 of 2" and "above it 0 of 1 do not" in limit.text
+
+
+def test_no_tables_no_findings():
+    assert findings({}) == [] and findings({"volume_loss": [], "frame_rate": [], "stability_map": []}) == []
+    empty = {name: [row(**dict.fromkeys(one.keys() - row().keys())) for one in table] for name, table in TABLES.items()}
+    del empty["stability_map"]
+    assert findings(empty) == [] and findings({"frame_rate": [row(), row(method="free")]}) == []
+
+
+CHANGES = {
+    "volume_loss": lambda one: {name: 1.5 * value if "%" in name else value for name, value in one.items()},
+    "frame_rate": lambda one: {name: value**2 if "_time " in name else value for name, value in one.items()},
+    "stability_map": lambda one: one | {"status": "diverged"},
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_number_that_moves_moves_its_finding(name):
+    """Nothing is told by heart."""
+    before, after = findings(TABLES), findings({**TABLES, name: [CHANGES[name](one) for one in TABLES[name]]})
+    assert [one.title for one in before] == [one.title for one in after] and before != after

@@ -1,0 +1,129 @@
+"""Pieces that died are stored; two commands may work on one folder."""
+
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.reference.reference_solves import reference_solves, standing_of
+from studies.runs.current import case_path
+from studies.scenes import ReferencePlan
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.store.record import Status, read_record, write_record
+from studies.sweep.failures import Failures
+from studies.sweep.load import load_runs
+from studies.sweep.run_studies import do, environment_of_workers
+from studies.sweep.standings import failed
+from studies.sweep.tasks import tasks_of
+from studies.timing.alone import alone
+from tests.studies.tiny import tiny_case, tiny_study
+
+ROOT = Path(__file__).parents[3]
+FATAL = """
+import os, signal
+from dataclasses import dataclass
+from typing import ClassVar
+
+from massspring import Free
+from tests.studies.tiny import tiny_case, tiny_study
+
+
+@dataclass(frozen=True)
+class Fatal(Free):
+    name: ClassVar[str] = "fatal"
+
+    def advance(self, state, boundary):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+STUDY = tiny_study(cases=(tiny_case(method=Fatal()), tiny_case(method=Free())))
+"""
+"""A study with a case that ends its process."""
+
+
+def test_a_piece_that_died_is_stored_as_failed(tmp_path):
+    scene = replace(BALL_SQUEEZE, reference=ReferencePlan("octant", (0.9, 0.5, 0.4)))
+    case = tiny_case(scene=scene)
+    tasks, failures = tasks_of(tmp_path, [tiny_study(cases=(case,))]), Failures()
+    for task in tasks:
+        failures.add(task, "its process died")
+    assert all(task.is_current() and failed(task) for task in tasks)
+    (run,), remarks = load_runs(tmp_path, tiny_study(cases=(case,)))
+    assert (run.record.status, run.record.message) == (Status.FAILED, "its process died")
+    assert "the reference of 'ball_squeeze' on mesh 0.9 is failed: its process died" in remarks[0]
+    assert [standing_of(tmp_path, solve).state for solve in reference_solves(scene)] == ["failed"] * 6
+    said = failures.sentence("again")
+    assert said.startswith(f"stored as failed: {tasks[0].label} (its process died), and 6 more; the rest is done")
+
+
+def test_what_another_command_has_done_meanwhile_is_not_done_again(results):
+    (task,) = (task for task in tasks_of(results, [tiny_study()]) if task.work == tiny_case(timed=True))
+    planned = replace(task, seen=task.state())
+    assert not planned.done_meanwhile(), "it is asked for as it is"
+    path = task.path()
+    write_record(path, read_record(path))
+    before = path.read_bytes(), path.stat().st_mtime_ns
+    assert planned.done_meanwhile() and do(planned) == path
+    assert (path.read_bytes(), path.stat().st_mtime_ns) == before
+    write_record(path, replace(read_record(path), fingerprint="0"))
+    assert not planned.done_meanwhile(), "that was other code"
+
+
+def test_workers_get_caches_that_do_not_depend_on_their_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ORGANBENCH_CACHE", "meshes")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "compiled")
+    with environment_of_workers():
+        assert os.environ["ORGANBENCH_CACHE"] == str(tmp_path / "meshes")
+        assert os.environ["NUMBA_CACHE_DIR"] == str(tmp_path / "compiled")
+        assert os.environ["OMP_NUM_THREADS"] == "1"
+    assert (os.environ["ORGANBENCH_CACHE"], os.environ["NUMBA_CACHE_DIR"]) == ("meshes", "compiled")
+
+
+def test_one_command_at_a_time_measures(tmp_path):
+    told = []
+    program = "import sys; from pathlib import Path; from studies.timing.alone import alone\n"
+    program += "with alone(Path(sys.argv[1]), lambda: print('waits', flush=True)): print('inside', flush=True)"
+    command = [sys.executable, "-c", program, str(tmp_path)]
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with alone(tmp_path):
+        other = subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True)
+        assert other.stdout is not None
+        told.append(other.stdout.readline())
+        time.sleep(0.2)
+        assert other.poll() is None, "it waits"
+    told += other.stdout.read().splitlines(keepends=True)
+    assert (other.wait(), told) == (0, ["waits\n", "inside\n"])
+    other.stdout.close()
+
+
+@pytest.mark.slow
+def test_a_case_that_ends_its_process_is_stored_and_the_rest_goes_on(organbench, tmp_path):
+    file, results = tmp_path / "fatal.py", tmp_path / "results"
+    file.write_text(FATAL)
+    code, out, err = organbench("run", file, "--results", results)
+    assert code == 1 and "tiny: 2 pieces ran, charts in" in out
+    (sentence,) = err.splitlines()
+    assert sentence.startswith("warning: stored as failed: tiny_squeeze-tetrahedral-60-fatal-dt0.5 (its process died 3")
+    assert sentence.endswith(f"the rest is done, `organbench run {file} --only failed` tries again")
+    assert organbench("status", file, "--results", results)[1].splitlines()[0] == "tiny: 1 ok, 1 failed"
+    assert organbench("run", file, "--results", results)[0] == 0, "what failed is known, and does not run again"
+
+
+@pytest.mark.slow
+def test_two_commands_on_one_folder_leave_what_one_leaves(finished_sweep, tmp_path):
+    results, file = tmp_path / "results", tmp_path / "one.py"
+    file.write_text("from tests.studies.tiny import tiny_case, tiny_study\nSTUDY = tiny_study(cases=(tiny_case(),))\n")
+    command = [sys.executable, "-m", "studies", "run", str(file), "--results", str(results), "--jobs", "1"]
+    both = [subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    for process in both:
+        assert process.communicate()[1] == "" and process.returncode == 0
+    by_one, by_two = (read_record(case_path(root, "tiny", tiny_case())) for root in (finished_sweep, results))
+    for name, field in by_one.fields.items():
+        assert np.array_equal(field.values, by_two.fields[name].values, equal_nan=field.values.dtype.kind == "f")
+    assert not list(results.rglob("*.part")), "nothing half-written is left"
