@@ -5,7 +5,7 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study report verify smoke test check lint docs figures stress bench clean distclean compiled \
+.PHONY: help study study-peers report verify smoke test check lint docs figures stress bench clean distclean compiled \
 	compiled-essential setup-run \
 	setup-test setup-dev FORCE
 
@@ -24,6 +24,12 @@ study-%: setup-run ## run one study and draw it: make study-volume_loss
 
 report: setup-run ## charts, tables and report.html, one page that opens anywhere, from the stored results
 	$(BIN)/organbench report
+
+study-peers: setup-run ## other programs beside ours on the same ball and liver: the extra `peers` (minutes)
+	$(BIN)/python -m pip install -q -c constraints.txt -e ".[peers]"
+	$(BIN)/organbench run studies/peers/study.py
+	$(BIN)/python -m studies.peers.main
+	$(BIN)/organbench plot studies/peers/study.py
 
 verify: setup-test ## the reference against closed forms, published numbers and other codes; test campaigns (minutes)
 	$(BIN)/organbench verify

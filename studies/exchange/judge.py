@@ -152,3 +152,17 @@ def _sway(fitting: Fitting, values: dict[str, np.ndarray]) -> dict[str, float]:
 def _named(path: Path, fitting: Fitting) -> str:
     digest = hashlib.sha256(np.ascontiguousarray(fitting.positions).tobytes()).hexdigest()
     return f"{path.name} sha256:{digest}"
+
+
+def unfinished_record(case: Case, status: Status, message: str) -> Record:
+    """The record of an entry that handed nothing in: status and message say why."""
+    return new_record(
+        kind="run",
+        key=case.key,
+        name=entry_name(case),
+        status=status,
+        message=message,
+        fingerprint=source_fingerprint(__name__),
+        attributes={ENTRY: "nothing was handed in"},
+        fields={},
+    )

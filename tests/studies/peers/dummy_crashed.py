@@ -1,0 +1,1 @@
+from tests.studies.peers.dummies import crashed as run  # noqa: F401

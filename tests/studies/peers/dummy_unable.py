@@ -1,0 +1,1 @@
+from tests.studies.peers.dummies import unable as run  # noqa: F401
