@@ -17,7 +17,7 @@ from studies.scene.quantities import allowed
 from studies.store.record import Status
 from studies.store.schema import SURFACE
 
-BINS = 60
+BINS = 40
 """Stretches of a history; of each the smallest and the largest value are shown."""
 MOST_NODES = 65_535
 """Numbers of nodes have two bytes on the page."""
