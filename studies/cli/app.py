@@ -32,7 +32,7 @@ COMMANDS = {
         ("advise", "answers.advise", "advise", "The cheapest recipe that is accurate enough for a scene."),
         ("calibrate", "answers.calibrate", "calibrate", "Fits few numbers of a body, judged in other scenes."),
         ("verify", "answers.verify", "verify", "Holds the reference against closed forms and published numbers."),
-        ("stress", "answers.stress", "stress", "Random trials that try to break every method; each end is named."),
+        ("stress", "answers.stress", "stress", "Tries to break every method at random; each end has a name."),
         ("cost", "running.cost", "cost", "Microseconds per stage of a step, and what the scene leaves out."),
         ("mesh", "meshes.mesh", "mesh", "Makes a mesh: of a synthetic organ, or from a file."),
         ("check", "meshes.check", "check", "Tells what is wrong with a mesh and what mends it."),
