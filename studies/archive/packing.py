@@ -16,9 +16,10 @@ from studies.archive.versions import pins
 from studies.base.atomic import is_there, part_beside
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
+from studies.exchange.entry import entry_files
 from studies.reference.reference_solves import reference_solves
 from studies.report.publish import check_studies
-from studies.report.results import make_folder, report
+from studies.report.results import make_folder, refresh, report
 from studies.runs.current import case_path
 from studies.runs.own import files_of
 from studies.store.archived import MANIFEST, check_no_archive
@@ -26,7 +27,6 @@ from studies.store.links import link_study
 from studies.timing.cases import timing_file
 
 SUFFIX = ".zip"
-PAGE = "report.html"
 README = """# Results of organbench {version}: {names}
 
 Nothing in here has to be computed again. Unpack it; the folder is a results folder like any other:
@@ -51,6 +51,8 @@ class Packed:
     files: int
     size: int
     """Bytes."""
+    remarks: list[str]
+    """What report.html had no room for, or cannot show."""
 
 
 def chosen(root: Path, catalogue: Sequence[Study]) -> list[Study]:
@@ -73,12 +75,12 @@ def pack(root: Path, studies: Sequence[Study], target: Path, day: str, extra: It
     check_studies(root, studies, "archived")
     make_folder(target.parent)
     with TemporaryDirectory(dir=target.parent, prefix=f"{target.stem}-") as place:
-        stage = Path(place)
-        gather(root, studies, stage)
-        describe(stage, studies, day, [path for path in (*extra, *own_files(studies), root / PAGE) if path.is_file()])
+        stage = Path(place) / "results"  # as commands in report.html name it
+        remarks = gather(root, studies, stage)
+        describe(stage, studies, day, [path for path in (*extra, *own_files(studies)) if path.is_file()])
         names = sorted(path for path in stage.rglob("*") if path.is_file())
         write_zip(stage, names, target, day)
-    return Packed(target, len(names), target.stat().st_size)
+    return Packed(target, len(names), target.stat().st_size, remarks)
 
 
 def own_files(studies: Sequence[Study]) -> list[Path]:
@@ -86,19 +88,23 @@ def own_files(studies: Sequence[Study]) -> list[Path]:
     return [file.path for s in studies for case in s.cases for file in files_of(case.method, case.body.law)]
 
 
-def gather(root: Path, studies: Sequence[Study], stage: Path) -> None:
-    """Records of studies and of their references, and what is drawn from them. Raises StudyError when one lacks."""
+def gather(root: Path, studies: Sequence[Study], stage: Path) -> list[str]:
+    """Records of studies, their references and entries from outside, and what is drawn from them; what report.html had
+    no room for, in sentences. Raises StudyError when a record is missing."""
+    stage.mkdir()
     for study in studies:
         found = [case_path(root, study.name, case) for case in study.cases]
         found += [timing_file(root, study.name, case) for case in study.cases if case.timed]
         found += [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
-        for path in found:
+        for path in [*found, *entry_files(root)]:
             bring(path, stage / path.relative_to(root))
         link_study(stage, study.name)
+        missing = refresh(stage, study)[1]
+        if missing:
+            raise StudyError(f"not archived, something is missing: {study.name}: {missing[0]}")
     remarks = report(stage, studies)[1]
-    if remarks:
-        raise StudyError(f"not archived, something is missing: {remarks[0]}")
     shutil.rmtree(stage / "cache")
+    return remarks
 
 
 def bring(source: Path, target: Path) -> None:

@@ -20,6 +20,8 @@ KIND = {
     "cost": "scenes",
     "safe-dt": "scenes",
     "view": "scenes",
+    "export": "scenes",
+    "judge": "scenes",
     "calibrate": "organs",
     "mesh": "organs",
 }

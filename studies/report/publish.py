@@ -6,7 +6,7 @@ from pathlib import Path
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.catalog import Study
-from studies.report.results import FIGURES, refresh, report
+from studies.report.results import FIGURES, charts_and_tables, refresh
 from studies.report.summary import SUMMARIES
 from studies.store.machine import machine_id, machine_of
 from studies.store.stamps import is_stamped
@@ -37,10 +37,10 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
     check_studies(root, studies)
     absent = [name for name in EXTRAS if not (root / name).exists()]
     check_extras(root, [name for name in EXTRAS if name not in absent])
-    written, remarks = report(root, studies)
+    written, remarks = charts_and_tables(root, studies)
     if remarks:
         raise StudyError(f"not published, something is missing: {remarks[0]}")
-    sources = [*(file for file in written if file.suffix in SUFFIXES), root / "machine.json"]
+    sources = [*written, root / "machine.json"]
     sources += [file for name in EXTRAS for file in _files(root / name)]
     show_summaries(root, studies, home)
     target = home / PUBLISHED

@@ -72,8 +72,16 @@ def make_folder(folder: Path) -> None:
 
 
 def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
-    """Charts and tables of all studies, the summaries, machine.json and report.html, which shows all of it in one
+    """Charts and tables of all studies, the summaries, machine.json, and report.html, which shows all of it in one
     page; paths, and what is missing in sentences.
+    """
+    written, remarks = charts_and_tables(root, studies)
+    page, left_out = write_page(root, studies)
+    return [*written, *([page] if page else [])], [*remarks, *left_out]
+
+
+def charts_and_tables(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
+    """The same without the page.
 
     A study of which nothing is stored keeps the charts that are there.
     """
@@ -91,9 +99,6 @@ def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]
         written.append(write_table(root / "kept_volume.csv", kept))
     if not is_archive(root):
         write_machine(root / "machine.json")
-    page, sentences = write_page(root, studies)
-    written += [] if page is None else [page]
-    remarks += sentences
     if absent:
         remarks.append(f"not run here, what is drawn of them stays: {', '.join(absent)}; make study-NAME runs one")
     return written, remarks

@@ -17,7 +17,7 @@ from studies.scene.quantities import allowed
 from studies.store.record import Status
 from studies.store.schema import SURFACE
 
-BINS = 60
+BINS = 40
 """Stretches of a history; of each the smallest and the largest value are shown."""
 MOST_NODES = 65_535
 """Numbers of nodes have two bytes on the page."""
@@ -66,11 +66,19 @@ def histories(run: Run) -> dict[str, Any]:
     """Volume, probed force and frame time, thinned; without those that were not measured."""
     if "t" not in run.record.fields:
         return {}
-    found = {"volume": PERCENT * (run.volume_ratio - 1), "force": run.force}
+    found = {"volume": PERCENT * (run.volume_ratio - 1)}
+    if probes_force(run):
+        found["force"] = run.force
     if run.timing is not None:
         found["frame"] = 1e-6 * np.median(run.timing.frame_ns, axis=0)
     shown = {name: thinned(run.field("t"), values) for name, values in found.items()}
     return {name: {"t": pack_series(t), "values": pack_series(values)} for name, (t, values) in shown.items() if len(t)}
+
+
+def probes_force(run: Run) -> bool:
+    """Whether what the scene probes is there: bodies that only fall have no obstacle and are held nowhere."""
+    scene = run.case.scene
+    return scene.probed.number < len(scene.obstacles if scene.probed.what == "obstacle" else scene.held)
 
 
 def thinned(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

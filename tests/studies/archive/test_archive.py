@@ -19,6 +19,7 @@ from studies.archive.packing import chosen, pack
 from studies.archive.versions import pins
 from studies.base.errors import StudyError
 from studies.catalog import Chart
+from studies.exchange.entry import ENTRY, entry_path, outside
 from studies.report.results import draw_charts, refresh
 from studies.runs.current import case_path
 from studies.store import archived, machine
@@ -57,7 +58,7 @@ def test_what_is_in_it(unpacked, finished_sweep):
     names = {path.relative_to(unpacked).as_posix() for path in unpacked.rglob("*") if path.is_file()}
     records = {case_path(Path(), "tiny", case).as_posix() for case in STUDY.cases}
     frame_times = {timed.timing_file(Path(), "tiny", case).as_posix() for case in STUDY.cases[:2]}
-    drawn = {"tiny/tiny.csv", "tiny/volume.png", "tiny/tiny.h5", "kept_volume.csv"}
+    drawn = {"tiny/tiny.csv", "tiny/volume.png", "tiny/tiny.h5", "kept_volume.csv", "report.html"}
     about = {"README.md", "CITATION.cff", "constraints.txt", "machine.json", archived.CRATE, archived.MANIFEST}
     assert {name for name in names if not name.startswith("code/")} == records | frame_times | drawn | about
     for name in records:
@@ -212,11 +213,24 @@ def test_all_that_is_stored_is_chosen(finished_sweep):
     assert chosen(finished_sweep, [STUDY, replace(STUDY, name="other")]) == [STUDY]
 
 
+def test_entries_from_outside_are_packed_with_their_row(results, tmp_path):
+    case = tiny_case()
+    record = read_record(case_path(results, "tiny", case))
+    entry = case.replaced(method=outside("other_program"))
+    attributes = record.attributes | {ENTRY: "other_program"}
+    write_record(entry_path(results, entry), replace(record, key=entry.key, name="other", attributes=attributes))
+    pack(results, [STUDY], tmp_path / "a.zip", DAY)
+    with zipfile.ZipFile(tmp_path / "a.zip") as archive:
+        assert entry_path(Path(), entry).as_posix() in archive.namelist()
+        assert "other_program" in archive.read("tiny/tiny.csv").decode()
+
+
 def test_a_study_file_is_packed_with_its_records(organbench, results, tiny_file, tmp_path):
     organbench("run", tiny_file, "--results", results)
     target = tmp_path / "new" / "tiny.zip"
     code, out, err = organbench("archive", tiny_file, "-o", target, "--results", results)
-    assert (code, err) == (0, "") and out.startswith(f"{target}: ")
+    assert code == 0 and out.startswith(f"{target}: ")
+    assert err.startswith("warning: report.html: chart picture.txt is left out"), "it is no picture"
     with zipfile.ZipFile(target) as archive:
         assert archive.read(tiny_file.name) == tiny_file.read_bytes()
         assert archive.read("tiny/picture.txt") == b"3 runs"

@@ -38,7 +38,7 @@ def completed(*words: str) -> tuple[list[str], list[str]]:
 @pytest.mark.parametrize(
     ("words", "offered"),
     [
-        (("st",), ["status"]),
+        (("sta",), ["status"]),
         (("run", "vol"), ["volume_loss"]),
         (("run", "volume_loss", "vol"), []),
         (("advise", "liver_pre"), ["liver_press"]),
@@ -47,7 +47,7 @@ def completed(*words: str) -> tuple[list[str], list[str]]:
         (("table", "--all", "vol"), ["volume_loss"]),
         (("table", "--csv", "vol"), []),
         (("run", "--sm"), ["--smoke"]),
-        (("nothing", "st"), ["status"]),
+        (("nothing", "sta"), ["status"]),
     ],
     ids=" ".join,
 )

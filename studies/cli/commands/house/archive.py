@@ -9,7 +9,7 @@ import typer
 from studies.archive.checking import check
 from studies.archive.packing import chosen, pack
 from studies.catalog import STUDIES
-from studies.cli.terminal import Results, busy, say
+from studies.cli.terminal import Results, busy, say, warn
 from studies.sweep.find_study import find_studies
 
 
@@ -33,4 +33,5 @@ def archive(
     files = [Path(name) for name in studies or [] if name.endswith(".py")]
     with busy(f"packing {', '.join(study.name for study in found)}"):
         packed = pack(results, found, output, datetime.now(UTC).date().isoformat(), files)
+    warn(packed.remarks)
     say(f"{packed.path}: {packed.files} files, {packed.size / 1e6:.1f} MB")
