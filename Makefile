@@ -26,7 +26,7 @@ report: setup-run ## charts, tables and report.html, one page that opens anywher
 	$(BIN)/organbench report
 
 study-peers: setup-run ## other programs beside ours on the same ball and liver: the extra `peers` (minutes)
-	$(BIN)/python -m pip install -q -c constraints.txt -e ".[peers]"
+	$(BIN)/python -m pip install -q -c constraints.txt --no-build-isolation -e ".[peers]"
 	$(BIN)/organbench run studies/peers/study.py
 	$(BIN)/python -m studies.peers.main
 	$(BIN)/organbench plot studies/peers/study.py

@@ -5,6 +5,7 @@ a row that says so, and the rest goes on.
 """
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -87,11 +88,17 @@ def judged(attempt: Attempt, given: Path, limit: float) -> Record:
 
 
 def hand_over(attempt: Attempt, given: Path, out: Path, limit: float) -> tuple[Status, str]:
-    """Runs the adapter in a process of its own; how it ended."""
-    words = [attempt.peer.module, str(given), str(out), attempt.peer.mesh, repr(attempt.shorter)]
+    """Runs the adapter in a process of its own, in the folder, where programs leave their logs; how it ended."""
+    words = [attempt.peer.module, str(given.resolve()), str(out.resolve()), attempt.peer.mesh, repr(attempt.shorter)]
+    surroundings = os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
     try:
         ended = subprocess.run(
-            [sys.executable, "-m", "studies.peers.run", *words], capture_output=True, text=True, timeout=limit
+            [sys.executable, "-m", "studies.peers.run", *words],
+            capture_output=True,
+            text=True,
+            timeout=limit,
+            cwd=given,
+            env=surroundings,
         )
     except subprocess.TimeoutExpired:
         return Status.FAILED, f"{attempt.peer.name} took longer than {limit:g} s"

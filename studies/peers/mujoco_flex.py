@@ -4,6 +4,9 @@ Volume is kept as its documentation has it, by a Poisson ratio near ½; the shea
 is that of the scene, on every degree of freedom. Planes are bodies that are moved by hand ("mocap").
 """
 
+# Checked alike where the package is not installed.
+# pyright: reportAttributeAccessIssue=false
+
 import time
 from pathlib import Path
 

@@ -5,6 +5,9 @@ Planes are static shapes that are moved by hand and push by a penalty; the force
 of the scene, on every velocity after a step.
 """
 
+# Checked alike where the package is not installed.
+# pyright: reportAttributeAccessIssue=false, reportArgumentType=false
+
 import time
 from itertools import pairwise
 from pathlib import Path
