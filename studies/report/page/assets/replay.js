@@ -107,10 +107,15 @@ function scaleColours() {
   byId("most").textContent = `${+(1000 * shown.most).toPrecision(3)} mm`;
 }
 
+function momentsOf(replay) {
+  const later = replay.checkpoints.filter((t) => t > 0).length, words = `at ${later} checkpoint${later === 1 ? "" : "s"}`;
+  return later < replay.checkpoints.length ? `at the start, ${words}` : words;
+}
+
 function tellColours(given) {
   const replay = given.replay, said = [];
   if (!replay.reference) said.push("No reference is stored for this scene, so the case stands alone.");
-  else if (replay.comparable) said.push(`Colour: distance of each point from the same point of the reference, known at ${replay.checkpoints.length} checkpoints and in proportion between them.`);
+  else if (replay.comparable) said.push(`Colour: distance of each point from the same point of the reference, known ${momentsOf(replay)} and in proportion between them.`);
   else said.push("The body may turn or slip freely in this scene: single points are not comparable, and no error is coloured.");
   if (replay.reference) said.push("The reference moves in a straight line from checkpoint to checkpoint.");
   said.push(`${replay.times.length} frames, rounded to ${replay.rounding} of the body's size.`);
