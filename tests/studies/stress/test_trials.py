@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from massspring import Free, MassSpringError, simulate
+from massspring.layout.threads import cores
 from massspring.methods.implicit_volume import ImplicitVolume
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.stress import outcome as module
@@ -57,7 +58,7 @@ def test_masses_and_the_origin_are_where_they_are_asked():
         ({"dt_fraction": 3.5, "load": "plane", "steps": 600}, "diverged"),
         ({"method": "shake", "precision": "float32"}, "refused"),
         ({"start": "mirrored", "volumes": "nodal", "law": "cotangent", "nodes": 60}, "inverted"),
-        ({"held": True, "threads": 2}, "ok"),
+        ({"held": True, "precision": "float32"}, "ok"),
         ({"steps": 12 * 10**12}, "refused"),
     ],
 )
@@ -104,6 +105,7 @@ def test_each_truth_is_missed_by_what_breaks_it(pressed):
     assert named(setup, replace(history, min_j=history.min_j * 0.0))[0] == "inverted"
 
 
+@pytest.mark.skipif(cores() < 2, reason="one core")
 def test_threads_are_compared_bit_for_bit(pressed, monkeypatch):
     setup, history = pressed
     assert other_bits(setup, history) is None
