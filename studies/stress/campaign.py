@@ -8,6 +8,7 @@ from concurrent.futures.process import BrokenProcessPool
 
 import pandas as pd
 
+from studies.base.interrupts import die_quietly
 from studies.stress.outcome import UNEXPLAINED, Outcome, tried
 from studies.stress.trial import Trial, draw
 
@@ -35,7 +36,7 @@ def run_trials(trials: Iterable[Trial], jobs: int, done: Callable[[Outcome], obj
 def _in_pool(chunks: list[list[Trial]], jobs: int) -> Iterator[Outcome]:
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # read by the libraries when a worker loads them
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=context)
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=die_quietly)  # not outliving this process
     try:
         for future in as_completed([pool.submit(try_all, chunk) for chunk in chunks]):
             if not isinstance(future.exception(), BrokenProcessPool):
