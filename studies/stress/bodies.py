@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from massspring import Body, Material, Volumes, quadratic_body, surface_body, tetrahedral_body
+from massspring.body.points import PAIRS
 from studies.geometry import organ
 from studies.geometry.mesh.organ_mesh import boundary_triangles, surface_first, tetrahedron_volumes
 from studies.stress.trial import ORGANS, QUADRATIC, SURFACE, Trial
@@ -16,9 +17,6 @@ FLATTEST = 1e-12
 STRETCH = {"needle": (20.0, 1.0, 1.0), "sheet": (1.0, 1.0, 0.03)}
 ORGAN_NODES = 150, 230
 REGIONS = 4
-PAIRS = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
-"""Corners at the ends of each side of a tetrahedron, in VTK's order."""
-
 Mesh = tuple[np.ndarray, np.ndarray]
 
 

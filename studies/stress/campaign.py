@@ -1,20 +1,22 @@
 """Many trials in several processes; a process that dies costs its trial alone."""
 
-import multiprocessing
-import os
+import pickle
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pandas as pd
 
 from studies.base.interrupts import die_quietly
 from studies.stress.outcome import UNEXPLAINED, Outcome, tried
 from studies.stress.trial import Trial, draw
+from studies.sweep.run_studies import environment_of_workers
+from studies.sweep.workers import done_or_dead
 
 CHUNK = 25
 """Trials that a process takes at a time."""
-ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 def run_trials(trials: Iterable[Trial], jobs: int, done: Callable[[Outcome], object]) -> list[Outcome]:
@@ -22,36 +24,32 @@ def run_trials(trials: Iterable[Trial], jobs: int, done: Callable[[Outcome], obj
     trials = list(trials)
     chunks = [trials[first : first + CHUNK] for first in range(0, len(trials), CHUNK)]
     found: dict[int, Outcome] = {}
-    for outcome in _in_pool(chunks, jobs):
-        found[outcome.trial.number] = outcome
-        done(outcome)
-    # What a dead process left is tried once more, each trial in a process of its own.
-    for trial in trials:
-        if trial.number not in found:
-            found[trial.number] = _alone(trial)
-            done(found[trial.number])
+    with TemporaryDirectory() as folder, environment_of_workers():
+        for outcome in _each(chunks, jobs, Path(folder)):
+            found[outcome.trial.number] = outcome
+            done(outcome)
     return [found[trial.number] for trial in trials]
 
 
-def _in_pool(chunks: list[list[Trial]], jobs: int) -> Iterator[Outcome]:
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # read by the libraries when a worker loads them
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=die_quietly)  # not outliving this process
-    try:
-        for future in as_completed([pool.submit(try_all, chunk) for chunk in chunks]):
-            if not isinstance(future.exception(), BrokenProcessPool):
-                yield from future.result()
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+def _each(chunks: list[list[Trial]], jobs: int, folder: Path) -> Iterator[Outcome]:
+    """A chunk that ends its process is tried again trial by trial."""
+    with closing(done_or_dead(chunks, jobs, partial(try_all, folder), die_quietly)) as ended:
+        for chunk, cause in ended:
+            if cause is None:
+                yield from pickle.loads(_file(folder, chunk).read_bytes())
+            elif len(chunk) == 1:
+                yield Outcome(chunk[0], UNEXPLAINED, cause, float("nan"))
+            else:
+                yield from _each([[trial] for trial in chunk], jobs, folder)
 
 
-def _alone(trial: Trial) -> Outcome:
-    return next(_in_pool([[trial]], 1), Outcome(trial, UNEXPLAINED, "its process died", float("nan")))
+def try_all(folder: Path, trials: list[Trial]) -> None:
+    """In a process: what came of each, left in `folder`."""
+    _file(folder, trials).write_bytes(pickle.dumps([tried(trial) for trial in trials]))
 
 
-def try_all(trials: list[Trial]) -> list[Outcome]:
-    """What came of each, in one process."""
-    return [tried(trial) for trial in trials]
+def _file(folder: Path, trials: list[Trial]) -> Path:
+    return folder / f"{trials[0].number}-{len(trials)}"
 
 
 def drawn(seed: int, cases: int) -> list[Trial]:

@@ -1,6 +1,6 @@
 """One trial of the stress campaign: every choice that makes it, drawn from a seed and a number."""
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -163,11 +163,6 @@ def _fitted(drawn: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
     if drawn["shape"] in ("two", "cell") and volumes == "regions":
         found["volumes"] = "whole"
     return found
-
-
-def from_dict(data: dict[str, Any]) -> Trial:
-    """A trial as `asdict` wrote it."""
-    return Trial(**{field.name: data[field.name] for field in fields(Trial)})
 
 
 def _method(drawn: dict[str, Any]) -> type[Method]:

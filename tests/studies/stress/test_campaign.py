@@ -1,6 +1,7 @@
 """The stress campaign as a whole: every trial once, whatever happens to a process; its table, chart and command."""
 
 import os
+import pickle
 
 import pandas as pd
 import pytest
@@ -14,11 +15,11 @@ from studies.stress.trial import draw as drawn
 DEADLY = 1
 
 
-def deadly(trials):
+def deadly(folder, trials):
     """One trial takes its process with it."""
     if any(trial.number == DEADLY for trial in trials):
         os._exit(9)
-    return [Outcome(trial, "ok", "", 0.0) for trial in trials]
+    campaign._file(folder, trials).write_bytes(pickle.dumps([Outcome(trial, "ok", "", 0.0) for trial in trials]))
 
 
 def test_a_process_that_dies_costs_its_trial_alone(monkeypatch):

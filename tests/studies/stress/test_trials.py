@@ -1,6 +1,6 @@
 """Trials of the stress campaign: drawn alike everywhere, ended by name, reduced to what matters."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from studies.stress import outcome as module
 from studies.stress.bodies import body_of, mesh_of
 from studies.stress.outcome import UNEXPLAINED, simplest, tried
 from studies.stress.surroundings import setup_of
-from studies.stress.trial import CHOICES, PLAIN, Trial, draw, from_dict
+from studies.stress.trial import CHOICES, PLAIN, Trial, draw
 from studies.stress.truths import broken, named, other_bits
 
 CALM = Trial(seed=0, number=0, method="implicit_volume", **PLAIN)
@@ -21,7 +21,6 @@ CALM = Trial(seed=0, number=0, method="implicit_volume", **PLAIN)
 
 def test_a_trial_is_its_seed_and_number():
     assert draw(3, 7) == draw(3, 7) != draw(3, 8) and draw(4, 7) != draw(3, 7)
-    assert from_dict(asdict(draw(3, 7))) == draw(3, 7)
     assert "--seed 3 --trial 7" in draw(3, 7).line
 
 
