@@ -11,6 +11,7 @@ from studies.metrics.run import Run
 from studies.metrics.table import UNRESOLVED, study_table
 from studies.metrics.wish import usual_wish
 from studies.runs.case import BodyRecipe
+from studies.runs.recipe_text import body_words
 
 PAPER = 550
 """Surface nodes of the paper's body where it stands beside others."""
@@ -105,7 +106,7 @@ def recommended_of(runs: Sequence[Run]) -> str:
         if chosen is None or paper is None:
             continue
         marked |= best is None
-        words = f"{_words(chosen.case.body)}, {chosen.case.dt_fraction:g}{'' if best else ' ‡'}"
+        words = f"{body_words(chosen.case.body)}, {chosen.case.dt_fraction:g}{'' if best else ' ‡'}"
         cells = [*_errors(paper), words, *_errors(chosen), _real_time(chosen)]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     if marked:
@@ -124,7 +125,7 @@ def ladder_of(runs: Sequence[Run]) -> str:
     for name, found in _by_scene(runs).items():
         for one in found:
             if name in LADDER_SCENES and one.advisable:
-                cells = [_words(one.case.body), str(volumes[one.case.key]), f"{one.case.dt_fraction:g}"]
+                cells = [body_words(one.case.body), str(volumes[one.case.key]), f"{one.case.dt_fraction:g}"]
                 lines.append(f"| {name} | " + " | ".join([*cells, *_errors(one), _real_time(one)]) + " |")
     return "\n".join(lines)
 
@@ -147,11 +148,6 @@ def _by_scene(runs: Sequence[Run]) -> dict[str, list[Judged]]:
 
 def _is_paper(body: BodyRecipe) -> bool:
     return body.kind == "surface" and body.nodes == PAPER
-
-
-def _words(body: BodyRecipe) -> str:
-    law = "" if body.law in ("van_gelder", "cotangent") else f", {body.law}"
-    return f"{body.series}{law}, {body.nodes}"
 
 
 def _errors(one: Judged) -> list[str]:

@@ -14,13 +14,14 @@ from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import Results, console, say, warn
 from studies.geometry.mesher.jobs import cache_folder
 from studies.metrics.table import check_columns
+from studies.population import POPULATION
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.report.results import refresh
 from studies.store.links import link_study
 from studies.store.paths import study_folder
 from studies.store.staleness import MISSING
 from studies.sweep.failures import Failures
-from studies.sweep.find_study import find_studies
+from studies.sweep.find_study import ON, find_studies
 from studies.sweep.plan import plan
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, warnings_of
@@ -40,12 +41,15 @@ def run(
     case: Annotated[str, typer.Option(help="this case alone, by its name, with its reference; no charts")] = "",
     only: Annotated[str, typer.Option(help="failed, stale, or both with a comma: nothing else runs")] = "",
     jobs: Annotated[int, typer.Option(min=1, help="processes for the physics; timing always runs alone")] = 2,
+    organs: Annotated[str, typer.Option(help="a folder of surfaces, FOLDER or FOLDER:mm: the studies on these")] = "",
     dry: Annotated[bool, typer.Option("--dry-run", help="say what would run, why and how long; run nothing")] = False,
 ) -> None:
     """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
     wanted = _filter(only)
     root = results / SMOKE if smoke else results
     failures = Failures()
+    if organs:
+        studies = [f"{name}{ON}{organs}" for name in studies or [POPULATION]]
     for found in _checked(studies or []):
         study = found.smoke() if smoke else found
         if case:
