@@ -17,7 +17,7 @@ from studies.scene.scene import Organ, Scene
 
 GAP = 0.0005
 """Between probe and surface at the start [m]."""
-PRESSED = 0.75
+PRESSED = 0.6
 """Share of the duration in which the probe moves; then all comes to rest."""
 CHECKPOINTS = 2
 """At half the depth and at rest: a member has a quarter of the time that a scene of the catalogue has."""

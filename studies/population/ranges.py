@@ -53,7 +53,7 @@ RANGES: dict[str, Ranges] = {
         radius=(0.011, 0.018),
         depth=(0.0035, 0.007),
         shift=0.015,
-        plan=ReferencePlan("solid", (250, 370, 550), variants=(), at_outlines=(1, 2, 3), at_contact=(2, 3, 4)),
+        plan=ReferencePlan("solid", (250, 370, 550), variants=(), at_outlines=(1, 2, 3), at_contact=(1, 2, 3)),
         sources=(
             "volume 137 ± 30 mL by ultrasound (Lee, J. Korean Soc. Med. Ultrasound 15 (1996) 63): a spread of 20 % "
             "gives ± 24 %",
@@ -68,7 +68,7 @@ RANGES: dict[str, Ranges] = {
         radius=(0.020, 0.030),
         depth=(0.008, 0.015),
         shift=0.025,
-        plan=ReferencePlan("solid", (430, 520, 620), variants=(), at_outlines=(2, 2, 3), at_contact=(2, 3, 3)),
+        plan=ReferencePlan("solid", (430, 520, 620), variants=(), at_contact=(2, 3, 3)),
         sources=(
             "about 1 L after a meal (Ferrua and Singh, J. Food Sci. 75 (2010) R151); no spread is given there, 20 % of "
             "the lengths are assumed",

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from massspring import ImplicitVolume
-from studies.catalog.accuracy import BUDGETS, LONG, SHORT, headline
+from studies.catalog.accuracy import LONG, SHORT, headline
 from studies.catalog.study import Chart, Study
 from studies.population.draw import Population
 from studies.runs.case import BodyRecipe, Case
@@ -19,16 +19,13 @@ NODES = 550
 
 def recipes_for(scene: Scene) -> tuple[tuple[BodyRecipe, float], ...]:
     """The bodies that every member gets, and their step over the limit: the paper's; one volume; one volume per node;
-    quadratic and graded, in the size that the accuracy study recommends and the next one."""
+    quadratic and graded, of the size that the accuracy study takes first."""
     axis = "centre_line" if has_wall(scene) else "straight"
-    best = headline(scene)
-    finer = BodyRecipe("quadratic", BUDGETS[2], graded=best.graded, mass=best.mass)
     return (
         (BodyRecipe("surface", NODES, axis=axis), SHORT),
         (BodyRecipe(nodes=NODES), SHORT),
         (BodyRecipe(nodes=NODES, law="cotangent", volumes="nodal"), SHORT),
-        (best, LONG),
-        (finer, LONG),
+        (headline(scene), LONG),
     )
 
 

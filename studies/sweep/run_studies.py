@@ -15,6 +15,7 @@ from numba.core import event
 
 from studies.base.atomic import write_whole
 from studies.base.compile_watch import CompileWatch, watching
+from studies.base.errors import StudyError
 from studies.base.interrupts import die_quietly
 from studies.catalog.study import Study
 from studies.geometry.mesher.jobs import cache_folder
@@ -54,7 +55,10 @@ def do(task: Task) -> Path:
     if task.done_meanwhile():
         return task.path()
     if isinstance(task.work, ReferenceSolve):
-        return solve(task.root, task.work)
+        try:
+            return solve(task.root, task.work)
+        except StudyError as error:  # a mesh that cannot be made costs its scene, as it does for a case
+            return store_failure(task, str(error))
     return run_case(task.root, task.study, task.work)
 
 

@@ -11,6 +11,7 @@ from studies.geometry import organ
 from studies.population import RANGES, Population, member, population_study
 from studies.scene.as_json import scene_from_dict, scene_to_json
 
+
 @pytest.mark.parametrize("name", RANGES)
 def test_a_larger_population_begins_with_the_smaller_one(name):
     few, more = Population(name, 2, 3).scenes(), Population(name, 4, 3).scenes()
@@ -72,7 +73,7 @@ def test_a_member_survives_being_stored(name):
 def test_organs_take_turns_so_that_a_study_cut_short_knows_them_all():
     study = population_study((Population("liver", 3), Population("kidney", 1)), "turns")
     assert [scene.name for scene in study.scenes] == ["liver_0_000", "kidney_0_000", "liver_0_001", "liver_0_002"]
-    assert len(study.cases) == 4 * 5 and len({case.name for case in study.cases}) == 20
+    assert len(study.cases) == 4 * 4 and len({case.name for case in study.cases}) == 16
 
 
 @pytest.mark.parametrize(
