@@ -15,6 +15,8 @@ from studies.population.ranges import RANGES, Ranges
 from studies.scene.placing import Vector, along, press_times, probe_of, scaled
 from studies.scene.scene import Organ, Scene
 
+NAME = "{organ}_{seed}_{number:03d}"
+"""Of a member's scene."""
 GAP = 0.0005
 """Between probe and surface at the start [m]."""
 PRESSED = 0.6
@@ -64,7 +66,7 @@ def member(organ: str, seed: int, number: int) -> Scene:
         parameters["wall"] = 1e3 * float(rng.uniform(*ranges.wall))  # shapes take millimetres
     modulus, radius, depth = (float(rng.uniform(*ends)) for ends in (ranges.shear_modulus, ranges.radius, ranges.depth))
     shape = SHAPES[organ](**parameters)
-    name = f"{organ}_{seed}_{number:03d}"
+    name = NAME.format(organ=organ, seed=seed, number=number)
     point = _palpated(shape, ranges, rng, radius, depth)
     if point is None:
         raise StudyError(f"member {name}: no place for a probe of {1e3 * radius:.1f} mm in {TRIES} tries")
@@ -85,6 +87,12 @@ def member(organ: str, seed: int, number: int) -> Scene:
         probed=replace(base.probed, direction=inward),
         reference=ranges.plan,
     )
+
+
+def organ_of(name: str) -> str | None:
+    """The organ of a member by its name; None where it is none."""
+    organ, *numbers = name.rsplit("_", 2)
+    return organ if organ in RANGES and len(numbers) == 2 and all(map(str.isdigit, numbers)) else None
 
 
 def _palpated(

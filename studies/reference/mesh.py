@@ -1,16 +1,11 @@
 """The mesh of a reference: the mesher's, finer where it counts, its sides curved onto the true surface and outlines."""
 
-from dataclasses import replace
-
 import numpy as np
 from skfem import MeshTet, MeshTet2
 
-from reference_fem import SolveError, curve, nodes
-from reference_fem.elements.shapes import build_elements, check_neighbours
-from reference_fem.elements.table import DEFAULT, find_element
+from reference_fem import curve, nodes
 from studies.geometry import OrganMesh, ball_octant, curved, project_ball
 from studies.grading.held_mesh import held_mesh, rim_sides, straight
-from studies.grading.shaping import curved_points
 from studies.grading.true_shape import as_curved, on_true_shape, true_shape
 from studies.reference.outlines import drawn_to_outlines
 from studies.scene.meshing import mesh_for
@@ -26,8 +21,8 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
 
     A region is held at the nodes of its facets: a mid-side node outside them, across a dent, stays free. Where elements
     at outlines are halved, their middles are drawn to the outline as well (studies.reference.outlines).
-    Sides that fold an element, or a part of a halved one, follow the true shape as far as none folds, with a warning,
-    as those of bodies do (studies.grading.shaping). Raises StudyError for a mesh that cannot be made.
+    Whether an element folds is judged where the reference integrates it, by reference_fem: the mesher's bound refuses
+    more. Raises StudyError for a mesh that cannot be made.
     """
     plan = scene.reference
     assert plan is not None  # never called for a scene without one
@@ -41,23 +36,10 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
     mesh = MeshTet2.from_mesh(body.mesh)
     if shape is not None:
         mesh = as_curved(body, coarse, on_true_shape(curved(organ_mesh, may_fold=True), coarse, shape, scene.held))
-        if folds(mesh):
-            points = curved_points(scene, organ_mesh, coarse, body, shape)
-            mesh = replace(mesh, doflocs=np.ascontiguousarray(points.T))
     *held, wall = body.facets(mesh)
     if at_outlines:
         mesh = drawn_to_outlines(mesh, np.concatenate([rim_sides(facets)[:, :2].ravel() for facets in held]))
     return mesh, [np.unique(facets) for facets in held], nodes(mesh)[wall[:, :3]].mean(axis=1)
-
-
-def folds(mesh: MeshTet2) -> bool:
-    """Whether the reference would refuse an element of the mesh."""
-    try:
-        build_elements(mesh, find_element(DEFAULT).order)
-        check_neighbours(mesh)
-    except SolveError:
-        return True
-    return False
 
 
 def _octant(scene: Scene, level: float) -> OrganMesh:

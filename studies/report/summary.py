@@ -134,8 +134,8 @@ def ladder_of(runs: Sequence[Run]) -> str:
 def population_of(runs: Sequence[Run]) -> str:
     """Every body on the members of every organ: the median, what 95 of 100 stay below, and the worst."""
     lines = [
-        "| organ | body, surface nodes | members, lost | force: median [%] | 95 of 100 [%] | worst [%] | mean: median [%] "
-        "| 95 of 100 [%] | largest floor, force / mean [%] |",
+        "| organ | body, surface nodes | members, lost | force: median [%] | 95 of 100 [%] | worst [%] "
+        "| mean: median [%] | 95 of 100 [%] | largest floor, force / mean [%] |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for group in groups(runs):
