@@ -88,7 +88,12 @@ def _interval(values: np.ndarray, statistic: object, seed: int) -> tuple[float, 
     if len(values) < 2:
         return (np.nan, np.nan)
     found = bootstrap(
-        (values,), statistic, n_resamples=RESAMPLES, method="percentile", vectorized=True, random_state=seed
+        (values,),
+        statistic,
+        n_resamples=RESAMPLES,
+        method="percentile",
+        vectorized=True,
+        rng=np.random.default_rng(seed),
     ).confidence_interval
     return (float(found.low), float(found.high))
 
