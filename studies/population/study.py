@@ -49,6 +49,6 @@ def study_of(scenes: Sequence[Scene], name: str) -> Study:
             for scene in scenes
             for body, fraction in recipes_for(scene)
         ),
-        charts=(Chart("distributions.png", "studies.plots.population:draw"),),
+        charts=(Chart("distributions.png", "studies.plots.campaigns.population:draw"),),
         columns=("force_end", "mean_error", "interior_error", "volume_worst", "min_j", "sway"),
     )
