@@ -68,7 +68,7 @@ RANGES: dict[str, Ranges] = {
         radius=(0.020, 0.030),
         depth=(0.008, 0.015),
         shift=0.025,
-        plan=ReferencePlan("solid", (430, 520, 620), variants=(), at_contact=(2, 3, 3)),
+        plan=ReferencePlan("solid", (430, 520, 620), variants=(), at_outlines=(1, 2, 3), at_contact=(2, 3, 3)),
         sources=(
             "about 1 L after a meal (Ferrua and Singh, J. Food Sci. 75 (2010) R151); no spread is given there, 20 % of "
             "the lengths are assumed",
