@@ -56,7 +56,8 @@ def add_methods(module: ModuleType) -> None:
         file = file_of(value)
         if file is not None:
             before = _METHODS.get(value.name)
-            _check_free("method", value.name, [m.name for m in (*METHODS, *LITERATURE)], file, before and file_of(before))
+            project = [method.name for method in (*METHODS, *LITERATURE)]
+            _check_free("method", value.name, project, file, before and file_of(before))
             _METHODS[value.name] = value
 
 

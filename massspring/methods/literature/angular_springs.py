@@ -32,6 +32,9 @@ from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 from massspring.world.surroundings import Surroundings
 
+TIE = 1e-9
+"""Cosines nearer to each other are equal but for round-off; the node that comes first is taken."""
+
 
 @njit_lean
 def angular_frame(frame, angles, force):
@@ -96,7 +99,8 @@ def angles_of(body: Body, ratio: float) -> Angles:
     for apex, ring in zip(apexes.tolist(), np.split(both[:, 1], begin[1:]), strict=True):
         edge = body.rest[ring] - body.rest[apex]
         edge /= np.linalg.norm(edge, axis=1, keepdims=True)
-        opposite = ring[np.argmin(edge @ edge.T, axis=1)]
+        cosine = edge @ edge.T
+        opposite = ring[np.argmax(cosine < cosine.min(axis=1, keepdims=True) + TIE, axis=1)]
         corners |= {(min(i, j), apex, max(i, j)) for i, j in zip(ring.tolist(), opposite.tolist(), strict=True)}
     corner = np.array(sorted(corners), dtype=np.int64)
     measured = np.array([opening(body.rest, *three) for three in corner.tolist()])

@@ -12,7 +12,6 @@ import numpy as np
 from massspring.kernels.contact.gaps import gap_and_normal
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
-
 TOUCHING = 1e-12
 """A node this little inside an obstacle [m] lies on it."""
 
@@ -46,12 +45,9 @@ class Mail(NamedTuple):
 
 @njit_inlined
 def spread(x, mail, axis, raising):
-    """Moves nodes along `axis` as little as links to fixed nodes, and to nodes so moved, ask, down or up.
-
-    Whether two fixed nodes are farther apart than the links between them allow.
-    """
+    """Moves nodes along `axis` as little as links to fixed nodes, and to nodes so moved, ask, down or up."""
     links, fixed, queue, queued = mail.links, mail.fixed, mail.queue, mail.queued
-    size, head, count, torn = queue.shape[0], 0, 0, False
+    size, head, count = queue.shape[0], 0, 0
     for i in range(size):
         queued[i] = fixed[i]
         if fixed[i] > 0:
@@ -67,24 +63,28 @@ def spread(x, mail, axis, raising):
             if (x[j, axis] >= bound) if raising else (x[j, axis] <= bound):
                 continue
             if fixed[j] > 0:
-                torn = True
                 continue
             x[j, axis] = bound
             if queued[j] == 0:
                 queued[j] = 1
                 queue[(head + count) % size] = j
                 count += 1
-    return torn
 
 
 @njit_lean
 def propagate(x, mail):
-    """All axes down, then up (eq. 14.8); whether fixed nodes are too far apart for the links between them."""
-    torn = False
+    """All axes down, then up (eq. 14.8); whether a link is left beyond its limits: fixed nodes are too far apart."""
     for axis in range(3):
-        torn |= spread(x, mail, axis, False)
-        torn |= spread(x, mail, axis, True)
-    return torn
+        spread(x, mail, axis, False)
+        spread(x, mail, axis, True)
+    links = mail.links
+    for i in range(x.shape[0]):
+        for e in range(links.start[i], links.start[i + 1]):
+            for axis in range(3):
+                apart = x[links.other[e], axis] - x[i, axis]
+                if apart > links.high[e, axis] + TOUCHING or apart < links.low[e, axis] - TOUCHING:
+                    return True
+    return False
 
 
 @njit_lean

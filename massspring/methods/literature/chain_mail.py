@@ -38,8 +38,10 @@ def chain_mail_frame(model, nodes, boundary, diagnostics, mail, sweeps):
     """One frame: place, pass on, relax (eq. 14.8, 14.9)."""
     x, before = nodes.x, nodes.v_star
     for step in range(boundary.position.shape[0]):
-        before[:] = x
         mail.fixed[:] = 0
+        for i in range(x.shape[0]):
+            for axis in range(3):
+                before[i, axis] = x[i, axis]
         for h in range(model.held_nodes.shape[0]):
             i, group = model.held_nodes[h], model.held_group[h]
             mail.fixed[i] = 1

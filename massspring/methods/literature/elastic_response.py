@@ -141,8 +141,9 @@ class Columns:
 
     def compliance(self, rows: TouchedRows) -> np.ndarray:
         """How far row b moves along its direction by 1 N along row a [m/N], symmetric, (c, c)."""
-        columns = self._known.columns[self._known.place[rows.nodes]]
-        self._rows = np.einsum("ri,rij->rj", rows.direction, columns).reshape(len(columns), -1, 3)
+        known = self._known
+        columns = known.columns[known.place[rows.nodes]]
+        self._rows = np.einsum("ri,rij->rj", rows.direction, columns).reshape(len(columns), *known.held.rest.shape)
         return np.einsum("abi,bi->ab", self._rows[:, rows.nodes], rows.direction)
 
     def moved(self, rows: TouchedRows, pushes: np.ndarray) -> np.ndarray:
