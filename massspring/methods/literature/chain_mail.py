@@ -71,7 +71,7 @@ class ChainMail(Method):
     """What it may be longer."""
     shear: float = 0.3
     """What it may be aside, over its length across the axis."""
-    sweeps: int = 20
+    sweeps: int = 5
     """Of relaxation, in each step."""
 
     name: ClassVar[str] = "chain_mail"

@@ -45,7 +45,7 @@ from massspring.world.surroundings import Surroundings
 class LinearModes(Method):
     """Linear vibration modes of the held organ (Pentland, Williams 1989): decoupled oscillators, contact solved for."""
 
-    modes: int = 100
+    modes: int = 300
     """How many of the lowest are kept; all of a body that has fewer."""
     bulk_ratio: float = 50.0
     """K over the shear modulus [1]; 50 is a Poisson ratio of 0.49."""
