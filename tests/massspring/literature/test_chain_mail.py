@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from massspring import Attachment, ChainMail, Clock, MassSpringError, Plane, Ramp, Setup, Sphere, Trajectory, simulate
-from massspring.methods.literature.chain_links import Links, Mail, propagate
+from massspring.methods.literature.chain_links import Links, Mail, propagate, relax
 from tests.massspring.methods.test_methods import squeeze
 
 ROUND_OFF = 1e-14
@@ -111,6 +111,18 @@ def test_links_hold_and_nothing_enters_while_it_is_pressed(filled_ball, sweeps):
     assert history.outcome == "finished" and history.penetration.max() <= 1.01e-12
     assert np.isnan(history.contact_force).all()  # geometry has no force
     assert np.array_equal(history.final, simulate(setup).final)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_relaxation_stays_within_the_limits(block_body, backwards):
+    """After a far move, where many links are at their limits."""
+    x, links, _ = displaced(block_body, ChainMail())
+    held = Attachment(np.array([0, 1]))
+    setup = Setup(block_body, ChainMail(), Clock(0.1, 1, 1), attachments=(held,))
+    before = x.copy()
+    relax(x, setup.start().model, mail_of(links, len(x)), setup.boundary(0), (0, backwards))
+    assert np.abs(x - before).max() > 0.01 * block_body.size
+    assert out_of_bounds(links, x) < ROUND_OFF
 
 
 def test_relaxation_brings_the_shape_back(filled_ball):
