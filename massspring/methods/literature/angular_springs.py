@@ -20,7 +20,6 @@ from massspring.body.body import Body
 from massspring.body.springs import EDGES_OF_TRIANGLE, unique_edges
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import BoundaryConditions, Push
-from massspring.kernels.forces.angles import Angles, angle_forces_into, opening
 from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.jit.stage_clock import SPRINGS, end_stage
 from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
@@ -28,6 +27,7 @@ from massspring.kernels.step.end import end_step
 from massspring.layout.allocate import start
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
+from massspring.methods.literature.angles import Angles, angle_forces_into, opening
 from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 from massspring.world.surroundings import Surroundings

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from massspring import AngularSprings, Clock, Free, MassSpringError, Ramp, Setup, simulate
-from massspring.kernels.forces.angles import Angles, angle_energy, angle_forces_into
+from massspring.methods.literature.angles import Angles, angle_energy, angle_forces_into
 from massspring.methods.literature.angular_springs import angles_of
 from tests.massspring.methods.test_cells import rest_forces
 from tests.massspring.methods.test_methods import clock_for, squeeze
