@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import Literal
 
 from massspring import ExplicitElements, ImplicitElements, ImplicitVolume
-from studies.catalog.literature import literature_cases
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.inertia import why_inertia_matters
@@ -107,7 +106,6 @@ ACCURACY = Study(
             *(_timed(scene, body, SHORT) for body in linear_bodies(scene)),
             *quadratic_cases(scene),
             *element_cases(scene),
-            *literature_cases(scene),
         )
     ),
     charts=(Chart("accuracy.png", "studies.plots.work_precision:draw"),),

@@ -1,6 +1,8 @@
-"""The other contestants of the literature, beside ours in every scene that ends at rest; no study of its own."""
+"""How do the literature's other contestants do: angular springs, chain mail, linear modes, precomputed response?"""
 
-from massspring import AngularSprings, ChainMail, ElasticResponse, LinearModes
+from massspring import AngularSprings, ChainMail, ElasticResponse, ImplicitVolume, LinearModes
+from studies.catalog.accuracy import LONG, SHORT, headline, judged_at_rest
+from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
@@ -24,3 +26,21 @@ def literature_cases(scene: Scene) -> tuple[Case, ...]:
         Case(scene, CURVED, LinearModes(), dt=FRAME_STEP, timed=True),
         Case(scene, CURVED, ElasticResponse(), dt=FRAME_STEP, timed=True),
     )
+
+
+def ours(scene: Scene) -> tuple[Case, ...]:
+    """What they stand beside: one volume on the springs of the first, and the body that is recommended."""
+    springs = WALL if has_wall(scene) else STRAIGHT
+    return (
+        Case(scene, springs, ImplicitVolume(), dt_fraction=SHORT, timed=True),
+        Case(scene, headline(scene), ImplicitVolume(), dt_fraction=LONG, timed=True),
+    )
+
+
+LITERATURE_STUDY = Study(
+    name="literature",
+    question=__doc__ or "",
+    cases=tuple(case for scene in judged_at_rest() for case in (*ours(scene), *literature_cases(scene))),
+    charts=(Chart("literature.png", "studies.plots.work_precision:draw"),),
+    columns=("force_end", "mean_error", "real_time", "step_time", "volume_worst", "min_j", "surface_error", "sway"),
+)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from massspring import LITERATURE, ImplicitVolume
+from massspring import ImplicitVolume
 from studies.catalog import STUDIES
 from studies.catalog.accuracy import ACCURACY, COARSE_STEP, LONG, can_be_graded, headline, judged_at_rest
 from studies.catalog.work_precision import WORK_PRECISION
@@ -18,8 +18,7 @@ from studies.store.paths import readable
 
 
 def of(scene):
-    """Its cases but for those of the literature."""
-    return [case for case in ACCURACY.cases if case.scene == scene and type(case.method) not in LITERATURE]
+    return [case for case in ACCURACY.cases if case.scene == scene]
 
 
 def test_it_has_every_scene_of_which_force_or_displacement_is_compared():
@@ -74,13 +73,6 @@ def test_elements_run_beside_the_springs(scene):
     assert [body.nodes for body in explicit] == [max(body.nodes for body in linear)]
     assert set(implicit) == (set() if scene.filled else {"tetrahedral", "quadratic"})
     assert set(implicit.values()) <= {COARSE_STEP} and len(elements) == 1 + len(implicit)
-
-
-@pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)
-def test_the_literature_stands_beside_ours_in_every_scene(scene):
-    others = [case for case in ACCURACY.cases if case.scene == scene and type(case.method) in LITERATURE]
-    assert [type(case.method) for case in others] == list(LITERATURE)
-    assert not any(case.method.capabilities.conditionally_stable for case in others if case.dt != "auto")
 
 
 def test_the_small_cut_holds_cases_of_the_campaign():

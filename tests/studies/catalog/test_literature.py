@@ -7,8 +7,8 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from massspring import LITERATURE, AngularSprings, ChainMail, ElasticResponse, LinearModes
-from studies.catalog.accuracy import ACCURACY
-from studies.catalog.literature import literature_cases
+from studies.catalog.accuracy import judged_at_rest
+from studies.catalog.literature import LITERATURE_STUDY, literature_cases
 from studies.catalog.study import smoke_case
 from studies.exchange.entry import outside
 from studies.metrics.metrics import METRICS
@@ -35,7 +35,7 @@ def ran(request, one_thread, mesh_cache, tmp_path_factory):
     case = replace(smoke_case(case), scene=replace(BALL_CLAMPED, reference=None))
     if isinstance(case.method, LinearModes | ElasticResponse):
         case = replace(case, body=NODAL)
-    return case, run_case(tmp_path_factory.mktemp("literature"), "accuracy", case)
+    return case, run_case(tmp_path_factory.mktemp("literature"), "literature", case)
 
 
 def test_each_runs_and_its_record_is_read_back(ran):
@@ -80,5 +80,13 @@ def test_an_entry_cannot_take_their_names():
 
 
 def test_settings_are_part_of_the_name_of_a_case():
-    names = {case.name for case in ACCURACY.cases if case.scene == BALL_CLAMPED}
+    names = {case.name for case in LITERATURE_STUDY.cases if case.scene == BALL_CLAMPED}
     assert Case(BALL_CLAMPED, method=AngularSprings(2.0)).name not in names
+
+
+@pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)
+def test_each_stands_once_beside_ours_in_every_scene(scene):
+    found = [case for case in LITERATURE_STUDY.cases if case.scene == scene]
+    others = [case for case in found if type(case.method) in LITERATURE]
+    assert [type(case.method) for case in others] == list(LITERATURE) and len(found) == len(others) + 2
+    assert not any(case.method.capabilities.conditionally_stable for case in others if case.dt != "auto")
