@@ -38,7 +38,7 @@ class Check:
         if isinstance(answer, ImportError):
             return f"worker {name} has no organbench that can be loaded ({answer}); install it there"
         if isinstance(answer, Exception):
-            return f"worker {name} cannot begin: {str(answer).splitlines()[0] if str(answer) else answer!r}"
+            return f"worker {name} cannot begin: {(str(answer) or repr(answer)).splitlines()[0]}"
         theirs, seen = answer
         if seen != self.content:
             folder = self.token.parents[1]

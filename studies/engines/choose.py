@@ -10,6 +10,7 @@ from studies.sweep.engine import Engine
 from studies.sweep.pool import Pool
 
 LOCAL = "local"
+NEEDED = "needs the package distributed, which is not installed: pip install 'distributed>=2025.1'"
 NO_WORKER_SECONDS = 60.0
 """That a cluster which is there may be without a worker."""
 WORDS = "local:N, an address as tcp://HOST:8786, or a FILE.yaml"
@@ -32,9 +33,7 @@ def engine_for(on: str, jobs: int, portable: bool, root: Path, tell: Callable[[s
     except ImportError as error:
         if error.name not in ("distributed", "dask", "yaml"):
             raise
-        raise StudyError(
-            f"--on {on} needs the package distributed, which is not installed: pip install 'distributed>=2025.1'"
-        ) from error
+        raise StudyError(f"--on {on} {NEEDED}") from error
     if "://" in on:
         return Cluster(lambda: nullcontext(on), NO_WORKER_SECONDS, portable)
     settings = read_settings(Path(on))

@@ -49,12 +49,12 @@ class Crew:
             return []
         self.looked = time.monotonic()
         known = self.lines.workers()
-        for address in known.keys() - self.names.keys():
+        for address in [address for address in known if address not in self.names]:
             self.names[address] = known[address].name
             self.checking.add(address)
             self.send(address, self.check.request, (CHECK, known[address]))
         lost: list[int] = []
-        for address in self.names.keys() - known.keys():
+        for address in [address for address in self.names if address not in known]:
             del self.names[address]
             self.checking.discard(address)
             self.lines.drop(address)

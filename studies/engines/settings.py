@@ -51,7 +51,8 @@ class Settings:
 def read_settings(path: Path) -> Settings:
     """The settings in a YAML file. Raises StudyError with what is wrong in it."""
     try:
-        given = yaml.safe_load(path.read_text(encoding="utf-8"))
+        # Words alone: YAML itself would read 2:00:00 as 7200, and a queue called 12 as a number.
+        given = yaml.load(path.read_text(encoding="utf-8"), yaml.BaseLoader)
     except FileNotFoundError:
         raise StudyError(f"there is no file {path}; write one as docs/cluster.md shows") from None
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:

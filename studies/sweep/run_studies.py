@@ -24,9 +24,10 @@ def run_studies(
 ) -> int:
     """Brings the studies up to date below `root`; the number of pieces that had to run.
 
-    `jobs`: so many processes of this machine, or an engine. `wanted` replaces the rule "what is not current". `on_compile` hears what is being compiled, from any thread.
-    `failures` hears of pieces whose process died; they are stored as failed. Another command may work on the same
-    folder. Raises StudyError when results cannot be written, and for a root that is an archive.
+    `jobs`: so many processes of this machine, or an engine. `wanted` replaces the rule "what is not current".
+    `on_compile` hears what is being compiled, from any thread. `failures` hears of pieces whose process died; they are
+    stored as failed. Another command may work on the same folder. Raises StudyError when results cannot be written, and
+    for a root that is an archive.
     """
     check_no_archive(root)
     root = root.absolute()

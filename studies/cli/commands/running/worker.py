@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from studies.base.errors import StudyError
+from studies.engines.choose import NEEDED
 
 LONELY_SECONDS = 120
 """Without a scheduler, after which a worker ends."""
@@ -27,9 +28,7 @@ def worker(
     if bool(scheduler) == (file is not None):
         raise StudyError("give either the address of a scheduler or a --scheduler-file")
     if find_spec("distributed") is None:
-        raise StudyError(
-            "a worker needs the package distributed, which is not installed: pip install 'distributed>=2025.1'"
-        )
+        raise StudyError(f"a worker {NEEDED}")
     where = [scheduler] if file is None else ["--scheduler-file", str(file)]
     words = [*where, "--nthreads", str(processes), "--nworkers", "1", "--no-dashboard"]
     words += ["--memory-limit", f"{memory:g}GB" if memory else "auto", "--death-timeout", str(LONELY_SECONDS)]
