@@ -16,7 +16,18 @@ ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "docs" / "site"
 STAGE = ROOT / "build" / "docs"
 PACKAGES = ("massspring", "reference_fem", "studies")
-FIRST = ("how-a-run-works", "theory", "notation", "methods", "results", "breaking", "own-organ", "meshes", "paper")
+FIRST = (
+    "how-a-run-works",
+    "theory",
+    "notation",
+    "methods",
+    "results",
+    "breaking",
+    "cluster",
+    "own-organ",
+    "meshes",
+    "paper",
+)
 """Pages of docs/ in the order of the menu; further ones follow."""
 LINK = re.compile(r"\]\((?:\.\./)?(results/[^)#\s]+)\)")
 """A link or picture in results/."""

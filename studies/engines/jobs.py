@@ -2,12 +2,14 @@
 
 import json
 import logging
+import os
 import secrets
 import shlex
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from distributed import LocalCluster
@@ -85,8 +87,10 @@ def _asked(command: list[str]) -> str:
 @contextmanager
 def _commands(settings: Settings, folder: Path, file: Path, tell: Told) -> Iterator[None]:
     """Each in a session of its own: Ctrl-C ends this command, which then ends them."""
-    memory = f"{settings.memory_gb:g}" if settings.memory_gb else "0"
-    words = settings.command.format(scheduler_file=file, processes=settings.processes, memory=memory)
+    needed = {"scheduler_file": file, "processes": settings.processes, "memory": f"{settings.memory_gb or 0:g}"}
+    words = settings.command
+    for name, value in needed.items():
+        words = words.replace(f"{{{name}}}", str(value))  # other braces are the shell's
     lines = "\n".join([*settings.setup, words])
     started: list[subprocess.Popen[bytes]] = []
     try:
@@ -100,10 +104,10 @@ def _commands(settings: Settings, folder: Path, file: Path, tell: Told) -> Itera
             _end(process)
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
-    process.terminate()
-    try:
-        process.wait(PATIENCE)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    """With all that it has started."""
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, number)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(PATIENCE)
