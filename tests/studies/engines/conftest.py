@@ -42,7 +42,7 @@ def physics(root, study):
         record = read_record(case_path(root, study.name, case))
         known = {name: value for name, value in record.attributes.items() if name != "seconds"}
         fields = {name: field.values for name, field in record.fields.items()}
-        found[case.name] = replace(record, attributes=known, fields={}), fields
+        found[case.name] = repr(replace(record, attributes=known, fields={})), fields  # NaN is not equal to itself
     return found
 
 
