@@ -36,7 +36,7 @@ def scheduler_with_jobs(settings: Settings, root: Path, tell: Told) -> Iterator[
     file = folder / "scheduler.json"
     host = settings.host or get_ip()
     with LocalCluster(
-        n_workers=0, host=host, scheduler_port=0, dashboard_address=None, silence_logs=logging.CRITICAL
+        n_workers=0, host=host, scheduler_port=0, dashboard_address=":0", silence_logs=logging.CRITICAL
     ) as cluster:
         write_whole(file, json.dumps({"address": cluster.scheduler_address}).encode())
         started = _commands if settings.kind == "command" else _array

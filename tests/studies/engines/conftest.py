@@ -18,7 +18,7 @@ from tests.studies.tiny import Silent
 def scheduler():
     """Address of a scheduler with two workers of one thread each, in threads of this process: pieces have processes of
     their own."""
-    options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": ":0"}
     with LocalCluster(protocol="tcp://", silence_logs=logging.CRITICAL, **options) as cluster:
         yield cluster.scheduler_address
 

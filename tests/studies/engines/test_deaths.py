@@ -90,7 +90,7 @@ def written(folder, text):
 
 def test_a_worker_that_is_killed_costs_no_case(tmp_path):
     study = written(tmp_path / "study", KILLS)
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "silence_logs": logging.CRITICAL}
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
     with LocalCluster(**options) as cluster:
         count, progress = swept(tmp_path / "killed", study, cluster.scheduler_address)
     frames = tmp_path / "study" / "frames"

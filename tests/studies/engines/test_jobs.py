@@ -49,21 +49,21 @@ def test_a_job_array_does_a_study_and_is_ended(slurm, organbench):
     assert "#SBATCH --array=1-1" in (slurm / "script").read_text()
     assert (slurm / "ended").read_text() == "4711\n"
     group = int((slurm / "process").read_text())
-    until = time.monotonic() + 20
-    while time.monotonic() < until and lives(group):
-        time.sleep(0.1)
-    assert not lives(group), "no worker is left"
+    assert is_gone(group), "no worker is left"
     assert organbench("run", study, "--results", results, "--on", file)[0] == 0
     assert len(list((results / "cache").glob("workers-*"))) == 1, "nothing to do asks for no job"
 
 
-def lives(group):
-    """Whether any process of a group is there."""
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True
+def is_gone(group, seconds=20.0):
+    """Whether every process of a group has ended within so many seconds."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False
 
 
 def refusal(tmp_path, text, refused):
@@ -99,7 +99,7 @@ def test_a_program_that_starts_workers_is_started_for_each_and_ended(tmp_path):
             time.sleep(0.05)
         words = started(tmp_path)
         assert [rest for _, *rest in words] == [["3", "8", "x"]] * 2
-    assert not any(lives(int(group)) for group, *_ in words)
+    assert all(is_gone(int(group)) for group, *_ in words)
     assert told == [f"2 workers started; what they print is in {folder}"]
     assert not (folder / "scheduler.json").exists()
 
