@@ -28,8 +28,6 @@ DONE = pickle.dumps(None)
 class Setup:
     """What a process of a client's sweep needs to begin."""
 
-    session: str
-    """Of the client: processes are kept from piece to piece, for no other."""
     environment: tuple[tuple[str, str], ...]
     files: tuple[Given, ...]
     folder: str
@@ -46,16 +44,17 @@ class Setup:
 class Child:
     """A process for pieces, and the line to it."""
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, session: str, setup: bytes) -> None:
+        self.session, self.setup = session, setup
         here, there = Pipe()
         with there:
             self.process = subprocess.Popen(
                 [sys.executable, "-c", PROGRAM.format(there.fileno()), json.dumps(sys.path)],
                 stdin=subprocess.PIPE,
                 pass_fds=(there.fileno(),),
-                env=os.environ | dict(setup.environment),
+                env=os.environ | dict(pickle.loads(setup).environment),
             )
-        self.setup, self.line = setup, here
+        self.line = here
 
     def ask(self, request: bytes) -> bytes | Death:
         """The answer, pickled; Death where the process ended instead."""
@@ -80,7 +79,7 @@ class Child:
 
 @dataclass(frozen=True)
 class _Known:
-    idle: dict[Setup, list[Child]]
+    idle: dict[bytes, list[Child]]
     busy: set[Child]
     lock: Lock
 
@@ -88,15 +87,16 @@ class _Known:
 _KNOWN = _Known(defaultdict(list), set(), Lock())
 
 
-def ask(setup: Setup, request: bytes) -> bytes | Death:
-    """Has a request done (studies.engines.requests, pickled) by a process of that setup: one that waits, or a new one.
+def ask(session: str, setup: bytes, request: bytes) -> bytes:
+    """Has a request done (studies.engines.requests) by a process of that setup: one that waits, or a new one.
 
-    As many are at work as the worker has threads. Returns the pickled answer, or Death where the process died."""
+    As many are at work as the worker has threads. All is pickled, also the answer, which is a Death where the process
+    died: the worker itself unpickles no type of ours, for one that it lacks would end it."""
     with _KNOWN.lock:
         idle = _KNOWN.idle[setup]
-        child, begun = (idle.pop(), True) if idle else (Child(setup), False)
+        child, begun = (idle.pop(), True) if idle else (Child(session, setup), False)
         _KNOWN.busy.add(child)
-    answer = DONE if begun else child.ask(pickle.dumps(setup))
+    answer = DONE if begun else child.ask(setup)
     has_begun = answer == DONE
     if has_begun:
         answer = child.ask(request)
@@ -107,15 +107,16 @@ def ask(setup: Setup, request: bytes) -> bytes | Death:
             _KNOWN.idle[setup].append(child)
     if not lives:
         child.end()
-    return answer
+    return pickle.dumps(answer) if isinstance(answer, Death) else answer
 
 
 def stop(session: str) -> None:
     """Ends all processes of a client, whatever they do."""
     with _KNOWN.lock:
-        mine = [setup for setup in _KNOWN.idle if setup.session == session]
-        idle = [child for setup in mine for child in _KNOWN.idle.pop(setup)]
-        busy = [child for child in _KNOWN.busy if child.setup.session == session]
+        idle = [child for waiting in _KNOWN.idle.values() for child in waiting if child.session == session]
+        for child in idle:
+            _KNOWN.idle[child.setup].remove(child)
+        busy = [child for child in _KNOWN.busy if child.session == session]
     for child in busy:
         child.process.terminate()  # who waits for its answer clears up
     for child in idle:

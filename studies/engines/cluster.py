@@ -90,7 +90,7 @@ class Cluster:
     @contextmanager
     def _crew(self, root: Path, tasks: Sequence[Task], files: tuple[Given, ...], portable: bool) -> Iterator[Crew]:
         lines = self._connected()
-        setup = Setup(lines.session, tuple(sorted(environment(portable).items())), files, os.getcwd())
+        setup = Setup(tuple(sorted(environment(portable).items())), files, os.getcwd())
         with check_for(root, files) as check:
             crew = Crew(lines, setup, check, Fleet(tasks))
             crew.assemble(self.patience)

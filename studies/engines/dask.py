@@ -18,7 +18,7 @@ from distributed import Client, Future, KilledWorker
 from distributed.client import FutureCancelledError
 
 from studies.base.errors import StudyError
-from studies.engines.apart import Setup, ask, stop
+from studies.engines.apart import Setup
 from studies.engines.requests import Request
 from studies.sweep.workers import Death
 
@@ -26,6 +26,9 @@ CONNECT_SECONDS = 10.0
 """After which a scheduler that does not answer is not there."""
 TRANSFER_SECONDS = 30.0
 """That an answer may take from its worker to here."""
+ASK = "__import__('studies.engines.apart', fromlist=['ask']).ask(session, setup, request)"
+STOP = "__import__('studies.engines.apart', fromlist=['stop']).stop(session)"
+"""What workers evaluate. A function of organbench itself would end a worker that has none, without a word."""
 LOST = "its worker was lost"
 """A cause of death."""
 
@@ -82,9 +85,8 @@ class Lines:
         """A request for one worker, which no other will get."""
         self.sent += 1
         key = f"organbench-{self.session}-{self.sent}"
-        future = self.client.submit(
-            ask, setup, pickle.dumps(request), key=key, workers=[address], allow_other_workers=False, pure=False
-        )
+        given = {"session": self.session, "setup": pickle.dumps(setup), "request": pickle.dumps(request)}
+        future = self.client.submit(eval, ASK, given, key=key, workers=[address], allow_other_workers=False, pure=False)
         self.flying[key] = future, label, address
         future.add_done_callback(lambda future: self.ended.put(future.key))
 
@@ -113,7 +115,7 @@ class Lines:
             return Death(LOST)
         except Exception as error:  # of Dask itself, or of a worker that has no organbench
             return error
-        return answer if isinstance(answer, Death) else pickle.loads(answer)
+        return pickle.loads(answer)
 
     def close(self) -> None:
         """Ends what is still being done, and the processes on all workers."""
@@ -123,7 +125,7 @@ class Lines:
         self.flying.clear()
         if self.client.status == "running":
             with suppress(Exception):
-                self.client.run(stop, self.session, on_error="ignore")
+                self.client.run(eval, STOP, {"session": self.session}, on_error="ignore")
 
 
 @contextmanager

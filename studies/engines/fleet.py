@@ -83,8 +83,9 @@ class Fleet:
             self.members[address].busy.pop(number, None)
 
     def gone(self, address: str) -> list[int]:
-        """A member is gone: the pieces that it had."""
-        return list(self.members.pop(address).busy)
+        """A worker is gone: the pieces that it had; one that was not checked yet had none."""
+        member = self.members.pop(address, None)
+        return [] if member is None else list(member.busy)
 
     def too_large(self) -> tuple[Task, float] | None:
         """The largest piece that waits and no member could ever do, with its need [bytes]; None without one."""

@@ -35,14 +35,14 @@ def scheduler_with_jobs(settings: Settings, root: Path, tell: Told) -> Iterator[
     folder = root.absolute() / "cache" / f"workers-{secrets.token_hex(4)}"
     file = folder / "scheduler.json"
     host = settings.host or get_ip()
-    with LocalCluster(
-        n_workers=0, host=host, scheduler_port=0, dashboard_address=":0", silence_logs=logging.CRITICAL
-    ) as cluster:
-        write_whole(file, json.dumps({"address": cluster.scheduler_address}).encode())
+    options = {"host": host, "scheduler_port": 0, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
+    with LocalCluster(n_workers=0, **options) as cluster:
+        address: str = cluster.scheduler_address  # pyright: ignore[reportAttributeAccessIssue]
+        write_whole(file, json.dumps({"address": address}).encode())
         started = _commands if settings.kind == "command" else _array
         try:
             with started(settings, folder, file, tell):
-                yield cluster.scheduler_address
+                yield address
         finally:
             file.unlink(missing_ok=True)
 

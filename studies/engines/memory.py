@@ -7,10 +7,11 @@ from studies.sweep.tasks import Task
 
 BASE = 0.3e9
 """Of any process, with the libraries and a body [bytes]; 0.2e9 are measured."""
-PER_UNKNOWN, MEASURED = 15e3, 25_000
-"""Of a reference of so many unknowns [bytes for each]: 14e3 are measured (kidney_probe on 370 nodes, MKL)."""
+PER_UNKNOWN, MEASURED = 17e3, 90_000
+"""Of a reference of up to so many unknowns [bytes for each]: 14.2e3 are measured for 25,423 (kidney_probe, MKL), and
+13.3e3 for 89,598."""
 ORDER = 1 / 3
-"""Of the growth of that: the factors of a matrix over a volume of n points have n^(4/3) numbers (George 1973)."""
+"""Of the growth of that beyond: factors of a matrix over a volume of n points have n^(4/3) numbers (George 1973)."""
 PER_NODE, PER_EDGE = 6.5, 60.0
 """Unknowns of a reference for n surface nodes, over n^1.5; of an octant for a size h over its radius, times h^3. No
 scene of the catalogue has more."""
@@ -25,7 +26,7 @@ def need_of(task: Task) -> float:
 
 def factors(unknowns: float) -> float:
     """Bytes of the factors of so many unknowns, with what is kept beside them."""
-    return PER_UNKNOWN * unknowns * (unknowns / MEASURED) ** ORDER
+    return PER_UNKNOWN * unknowns * max(1.0, unknowns / MEASURED) ** ORDER
 
 
 def unknowns_of(task: Task, solve: ReferenceSolve) -> float:

@@ -12,6 +12,7 @@ from tests.studies.engines.conftest import assert_equal_bits, engine_at, physics
 from tests.studies.tiny import Silent, content, tiny_study
 
 
+@pytest.mark.filterwarnings("ignore:beside the frame times")
 def test_a_cluster_leaves_what_the_pool_leaves(scheduler, finished_sweep, tmp_path):
     study = tiny_study()
     count, progress = swept(tmp_path, study, scheduler)

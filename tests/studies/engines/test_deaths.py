@@ -1,11 +1,9 @@
 """Workers, pieces and schedulers that die."""
 
-import json
 import logging
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -17,7 +15,7 @@ from studies.sweep.failures import Failures
 from studies.sweep.find_study import find_study
 from studies.sweep.load import load_runs
 from studies.sweep.run_studies import run_studies
-from tests.studies.engines.conftest import assert_equal_bits, engine_at, physics, swept
+from tests.studies.engines.conftest import address_in, assert_equal_bits, engine_at, physics, swept
 from tests.studies.sweep.test_failures import FATAL
 from tests.studies.tiny import FRAMES, Silent
 
@@ -114,15 +112,6 @@ def test_a_case_that_ends_its_process_is_stored_as_failed_and_the_rest_goes_on(s
 def started(words, log):
     """A program of this Python, whose words go to a file."""
     return subprocess.Popen([sys.executable, "-m", *words], cwd=ROOT, env=ENVIRONMENT, stdout=log, stderr=log)
-
-
-def address_in(file, seconds=60.0):
-    """What a scheduler file says as soon as it is there."""
-    until = time.monotonic() + seconds
-    while not file.exists():
-        assert time.monotonic() < until, "the scheduler did not start"
-        time.sleep(0.05)
-    return json.loads(file.read_text())["address"]
 
 
 class Killer(Silent):

@@ -15,7 +15,7 @@ from studies.engines.crew import Crew
 from studies.engines.dask import Answer, Found
 from studies.engines.fleet import Fleet, Member
 from studies.engines.identity import difference, this_identity
-from studies.engines.memory import BASE, need_of
+from studies.engines.memory import BASE, factors, need_of, unknowns_of
 from studies.engines.requests import Piece, Presence
 from studies.reference.reference_solves import ReferenceSolve
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
@@ -23,7 +23,7 @@ from studies.sweep.tasks import Task
 from studies.sweep.workers import Death
 from tests.studies.tiny import tiny_case
 
-SETUP = Setup("session", (), (), ".")
+SETUP = Setup((), (), ".")
 
 
 def small(number):
@@ -123,7 +123,7 @@ def test_a_piece_that_no_worker_has_the_memory_for_is_refused_before_anything_ru
     lines = MadeUp(as_it_should(check), a=worker("a", memory=2 * BASE), b=worker("b", memory=BASE))
     crew = crew_of(lines, check, [large(), small(1)])
     with pytest.raises(
-        StudyError, match=r"reference ball_squeeze-0\.1 needs about \d+\.\d GB, and the largest worker has 1\.0"
+        StudyError, match=r"reference ball_squeeze-0\.1 needs about \d+\.\d GB, and the largest worker has 0\.6"
     ):
         Cluster(lambda: None, 1.0)._check_memory(crew.fleet)  # type: ignore[arg-type]
     assert all(isinstance(request, Presence) for _, request in lines.sent)
@@ -139,6 +139,16 @@ def test_a_worker_that_leaves_costs_a_try_and_a_third_the_piece(check):
     crew = crew_of(lines, check, [small(1), small(2)])
     assert ended(crew) == {small(1).label: "its process died 3 times: its worker was lost", small(2).label: None}
     assert len(lines.known) == len(crew.fleet.members) == 1, "three are gone"
+
+
+def test_a_worker_that_leaves_before_it_is_checked_is_forgotten(check):
+    def value(address, request):
+        if address == "hasty":
+            return None
+        return (check.ours, check.content) if isinstance(request, Presence) else "done"
+
+    crew = crew_of(MadeUp(value, hasty=worker("hasty"), a=worker("a")), check, [small(1)])
+    assert ended(crew) == {small(1).label: None} and not crew.checking
 
 
 def test_a_sweep_whose_workers_are_all_gone_says_so(check):
@@ -244,3 +254,14 @@ def test_a_process_that_dies_is_tried_three_times(check):
     causes = ended(crew_of(lines, check, [small(n) for n in range(3)]))
     assert causes == {small(0).label: None, small(1).label: "its process died 3 times: killed", small(2).label: None}
     assert sum(request == Piece(small(1)) for _, request in lines.sent) == 3
+
+
+@pytest.mark.parametrize(("unknowns", "peak"), [(8_191, 0.30e9), (25_423, 0.52e9), (41_851, 0.60e9), (89_598, 1.35e9)])
+def test_no_less_memory_is_declared_than_references_have_taken(unknowns, peak):
+    assert peak < BASE + factors(unknowns) < 1.9 * peak
+
+
+def test_the_size_of_a_reference_is_declared_before_it_is_known():
+    for level, unknowns in ((0.12, 16_482), (0.22, 4_391)):
+        solve = ReferenceSolve(BALL_SQUEEZE, level)
+        assert unknowns <= unknowns_of(Task(Path("nowhere"), "tiny", solve), solve) < 3 * unknowns
