@@ -2,25 +2,23 @@
 
 from dataclasses import replace
 from pathlib import Path
-from threading import Timer
 
 import pytest
 
 from studies.base.errors import StudyError
 from studies.engines import crew as crew_module
 from studies.engines.apart import Setup
-from studies.engines.checks import check_for, wait_until_seen
+from studies.engines.checks import check_for
 from studies.engines.cluster import Cluster
 from studies.engines.crew import Crew
-from studies.engines.dask import Answer, Found
 from studies.engines.fleet import Fleet, Member
-from studies.engines.identity import difference, this_identity
-from studies.engines.memory import BASE, factors, need_of, unknowns_of
+from studies.engines.memory import BASE, need_of
 from studies.engines.requests import Piece, Presence
 from studies.reference.reference_solves import ReferenceSolve
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.sweep.tasks import Task
 from studies.sweep.workers import Death
+from tests.studies.engines.made_up import MadeUp, worker
 from tests.studies.tiny import tiny_case
 
 SETUP = Setup((), (), ".")
@@ -34,37 +32,6 @@ def small(number):
 def large():
     """The piece with the most memory of a reference."""
     return Task(Path("results"), "tiny", ReferenceSolve(BALL_SQUEEZE, 0.1))
-
-
-class MadeUp:
-    """Lines to workers that answer as `value` says, in order; without a value they leave."""
-
-    session = "session"
-
-    def __init__(self, value, **workers):
-        self.known = dict(workers)
-        self.value, self.answers, self.sent = value, [], []
-
-    def workers(self):
-        """Those of now."""
-        return dict(self.known)
-
-    def send(self, address, setup, request, label):
-        """Answers at once."""
-        self.sent.append((address, request))
-        value = self.value(address, request)
-        if value is None:
-            del self.known[address]
-        else:
-            self.answers.append(Answer(label, address, value))
-
-    def drop(self, address):
-        """What it was asked is not answered."""
-        self.answers = [answer for answer in self.answers if answer.address != address]
-
-    def next_answer(self, seconds):
-        """The first that was not read yet."""
-        return self.answers.pop(0) if self.answers else None
 
 
 @pytest.fixture(autouse=True)
@@ -96,10 +63,6 @@ def ended(crew, then=lambda task: None):
         found[task.label] = cause
         then(task)
     return found
-
-
-def worker(name, threads=1, memory=0.0):
-    return Found(name, threads, memory)
 
 
 def test_every_piece_goes_to_one_worker(check):
@@ -194,56 +157,6 @@ def test_a_worker_that_joins_later_gets_pieces(check):
     assert {address for address, request in lines.sent if isinstance(request, Piece)} == {"a", "late"}
 
 
-@pytest.mark.parametrize(
-    ("answer", "told"),
-    [
-        (
-            lambda ours, content: (ours, None),
-            r"worker w does not see .*; put the results on a folder that every worker",
-        ),
-        (lambda ours, content: (ours, "older"), "worker w does not see"),
-        (
-            lambda ours, content: ModuleNotFoundError("No module named 'studies'"),
-            r"worker w has no organbench .*'studies'",
-        ),
-        (lambda ours, content: Death("it ended with exit code 1"), "worker w cannot start a process .*exit code 1"),
-        (lambda ours, content: StudyError("the disk is full\nand more"), "worker w cannot begin: the disk is full;"),
-        (lambda ours, content: (replace(ours, packages={"numba": "0.1"}), content), "worker w has numpy not installed"),
-        (lambda ours, content: (replace(ours, references=""), content), "worker w has other code"),
-    ],
-)
-def test_what_is_wrong_with_a_worker_is_a_sentence(check, answer, told):
-    lines = MadeUp(lambda address, request: answer(check.ours, check.content), w=worker("w"))
-    with pytest.raises(StudyError, match=told):
-        crew_of(lines, check, [])
-
-
-def test_modules_beside_a_file_of_the_user_are_compared(tmp_path):
-    (tmp_path / "mine.py").write_text("import helper")
-    (tmp_path / "helper.py").write_text("x = 1")
-    given = ((str(tmp_path / "mine.py"), b"import helper"),)
-    ours = this_identity(given)
-    assert difference(ours, this_identity(given)) is None
-    (tmp_path / "helper.py").write_text("x = 2")
-    assert "has other modules beside" in str(difference(ours, this_identity(given)))
-
-
-def test_a_worker_that_sees_the_folder_answers_with_what_the_file_holds(tmp_path, check):
-    identity, seen = check.request.answer()
-    assert check.fault("w", (identity, seen)) is None
-    elsewhere = replace(check.request, token=tmp_path / "elsewhere" / "cache" / "token")
-    assert elsewhere.answer()[1] is None
-    assert not list(check.token.parent.glob("*.part"))
-
-
-def test_files_of_other_machines_are_waited_for(tmp_path):
-    late = tmp_path / "late.h5"
-    Timer(0.3, late.touch).start()
-    wait_until_seen([late, tmp_path], 20.0)
-    with pytest.raises(StudyError, match=r"never\.h5 was written by a worker and is not seen here after 0\.2 s"):
-        wait_until_seen([late, tmp_path / "never.h5"], 0.2)
-
-
 def test_a_process_that_dies_is_tried_three_times(check):
     def value(address, request):
         if isinstance(request, Presence):
@@ -254,14 +167,3 @@ def test_a_process_that_dies_is_tried_three_times(check):
     causes = ended(crew_of(lines, check, [small(n) for n in range(3)]))
     assert causes == {small(0).label: None, small(1).label: "its process died 3 times: killed", small(2).label: None}
     assert sum(request == Piece(small(1)) for _, request in lines.sent) == 3
-
-
-@pytest.mark.parametrize(("unknowns", "peak"), [(8_191, 0.30e9), (25_423, 0.52e9), (41_851, 0.60e9), (89_598, 1.35e9)])
-def test_no_less_memory_is_declared_than_references_have_taken(unknowns, peak):
-    assert peak < BASE + factors(unknowns) < 1.9 * peak
-
-
-def test_the_size_of_a_reference_is_declared_before_it_is_known():
-    for level, unknowns in ((0.12, 16_482), (0.22, 4_391)):
-        solve = ReferenceSolve(BALL_SQUEEZE, level)
-        assert unknowns <= unknowns_of(Task(Path("nowhere"), "tiny", solve), solve) < 3 * unknowns
