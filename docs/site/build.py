@@ -18,7 +18,7 @@ STAGE = ROOT / "build" / "docs"
 PACKAGES = ("massspring", "reference_fem", "studies")
 FIRST = (
     *("how-a-run-works", "theory", "notation", "methods", "results"),
-    *("population", "breaking", "own-organ", "meshes", "paper"),
+    *("population", "breaking", "cluster", "own-organ", "meshes", "paper"),
 )
 """Pages of docs/ in the order of the menu; further ones follow."""
 LINK = re.compile(r"\]\((?:\.\./)?(results/[^)#\s]+)\)")

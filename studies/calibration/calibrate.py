@@ -19,7 +19,7 @@ from studies.runs.current import run_fingerprint
 from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
 from studies.store.machine import this_machine
-from studies.sweep.run_studies import Progress, Told
+from studies.sweep.engine import Progress, Told
 
 NODES = 550
 RESULTS = Path("results")

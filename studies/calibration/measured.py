@@ -15,18 +15,10 @@ from studies.runs.current import case_path, why_case_is_stale
 from studies.runs.run import run_case
 from studies.scene.scene import Scene
 from studies.store.record import read_record
-from studies.sweep.run_studies import Progress, Told, check_writable, perform, told_by_workers
+from studies.sweep.engine import Progress, Told
+from studies.sweep.pool import perform, told_by_workers
+from studies.sweep.run_studies import check_writable
 from studies.sweep.tasks import Task
-
-
-class Silent:
-    """Progress that nobody follows."""
-
-    def begin(self, what: str, total: int) -> None:
-        """Nothing is shown."""
-
-    def advance(self, what: str, note: str) -> None:
-        """Nothing is shown."""
 
 
 def pending(root: Path, scenes: Iterable[Scene], start: BodyRecipe) -> list[Task]:

@@ -26,6 +26,7 @@ PURPOSE = {
     "view": "what reads the files of `organbench view` without ParaView",
     "crosscheck": "the second finite-element code of `organbench verify`",
     "parquet": "`organbench table --parquet`",
+    "cluster": "`organbench run --on` workers of other machines",
 }
 """What an extra is for; those of developers (tests, documentation) are not listed."""
 PATIENCE = 60.0

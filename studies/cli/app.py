@@ -18,6 +18,7 @@ COMMANDS = {
     for name, module, function, line in (
         ("list", "results.list_names", "list_all", "Studies, scenes, organs, methods and metrics, a line each."),
         ("run", "running.run", "run", "Runs what is missing or stale, then draws the charts."),
+        ("worker", "running.worker", "worker", "Does pieces of studies for `organbench run --on` elsewhere."),
         ("status", "running.status", "status", "How many cases are ok, failed, stale or missing, and why."),
         ("show", "results.show", "show", "What is in a results file: status, numbers, fields with units."),
         ("table", "results.table", "table", "One row per case, with the metrics of the study."),

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from studies.base import portable
 from studies.base.errors import StudyError
 from studies.store.machine import machine_id
 from studies.store.record import SCHEMA, Field, Record, Status
@@ -22,8 +23,9 @@ def new_record(
     attributes: Mapping[str, Any],
     fields: Mapping[str, Field],
 ) -> Record:
-    """A record with the current schema and this machine's id filled in."""
-    return Record(SCHEMA, kind, key, name, status, message, fingerprint, machine_id(), dict(attributes), dict(fields))
+    """A record with the current schema and this machine's id filled in, and whether it was computed portably."""
+    known = {**attributes, **portable.attributes()}
+    return Record(SCHEMA, kind, key, name, status, message, fingerprint, machine_id(), known, dict(fields))
 
 
 def new_fields(specs: Mapping[str, FieldSpec], values: Mapping[str, np.ndarray]) -> dict[str, Field]:

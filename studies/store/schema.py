@@ -134,6 +134,7 @@ RUN_ATTRIBUTES: dict[str, AttributeSpec] = SECONDS | {
     "own_files": AttributeSpec(
         TEXT, "", "files of the user with the method and the law: JSON, path to SHA-256", optional=True
     ),
+    "portable": AttributeSpec(TEXT, "", "settings of a result that is equal on every x86-64 processor", optional=True),
 }
 
 REFERENCE_FIELDS: dict[str, FieldSpec] = {
@@ -163,6 +164,7 @@ REFERENCE_ATTRIBUTES: dict[str, AttributeSpec] = {
     "unknowns": AttributeSpec(INDEX, "1", "unknowns of the finite-element problem"),
     "steps_done": AttributeSpec(INDEX, "1", "checkpoints that were reached"),
     "seconds": AttributeSpec(NUMBER, "s", "wall time of the solution"),
+    "portable": AttributeSpec(TEXT, "", "settings of a result that is equal on every x86-64 processor", optional=True),
 }
 
 TIMING_FIELDS: dict[str, FieldSpec] = {

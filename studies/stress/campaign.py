@@ -12,7 +12,7 @@ import pandas as pd
 from studies.base.interrupts import die_quietly
 from studies.stress.outcome import UNEXPLAINED, Outcome, tried
 from studies.stress.trial import Trial, draw
-from studies.sweep.run_studies import environment_of_workers
+from studies.sweep.pool import environment_of_workers
 from studies.sweep.workers import done_or_dead
 
 CHUNK = 25

@@ -9,6 +9,7 @@ from studies.catalog.study import Study
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import Case
 from studies.runs.current import case_path, why_case_is_stale
+from studies.store.record import peek
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,10 @@ class Task:
         if isinstance(self.work, ReferenceSolve):
             return self.work.why_stale(self.root)
         return why_case_is_stale(self.root, self.study, self.work)
+
+    def is_portable(self) -> bool:
+        """Whether its stored result is one that is equal on every x86-64 processor."""
+        return "portable" in peek(self.path()).attributes
 
     def state(self) -> tuple[int, ...] | None:
         """What tells its file from any later one; None where there is none."""

@@ -14,7 +14,8 @@ from studies.runs.current import case_path
 from studies.store.record import peek, read_record, write_record
 from studies.store.staleness import CODE_CHANGED, MISSING
 from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, plan
-from studies.sweep.run_studies import perform, run_studies, told_by_workers
+from studies.sweep.pool import perform, told_by_workers
+from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed
 from studies.timing.cases import timing_file
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study

@@ -12,9 +12,9 @@ from studies.scenes import ReferencePlan
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status, read_record, write_record
 from studies.store.staleness import OTHER_VERSION
-from studies.sweep import run_studies as module
 from studies.sweep.load import load_runs
-from studies.sweep.run_studies import perform, run_studies
+from studies.sweep.pool import Pool, perform
+from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, standings, warnings_of
 from studies.sweep.tasks import Task, tasks_of
 from studies.timing import cases as timed
@@ -123,7 +123,7 @@ def test_references_are_shared_and_come_first(tmp_path):
 
 def test_results_that_cannot_be_written_are_told_before_anything_runs(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("no folder")
-    monkeypatch.setattr(module, "perform", lambda *_: pytest.fail("nothing may run"))
+    monkeypatch.setattr(Pool, "perform", lambda *_: pytest.fail("nothing may run"))
     with pytest.raises(StudyError, match="choose a results folder that can be written to"):
         run_studies(tmp_path / "file", [tiny_study()], 1, Silent())
 

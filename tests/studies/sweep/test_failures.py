@@ -17,7 +17,7 @@ from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.failures import Failures
 from studies.sweep.load import load_runs
-from studies.sweep.run_studies import do, environment_of_workers
+from studies.sweep.pool import do, environment_of_workers
 from studies.sweep.standings import failed
 from studies.sweep.tasks import tasks_of
 from studies.timing.alone import alone

@@ -8,10 +8,12 @@ from typing import Annotated
 import typer
 
 from studies.base.atomic import sweep_parts
+from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
 from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import Results, console, say, warn
+from studies.engines.choose import WORDS, engine_for
 from studies.geometry.mesher.jobs import cache_folder
 from studies.metrics.table import check_columns
 from studies.population import POPULATION
@@ -20,6 +22,7 @@ from studies.report.results import refresh
 from studies.store.links import link_study
 from studies.store.paths import study_folder
 from studies.store.staleness import MISSING
+from studies.sweep.engine import Engine
 from studies.sweep.failures import Failures
 from studies.sweep.find_study import ON, find_studies
 from studies.sweep.plan import plan
@@ -28,6 +31,8 @@ from studies.sweep.standings import failed, warnings_of
 from studies.sweep.tasks import Task
 
 SMOKE = "smoke"
+JOBS = 2
+"""Processes, where nothing is said."""
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 Wanted = Callable[[Task], bool] | None
 
@@ -40,24 +45,31 @@ def run(
     smoke: Annotated[bool, typer.Option(help="small meshes, few frames; kept apart in results/smoke")] = False,
     case: Annotated[str, typer.Option(help="this case alone, by its name, with its reference; no charts")] = "",
     only: Annotated[str, typer.Option(help="failed, stale, or both with a comma: nothing else runs")] = "",
-    jobs: Annotated[int, typer.Option(min=1, help="processes for the physics; timing always runs alone")] = 2,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="processes for the physics; timing always runs alone  [default: 2]")
+    ] = None,
+    on: Annotated[str, typer.Option(help=f"{WORDS} (docs/cluster.md)")] = "",
+    portable: Annotated[bool, typer.Option(help="results equal on every x86-64 processor; slower")] = False,
     organs: Annotated[str, typer.Option(help="a folder of surfaces, FOLDER or FOLDER:mm: the studies on these")] = "",
     dry: Annotated[bool, typer.Option("--dry-run", help="say what would run, why and how long; run nothing")] = False,
 ) -> None:
     """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
+    if on and jobs is not None:
+        raise StudyError("give either --jobs or --on: --on local:4 stands for --jobs 4")
     wanted = _filter(only)
     root = results / SMOKE if smoke else results
     failures = Failures()
     if organs:
         studies = [f"{name}{ON}{organs}" for name in studies or [POPULATION]]
-    for found in _checked(studies or []):
-        study = found.smoke() if smoke else found
-        if case:
-            study = _case_alone(study, case)
-        if dry:
-            dry_run(console, study.name, plan(root, study, wanted), jobs)
-        else:
-            _bring_up_to_date(root, study, jobs, wanted, not case, failures)
+    with engine_for(on, jobs or JOBS, portable, root, say) as engine:
+        for found in _checked(studies or []):
+            study = found.smoke() if smoke else found
+            if case:
+                study = _case_alone(study, case)
+            if dry:
+                dry_run(console, study.name, plan(root, study, wanted), jobs or JOBS)
+            else:
+                _bring_up_to_date(root, study, engine, wanted, not case, failures)
     if failures.causes:
         warn([failures.sentence(f"organbench run {' '.join(studies or [])}".rstrip() + " --only failed")])
         raise typer.Exit(1)
@@ -69,9 +81,12 @@ def _case_alone(study: Study, name: str) -> Study:
     return replace(study, cases=(chosen,))
 
 
-def _bring_up_to_date(root: Path, study: Study, jobs: int, wanted: Wanted, drawn: bool, failures: Failures) -> None:
-    with TerminalProgress(console, plan(root, study, wanted), jobs) as progress:
-        count = run_studies(root, [study], jobs, progress, wanted, progress.compiling, failures)
+def _bring_up_to_date(
+    root: Path, study: Study, engine: Engine, wanted: Wanted, drawn: bool, failures: Failures
+) -> None:
+    planned = plan(root, study, wanted)
+    with TerminalProgress(console, planned, engine.processes if planned else 1) as progress:
+        count = run_studies(root, [study], engine, progress, wanted, progress.compiling, failures)
     for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
         sweep_parts(folder)
     warn(link_study(root, study.name))

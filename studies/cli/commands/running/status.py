@@ -13,6 +13,7 @@ from studies.cli.terminal import Results, console, say
 from studies.reference.reference_solves import SolveStanding, reference_solves, standing_of
 from studies.scene.scene import Scene
 from studies.sweep.find_study import find_study
+from studies.sweep.machines import machines_of, mixture
 from studies.sweep.standings import Standing, standings
 
 SHOWN = 8
@@ -31,6 +32,9 @@ def status(
         say(f"{entry.name}: {counted(standing.status for standing in found)}")
         if study:
             show_reasons(found, every)
+            mixed = mixture(machines_of(found))
+            if mixed:
+                say(f"  {mixed}")
     show_references(results, {scene.name: scene for entry in chosen for scene in entry.scenes}.values(), every)
 
 

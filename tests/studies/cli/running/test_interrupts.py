@@ -14,7 +14,7 @@ from studies.base import interrupts
 from studies.base.errors import StudyError
 from studies.cli import app as cli
 from studies.geometry.mesher import process
-from studies.sweep.run_studies import perform
+from studies.sweep.pool import perform
 from tests.studies.tiny import Silent
 
 pytestmark = [

@@ -1,0 +1,36 @@
+"""`organbench worker`: a worker of a Dask cluster."""
+
+import os
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.base.errors import StudyError
+from studies.engines.choose import NEEDED
+
+LONELY_SECONDS = 120
+"""Without a scheduler, after which a worker ends."""
+
+
+def worker(
+    scheduler: Annotated[str, typer.Argument(help="address of the scheduler, as tcp://HOST:8786")] = "",
+    file: Annotated[Path | None, typer.Option("--scheduler-file", help="a file that holds it")] = None,
+    processes: Annotated[int, typer.Option(min=1, help="pieces that it does at a time")] = 1,
+    memory: Annotated[float, typer.Option(min=0, help="GB for all of them; 0: its share of the machine's")] = 0,
+    name: Annotated[str, typer.Option(help="name in messages")] = "",
+) -> None:
+    """Does pieces of studies for `organbench run --on`, until it is ended or its scheduler is gone.
+
+    The same as `dask worker`, with one process for each piece in any case."""
+    if bool(scheduler) == (file is not None):
+        raise StudyError("give either the address of a scheduler or a --scheduler-file")
+    if find_spec("distributed") is None:
+        raise StudyError(f"a worker {NEEDED}")
+    where = [scheduler] if file is None else ["--scheduler-file", str(file)]
+    words = [*where, "--nthreads", str(processes), "--nworkers", "1", "--no-dashboard"]
+    words += ["--memory-limit", f"{memory:g}GB" if memory else "auto", "--death-timeout", str(LONELY_SECONDS)]
+    words += ["--name", name] if name else []
+    os.execv(sys.executable, [sys.executable, "-m", "distributed.cli.dask_worker", *words])

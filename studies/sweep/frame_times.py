@@ -1,0 +1,32 @@
+"""The second phase of a sweep: frame times, measured by one process with nothing beside it."""
+
+from pathlib import Path
+
+from studies.base.compile_watch import watching
+from studies.catalog.study import Study
+from studies.runs.case import Case
+from studies.runs.current import case_path
+from studies.sweep.engine import Progress, Told
+from studies.timing.alone import alone
+from studies.timing.cases import time_cases, timing_is_current
+
+
+def measure_times(root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
+    """Times what is not timed yet, of `among` where given, when no other command does; how many that were."""
+
+    def pending() -> list[Case]:
+        return [
+            case
+            for case in study.cases
+            if case.timed and not timing_is_current(root, study.name, case)
+            if among is None or case_path(root, study.name, case) in among
+        ]
+
+    if not pending():
+        return 0
+    with alone(root), watching(on_compile):
+        left = pending()  # another command may have done it meanwhile
+        if left:
+            progress.begin("timing", len(left))
+            time_cases(root, study.name, left, lambda name: progress.advance("timing", name))
+    return len(left)
