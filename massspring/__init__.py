@@ -54,12 +54,13 @@ if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
         if name == "__all__":
-            methods = import_module(_FACE["*"]).METHODS
+            home = import_module(_FACE["*"])
             return [
                 *(name for name in _FACE if name != "*"),
+                "LITERATURE",
                 "METHODS",
                 "Method",
-                *(method.__name__ for method in methods),
+                *(method.__name__ for method in (*home.METHODS, *home.LITERATURE)),
             ]
         if name == "__version__":
             return import_module("importlib.metadata").version("organbench")

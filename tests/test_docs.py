@@ -83,7 +83,7 @@ def test_equations_are_numbered_once_and_the_table_of_old_numbers_is_complete():
     old, new = [old for old, _ in rows if old != "–"], [new for _, new in rows]
     assert labels() in (old, new)
     assert len(set(old)) == len(old)
-    for section in range(1, 14):
+    for section in range(1, 15):
         assert [n for n in new if n.startswith(f"{section}.")] == [
             f"{section}.{k + 1}" for k in range(sum(n.startswith(f"{section}.") for n in new))
         ]

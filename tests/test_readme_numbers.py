@@ -9,7 +9,7 @@ import pytest
 from massspring import METHODS
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.family import true_volume
-from studies.plots.recovery import RETURNED
+from studies.plots.campaigns.recovery import RETURNED
 from studies.reference.solve import VARIANTS
 from studies.report.publish import PUBLISHED
 from studies.scenes import BALL_SQUEEZE, LIVER_PRESS

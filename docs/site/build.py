@@ -17,16 +17,8 @@ SITE = ROOT / "docs" / "site"
 STAGE = ROOT / "build" / "docs"
 PACKAGES = ("massspring", "reference_fem", "studies")
 FIRST = (
-    "how-a-run-works",
-    "theory",
-    "notation",
-    "methods",
-    "results",
-    "breaking",
-    "cluster",
-    "own-organ",
-    "meshes",
-    "paper",
+    *("how-a-run-works", "theory", "notation", "methods", "results"),
+    *("population", "breaking", "cluster", "own-organ", "meshes", "paper"),
 )
 """Pages of docs/ in the order of the menu; further ones follow."""
 LINK = re.compile(r"\]\((?:\.\./)?(results/[^)#\s]+)\)")

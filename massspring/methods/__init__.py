@@ -8,6 +8,10 @@ from massspring.methods.elements.implicit_elements import ImplicitElements
 from massspring.methods.free import Free
 from massspring.methods.implicit_springs import ImplicitSprings
 from massspring.methods.implicit_volume import ImplicitVolume
+from massspring.methods.literature.angular_springs import AngularSprings
+from massspring.methods.literature.chain_mail import ChainMail
+from massspring.methods.literature.elastic_response import ElasticResponse
+from massspring.methods.literature.linear_modes import LinearModes
 from massspring.methods.method import Method
 from massspring.methods.penalty import Penalty
 from massspring.methods.post_stabilization import PostStabilization
@@ -36,6 +40,9 @@ METHODS: tuple[type[Method], ...] = (
     ExplicitElements,
     ImplicitElements,
 )
+
+LITERATURE: tuple[type[Method], ...] = (AngularSprings, ChainMail, LinearModes, ElasticResponse)
+"""What the literature puts in the place of METHODS; it does not promise what the contract test measures of those."""
 
 VARIANTS: tuple[Method, ...] = (Element(hard=True), Xpbd(volumes="whole"))
 """Settings with which a method solves other equations than by default; the contract test covers them too."""

@@ -16,6 +16,7 @@ from massspring.layout.state import State, new_diagnostics
 from massspring.layout.threads import team_at_work
 from massspring.methods.capabilities import Capabilities
 from massspring.world.obstacles import Attachment
+from massspring.world.surroundings import Surroundings
 
 
 class Method(Protocol):
@@ -35,6 +36,10 @@ class Method(Protocol):
     def why_not(self, body: Body) -> str | None:
         """Why the method cannot advance `body`; None when it can."""
         return self.capabilities.why_not(body)
+
+    def why_not_among(self, surroundings: Surroundings) -> str | None:
+        """Why the method cannot run in such surroundings; None when it can."""
+        return None
 
     def added_stiffness(self, body: Body) -> csr_array | None:
         """B [√(N/m)], (3n, r): small oscillations about rest feel B Bᵀ beside the springs; None for nothing."""

@@ -11,10 +11,12 @@ from massspring.body.surface import winding_number
 from massspring.body.volumes import PATCH, Volumes
 from massspring.errors import MassSpringError
 from massspring.layout.probe_arrays import tip_depth
+from massspring.layout.state import State
 from massspring.layout.threads import cores
 from massspring.methods.capabilities import No
 from massspring.methods.method import Method
-from massspring.world.obstacles import Capsule, Plane, Probe, Sphere
+from massspring.world.obstacles import Capsule, Obstacle, Plane, Probe, Sphere
+from massspring.world.surroundings import Surroundings
 from massspring.world.trajectories import Ramp
 
 INSIDE = 1e-6
@@ -76,6 +78,13 @@ def check_body(body: Body, method: Method) -> None:
             f"springs of law '{body.law}' pull every part of the body together, and it keeps {body.kept.count} "
             f"volumes for {body.node_count} nodes; keep one volume per node, or for {PATCH} of them"
         )
+
+
+def check_among(surroundings: Surroundings, method: Method) -> None:
+    """Raises MassSpringError for surroundings that the method cannot run in."""
+    reason = method.why_not_among(surroundings)
+    if reason is not None:
+        raise MassSpringError(f"method '{method.name}' does not apply to these surroundings: {reason}")
 
 
 def check_facets(precision: str, body: Body, obstacles: Collection[object]) -> None:
@@ -148,3 +157,17 @@ def check_threads(threads: int, method: Method) -> None:
     supported = method.capabilities.threads
     if threads > 1 and isinstance(supported, No):
         raise MassSpringError(f"method '{method.name}' runs on one thread, {supported.because}; leave threads at 1")
+
+
+def check_probes(state: State, obstacles: tuple[Obstacle, ...]) -> str | None:
+    """Which thin probe was driven through tissue that had nowhere to go, or None."""
+    if state.probing is None or not state.probing.passed.any():
+        return None
+    thin = [number for number, obstacle in enumerate(obstacles) if isinstance(obstacle, Probe)]
+    p = int(np.flatnonzero(state.probing.passed)[0])
+    triangle = int(state.probing.passed[p]) - 1
+    held = int((state.model.inverse_mass[state.model.triangles[triangle]] == 0.0).sum())
+    return (
+        f"the thin probe that is obstacle {thin[p]} was driven through triangle {triangle}, {held} of whose corners "
+        "are attached; lead its path past attached tissue, or attach fewer nodes"
+    )

@@ -17,10 +17,12 @@ from massspring.layout.state import State
 from massspring.layout.threads import shared
 from massspring.methods.method import Method
 from massspring.run.checks import (
+    check_among,
     check_body,
     check_facets,
     check_nodal,
     check_probe,
+    check_probes,
     check_solid,
     check_surroundings,
     check_targets,
@@ -31,6 +33,7 @@ from massspring.run.precision import Precision, check_precision, in_precision
 from massspring.run.renumber import Numbered, numbered
 from massspring.world.clock import Clock
 from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
+from massspring.world.surroundings import Surroundings
 from massspring.world.targets import fastest_filling, followed
 from massspring.world.trajectories import Ramp
 
@@ -65,6 +68,9 @@ class Setup:
 
     def __post_init__(self) -> None:
         check_body(self.body, self.method)
+        moved = self.velocity is not None or self.positions is not None
+        around = Surroundings(self.obstacles, len(self.attachments), self.gravity, bool(self.targets), moved)
+        check_among(around, self.method)
         check_precision(self.precision, self.method)
         check_facets(self.precision, self.body, self.solids)
         check_threads(self.threads, self.method)
@@ -192,20 +198,6 @@ def check_state(state: State, body: Body) -> str | None:
     if not np.isfinite(state.lam).all():
         return "pressures are no longer finite"
     return None if far < ESCAPED * body.size else f"a node has moved {far:.3g} m from rest"
-
-
-def check_probes(state: State, obstacles: tuple[Obstacle, ...]) -> str | None:
-    """Which thin probe was driven through tissue that had nowhere to go, or None."""
-    if state.probing is None or not state.probing.passed.any():
-        return None
-    thin = [number for number, obstacle in enumerate(obstacles) if isinstance(obstacle, Probe)]
-    p = int(np.flatnonzero(state.probing.passed)[0])
-    triangle = int(state.probing.passed[p]) - 1
-    held = int((state.model.inverse_mass[state.model.triangles[triangle]] == 0.0).sum())
-    return (
-        f"the thin probe that is obstacle {thin[p]} was driven through triangle {triangle}, {held} of whose corners "
-        "are attached; lead its path past attached tissue, or attach fewer nodes"
-    )
 
 
 def simulate(

@@ -156,19 +156,26 @@ def check_shapes(det):
         )
 
 
+CENTROID = np.full((3, 1), 0.25)
+OUTWARD = np.array([-1, 1, -1, 1])
+"""Whether the faces of an upright tetrahedron, as RefTet lists their vertices, turn counterclockwise from outside."""
+
+
 def check_neighbours(mesh):
-    """Refuse an inside-out element: the two tetrahedra at a face must lie on opposite sides of it."""
-    inner = np.flatnonzero(mesh.f2t[1] >= 0)
-    a, b, c = mesh.p[:, mesh.facets[:, inner]].transpose(1, 2, 0)
-    normal = np.cross(b - a, c - a)
-    sides = []
-    for k in (0, 1):
-        element = mesh.t[:4, mesh.f2t[k, inner]]
-        other = element.sum(axis=0) - mesh.facets[:, inner].sum(axis=0)
-        sides.append(np.einsum("ni,ni->n", mesh.p[:, other].T - a, normal))
-    bad = np.flatnonzero(sides[0] * sides[1] >= 0.0)
+    """Refuse an inside-out element: two tetrahedra turn round the face between them in opposite ways.
+
+    The map of an element says how it turns, not its corners: those of a part of a curved element that was halved may
+    lie the other way round, though it is upright everywhere.
+    """
+    _, shape = basis_table(ElementTetP2(), CENTROID)
+    sign = np.sign(np.linalg.det(np.einsum("eni,qJn->eqiJ", nodes(mesh)[element_nodes(mesh)], shape)[:, 0]))
+    a, b, c = np.asarray(mesh.t[:4], np.int64)[np.array(RefTet.facets)].transpose(1, 0, 2)
+    turns = np.sign((b - a) * (c - a) * (c - b)) * OUTWARD[:, None] * sign
+    round_face = np.zeros(mesh.nfacets)
+    np.add.at(round_face, mesh.t2f, turns)
+    bad = np.flatnonzero((mesh.f2t[1] >= 0) & (round_face != 0.0))
     if bad.size:
-        pair = mesh.f2t[:, inner[bad[0]]]
+        pair = mesh.f2t[:, bad[0]]
         raise SolveError(
             f"elements {pair[0]} and {pair[1]} overlap across their common face ({bad.size} such faces, limit 0): "
             f"one of them is inverted, mend the mesh"

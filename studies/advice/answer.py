@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from studies.advice.campaign import Stored, stored
 from studies.advice.kinds import same_kind, worst_of
+from studies.advice.population import Unseen, unseen
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog.accuracy import ACCURACY
@@ -50,6 +51,8 @@ class Advice:
     """Scenes of the same kind, where the scene itself was never run; the errors are the worst of them."""
     short: ShortTiming | None = None
     """The timing that was taken for this answer."""
+    unseen: Unseen | None = None
+    """What the chosen recipe did on other organs of the kind; None where no population was run with it."""
 
     @property
     def real_time(self) -> float:
@@ -78,6 +81,8 @@ def advise(
     found, alike = _known(asked, Path(results))
     rows = worst_of(asked, list(found.found.values())) if alike else found.found[asked.name]
     answer = replace(_chosen(asked, named, rows, found), alike=alike)
+    if answer.chosen is not None:
+        answer = replace(answer, unseen=unseen(Path(results), answer.chosen.case))
     return _timed(answer) if timing else _untimed(answer)
 
 

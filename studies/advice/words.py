@@ -3,6 +3,7 @@
 from dataclasses import fields
 
 from studies.advice.answer import Advice
+from studies.advice.population import words as others
 from studies.catalog.accuracy import ACCURACY
 from studies.metrics.cells import MISSING, value_cell
 from studies.metrics.judged import Judged, Measured
@@ -87,6 +88,8 @@ def _recipe(answer: Advice, one: Judged) -> list[str]:
         "again": _command(answer, case),
         "in Python": in_python(case),
     }
+    if answer.unseen is not None:
+        rows["others"] = others(answer.unseen)
     return [f"  {name:<{LABEL}}{words}" for name, words in rows.items()]
 
 

@@ -3,6 +3,7 @@
 from studies.catalog.accuracy import ACCURACY
 from studies.catalog.frame_rate import FRAME_RATE
 from studies.catalog.laws import LAWS_STUDY
+from studies.catalog.literature import LITERATURE_STUDY
 from studies.catalog.methods import METHODS_STUDY
 from studies.catalog.organs import ORGANS
 from studies.catalog.stability_map import STABILITY_MAP
@@ -21,6 +22,7 @@ STUDIES: tuple[Study, ...] = (
     STRESS,
     LAWS_STUDY,
     METHODS_STUDY,
+    LITERATURE_STUDY,
     ACCURACY,
 )
 

@@ -27,7 +27,7 @@ STABILITY_MAP = Study(
         for factor in STIFFNESS
         for steps in STEPS_PER_FRAME
     ),
-    charts=(Chart("stability.png", "studies.plots.stability:draw"),),
+    charts=(Chart("stability.png", "studies.plots.campaigns.stability:draw"),),
     columns=("volume_worst", "min_j"),
     main=True,
 )

@@ -18,6 +18,6 @@ STRESS = Study(
         for scene in STRESS_SCENES
         for body, method in ((ONE, Free()), (ONE, ImplicitVolume()), (ONE, Shake()), (MANY, ImplicitVolume()))
     ),
-    charts=(Chart("recovery.png", "studies.plots.recovery:draw"),),
+    charts=(Chart("recovery.png", "studies.plots.campaigns.recovery:draw"),),
     columns=("inverted_share", "rest_distance", "volume_end", "min_j"),
 )

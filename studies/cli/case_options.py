@@ -4,9 +4,9 @@ from typing import Annotated
 
 import typer
 
-from massspring import METHODS
 from studies.base.lookup import lookup
 from studies.runs.case import BodyRecipe, Case
+from studies.runs.own import methods_by_name
 from studies.scenes import SCENES
 
 MethodName = Annotated[str, typer.Option(help="see `organbench list`")]
@@ -20,5 +20,5 @@ def chosen_case(scene: str, method: str, body: str, nodes: int) -> Case:
     return Case(
         scene=lookup(scene, {s.name: s for s in SCENES}, "scene"),
         body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
-        method=lookup(method, {m.name: m for m in METHODS}, "method")(),
+        method=lookup(method, methods_by_name(), "method")(),
     )

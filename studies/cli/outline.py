@@ -15,9 +15,10 @@ def studies() -> list[tuple[str, str]]:
 
 
 def methods() -> list[tuple[str, str]]:
-    """(name, first line) of each of METHODS."""
+    """(name, first line) of each of METHODS and of LITERATURE."""
     found = []
-    for name, module in _registered("massspring.methods", "METHODS"):
+    homes = [home for registry in ("METHODS", "LITERATURE") for home in _registered("massspring.methods", registry)]
+    for name, module in homes:
         (node,) = [n for n in _parsed(module).body if isinstance(n, ast.ClassDef) and n.name == name]
         (word,) = [
             n.value.value

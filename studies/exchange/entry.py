@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from massspring import METHODS, Method
+from massspring import LITERATURE, METHODS, Method
 from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
@@ -46,7 +46,7 @@ class Outside(Method):
 @cache
 def outside(name: str) -> Outside:
     """The method that stands for an entry. Raises StudyError for a name that is a method's, or that is no name."""
-    if name in [method.name for method in METHODS]:
+    if name in [method.name for method in (*METHODS, *LITERATURE)]:
         raise StudyError(f"'{name}' is a method of this program; give your entry another name (--name)")
     if not name or readable(name) != name:
         raise StudyError(f"{name!r} cannot name an entry; use letters, digits, '.', '_' and '-' (--name)")

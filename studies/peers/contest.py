@@ -18,7 +18,7 @@ from studies.exchange.export import export
 from studies.exchange.judge import entry_record, unfinished_record
 from studies.exchange.meshes import given_mesh
 from studies.peers.scene_folder import CANNOT, MISSING
-from studies.plots.peers import HALF_STEP
+from studies.plots.campaigns.peers import HALF_STEP
 from studies.runs.case import Case
 from studies.scene.scene import Scene
 from studies.store.record import Record, Status, write_record

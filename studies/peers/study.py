@@ -25,6 +25,6 @@ STUDY = Study(
         for body in bodies
         for method in methods
     ),
-    charts=(Chart("peers.png", "studies.plots.peers:draw"),),
+    charts=(Chart("peers.png", "studies.plots.campaigns.peers:draw"),),
     columns=("force_end", "mean_error", "volume_worst", "real_time", "silhouette_error", "min_j"),
 )

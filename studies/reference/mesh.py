@@ -21,7 +21,8 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
 
     A region is held at the nodes of its facets: a mid-side node outside them, across a dent, stays free. Where elements
     at outlines are halved, their middles are drawn to the outline as well (studies.reference.outlines).
-    Raises StudyError for a mesh that cannot be made.
+    Whether an element folds is judged where the reference integrates it, by reference_fem: the mesher's bound refuses
+    more. Raises StudyError for a mesh that cannot be made.
     """
     plan = scene.reference
     assert plan is not None  # never called for a scene without one
@@ -34,7 +35,7 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
     shape = true_shape(scene.organ)
     mesh = MeshTet2.from_mesh(body.mesh)
     if shape is not None:
-        mesh = as_curved(body, coarse, on_true_shape(curved(organ_mesh), coarse, shape, scene.held))
+        mesh = as_curved(body, coarse, on_true_shape(curved(organ_mesh, may_fold=True), coarse, shape, scene.held))
     *held, wall = body.facets(mesh)
     if at_outlines:
         mesh = drawn_to_outlines(mesh, np.concatenate([rim_sides(facets)[:, :2].ravel() for facets in held]))

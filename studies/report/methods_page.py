@@ -4,9 +4,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
 
-from massspring import METHODS, Method
+from massspring import LITERATURE, METHODS, Method, Plane
 from massspring.methods import VARIANTS
 from massspring.methods.capabilities import No
+from massspring.world.surroundings import Surroundings
 from studies.base.atomic import write_whole
 
 PAGE = Path("docs/methods.md")
@@ -37,6 +38,21 @@ damping.
 REASONS = """
 ## Why not
 """
+OTHERS = """
+## Others of the literature
+
+`LITERATURE`: what is put in the place of the methods above, without their contract (docs/theory.md, section 14).
+*Keeps* and *stable* as above. They run in the same scenes and beside the same reference; the study `accuracy` has them
+in every scene, and what they cannot do is a case that is skipped with the reason.
+"""
+AROUND: Mapping[str, Surroundings] = {
+    "nothing held": Surroundings(),
+    "weight": Surroundings(attachments=1, gravity=(0.0, 0.0, -9.81)),
+    "friction": Surroundings((Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), friction=0.3),), 1),
+    "a start in motion": Surroundings(attachments=1, moved=True),
+    "volumes that change": Surroundings(attachments=1, targets=True),
+}
+"""What may be around a body, in words of the page."""
 OPTIONS: Mapping[str, str] = {
     "targets": "targets of volumes that change",
     "triangle_springs": "triangle springs (membranes)",
@@ -88,6 +104,15 @@ def reasons(methods: Iterable[Method]) -> list[list[str]]:
     return rows
 
 
+def others_of(method: Method) -> list[str]:
+    """One row of the table of the literature."""
+    stable = "below the limit" if method.capabilities.conditionally_stable else "any step"
+    refused = {words: method.why_not_among(around) for words, around in AROUND.items()}
+    cannot = [f"{words} ({reason.split(';')[0]})" for words, reason in refused.items() if reason]
+    summary = (method.__doc__ or "").strip().split("\n")[0]
+    return [method.name, summary, method.capabilities.keeps, stable, "; ".join(cannot)]
+
+
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Markdown."""
     return "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows))
@@ -100,7 +125,9 @@ def methods_page() -> str:
     head = ("method", "keeps", "correction", "stable", *OPTIONS.values())
     supported = table(head, map(capabilities_of, methods))
     why = table(("not supported", "by", "because"), reasons(methods))
-    return "\n".join([HEAD + CLAIMS, claims, CAPABILITIES, supported, REASONS, why, ""])
+    head = ("method", "what it does", "keeps", "stable", "cannot do")
+    others = table(head, [others_of(kind()) for kind in LITERATURE])
+    return "\n".join([HEAD + CLAIMS, claims, CAPABILITIES, supported, REASONS, why, OTHERS, others, ""])
 
 
 if __name__ == "__main__":

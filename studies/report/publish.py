@@ -6,6 +6,7 @@ from pathlib import Path
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.catalog import Study
+from studies.population import POPULATION
 from studies.report.results import FIGURES, charts_and_tables, refresh
 from studies.report.summary import SUMMARIES
 from studies.store.machine import machine_id, machine_of
@@ -30,9 +31,10 @@ SUFFIXES = (".csv", ".md", ".png", ".json")
 def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path], list[str]]:
     """Copies all tables and charts below `root` to `home`/results/published and the summaries into the pages of `home`.
 
-    The published files, and the names of EXTRAS that were not made below `root` and stay as they are. Files that
-    nothing makes any more go. Raises StudyError, before anything is written to `home`, unless every piece of every
-    study, and every one of EXTRAS that is there, is of the present code.
+    The published files, and the names of EXTRAS that were not made below `root` and stay as they are, as does the
+    population where it is none of `studies`. Files that nothing makes any more go. Raises StudyError, before anything
+    is written to `home`, unless every piece of every study, and every one of EXTRAS that is there, is of the present
+    code.
     """
     check_studies(root, studies)
     absent = [name for name in EXTRAS if not (root / name).exists()]
@@ -45,7 +47,8 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
     show_summaries(root, studies, home)
     target = home / PUBLISHED
     copies = _copy(sources, root, target)
-    _remove([file for file in _files(target) if file.relative_to(target).parts[0] not in absent], copies)
+    kept = {*absent, POPULATION} - {study.name for study in studies}
+    _remove([file for file in _files(target) if file.relative_to(target).parts[0] not in kept], copies)
     return copies, absent
 
 

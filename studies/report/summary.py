@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from studies.metrics.cells import MISSING, UNRESOLVED_MARK, value_cell
-from studies.metrics.judged import Judged, Measured, cheapest, judged, nearest
+from studies.metrics.distribution import groups
+from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, judged, nearest
 from studies.metrics.run import Run
 from studies.metrics.table import UNRESOLVED, study_table
 from studies.metrics.wish import usual_wish
 from studies.runs.case import BodyRecipe
+from studies.runs.recipe_text import body_words
 
 PAPER = 550
 """Surface nodes of the paper's body where it stands beside others."""
@@ -105,7 +107,7 @@ def recommended_of(runs: Sequence[Run]) -> str:
         if chosen is None or paper is None:
             continue
         marked |= best is None
-        words = f"{_words(chosen.case.body)}, {chosen.case.dt_fraction:g}{'' if best else ' ‡'}"
+        words = f"{body_words(chosen.case.body)}, {chosen.case.dt_fraction:g}{'' if best else ' ‡'}"
         cells = [*_errors(paper), words, *_errors(chosen), _real_time(chosen)]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     if marked:
@@ -124,15 +126,47 @@ def ladder_of(runs: Sequence[Run]) -> str:
     for name, found in _by_scene(runs).items():
         for one in found:
             if name in LADDER_SCENES and one.advisable:
-                cells = [_words(one.case.body), str(volumes[one.case.key]), f"{one.case.dt_fraction:g}"]
+                cells = [body_words(one.case.body), str(volumes[one.case.key]), f"{one.case.dt_fraction:g}"]
                 lines.append(f"| {name} | " + " | ".join([*cells, *_errors(one), _real_time(one)]) + " |")
     return "\n".join(lines)
+
+
+def population_of(runs: Sequence[Run]) -> str:
+    """Every body on the members of every organ: the median, what 95 of 100 stay below, and the worst."""
+    lines = [
+        "| organ | body, surface nodes | members, lost | force: median [%] | 95 of 100 [%] | worst [%] "
+        "| mean: median [%] | 95 of 100 [%] | largest floor, force / mean [%] |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for group in groups(runs):
+        force, mean = group.of(FORCE), group.of(DISPLACEMENT)
+        if not force.count:
+            continue
+        cells = [
+            f"{force.count}, {force.lost}",
+            _with_interval(force.median, force.median_interval, signed=True),
+            _with_interval(force.bound, force.bound_interval),
+            f"{force.worst:+.2g} ({force.worst_member})",
+            _with_interval(mean.median, mean.median_interval),
+            _with_interval(mean.bound, mean.bound_interval),
+            f"{force.floor:.2g} / {mean.floor:.2g}",
+        ]
+        lines.append(f"| {group.organ} | {group.body} | " + " | ".join(cells) + " |")
+    return "\n".join(lines) if len(lines) > 2 else "No results yet: run `make study-population`."
+
+
+def _with_interval(value: float, interval: tuple[float, float], signed: bool = False) -> str:
+    """A number with the two ends of its 95 % interval in brackets."""
+    sign = "+" if signed else ""
+    low, high = (f"{end:{sign}.2g}" for end in interval)
+    return f"{value:{sign}.2g} ({low} to {high})"
 
 
 SUMMARIES = (
     Summary("volume_loss", "summary.md", "README.md", "results", results_of),
     Summary("accuracy", "accuracy/recommended.md", "README.md", "recommended", recommended_of),
     Summary("accuracy", "accuracy/ladder.md", "docs/paper.md", "ladder", ladder_of),
+    Summary("population", "population/population.md", "docs/population.md", "population", population_of),
 )
 
 
@@ -147,11 +181,6 @@ def _by_scene(runs: Sequence[Run]) -> dict[str, list[Judged]]:
 
 def _is_paper(body: BodyRecipe) -> bool:
     return body.kind == "surface" and body.nodes == PAPER
-
-
-def _words(body: BodyRecipe) -> str:
-    law = "" if body.law in ("van_gelder", "cotangent") else f", {body.law}"
-    return f"{body.series}{law}, {body.nodes}"
 
 
 def _errors(one: Judged) -> list[str]:

@@ -7,7 +7,7 @@ from typing import TypeGuard
 
 import numpy as np
 
-from massspring import METHODS, Body, Method
+from massspring import LITERATURE, METHODS, Body, Method
 from massspring.body.laws import Edges, StiffnessLaw, laws_by_name
 from massspring.body.membranes import MEMBRANE_LAWS
 from massspring.body.smoothed import SMOOTHED
@@ -19,8 +19,8 @@ _LAWS: dict[str, StiffnessLaw] = {}
 
 
 def methods_by_name() -> dict[str, type[Method]]:
-    """METHODS and those of the user's files."""
-    return {method.name: method for method in METHODS} | _METHODS
+    """METHODS, LITERATURE and those of the user's files."""
+    return {method.name: method for method in (*METHODS, *LITERATURE)} | _METHODS
 
 
 def own_laws() -> Mapping[str, StiffnessLaw]:
@@ -56,7 +56,8 @@ def add_methods(module: ModuleType) -> None:
         file = file_of(value)
         if file is not None:
             before = _METHODS.get(value.name)
-            _check_free("method", value.name, [method.name for method in METHODS], file, before and file_of(before))
+            project = [method.name for method in (*METHODS, *LITERATURE)]
+            _check_free("method", value.name, project, file, before and file_of(before))
             _METHODS[value.name] = value
 
 

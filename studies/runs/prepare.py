@@ -19,6 +19,7 @@ from massspring import (
 )
 from massspring.body.membranes import MEMBRANE_LAWS
 from massspring.body.volumes import Volumes
+from massspring.world.surroundings import Surroundings
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
@@ -142,6 +143,10 @@ def prepare(case: Case) -> Prepared:
     if reason is not None:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to the {case.body.kind} body: {reason}")
     targets = targets_for(scene, mesh, body)
+    around = Surroundings(scene.obstacles, len(scene.held), scene.gravity, bool(targets), scene.start is not None)
+    reason = case.method.why_not_among(around)
+    if reason is not None:
+        raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
     if case.body.kind in ("surface", "membrane") and mesh.hollow:
         mesh = mesh.outer()
     attachments = attachments_for(scene, mesh)

@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 from studies.base.errors import StudyError
-from studies.runs.case import Case, case_from_json, case_to_dict
+from studies.runs.case import BodyRecipe, Case, case_from_json, case_to_dict
 from studies.scene.scene import Scene
 
 
@@ -30,6 +30,12 @@ def case_of_recipe(scene: Scene, text: str) -> Case:
         mixes = name == "body" and isinstance(value, dict)
         whole[name] = {**whole[name], **value} if mixes else value
     return case_from_json(json.dumps(whole))
+
+
+def body_words(body: BodyRecipe) -> str:
+    """A body as tables for people name it: "graded quadratic, masses by stiffness, 794"."""
+    law = "" if body.law in ("van_gelder", "cotangent") else f", {body.law}"
+    return f"{body.series}{law}, {body.nodes}"
 
 
 def _parts(case: Case) -> dict[str, Any]:

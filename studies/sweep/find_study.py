@@ -1,5 +1,6 @@
 """A study by name: of the catalogue, or of a Python file of the user."""
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -7,17 +8,25 @@ from typing import Any
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
+from studies.population import POPULATION, population_study, study_on
 from studies.runs.case import Case, case_from_json, case_to_dict
 from studies.sweep.own_files import load_file
 
+ON = "@"
+"""Between the name of a study and a folder of surfaces: "population@meshes", or "population@meshes:mm"."""
 MAIN = "main"
 """Stands for the main studies of the catalogue; no study has this name."""
 
 
 def find_study(name: str) -> Study:
-    """A study of the catalogue, or STUDY of a Python file. Raises StudyError, for whatever is wrong with the file."""
+    """A study of the catalogue, or STUDY of a Python file; either on a folder of surfaces, where ON and one follow.
+
+    Warns of files in the folder that are mended or refused. Raises StudyError, for whatever is wrong with the file.
+    """
+    if ON in name:
+        return _on_folder(*name.split(ON, 1))
     if not name.endswith(".py"):
-        return lookup(name, {study.name: study for study in STUDIES}, "study")
+        return known_studies([name])[0]
     if not Path(name).is_file():
         raise StudyError(f"there is no study file {name}; give a Python file that defines STUDY")
     study = getattr(load_file(Path(name)), "STUDY", None)
@@ -26,6 +35,25 @@ def find_study(name: str) -> Study:
     for case in study.cases:
         _check_stored(name, case)
     return study
+
+
+def _on_folder(name: str, given: str) -> Study:
+    folder, _, unit = given.partition(":") if not Path(given).is_dir() else (given, "", "")
+    study, placed = study_on(find_study(name), Path(folder), unit or None)
+    for one in placed:
+        said = "; ".join(one.words)
+        if said:
+            warnings.warn(said if one.scene else f"{one.path.name} is refused: {said}", stacklevel=2)
+    return study
+
+
+def known_studies(names: Sequence[str]) -> list[Study]:
+    """Studies of the catalogue by name, and that of the population, which is drawn when it is asked for.
+
+    Raises StudyError with the nearest name.
+    """
+    makers = {study.name: (lambda study=study: study) for study in STUDIES} | {POPULATION: population_study}
+    return [lookup(name, makers, "study")() for name in names]
 
 
 def find_studies(names: Sequence[str]) -> list[Study]:

@@ -13,6 +13,7 @@ from threading import Event, Thread
 from numba.core import event
 
 from studies.base.compile_watch import CompileWatch
+from studies.base.errors import StudyError
 from studies.base.interrupts import die_quietly
 from studies.base.portable import environment as portable_environment
 from studies.catalog.study import Study
@@ -40,7 +41,10 @@ def do(task: Task) -> Path:
     if task.done_meanwhile():
         return task.path()
     if isinstance(task.work, ReferenceSolve):
-        return solve(task.root, task.work)
+        try:
+            return solve(task.root, task.work)
+        except StudyError as error:  # a mesh that cannot be made costs its scene, as it does for a case
+            return store_failure(task, str(error))
     return run_case(task.root, task.study, task.work)
 
 

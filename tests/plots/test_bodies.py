@@ -8,7 +8,8 @@ from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
 
 from massspring import METHODS, Free, ImplicitVolume
-from studies.plots import force_path, laws, methods, recovery, stability, volume_history
+from studies.plots import force_path, laws, methods, volume_history
+from studies.plots.campaigns import recovery, stability
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, styled
 from studies.scenes.stomach_press import STOMACH_PRESS

@@ -5,7 +5,8 @@ import pytest
 from matplotlib.colors import to_hex
 
 from massspring import Free, ImplicitVolume
-from studies.plots import cost_ratio, frame_time, squeeze, stability
+from studies.plots import cost_ratio, frame_time, squeeze
+from studies.plots.campaigns import stability
 from studies.plots.style.style import BLACK, BLUE, GREY, STATUS_LOOKS, VERMILLION
 from studies.store.record import Status
 from tests.plots.made_up import FRAMES, frame_ns, run, stability_grid

@@ -12,7 +12,8 @@ from matplotlib.text import Text
 from massspring import Free
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
-from studies.plots import laws, squeeze, stability
+from studies.plots import laws, squeeze
+from studies.plots.campaigns import stability
 from studies.plots.style.style import DPI, SMALL, styled
 from studies.store.record import Status
 from tests.plots.made_up import grid, laws_grid, run, stability_grid, timed_grid, without_reference

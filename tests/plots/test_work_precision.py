@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from massspring import ExplicitElements, Free, ImplicitElements
+from massspring import LITERATURE, ExplicitElements, Free, ImplicitElements
 from studies.metrics.judged import front
 from studies.metrics.metrics import METRICS
 from studies.plots import work_precision as work
@@ -133,6 +133,11 @@ def test_families_are_told_apart_without_colour():
             look = family_of(drawn.case)
             assert look.name.startswith(method.name.replace("_", " ")) and look.name in words(work.figure([drawn]))
             assert len(markers(work.figure([drawn]).axes[0], look.marker)) == 1
+    for kind, body in zip(LITERATURE, ("tetrahedral", "tetrahedral", "quadratic", "quadratic"), strict=True):
+        drawn = at(0.5, 0.1, kind=body, method=kind(), nodes=594)
+        look = family_of(drawn.case)
+        assert look.colour != GREY and look.name in words(work.figure([drawn]))
+        assert len(markers(work.figure([drawn]).axes[0], look.marker)) == 1
     other = family_of(run(LIVER_PRESS, method=Free()).case)
     assert other.colour == GREY and other.name == "tetrahedral, free"
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import massspring
-from massspring import METHODS, Method
+from massspring import LITERATURE, METHODS, Method
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Chart
 from studies.plots import volume_history
@@ -40,8 +40,8 @@ def test_the_type_checker_sees_the_same_names(package):
 
 
 def test_every_method_is_exported():
-    """METHODS is the only list of them."""
-    for method in (*METHODS, Method):
+    """METHODS and LITERATURE are the only lists of them."""
+    for method in (*METHODS, *LITERATURE, Method):
         assert getattr(massspring, method.__name__) is method
         assert method.__name__ in dir(massspring) and method.__name__ in massspring.__all__
     scope: dict = {}

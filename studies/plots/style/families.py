@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from massspring import METHODS
+from massspring import LITERATURE, METHODS
 from massspring.body.smoothed import edge_smoothed
 from studies.plots.style.style import (
     BLACK,
@@ -50,9 +50,13 @@ CONTESTANTS: dict[tuple[str, str], Family] = {
     ("explicit_elements", "quadratic"): Family("explicit elements, quadratic", MUTED[2], ">"),
     ("implicit_elements", "tetrahedral"): Family("implicit elements, linear", YELLOW, "p"),
     ("implicit_elements", "quadratic"): Family("implicit elements, quadratic", MUTED[1], "h"),
+    ("angular_springs", "tetrahedral"): Family("angular springs", MUTED[6], "$A$"),
+    ("chain_mail", "tetrahedral"): Family("chain mail", MUTED[3], "$C$"),
+    ("linear_modes", "quadratic"): Family("linear modes", MUTED[5], "$M$"),
+    ("elastic_response", "quadratic"): Family("elastic response, precomputed", MUTED[9], "$R$"),
 }
 """What is taken instead of mass-spring bodies, by method and kind of body."""
-OUR_METHODS = tuple(method.name for method in METHODS)
+OUR_METHODS = tuple(method.name for method in (*METHODS, *LITERATURE))
 WHOLE = "implicit_volume"
 """The method that needs no name."""
 

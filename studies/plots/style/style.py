@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.typing import LineStyleType
 
-from massspring import METHODS
+from massspring import LITERATURE, METHODS
 from studies.base.atomic import write_whole
 from studies.store.record import Status
 
@@ -37,6 +37,8 @@ METHOD_COLOURS = {"free": VERMILLION, "implicit_volume": BLUE}
 MUTED = ("#332288", "#999933", "#882255", "#44AA99", "#DDCC77", "#AA4499", "#117733", "#661100", "#88CCEE", "#CC6677")
 # And pear, light blue and olive of his light scheme, for the methods that came last.
 LIGHT_SCHEME = ("#BBCC33", "#77AADD", "#AAAA00")
+LITERATURE_COLOURS = ("#99DDFF", "#44BB99", "#EE8866", "#FFAABB")
+"""Light cyan, mint, orange and pink of the same."""
 OTHER_METHODS = (GREEN, PURPLE, ORANGE, SKY, *MUTED, *LIGHT_SCHEME)
 BODY_LOOKS: dict[str, tuple[LineStyleType, str]] = {
     "tetrahedral": ("-", "o"),
@@ -154,6 +156,9 @@ def method_colour(name: str) -> str:
     """The colour a method has in every chart."""
     if name in METHOD_COLOURS:
         return METHOD_COLOURS[name]
+    for method, colour in zip(LITERATURE, LITERATURE_COLOURS, strict=True):
+        if name == method.name:
+            return colour
     others = [method.name for method in METHODS if method.name not in METHOD_COLOURS]
     if name in others:
         return OTHER_METHODS[others.index(name) % len(OTHER_METHODS)]

@@ -19,7 +19,7 @@ from massspring import (
 )
 from massspring.body.inside import is_inside, surface_distance
 from massspring.kernels.probe.arrays import LEFT_BEHIND
-from massspring.run.simulation import check_probes
+from massspring.run.checks import check_probes
 from tests.massspring.methods.test_methods import clock_for
 from tests.massspring.probe.test_probe import BALL, EDGE, METHODS, R, frames_of
 

@@ -7,7 +7,7 @@ import pytest
 
 from massspring import Attachment, ImplicitVolume, Probe, Setup, Trajectory, Volumes, simulate
 from massspring.kernels.probe.arrays import CARRYING, IN_CONTACT, LEFT_BEHIND
-from massspring.run.simulation import check_probes
+from massspring.run.checks import check_probes
 from tests.massspring.methods.test_methods import clock_for
 
 EDGE = 0.02

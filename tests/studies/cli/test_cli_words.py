@@ -2,7 +2,7 @@
 
 import pytest
 
-from massspring import METHODS
+from massspring import LITERATURE, METHODS
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.cli import app as cli
@@ -13,7 +13,7 @@ from studies.metrics.metrics import METRICS
 
 def test_the_outline_is_what_the_modules_say():
     assert outline.studies() == [(s.name, s.question.strip().split("\n")[0]) for s in STUDIES]
-    assert outline.methods() == [(m.name, (m.__doc__ or "").strip().split("\n")[0]) for m in METHODS]
+    assert outline.methods() == [(m.name, (m.__doc__ or "").strip().split("\n")[0]) for m in (*METHODS, *LITERATURE)]
     assert outline.metrics() == [(m.name, m.description) for m in METRICS]
 
 

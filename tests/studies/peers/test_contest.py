@@ -12,7 +12,7 @@ from studies.exchange.export import export
 from studies.metrics.table import study_table
 from studies.peers.contest import PEERS, Attempt, Peer, contest, hand_over
 from studies.peers.scene_folder import CannotDo, SceneFolder, moved
-from studies.plots.peers import draw, figure
+from studies.plots.campaigns.peers import draw, figure
 from studies.scenes import BALL_CLAMPED, LIVER_PROBE, STOMACH_PRESS
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status

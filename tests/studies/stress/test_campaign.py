@@ -6,7 +6,7 @@ import pickle
 import pandas as pd
 import pytest
 
-from studies.plots.breaking import LOOKS, draw
+from studies.plots.campaigns.breaking import LOOKS, draw
 from studies.stress import campaign
 from studies.stress.campaign import counts, run_trials, table_of
 from studies.stress.outcome import UNEXPLAINED, Outcome

@@ -9,7 +9,7 @@ import typer
 from studies.base.atomic import write_whole
 from studies.cli.progress import TerminalProgress
 from studies.cli.terminal import Results, console, errors, say
-from studies.plots.breaking import draw as draw_chart
+from studies.plots.campaigns.breaking import draw as draw_chart
 from studies.store.csv_table import write_table
 from studies.store.stamps import set_stamp
 from studies.stress.campaign import counts, drawn, run_trials, table_of

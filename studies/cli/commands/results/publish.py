@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from studies.base.lookup import lookup
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, say
 from studies.report import publish as publishing
+from studies.sweep.find_study import known_studies
 
 
 def publish(
@@ -17,8 +17,7 @@ def publish(
 ) -> None:
     """Copies tables and charts to results/published, and the summaries into README and docs; refuses stale results."""
     if studies:
-        chosen = [lookup(name, {study.name: study for study in STUDIES}, "study") for name in studies]
-        copies, absent = publishing.publish_some(results, chosen, Path(".")), []
+        copies, absent = publishing.publish_some(results, known_studies(studies), Path(".")), []
     else:
         copies, absent = publishing.publish(results, STUDIES, Path("."))
     for path in copies:

@@ -16,6 +16,7 @@ from studies.cli.terminal import Results, console, say, warn
 from studies.engines.choose import WORDS, engine_for
 from studies.geometry.mesher.jobs import cache_folder
 from studies.metrics.table import check_columns
+from studies.population import POPULATION
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.report.results import refresh
 from studies.store.links import link_study
@@ -23,7 +24,7 @@ from studies.store.paths import study_folder
 from studies.store.staleness import MISSING
 from studies.sweep.engine import Engine
 from studies.sweep.failures import Failures
-from studies.sweep.find_study import find_studies
+from studies.sweep.find_study import ON, find_studies
 from studies.sweep.plan import plan
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, warnings_of
@@ -49,6 +50,7 @@ def run(
     ] = None,
     on: Annotated[str, typer.Option(help=f"{WORDS} (docs/cluster.md)")] = "",
     portable: Annotated[bool, typer.Option(help="results equal on every x86-64 processor; slower")] = False,
+    organs: Annotated[str, typer.Option(help="a folder of surfaces, FOLDER or FOLDER:mm: the studies on these")] = "",
     dry: Annotated[bool, typer.Option("--dry-run", help="say what would run, why and how long; run nothing")] = False,
 ) -> None:
     """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
@@ -57,6 +59,8 @@ def run(
     wanted = _filter(only)
     root = results / SMOKE if smoke else results
     failures = Failures()
+    if organs:
+        studies = [f"{name}{ON}{organs}" for name in studies or [POPULATION]]
     with engine_for(on, jobs or JOBS, portable, root, say) as engine:
         for found in _checked(studies or []):
             study = found.smoke() if smoke else found

@@ -1,0 +1,119 @@
+"""Angular springs: what bends the surface is resisted at its nodes, in place of a volume constraint.
+
+Nedel, Thalmann, Real time muscle deformations using mass-spring systems, Computer Graphics International 1998: beside
+the linear springs, "angular springs" keep the angle between opposite edges at each node of the surface, meant to keep
+the shape and so the volume. Their energy is ½ κ (θ − θ0)² (docs/theory.md, eq. 14.5); their constants are left to the
+user. Here κ = `ratio` k̄ |a| |b|, k̄ the mean stiffness of the linear springs, so that bending an edge by its length
+takes `ratio` times the force of a linear spring.
+
+Limits: an angle below π is the same in a bulge and in a dent of equal depth; and a volume can shrink without any angle
+changing (all lengths by one factor). The volume is kept by nothing but stiffness, which also adds to the force.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from massspring.body.body import Body
+from massspring.body.springs import EDGES_OF_TRIANGLE, unique_edges
+from massspring.errors import MassSpringError
+from massspring.kernels.arrays.layout import BoundaryConditions, Push
+from massspring.kernels.jit.decorators import njit_lean
+from massspring.kernels.jit.stage_clock import SPRINGS, end_stage
+from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
+from massspring.kernels.step.end import end_step
+from massspring.layout.allocate import start
+from massspring.layout.state import State
+from massspring.methods.capabilities import Capabilities, No
+from massspring.methods.literature.angles import Angles, angle_forces_into, opening
+from massspring.methods.method import Method, begin_frame
+from massspring.world.obstacles import Attachment
+from massspring.world.surroundings import Surroundings
+
+TIE = 1e-9
+"""Cosines nearer to each other are equal but for round-off; the node that comes first is taken."""
+
+
+@njit_lean
+def angular_frame(frame, angles, force):
+    """One frame of symplectic Euler with angular springs as one more force (eq. 3.1, 3.2, 3.5, 3.7, 14.6)."""
+    push = Push(force, 1.0)
+    open_frame(frame)
+    for step in range(frame.boundary.position.shape[0]):
+        begin_step(frame, step, False)
+        angle_forces_into(frame.nodes.x, angles, force)
+        end_stage(frame.diagnostics.stage_times, SPRINGS)
+        search_contacts(frame, step, push)
+        end_step(frame, step, push, 0.0, None)
+
+
+@dataclass(frozen=True)
+class AngularSprings(Method):
+    """Springs that keep the angles between opposite surface edges (Nedel, Thalmann 1998); no volume kept."""
+
+    ratio: float = 1.0
+    """Force of an angular spring over that of a linear one [1]."""
+
+    name: ClassVar[str] = "angular_springs"
+    order: ClassVar[int] = 1
+    volume_tol: ClassVar[float | None] = None
+    capabilities: ClassVar[Capabilities] = Capabilities("none", thin_probes=No("how its angles meet them is not tried"))
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.ratio < float("inf"):
+            raise MassSpringError(f"{self.name}'s ratio is {self.ratio}; it must be positive and finite")
+
+    def why_not_among(self, surroundings: Surroundings) -> str | None:
+        """Why the method cannot run in such surroundings; None when it can."""
+        return "it keeps no volume that could be filled" if surroundings.targets else None
+
+    def added_stiffness(self, body: Body) -> csr_array:
+        """√κ ∂θ/∂x of every angle at rest, (3n, a)."""
+        angles = angles_of(body, self.ratio)
+        slope = angle_slopes(body.rest, angles) * np.sqrt(angles.stiffness)[:, None, None]
+        rows = 3 * angles.corner[:, :, None] + np.arange(3)
+        columns = np.broadcast_to(np.arange(len(slope))[:, None, None], rows.shape)
+        shape = (3 * body.node_count, len(slope))
+        return csr_array((slope.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+
+    def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
+        """The body at rest, or with velocities `v` (n, 3) [m/s], and its angles."""
+        return start(body, attachments, v, memory=angles_of(body, self.ratio))
+
+    def advance(self, state: State, boundary: BoundaryConditions) -> State:
+        """One frame."""
+        after = begin_frame(state, boundary)
+        angular_frame(after.frame(boundary), after.memory, np.empty_like(after.nodes.x))
+        return after
+
+
+def angles_of(body: Body, ratio: float) -> Angles:
+    """The angles at surface nodes between each edge and that which is most nearly opposite to it."""
+    ends = unique_edges(body.triangles, EDGES_OF_TRIANGLE).astype(np.int64)
+    both = np.concatenate([ends, ends[:, ::-1]])
+    both = both[np.argsort(both[:, 0], kind="stable")]
+    apexes, begin = np.unique(both[:, 0], return_index=True)
+    corners: set[tuple[int, int, int]] = set()
+    for apex, ring in zip(apexes.tolist(), np.split(both[:, 1], begin[1:]), strict=True):
+        edge = body.rest[ring] - body.rest[apex]
+        edge /= np.linalg.norm(edge, axis=1, keepdims=True)
+        cosine = edge @ edge.T
+        opposite = ring[np.argmax(cosine < cosine.min(axis=1, keepdims=True) + TIE, axis=1)]
+        corners |= {(min(i, j), apex, max(i, j)) for i, j in zip(ring.tolist(), opposite.tolist(), strict=True)}
+    corner = np.array(sorted(corners), dtype=np.int64)
+    measured = np.array([opening(body.rest, *three) for three in corner.tolist()])
+    stiffness = ratio * body.springs.stiffness.mean() * measured[:, 3] * measured[:, 4]
+    return Angles(corner, np.ascontiguousarray(measured[:, 0]), stiffness)
+
+
+def angle_slopes(x: np.ndarray, angles: Angles) -> np.ndarray:
+    """∂θ/∂x of the first end, the apex and the second end [1/m] at `x` (n, 3), (a, 3, 3); 0 of a straight angle."""
+    edge = x[angles.corner[:, [0, 2]]] - x[angles.corner[:, 1]][:, None]
+    length = np.linalg.norm(edge, axis=2, keepdims=True)
+    unit = edge / length
+    cosine = np.einsum("ai,ai->a", unit[:, 0], unit[:, 1])[:, None, None]
+    sine = np.linalg.norm(np.cross(unit[:, 0], unit[:, 1]), axis=1)[:, None, None]
+    ends = np.divide(cosine * unit - unit[:, ::-1], length * sine, out=np.zeros_like(unit), where=sine > 0.0)
+    return np.stack([ends[:, 0], -ends.sum(axis=1), ends[:, 1]], axis=1)

@@ -1,0 +1,164 @@
+"""Links of a chain mail: how far nodes may be apart along each axis, and what a moved node does to the others.
+
+A link asks low ≤ x_j − x_i ≤ high along each axis. Such bounds are closed under minima and maxima, so that fixed nodes
+lower the others in one pass and raise them in another, each node as little as it must; what comes out depends on no
+order (docs/theory.md, eq. 14.8).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from massspring.kernels.contact.gaps import gap_and_normal
+from massspring.kernels.jit.decorators import njit_inlined, njit_lean
+
+TOUCHING = 1e-12
+"""A node this little inside an obstacle [m] lies on it."""
+
+
+class Links(NamedTuple):
+    """2 s links, from both ends of each of s springs; n nodes."""
+
+    start: np.ndarray
+    """Where the links of each node begin, (n + 1,) int64."""
+    other: np.ndarray
+    """The node at the other end, (2s,) int64."""
+    rest: np.ndarray
+    """x_j − x_i at rest [m], (2s, 3)."""
+    low: np.ndarray
+    """[m], (2s, 3)."""
+    high: np.ndarray
+    """[m], (2s, 3)."""
+
+
+class Mail(NamedTuple):
+    """Links and scratch."""
+
+    links: Links
+    fixed: np.ndarray
+    """1 for nodes that neither links nor relaxation move in this step, (n,) uint8."""
+    queue: np.ndarray
+    """(n,) int64."""
+    queued: np.ndarray
+    """(n,) uint8."""
+
+
+@njit_inlined
+def spread(x, mail, axis, raising):
+    """Moves nodes along `axis` as little as links to fixed nodes, and to nodes so moved, ask, down or up."""
+    links, fixed, queue, queued = mail.links, mail.fixed, mail.queue, mail.queued
+    size, head, count = queue.shape[0], 0, 0
+    for i in range(size):
+        queued[i] = fixed[i]
+        if fixed[i] > 0:
+            queue[count] = i
+            count += 1
+    while count > 0:
+        i = queue[head]
+        head, count = (head + 1) % size, count - 1
+        queued[i] = 0
+        for e in range(links.start[i], links.start[i + 1]):
+            j = links.other[e]
+            bound = x[i, axis] + (links.low[e, axis] if raising else links.high[e, axis])
+            if (x[j, axis] >= bound) if raising else (x[j, axis] <= bound):
+                continue
+            if fixed[j] > 0:
+                continue
+            x[j, axis] = bound
+            if queued[j] == 0:
+                queued[j] = 1
+                queue[(head + count) % size] = j
+                count += 1
+
+
+@njit_lean
+def propagate(x, mail):
+    """All axes down, then up (eq. 14.8); whether a link is left beyond its limits: fixed nodes are too far apart."""
+    for axis in range(3):
+        spread(x, mail, axis, False)
+        spread(x, mail, axis, True)
+    links = mail.links
+    for i in range(x.shape[0]):
+        for e in range(links.start[i], links.start[i + 1]):
+            for axis in range(3):
+                apart = x[links.other[e], axis] - x[i, axis]
+                if apart > links.high[e, axis] + TOUCHING or apart < links.low[e, axis] - TOUCHING:
+                    return True
+    return False
+
+
+@njit_lean
+def push_out(x, model, mail, boundary, step):
+    """Puts surface nodes that are inside an obstacle onto it, and fixes them; how many."""
+    count = 0
+    for c in range(model.surface_nodes.shape[0]):
+        i = model.surface_nodes[c]
+        if model.touchable[i] == 0:
+            continue
+        if lifted(x, boundary, step, i):
+            mail.fixed[i] = 1
+            count += 1
+    return count
+
+
+@njit_inlined
+def lifted(x, boundary, step, i):
+    """Moves node i out of the obstacles that it is inside of, one after the other; whether it was in one."""
+    inside = False
+    for o in range(boundary.radius.shape[0]):
+        place = boundary.position[step, o]
+        r0, r1, r2 = x[i, 0] - place[0], x[i, 1] - place[1], x[i, 2] - place[2]
+        gap, n0, n1, n2 = gap_and_normal(boundary, o, r0, r1, r2)
+        if gap < -TOUCHING:
+            x[i, 0], x[i, 1], x[i, 2] = x[i, 0] - gap * n0, x[i, 1] - gap * n1, x[i, 2] - gap * n2
+            inside = True
+    return inside
+
+
+@njit_inlined
+def bounded(x, links, i, axis, place):
+    """`place` or the nearest position along `axis` that all links of node i allow."""
+    low, high = -np.inf, np.inf
+    for e in range(links.start[i], links.start[i + 1]):
+        j = links.other[e]
+        low = max(low, x[j, axis] - links.high[e, axis])
+        high = min(high, x[j, axis] - links.low[e, axis])
+    return max(low, min(place, high))
+
+
+@njit_lean
+def relax(x, model, mail, boundary, when):
+    """Moves each node that is not held to the mean of where its links would have it, within all its links and outside
+    of obstacles, one after the other (eq. 14.9); a node that cannot stays.
+
+    `when`: the step, and whether the last node comes first.
+    """
+    links, (step, backwards) = mail.links, when
+    for k in range(x.shape[0]):
+        i = k if not backwards else x.shape[0] - 1 - k
+        first, last = links.start[i], links.start[i + 1]
+        if model.inverse_mass[i] == 0.0 or first == last:
+            continue
+        old0, old1, old2 = x[i, 0], x[i, 1], x[i, 2]
+        for axis in range(3):
+            mean = 0.0
+            for e in range(first, last):
+                mean += x[links.other[e], axis] - links.rest[e, axis]
+            x[i, axis] = mean / (last - first)
+        if model.touchable[i] > 0:
+            lifted(x, boundary, step, i)
+        for axis in range(3):
+            x[i, axis] = bounded(x, links, i, axis, x[i, axis])
+        if model.touchable[i] > 0 and is_inside(x, boundary, step, i):
+            x[i, 0], x[i, 1], x[i, 2] = old0, old1, old2
+
+
+@njit_inlined
+def is_inside(x, boundary, step, i):
+    """Whether node i is inside an obstacle, round-off of one that lies on it aside."""
+    for o in range(boundary.radius.shape[0]):
+        place = boundary.position[step, o]
+        gap, _, _, _ = gap_and_normal(boundary, o, x[i, 0] - place[0], x[i, 1] - place[1], x[i, 2] - place[2])
+        if gap < -TOUCHING:
+            return True
+    return False

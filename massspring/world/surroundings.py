@@ -1,0 +1,25 @@
+"""What a body meets in a run, as far as a method may refuse it."""
+
+from dataclasses import dataclass
+
+from massspring.world.obstacles import Obstacle
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """Obstacles, what is held, loads and the start of a run."""
+
+    obstacles: tuple[Obstacle, ...] = ()
+    attachments: int = 0
+    """How many."""
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """[m/s²]."""
+    targets: bool = False
+    """Whether a kept volume is to change."""
+    moved: bool = False
+    """Whether the body starts with velocities, or in another shape than at rest."""
+
+    @property
+    def rough(self) -> bool:
+        """Whether an obstacle has friction."""
+        return any(getattr(obstacle, "friction", 0.0) != 0.0 for obstacle in self.obstacles)

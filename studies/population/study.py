@@ -1,0 +1,54 @@
+"""The study of a population: recipes × members, as every other study is run, stored and judged."""
+
+from collections.abc import Sequence
+
+from massspring import ImplicitVolume
+from studies.catalog.accuracy import LONG, SHORT, headline
+from studies.catalog.study import Chart, Study
+from studies.population.draw import Population
+from studies.runs.case import BodyRecipe, Case
+from studies.scene.kind import has_wall
+from studies.scene.scene import Scene
+
+POPULATION = "population"
+"""The study that `organbench run population` brings up to date."""
+MEMBERS = (Population("liver", 40), Population("kidney", 40), Population("stomach", 20))
+NODES = 550
+"""Surface nodes of the linear bodies, of a hollow organ as many again on its lumen."""
+
+
+def recipes_for(scene: Scene) -> tuple[tuple[BodyRecipe, float], ...]:
+    """The bodies that every member gets, and their step over the limit: the paper's; one volume; one volume per node;
+    quadratic and graded, of the size that the accuracy study takes first."""
+    axis = "centre_line" if has_wall(scene) else "straight"
+    return (
+        (BodyRecipe("surface", NODES, axis=axis), SHORT),
+        (BodyRecipe(nodes=NODES), SHORT),
+        (BodyRecipe(nodes=NODES, law="cotangent", volumes="nodal"), SHORT),
+        (headline(scene), LONG),
+    )
+
+
+def population_study(populations: Sequence[Population] = MEMBERS, name: str = POPULATION) -> Study:
+    """Every recipe on every member; members of different organs take turns, so that a study cut short knows them all.
+
+    Raises StudyError for a member that cannot be drawn.
+    """
+    drawn = [population.scenes() for population in populations]
+    turns = [scenes[at] for at in range(max(map(len, drawn), default=0)) for scenes in drawn if at < len(scenes)]
+    return study_of(turns, name)
+
+
+def study_of(scenes: Sequence[Scene], name: str) -> Study:
+    """The same recipes on any scenes."""
+    return Study(
+        name=name,
+        question="How accurate is each body on organs nobody has seen: the median, and the worst of twenty?",
+        cases=tuple(
+            Case(scene, body, ImplicitVolume(), dt_fraction=fraction)
+            for scene in scenes
+            for body, fraction in recipes_for(scene)
+        ),
+        charts=(Chart("distributions.png", "studies.plots.campaigns.population:draw"),),
+        columns=("force_end", "mean_error", "interior_error", "volume_worst", "min_j", "sway"),
+    )

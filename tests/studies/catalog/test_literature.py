@@ -1,0 +1,92 @@
+"""The literature's contestants run like ours, store what they have, and are skipped where a scene asks for more."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
+
+from massspring import LITERATURE, AngularSprings, ChainMail, ElasticResponse, LinearModes
+from studies.catalog.accuracy import judged_at_rest
+from studies.catalog.literature import LITERATURE_STUDY, literature_cases
+from studies.catalog.study import smoke_case
+from studies.exchange.entry import outside
+from studies.metrics.metrics import METRICS
+from studies.metrics.run import Run
+from studies.runs.case import BodyRecipe, Case, case_from_json
+from studies.runs.run import measure, replay, run_case
+from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, SPLEEN_SAG
+from studies.store.record import Status, read_record
+
+NODAL = BodyRecipe(nodes=150, law="cotangent", volumes="nodal")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread():
+    """As in the processes of a sweep: products of a few hundred rows do not gain from a second."""
+    with threadpool_limits(1):
+        yield
+
+
+@pytest.fixture(scope="module", params=LITERATURE, ids=lambda kind: kind.name)
+def ran(request, one_thread, mesh_cache, tmp_path_factory):
+    """The case on the ball held at both caps, made small, and where its record lies."""
+    (case,) = (case for case in literature_cases(BALL_CLAMPED) if type(case.method) is request.param)
+    case = replace(smoke_case(case), scene=replace(BALL_CLAMPED, reference=None))
+    if isinstance(case.method, LinearModes | ElasticResponse):
+        case = replace(case, body=NODAL)
+    return case, run_case(tmp_path_factory.mktemp("literature"), "literature", case)
+
+
+def test_each_runs_and_its_record_is_read_back(ran):
+    case, path = ran
+    record = read_record(path)
+    assert (record.status, record.message) == (Status.OK, "")
+    assert case_from_json(record.key) == case.replaced(timed=False)
+    force = record.fields["held_force"].values
+    assert np.isnan(force).all() if isinstance(case.method, ChainMail) else force[-1, 1, 2] < -0.2
+
+
+def test_a_replay_is_equal_to_the_last_bit(ran):
+    assert replay(ran[1])[2] is None
+
+
+def test_metrics_without_a_reference_are_numbers(ran):
+    case, path = ran
+    run = Run(case, read_record(path), None, None)
+    found = {metric.name: metric(run) for metric in METRICS if metric.name in ("volume_worst", "min_j", "j_spread")}
+    assert np.isfinite(list(found.values())).all() and 0.5 < found["volume_worst"] < 20.0
+
+
+@pytest.mark.parametrize(
+    ("scene", "method", "body", "sentence"),
+    [
+        (BALL_SQUEEZE, LinearModes(), NODAL, "nothing is held"),
+        (BALL_SQUEEZE, ElasticResponse(), NODAL, "nothing is held"),
+        (BALL_CLAMPED, ElasticResponse(), BodyRecipe(nodes=150), "its springs must have no length"),
+        (SPLEEN_SAG, ChainMail(), BodyRecipe(nodes=150), "nothing weighs"),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_what_a_scene_asks_beyond_them_is_a_skip_with_a_reason(mesh_cache, scene, method, body, sentence):
+    record = measure(Case(scene, body, method, dt=0.02))
+    assert record.status == Status.SKIPPED and sentence in record.message
+
+
+def test_an_entry_cannot_take_their_names():
+    for kind in LITERATURE:
+        with pytest.raises(Exception, match="is a method of this program"):
+            outside(kind.name)
+
+
+def test_settings_are_part_of_the_name_of_a_case():
+    names = {case.name for case in LITERATURE_STUDY.cases if case.scene == BALL_CLAMPED}
+    assert Case(BALL_CLAMPED, method=AngularSprings(2.0)).name not in names
+
+
+@pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)
+def test_each_stands_once_beside_ours_in_every_scene(scene):
+    found = [case for case in LITERATURE_STUDY.cases if case.scene == scene]
+    others = [case for case in found if type(case.method) in LITERATURE]
+    assert [type(case.method) for case in others] == list(LITERATURE) and len(found) == len(others) + 2
+    assert not any(case.method.capabilities.conditionally_stable for case in others if case.dt != "auto")
