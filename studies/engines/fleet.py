@@ -33,9 +33,9 @@ class Member:
         """Whether it could do a piece of so many bytes, with nothing beside."""
         return not self.memory or need <= self.memory
 
-    def takes(self, need: float) -> bool:
-        """Whether it can do so now."""
-        return len(self.busy) < self.threads and self.suffices(need + sum(self.busy.values()))
+    def has_room(self, need: float) -> bool:
+        """Whether it could do so beside what it has."""
+        return self.suffices(need + sum(self.busy.values()))
 
 
 class Fleet:
@@ -61,7 +61,7 @@ class Fleet:
     def _next_for(self, member: Member) -> int | None:
         if len(member.busy) >= member.threads:
             return None
-        return next((number for number in self.waiting if member.takes(self.needs[number])), None)
+        return next((number for number in self.waiting if member.has_room(self.needs[number])), None)
 
     def done(self, address: str, number: int) -> None:
         """A piece is done."""
