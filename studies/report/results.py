@@ -120,7 +120,8 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
     if before.get("inputs") == shown["inputs"] and all(path.exists() for path in (*paths, part_path(root, study))):
         return paths, before["remarks"]
     runs, shown["remarks"] = load_runs(root, study)
-    entries, unreadable = entries_beside(root, study.scenes, runs)
+    references = {run.case.scene.name: run.reference for run in runs}
+    entries, unreadable = entries_beside(root, study.scenes, lambda scene: references.get(scene.name))
     shown["remarks"] += unreadable
     rows = study_table([*runs, *entries], study.columns)
     write_table(table, rows)

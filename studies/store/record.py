@@ -5,7 +5,7 @@ A failure is a record too, with its status, its message and NaN after the moment
 
 import io
 import json
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -114,6 +114,14 @@ def peek(path: Path) -> Record:
     return record if untouched else replace(read_record(path), fields={})
 
 
+def glance(path: Path, attributes: Collection[str]) -> Record:
+    """As `peek`, with those of the named attributes that are there alone: a third of the time for a small file."""
+    with open_results(path) as (file, untouched):
+        if untouched:
+            return _header(path, file, (*HEADER, *attributes))[0]
+    return peek(path)
+
+
 def canonical(key: str) -> str:
     """The JSON text of a case with sorted names and no blanks, so that equal cases are equal text."""
     try:
@@ -156,8 +164,8 @@ def _is_short_list(value: Any) -> bool:
     return array.dtype.kind in "biuf" and array.nbytes <= 4096
 
 
-def _header(path: Path, file: h5py.File) -> tuple[Record, dict[str, str]]:
-    """The record without fields, and the digest of each field by name."""
+def _header(path: Path, file: h5py.File, wanted: Collection[str] | None = None) -> tuple[Record, dict[str, str]]:
+    """The record without fields, of its attributes all or those `wanted`; and the digest of each field by name."""
     if "schema" not in file.attrs:
         raise StudyError(f"{path} is an HDF5 file, but not a results file of organbench: it has no schema version")
     schema = _plain(file.attrs["schema"])
@@ -172,7 +180,10 @@ def _header(path: Path, file: h5py.File) -> tuple[Record, dict[str, str]]:
         raise DamagedFile(f"{path} lacks the attribute {CHECKSUMS!r}: {AGAIN}")
     digests = json.loads(str(file.attrs[CHECKSUMS]))
     values = {}
-    for name, digest in digests["attributes"].items():
+    chosen = digests["attributes"]
+    if wanted is not None:
+        chosen = {name: chosen[name] for name in wanted if name in chosen}
+    for name, digest in chosen.items():
         if name not in file.attrs:
             raise DamagedFile(f"{path} lacks the attribute {name!r}: {AGAIN}")
         values[name] = _plain(file.attrs[name])

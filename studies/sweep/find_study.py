@@ -23,8 +23,12 @@ def find_study(name: str) -> Study:
     study = getattr(load_file(Path(name)), "STUDY", None)
     if not isinstance(study, Study):
         raise StudyError(f"{name} defines no STUDY of type studies.catalog.Study; see CONTRIBUTING.md")
+    seen: set[object] = set()
     for case in study.cases:
-        _check_stored(name, case)
+        parts = _parts(case)
+        if not seen.issuperset(parts):
+            _check_stored(name, case)
+            seen.update(parts)
     return study
 
 
@@ -32,6 +36,13 @@ def find_studies(names: Sequence[str]) -> list[Study]:
     """The studies of so many names; the main ones of the catalogue for none, and for the name "main"."""
     found = [[s for s in STUDIES if s.main] if name == MAIN else [find_study(name)] for name in names or [MAIN]]
     return [study for group in found for study in group]
+
+
+def _parts(case: Case) -> tuple[object, ...]:
+    """What decides whether a case can be stored: equal parts can or cannot alike. Of numbers it is their type."""
+    numbers = (case.dt, case.dt_fraction, case.frames, case.beyond_limit, case.precision)
+    types = tuple(value if isinstance(value, str) else type(value) for value in numbers)
+    return id(case.scene), repr(case.body), (type(case.method), repr(case.method)), (*types, repr(case.recorded))
 
 
 def _check_stored(name: str, case: Case) -> None:

@@ -25,11 +25,12 @@ from studies.runs.current import case_path
 from studies.runs.run import run_case
 from studies.store.archived import check_no_archive
 from studies.sweep.failures import Failures, store_failure
+from studies.sweep.known import Known
 from studies.sweep.own_files import Given, given_files, load_given
 from studies.sweep.tasks import Task, tasks_of
 from studies.sweep.workers import done_or_dead
 from studies.timing.alone import alone
-from studies.timing.cases import time_cases, timing_is_current
+from studies.timing.cases import time_cases
 
 COMPILED = "NUMBA_CACHE_DIR"
 """Where the user may want compiled code."""
@@ -150,7 +151,8 @@ def run_studies(
     """
     check_no_archive(root)
     root = root.absolute()
-    rule = wanted or (lambda task: not task.is_current())
+    known = Known(root)
+    rule = wanted or (lambda task: known.why_stale(task) is not None)
     todo = [replace(task, seen=task.state()) for task in tasks_of(root, studies) if rule(task)]
     if todo:
         check_writable(root)
@@ -169,10 +171,11 @@ def measure_times(root: Path, study: Study, progress: Progress, on_compile: Told
     """Times what is not timed yet, of `among` where given, when no other command does; how many that were."""
 
     def pending() -> list[Case]:
+        known = Known(root)
         return [
             case
             for case in study.cases
-            if case.timed and not timing_is_current(root, study.name, case)
+            if case.timed and known.can_be_timed(study.name, case) and known.why_untimed(study.name, case) is not None
             if among is None or case_path(root, study.name, case) in among
         ]
 

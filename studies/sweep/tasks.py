@@ -9,6 +9,7 @@ from studies.catalog.study import Study
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import Case
 from studies.runs.current import case_path, why_case_is_stale
+from studies.runs.digest import case_digest
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,10 @@ class Task:
 
 def tasks_of(root: Path, studies: Iterable[Study]) -> list[Task]:
     """Everything the studies need, each piece once, longest first."""
-    tasks: dict[Path, Task] = {}
+    tasks: dict[object, Task] = {}
     for study in studies:
-        found = [reference_solve for scene in study.scenes for reference_solve in reference_solves(scene)]
-        for work in (*found, *study.cases):
-            task = Task(root, study.name, work)
-            tasks[task.path()] = task
+        for solve in (solve for scene in study.scenes for solve in reference_solves(scene)):
+            tasks[solve.path(root)] = Task(root, study.name, solve)
+        for case in study.cases:
+            tasks[study.name, case_digest(case)] = Task(root, study.name, case)
     return sorted(tasks.values(), key=lambda task: -task.weight)

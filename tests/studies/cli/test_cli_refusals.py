@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.cli.commands.results import table
 from studies.runs.current import case_path
 from studies.store.paths import record_files
 from studies.store.record import Status, read_record, write_record
@@ -49,8 +48,6 @@ REPOSITORY = Path(__file__).parents[3]
 )
 def test_unknown_words_get_the_nearest_match(refused, tmp_path, monkeypatch, words, told):
     monkeypatch.setenv("ORGANBENCH_RESULTS", str(tmp_path))
-    if words[0] == "table":
-        monkeypatch.setattr(table, "load_runs", lambda root, study: ([], []))
     assert told in refused(*words)
     assert list(tmp_path.iterdir()) == []
 

@@ -21,14 +21,16 @@ from studies.store.paths import study_folder
 from studies.store.staleness import MISSING
 from studies.sweep.failures import Failures
 from studies.sweep.find_study import find_studies
+from studies.sweep.known import Known
 from studies.sweep.plan import plan
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, warnings_of
-from studies.sweep.tasks import Task
+from studies.sweep.tasks import Task, tasks_of
 
 SMOKE = "smoke"
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 Wanted = Callable[[Task], bool] | None
+Rule = Callable[[Task, Known], bool]
 
 
 def run(
@@ -43,15 +45,16 @@ def run(
     dry: Annotated[bool, typer.Option("--dry-run", help="say what would run, why and how long; run nothing")] = False,
 ) -> None:
     """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
-    wanted = _filter(only)
+    rules = _rules(only)
     root = results / SMOKE if smoke else results
     failures = Failures()
     for found in _checked(studies or []):
         study = found.smoke() if smoke else found
         if case:
             study = _case_alone(study, case)
+        wanted = _wanted(root, study, rules)
         if dry:
-            dry_run(console, study.name, plan(root, study, wanted), jobs)
+            dry_run(console, study.name, plan(root, study, wanted), jobs, root)
         else:
             _bring_up_to_date(root, study, jobs, wanted, not case, failures)
     if failures.causes:
@@ -88,12 +91,18 @@ def _checked(names: list[str]) -> list[Study]:
     return studies
 
 
-def _filter(only: str) -> Wanted:
-    if not only:
-        return None
-    rules: dict[str, Callable[[Task], bool]] = {
+def _rules(only: str) -> list[Rule]:
+    rules: dict[str, Rule] = {
         "failed": failed,
-        "stale": lambda task: task.why_stale() not in (None, MISSING),
+        "stale": lambda task, known: known.why_stale(task) not in (None, MISSING),
     }
-    chosen = [lookup(word.strip(), rules, "filter") for word in only.split(",")]
-    return lambda task: any(rule(task) for rule in chosen)
+    return [lookup(word.strip(), rules, "filter") for word in only.split(",")] if only else []
+
+
+def _wanted(root: Path, study: Study, rules: list[Rule]) -> Wanted:
+    """What one of the rules lets run; None for none, where all that is not current runs."""
+    if not rules:
+        return None
+    known = Known(root)
+    chosen = {task.path().absolute() for task in tasks_of(root, [study]) if any(rule(task, known) for rule in rules)}
+    return lambda task: task.path().absolute() in chosen

@@ -1,0 +1,51 @@
+"""Studies of very many cases whose records are made up: what they cost to look after, without running them."""
+
+from dataclasses import replace
+from itertools import islice, product
+from pathlib import Path
+
+from studies.catalog.study import Study
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.current import run_fingerprint
+from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.store.checksums import BLOCK, attribute_digest, sealed
+from studies.store.paths import SUFFIX, file_stem, key_digest, study_folder
+from studies.store.record import Record, write_record
+
+NAME = "many"
+FRACTIONS = [k / 10_000 for k in range(1001, 10_000) if k % 10]
+"""Of the stability limit; all of one length as text."""
+NODES = range(1000, 10_000)
+SCENE = replace(BALL_SQUEEZE, reference=None)
+
+
+def many_study(count: int) -> Study:
+    """A study of so many cases, which differ by nodes and time step. At most 73 million."""
+    settings = islice(product(NODES, FRACTIONS), count)
+    bodies = {nodes: BodyRecipe(nodes=nodes) for nodes in NODES}
+    cases = tuple(Case(SCENE, bodies[nodes], dt_fraction=fraction) for nodes, fraction in settings)
+    return Study(NAME, "What do many cases cost?", cases, (), ("volume_worst", "volume_end", "min_j", "penetration"))
+
+
+def make_up(root: Path, study: Study, like: Record) -> int:
+    """Stores a record for every case of `study`, a copy of `like` but for its case; the bytes of each."""
+    first = study.cases[0]
+    path = study_folder(root, study.name) / "template"
+    write_record(path, replace(like, key=first.key, name=first.name, fingerprint=run_fingerprint()))
+    image = path.read_bytes()
+    path.unlink()
+    before = _texts(first)
+    for case in study.cases:
+        own, copy = _texts(case), image
+        for old, new in zip(before, own, strict=True):
+            assert len(old) == len(new) and copy.count(old) == 1  # else it would be no HDF5 file any more
+            copy = copy.replace(old, new)
+        name = file_stem(case.name, key_digest(case.key)) + SUFFIX
+        path.with_name(name).write_bytes(sealed(b"\0" * BLOCK + copy[BLOCK:]))
+    return len(image)
+
+
+def _texts(case: Case) -> tuple[bytes, ...]:
+    """What is a case's own in the file of its record."""
+    digests = (attribute_digest(case.key), attribute_digest(case.name))
+    return tuple(text.encode() for text in (case.key, case.name, *digests))
