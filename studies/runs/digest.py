@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import Any, Generic, TypeVar
 
 from studies.runs.case import Case, case_to_dict
+from studies.store.paths import key_digest
 from studies.store.record import canonical
 
 T, V = TypeVar("T"), TypeVar("V")
@@ -38,7 +39,10 @@ class Remembered(Generic[T, V]):
 
 
 def _digest(case: Case) -> str:
-    scene, body, method = _parts(case)
+    found = _parts(case)
+    if found is None:
+        return key_digest(case.key)
+    scene, body, method = found
     plain = {
         "beyond_limit": case.beyond_limit,
         "body": body,
@@ -64,10 +68,13 @@ _scenes = Remembered[Any, str](lambda scene: "")
 _others: dict[bytes, str] = {}
 
 
-def _parts(case: Case) -> tuple[str, str, str]:
-    """Canonical JSON of what cases share: of the scene by identity, of body and method by what they hold."""
-    # Equal bytes are equal settings of equal types: 1 and 1.0 are different JSON.
-    body, method = pickle.dumps(case.body), pickle.dumps(case.method)
+def _parts(case: Case) -> tuple[str, str, str] | None:
+    """Canonical JSON of what cases share: of the scene by identity, of body and method by what they hold. None for a
+    method of a class that was made on the fly."""
+    try:  # equal bytes are equal settings of equal types: 1 and 1.0 are different JSON
+        body, method = pickle.dumps(case.body), pickle.dumps(case.method)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return None
     if not (_scenes(case.scene) and body in _others and method in _others):
         if len(_others) > MOST:
             _others.clear()

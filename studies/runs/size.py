@@ -1,4 +1,4 @@
-"""How many bytes the record of a case will have, about: from what its fields are (studies.store.schema), no mesh made."""
+"""How many bytes the record of a case will have, about, told before there is a mesh from what its fields will be."""
 
 from studies.runs.case import Case
 from studies.store.schema import SURFACE

@@ -4,14 +4,11 @@ That is the record, this machine's frame times, the reference of the scene, and 
 """
 
 import hashlib
-import json
-import time
 from collections.abc import Sequence
 
 from massspring.sources import source_fingerprint
 from studies.base.errors import DamagedFile
 from studies.base.own_file import file_of
-from studies.base.shelf import Kept
 from studies.catalog.study import Study
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run
@@ -20,7 +17,7 @@ from studies.runs.case import Case
 from studies.runs.current import case_fingerprint
 from studies.store.archived import shown_machine
 from studies.store.index.entry import Entry
-from studies.store.index.folder import EACH
+from studies.store.index.room import Room
 from studies.store.paths import timing_name
 from studies.store.record import read_record
 from studies.sweep.known import Known
@@ -47,9 +44,7 @@ class Rows:
     def __init__(self, known: Known, study: Study, metrics: Sequence[Metric]) -> None:
         self.known, self.study, self.metrics = known, study, metrics
         self.folder, self.references = known.folder(study.name), References(known)
-        self.room, self.machine = room_of(metrics), shown_machine(known.root)
-        self.kept, self.fresh = self.folder.shelf.load(self.room), dict[str, Kept]()
-        self.began = time.monotonic()
+        self.room, self.machine = Room(self.folder, room_of(metrics)), shown_machine(known.root)
         self.problems = [p for scene in study.scenes if (p := self.references.problem(scene)) is not None]
         code = source_fingerprint("studies.metrics.table", "studies.reference.load", "studies.timing.cases")
         self.scenes = {scene.name: _hash(f"{code} {self.references.state(scene)}") for scene in study.scenes}
@@ -63,34 +58,26 @@ class Rows:
         if entry.fault:
             self.problems.append(entry.error())
             return None
-        state = self._state(case, entry)
-        before = self.kept.get(entry.file)
-        if before is not None and before.state == state:
-            return json.loads(before.text)
+        timing = self._timing(case, entry)
         try:
-            row = row_of(self._run(case, entry), self.metrics)
+            return self.room.get(
+                entry.file, self._depends(case, timing), lambda: row_of(self._run(case, entry, timing), self.metrics)
+            )
         except DamagedFile as problem:  # since the index read it
-            self.folder.forget([entry.file])
+            self.folder.forget([entry.file, *([timing.file] if timing else [])])
             self.problems.append(problem)
             return None
-        self.fresh[entry.file] = Kept(state, json.dumps(row))
-        if time.monotonic() - self.began > EACH:
-            self.keep()
-        return row
 
     def keep(self) -> None:
-        """Keeps what was measured, and forgets what there is no more."""
-        gone = [name for name in self.kept if name not in self.folder.entries]
-        shelf = self.folder.shelf
-        shelf.put(self.room, self.fresh, gone)
-        others = [room for room in shelf.rooms() if room.startswith(ROOM) and room != self.room]
-        shelf.drop(others[: max(0, 1 + len(others) - MOST_ROOMS)])
-        self.began, self.fresh = time.monotonic(), {}
+        """Keeps what was measured, and forgets some of too many sets of metrics."""
+        self.room.keep()
+        others = [room for room in self.folder.shelf.rooms() if room.startswith(ROOM) and room != self.room.name]
+        self.folder.shelf.drop(others[: max(0, 1 + len(others) - MOST_ROOMS)])
 
-    def _run(self, case: Case, entry: Entry) -> Run:
+    def _run(self, case: Case, entry: Entry, timing: Entry | None) -> Run:
         record = read_record(self.folder.folder / entry.file)
-        timing = read_timing(self.known.root, self.study.name, case) if self._timing(case, entry) else None
-        return Run(case, record, self.references.of(case.scene), timing)
+        measured = read_timing(self.known.root, self.study.name, case) if timing else None
+        return Run(case, record, self.references.of(case.scene), measured)
 
     def _timing(self, case: Case, entry: Entry) -> Entry | None:
         """The frame times that are shown; None also of a damaged file, which is told of."""
@@ -100,11 +87,10 @@ class Rows:
             return None
         return timing
 
-    def _state(self, case: Case, entry: Entry) -> str:
-        """What tells a row from that of any other record, timing, reference and code."""
-        timing = self._timing(case, entry)
-        states = [self.folder.states[one.file] for one in (entry, timing) if one is not None]
-        return f"{' '.join(states)} {case_fingerprint(case)} {self.scenes[case.scene.name]}"
+    def _depends(self, case: Case, timing: Entry | None) -> str:
+        """What a row depends on beside the record: frame times, code, reference."""
+        timed = self.folder.states[timing.file] if timing else "not timed"
+        return f"{timed} {case_fingerprint(case)} {self.scenes[case.scene.name]}"
 
 
 def room_of(metrics: Sequence[Metric]) -> str:

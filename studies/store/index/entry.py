@@ -53,9 +53,14 @@ def state_of(found: os.stat_result) -> str:
     return f"{found.st_size} {found.st_mtime_ns} {found.st_ctime_ns} {found.st_ino}"
 
 
+def written(state: str | None) -> str:
+    """Size and time of a file, which a copy of the folder has too; of none, nothing."""
+    return "" if state is None else " ".join(state.split()[:2])
+
+
 def read_entry(path: Path) -> Entry:
     """Of a file, held to its checksums. What is wrong with it is part of the entry."""
-    size = path.stat().st_size
+    size = path.stat().st_size if path.is_file() else 0
     try:
         record = glance(path, KNOWN)
         digest = key_digest(record.key)

@@ -44,13 +44,7 @@ class FolderIndex:
         begun, fresh = time.monotonic(), dict[str, Kept]()
         self.shelf.put(ENTRIES, {}, gone)
         for name in names:
-            try:
-                entry = read_entry(self.folder / name)
-            except FileNotFoundError:  # removed, or replaced by another command, since the folder was listed
-                self.entries.pop(name, None)
-                self.states.pop(name)
-                continue
-            self.entries[name] = entry
+            entry = self.entries[name] = read_entry(self.folder / name)
             fresh[name] = Kept(self.states[name], text_of(entry))
             if time.monotonic() - begun > EACH:
                 self.shelf.put(ENTRIES, fresh)

@@ -42,9 +42,7 @@ def prune(
         gone = remove(found)
         say(f"removed {len(gone)} files, {size(gone)}" + _left(found, gone))
     else:
-        say(
-            f"nothing is removed yet: --rule with the rules that you mean, and --yes, removes them ({size(found)} in all)"
-        )
+        say(f"nothing is removed yet ({size(found)}): --rule with the rules that you mean, and --yes, does")
 
 
 def show(found: list[Prunable], rule: Rule, listed: bool) -> None:
