@@ -166,27 +166,28 @@ def _is_short_list(value: Any) -> bool:
 
 def _header(path: Path, file: h5py.File, wanted: Collection[str] | None = None) -> tuple[Record, dict[str, str]]:
     """The record without fields, of its attributes all or those `wanted`; and the digest of each field by name."""
-    if "schema" not in file.attrs:
+    attributes = file.attrs  # a new one each time it is asked for, and each opens the file's root
+    if "schema" not in attributes:
         raise StudyError(f"{path} is an HDF5 file, but not a results file of organbench: it has no schema version")
-    schema = _plain(file.attrs["schema"])
+    schema = _plain(attributes["schema"])
     if schema != SCHEMA:
         raise OtherVersion(
             f"{path} has results schema {schema}, this version reads {SCHEMA}: run its case again, "
             "or read it with the version that wrote it"
         )
-    if _plain(file.attrs.get("kind")) == INDEX_KIND:
+    if _plain(attributes.get("kind")) == INDEX_KIND:
         raise StudyError(f"{path} is the index of a study, not a case: give one of the files beside it")
-    if CHECKSUMS not in file.attrs:
+    if CHECKSUMS not in attributes:
         raise DamagedFile(f"{path} lacks the attribute {CHECKSUMS!r}: {AGAIN}")
-    digests = json.loads(str(file.attrs[CHECKSUMS]))
+    digests = json.loads(str(attributes[CHECKSUMS]))
     values = {}
     chosen = digests["attributes"]
     if wanted is not None:
         chosen = {name: chosen[name] for name in wanted if name in chosen}
     for name, digest in chosen.items():
-        if name not in file.attrs:
+        if name not in attributes:
             raise DamagedFile(f"{path} lacks the attribute {name!r}: {AGAIN}")
-        values[name] = _plain(file.attrs[name])
+        values[name] = _plain(attributes[name])
         if attribute_digest(values[name]) != digest:
             raise DamagedFile(f"{path}: the attribute {name!r} has changed since it was written: {AGAIN}")
     header = {name: values.pop(name) for name in HEADER}

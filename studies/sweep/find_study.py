@@ -4,16 +4,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from studies.base.collection import uncollected
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
 from studies.runs.case import Case, case_from_json, case_to_dict
+from studies.runs.digest import parts_of
 from studies.sweep.own_files import load_file
 
 MAIN = "main"
 """Stands for the main studies of the catalogue; no study has this name."""
 
 
+@uncollected()
 def find_study(name: str) -> Study:
     """A study of the catalogue, or STUDY of a Python file. Raises StudyError, for whatever is wrong with the file."""
     if not name.endswith(".py"):
@@ -25,10 +28,10 @@ def find_study(name: str) -> Study:
         raise StudyError(f"{name} defines no STUDY of type studies.catalog.Study; see CONTRIBUTING.md")
     seen: set[object] = set()
     for case in study.cases:
-        parts = _parts(case)
-        if not seen.issuperset(parts):
+        parts, numbers = parts_of(case), _types(case)
+        if parts is None or numbers not in seen or not seen.issuperset(parts):
             _check_stored(name, case)
-            seen.update(parts)
+            seen.update((*(parts or ()), numbers))
     return study
 
 
@@ -38,11 +41,10 @@ def find_studies(names: Sequence[str]) -> list[Study]:
     return [study for group in found for study in group]
 
 
-def _parts(case: Case) -> tuple[object, ...]:
-    """What decides whether a case can be stored: equal parts can or cannot alike. Of numbers it is their type."""
-    numbers = (case.dt, case.dt_fraction, case.frames, case.beyond_limit, case.precision)
-    types = tuple(value if isinstance(value, str) else type(value) for value in numbers)
-    return id(case.scene), repr(case.body), (type(case.method), repr(case.method)), (*types, repr(case.recorded))
+def _types(case: Case) -> tuple[object, ...]:
+    """Of the numbers of a case, whose values can all be stored; with its parts it decides whether a case can be."""
+    numbers = (case.dt, case.dt_fraction, case.frames, case.beyond_limit)
+    return (*map(type, numbers), case.precision, case.recorded)
 
 
 def _check_stored(name: str, case: Case) -> None:

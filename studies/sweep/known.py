@@ -30,6 +30,7 @@ class Known:
     def __init__(self, root: Path, check: bool = False) -> None:
         self.root, self.check = Path(root), check
         self._folders: dict[str, FolderIndex] = {}
+        self._codes: dict[tuple[type, str], str] = {}
 
     def folder(self, study: str) -> FolderIndex:
         """Of a study, or REFERENCES."""
@@ -46,6 +47,14 @@ class Known:
         name = file_stem(case.name, digest) + SUFFIX
         return next((entry for entry in found if entry.file == name), None)
 
+    def code(self, case: Case) -> str:
+        """Of what makes the run of a case (studies.runs.current.case_fingerprint): all that its method and its law
+        come from."""
+        made_by = type(case.method), case.body.law
+        if made_by not in self._codes:
+            self._codes[made_by] = case_fingerprint(case)
+        return self._codes[made_by]
+
     def of_solve(self, solve: ReferenceSolve) -> Entry | None:
         """The file of a piece of a reference."""
         return self.folder(REFERENCES).entries.get(solve.path(self.root).name)
@@ -57,14 +66,18 @@ class Known:
 
     def why_stale(self, task: Task) -> str | None:
         """Why a piece must run (again) (studies.store.staleness); None when it need not."""
-        work = task.work
+        return self.look(task)[1]
+
+    def look(self, task: Task) -> tuple[Entry | None, str | None]:
+        """The file of a piece, and why it must run."""
+        entry, work = self.entry(task), task.work
         if isinstance(work, ReferenceSolve):
-            return self.why_solve_is_stale(work)
-        return self.why_case_is_stale(task.study, work)
+            return entry, _why(entry, lambda: key_digest(work.key), reference_fingerprint())
+        return entry, _why(entry, lambda: case_digest(work), self.code(work))
 
     def why_case_is_stale(self, study: str, case: Case) -> str | None:
         """The same of a case."""
-        return _why(self.of_case(study, case), lambda: case_digest(case), case_fingerprint(case))
+        return _why(self.of_case(study, case), lambda: case_digest(case), self.code(case))
 
     def why_solve_is_stale(self, solve: ReferenceSolve) -> str | None:
         """The same of a piece of a reference."""
@@ -82,7 +95,7 @@ class Known:
 
     def why_untimed(self, study: str, case: Case) -> str | None:
         """Why this machine must time a case (again), were it to be timed; None when it need not."""
-        return _why(self.of_timing(study, case), lambda: case_digest(case), case_fingerprint(case))
+        return _why(self.of_timing(study, case), lambda: case_digest(case), self.code(case))
 
     def standing(self, solve: ReferenceSolve) -> SolveStanding:
         """How a piece of a reference stands, as `studies.reference.reference_solves.standing_of` tells it."""

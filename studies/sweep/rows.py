@@ -7,6 +7,7 @@ import hashlib
 from collections.abc import Sequence
 
 from massspring.sources import source_fingerprint
+from studies.base.collection import uncollected
 from studies.base.errors import DamagedFile
 from studies.base.own_file import file_of
 from studies.catalog.study import Study
@@ -14,7 +15,6 @@ from studies.metrics.metric import Metric
 from studies.metrics.run import Run
 from studies.metrics.table import Row, row_of
 from studies.runs.case import Case
-from studies.runs.current import case_fingerprint
 from studies.store.archived import shown_machine
 from studies.store.index.entry import Entry
 from studies.store.index.room import Room
@@ -30,6 +30,7 @@ MOST_ROOMS = 4
 """Sets of metrics whose rows are kept."""
 
 
+@uncollected()
 def table_rows(known: Known, study: Study, metrics: Sequence[Metric]) -> tuple[list[Row], list[str], References]:
     """A row per stored case (studies.metrics.table), what is missing or damaged in sentences, and the references."""
     rows = Rows(known, study, metrics)
@@ -90,7 +91,7 @@ class Rows:
     def _depends(self, case: Case, timing: Entry | None) -> str:
         """What a row depends on beside the record: frame times, code, reference."""
         timed = self.folder.states[timing.file] if timing else "not timed"
-        return f"{timed} {case_fingerprint(case)} {self.scenes[case.scene.name]}"
+        return f"{timed} {self.known.code(case)} {self.scenes[case.scene.name]}"
 
 
 def room_of(metrics: Sequence[Metric]) -> str:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from studies.base.collection import uncollected
 from studies.catalog.study import Study
 from studies.store.schema import Status
 from studies.store.staleness import MISSING
@@ -29,6 +30,7 @@ class Standing:
     message: str
 
 
+@uncollected()
 def standings(root: Path, study: Study, known: Known | None = None) -> list[Standing]:
     """Every piece of a study: ok, failed in some way, stale or missing."""
     known = known or Known(root)
@@ -37,7 +39,7 @@ def standings(root: Path, study: Study, known: Known | None = None) -> list[Stan
 
 def standing_of(task: Task, known: Known) -> Standing:
     """How a piece stands."""
-    entry, why = known.entry(task), known.why_stale(task)
+    entry, why = known.look(task)
     if entry is None or why is not None:
         return Standing(task, "missing" if why == MISSING else "stale", why or MISSING)
     return Standing(task, entry.status, entry.message)

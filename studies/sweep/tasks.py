@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from studies.base.atomic import is_there
+from studies.base.collection import uncollected
 from studies.catalog.study import Study
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import Case
@@ -64,6 +65,7 @@ class Task:
         )
 
 
+@uncollected()
 def tasks_of(root: Path, studies: Iterable[Study]) -> list[Task]:
     """Everything the studies need, each piece once, longest first."""
     tasks: dict[object, Task] = {}

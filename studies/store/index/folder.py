@@ -11,13 +11,15 @@ from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 
+from studies.base.collection import uncollected
 from studies.base.errors import StudyError
 from studies.base.shelf import Kept, Shelf
 from studies.store.index.entry import Entry, entry_of, read_entry, state_of, text_of
 from studies.store.paths import DIGITS, SUFFIX, TIMING, index_path, study_folder
+from studies.store.record import SCHEMA
 
-ENTRIES = "entries"
-"""The room of a shelf that holds them."""
+ENTRIES = f"entries of schema {SCHEMA}: {' '.join(Entry._fields)}"
+"""The room of a shelf that holds them: another one when they say something else."""
 EACH = 5.0
 """Seconds after which what was read is kept, so that an interrupted command need not begin again."""
 MANY = 1000
@@ -30,29 +32,29 @@ class FolderIndex:
     def __init__(self, root: Path, folder: str, check: bool = False) -> None:
         """Reads what is new or has changed since; `check`: every file. Raises StudyError for a folder that may not be
         looked into."""
-        self.root, self.folder = Path(root), study_folder(root, folder)
-        self.shelf = shelf_of(root, folder)
-        self.states = dict(_files(self.folder, index_path(root, folder).name))
-        known = {} if check else self.shelf.load(ENTRIES)
-        changed = [name for name, state in self.states.items() if name not in known or known[name].state != state]
-        self.entries = {name: entry_of(kept.text) for name, kept in known.items() if name in self.states}
-        self.read = len(changed)
-        """How many files were opened."""
-        self._read(changed, [name for name in known if name not in self.states])
+        self.folder, self.shelf = study_folder(root, folder), shelf_of(root, folder)
+        with uncollected():
+            self.states = dict(_files(self.folder, index_path(root, folder).name))
+            known = self.shelf.load(ENTRIES)
+            states = {} if check else {name: kept.state for name, kept in known.items()}
+            self.changed = [name for name, state in self.states.items() if states.get(name) != state]
+            """Names of the files that are opened."""
+            self.entries = {name: entry_of(kept.text) for name, kept in known.items() if name in self.states}
+        self.shelf.put(ENTRIES, {}, [name for name in known if name not in self.states])
+        self._read()
 
-    def _read(self, names: Iterable[str], gone: Iterable[str]) -> None:
+    def _read(self) -> None:
         begun, fresh = time.monotonic(), dict[str, Kept]()
-        self.shelf.put(ENTRIES, {}, gone)
-        for name in names:
+        for name in self.changed:
             entry = self.entries[name] = read_entry(self.folder / name)
             fresh[name] = Kept(self.states[name], text_of(entry))
             if time.monotonic() - begun > EACH:
                 self.shelf.put(ENTRIES, fresh)
                 begun, fresh = time.monotonic(), {}
         self.shelf.put(ENTRIES, fresh)
-        if self.shelf.problem and self.read > MANY:
+        if self.shelf.problem and len(self.changed) > MANY:
             warnings.warn(
-                f"{self.shelf.path} cannot be kept ({self.shelf.problem}): every command reads all {self.read} "
+                f"{self.shelf.path} cannot be kept ({self.shelf.problem}): every command reads all {len(self.changed)} "
                 f"files of {self.folder} again",
                 stacklevel=3,
             )

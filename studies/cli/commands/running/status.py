@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from studies.catalog import STUDIES
-from studies.cli.terminal import Results, console, say
+from studies.cli.terminal import Results, busy, console, say
 from studies.reference.reference_solves import SolveStanding, reference_solves
 from studies.scene.scene import Scene
 from studies.sweep.find_study import find_study
@@ -30,7 +30,8 @@ def status(
     chosen = [find_study(study)] if study else list(STUDIES)
     known = Known(results, check)
     for entry in chosen:
-        found = standings(results, entry, known)
+        with busy(f"looking at {entry.name}"):
+            found = standings(results, entry, known)
         say(f"{entry.name}: {counted(standing.status for standing in found)}")
         if study:
             show_reasons(found, every)
