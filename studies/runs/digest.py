@@ -13,7 +13,8 @@ from studies.scene.scene import Scene
 from studies.store.paths import key_digest
 from studies.store.record import canonical
 
-T, V = TypeVar("T"), TypeVar("V")
+T = TypeVar("T")
+V = TypeVar("V")
 MOST = 100_000
 """Numbers that are remembered, and bodies and methods."""
 

@@ -72,8 +72,9 @@ def read_entry(path: Path) -> Entry:
         return Entry(path.name, size, str(error), str(error))
     head = (record.kind, record.name, str(record.status), record.message, record.fingerprint, record.machine)
     known: dict[str, Any] = {name: record.attributes.get(name) for name in KNOWN}
+    known["warnings"] = known["warnings"] or ""
     at_home = path.name.split(TIMING)[0].removesuffix(SUFFIX) == file_stem(record.name, digest)
-    return Entry(path.name, size, "", "", digest, at_home, *head, **known | {"warnings": known["warnings"] or ""})
+    return Entry(path.name, size, "", "", digest, at_home, *head, **known)
 
 
 def text_of(entry: Entry) -> str:
