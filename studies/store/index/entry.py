@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from studies.base.atomic import is_there
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.store.paths import SUFFIX, TIMING, file_stem, key_digest
 from studies.store.record import glance
@@ -59,8 +60,9 @@ def written(state: str | None) -> str:
 
 
 def read_entry(path: Path) -> Entry:
-    """Of a file, held to its checksums. What is wrong with it is part of the entry."""
-    size = path.stat().st_size if path.is_file() else 0
+    """Of a file, held to its checksums. What is wrong with it is part of the entry; raises StudyError only for a folder
+    that may not be entered."""
+    size = path.stat().st_size if is_there(path) else 0
     try:
         record = glance(path, KNOWN)
         digest = key_digest(record.key)

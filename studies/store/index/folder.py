@@ -86,12 +86,12 @@ def _files(folder: Path, links: str) -> Iterator[tuple[str, str]]:
     """Names and states of the results files in a folder; none where there is no folder."""
     try:
         with os.scandir(folder) as found:
-            names = [file for file in found if file.name.endswith(SUFFIX) and file.name != links]
+            files = [file for file in found if file.name.endswith(SUFFIX) and file.name != links]
+        for file in files:
+            with suppress(FileNotFoundError):  # replaced meanwhile
+                yield file.name, state_of(file.stat())
     except (FileNotFoundError, NotADirectoryError):
         return
     except OSError as problem:
         reason = problem.strerror or str(problem)
         raise StudyError(f"{folder} cannot be looked at ({reason}): change the permissions of its folder") from problem
-    for file in names:
-        with suppress(FileNotFoundError):  # replaced meanwhile
-            yield file.name, state_of(file.stat())

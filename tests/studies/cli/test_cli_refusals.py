@@ -102,12 +102,12 @@ def test_results_that_cannot_be_written(refused, tiny_file, finished_sweep, tmp_
     (tmp_path / "file").write_text("no folder")
     root = finished_sweep if command[0] == "table" else tmp_path / "file"
     target = [str(tmp_path / "file" / "t.csv") if word == "TARGET" else word for word in command[1:]]
-    before = content(finished_sweep)
+    before = content(finished_sweep / "tiny")
     if command[0] == "plot":
         tiny_file.write_text(TINY.replace("charts=", "cases=(), charts="))
     sentence = refused(command[0], tiny_file, *target, "--results", root)
     assert "can be written to" in sentence
-    assert content(finished_sweep) == before
+    assert content(finished_sweep / "tiny") == before
 
 
 def test_bad_meshes_fail_and_the_study_goes_on(organbench, tmp_path):

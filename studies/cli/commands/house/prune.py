@@ -26,7 +26,7 @@ def prune(
     listed: Annotated[bool, typer.Option("--list", help="name every file")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="remove them; without, they are only listed")] = False,
 ) -> None:
-    """Lists stored files that nothing needs any more, by rule, and with --yes removes them. What is current stays."""
+    """Lists stored files that nothing needs, and removes them with --yes, by rule. What is current stays."""
     if bool(studies) == every:
         raise StudyError("name the studies whose files are to be looked at, or give --all")
     if yes and not rules:
