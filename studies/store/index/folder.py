@@ -40,6 +40,8 @@ class FolderIndex:
             self.changed = [name for name, state in self.states.items() if states.get(name) != state]
             """Names of the files that are opened."""
             self.entries = {name: entry_of(kept.text) for name, kept in known.items() if name in self.states}
+        if not known:
+            self.shelf.drop(room for room in self.shelf.rooms() if room.startswith("entries of schema "))
         self.shelf.put(ENTRIES, {}, [name for name in known if name not in self.states])
         self._read()
 

@@ -164,6 +164,13 @@ def test_an_index_of_another_version_is_made_again(many, opened, monkeypatch):
     assert entries(many) == expected and opened == []
 
 
+def test_what_entries_said_before_is_forgotten(many, monkeypatch):
+    entries(many)
+    monkeypatch.setattr(index_folder, "ENTRIES", "entries of schema 0: other words")
+    entries(many)
+    assert shelf_of(many, NAME).rooms() == ["entries of schema 0: other words"]
+
+
 def no_folder(root, monkeypatch):
     (root / "cache").write_text("no folder")
 
