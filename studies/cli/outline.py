@@ -9,9 +9,10 @@ from studies.base.errors import StudyError
 
 
 def studies() -> list[tuple[str, str]]:
-    """(name, question) of each of STUDIES: the name of its module, and the first line there."""
+    """(name, question) of each of STUDIES, the name of its module and the first line there, and of the population."""
     homes = _registered("studies.catalog", "STUDIES")
-    return [(module.rsplit(".", 1)[1], _first_line(_parsed(module))) for _, module in homes]
+    catalogue = [(module.rsplit(".", 1)[1], _first_line(_parsed(module))) for _, module in homes]
+    return [*catalogue, ("population", _first_line(_parsed("studies.population.study")))]
 
 
 def methods() -> list[tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""The study of a population: recipes × members, as every other study is run, stored and judged."""
+"""How accurate is each body on organs nobody has seen: the median, and the worst of twenty?"""
 
 from collections.abc import Sequence
 
@@ -43,7 +43,7 @@ def study_of(scenes: Sequence[Scene], name: str) -> Study:
     """The same recipes on any scenes."""
     return Study(
         name=name,
-        question="How accurate is each body on organs nobody has seen: the median, and the worst of twenty?",
+        question=__doc__ or "",
         cases=tuple(
             Case(scene, body, ImplicitVolume(), dt_fraction=fraction)
             for scene in scenes
