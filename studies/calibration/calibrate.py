@@ -9,7 +9,7 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.calibration.fit import Fit, fit
 from studies.calibration.folds import Fold, folds_of, own_scenes
-from studies.calibration.measured import Measurements, Silent, bring_up_to_date, pending
+from studies.calibration.measured import Measurements, bring_up_to_date, pending
 from studies.calibration.parameters import KINDS, Parameter, parameters_of
 from studies.calibration.stored import Calibration, SceneErrors, Trial, write_calibration
 from studies.calibration.verdict import Compared, Verdict, verdict_of, worst
@@ -19,7 +19,7 @@ from studies.runs.current import run_fingerprint
 from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
 from studies.store.machine import this_machine
-from studies.sweep.engine import Progress, Told
+from studies.sweep.engine import Progress, Silent, Told
 
 NODES = 550
 RESULTS = Path("results")

@@ -39,6 +39,7 @@ COMMANDS = {
         ("check", "meshes.check", "check", "Tells what is wrong with a mesh and what mends it."),
         ("place", "meshes.place", "place", "Proposes hold and probe for a scan, and writes a scene file."),
         ("archive", "house.archive", "archive", "Packs records, tables, charts and code into one zip file."),
+        ("prune", "house.prune", "prune", "Lists stored files that nothing needs, and removes them."),
         ("doctor", "house.doctor", "doctor", "What is missing on this machine, and what mends it."),
         ("safe-dt", "running.safe_dt", "safe_dt", "The stability limit of a scene, predicted and verified by runs."),
     )

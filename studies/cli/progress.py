@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
+from pathlib import Path
 from types import TracebackType
 
 from rich.console import Console
@@ -10,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from studies.base.interrupts import stop_if_pressed
 from studies.store.staleness import MISSING
-from studies.sweep.plan import TIMING, Planned, expected
+from studies.sweep.plan import TIMING, Planned, expected, expected_bytes, free_bytes
 
 QUIET_SECONDS = 10.0
 """Without a terminal (a log file), a line at most this often."""
@@ -111,8 +112,8 @@ def compiling(console: Console, doing: str) -> Iterator[Callable[[str], None]]:
         yield tell
 
 
-def dry_run(console: Console, study: str, planned: list[Planned], jobs: int) -> None:
-    """Says what would run: how much of what, why, and how long."""
+def dry_run(console: Console, study: str, planned: list[Planned], jobs: int, root: Path) -> None:
+    """Says what would run: how much of what, why, how long, and what it will store below `root`."""
 
     def say(text: str) -> None:
         console.print(text, markup=False, highlight=False)
@@ -135,3 +136,25 @@ def dry_run(console: Console, study: str, planned: list[Planned], jobs: int) -> 
         say(f"  about {words(total)} with {jobs} processes, {basis}")
     else:
         say("  no estimate: nothing of it has run yet")
+    say(f"  {disk(planned, root)}")
+
+
+def disk(planned: list[Planned], root: Path) -> str:
+    """What pieces will store, beside what the disk has left."""
+    stored, unknown = expected_bytes(planned)
+    free = free_bytes(root)
+    more = f" (without {unknown} references of unknown size)" if unknown else ""
+    if stored > free:
+        return (
+            f"about {amount(stored)}{more}, more than the {amount(free)} that are free: make room (`organbench prune` "
+            "lists what is not needed), or choose another disk with --results"
+        )
+    return f"about {amount(stored)}{more} will be stored, {amount(free)} are free"
+
+
+def amount(size: float) -> str:
+    """Bytes as people say them: "8.0 MB"."""
+    for unit, limit in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
+        if size >= limit:
+            return f"{size / limit:.1f} {unit}"
+    return f"{size / 1e3:.0f} kB"

@@ -1,7 +1,7 @@
 """An entry from outside as a record like those of our own runs, stored under its own name and read back."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -93,22 +93,23 @@ def entry_files(root: Path) -> list[Path]:
     return record_files(root, FOLDER)
 
 
-def entries_beside(root: Path, scenes: Iterable[Scene], runs: Iterable[Run]) -> tuple[list[Run], list[str]]:
-    """The entries in `scenes`, judged by the references that the `runs` in them have; and what cannot be read, a
-    sentence each. A scene is the same whatever its reference's meshes and its number of frames."""
-    references = {run.case.scene.name: run.reference for run in runs}
+def entries_beside(
+    root: Path, scenes: Iterable[Scene], reference_of: Callable[[Scene], Reference | None]
+) -> tuple[list[Run], list[str]]:
+    """The entries in `scenes`, judged by the references of these; and what cannot be read, a sentence each. A scene is
+    the same whatever its reference's meshes and its number of frames."""
     wanted = {_same(scene): scene for scene in scenes}
     found, problems = [], []
     for path in entry_files(root):
         try:
             record = read_record(path)
-            run = run_of_entry(record, references.get(scene_of_key(record.key).name))
+            run = run_of_entry(record, None)
         except StudyError as problem:
             problems.append(str(problem))
             continue
         scene = wanted.get(_same(run.case.scene))
         if scene is not None:
-            found.append(replace(run, case=run.case.replaced(scene=scene)))
+            found.append(replace(run, case=run.case.replaced(scene=scene), reference=reference_of(scene)))
     return found, problems
 
 

@@ -1,6 +1,7 @@
 """One row per case: what it was, how it ended, and the study's metrics beside the floor of their reference."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import pandas as pd
 
@@ -12,6 +13,8 @@ from studies.metrics.run import Run
 from studies.reference.uncertainty import QUANTITIES
 from studies.runs.recipe_text import recipe_text
 
+Row = dict[str, Any]
+"""Names of columns, with values."""
 UNRESOLVED = "doubtful"
 """Column with the metrics of which the reference knows the truth less than ten times better than the model."""
 
@@ -41,14 +44,20 @@ def study_table(runs: Sequence[Run], columns: Sequence[str | Metric]) -> pd.Data
     """Metrics `columns`, by name or as they are, of `runs`; a column "… floor" follows where the reference has an
     uncertainty of its own."""
     metrics = [metric(name) for name in columns]
-    rows = [_row(run, metrics) for run in runs]
-    known = {name for row in rows for name, value in row.items() if " floor [" not in name or value == value}
-    return pd.DataFrame([{name: value for name, value in row.items() if name in known} for row in rows])
+    return frame_of([row_of(run, metrics) for run in runs])
 
 
-def _row(run: Run, metrics: Sequence[Metric]) -> dict[str, object]:
+def frame_of(rows: Sequence[Row]) -> pd.DataFrame:
+    """Rows as a table, without floors that none of them has."""
+    frame = pd.DataFrame(rows)
+    unknown = [name for name in frame.columns if " floor [" in name and frame[name].isna().to_numpy().all()]
+    return frame.drop(columns=unknown)
+
+
+def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
+    """What a run was, how it ended, and its metrics beside their floors."""
     case, attributes = run.case, run.record.attributes
-    row: dict[str, object] = {
+    row: Row = {
         "scene": case.scene.name,
         "body": case.body.series,
         "law": attributes.get("law", ""),

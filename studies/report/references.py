@@ -55,9 +55,12 @@ def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def state_of(files: Iterable[Path]) -> str:
-    """Hash of all that charts and tables are made from: result files with their sizes and times, and the code."""
+def state_of(files: Iterable[Path], others: Iterable[str] = ()) -> str:
+    """Hash of all that charts and tables are made from: result files with their sizes and times, `others` that were
+    looked at before, and the code."""
     digest = hashlib.sha256(source_fingerprint(*own_modules()).encode())
+    for other in others:
+        digest.update(f"{other}\n".encode())
     for file in files:
         state = file.stat() if is_there(file) else None
         digest.update(f"{file.name} {state and (state.st_mtime_ns, state.st_size)}\n".encode())

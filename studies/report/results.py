@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from studies.base.atomic import is_there, write_whole
+from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.base.own_file import file_of
 from studies.base.study_file import fault_of_study_file
@@ -24,15 +24,16 @@ from studies.report.page.part import part_path, write_part
 from studies.report.page.write import write_page
 from studies.report.references import refresh_uncertainty, state_of
 from studies.report.summary import SUMMARIES
-from studies.runs.current import case_path
+from studies.runs.digest import case_digest
 from studies.runs.paper import play, slide_case, squeezed_balls
-from studies.store.archived import is_archive
+from studies.store.archived import is_archive, shown_machine
 from studies.store.csv_table import write_table
+from studies.store.index.entry import written
 from studies.store.machine import write_machine
-from studies.store.paths import study_folder
+from studies.store.paths import study_folder, timing_name
 from studies.store.stamps import set_stamp
+from studies.sweep.known import Known
 from studies.sweep.load import load_runs
-from studies.timing.cases import shown_timing_file
 
 FIGURES = "figures"
 FIGURE_NODES = 550
@@ -85,9 +86,9 @@ def charts_and_tables(root: Path, studies: Sequence[Study]) -> tuple[list[Path],
 
     A study of which nothing is stored keeps the charts that are there.
     """
-    written, remarks, absent = [], [], []
+    written, remarks, absent, known = [], [], [], Known(root)
     for study in studies:
-        if not any(is_there(case_path(root, study.name, case)) for case in study.cases):
+        if not any(known.of_case(study.name, case) for case in study.cases):
             absent.append(study.name)
             continue
         paths, missing = refresh(root, study)
@@ -120,7 +121,8 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
     if before.get("inputs") == shown["inputs"] and all(path.exists() for path in (*paths, part_path(root, study))):
         return paths, before["remarks"]
     runs, shown["remarks"] = load_runs(root, study)
-    entries, unreadable = entries_beside(root, study.scenes, runs)
+    references = {run.case.scene.name: run.reference for run in runs}
+    entries, unreadable = entries_beside(root, study.scenes, lambda scene: references.get(scene.name))
     shown["remarks"] += unreadable
     rows = study_table([*runs, *entries], study.columns)
     write_table(table, rows)
@@ -146,14 +148,18 @@ def _stamped(stamp: Path) -> dict[str, Any]:
 def inputs_of(root: Path, study: Study) -> str:
     """Hash of all that charts and tables are made from: result files with their sizes and times, and the code, that of
     the user's files too."""
-    files = [case_path(root, study.name, case) for case in study.cases]
-    files += [shown_timing_file(root, study.name, case) for case in study.cases if case.timed]
-    files += entry_files(root)
+    known, machine = Known(root), shown_machine(root)
+    entries = [(case, known.of_case(study.name, case)) for case in study.cases]
+    names = [entry.file if entry else case_digest(case) for case, entry in entries]
+    names += [timing_name(entry.file, machine) for case, entry in entries if entry and case.timed]
+    states = known.folder(study.name).states
+    files = [f"{name} {written(states.get(name))}" for name in names]
     references = [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
     metrics = [metric(column) for column in study.columns]
     shown = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
     own = {file.sha256[:16] for file in map(file_of, shown) if file is not None}
-    return "-".join([state_of([*files, *references]), *(entry.name for entry in metrics), *sorted(own)])
+    state = state_of([*entry_files(root), *references], files)
+    return "-".join([state, *(entry.name for entry in metrics), *sorted(own)])
 
 
 def draw_figures(root: Path) -> list[Path]:

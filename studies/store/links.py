@@ -2,15 +2,17 @@
 
 import io
 from collections import Counter
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import h5py
 
 from studies.base.atomic import is_there, sweep_parts, write_whole
-from studies.base.errors import StudyError
 from studies.store.checksums import BLOCK, sealed
-from studies.store.paths import index_path, record_files, timing_files
-from studies.store.record import INDEX_KIND, SCHEMA, peek
+from studies.store.index.entry import Entry
+from studies.store.index.folder import FolderIndex
+from studies.store.paths import DIGITS, SUFFIX, TIMING, index_path
+from studies.store.record import INDEX_KIND, SCHEMA
 
 
 def link_study(root: Path, study: str) -> list[str]:
@@ -22,38 +24,39 @@ def link_study(root: Path, study: str) -> list[str]:
     """
     index = index_path(root, study)
     sweep_parts(index.parent)
-    targets, unreadable = _targets(record_files(root, study))
-    timings, more = _targets(timing_files(root, study), by_machine=True)
+    entries = sorted(FolderIndex(root, study).entries.values())
+    unreadable = [entry.told for entry in entries if entry.fault]
+    records, timings = (
+        [entry for entry in entries if not entry.fault and (TIMING in entry.file) == timed] for timed in (False, True)
+    )
+    targets = _targets(records, {"timing"}) | _targets(timings)
     image = io.BytesIO()
     with h5py.File(image, "w", userblock_size=BLOCK) as file:
         file.attrs.update({"schema": SCHEMA, "kind": INDEX_KIND, "name": study})
-        for name, target in (targets | timings).items():
-            file[name] = h5py.ExternalLink(target.name, "/")
+        for name, target in targets.items():
+            file[name] = h5py.ExternalLink(target, "/")
     content = sealed(image.getvalue())
     if not is_there(index) or index.read_bytes() != content:  # a folder that cannot be written to may be looked at
         write_whole(index, content)
-    return unreadable + more
+    return unreadable
 
 
-def _targets(files: list[Path], by_machine: bool = False) -> tuple[dict[str, Path], list[str]]:
+def _targets(entries: Sequence[Entry], taken: Collection[str] = ()) -> dict[str, str]:
     """Link name -> file. Names that are taken twice, or are also a folder of another name, get the file's hash."""
-    names: dict[Path, str] = {}
-    unreadable = []
-    for file in files:
-        try:
-            record = peek(file)
-        except StudyError as problem:
-            unreadable.append(str(problem))
-            continue
-        name = "/".join(part for part in record.name.split("/") if part not in ("", ".", "..")) or file.stem
-        names[file] = f"timing/{record.machine}/{name}" if by_machine else name
+    names = {entry.file: _name(entry) for entry in entries}
     count = Counter(names.values())
-    folders = {"/".join(parts[:n]) for parts in (x.split("/") for x in count) for n in range(1, len(parts))}
-    if not by_machine:
-        folders.add("timing")
-    clash = {name for name in count if count[name] > 1 or name in folders}
-    return {(f"{name}-{_hash(file)}" if name in clash else name): file for file, name in names.items()}, unreadable
+    folders = {"/".join(parts[:n]) for parts in (x.split("/") for x in count) for n in range(1, len(parts))} | set(
+        taken
+    )
+    clash = {name for name in count if count[name] > 1 or name in folders or name in taken}
+    return {(f"{name}-{_hash(file)}" if name in clash else name): file for file, name in names.items()}
 
 
-def _hash(file: Path) -> str:
-    return file.name.split(".timing.")[0].removesuffix(".h5")[-8:]
+def _name(entry: Entry) -> str:
+    parts = [part for part in entry.name.split("/") if part not in ("", ".", "..")]
+    name = "/".join(parts) or entry.file.removesuffix(SUFFIX)
+    return f"timing/{entry.machine}/{name}" if TIMING in entry.file else name
+
+
+def _hash(file: str) -> str:
+    return file.split(TIMING)[0].removesuffix(SUFFIX)[-DIGITS:]

@@ -7,6 +7,10 @@ from pathlib import Path
 from studies.base.errors import StudyError
 from studies.store.record import canonical
 
+DIGITS = 8
+"""Of the hash in the name of a file."""
+SUFFIX, TIMING = ".h5", ".timing."
+"""Of results files; between the name of a record and the machine that timed it."""
 LONGEST_NAME = 100  # file systems stop at 255 bytes, people long before
 
 
@@ -16,9 +20,14 @@ def readable(name: str) -> str:
     return text[:LONGEST_NAME].rstrip("-.") or "case"
 
 
+def key_digest(key: str) -> str:
+    """SHA-256 (hex) of the canonical JSON of a case. Raises StudyError when it is no JSON."""
+    return hashlib.sha256(canonical(key).encode()).hexdigest()
+
+
 def key_hash(key: str) -> str:
-    """The first 8 hex digits of SHA-256 of the canonical JSON of a case. Raises StudyError when it is no JSON."""
-    return hashlib.sha256(canonical(key).encode()).hexdigest()[:8]
+    """Its first 8 digits, which end the name of the file."""
+    return key_digest(key)[:DIGITS]
 
 
 def study_folder(root: Path, study: str) -> Path:
@@ -28,16 +37,26 @@ def study_folder(root: Path, study: str) -> Path:
     return Path(root) / study
 
 
+def file_stem(name: str, digest: str) -> str:
+    """How the file of a case is called, without SUFFIX."""
+    return f"{readable(name)}-{digest[:DIGITS]}"
+
+
 def record_path(root: Path, study: str, name: str, key: str) -> Path:
     """Where the record of the case `key` (JSON text), called `name`, lies."""
-    return study_folder(root, study) / f"{readable(name)}-{key_hash(key)}.h5"
+    return study_folder(root, study) / f"{file_stem(name, key_digest(key))}{SUFFIX}"
 
 
 def timing_path(path: Path, machine: str) -> Path:
     """The file with the frame times that `machine` (its id) measured for the case recorded in `path`."""
     if readable(machine) != machine or "." in machine:
         raise StudyError(f"{machine!r} cannot be a machine id: use the id of studies.store.machine")
-    return path.with_name(f"{path.stem}.timing.{machine}.h5")
+    return path.with_name(timing_name(path.name, machine))
+
+
+def timing_name(file: str, machine: str) -> str:
+    """What the timing file beside the record `file` is called."""
+    return f"{file.removesuffix(SUFFIX)}{TIMING}{machine}{SUFFIX}"
 
 
 def index_path(root: Path, study: str) -> Path:

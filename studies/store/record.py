@@ -5,7 +5,7 @@ A failure is a record too, with its status, its message and NaN after the moment
 
 import io
 import json
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -114,6 +114,14 @@ def peek(path: Path) -> Record:
     return record if untouched else replace(read_record(path), fields={})
 
 
+def glance(path: Path, attributes: Collection[str]) -> Record:
+    """As `peek`, with those of the named attributes that are there alone: a third of the time for a small file."""
+    with open_results(path) as (file, untouched):
+        if untouched:
+            return _header(path, file, (*HEADER, *attributes))[0]
+    return peek(path)
+
+
 def canonical(key: str) -> str:
     """The JSON text of a case with sorted names and no blanks, so that equal cases are equal text."""
     try:
@@ -156,26 +164,30 @@ def _is_short_list(value: Any) -> bool:
     return array.dtype.kind in "biuf" and array.nbytes <= 4096
 
 
-def _header(path: Path, file: h5py.File) -> tuple[Record, dict[str, str]]:
-    """The record without fields, and the digest of each field by name."""
-    if "schema" not in file.attrs:
+def _header(path: Path, file: h5py.File, wanted: Collection[str] | None = None) -> tuple[Record, dict[str, str]]:
+    """The record without fields, of its attributes all or those `wanted`; and the digest of each field by name."""
+    attributes = file.attrs  # a new one each time it is asked for, and each opens the file's root
+    if "schema" not in attributes:
         raise StudyError(f"{path} is an HDF5 file, but not a results file of organbench: it has no schema version")
-    schema = _plain(file.attrs["schema"])
+    schema = _plain(attributes["schema"])
     if schema != SCHEMA:
         raise OtherVersion(
             f"{path} has results schema {schema}, this version reads {SCHEMA}: run its case again, "
             "or read it with the version that wrote it"
         )
-    if _plain(file.attrs.get("kind")) == INDEX_KIND:
+    if _plain(attributes.get("kind")) == INDEX_KIND:
         raise StudyError(f"{path} is the index of a study, not a case: give one of the files beside it")
-    if CHECKSUMS not in file.attrs:
+    if CHECKSUMS not in attributes:
         raise DamagedFile(f"{path} lacks the attribute {CHECKSUMS!r}: {AGAIN}")
-    digests = json.loads(str(file.attrs[CHECKSUMS]))
+    digests = json.loads(str(attributes[CHECKSUMS]))
     values = {}
-    for name, digest in digests["attributes"].items():
-        if name not in file.attrs:
+    chosen = digests["attributes"]
+    if wanted is not None:
+        chosen = {name: chosen[name] for name in wanted if name in chosen}
+    for name, digest in chosen.items():
+        if name not in attributes:
             raise DamagedFile(f"{path} lacks the attribute {name!r}: {AGAIN}")
-        values[name] = _plain(file.attrs[name])
+        values[name] = _plain(attributes[name])
         if attribute_digest(values[name]) != digest:
             raise DamagedFile(f"{path}: the attribute {name!r} has changed since it was written: {AGAIN}")
     header = {name: values.pop(name) for name in HEADER}

@@ -5,11 +5,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from studies.base.collection import uncollected
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
 from studies.population import POPULATION, population_study, study_on
 from studies.runs.case import Case, case_from_json, case_to_dict
+from studies.runs.digest import parts_of
 from studies.sweep.own_files import load_file
 
 ON = "@"
@@ -18,6 +20,7 @@ MAIN = "main"
 """Stands for the main studies of the catalogue; no study has this name."""
 
 
+@uncollected()
 def find_study(name: str) -> Study:
     """A study of the catalogue, or STUDY of a Python file; either on a folder of surfaces, where ON and one follow.
 
@@ -32,8 +35,12 @@ def find_study(name: str) -> Study:
     study = getattr(load_file(Path(name)), "STUDY", None)
     if not isinstance(study, Study):
         raise StudyError(f"{name} defines no STUDY of type studies.catalog.Study; see CONTRIBUTING.md")
+    seen: set[object] = set()
     for case in study.cases:
-        _check_stored(name, case)
+        parts, numbers = parts_of(case), _types(case)
+        if parts is None or numbers not in seen or not seen.issuperset(parts):
+            _check_stored(name, case)
+            seen.update((*(parts or ()), numbers))
     return study
 
 
@@ -60,6 +67,12 @@ def find_studies(names: Sequence[str]) -> list[Study]:
     """The studies of so many names; the main ones of the catalogue for none, and for the name "main"."""
     found = [[s for s in STUDIES if s.main] if name == MAIN else [find_study(name)] for name in names or [MAIN]]
     return [study for group in found for study in group]
+
+
+def _types(case: Case) -> tuple[object, ...]:
+    """Of the numbers of a case, whose values can all be stored; with its parts it decides whether a case can be."""
+    numbers = (case.dt, case.dt_fraction, case.frames, case.beyond_limit)
+    return (*map(type, numbers), case.precision, case.recorded)
 
 
 def _check_stored(name: str, case: Case) -> None:

@@ -7,18 +7,20 @@ from studies.catalog.study import Study
 from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.sweep.engine import Progress, Told
+from studies.sweep.known import Known
 from studies.timing.alone import alone
-from studies.timing.cases import time_cases, timing_is_current
+from studies.timing.cases import time_cases
 
 
 def measure_times(root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
     """Times what is not timed yet, of `among` where given, when no other command does; how many that were."""
 
     def pending() -> list[Case]:
+        known = Known(root)
         return [
             case
             for case in study.cases
-            if case.timed and not timing_is_current(root, study.name, case)
+            if case.timed and known.can_be_timed(study.name, case) and known.why_untimed(study.name, case) is not None
             if among is None or case_path(root, study.name, case) in among
         ]
 

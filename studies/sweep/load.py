@@ -10,6 +10,7 @@ from studies.base.errors import OtherVersion, StudyError
 from studies.catalog.study import Study
 from studies.metrics.run import Run
 from studies.reference.load import load_reference
+from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.store.archived import is_archive
 from studies.store.record import read_record
@@ -34,14 +35,19 @@ def load_runs(root: Path, study: Study) -> tuple[list[Run], list[str]]:
     for case in study.cases:
         path = case_path(root, study.name, case)
         if not is_there(path):
-            what = "is missing in the archive" if is_archive(root) else "has not run"
-            problems.append(StudyError(f"case {case.name} {what}"))
+            problems.append(not_stored(root, case))
             continue
         record = tried(partial(read_record, path))
         if record is not None:
             timing = tried(partial(read_timing, root, study.name, case)) if case.timed else None
             runs.append(Run(case, record, references[case.scene.name], timing))
     return runs, remarks_of(problems)
+
+
+def not_stored(root: Path, case: Case) -> StudyError:
+    """What is said of a case without a file."""
+    what = "is missing in the archive" if is_archive(root) else "has not run"
+    return StudyError(f"case {case.name} {what}")
 
 
 def remarks_of(problems: Sequence[StudyError]) -> list[str]:

@@ -3,19 +3,20 @@
 from collections import Counter
 from collections.abc import Iterable
 
-from studies.sweep.standings import Standing, stored
+from studies.sweep.known import Known
+from studies.sweep.standings import Standing
 
 ANY = "any"
 """Stands for the machine of a portable result, which is equal on every one (studies.base.portable)."""
 
 
-def machines_of(found: Iterable[Standing]) -> Counter[str]:
+def machines_of(found: Iterable[Standing], known: Known) -> Counter[str]:
     """Results of each kind of machine, by its id, the most first; stale and missing ones left out."""
     counts: Counter[str] = Counter()
     for standing in found:
-        record = stored(standing.task.path()) if standing.status not in ("stale", "missing") else None
-        if record is not None:
-            counts[ANY if "portable" in record.attributes else record.machine] += 1
+        entry = known.entry(standing.task) if standing.status not in ("stale", "missing") else None
+        if entry is not None:
+            counts[entry.machine if entry.portable is None else ANY] += 1
     return Counter(dict(counts.most_common()))
 
 

@@ -9,6 +9,7 @@ from studies.catalog.study import Study
 from studies.store.archived import check_no_archive
 from studies.sweep.engine import Engine, Progress, Told
 from studies.sweep.failures import Failures
+from studies.sweep.known import Known
 from studies.sweep.pool import Pool
 from studies.sweep.tasks import Task, tasks_of
 
@@ -31,8 +32,12 @@ def run_studies(
     """
     check_no_archive(root)
     root = root.absolute()
-    engine = Pool(jobs) if isinstance(jobs, int) else jobs
-    rule = wanted or (lambda task: not task.is_current() or (engine.portable and not task.is_portable()))
+    engine, known = Pool(jobs) if isinstance(jobs, int) else jobs, Known(root)
+
+    def stale(task: Task) -> bool:
+        return known.why_stale(task) is not None or (engine.portable and not known.is_portable(task))
+
+    rule = wanted or stale
     todo = [replace(task, seen=task.state()) for task in tasks_of(root, studies) if rule(task)]
     if todo:
         check_writable(root)

@@ -1,29 +1,23 @@
-"""How every piece of a study stands, read off the headers of what is stored."""
+"""How every piece of a study stands, by the index of what is stored."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from studies.base.errors import StudyError
+from studies.base.collection import uncollected
 from studies.catalog.study import Study
-from studies.runs.current import case_path
-from studies.store.record import Record, Status, peek
+from studies.store.schema import Status
 from studies.store.staleness import MISSING
+from studies.sweep.known import Known
 from studies.sweep.tasks import Task, tasks_of
+
+FAILURES = (Status.FAILED, Status.NOT_CONVERGED, Status.TIMED_OUT)
 
 
 def warnings_of(root: Path, study: Study) -> list[str]:
     """What the cases of a study warned of when they were prepared, a sentence each."""
-    records = [stored(case_path(root, study.name, case)) for case in study.cases]
-    warnings = [record.attributes.get("warnings", "") for record in records if record is not None]
-    return [str(sentence) for sentence in warnings if sentence]
-
-
-def stored(path: Path) -> Record | None:
-    """The header of a stored result; None where there is none, or none that can be read."""
-    try:
-        return peek(path)
-    except StudyError:
-        return None
+    known = Known(root)
+    entries = [known.of_case(study.name, case) for case in study.cases]
+    return [entry.warnings for entry in entries if entry is not None and entry.warnings]
 
 
 @dataclass(frozen=True)
@@ -36,20 +30,22 @@ class Standing:
     message: str
 
 
-def standings(root: Path, study: Study) -> list[Standing]:
+@uncollected()
+def standings(root: Path, study: Study, known: Known | None = None) -> list[Standing]:
     """Every piece of a study: ok, failed in some way, stale or missing."""
-    found = []
-    for task in tasks_of(root, [study]):
-        why = task.why_stale()
-        if why is None:
-            record = peek(task.path())
-            found.append(Standing(task, str(record.status), record.message))
-        else:
-            found.append(Standing(task, "missing" if why == MISSING else "stale", why))
-    return found
+    known = known or Known(root)
+    return [standing_of(task, known) for task in tasks_of(root, [study])]
 
 
-def failed(task: Task) -> bool:
+def standing_of(task: Task, known: Known) -> Standing:
+    """How a piece stands."""
+    entry, why = known.look(task)
+    if entry is None or why is not None:
+        return Standing(task, "missing" if why == MISSING else "stale", why or MISSING)
+    return Standing(task, entry.status, entry.message)
+
+
+def failed(task: Task, known: Known | None = None) -> bool:
     """Whether the stored result of a task is no success; a damaged file is stale instead."""
-    record = stored(task.path())
-    return record is not None and record.status in (Status.FAILED, Status.NOT_CONVERGED, Status.TIMED_OUT)
+    entry = (known or Known(task.root)).entry(task)
+    return entry is not None and entry.status in FAILURES

@@ -5,11 +5,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from studies.base.atomic import is_there
+from studies.base.collection import uncollected
 from studies.catalog.study import Study
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import Case
 from studies.runs.current import case_path, why_case_is_stale
-from studies.store.record import peek
+from studies.runs.digest import case_digest
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,6 @@ class Task:
             return self.work.why_stale(self.root)
         return why_case_is_stale(self.root, self.study, self.work)
 
-    def is_portable(self) -> bool:
-        """Whether its stored result is one that is equal on every x86-64 processor."""
-        return "portable" in peek(self.path()).attributes
-
     def state(self) -> tuple[int, ...] | None:
         """What tells its file from any later one; None where there is none."""
         if not is_there(self.path()):
@@ -68,12 +65,13 @@ class Task:
         )
 
 
+@uncollected()
 def tasks_of(root: Path, studies: Iterable[Study]) -> list[Task]:
     """Everything the studies need, each piece once, longest first."""
-    tasks: dict[Path, Task] = {}
+    tasks: dict[object, Task] = {}
     for study in studies:
-        found = [reference_solve for scene in study.scenes for reference_solve in reference_solves(scene)]
-        for work in (*found, *study.cases):
-            task = Task(root, study.name, work)
-            tasks[task.path()] = task
+        for solve in (solve for scene in study.scenes for solve in reference_solves(scene)):
+            tasks[solve.path(root)] = Task(root, study.name, solve)
+        for case in study.cases:
+            tasks[study.name, case_digest(case)] = Task(root, study.name, case)
     return sorted(tasks.values(), key=lambda task: -task.weight)

@@ -2,6 +2,7 @@
 
 import io
 import re
+import shutil
 from dataclasses import replace
 
 import numba
@@ -9,11 +10,12 @@ import pytest
 from rich.console import Console
 
 from studies.base.compile_watch import watching
+from studies.cli import progress
 from studies.cli.progress import QUIET_SECONDS, TerminalProgress, compiling, words
 from studies.runs.current import case_path
 from studies.store.record import peek, read_record, write_record
 from studies.store.staleness import CODE_CHANGED, MISSING
-from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, plan
+from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, expected_bytes, free_bytes, plan
 from studies.sweep.pool import perform, told_by_workers
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed
@@ -45,9 +47,9 @@ def test_what_is_planned_is_what_runs(results):
     ]
     assert found[0].seconds == peek(path).attributes["seconds"] > 0
     assert found[1].seconds is None
-    progress = Silent()
-    assert run_studies(results, [tiny_study()], 1, progress) == 2
-    assert progress.done == [(p.stage, p.label) for p in found]
+    watched = Silent()
+    assert run_studies(results, [tiny_study()], 1, watched) == 2
+    assert watched.done == [(p.stage, p.label) for p in found]
     assert plan(results, tiny_study()) == []
 
 
@@ -83,12 +85,39 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
     assert "tiny: 6 pieces would run" in out
     assert "  3 cases (missing): no estimate" in out
     assert "no estimate: nothing of it has run yet" in out
+    assert re.search(r"  about \d+ kB will be stored, [\d.]+ [GT]B are free\n", out)
     stale(results, tiny_case(timed=True))
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--results", results)
     assert re.search(r"  1 case \(the code has changed since\): about \d+ s of computing\n", out)
     assert "with 2 processes, from earlier runs of 1 of the 1 pieces; compiling comes on top" in out
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--only", "failed", "--results", results)
     assert out.strip() == "tiny: nothing would run, all is current"
+
+
+def test_a_disk_without_room_is_told_beforehand(organbench, tiny_file, tmp_path, monkeypatch):
+    monkeypatch.setattr(progress, "free_bytes", lambda folder: 1000.0)
+    code, out, _ = organbench("run", tiny_file, "--dry-run", "--results", tmp_path / "empty")
+    assert code == 0 and re.search(r"about \d+ kB, more than the 1 kB that are free: make room", out)
+
+
+def test_the_room_is_that_of_the_disk_on_which_the_folder_will_lie(tmp_path):
+    assert free_bytes(tmp_path / "not" / "yet") == pytest.approx(shutil.disk_usage(tmp_path).free, rel=0.05)
+
+
+def test_bytes_are_those_of_the_last_time_or_of_what_is_recorded(results):
+    path = stale(results, tiny_case(timed=True))
+    (known, *_) = plan(results, tiny_study())
+    assert known.size == path.stat().st_size
+    path.unlink()
+    (guessed,) = [p for p in plan(results, tiny_study()) if p.label == known.label and p.stage == PHYSICS]
+    assert guessed.size is not None and 0.5 < guessed.size / known.size < 2.0
+
+
+def test_references_count_as_the_mean_of_those_that_are_known():
+    known, unknown = (replace(piece(PHYSICS, "reference", 1.0), size=size) for size in (300, None))
+    case = replace(piece(PHYSICS, "case", 1.0), size=10)
+    assert expected_bytes([known, unknown, case]) == (610, 0)
+    assert expected_bytes([unknown, unknown, case]) == (10, 2)
 
 
 def log() -> Console:

@@ -261,7 +261,7 @@ def test_an_entry_stands_in_tables_and_charts_beside_ours(organbench, ours, foun
     organbench("judge", scene_file, path, *options[:-1], 2.5)
     organbench("plot", study, "--results", results)
     assert (results / "mine" / "front.png").read_bytes() != front  # drawn again: it has become slower
-    runs, problems = entries_beside(results, [SCENE], [])
+    runs, problems = entries_beside(results, [SCENE], lambda scene: None)
     assert [run.case.method.name for run in runs] == ["theirs"] and not problems
 
 

@@ -1,5 +1,6 @@
 """`organbench show`: a results file for the eye: what it is, how it ended, what is in it."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -11,11 +12,14 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
-from studies.base.errors import StudyError
 from studies.cli.terminal import console
+from studies.store.index.entry import Entry, read_entry
+from studies.store.index.folder import FolderIndex
 from studies.store.opening import open_results
-from studies.store.record import INDEX_KIND, Field, Record, Status, peek, read_record
+from studies.store.record import INDEX_KIND, Field, Record, Status, read_record
 
+LEAVES = 200
+"""Files of a study that are named; `--all` names the rest."""
 WIDE, NARROW = 120, 70
 """Columns of a terminal from which descriptions stand beside the numbers, and below which shape and unit go."""
 
@@ -36,12 +40,12 @@ def describe(path: Path, width: int = WIDE, every: bool = True) -> Tree:
     path = Path(path)
     with open_results(path) as (file, _):
         links = _links(file) if file.attrs.get("kind") == INDEX_KIND else None
-    return _index(path, links) if links is not None else _record(path, read_record(path), width, every)
+    return _index(path, links, every) if links is not None else _record(path, read_record(path), width, every)
 
 
 def _record(path: Path, record: Record, width: int, every: bool) -> Tree:
     tree = Tree(Text.assemble((record.name, "bold"), f"\n{record.kind} in {path.name}"))
-    tree.add(_verdict(record))
+    tree.add(_verdict(record.status, record.message))
     origin = f"machine {record.machine or '-'}, code {record.fingerprint[:8] or '-'}, schema {record.schema}"
     tree.add(Text(origin))
     if every:
@@ -62,9 +66,9 @@ def _record(path: Path, record: Record, width: int, every: bool) -> Tree:
     return tree
 
 
-def _verdict(record: Record) -> Text:
-    colour = "green" if record.status == Status.OK else "red"
-    return Text.assemble(("status " + record.status, colour), f": {record.message}" if record.message else "")
+def _verdict(status: str, message: str) -> Text:
+    colour = "green" if status == Status.OK else "red"
+    return Text.assemble(("status " + status, colour), f": {message}" if message else "")
 
 
 def _table(fields: dict[str, Field], width: int) -> Table:
@@ -111,18 +115,32 @@ def _links(file: h5py.File) -> dict[str, str]:
     return found
 
 
-def _index(path: Path, links: dict[str, str]) -> Tree:
+def _index(path: Path, links: dict[str, str], every: bool) -> Tree:
     tree = Tree(Text.assemble((path.stem, "bold"), f"  (index of {len(links)} files, {path})"))
-    branches: dict[str, Tree] = {"": tree}
+    known, branches = _entries(path), {"": tree}
+    leaves = Counter[str]()
     for name in sorted(links):
         *folders, leaf = name.split("/")
         for depth in range(1, len(folders) + 1):
             folder = "/".join(folders[:depth])
             if folder not in branches:
                 branches[folder] = branches["/".join(folders[: depth - 1])].add(Text(folders[depth - 1]))
-        try:
-            verdict = _verdict(peek(path.parent / links[name]))
-        except StudyError as problem:
-            verdict = Text(str(problem), style="red")
-        branches["/".join(folders)].add(Text.assemble(leaf + "  ", verdict))
+        place = "/".join(folders)
+        leaves[place] += 1
+        if every or leaves[place] <= LEAVES:
+            entry = known.get(links[name]) or read_entry(path.parent / links[name])
+            branches[place].add(Text.assemble(leaf + "  ", _brief(entry)))
+    for place, count in leaves.items():
+        if not every and count > LEAVES:
+            branches[place].add(Text(f"and {count - LEAVES} more (--all names them)"))
     return tree
+
+
+def _entries(path: Path) -> dict[str, Entry]:
+    """What is known of the files beside a study's index; nothing where it does not lie in a results folder."""
+    folder = path.absolute().parent
+    return FolderIndex(folder.parent, folder.name).entries if folder.name == path.stem else {}
+
+
+def _brief(entry: Entry) -> Text:
+    return Text(entry.told, style="red") if entry.fault else _verdict(entry.status, entry.message)

@@ -1,8 +1,8 @@
 """`organbench table`: the metrics of a study, a row per case."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
@@ -12,13 +12,14 @@ from studies.exchange.entry import entries_beside
 from studies.metrics.cells import MISSING, UNRESOLVED_MARK, plain, value_cell
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
-from studies.metrics.table import UNRESOLVED, study_table
+from studies.metrics.table import UNRESOLVED, frame_of, row_of
 from studies.metrics.table import metric as metric_of
 from studies.scene.quantities import ALWAYS
 from studies.store.csv_table import write_table
 from studies.store.parquet_table import write_parquet
 from studies.sweep.find_study import find_study
-from studies.sweep.load import load_runs
+from studies.sweep.known import Known
+from studies.sweep.rows import table_rows
 
 Row = Mapping[Any, Any]
 SETTINGS = {"law": "law {}", "nodes": "{} nodes", "stiffness": "stiffness {}", "dt/dt_c": "dt = {} dt_c"}
@@ -38,17 +39,17 @@ def table(
     own = [metric_of(column) for column in entry.columns]
     known = {m.name: m for m in (*METRICS, *own)}
     chosen = [lookup(name.strip(), known, "metric") for name in metrics.split(",")] if metrics else own
-    runs, remarks = load_runs(results, entry)
-    entries, unreadable = entries_beside(results, entry.scenes, runs)
-    runs += entries
+    rows, remarks, references = table_rows(Known(results), entry, chosen)
+    entries, unreadable = entries_beside(results, entry.scenes, references.of)
+    rows += [row_of(run, chosen) for run in entries]
     warn([*remarks, *unreadable])
-    frame = study_table(runs, chosen)
-    written = [write(path, frame) for write, path in ((write_table, csv), (write_parquet, parquet)) if path is not None]
-    for path in written:
-        say(path)
+    written = [path for path in (csv, parquet) if path is not None]
     if written:
+        frame = frame_of(rows)
+        for write, path in ((write_table, csv), (write_parquet, parquet)):
+            if path is not None:
+                say(write(path, frame))
         return
-    rows = frame.to_dict("records")
     if not rows:
         say("nothing is stored of it yet: `organbench run` does that")
         return
@@ -60,12 +61,11 @@ def draw(rows: Sequence[Row], metrics: list[Metric], every: bool) -> None:
     shared = [words.format(setting(rows[0], key)) for key, words in SETTINGS.items() if len(values(rows, key)) == 1]
     if shared:
         say(", ".join(shared))
-    rest = list(metrics)
+    layout, rest = Layout(rows), list(metrics)
     while rest:
-        count = fitting(rows, rest)
-        for line in block(rows, rest[:count]):
-            say(line)
-        rest = rest[count:]
+        columns = layout.fitting(rest)
+        say("\n".join(layout.block(columns)))
+        rest = rest[len(columns) :]
         if not every:
             break
     if any(row[UNRESOLVED] for row in rows):
@@ -74,42 +74,66 @@ def draw(rows: Sequence[Row], metrics: list[Metric], every: bool) -> None:
         say(f"not shown (--all, --csv FILE, --metrics): {', '.join(metric.name for metric in rest)}")
 
 
-def fitting(rows: Sequence[Row], metrics: list[Metric]) -> int:
-    """How many of the first metrics fit beside the labels; one at least."""
-    for count in range(len(metrics), 1, -1):
-        if max(map(len, block(rows, metrics[:count]))) <= console.width:
-            return count
-    return 1
+class Column(NamedTuple):
+    """Texts below one another."""
+
+    head: list[str]
+    cells: list[str]
+
+    @property
+    def width(self) -> int:
+        """Of the longest."""
+        return max(map(len, (*self.head, *self.cells)))
+
+    def filled(self, height: int, justified: Callable[[str, int], str]) -> list[str]:
+        """All of one width, the head at the bottom of `height` lines."""
+        width = self.width
+        return [justified(text, width) for text in [""] * (height - len(self.head)) + self.head + self.cells]
 
 
-def block(rows: Sequence[Row], metrics: list[Metric]) -> list[str]:
-    """Lines: a head with the units, then all rows, under a heading for each scene and body."""
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(f"{row['scene']}, {row['body']}", []).append(row)
-    differing = [key for key in SETTINGS if any(len(values(group, key)) > 1 for group in groups.values())]
-    shared = [key for key in SETTINGS if key not in differing and len(values(rows, key)) > 1]
-    ended = ["status"] if any(row["status"] != "ok" for row in rows) else []
-    heads = [[""], *([key] for key in (*differing, *ended)), *(head(metric) for metric in metrics)]
-    height, left = max(map(len, heads)), 1 + len(differing) + len(ended)
-    table = [[""] * (height - len(lines)) + lines for lines in heads]
-    for row in rows:
-        labels = [f"  {row['method']}", *(setting(row, key) for key in differing), *(row[key] for key in ended)]
-        for column, text in zip(table, [*labels, *(cell(row, metric) for metric in metrics)], strict=True):
-            column.append(text)
-    widths = [max(map(len, column)) for column in table]
-    texts = [
-        "  ".join(
-            text.ljust(width) if k < left else text.rjust(width)
-            for k, (text, width) in enumerate(zip(line, widths, strict=True))
-        )
-        for line in zip(*table, strict=True)
-    ]
-    lines, drawn = texts[:height], dict(zip(map(id, rows), texts[height:], strict=True))
-    for heading, group in groups.items():
-        lines.append(", ".join([heading, *(SETTINGS[key].format(setting(group[0], key)) for key in shared)]))
-        lines += [drawn[id(row)] for row in group]
-    return [line.rstrip() for line in lines]
+class Layout:
+    """Rows below a heading for each scene and body; at the left what each is called, then columns of metrics."""
+
+    def __init__(self, rows: Sequence[Row]) -> None:
+        self.rows = rows
+        self.groups: dict[str, list[int]] = {}
+        for number, row in enumerate(rows):
+            self.groups.setdefault(f"{row['scene']}, {row['body']}", []).append(number)
+        groups = [[rows[number] for number in group] for group in self.groups.values()]
+        differing = [key for key in SETTINGS if any(len(values(group, key)) > 1 for group in groups)]
+        self.shared = [key for key in SETTINGS if key not in differing and len(values(rows, key)) > 1]
+        ended = ["status"] if any(row["status"] != "ok" for row in rows) else []
+        self.labels = [Column([""], [f"  {row['method']}" for row in rows])]
+        self.labels += [Column([key], [setting(row, key) for row in rows]) for key in differing]
+        self.labels += [Column([key], [row[key] for row in rows]) for key in ended]
+
+    def heading(self, name: str) -> str:
+        """Of a group: what all of its rows share."""
+        first = self.rows[self.groups[name][0]]
+        return ", ".join([name, *(SETTINGS[key].format(setting(first, key)) for key in self.shared)])
+
+    def fitting(self, metrics: list[Metric]) -> list[Column]:
+        """Columns of as many of the first metrics as fit beside the labels; one at least."""
+        headings = max(len(self.heading(name)) for name in self.groups)
+        width, columns = sum(column.width + 2 for column in self.labels) - 2, list[Column]()
+        for metric in metrics:
+            column = Column(head(metric), [cell(row, metric) for row in self.rows])
+            width += 2 + column.width
+            if columns and max(width, headings) > console.width:
+                break
+            columns.append(column)
+        return columns
+
+    def block(self, columns: list[Column]) -> list[str]:
+        """Lines: a head with the units, then all rows, under their headings."""
+        height = max(len(column.head) for column in (*self.labels, *columns))
+        texts = [column.filled(height, str.ljust) for column in self.labels]
+        texts += [column.filled(height, str.rjust) for column in columns]
+        lines = ["  ".join(line).rstrip() for line in zip(*texts, strict=True)]
+        found = lines[:height]
+        for name, numbers in self.groups.items():
+            found += [self.heading(name), *(lines[height + number] for number in numbers)]
+        return found
 
 
 def head(metric: Metric) -> list[str]:
@@ -119,7 +143,8 @@ def head(metric: Metric) -> list[str]:
 
 def values(rows: Sequence[Row], key: str) -> set[str]:
     """What a setting is in the rows, as it is printed."""
-    return {setting(row, key) for row in rows}
+    found = {row[key]: row for row in rows}
+    return {setting(row, key) for row in found.values()}
 
 
 def setting(row: Row, key: str) -> str:

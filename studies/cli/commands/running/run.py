@@ -25,16 +25,18 @@ from studies.store.staleness import MISSING
 from studies.sweep.engine import Engine
 from studies.sweep.failures import Failures
 from studies.sweep.find_study import ON, find_studies
+from studies.sweep.known import Known
 from studies.sweep.plan import plan
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, warnings_of
-from studies.sweep.tasks import Task
+from studies.sweep.tasks import Task, tasks_of
 
 SMOKE = "smoke"
 JOBS = 2
 """Processes, where nothing is said."""
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 Wanted = Callable[[Task], bool] | None
+Rule = Callable[[Task, Known], bool]
 
 
 def run(
@@ -56,7 +58,7 @@ def run(
     """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
     if on and jobs is not None:
         raise StudyError("give either --jobs or --on: --on local:4 stands for --jobs 4")
-    wanted = _filter(only)
+    rules = _rules(only)
     root = results / SMOKE if smoke else results
     failures = Failures()
     if organs:
@@ -66,8 +68,9 @@ def run(
             study = found.smoke() if smoke else found
             if case:
                 study = _case_alone(study, case)
+            wanted = _wanted(root, study, rules)
             if dry:
-                dry_run(console, study.name, plan(root, study, wanted), jobs or JOBS)
+                dry_run(console, study.name, plan(root, study, wanted), jobs or JOBS, root)
             else:
                 _bring_up_to_date(root, study, engine, wanted, not case, failures)
     if failures.causes:
@@ -107,12 +110,18 @@ def _checked(names: list[str]) -> list[Study]:
     return studies
 
 
-def _filter(only: str) -> Wanted:
-    if not only:
-        return None
-    rules: dict[str, Callable[[Task], bool]] = {
+def _rules(only: str) -> list[Rule]:
+    rules: dict[str, Rule] = {
         "failed": failed,
-        "stale": lambda task: task.why_stale() not in (None, MISSING),
+        "stale": lambda task, known: known.why_stale(task) not in (None, MISSING),
     }
-    chosen = [lookup(word.strip(), rules, "filter") for word in only.split(",")]
-    return lambda task: any(rule(task) for rule in chosen)
+    return [lookup(word.strip(), rules, "filter") for word in only.split(",")] if only else []
+
+
+def _wanted(root: Path, study: Study, rules: list[Rule]) -> Wanted:
+    """What one of the rules lets run; None for none, where all that is not current runs."""
+    if not rules:
+        return None
+    known = Known(root)
+    chosen = {task.path().absolute() for task in tasks_of(root, [study]) if any(rule(task, known) for rule in rules)}
+    return lambda task: task.path().absolute() in chosen

@@ -9,10 +9,11 @@ import typer
 from rich.table import Table
 
 from studies.catalog import STUDIES
-from studies.cli.terminal import Results, console, say
-from studies.reference.reference_solves import SolveStanding, reference_solves, standing_of
+from studies.cli.terminal import Results, busy, console, say
+from studies.reference.reference_solves import SolveStanding, reference_solves
 from studies.scene.scene import Scene
 from studies.sweep.find_study import find_study
+from studies.sweep.known import Known
 from studies.sweep.machines import machines_of, mixture
 from studies.sweep.standings import Standing, standings
 
@@ -24,18 +25,21 @@ def status(
     study: Annotated[str, typer.Argument(help="one study, with what is not ok; all, in numbers, without")] = "",
     results: Results = Path("results"),
     every: Annotated[bool, typer.Option("--all", help="name every piece that is not ok, and every mesh")] = False,
+    check: Annotated[bool, typer.Option(help="hold every file to its checksums, not only those that changed")] = False,
 ) -> None:
     """How many cases are ok, failed, stale or missing, and why; and how the references stand, mesh by mesh."""
     chosen = [find_study(study)] if study else list(STUDIES)
+    known = Known(results, check)
     for entry in chosen:
-        found = standings(results, entry)
+        with busy(f"looking at {entry.name}"):
+            found = standings(results, entry, known)
         say(f"{entry.name}: {counted(standing.status for standing in found)}")
         if study:
             show_reasons(found, every)
-            mixed = mixture(machines_of(found))
+            mixed = mixture(machines_of(found, known))
             if mixed:
                 say(f"  {mixed}")
-    show_references(results, {scene.name: scene for entry in chosen for scene in entry.scenes}.values(), every)
+    show_references(known, {scene.name: scene for entry in chosen for scene in entry.scenes}.values(), every)
 
 
 def counted(words: Iterable[str]) -> str:
@@ -59,12 +63,9 @@ def show_reasons(found: list[Standing], every: bool) -> None:
             say(f"    and {len(labels) - len(shown)} more (--all names them)")
 
 
-def show_references(root: Path, scenes: Iterable[Scene], every: bool) -> None:
+def show_references(known: Known, scenes: Iterable[Scene], every: bool) -> None:
     """How the references stand: a line per scene, or one per mesh and setting."""
-    found = {
-        scene.name: [standing_of(root, reference_solve) for reference_solve in reference_solves(scene)]
-        for scene in scenes
-    }
+    found = {scene.name: [known.standing(solve) for solve in reference_solves(scene)] for scene in scenes}
     found = {name: rows for name, rows in found.items() if rows}
     if not found:
         return
