@@ -46,7 +46,7 @@ def test_a_scheduler_without_workers_is_a_sentence(tmp_path):
 
 def test_a_folder_that_workers_do_not_see_is_a_sentence(scheduler, tmp_path, monkeypatch):
     monkeypatch.setattr(Presence, "__reduce__", lambda self: (Presence, (tmp_path / "elsewhere" / "token", self.files)))
-    with pytest.raises(StudyError, match=rf"worker 0 does not see {tmp_path}; put the results on a folder"):
+    with pytest.raises(StudyError, match=rf"worker [01] does not see {tmp_path}; put the results on a folder"):
         swept(tmp_path, tiny_study(), scheduler)
     assert not (tmp_path / "tiny").exists()
 
