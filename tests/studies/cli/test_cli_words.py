@@ -9,10 +9,12 @@ from studies.cli import app as cli
 from studies.cli import outline
 from studies.cli.group import loaded
 from studies.metrics.metrics import METRICS
+from studies.population import Population, population_study
 
 
 def test_the_outline_is_what_the_modules_say():
-    assert outline.studies() == [(s.name, s.question.strip().split("\n")[0]) for s in STUDIES]
+    shown = (*STUDIES, population_study((Population("liver", 1),)))
+    assert outline.studies() == [(s.name, s.question.strip().split("\n")[0]) for s in shown]
     assert outline.methods() == [(m.name, (m.__doc__ or "").strip().split("\n")[0]) for m in (*METHODS, *LITERATURE)]
     assert outline.metrics() == [(m.name, m.description) for m in METRICS]
 
