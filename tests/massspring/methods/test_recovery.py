@@ -65,7 +65,7 @@ def test_from_any_start_the_rest_shape_comes_back_with_a_volume_at_every_node(st
 @pytest.mark.parametrize("start", ["mirrored", "scrambled", "line"])
 def test_a_quadratic_body_comes_back(start):
     body = curved_solid()
-    history = ended(body, start)
+    history = ended(body, start, frames=300)
     assert history.outcome == "finished" and distance(body, history.final) < BACK
 
 
