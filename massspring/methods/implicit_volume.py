@@ -46,8 +46,9 @@ from massspring.kernels.step.end import end_step
 from massspring.layout.allocate import start
 from massspring.layout.block_jacobi import clusters_at_rest
 from massspring.layout.state import State
-from massspring.methods.capabilities import Capabilities
+from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.families.points import point_volumes_frame
+from massspring.methods.families.recovery import followed_by, is_back, recovery_of, simpler, why_not_recover
 from massspring.methods.method import Method, threaded_frame
 from massspring.world.obstacles import Attachment
 
@@ -167,6 +168,9 @@ class ImplicitVolume(Method):
     tolerance: float = 1e-6
     """Volume error that an iterative solve may leave, over the volume [1]: 1 % of what a kept volume may be off."""
     most_iterations: int = 200
+    recovers: bool = False
+    """Whether a body with several volumes comes back from a start that is inside out, flat or anywhere: until then it
+    has springs with rest length and one volume (docs/theory.md, eq. 8.15). From rest on nothing changes."""
 
     name: ClassVar[str] = "implicit_volume"
     order: ClassVar[int] = 1
@@ -182,9 +186,19 @@ class ImplicitVolume(Method):
         float32=True,
     )
 
+    def __post_init__(self) -> None:
+        if self.recovers:
+            limits = dict.fromkeys(("thin_probes", "threads", "float32"), No("it may recover as another body"))
+            object.__setattr__(self, "capabilities", replace(self.capabilities, **limits))
+
+    def why_not(self, body: Body) -> str | None:
+        """Why the method cannot advance `body`; None when it can."""
+        reason = self.capabilities.why_not(body)
+        return why_not_recover(body) if reason is None and self.recovers else reason
+
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """The body at rest, or with velocities `v` (n, 3) [m/s], and clusters of its volumes where they are many."""
-        state = start(body, attachments, v)
+        state = start(body, attachments, v, recovery_of(body, attachments, v) if self.recovers else None)
         rows = state.rows
         if not isinstance(rows, VolumeRows) or len(rows.matrix):
             return state
@@ -193,6 +207,11 @@ class ImplicitVolume(Method):
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
+        if state.memory is not None:
+            if not is_back(state.memory, state.nodes.x):
+                simple = self.advance(*simpler(state, state.memory, boundary))
+                return followed_by(state, state.memory, simple, len(boundary.position))
+            state = replace(state, memory=None, lam=np.zeros_like(state.lam))
         with threaded_frame(state, boundary) as after:
             if after.rows is None:
                 lam = implicit_volume_frame(after.frame(boundary), float(after.lam[0]))

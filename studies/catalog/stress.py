@@ -8,7 +8,9 @@ from studies.scenes.stress import STRESS_SCENES
 NODES = 230
 """On the surface: about 316 with those inside, as many as in docs/theory.md, section 5."""
 ONE, MANY = BodyRecipe(nodes=NODES), BodyRecipe(nodes=NODES, volumes="nodal")
+TAUT = BodyRecipe(nodes=NODES, law="cotangent", volumes="nodal")
 FRACTION = 0.2
+BACK = ImplicitVolume(recovers=True)
 
 STRESS = Study(
     name="stress",
@@ -16,7 +18,15 @@ STRESS = Study(
     cases=tuple(
         Case(scene, body, method, dt_fraction=FRACTION)
         for scene in STRESS_SCENES
-        for body, method in ((ONE, Free()), (ONE, ImplicitVolume()), (ONE, Shake()), (MANY, ImplicitVolume()))
+        for body, method in (
+            (ONE, Free()),
+            (ONE, ImplicitVolume()),
+            (ONE, Shake()),
+            (MANY, ImplicitVolume()),
+            (TAUT, ImplicitVolume()),
+            (MANY, BACK),
+            (TAUT, BACK),
+        )
     ),
     charts=(Chart("recovery.png", "studies.plots.campaigns.recovery:draw"),),
     columns=("inverted_share", "rest_distance", "volume_end", "min_j"),

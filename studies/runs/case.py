@@ -76,6 +76,8 @@ class BodyRecipe:
 
 LATER = {"weights": None, "graded": False, "mass": "lumped", "contact": "facets"}
 """Settings of a recipe that came after the first records, and what they were before."""
+LATER_SETTINGS = {"implicit_volume": {"recovers": False}}
+"""The same of methods, by name."""
 
 
 @dataclass(frozen=True)
@@ -169,8 +171,11 @@ def case_to_dict(case: Case) -> dict[str, Any]:
         chosen["recorded"] = list(case.recorded)
     return {
         "scene": _scene_adapter().dump_python(case.scene, mode="json"),
-        "body": _recipe_to_dict(case.body),
-        "method": {"name": case.method.name, "settings": asdict(case.method)},  # pyright: ignore[reportArgumentType]
+        "body": _without(LATER, case.body),
+        "method": {
+            "name": case.method.name,
+            "settings": _without(LATER_SETTINGS.get(case.method.name, {}), case.method),
+        },
         "dt": case.dt,
         "dt_fraction": case.dt_fraction,
         "frames": case.frames,
@@ -179,9 +184,9 @@ def case_to_dict(case: Case) -> dict[str, Any]:
     }
 
 
-def _recipe_to_dict(recipe: BodyRecipe) -> dict[str, Any]:
-    """JSON-able form; of LATER only what was chosen, so that records from before it could be stay current."""
-    return {name: value for name, value in asdict(recipe).items() if name not in LATER or value != LATER[name]}
+def _without(later: Mapping[str, Any], settings: Any) -> dict[str, Any]:
+    """JSON-able form; of what came `later` only what was chosen, so that records from before it could stay current."""
+    return {name: value for name, value in asdict(settings).items() if name not in later or value != later[name]}
 
 
 def case_from_json(text: str) -> Case:

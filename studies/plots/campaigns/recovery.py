@@ -4,19 +4,21 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from studies.metrics.run import Run
 from studies.metrics.table import metric
-from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
+from studies.plots.style.bodies import BodyLook, body_handle, body_looks
 from studies.plots.style.page import blank, by_scene, finish, good_frames, grouped, has_frames, log_axis, page, panels
-from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, save, styled
-from studies.runs.case import BodyRecipe
+from studies.plots.style.style import BLACK, GREY, PURPLE, SMALL, heading, method_colour, readable, save, styled
+from studies.runs.case import BodyRecipe, Case, chosen_settings
 
 TITLE = "From which starts a body finds its rest shape again"
 LOWEST, HIGHEST = -1.6, 1.15
 COLUMNS = 3
+CHOSEN = PURPLE
 RETURNED = 0.01
 """RMS distance from the rest shape over the size [%] up to which a body is back."""
 
@@ -47,7 +49,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         f"Less than {LOWEST:g} is drawn there.",
         *_ends(shown, looks),
     ]
-    return finish(sheet, TITLE, body_method_handles(shown, looks), notes, columns=3)
+    return finish(sheet, TITLE, _handles(shown, looks), notes, columns=3)
 
 
 def _draw_start(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> None:
@@ -65,18 +67,37 @@ def _draw_start(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
     )
     for run in group:
         good = slice(0, good_frames(run))
-        look = {"color": method_colour(run.case.method.name), "linestyle": looks[run.case.body].line}
+        look = {"color": _colour(run.case), "linestyle": looks[run.case.body].line}
         axes.plot(run.field("t")[good], np.maximum(run.field("min_j")[good], LOWEST), **look)
     axes.set_ylim(LOWEST - 0.05, HIGHEST)
     log_axis(axes.xaxis)
+
+
+def _colour(case: Case) -> str:
+    """That of the method; with other settings than the default ones, its own here."""
+    return CHOSEN if chosen_settings(case.method) else method_colour(case.method.name)
+
+
+def _handles(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list[Artist]:
+    """Legend entries for every body, and method with its settings, that occur together."""
+    entries = []
+    for case in {(looks[run.case.body], run.case.method_words): run.case for run in shown}.values():
+        entry = body_handle(looks[case.body], case.method.name)
+        entry.set(color=_colour(case), label=_model(case, looks))
+        entries.append(entry)
+    return entries
+
+
+def _model(case: Case, looks: dict[BodyRecipe, BodyLook]) -> str:
+    """Body, and method with its settings: "tetrahedral, nodal volumes, implicit volume recovers"."""
+    return f"{looks[case.body].name}, {readable(case.method_words)}"
 
 
 def _ends(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list[str]:
     """How many starts each model comes back from."""
     inverted, distance = metric("inverted_share"), metric("rest_distance")
     sentences = []
-    for group in grouped(shown, lambda run: (looks[run.case.body], run.case.method.name)):
-        body, method = looks[group[0].case.body].name, readable(group[0].case.method.name)
+    for group in grouped(shown, lambda run: (looks[run.case.body], run.case.method_words)):
         lost = [run for run in group if not distance(run) < RETURNED]
         shares = np.array([share for share in map(inverted, lost) if share == share])
         left = ""
@@ -85,7 +106,7 @@ def _ends(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list[str]:
                 f"{share:.2g}" if share < 10 else f"{share:.0f}" for share in (shares.min(), shares.max())
             )
             left = f"; elsewhere {' to '.join(span)} % of tetrahedra stay flat or turned"
-        sentences.append(f"{body}, {method}: back from {len(group) - len(lost)} of {len(group)}{left}.")
+        sentences.append(f"{_model(group[0].case, looks)}: back from {len(group) - len(lost)} of {len(group)}{left}.")
     return sentences
 
 

@@ -98,6 +98,8 @@ def test_a_setting_that_is_not_chosen_leaves_old_keys_as_they_were():
     assert "weights" not in json.loads(Case(SCENES[0]).key)["body"]
     assert "precision" not in json.loads(Case(SCENES[0]).key)
     assert not {"graded", "mass"} & set(json.loads(Case(SCENES[0]).key)["body"])
+    assert set(json.loads(Case(SCENES[0]).key)["method"]["settings"]) == {"tolerance", "most_iterations"}
+    assert json.loads(Case(SCENES[0], method=ImplicitVolume(recovers=True)).key)["method"]["settings"]["recovers"]
 
 
 def test_grading_and_masses_stand_in_names_and_series():
