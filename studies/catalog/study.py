@@ -72,6 +72,8 @@ class Study:
     """Metrics shown in its table: names of METRICS, or metrics of one's own."""
     main: bool = False
     """Whether it belongs to `make study`, and to `organbench run` without a name."""
+    counts_losses: bool = False
+    """Whether cases and references that fail are part of its answer: it is published with them."""
 
     def __post_init__(self) -> None:
         if self.name in RESERVED:

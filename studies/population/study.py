@@ -50,5 +50,6 @@ def study_of(scenes: Sequence[Scene], name: str) -> Study:
             for body, fraction in recipes_for(scene)
         ),
         charts=(Chart("distributions.png", "studies.plots.campaigns.population:draw"),),
+        counts_losses=True,
         columns=("force_end", "mean_error", "interior_error", "volume_worst", "min_j", "sway"),
     )
