@@ -48,7 +48,7 @@ def test_the_starts_that_a_body_recovers_from():
     several, starts, lost = said(r"With one volume constraint the ball recovers from (\w+) of the (\w+) starts, all "
                                  r"except the (\w+)\.")  # fmt: skip
     said(r"With springs alone it (never) does\.")
-    (nodal,) = said(r"With nodal volumes it recovers from (\w+)\b")
+    nodal, mended = said(r"With nodal volumes it recovers from (\w+), and from (\w+) where the method `recovers`")
     rows = table("stress")
     names = [scene.name for scene in STRESS_SCENES]
     assert sorted(set(rows["scene"])) == sorted(names) and starts == WORDS[len(names)]
@@ -58,7 +58,11 @@ def test_the_starts_that_a_body_recovers_from():
         assert several == WORDS[len(back)]
         assert set(names) - set(back) == {f"stress_{lost}"}
     assert recovered(one[one["method"] == "free"]) == []
-    assert nodal == WORDS[len(recovered(rows[rows["body"] == NODAL]))]
+    many = rows[rows["body"] == NODAL]
+    chosen = many["recipe"].str.contains("recovers")
+    assert nodal == WORDS[len(recovered(many[~chosen & (many["law"] == "van_gelder")]))]
+    for law in ("van_gelder", "cotangent"):
+        assert mended == WORDS[len(recovered(many[chosen & (many["law"] == law)]))]
 
 
 def test_what_one_volume_leaves_of_the_force_under_any_law():

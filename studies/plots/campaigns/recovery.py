@@ -105,7 +105,7 @@ def _ends(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list[str]:
             span = dict.fromkeys(
                 f"{share:.2g}" if share < 10 else f"{share:.0f}" for share in (shares.min(), shares.max())
             )
-            left = f"; elsewhere {' to '.join(span)} % of tetrahedra stay flat or turned"
+            left = f"; else {' to '.join(span)} % stay flat or inside out"
         sentences.append(f"{_model(group[0].case, looks)}: back from {len(group) - len(lost)} of {len(group)}{left}.")
     return sentences
 
