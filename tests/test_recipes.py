@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import massspring
-from massspring import METHODS, Volumes, tetrahedral_body
+from massspring import LITERATURE, METHODS, Volumes, tetrahedral_body
 from massspring.body.laws import LAWS
 from studies.catalog import STUDIES, Chart
 from studies.catalog.methods import contestants
@@ -237,6 +237,6 @@ def test_an_added_law_keeps_the_contract(recipe, add):
 
 def test_the_list_of_commands_reads_the_tuples():
     """Without running them: they must stay tuples that name their things one by one."""
-    assert [name for name, _ in outline.methods()] == [method.name for method in METHODS]
+    assert [name for name, _ in outline.methods()] == [method.name for method in (*METHODS, *LITERATURE)]
     assert [name for name, _ in outline.metrics()] == [metric.name for metric in METRICS]
-    assert len(outline.studies()) == len(STUDIES)
+    assert len(outline.studies()) == len(STUDIES) + 1, "and the population"

@@ -156,19 +156,20 @@ def check_shapes(det):
         )
 
 
-CENTROID = np.full((3, 1), 0.25)
 OUTWARD = np.array([-1, 1, -1, 1])
 """Whether the faces of an upright tetrahedron, as RefTet lists their vertices, turn counterclockwise from outside."""
 
 
 def check_neighbours(mesh):
-    """Refuse an inside-out element: two tetrahedra turn round the face between them in opposite ways.
+    """Refuse a folded element, and an inside-out one: two tetrahedra turn round the face between them in opposite ways.
 
     The map of an element says how it turns, not its corners: those of a part of a curved element that was halved may
     lie the other way round, though it is upright everywhere.
     """
-    _, shape = basis_table(ElementTetP2(), CENTROID)
-    sign = np.sign(np.linalg.det(np.einsum("eni,qJn->eqiJ", nodes(mesh)[element_nodes(mesh)], shape)[:, 0]))
+    _, shape = basis_table(ElementTetP2(), get_quadrature(RefTet, ELEMENTS[DEFAULT].order)[0])
+    det = np.linalg.det(np.einsum("eni,qJn->eqiJ", nodes(mesh)[element_nodes(mesh)], shape))
+    check_shapes(det)
+    sign = np.sign(det[:, 0])
     a, b, c = np.asarray(mesh.t[:4], np.int64)[np.array(RefTet.facets)].transpose(1, 0, 2)
     turns = np.sign((b - a) * (c - a) * (c - b)) * OUTWARD[:, None] * sign
     round_face = np.zeros(mesh.nfacets)

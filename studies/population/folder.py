@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import studies.geometry as geometry
 from massspring import Sphere, Trajectory
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
-from studies.geometry import scan
 from studies.geometry.files.units import Source, check_unit
 from studies.population.draw import CHECKPOINTS, FRAMES, GAP, PRESSED
 from studies.scene.kind import has_wall
@@ -64,7 +64,7 @@ def _placed(path: Path, unit: str | None, name: str) -> Placed:
         warnings.simplefilter("always")
         try:
             source = Source(path.absolute(), unit)
-            mesh = scan(source, NODES, fill=False)
+            mesh = geometry.scan(source, NODES, fill=False)
             scene = placed_scene(name, replace(source, unit=mesh.recipe["unit"]), proposal(mesh))
         except StudyError as error:
             return Placed(path, None, (str(error),))

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from studies.base.errors import StudyError
+from massspring import LITERATURE
+from studies.base.errors import DoesNotApply, StudyError
 from studies.catalog import STUDIES
 from studies.catalog.study import SMOKE_FRAMES, SMOKE_NODES, SMOKE_NODES_HOLLOW, SMOKE_QUADRATIC
 from studies.metrics.table import metric
@@ -93,7 +94,11 @@ def representatives(cases):
 
 
 def check_prepared(case):
-    prepared = prepare(case)
+    try:
+        prepared = prepare(case)
+    except DoesNotApply as reason:  # the literature's methods are asked for in every scene
+        assert type(case.method) in LITERATURE and len(str(reason)) > 40
+        return
     assert prepared.setup.clock.frames == case.frames
     assert prepared.setup.clock.duration == pytest.approx(case.scene.duration, rel=1e-12)
 

@@ -170,7 +170,7 @@ def test_some_studies_are_published_and_all_else_stays(current, home, organbench
     for name in ("other/other.csv", "volume_loss/older.png", "kept_volume.csv"):
         (home / PUBLISHED / name).parent.mkdir(parents=True, exist_ok=True)
         (home / PUBLISHED / name).write_text("old")
-    monkeypatch.setattr(command, "STUDIES", (HEADLINE,))
+    monkeypatch.setattr("studies.sweep.find_study.STUDIES", (HEADLINE,))
     code, out, _ = organbench("publish", "volume_loss", "--results", current)
     assert code == 0 and "one.png" in out and "old" not in (home / "README.md").read_text()
     left = {path.relative_to(home / PUBLISHED).as_posix() for path in (home / PUBLISHED).rglob("*") if path.is_file()}

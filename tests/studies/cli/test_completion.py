@@ -11,6 +11,7 @@ from studies.catalog import STUDIES
 from studies.cli import app as cli
 from studies.cli.completing import KIND, NAMES
 from studies.geometry.organs import SHAPES
+from studies.population import POPULATION
 from studies.scenes import SCENES
 
 ROOT = Path(__file__).parents[3]
@@ -59,7 +60,7 @@ def test_what_is_offered(words, offered):
 
 
 def test_every_name_is_offered():
-    assert NAMES["studies"]() == [study.name for study in STUDIES]
+    assert NAMES["studies"]() == [*(study.name for study in STUDIES), POPULATION]
     assert NAMES["scenes"]() == [scene.name for scene in SCENES]
     assert NAMES["organs"]() == list(SHAPES)
     assert KIND.keys() <= cli.COMMANDS.keys() and set(KIND.values()) == NAMES.keys()
