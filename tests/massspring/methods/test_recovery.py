@@ -119,6 +119,9 @@ def test_a_throw_leaves_momentum_and_held_nodes_as_they_are(nodal_ball):
     states = [RECOVERS.advance(setup.start(), setup.boundary(0)) for _ in range(2)]
     np.testing.assert_array_equal(states[0].v, states[1].v)
     assert not states[0].v[held].any()
+    setup = Setup(nodal_ball, RECOVERS, clock_for(nodal_ball, 1, 1), positions=start_of(nodal_ball, *LINE))
+    v = RECOVERS.advance(setup.start(), setup.boundary(0)).v
+    assert np.abs(nodal_ball.mass @ v).max() < 1e-12 * (nodal_ball.mass @ np.abs(v)).max()
 
 
 def test_held_and_pressed_it_comes_back_and_no_node_is_in_a_plane(nodal_ball):
