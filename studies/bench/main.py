@@ -18,7 +18,6 @@ from reference_fem.exact import BALL_BETWEEN_PLANES
 from studies.bench import meshes as geometry_bench
 from studies.bench.elements import element_lines
 from studies.bench.line import BenchLine
-from studies.bench.many_cases import many_lines
 from studies.bench.plain import plain_lines
 from studies.bench.plain_points import plain_points_lines
 from studies.bench.slide import slide_lines
@@ -131,7 +130,6 @@ def main() -> None:
         path_lines,
         second_code_lines,
         geometry_lines,
-        many_lines,
     )
     lines = [line for stage in stages for line in stage()]
     table = pd.DataFrame(

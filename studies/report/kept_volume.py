@@ -15,7 +15,7 @@ from studies.runs.case import Case
 from studies.runs.digest import case_digest
 from studies.store.index.room import Room
 from studies.store.record import read_record
-from studies.sweep.known import Known
+from studies.sweep.stored.known import Known
 
 PROMISED = 1e-4
 """Worst |V_r/V0_r − 1| of any kept volume, after any frame, at the default step [1]."""

@@ -32,8 +32,8 @@ from studies.store.index.entry import written
 from studies.store.machine import write_machine
 from studies.store.paths import study_folder, timing_name
 from studies.store.stamps import set_stamp
-from studies.sweep.known import Known
 from studies.sweep.load import load_runs
+from studies.sweep.stored.known import Known
 
 FIGURES = "figures"
 FIGURE_NODES = 550

@@ -165,7 +165,8 @@ def _is_short_list(value: Any) -> bool:
 
 
 def _header(path: Path, file: h5py.File, wanted: Collection[str] | None = None) -> tuple[Record, dict[str, str]]:
-    """The record without fields, of its attributes all or those `wanted`; and the digest of each field by name."""
+    """The record without fields, and the digest of each field by name. `wanted`: of its attributes these alone, of a
+    file of which every byte is known to be as it was written."""
     attributes = file.attrs  # a new one each time it is asked for, and each opens the file's root
     if "schema" not in attributes:
         raise StudyError(f"{path} is an HDF5 file, but not a results file of organbench: it has no schema version")
@@ -180,19 +181,22 @@ def _header(path: Path, file: h5py.File, wanted: Collection[str] | None = None) 
     if CHECKSUMS not in attributes:
         raise DamagedFile(f"{path} lacks the attribute {CHECKSUMS!r}: {AGAIN}")
     digests = json.loads(str(attributes[CHECKSUMS]))
-    values = {}
-    chosen = digests["attributes"]
-    if wanted is not None:
-        chosen = {name: chosen[name] for name in wanted if name in chosen}
-    for name, digest in chosen.items():
-        if name not in attributes:
-            raise DamagedFile(f"{path} lacks the attribute {name!r}: {AGAIN}")
-        values[name] = _plain(attributes[name])
-        if attribute_digest(values[name]) != digest:
-            raise DamagedFile(f"{path}: the attribute {name!r} has changed since it was written: {AGAIN}")
+    if wanted is None:
+        values = {name: _checked(path, attributes, name, digest) for name, digest in digests["attributes"].items()}
+    else:
+        values = {name: _plain(attributes[name]) for name in wanted if name in digests["attributes"]}
     header = {name: values.pop(name) for name in HEADER}
     header["status"] = Status(lookup(header["status"], [str(status) for status in Status], f"status in {path}"))
     return Record(**header, attributes=values), digests["fields"]
+
+
+def _checked(path: Path, attributes: h5py.AttributeManager, name: str, digest: str) -> Any:
+    if name not in attributes:
+        raise DamagedFile(f"{path} lacks the attribute {name!r}: {AGAIN}")
+    value = _plain(attributes[name])
+    if attribute_digest(value) != digest:
+        raise DamagedFile(f"{path}: the attribute {name!r} has changed since it was written: {AGAIN}")
+    return value
 
 
 def _storable(value: Any) -> Any:

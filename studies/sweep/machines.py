@@ -3,8 +3,8 @@
 from collections import Counter
 from collections.abc import Iterable
 
-from studies.sweep.known import Known
 from studies.sweep.standings import Standing
+from studies.sweep.stored.known import Known
 
 ANY = "any"
 """Stands for the machine of a portable result, which is equal on every one (studies.base.portable)."""

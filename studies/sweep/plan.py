@@ -10,7 +10,7 @@ from studies.catalog.study import Study
 from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.size import record_bytes, timing_bytes
 from studies.store.index.entry import Entry
-from studies.sweep.known import Known
+from studies.sweep.stored.known import Known
 from studies.sweep.tasks import Task, tasks_of
 
 PHYSICS, TIMING = "physics", "timing"

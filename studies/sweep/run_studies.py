@@ -9,8 +9,8 @@ from studies.catalog.study import Study
 from studies.store.archived import check_no_archive
 from studies.sweep.engine import Engine, Progress, Told
 from studies.sweep.failures import Failures
-from studies.sweep.known import Known
 from studies.sweep.pool import Pool
+from studies.sweep.stored.known import Known
 from studies.sweep.tasks import Task, tasks_of
 
 

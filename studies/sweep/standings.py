@@ -5,12 +5,9 @@ from pathlib import Path
 
 from studies.base.collection import uncollected
 from studies.catalog.study import Study
-from studies.store.schema import Status
 from studies.store.staleness import MISSING
-from studies.sweep.known import Known
+from studies.sweep.stored.known import FAILURES, Known
 from studies.sweep.tasks import Task, tasks_of
-
-FAILURES = (Status.FAILED, Status.NOT_CONVERGED, Status.TIMED_OUT)
 
 
 def warnings_of(root: Path, study: Study) -> list[str]:

@@ -19,14 +19,14 @@ from studies.store.links import link_study
 from studies.store.paths import index_path, record_files
 from studies.store.record import read_record, write_record
 from studies.store.staleness import CASE_CHANGED, CODE_CHANGED, DAMAGED, MISSING, why_stale
-from studies.sweep import known as module
 from studies.sweep.find_study import find_study
-from studies.sweep.known import Known
 from studies.sweep.load import load_runs
 from studies.sweep.plan import plan
-from studies.sweep.rows import MOST_ROOMS, ROOM, table_rows
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import standings, warnings_of
+from studies.sweep.stored import known as module
+from studies.sweep.stored.known import Known
+from studies.sweep.stored.rows import MOST_ROOMS, ROOM, table_rows
 from studies.sweep.tasks import Task, tasks_of
 from studies.timing.cases import timing_file
 from tests.studies import made_up_run
@@ -164,7 +164,7 @@ def test_a_reference_that_changed_measures_anew(many, monkeypatch):
     own = Metric("count", "1", "-", lambda run: measured.append(1) or 1.0)
     rows(many, [own]), rows(many, [own])
     assert len(measured) == COUNT
-    monkeypatch.setattr("studies.sweep.references.References.state", lambda self, scene: "solved again")
+    monkeypatch.setattr("studies.sweep.stored.references.References.state", lambda self, scene: "solved again")
     rows(many, [own])
     assert len(measured) == 2 * COUNT
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 from studies.runs.current import case_path
 from studies.store.record import read_record, write_record
-from studies.sweep.known import Known
 from studies.sweep.machines import machines_of, mixture
 from studies.sweep.standings import standings
+from studies.sweep.stored.known import Known
 from tests.studies.tiny import tiny_study
 
 

@@ -10,8 +10,8 @@ import pytest
 from studies.runs.current import case_path
 from studies.store.links import link_study
 from studies.store.record import Status, read_record, write_record
-from studies.sweep.prune import DAY, Rule, prunable, remove
 from studies.sweep.standings import standings
+from studies.sweep.stored.prune import DAY, Rule, prunable, remove
 from studies.timing.cases import timing_file
 from tests.studies.octant import SCENE
 from tests.studies.tiny import content, diverging_case, tiny_case, tiny_study

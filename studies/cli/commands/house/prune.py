@@ -10,7 +10,7 @@ from studies.base.lookup import lookup
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, say
 from studies.sweep.find_study import find_studies
-from studies.sweep.prune import MEANING, Prunable, Rule, prunable, remove
+from studies.sweep.stored.prune import MEANING, Prunable, Rule, prunable, remove
 
 SHOWN = 8
 """Files named per rule; `--list` names the rest."""

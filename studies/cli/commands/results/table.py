@@ -18,8 +18,8 @@ from studies.scene.quantities import ALWAYS
 from studies.store.csv_table import write_table
 from studies.store.parquet_table import write_parquet
 from studies.sweep.find_study import find_study
-from studies.sweep.known import Known
-from studies.sweep.rows import table_rows
+from studies.sweep.stored.known import Known
+from studies.sweep.stored.rows import table_rows
 
 Row = Mapping[Any, Any]
 SETTINGS = {"law": "law {}", "nodes": "{} nodes", "stiffness": "stiffness {}", "dt/dt_c": "dt = {} dt_c"}

@@ -25,10 +25,10 @@ from studies.store.staleness import MISSING
 from studies.sweep.engine import Engine
 from studies.sweep.failures import Failures
 from studies.sweep.find_study import ON, find_studies
-from studies.sweep.known import Known
 from studies.sweep.plan import plan
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, warnings_of
+from studies.sweep.stored.known import Known
 from studies.sweep.tasks import Task, tasks_of
 
 SMOKE = "smoke"

@@ -13,9 +13,9 @@ from studies.cli.terminal import Results, busy, console, say
 from studies.reference.reference_solves import SolveStanding, reference_solves
 from studies.scene.scene import Scene
 from studies.sweep.find_study import find_study
-from studies.sweep.known import Known
 from studies.sweep.machines import machines_of, mixture
 from studies.sweep.standings import Standing, standings
+from studies.sweep.stored.known import Known
 
 SHOWN = 8
 """Pieces named per reason; `--all` names the rest."""

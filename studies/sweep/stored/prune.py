@@ -14,8 +14,7 @@ from studies.reference.reference_solves import reference_solves
 from studies.store.archived import check_no_archive
 from studies.store.index.entry import Entry, state_of
 from studies.store.paths import SUFFIX, TIMING, study_folder
-from studies.sweep.known import Known
-from studies.sweep.standings import FAILURES
+from studies.sweep.stored.known import FAILURES, Known
 
 DAY = 86_400.0
 """Seconds."""

@@ -17,6 +17,8 @@ from studies.store.schema import Status
 from studies.store.staleness import CASE_CHANGED, CODE_CHANGED, MISSING
 from studies.sweep.tasks import Task
 
+FAILURES = (Status.FAILED, Status.NOT_CONVERGED, Status.TIMED_OUT)
+"""Of a piece that another run may bring further."""
 TIMED = (Status.OK, Status.INVERTED, Status.DRIFTED)
 """A run that broke off has no comparable frames."""
 

@@ -6,7 +6,7 @@ from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import reference_solves
 from studies.scene.scene import Scene
 from studies.store.record import Status
-from studies.sweep.known import Known
+from studies.sweep.stored.known import Known
 
 
 class References:

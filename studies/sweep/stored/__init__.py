@@ -1,0 +1,1 @@
+"""What is stored of studies, looked up by the index of their folders."""
