@@ -6,7 +6,7 @@ import numpy as np
 from skfem import MeshTet, MeshTet2
 
 from reference_fem.elements.shapes import facet_nodes, nodes
-from reference_fem.oracles.bodies import ball_octant, shell_octant
+from reference_fem.oracles.bodies import ball_octant, shell_octant, straight
 from studies.geometry import organ
 from studies.stress.bodies import ORGAN_NODES, RADIUS, cloud
 from studies.stress.reference.trial import SHELL, ReferenceTrial
@@ -32,7 +32,8 @@ def _sound(trial: ReferenceTrial, rng: np.random.Generator) -> MeshTet:
     if trial.shape == "octant":
         return _scaled(ball_octant(size))
     if trial.shape == SHELL:
-        return _scaled(shell_octant(INNER, 2 + trial.nodes % 2, size - size // 3))
+        found = shell_octant(INNER, 2 + trial.nodes % 2, size - size // 3)
+        return _scaled(found if trial.nodes % 2 else straight(found))
     if trial.shape == "box":
         ends = [np.sort([0.0, *rng.random(1 + size // 2), 1.0]) for _ in range(3)]
         return _scaled(MeshTet.init_tensor(*ends))

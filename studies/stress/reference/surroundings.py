@@ -23,8 +23,9 @@ from reference_fem.oracles.bodies import symmetry
 from studies.stress.bodies import DENSITY, RADIUS
 from studies.stress.reference.bodies import INNER, mesh_of
 from studies.stress.reference.trial import FILLED, MOVED, OBSTACLES, SHELL, ReferenceTrial
-from studies.stress.surroundings import HELD
 
+HELD = 0.4
+"""Share of the height that is held, and that is moved."""
 ALONG = {"press": (0.0, 0.0, -1.0), "pull": (0.0, 0.0, 1.0), "shear": (1.0, 0.0, 0.0)}
 FULLEST = 0.9
 """Depth at which a lumen holds three times its volume, or its pressure is mu."""
@@ -84,6 +85,7 @@ def _newton(trial: ReferenceTrial) -> NewtonSettings:
         penalty=trial.penalty,
         max_iterations=trial.iterations,
         smallest_step=trial.smallest_step,
+        solver=trial.solver,
     )
 
 
@@ -98,7 +100,7 @@ def _box(mesh: MeshTet) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _held(trial: ReferenceTrial, mesh: MeshTet, duration: float) -> list[PrescribedDisplacement]:
-    """Planes of symmetry, or the lowest quarter; and the highest quarter where it is moved."""
+    """Planes of symmetry, or the lowest part; and the highest part where it is moved."""
     low, high = _box(mesh)
     share = HELD * (high[2] - low[2])
     held = [PrescribedDisplacement(lambda x: x[2] <= low[2] + share)]
@@ -110,7 +112,8 @@ def _held(trial: ReferenceTrial, mesh: MeshTet, duration: float) -> list[Prescri
         far = trial.depth * (high[2] - low[2]) * np.array(ALONG[trial.load])
         parts = (0, 1, 2) if len(held) == 1 else (0,) if trial.load == "shear" else (2,)
         motion = _linear(far, duration)
-        held.append(PrescribedDisplacement(lambda x: x[2] >= high[2] - share, parts, motion))
+        beside = 1e-9 if len(held) > 1 else -np.inf
+        held.append(PrescribedDisplacement(lambda x: (x[2] >= high[2] - share) & (x[0] > beside), parts, motion))
     return held
 
 

@@ -21,6 +21,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "steps": (1, 2, 4, 10, 30),
     "iterations": (5, 10, 25, 25, 50),
     "smallest_step": (1.0, 1.0 / 16.0, 1.0 / 64.0),
+    "solver": ("scipy", "scipy", "scipy", "scipy", "scipy", "scipy", "scipy", "auto"),
 }
 """What is drawn evenly; a choice that stands there twice is drawn twice as often."""
 FLAWS = "inside_out", "open", "unused", "not_finite", "flat", "loose"
@@ -44,6 +45,7 @@ PLAIN: dict[str, Any] = {
     "penalty": 1500.0,
     "iterations": 25,
     "smallest_step": 1.0 / 64.0,
+    "solver": "scipy",
     "speed": 0.0,
 }
 """The gentlest value of each choice, to which a failure is reduced."""
@@ -85,6 +87,7 @@ class ReferenceTrial:
     penalty: float
     iterations: int
     smallest_step: float
+    solver: str
     speed: float
     """Size of the body over the time that the load takes, over the speed of shear waves; 0: a path of rest."""
 
@@ -105,7 +108,7 @@ def draw(seed: int, number: int) -> ReferenceTrial:
     drawn = {name: values[int(rng.integers(len(values)))] for name, values in CHOICES.items()}
     drawn |= {
         "flaw": FLAWS[int(rng.integers(len(FLAWS)))] if rng.random() < FLAWED else "none",
-        "bend": float(rng.uniform(0.0, 0.15)) if rng.random() < 0.25 else 0.0,
+        "bend": float(10.0 ** rng.uniform(-3.0, -0.8)) if rng.random() < 0.25 else 0.0,
         "nodes": int(rng.integers(6, 26)),
         "mu": float(2e3 * 10.0 ** rng.uniform(-3.0, 3.0)),
         "bulk": float(10.0 ** rng.uniform(0.0, 6.0)),
