@@ -11,7 +11,6 @@ import pandas as pd
 
 from studies.base.interrupts import die_quietly
 from studies.stress.outcome import UNEXPLAINED, Attempt, Drawn, Outcome, tried
-from studies.stress.trial import Trial, draw
 from studies.sweep.pool import environment_of_workers
 from studies.sweep.workers import done_or_dead
 
@@ -52,11 +51,6 @@ def try_all(folder: Path, attempt: Attempt, trials: list[Drawn]) -> None:
 
 def _file(folder: Path, trials: list[Drawn]) -> Path:
     return folder / f"{trials[0].number}-{len(trials)}"
-
-
-def drawn(seed: int, cases: int) -> list[Trial]:
-    """Trials 0 to cases - 1 of a seed."""
-    return [draw(seed, number) for number in range(cases)]
 
 
 def table_of(outcomes: Iterable[Outcome]) -> pd.DataFrame:

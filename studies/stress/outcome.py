@@ -83,9 +83,7 @@ def _run(trial: Trial) -> tuple[str, str]:
     return (UNEXPLAINED, wrong) if wrong else named(setup, history)
 
 
-def simplest(
-    outcome: Outcome, most: int = 200, attempt: Attempt = tried, plain: Mapping[str, Any] = PLAIN
-) -> Outcome:
+def simplest(outcome: Outcome, most: int = 200, attempt: Attempt = tried, plain: Mapping[str, Any] = PLAIN) -> Outcome:
     """A trial with as few choices off the gentlest, `plain`, as still ends in that status, tried choice by choice."""
     found, waiting = outcome, deque(_gentler(outcome.trial, plain))
     while waiting and most > 0:

@@ -95,7 +95,9 @@ def _run(trial: ReferenceTrial, ask: Callable[[], None], reached: Reached) -> tu
     wrong = broken(system, reached.found, reached.state)
     if wrong:
         return UNEXPLAINED, wrong
-    least = corner_ratio(system, reached.found)
+    least, flattest = corner_ratio(system, reached.found.u)
+    if status == "ok" and flattest <= 0.0:
+        return "inverted", f"an element is inside out at a corner, at rest already (volume ratio {flattest:.3g})"
     if status == "ok" and least <= 0.0:
         return "inverted", f"an element ends inside out at a corner (least volume ratio {least:.3g})"
     return status, message

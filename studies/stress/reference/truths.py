@@ -18,7 +18,8 @@ from reference_fem.system.state import State
 
 ROUND_OFF = 1e-9
 """Of what is summed: far above what double precision leaves on these meshes, far below every tolerance drawn."""
-CORNERS = np.vstack((np.zeros(3), np.eye(3))).T
+CORNERS = np.vstack((np.zeros(3), np.eye(3), np.full(3, 0.25))).T
+"""And the middle."""
 
 
 def broken(system: System, found: Equilibrium, state: State | None) -> str | None:
@@ -155,10 +156,12 @@ def depth(system: System, state: State) -> float:
     return max((-float(gaps(row, y).min()) for row in system.obstacles_at(state.t)), default=0.0)
 
 
-def corner_ratio(system: System, found: Equilibrium) -> float:
-    """Least volume ratio at the corners of the elements, where no element is integrated."""
+def corner_ratio(system: System, u: np.ndarray) -> tuple[float, float]:
+    """(least volume ratio at the corners of the elements, where none is integrated; how far from flat they are there at
+    rest, over the element's middle: not above 0 where the mesh itself is folded)."""
     mesh = system.problem.mesh
     _, shape = basis_table(ElementTetP2(), CORNERS)
     table, rest = element_nodes(mesh), nodes(mesh)
-    now, before = (np.linalg.det(np.einsum("eni,qJn->eqiJ", x[table], shape)) for x in (rest + found.u, rest))
-    return float(np.min(now / before))
+    now, before = (np.linalg.det(np.einsum("eni,qJn->eqiJ", x[table], shape)) for x in (rest + u, rest))
+    middle = before[:, -1:]
+    return float(np.min(now / before)), float(np.min(before / middle))
