@@ -21,7 +21,7 @@ def mesh_of(trial: ReferenceTrial) -> MeshTet:
     rng = np.random.default_rng((trial.seed, trial.number, 19))
     mesh = _sound(trial, rng)
     mesh = FLAW[trial.flaw](mesh) if trial.flaw in FLAW else mesh
-    return _bent(mesh, trial.bend, rng) if trial.bend > 0.0 else mesh
+    return _bent(mesh, trial.bend, rng) if trial.bend > 0.0 and trial.flaw != "unused" else mesh
 
 
 def _sound(trial: ReferenceTrial, rng: np.random.Generator) -> MeshTet:

@@ -23,7 +23,7 @@ def counts_by_choice(table: pd.DataFrame) -> pd.DataFrame:
         rows.append(found[found["value"] != "all"].assign(choice=choice))
     rows.append(found[found["value"] == "all"].assign(choice="all"))
     whole = pd.concat(rows, ignore_index=True)
-    return whole[["choice", *(name for name in whole if name != "choice")]]
+    return whole.reindex(columns=["choice", *(name for name in whole if name != "choice")])
 
 
 def last_states(outcomes: Iterable[Outcome]) -> bytes:

@@ -1,7 +1,7 @@
 """`organbench stress`: random trials that try to break every method, or the reference, and what came of each."""
 
 import gzip
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +15,7 @@ from studies.plots.campaigns.breaking import draw as draw_chart
 from studies.store.csv_table import write_table
 from studies.store.stamps import set_stamp
 from studies.stress.campaign import counts, run_trials, table_of
-from studies.stress.outcome import UNEXPLAINED, Outcome, simplest, tried
+from studies.stress.outcome import UNEXPLAINED, Attempt, Drawn, Outcome, simplest, tried
 from studies.stress.reference.outcome import tried as try_reference
 from studies.stress.reference.table import counts_by_choice, last_states
 from studies.stress.reference.trial import PLAIN as GENTLE
@@ -35,7 +35,9 @@ def stress(
     results: Results = Path("results"),
 ) -> None:
     """Tries to break every method with random bodies and surroundings (exit code 1: an end without a name)."""
-    make, attempt, plain = (draw_reference, try_reference, GENTLE) if reference else (draw, tried, PLAIN)
+    make: Callable[[int, int], Drawn] = draw_reference if reference else draw
+    attempt: Attempt = try_reference if reference else tried
+    plain = GENTLE if reference else PLAIN
     if trial is not None:
         found = [attempt(make(seed, trial))]
         tell(found[0])
