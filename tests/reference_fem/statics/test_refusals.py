@@ -95,7 +95,7 @@ def test_a_tangent_that_stays_singular_ends_the_path_with_what_converged(monkeyp
         return plain(system, found)
 
     monkeypatch.setattr(newton, "Tangent", from_then_on)
-    with pytest.raises(SolveError, match="last that converged.*hold it") as caught:
+    with pytest.raises(SolveError, match=r"last that converged.*hold it") as caught:
         pulled(1.0)
     assert [step.t for step in caught.value.converged] == [0.5]
 

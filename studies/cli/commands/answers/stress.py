@@ -3,7 +3,7 @@
 import gzip
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import pandas as pd
 import typer
@@ -15,7 +15,7 @@ from studies.plots.campaigns.breaking import draw as draw_chart
 from studies.store.csv_table import write_table
 from studies.store.stamps import set_stamp
 from studies.stress.campaign import counts, run_trials, table_of
-from studies.stress.outcome import UNEXPLAINED, Attempt, Drawn, Outcome, simplest, tried
+from studies.stress.outcome import UNEXPLAINED, Attempt, Outcome, simplest, tried
 from studies.stress.reference.outcome import tried as try_reference
 from studies.stress.reference.table import counts_by_choice, last_states
 from studies.stress.reference.trial import PLAIN as GENTLE
@@ -35,7 +35,7 @@ def stress(
     results: Results = Path("results"),
 ) -> None:
     """Tries to break every method with random bodies and surroundings (exit code 1: an end without a name)."""
-    make: Callable[[int, int], Drawn] = draw_reference if reference else draw
+    make: Callable[[int, int], Any] = draw_reference if reference else draw
     attempt: Attempt = try_reference if reference else tried
     plain = GENTLE if reference else PLAIN
     if trial is not None:
