@@ -1,7 +1,7 @@
 """`organbench stress`: random trials that try to break every method, or the reference, and what came of each."""
 
 import gzip
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,6 +24,11 @@ from studies.stress.trial import PLAIN, draw
 
 FOLDER, REFERENCE, TRIALS, LAST = "breaking", "breaking_reference", "trials.csv.gz", "last.npz"
 WHAT = "trials"
+CAMPAIGNS: Mapping[bool, tuple[Callable[[int, int], Any], Attempt, Mapping[str, Any]]] = {
+    False: (draw, tried, PLAIN),
+    True: (draw_reference, try_reference, GENTLE),
+}
+"""Whether the reference is tried: how a trial is drawn and tried, and its gentlest choices."""
 
 
 def stress(
@@ -35,9 +40,7 @@ def stress(
     results: Results = Path("results"),
 ) -> None:
     """Tries to break every method with random bodies and surroundings (exit code 1: an end without a name)."""
-    make: Callable[[int, int], Any] = draw_reference if reference else draw
-    attempt: Attempt = try_reference if reference else tried
-    plain = GENTLE if reference else PLAIN
+    make, attempt, plain = CAMPAIGNS[reference]
     if trial is not None:
         found = [attempt(make(seed, trial))]
         tell(found[0])
