@@ -56,6 +56,7 @@ docs: setup-dev compiled-essential ## the documentation as a site: open site/ind
 
 stress: setup-run ## ten thousand random trials that try to break every method (minutes)
 	$(BIN)/organbench stress --cases 10000
+	$(BIN)/organbench stress --reference --cases 300
 
 figures: setup-run ## draw the charts again from the stored results
 	$(BIN)/organbench report --figures

@@ -1,4 +1,4 @@
-"""The one exception of this package, and the one warning."""
+"""The exceptions of this package, and the one warning."""
 
 
 class SolveError(ValueError):
@@ -10,6 +10,10 @@ class SolveError(ValueError):
     def __init__(self, message, converged=()):
         super().__init__(message)
         self.converged = list(converged)
+
+
+class SingularTangent(SolveError):
+    """A tangent that cannot be factorised or solved with: the body is free to move, or a step went too far."""
 
 
 class SlowSolverWarning(UserWarning):

@@ -6,6 +6,7 @@ import numpy as np
 
 from reference_fem.contact import augmented as contact
 from reference_fem.contact.augmented import NO_GUESS
+from reference_fem.errors import SingularTangent
 from reference_fem.statics import active_set
 from reference_fem.statics.tangent import Tangent
 from reference_fem.system.saddle_point import System
@@ -75,10 +76,16 @@ def let_go(grip: contact.Grip, guess):
 
 
 def direction(system: System, found, x, target):
-    """Newton's change at x, which also takes the held unknowns to their target; and the contact pressures to expect."""
-    tangent = Tangent(system, found)
-    change = tangent.newton(target - x[system.pattern.held])
-    return active_set.settled(system, tangent, x, change) if len(system.rows) else (change, NO_GUESS)
+    """Newton's change at x, which also takes the held unknowns to their target; and the contact pressures to expect.
+
+    Raises StepFailed where the tangent is singular: a shorter step may pass by.
+    """
+    try:
+        tangent = Tangent(system, found)
+        change = tangent.newton(target - x[system.pattern.held])
+        return active_set.settled(system, tangent, x, change) if len(system.rows) else (change, NO_GUESS)
+    except SingularTangent as singular:
+        raise StepFailed(str(singular)) from singular
 
 
 def settled(found, settings, slack):

@@ -1,6 +1,7 @@
 """Refusing what cannot be solved, with one sentence each."""
 
 import numpy as np
+from skfem import MeshTet2
 
 from reference_fem.elements.shapes import check_neighbours, facet_nodes, nodes
 from reference_fem.elements.surface import point_positions
@@ -13,11 +14,13 @@ START_DEPTH = 1e-3
 
 def check_mesh(mesh):
     """Refuse non-finite points, vertices that no element uses, and elements turned inside out."""
-    x = nodes(mesh)
+    x = mesh.doflocs.T
     bad = np.flatnonzero(~np.isfinite(x).all(axis=1))
     if bad.size:
         raise SolveError(f"node {bad[0]} of the mesh is at {x[bad[0]]}: all coordinates must be finite [m]")
-    unused = np.setdiff1d(np.arange(mesh.nvertices), mesh.t)
+    # a straight mesh has no other points than vertices, also behind the last one that is used
+    count = mesh.nvertices if isinstance(mesh, MeshTet2) else len(x)
+    unused = np.setdiff1d(np.arange(count), mesh.t)
     if unused.size:
         raise SolveError(
             f"vertex {unused[0]} belongs to no tetrahedron ({unused.size} such vertices): remove unused vertices"

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from reference_fem.errors import SlowSolverWarning, SolveError
+from reference_fem.errors import SingularTangent, SlowSolverWarning, SolveError
 
 RESIDUAL_LIMIT = 1e-6
 """Largest relative residual of a solve (max norm) before the factors are rejected: Newton only needs a direction,
@@ -145,7 +145,7 @@ class SymmetricSolver:
         try:
             self.factors.factor(self.upper, afresh)
         except self.factors.failure as problem:
-            raise SolveError(
+            raise SingularTangent(
                 f"the tangent matrix of {len(self.upper.indptr) - 1} unknowns cannot be factorised ({problem}): "
                 f"part of the body may be free to move, hold it"
             ) from problem
@@ -161,7 +161,7 @@ class SymmetricSolver:
             x = self.factors.solve(b)
         misfit = self.misfit(x, b)
         if not misfit <= RESIDUAL_LIMIT:
-            raise SolveError(
+            raise SingularTangent(
                 f"the tangent matrix of {len(self.upper.indptr) - 1} unknowns is singular to working precision "
                 f"(relative residual {misfit:.1e}, limit {RESIDUAL_LIMIT:.0e}): part of the body may be free to move, "
                 f"hold it"

@@ -10,8 +10,7 @@ from tempfile import TemporaryDirectory
 import pandas as pd
 
 from studies.base.interrupts import die_quietly
-from studies.stress.outcome import UNEXPLAINED, Outcome, tried
-from studies.stress.trial import Trial, draw
+from studies.stress.outcome import UNEXPLAINED, Attempt, Drawn, Outcome, tried
 from studies.sweep.pool import environment_of_workers
 from studies.sweep.workers import done_or_dead
 
@@ -19,42 +18,39 @@ CHUNK = 25
 """Trials that a process takes at a time."""
 
 
-def run_trials(trials: Iterable[Trial], jobs: int, done: Callable[[Outcome], object]) -> list[Outcome]:
-    """What came of every trial, in their order; `done` hears of each."""
+def run_trials(
+    trials: Iterable[Drawn], jobs: int, done: Callable[[Outcome], object], attempt: Attempt = tried
+) -> list[Outcome]:
+    """What `attempt` made of every trial, in their order; `done` hears of each."""
     trials = list(trials)
     chunks = [trials[first : first + CHUNK] for first in range(0, len(trials), CHUNK)]
     found: dict[int, Outcome] = {}
     with TemporaryDirectory() as folder, environment_of_workers():
-        for outcome in _each(chunks, jobs, Path(folder)):
+        for outcome in _each(chunks, jobs, Path(folder), attempt):
             found[outcome.trial.number] = outcome
             done(outcome)
     return [found[trial.number] for trial in trials]
 
 
-def _each(chunks: list[list[Trial]], jobs: int, folder: Path) -> Iterator[Outcome]:
+def _each(chunks: list[list[Drawn]], jobs: int, folder: Path, attempt: Attempt) -> Iterator[Outcome]:
     """A chunk that ends its process is tried again trial by trial."""
-    with closing(done_or_dead(chunks, jobs, partial(try_all, folder), die_quietly)) as ended:
+    with closing(done_or_dead(chunks, jobs, partial(try_all, folder, attempt), die_quietly)) as ended:
         for chunk, cause in ended:
             if cause is None:
                 yield from pickle.loads(_file(folder, chunk).read_bytes())
             elif len(chunk) == 1:
                 yield Outcome(chunk[0], UNEXPLAINED, cause, float("nan"))
             else:
-                yield from _each([[trial] for trial in chunk], jobs, folder)
+                yield from _each([[trial] for trial in chunk], jobs, folder, attempt)
 
 
-def try_all(folder: Path, trials: list[Trial]) -> None:
+def try_all(folder: Path, attempt: Attempt, trials: list[Drawn]) -> None:
     """In a process: what came of each, left in `folder`."""
-    _file(folder, trials).write_bytes(pickle.dumps([tried(trial) for trial in trials]))
+    _file(folder, trials).write_bytes(pickle.dumps([attempt(trial) for trial in trials]))
 
 
-def _file(folder: Path, trials: list[Trial]) -> Path:
+def _file(folder: Path, trials: list[Drawn]) -> Path:
     return folder / f"{trials[0].number}-{len(trials)}"
-
-
-def drawn(seed: int, cases: int) -> list[Trial]:
-    """Trials 0 to cases - 1 of a seed."""
-    return [draw(seed, number) for number in range(cases)]
 
 
 def table_of(outcomes: Iterable[Outcome]) -> pd.DataFrame:
@@ -62,8 +58,8 @@ def table_of(outcomes: Iterable[Outcome]) -> pd.DataFrame:
     return pd.DataFrame([outcome.row for outcome in outcomes])
 
 
-def counts(table: pd.DataFrame) -> pd.DataFrame:
-    """How many trials ended how: a row for each method, a column for each status, and of all."""
-    found = pd.DataFrame(pd.crosstab(table["method"], table["status"], margins=True, margins_name="all"))
+def counts(table: pd.DataFrame, by: str = "method") -> pd.DataFrame:
+    """How many trials ended how: a row for each method, or value of `by`, a column for each status, and of all."""
+    found = pd.DataFrame(pd.crosstab(table[by], table["status"], margins=True, margins_name="all"))
     first = [name for name in ("ok", "refused") if name in found]
     return found.reindex(columns=[*first, *sorted(set(found) - {*first, "all"}), "all"])

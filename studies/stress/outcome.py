@@ -3,8 +3,9 @@
 import time
 import warnings
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
+from typing import Any, ClassVar, Protocol
 
 from massspring import MassSpringError, simulate
 from studies.base.errors import StudyError
@@ -17,13 +18,35 @@ SECONDS = 20.0
 """After which a trial is given up."""
 
 
+class Drawn(Protocol):
+    """A trial of any campaign: a dataclass of its choices."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def number(self) -> int:
+        """Which one of its seed."""
+        ...
+
+    @property
+    def line(self) -> str:
+        """The command that repeats it."""
+        ...
+
+    @property
+    def changed(self) -> dict[str, Any]:
+        """The choices that are not the gentlest."""
+        ...
+
+
 @dataclass(frozen=True)
 class Outcome:
     """Of a trial."""
 
-    trial: Trial
+    trial: Drawn
     status: str
-    """ "ok", "refused", "diverged", "blocked", "inverted", "drifted", "penetrated", "timed-out", or UNEXPLAINED."""
+    """ "ok", "refused", "diverged", "blocked", "inverted", "drifted", "penetrated", "timed-out", or UNEXPLAINED; of the
+    reference "not-converged" too."""
     message: str
     seconds: float
 
@@ -31,6 +54,10 @@ class Outcome:
     def row(self) -> dict[str, object]:
         """For a table."""
         return {**asdict(self.trial), "status": self.status, "message": self.message, "seconds": self.seconds}
+
+
+Attempt = Callable[[Any], Outcome]
+"""What comes of a trial."""
 
 
 def tried(trial: Trial) -> Outcome:
@@ -56,25 +83,25 @@ def _run(trial: Trial) -> tuple[str, str]:
     return (UNEXPLAINED, wrong) if wrong else named(setup, history)
 
 
-def simplest(outcome: Outcome, most: int = 200) -> Outcome:
-    """A trial with as few choices off the gentlest as still ends in that status, tried choice by choice."""
-    found, waiting = outcome, deque(_gentler(outcome.trial))
+def simplest(outcome: Outcome, most: int = 200, attempt: Attempt = tried, plain: Mapping[str, Any] = PLAIN) -> Outcome:
+    """A trial with as few choices off the gentlest, `plain`, as still ends in that status, tried choice by choice."""
+    found, waiting = outcome, deque(_gentler(outcome.trial, plain))
     while waiting and most > 0:
         most -= 1
-        attempt = tried(waiting.popleft())
-        if attempt.status == outcome.status and _kind(attempt) == _kind(outcome):
-            found, waiting = attempt, deque(_gentler(attempt.trial))
+        simpler = attempt(waiting.popleft())
+        if simpler.status == outcome.status and _kind(simpler) == _kind(outcome):
+            found, waiting = simpler, deque(_gentler(simpler.trial, plain))
     return found
 
 
-def _gentler(trial: Trial) -> Iterable[Trial]:
+def _gentler(trial: Drawn, plain: Mapping[str, Any]) -> Iterable[Drawn]:
     """The trial with one choice more at its gentlest, or half-way there."""
     for name in trial.changed:
-        yield replace(trial, **{name: PLAIN[name]})
+        yield replace(trial, **{name: plain[name]})
     for name in ("nodes", "steps"):
         value = getattr(trial, name)
-        if value > 2 * PLAIN[name]:
-            yield replace(trial, **{name: int(value // 2 // PLAIN["steps"] * PLAIN["steps"] or value // 2)})
+        if value > 2 * plain[name]:
+            yield replace(trial, **{name: int(value // 2 // plain["steps"] * plain["steps"] or value // 2)})
 
 
 def _kind(outcome: Outcome) -> str:

@@ -17,6 +17,8 @@ from reference_fem import (
     curve,
     equilibrium_path,
 )
+from reference_fem.errors import SingularTangent
+from reference_fem.statics import newton
 from tests.reference_fem.bodies import block, symmetry
 
 TISSUE = NeoHookean(1.0, 1000.0)
@@ -49,6 +51,53 @@ def test_unused_vertex():
     t = mesh.t + 1
     p = np.hstack((np.zeros((3, 1)) - 1.0, mesh.p))
     assert "vertex 0 belongs to no tetrahedron" in refused(Problem(MeshTet(p, t), TISSUE, [BOTTOM]))[0]
+
+
+def test_unused_vertex_behind_all_others():
+    mesh = block()
+    p, last = np.hstack((mesh.p, np.zeros((3, 1)) - 1.0)), mesh.p.shape[1]
+    assert f"vertex {last} belongs to no tetrahedron" in refused(Problem(MeshTet(p, mesh.t), TISSUE, [BOTTOM]))[0]
+
+
+def pulled(share):
+    """A block whose top is pulled up by a tenth for each second, solved up to `share` seconds."""
+    top = PrescribedDisplacement(lambda x: x[2] > 1.0 - 1e-9, motion=lambda t: (0.0, 0.0, 0.1 * t))
+    return equilibrium_path(Problem(block(), TISSUE, [BOTTOM, top]), (0.5, share), NewtonSettings(smallest_step=0.5))
+
+
+def test_a_singular_tangent_is_a_step_that_failed(monkeypatch):
+    """The first sub-step of the second interval meets it, and its halves do not."""
+    plain, made = newton.Tangent, []
+
+    def once(system, found):
+        made.append(found)
+        if len(made) == first + 1:
+            raise SingularTangent("the tangent matrix is singular: hold it")
+        return plain(system, found)
+
+    first = iterations_to_the_first()
+    monkeypatch.setattr(newton, "Tangent", once)
+    assert [step.substeps for step in pulled(1.0)] == [1, 2]
+
+
+def iterations_to_the_first():
+    """Linear solves up to the first wanted time of `pulled`."""
+    return pulled(1.0)[0].newton_iterations
+
+
+def test_a_tangent_that_stays_singular_ends_the_path_with_what_converged(monkeypatch):
+    first, plain, made = iterations_to_the_first(), newton.Tangent, []
+
+    def from_then_on(system, found):
+        made.append(found)
+        if len(made) > first:
+            raise SingularTangent("the tangent matrix is singular: hold it")
+        return plain(system, found)
+
+    monkeypatch.setattr(newton, "Tangent", from_then_on)
+    with pytest.raises(SolveError, match=r"last that converged.*hold it") as caught:
+        pulled(1.0)
+    assert [step.t for step in caught.value.converged] == [0.5]
 
 
 def test_an_element_turned_inside_out():
