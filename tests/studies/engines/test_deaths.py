@@ -101,7 +101,8 @@ def test_a_worker_that_is_killed_costs_no_case(tmp_path):
 
 
 def test_a_case_that_ends_its_process_is_stored_as_failed_and_the_rest_goes_on(scheduler, tmp_path):
-    study, failures = written(tmp_path / "study", FATAL), Failures()
+    fatal = FATAL.replace('"fatal"', '"fatal_there"')  # a process knows one method of each name
+    study, failures = written(tmp_path / "study", fatal), Failures()
     swept(tmp_path / "results", study, scheduler, failures=failures)
     (cause,) = failures.causes.values()
     assert cause.startswith("its process died 3 times: killed by SIGKILL")
