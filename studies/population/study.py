@@ -36,17 +36,12 @@ def population_study(populations: Sequence[Population] = MEMBERS, name: str = PO
     """
     drawn = [population.scenes() for population in populations]
     turns = [scenes[at] for at in range(max(map(len, drawn), default=0)) for scenes in drawn if at < len(scenes)]
-    return study_of(turns, name)
-
-
-def study_of(scenes: Sequence[Scene], name: str) -> Study:
-    """The same recipes on any scenes."""
     return Study(
         name=name,
         question=__doc__ or "",
         cases=tuple(
             Case(scene, body, ImplicitVolume(), dt_fraction=fraction)
-            for scene in scenes
+            for scene in turns
             for body, fraction in recipes_for(scene)
         ),
         charts=(Chart("distributions.png", "studies.plots.campaigns.population:draw"),),

@@ -11,6 +11,7 @@ import numpy as np
 from numba.core import config
 from threadpoolctl import threadpool_limits
 
+from studies.base.collection import uncollected
 from studies.base.errors import StudyError
 from studies.store.new_record import new_fields
 from studies.store.record import Field
@@ -109,23 +110,12 @@ def interleave(
     for turn in range(-warmups, repeats):
         first = turn % len(names)
         gc.collect()
-        with _no_garbage_collection():
+        with uncollected():
             for name in names[first:] + names[:first]:
                 measured = np.asarray(contestants[name]())
                 if turn >= 0:
                     times[name].append(measured)
     return {name: _stacked(name, rows) for name, rows in times.items()}
-
-
-@contextmanager
-def _no_garbage_collection() -> Iterator[None]:
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 def _stacked(name: str, rows: list[np.ndarray]) -> np.ndarray:

@@ -10,6 +10,7 @@ from studies.cli import app as cli
 from studies.reference.load import load_reference
 from studies.reference.reference_solves import reference_solves
 from studies.reference.solve import solve
+from studies.store import opening
 from studies.sweep.run_studies import run_studies
 from tests.conftest import once_per_run
 from tests.studies.octant import SCENE
@@ -80,3 +81,18 @@ def tiny_file(tmp_path):
     path = tmp_path / "tiny_file.py"
     path.write_text(TINY)
     return path
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """Names of the results files that are read, as they are."""
+    found = []
+    read = opening.seal_of
+    monkeypatch.setattr(opening, "seal_of", lambda path: found.append(path.name) or read(path))
+    return found
+
+
+@pytest.fixture
+def trusted(monkeypatch):
+    """Of a changed file no other process need try whether the library comes to an end with it."""
+    monkeypatch.setattr(opening, "_comes_to_an_end", lambda path: True)

@@ -10,7 +10,6 @@ import pytest
 
 from studies.base import shelf
 from studies.bench.many_cases import NAME, make_up, many_study
-from studies.store import opening
 from studies.store.index import folder as index_folder
 from studies.store.index.entry import read_entry
 from studies.store.index.folder import ENTRIES, FolderIndex, shelf_of
@@ -29,21 +28,6 @@ def many(tmp_path):
     """A results folder with COUNT made-up records."""
     make_up(tmp_path, many_study(COUNT), made_up_run.run().record)
     return tmp_path
-
-
-@pytest.fixture
-def opened(monkeypatch):
-    """Names of the results files that are read, as they are."""
-    found = []
-    read = opening.seal_of
-    monkeypatch.setattr(opening, "seal_of", lambda path: found.append(path.name) or read(path))
-    return found
-
-
-@pytest.fixture
-def trusted(monkeypatch):
-    """Of a changed file no other process need try whether the library comes to an end with it."""
-    monkeypatch.setattr(opening, "_comes_to_an_end", lambda path: True)
 
 
 def entries(root):

@@ -13,7 +13,6 @@ from studies.report.kept_volume import kept_volumes
 from studies.report.results import refresh
 from studies.runs import current
 from studies.runs.current import case_path
-from studies.store import opening
 from studies.store.index import folder as index_folder
 from studies.store.links import link_study
 from studies.store.paths import index_path, record_files
@@ -42,20 +41,6 @@ COLUMNS = [metric(name) for name in STUDY.columns]
 def many(tmp_path):
     make_up(tmp_path, STUDY, made_up_run.run().record)
     return tmp_path
-
-
-@pytest.fixture
-def opened(monkeypatch):
-    found = []
-    read = opening.seal_of
-    monkeypatch.setattr(opening, "seal_of", lambda path: found.append(path.name) or read(path))
-    return found
-
-
-@pytest.fixture
-def trusted(monkeypatch):
-    """Of a changed file no other process need try whether the library comes to an end with it."""
-    monkeypatch.setattr(opening, "_comes_to_an_end", lambda path: True)
 
 
 def statuses(root, study=STUDY):
