@@ -45,9 +45,7 @@ def check_memory(needed, free, unknowns):
 def load_pardiso():
     """The optional wrapper module, or None after one SlowSolverWarning in the life of the process."""
     try:
-        import pypardiso
-
-        pypardiso.PyPardisoSolver()  # ImportError when the MKL library itself is missing
+        import pypardiso  # ImportError when the MKL library itself is missing
     except ImportError as problem:
         warnings.warn(
             f"pypardiso is not usable ({problem}): SciPy's solver gives the same answers, five to twenty times "
@@ -56,6 +54,8 @@ def load_pardiso():
             stacklevel=3,
         )
         return None
+    # Each solver made without this path searches the whole environment for the library, for up to 1.6 s.
+    os.environ.setdefault("PYPARDISO_MKL_RT", pypardiso.ps.libmkl._name)
     return pypardiso
 
 

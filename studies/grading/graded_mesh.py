@@ -1,5 +1,7 @@
 """The mesh of a body that is finer where its scene holds and touches it, with a wanted number of surface nodes."""
 
+from itertools import count
+
 import numpy as np
 
 from studies.base.errors import StudyError
@@ -77,18 +79,37 @@ def coarse_level(scene: Scene, nodes: int, at_outlines: int, at_contact: int, qu
             failed = failed or error  # raised below, unless a neighbour of this level can be meshed
             level += max(1, level // 50)
             continue
-        wanted = max(FEWEST, round(level * nodes / found[level]))
-        if abs(found[level] / nodes - 1.0) <= CLOSE or wanted in found:
+        off = abs(found[level] / nodes - 1.0)
+        level = max(FEWEST, round(level * nodes / found[level]))
+        if off <= CLOSE or (level in found and _off(found, nodes) <= TOLERANCE):
             break
-        level = wanted
+        if level in found:
+            level = _untried(level, found)
     if failed is not None and not found:
         raise failed
-    best = min(found, key=lambda tried: abs(found[tried] - nodes))
-    if abs(found[best] / nodes - 1.0) > TOLERANCE:
+    best = _best(found, nodes)
+    if _off(found, nodes) > TOLERANCE:
         raise StudyError(
             f"scene '{scene.name}': no graded mesh has {nodes} surface nodes; ask for {found[best]}, the nearest found"
         )
     return best
+
+
+def _best(found: dict[int, int], nodes: int) -> int:
+    """The level whose number of nodes comes nearest."""
+    return min(found, key=lambda tried: abs(found[tried] - nodes))
+
+
+def _off(found: dict[int, int], nodes: int) -> float:
+    """Smallest deviation found, over the wanted number."""
+    return abs(found[_best(found, nodes)] / nodes - 1.0)
+
+
+def _untried(level: int, found: dict[int, int]) -> int:
+    """The nearest level that was not tried: neighbours end in numbers of nodes that jump."""
+    step = max(1, level // 50)
+    near = (level + sign * k * step for k in count(1) for sign in (1, -1))
+    return next(other for other in near if other >= FEWEST and other not in found)
 
 
 def outer_nodes(body: HeldMesh, quadratic: bool) -> int:

@@ -2,6 +2,7 @@
 
 import builtins
 import importlib.util
+import sys
 import warnings
 
 import numpy as np
@@ -100,6 +101,14 @@ def test_missing_fast_solver_is_mentioned_once(monkeypatch):
             linear.SymmetricSolver("pardiso")
     finally:
         linear.load_pardiso.cache_clear()
+
+
+@pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
+def test_the_library_is_searched_once_in_a_process(monkeypatch):
+    """A search for the second solver would end in an error here."""
+    pypardiso = linear.load_pardiso()
+    monkeypatch.setattr(sys.modules[pypardiso.PyPardisoSolver.__module__], "find_library", None)
+    linear.SymmetricSolver("pardiso")
 
 
 def test_the_scipy_backend_never_warns():

@@ -12,6 +12,7 @@ from studies.geometry import HalfSpace, check_surface, curved
 from studies.geometry.mesh.jacobian import PAIRS
 from studies.geometry.mesh.organ_mesh import signed_volume, tetrahedron_volumes
 from studies.geometry.surface.family import true_volume
+from studies.grading import graded_mesh as search
 from studies.grading.graded_mesh import graded_mesh, halved, is_hollow, mesh_at, usual_grading
 from studies.grading.true_shape import true_shape
 from studies.scene.meshing import mesh_for
@@ -113,6 +114,14 @@ def test_a_number_of_nodes_that_cannot_be_had_is_one_sentence(mesh_cache, nodes,
     with pytest.raises(StudyError, match=told) as caught:
         graded_mesh(BALL_CLAMPED, nodes, 1, 0, True)
     assert "\n" not in str(caught.value)
+
+
+def test_neighbours_are_tried_where_the_number_of_nodes_jumps(monkeypatch):
+    """152 vertices end in 906 nodes and ask for 133, which end in 695 and ask for 152 again."""
+    jumps = {200: 1042, 152: 906, 133: 695}
+    monkeypatch.setattr(search, "halved", lambda scene, level, *halvings: (None, None, level))
+    monkeypatch.setattr(search, "outer_nodes", lambda level, quadratic: jumps.get(level, 774))
+    assert search.coarse_level(BALL_CLAMPED, 794, 1, 2, True) not in jumps
 
 
 @pytest.mark.slow
