@@ -68,6 +68,8 @@ class Lumen:
     """Rest volume [m³]."""
     cavity: Cavity = field(repr=False)
     number: int = 0
+    normals: np.ndarray | None = None
+    """N_abc: integral of phi_a n dA over a facet = sum of N_abc y_b × y_c, (nn, nn, nn); None of a closed wall."""
 
     @property
     def by_pressure(self):
@@ -83,13 +85,34 @@ class Lumen:
         """Adds dV/dx to gradient, -pressure d²V/dx² to values if tangent; returns V [m³]."""
         return add_wall(x, self.wall, pressure, gradient, values, tangent)
 
+    def beyond_pressure(self, x):
+        """What dV/dx has on held unknowns beside the wall's area times its normal, of the shape of x [m²].
+
+        The volume is that of a cone. Where its wall ends on a symmetry plane, the cone grows with the edge when that
+        leaves the plane, which the content cannot feel: it presses on the wall alone.
+        """
+        beyond = np.zeros(len(x))
+        if self.normals is None:
+            return beyond
+        add_wall(x, self.wall, 0.0, beyond, np.zeros(1), False)
+        dofs = self.wall.dofs.astype(np.int64)
+        y = (self.wall.rest[dofs] + x[dofs]).reshape(len(dofs), 3, -1)
+        turned = np.cross(y[:, :, :, None], y[:, :, None, :], axis=1)
+        area = np.einsum("abc,fibc->fia", self.normals, turned).reshape(dofs.shape)
+        return beyond - np.bincount(dofs.ravel(), area.ravel(), minlength=len(x))
+
+
+def facet_normals(element):
+    """N_abc of a facet: integral of phi_a (phi_b,r phi_c,s), (nn, nn, nn)."""
+    points, w = get_quadrature(RefTri, 4)  # degree 2 + 1 + 1
+    N, dN = basis_table(element, points)
+    return np.einsum("q,qa,qb,qc->abc", w, N, dN[:, 0], dN[:, 1])
+
 
 def facet_shares(element):
     """Triples and their shares C_abc of the cone over one facet: integral of y·(y_r × y_s) / 3, antisymmetrised."""
-    points, w = get_quadrature(RefTri, 4)  # degree 2 + 1 + 1
-    N, dN = basis_table(element, points)
-    T = np.einsum("q,qa,qb,qc->abc", w, N, dN[:, 0], dN[:, 1]) / 3.0
-    triples = np.array(list(itertools.combinations(range(N.shape[1]), 3)))
+    T = facet_normals(element) / 3.0
+    triples = np.array(list(itertools.combinations(range(len(T)), 3)))
     even, odd = ((0, 1, 2), (1, 2, 0), (2, 0, 1)), ((0, 2, 1), (2, 1, 0), (1, 0, 2))
     shares = sum(T[tuple(triples[:, p].T)] for p in even) - sum(T[tuple(triples[:, p].T)] for p in odd)
     return triples.astype(np.uint32), np.asarray(shares)
@@ -138,7 +161,7 @@ def find_lumens(problem, pattern, element, table, held) -> list[Lumen]:
     x, lumens = nodes(problem.mesh), []
     corners = facet_nodes(problem.mesh)[:, :3]
     for number, chosen in enumerate(find_walls(problem.cavities, x[corners].mean(axis=1).T)):
-        origin = wall_origin(number, corners[chosen], x, held)
+        origin, is_open = wall_origin(number, corners[chosen], x, held)
         wall = build_wall(problem, pattern, element, table[chosen], origin)
         nothing = np.zeros(len(pattern.rank))
         volume0 = add_wall(nothing, wall, 0.0, nothing.copy(), np.zeros(1), False)
@@ -146,7 +169,8 @@ def find_lumens(problem, pattern, element, table, held) -> list[Lumen]:
             raise SolveError(
                 f"cavity {number} encloses {volume0:.3g} m³ (limit > 0): choose the inner surface of the tissue"
             )
-        lumens.append(Lumen(wall, volume0, problem.cavities[number], number))
+        normals = -facet_normals(element) if is_open else None
+        lumens.append(Lumen(wall, volume0, problem.cavities[number], number, normals))
     return lumens
 
 
@@ -180,7 +204,8 @@ def build_wall(problem, pattern, element, table, origin) -> Wall:
 
 
 def wall_origin(number, corners, x, held):
-    """A point that all symmetry planes which close the wall go through, (3,) [m]; the centre where none does."""
+    """A point that all symmetry planes which close the wall go through, (3,) [m], the centre where none does; and
+    whether any does."""
     edges = np.sort(np.concatenate((corners[:, :2], corners[:, 1:], corners[:, ::2])), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
     border = edges[count == 1]
@@ -198,4 +223,4 @@ def wall_origin(number, corners, x, held):
             f"the wall of cavity {number} is open along {np.sum(~closed)} edges (limit 0): choose the whole inner "
             f"surface, which may only end on coordinate planes held at zero"
         )
-    return origin
+    return origin, len(border) > 0

@@ -150,8 +150,10 @@ def describe(system: System, state: State, iterations, substeps) -> Equilibrium:
     found = system.evaluate(state.x, system.loads_of(state), tangent=False)
     mesh, material = system.problem.mesh, system.problem.material
     J = np.linalg.det(assembly.deformation(state.x, elements, material.kappa)[0])
-    reaction = np.zeros(n)
-    reaction[system.pattern.held] = found.residual[system.pattern.held]
+    reaction, held = np.zeros(n), system.pattern.held
+    reaction[held] = found.residual[held]
+    for lumen, pressure in zip(system.lumens, state.x[system.field_count :], strict=True):
+        reaction[held] += pressure * lumen.beyond_pressure(state.x[: system.field_count])[held]
     return Equilibrium(
         t=float(state.t),
         u=at_nodes(mesh, system.element, state.x[:n].reshape(-1, 3).copy()),
