@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from massspring import METHODS, Free, ImplicitVolume
+from massspring import LITERATURE, METHODS, Free, ImplicitVolume
 from massspring.kernels.jit.stage_clock import STAGES
 from massspring.methods import VARIANTS
 from studies.base.errors import StudyError
@@ -26,9 +26,9 @@ def own_folder(tmp_path, monkeypatch):
 
 def test_every_method_is_there_in_each_form_that_it_supports():
     found = variants()
-    assert {variant.method for variant in found} == {*(method() for method in METHODS), *VARIANTS}
+    assert {variant.method for variant in found} == {*(method() for method in (*METHODS, *LITERATURE)), *VARIANTS}
     assert len({variant.name for variant in found}) == len(found)
-    for method in METHODS:
+    for method in (*METHODS, *LITERATURE):
         own = [variant for variant in found if variant.method == method()]
         table = method.capabilities
         assert {variant.option for variant in own} == {

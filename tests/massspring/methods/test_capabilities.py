@@ -104,6 +104,8 @@ def test_a_body_runs_or_is_refused_with_the_sentence_of_the_table(method, kind, 
     table = [getattr(method.capabilities, name) for name in NEEDED.get(kind, ())]
     denied = [support.because for support in table if not support]
     reason = denied[0] if denied else REFUSED[kind].get(method.capabilities.keeps)
+    if reason is None and getattr(method, "recovers", False) and not len(any_body.tetrahedra):
+        reason = NO_TETRAHEDRA
     if reason is None:
         assert method.why_not(any_body) is None
         assert runs(Setup(any_body, method, clock_for(any_body, 1, 2, method=method)))
