@@ -5,7 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Attachment, Body, Free, ImplicitVolume, Plane, Probe, Setup, Sphere, Trajectory, simulate
+from massspring import (
+    Attachment,
+    Body,
+    Free,
+    ImplicitVolume,
+    Plane,
+    Probe,
+    Setup,
+    Sphere,
+    Trajectory,
+    Volumes,
+    simulate,
+)
 from tests.massspring.methods.test_methods import clock_for, squeeze
 
 FAR = np.array([10.0, -8.0, 6.0])
@@ -20,7 +32,7 @@ def pressed(body: Body, method, precision: str, shift: np.ndarray) -> Setup:
     depth, size = 0.05 * float(np.ptp(body.rest[:, 2])), float(np.ptp(body.rest[:, 0]))
     middle = body.rest.mean(axis=0)
     beside = np.array([body.rest[:, 0].max() + 0.5 * size, middle[1], middle[2]])
-    still, inwards = (0.0, 0.0, 0.0), (-0.05 * size, 0.0, 0.0)
+    still, inwards = (0.0, 0.0, 0.0), (-0.1 * size, 0.0, 0.0)
     ball = Sphere(tuple(beside + shift), 0.5 * size, Trajectory((0.0, clock.duration), (still, inwards)), 0.3)
     aside = Trajectory((0.0, clock.duration), (still, (0.0, 0.02 * size, 0.0)))
     held = Attachment(np.flatnonzero(body.rest[:, 0] < body.rest[:, 0].min() + 0.1 * size), aside)
@@ -45,13 +57,12 @@ def test_single_precision_at_ten_metres_is_as_good_as_at_the_origin(ball_body, m
     """Kept as given, positions would be wrong by 2e-5 of the body's size as soon as they are stored."""
     here, there = errors(ball_body, method, np.zeros(3)), errors(ball_body, method, FAR)
     assert (here > 1e-12).all(), "both ran in double precision"
-    assert (there < 3.0 * here).all() and there[0] < 3e-6
+    assert (there < 5.0 * here).all() and there[0] < 3e-6
 
 
-def test_many_volumes_are_met_at_ten_metres(request):
-    body = request.getfixturevalue("nodal_body")
-    here, there = errors(body, ImplicitVolume(), np.zeros(3)), errors(body, ImplicitVolume(), FAR)
-    assert (there < 3.0 * here).all()
+def test_many_volumes_are_met_at_ten_metres(filled_ball):
+    body = filled_ball.keeping(Volumes.nodal(filled_ball))
+    assert (errors(body, ImplicitVolume(), FAR) < [5e-6, 1e-5]).all()
 
 
 def test_a_state_is_relative_to_the_middle_of_the_body_at_the_start(ball_body):
