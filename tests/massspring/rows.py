@@ -28,10 +28,15 @@ SUPPORTED = {
 Quadratic bodies have tests of their own (methods/test_quadratic_motion.py), and so have elements (elements)."""
 
 
+def recovers(method: Method) -> bool:
+    """Whether a body that is far from its volumes is another one until it is back."""
+    return getattr(method, "recovers", False)
+
+
 def kinds_of(method: Method) -> tuple[str, ...]:
     """The kinds of bodies that a method can advance; what recovers needs tetrahedra."""
     kinds = SUPPORTED[method.capabilities.keeps]
-    return tuple(kind for kind in kinds if kind != "ball") if getattr(method, "recovers", False) else kinds
+    return tuple(kind for kind in kinds if kind != "ball") if recovers(method) else kinds
 
 
 def rows(methods: Iterable[str] = CONTESTANTS, kinds: Sequence[str] = KINDS) -> list:

@@ -78,6 +78,15 @@ def test_a_variant_advances_a_body_that_is_pressed(option):
     assert again == []
 
 
+@pytest.mark.parametrize("method", LITERATURE, ids=lambda method: method.name)
+def test_those_of_the_literature_advance_too(method):
+    """Without friction, targets or whatever else they refuse."""
+    first = next(variant for variant in variants() if variant.method == method())
+    setup = setup_of(first)
+    moved = setup.method.advance(setup.start(), setup.boundary(0))
+    assert np.isfinite(moved.x).all() and np.abs(moved.x - tiny_body(first.kind).rest).max() > 0
+
+
 def test_compiling_is_logged_with_its_own_time_and_loading_is_not():
     @numba.njit
     def inner(x):
