@@ -63,7 +63,7 @@ class Setup:
     positions: np.ndarray | None = None
     """Initial positions [m], (n, 3); None: those at rest."""
     precision: Precision = "float64"
-    """Of the state; "float32" is faster and meets volumes to 1e-5, for methods that claim it."""
+    """Of the state; "float32" is faster and meets volumes to 1e-5 wherever the body lies, for methods that claim it."""
     threads: int = 1
     """That share a step; the result is the same to the last bit. Pays for bodies of some thousand nodes."""
 

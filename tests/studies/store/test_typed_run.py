@@ -2,6 +2,7 @@
 
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -37,6 +38,15 @@ def test_every_line_of_the_tables_is_a_name_of_the_run(path):
         found = getattr(run.attributes, name)
         assert getattr(RunAttributes, name) is line and found is run.record.attributes.get(name)
         assert isinstance(found, TYPES[line.kind]) or (found is None and line.optional), name
+
+
+def test_the_document_reads_a_run(path, capsys):
+    """With this file in the place of its own."""
+    text = (Path(__file__).parents[3] / "docs" / "results.md").read_text(encoding="utf-8")
+    code = text.split("## In Python")[1].split("```python\n")[1].split("```")[0]
+    line = next(line for line in code.splitlines() if "Run.load" in line)
+    exec(code.replace(line, f"run = Run.load({str(path)!r})"), {})
+    assert "ImplicitVolume" in capsys.readouterr().out
 
 
 def test_a_field_and_an_attribute_of_one_name_are_two_things(path):
