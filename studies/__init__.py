@@ -7,18 +7,18 @@ from studies.base.face import lazy
 if TYPE_CHECKING:
     from massspring.methods import METHODS
     from massspring.methods.barycentre import Barycentre
-    from massspring.methods.baumgarte import Baumgarte
+    from massspring.methods.constraints.baumgarte import Baumgarte
+    from massspring.methods.constraints.post_stabilization import PostStabilization
+    from massspring.methods.constraints.projection import Projection
+    from massspring.methods.constraints.shake import Shake
     from massspring.methods.element import Element
     from massspring.methods.free import Free
     from massspring.methods.implicit_springs import ImplicitSprings
     from massspring.methods.implicit_volume import ImplicitVolume
     from massspring.methods.method import Method
     from massspring.methods.penalty import Penalty
-    from massspring.methods.post_stabilization import PostStabilization
     from massspring.methods.pressure import Pressure
-    from massspring.methods.projection import Projection
     from massspring.methods.pyramid import Pyramid
-    from massspring.methods.shake import Shake
     from massspring.methods.xpbd import Xpbd
     from studies.advice.answer import Advice, Recommendation, advise, recommended
     from studies.base.errors import StudyError
@@ -75,7 +75,7 @@ _FACE = {
     "STUDIES": "studies.catalog",
     "Advice": "studies.advice.answer",
     "Barycentre": "massspring.methods.barycentre",
-    "Baumgarte": "massspring.methods.baumgarte",
+    "Baumgarte": "massspring.methods.constraints.baumgarte",
     "BodyRecipe": "studies.runs.case",
     "Case": "studies.runs.case",
     "Chart": "studies.catalog.study",
@@ -91,16 +91,16 @@ _FACE = {
     "Metric": "studies.metrics.metric",
     "Organ": "studies.scene.scene",
     "Penalty": "massspring.methods.penalty",
-    "PostStabilization": "massspring.methods.post_stabilization",
+    "PostStabilization": "massspring.methods.constraints.post_stabilization",
     "Pressure": "massspring.methods.pressure",
-    "Projection": "massspring.methods.projection",
+    "Projection": "massspring.methods.constraints.projection",
     "Pyramid": "massspring.methods.pyramid",
     "Recommendation": "studies.advice.answer",
     "Record": "studies.store.record",
     "ReferencePlan": "studies.scene.scene",
     "Run": "studies.metrics.run",
     "Scene": "studies.scene.scene",
-    "Shake": "massspring.methods.shake",
+    "Shake": "massspring.methods.constraints.shake",
     "Status": "studies.store.record",
     "Study": "studies.catalog.study",
     "StudyError": "studies.base.errors",

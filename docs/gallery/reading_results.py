@@ -47,19 +47,19 @@ with h5py.File("results/small/small.h5") as file:
         print(name, "->", case.attrs["status"], case["volume"].shape, case["volume"].attrs["unit"])
 
 # %% [markdown]
-# `read_record` compares every byte with its checksum first.
+# `Run.load` compares every byte with its checksum first. Arrays are `fields`, numbers and texts `attributes`.
 
 # %%
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from studies import read_record
+from studies import Run
 
 figure, axes = plt.subplots(figsize=(7, 3.4), layout="constrained")
 for path in sorted(Path("results/small").glob("ball*.h5")):
-    record = read_record(path)
-    force = pd.Series(abs(record.fields["contact_force"].values[:, 0, 2]), record.fields["t"].values)
+    run = Run.load(path)
+    force = pd.Series(abs(run.fields.contact_force[:, 0, 2]), run.fields.t)
     force.plot(ax=axes, label=path.stem.rsplit("-", 1)[0])
 axes.set(xlabel="time [s]", ylabel="force on a plate [N]", ylim=(0, 5))
 axes.legend(fontsize=8)

@@ -38,11 +38,14 @@ class State:
 
     team: ThreadTeam | None = None
     """Threads that share the longest loops of a frame; None for one thread."""
+    origin: np.ndarray | None = None
+    """What `nodes.x` and `model.held_rest` are relative to [m], (3,); None where they are as given."""
 
     @property
     def x(self) -> np.ndarray:
         """Positions [m], (n, 3)."""
-        return self.nodes.x if self.permutation is None else self.nodes.x[self.permutation]
+        x = self.nodes.x if self.permutation is None else self.nodes.x[self.permutation]
+        return x if self.origin is None else x + self.origin
 
     @property
     def v(self) -> np.ndarray:
@@ -58,8 +61,18 @@ class State:
     def moved_to(self, x: np.ndarray) -> "State":
         """The same at positions `x` (n, 3) [m]."""
         nodes = self.nodes._replace(x=self.nodes.x.copy())
-        nodes.x[slice(None) if self.permutation is None else self.permutation] = x
+        place = slice(None) if self.permutation is None else self.permutation
+        nodes.x[place] = x if self.origin is None else x - self.origin
         return replace(self, nodes=nodes)
+
+    def relative_to(self, origin: np.ndarray) -> "State":
+        """The same body in the same place, its arrays relative to `origin` (3,) [m]; they were as given.
+
+        The obstacles of a frame have to be so too (`Setup.boundary`).
+        """
+        nodes = self.nodes._replace(x=self.nodes.x - origin)
+        model = self.model._replace(held_rest=self.model.held_rest - origin)
+        return replace(self, nodes=nodes, model=model, origin=origin)
 
 
 def new_diagnostics(obstacles: int, attachments: int, stage_times: StageTimes = UNTIMED) -> FrameDiagnostics:

@@ -1,4 +1,4 @@
-"""What a set-up is checked for before it runs; each complaint is one sentence."""
+"""What a set-up is checked for before it runs, and its surroundings in each frame; each complaint is one sentence."""
 
 from collections.abc import Collection, Mapping
 
@@ -10,6 +10,7 @@ from massspring.body.points import PointVolumes
 from massspring.body.surface import winding_number
 from massspring.body.volumes import PATCH, Volumes
 from massspring.errors import MassSpringError
+from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.probe_arrays import tip_depth
 from massspring.layout.state import State
 from massspring.layout.threads import cores
@@ -171,3 +172,16 @@ def check_probes(state: State, obstacles: tuple[Obstacle, ...]) -> str | None:
         f"the thin probe that is obstacle {thin[p]} was driven through triangle {triangle}, {held} of whose corners "
         "are attached; lead its path past attached tissue, or attach fewer nodes"
     )
+
+
+def check_loads(boundary: BoundaryConditions) -> str | None:
+    """Which part of the outside world has no place or no size any more, or None."""
+    for what, values in (
+        ("obstacle", boundary.position),
+        ("attachment", boundary.held_displacement),
+        ("target of kept volume", boundary.volume_target[:, :, None]),
+    ):
+        bad = np.flatnonzero(~np.isfinite(values).all(axis=(0, 2)))
+        if len(bad):
+            return f"{what} {bad[0]} is no longer finite; correct its path"
+    return None

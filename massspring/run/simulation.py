@@ -20,6 +20,7 @@ from massspring.run.checks import (
     check_among,
     check_body,
     check_facets,
+    check_loads,
     check_nodal,
     check_probe,
     check_probes,
@@ -62,7 +63,7 @@ class Setup:
     positions: np.ndarray | None = None
     """Initial positions [m], (n, 3); None: those at rest."""
     precision: Precision = "float64"
-    """Of the state; "float32" is faster and meets volumes to 1e-5, for methods that claim it."""
+    """Of the state; "float32" is faster and meets volumes to 1e-5 wherever the body lies, for methods that claim it."""
     threads: int = 1
     """That share a step; the result is the same to the last bit. Pays for bodies of some thousand nodes."""
 
@@ -119,6 +120,15 @@ class Setup:
         """The body with the numbers its nodes have during a run."""
         return numbered(self.body)
 
+    @cached_property
+    def origin(self) -> np.ndarray:
+        """What positions are relative to during the run [m], (3,): in single precision the middle of the body at the
+        start, for its digits are those of the largest coordinate; else 0."""
+        if self.precision == "float64":
+            return np.zeros(3)
+        x = self.body.rest if self.positions is None else self.positions
+        return 0.5 * (x.min(axis=0) + x.max(axis=0))
+
     def start(self) -> State:
         """The state at t = 0."""
         state = self.inside.start(self.method, self.attachments, self.velocity)
@@ -127,7 +137,8 @@ class Setup:
             state = replace(state, probing=probing)
         if self.positions is not None:
             state = state.moved_to(self.positions)
-        state = in_precision(state, self.precision)
+        if self.precision == "float32":
+            state = in_precision(state.relative_to(self.origin), self.precision)
         if self.threads == 1:
             return state
         return shared(state, self.threads)
@@ -149,17 +160,18 @@ class Setup:
         }
 
     def boundary(self, frame: int) -> BoundaryConditions:
-        """The outside world during frame number `frame` (0, 1, …): positions at the end of each of its steps."""
+        """The outside world during frame number `frame` (0, 1, …): positions at the end of each of its steps, relative
+        to `origin`."""
         dt = self.clock.dt
         t = frame * self.clock.frame + dt * np.arange(1, self.clock.steps + 1)
         solids, probes = self.solids, self.probes
         return BoundaryConditions(
             **self._unmoved,
-            position=_tracks([o.anchor + o.path(t) for o in solids], len(t)),
+            position=_tracks([o.anchor + o.path(t) for o in solids], len(t)) - self.origin,
             velocity=_tracks([(o.path(t) - o.path(t - dt)) / dt for o in solids], len(t)),
             held_displacement=_tracks([a.path(t) for a in self.attachments], len(t)),
             volume_target=self.volume_targets(t),
-            tips=Tips(*(_tracks([p.anchor + p.path(u) for p in probes], len(t)) for u in (t - dt, t))),
+            tips=Tips(*(_tracks([p.anchor + p.path(u) for p in probes], len(t)) - self.origin for u in (t - dt, t))),
         )
 
     def volume_targets(self, t: np.ndarray) -> np.ndarray:
@@ -175,19 +187,6 @@ def _rows(vectors: list[np.ndarray]) -> np.ndarray:
 def _tracks(tracks: list[np.ndarray], steps: int) -> np.ndarray:
     """(q, o, 3), contiguous, also when there is nothing to track."""
     return np.ascontiguousarray(np.array(tracks, dtype=np.float64).reshape(-1, steps, 3).transpose(1, 0, 2))
-
-
-def check_loads(boundary: BoundaryConditions) -> str | None:
-    """Which part of the outside world has no place or no size any more, or None."""
-    for what, values in (
-        ("obstacle", boundary.position),
-        ("attachment", boundary.held_displacement),
-        ("target of kept volume", boundary.volume_target[:, :, None]),
-    ):
-        bad = np.flatnonzero(~np.isfinite(values).all(axis=(0, 2)))
-        if len(bad):
-            return f"{what} {bad[0]} is no longer finite; correct its path"
-    return None
 
 
 def check_state(state: State, body: Body) -> str | None:

@@ -5,11 +5,24 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from massspring import METHODS, Attachment, Clock, Method, Plane, Probe, Setup, Trajectory, simulate, step_limit
+from massspring import (
+    LITERATURE,
+    METHODS,
+    Attachment,
+    Clock,
+    Method,
+    Plane,
+    Probe,
+    Setup,
+    Trajectory,
+    simulate,
+    step_limit,
+)
 from massspring.body.body import NO_FACETS
 from massspring.layout.threads import shared
 from massspring.methods import VARIANTS
 from massspring.run.precision import Precision
+from massspring.world.surroundings import Surroundings
 from studies.compiling.bodies import EDGE, KINDS, tiny_body
 
 FRAMES, STEPS = 2, 2
@@ -42,7 +55,8 @@ def variants() -> list[Variant]:
 
     Two processes that do neighbours at once would otherwise both compile the same.
     """
-    found = [variant for method in (*(method() for method in METHODS), *VARIANTS) for variant in variants_of(method)]
+    methods = (*(method() for method in (*METHODS, *LITERATURE)), *VARIANTS)
+    found = [variant for method in methods for variant in variants_of(method)]
     return sorted(found, key=lambda one: (one.kind not in OWN_TYPES, one.option != PLAIN, _rank(one.method)))
 
 
@@ -68,7 +82,7 @@ def _rank(method: Method) -> int:
 
 
 def advance(variant: Variant) -> None:
-    """Some frames of the variant: a rough plane presses the body, which is held below."""
+    """Some frames of the variant: a plane presses the body, which is held below; a rough one where the method can."""
     setup = setup_of(variant)
     if variant.option != THREADS:
         simulate(setup)
@@ -87,6 +101,8 @@ def setup_of(variant: Variant) -> Setup:
     clock = Clock(STEPS * dt, FRAMES, STEPS)
     down = Trajectory((0.0, clock.duration), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.02 * EDGE)))
     plane = Plane((0.0, 0.0, EDGE), (0.0, 0.0, -1.0), down, friction=0.3)
+    if method.why_not_among(Surroundings((plane,), attachments=1)):
+        plane = replace(plane, friction=0.0)
     probes = (Probe((0.0, 0.0, 10 * EDGE)),) if variant.option == PROBE else ()
     held = Attachment(np.flatnonzero(body.rest[:, 2] < 1e-9))
     return Setup(body, method, clock, (plane, *probes), (held,), damping=10.0, precision=variant.precision)

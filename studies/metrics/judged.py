@@ -80,7 +80,7 @@ def judged(run: Run) -> Judged | None:
     if run.record.status != Status.OK:
         return None
     force, displacement = (Measured(entry(run), entry.uncertainty(run)) for entry in (FORCE, DISPLACEMENT))
-    dt = float(run.record.attributes["dt"])
+    dt = float(run.attributes.dt)
     return Judged(run.case, force, displacement, cost_of(run), dt, run.timing is not None)
 
 
@@ -88,7 +88,7 @@ def cost_of(run: Run) -> Measured:
     """Computing time over simulated time [1], and half the range over the repeats."""
     if run.timing is None:
         return UNKNOWN
-    return cost_of_frames(run.timing.frame_ns, float(run.record.attributes["frame"]))
+    return cost_of_frames(run.timing.frame_ns, float(run.attributes.frame))
 
 
 def cost_of_frames(frame_ns: np.ndarray, frame: float) -> Measured:

@@ -47,9 +47,9 @@ def surface_error(run: Run) -> float:
 
 def interior_error(run: Run) -> float:
     """Volume-weighted relative L2 error of the displacement at the last checkpoint [%]; NaN without an interior."""
-    if not len(run.field("tetrahedra")):
+    if not len(run.fields.tetrahedra):
         return float("nan")
-    return _relative(run, run.field("mass"))
+    return _relative(run, run.fields.mass)
 
 
 def mean_error(run: Run) -> float:
@@ -63,34 +63,34 @@ def mean_error(run: Run) -> float:
 def silhouette_error(run: Run) -> float:
     """Hausdorff distance of the deformed surface to its deformation by the reference, over the body's size [%]."""
     assert run.reference is not None
-    rest, triangles = run.field("rest"), run.field("triangles")
+    rest, triangles = run.fields.rest, run.fields.triangles
     surface = np.unique(triangles)
     # The same polyhedron, moved by the reference: what the facets cut off the true organ is no error of the model.
     truth = rest.copy()
     truth[surface] += run.reference.displacement(rest[surface])
-    return PERCENT * hausdorff(run.field("snapshots")[-1], triangles, truth, triangles) / run.size
+    return PERCENT * hausdorff(run.fields.snapshots[-1], triangles, truth, triangles) / run.size
 
 
 def min_j(run: Run) -> float:
     """Smallest tetrahedron volume ratio over all frames [1]; NaN for a surface body."""
-    return float(np.min(run.field("min_j")))
+    return float(np.min(run.fields.min_j))
 
 
 def inverted_share(run: Run) -> float:
     """Share of tetrahedra turned inside out at the last checkpoint [%]; NaN for a surface body."""
-    cells = run.field("tetrahedra")
+    cells = run.fields.tetrahedra
     if not len(cells):
         return float("nan")
-    return PERCENT * float((tetrahedron_volumes(run.field("snapshots")[-1], cells) <= 0).mean())
+    return PERCENT * float((tetrahedron_volumes(run.fields.snapshots[-1], cells) <= 0).mean())
 
 
 def j_spread(run: Run) -> float:
     """100 × (95th − 5th percentile of J over the rest volume) at the last checkpoint [%]; NaN for a surface body."""
-    cells = run.field("tetrahedra")
+    cells = run.fields.tetrahedra
     if not len(cells):
         return float("nan")
-    rest = tetrahedron_volumes(run.field("rest"), cells)
-    ratio = tetrahedron_volumes(run.field("snapshots")[-1], cells) / rest
+    rest = tetrahedron_volumes(run.fields.rest, cells)
+    ratio = tetrahedron_volumes(run.fields.snapshots[-1], cells) / rest
     order = np.argsort(ratio)
     below = np.cumsum(rest[order]) / rest.sum()
     low, high = ratio[order][np.searchsorted(below, (0.05, 0.95))]
@@ -99,8 +99,8 @@ def j_spread(run: Run) -> float:
 
 def rest_distance(run: Run) -> float:
     """100 × RMS distance of the nodes from their rest shape, moved and turned to fit, over the body's size [%]."""
-    rest, last = run.field("rest"), run.field("snapshots")[-1]
-    mass = run.field("mass") / run.field("mass").sum()
+    rest, last = run.fields.rest, run.fields.snapshots[-1]
+    mass = run.fields.mass / run.fields.mass.sum()
     wanted, found = rest - mass @ rest, last - mass @ last
     left, _, right = np.linalg.svd((mass[:, None] * wanted).T @ found)
     # A turn, never a mirror image (Kabsch 1976).
@@ -110,11 +110,9 @@ def rest_distance(run: Run) -> float:
 
 def penetration(run: Run) -> float:
     """100 × the deepest any node lies inside an obstacle after a frame, over the body's size [%]; NaN without one."""
-    depth = run.field("penetration")
+    depth = run.fields.penetration
     return (
-        PERCENT * float(depth.max()) / float(np.linalg.norm(np.ptp(run.field("rest"), axis=0)))
-        if depth.size
-        else np.nan
+        PERCENT * float(depth.max()) / float(np.linalg.norm(np.ptp(run.fields.rest, axis=0))) if depth.size else np.nan
     )
 
 
@@ -128,9 +126,9 @@ def pressure_error(run: Run) -> float:
 def frequency_error(run: Run) -> float:
     """100 (f/f_ref − 1) of the ringing, both read off the displacement of the same points [%]."""
     assert run.reference is not None
-    rest, weights, scene = run.field("rest")[run.material_nodes], run.surface_weights, run.case.scene
-    t = run.field("t")[run.checkpoint_frames]
-    own = run.field("snapshots")[:, run.material_nodes] - rest
+    rest, weights, scene = run.fields.rest[run.material_nodes], run.surface_weights, run.case.scene
+    t = run.fields.t[run.checkpoint_frames]
+    own = run.fields.snapshots[:, run.material_nodes] - rest
     times, truth = np.array(scene.checkpoints), run.reference.displacements(rest)
     found, wanted = (ringing_frequency(scene, at, rest, u, weights) for at, u in ((t, own), (times, truth)))
     return PERCENT * (found / wanted - 1)
@@ -141,7 +139,7 @@ def lumen_pressure_error(run: Run) -> float:
     assert run.reference is not None
     if run.lumen is None:
         return float("nan")
-    lam = float(run.field("pressure")[run.checkpoint_frames[-1], run.lumen])
+    lam = float(run.fields.pressure[run.checkpoint_frames[-1], run.lumen])
     return PERCENT * (lam / float(run.reference.field("lumen_pressure")[-1]) - 1) if lam else float("nan")
 
 
@@ -163,7 +161,7 @@ def _timing(run: Run, quantile: float) -> float:
 
 def step_time(run: Run) -> float:
     """Median frame time over the steps in a frame [µs]; NaN where these are not known."""
-    return 1e-3 * _timing(run, 0.5) / (run.record.attributes["steps"] or float("nan"))
+    return 1e-3 * _timing(run, 0.5) / (run.attributes.steps or float("nan"))
 
 
 def frame_time(run: Run) -> float:
@@ -178,7 +176,7 @@ def frame_time_p99(run: Run) -> float:
 
 def real_time(run: Run) -> float:
     """Simulated seconds per second of computing [1]: what explicit steps of different size are compared by."""
-    return float(run.record.attributes["frame"]) / (1e-9 * _timing(run, 0.5))
+    return float(run.attributes.frame) / (1e-9 * _timing(run, 0.5))
 
 
 def _time_spread(metric: Callable[[Run], float]) -> Callable[[Run], float]:

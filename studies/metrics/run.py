@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
+from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.reference.load import Reference
-from studies.runs.case import Case
-from studies.store.record import Record
+from studies.runs.case import Case, case_from_json
+from studies.store.record import Record, read_record
+from studies.store.schema import RunAttributes, RunFields
 from studies.timing.protocol import FrameTiming
 
 
@@ -21,24 +24,50 @@ class Run:
     reference: Reference | None = None
     timing: FrameTiming | None = None
 
+    @staticmethod
+    def load(path: Path | str) -> "Run":
+        """The run that is stored in `path`, without reference and frame times (`load_runs` finds both).
+
+        Raises StudyError for a file that holds none, and for a method of a user's file that this process has not read.
+        """
+        record = read_record(Path(path))
+        if record.kind != "run":
+            raise StudyError(f"{path} holds a {record.kind}, not a run; read_record opens it")
+        return Run(case_from_json(record.key), record)
+
+    @cached_property
+    def fields(self) -> RunFields:
+        """Stored arrays by name: `fields.t`; `RunFields.t` says unit and shape. None where one is optional and not
+        there; StudyError where nothing was computed."""
+        return RunFields(self._words, {name: item.values for name, item in self.record.fields.items()})
+
+    @cached_property
+    def attributes(self) -> RunAttributes:
+        """Stored numbers and texts by name: `attributes.dt`; else as `fields`."""
+        return RunAttributes(self._words, self.record.attributes)
+
+    @property
+    def _words(self) -> str:
+        return f"the record of {self.record.name}, {self.record.status},"
+
     def field(self, name: str) -> np.ndarray:
-        """Stored values by name."""
+        """Stored values of a field that is there, by name."""
         return self.record.fields[name].values
 
     @cached_property
     def checkpoint_frames(self) -> np.ndarray:
         """Index of the frame that ends at each checkpoint, (K,)."""
-        return np.array([int(np.argmin(np.abs(self.field("t") - t))) for t in self.case.scene.checkpoints])
+        return np.array([int(np.argmin(np.abs(self.fields.t - t))) for t in self.case.scene.checkpoints])
 
     @cached_property
     def force(self) -> np.ndarray:
         """The probed force of every frame [N], (F,)."""
-        return self.case.scene.output_force(self.field("contact_force"), self.field("held_force"))
+        return self.case.scene.output_force(self.fields.contact_force, self.fields.held_force)
 
     @cached_property
     def volume_ratio(self) -> np.ndarray:
         """V/V0 of every frame [1], of the kept volume that is farthest off in it, (F,)."""
-        ratio = self.field("volume") / self.field("volume_target")
+        ratio = self.fields.volume / self.fields.volume_target
         return ratio[np.arange(len(ratio)), np.argmax(np.abs(ratio - 1), axis=1)]
 
     @cached_property
@@ -50,7 +79,7 @@ class Run:
     @cached_property
     def tissue_pressure(self) -> np.ndarray:
         """Mean multiplier of the tissue's volumes [Pa], weighted by their size, (F,)."""
-        size, lam = self.field("volume_target"), self.field("pressure")
+        size, lam = self.fields.volume_target, self.fields.pressure
         if self.lumen is not None:
             size, lam = np.delete(size, self.lumen, axis=1), np.delete(lam, self.lumen, axis=1)
         return (size * lam).sum(axis=1) / size.sum(axis=1)
@@ -59,26 +88,26 @@ class Run:
     def displacement_error(self) -> tuple[np.ndarray, np.ndarray]:
         """Displacements of the material nodes at the last checkpoint and their error [m], both (n, 3)."""
         assert self.reference is not None  # _against checked it
-        rest = self.field("rest")[self.material_nodes]
+        rest = self.fields.rest[self.material_nodes]
         truth = self.reference.displacement(rest)
-        return truth, self.field("snapshots")[-1][self.material_nodes] - rest - truth
+        return truth, self.fields.snapshots[-1][self.material_nodes] - rest - truth
 
     @cached_property
     def material_nodes(self) -> np.ndarray:
         """Nodes that are points of the organ: virtual nodes on an axis are none."""
-        if len(self.field("tetrahedra")):
-            return np.arange(len(self.field("rest")))
-        return np.unique(self.field("triangles"))
+        if len(self.fields.tetrahedra):
+            return np.arange(len(self.fields.rest))
+        return np.unique(self.fields.triangles)
 
     @cached_property
     def size(self) -> float:
         """Diagonal of the box of the nodes at rest [m]."""
-        return float(np.linalg.norm(np.ptp(self.field("rest"), axis=0)))
+        return float(np.linalg.norm(np.ptp(self.fields.rest, axis=0)))
 
     @cached_property
     def surface_weights(self) -> np.ndarray:
         """Rest area of each material node [m²], 0 inside."""
-        triangles = self.field("triangles")
-        area = triangle_areas(self.field("rest"), triangles)
-        share = np.bincount(triangles.ravel(), weights=np.repeat(area / 3, 3), minlength=len(self.field("rest")))
+        triangles = self.fields.triangles
+        area = triangle_areas(self.fields.rest, triangles)
+        share = np.bincount(triangles.ravel(), weights=np.repeat(area / 3, 3), minlength=len(self.fields.rest))
         return share[self.material_nodes]

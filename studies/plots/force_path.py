@@ -68,7 +68,7 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
         run = same[0]  # another time step lies on the same line; the table shows by how much it does not
         good = slice(0, good_frames(run))
         colour = method_colour(run.case.method.name)
-        axes.plot(run.field("t")[good], run.force[good], color=colour, linestyle=looks[run.case.body].line)
+        axes.plot(run.fields.t[good], run.force[good], color=colour, linestyle=looks[run.case.body].line)
         ends.append((float(run.force[good][-1]), _error(run), colour))
     top = ROOM * _largest(group)
     motion = _motion(group[0].case.scene)

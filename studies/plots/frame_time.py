@@ -69,7 +69,7 @@ def _span(timings: Sequence[FrameTiming]) -> tuple[float, float]:
 def _draw_history(axes: Axes, body: Sequence[Run], span: tuple[float, float], name: str) -> None:
     for run in body:
         assert run.timing is not None  # figure() chose those
-        frames, t = run.timing.frame_ns / NS_PER_MS, run.field("t")
+        frames, t = run.timing.frame_ns / NS_PER_MS, run.fields.t
         colour = method_colour(run.case.method.name)
         low, high = frames.min(axis=0), frames.max(axis=0)
         # As a picture also in an SVG: the band has an edge at every frame.

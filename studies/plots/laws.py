@@ -83,7 +83,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         row[0].set_ylabel("force error, last checkpoint [%]")
         row[1].set_ylabel("step limit [ms]")
         _draw_force(row[0], group, metric, looks)
-        _draw_lines(row[1], group, lambda run: MS_PER_S * run.record.attributes["dt_limit"], looks)
+        _draw_lines(row[1], group, lambda run: MS_PER_S * run.attributes.dt_limit, looks)
         log_axis(row[1].yaxis)
         for panel in row:
             panel.set_xscale("log")

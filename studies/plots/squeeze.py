@@ -41,13 +41,13 @@ def figure(runs: Sequence[Run]) -> Figure:
     sheet = page(3.0 * (len(squeezed) + (2 if reference else 1)), 3.75)
     axes = panels(sheet, 1, len(squeezed) + (2 if reference else 1))[0]
     outline = CAMERA.see(reference.surface()[0])[:, :2] if reference else None
-    rest, triangles = some.field("rest"), some.field("triangles")
+    rest, triangles = some.fields.rest, some.fields.triangles
     volume = 1e6 * some.record.attributes["rest_volume"]
     _draw_ball(axes[0], some, rest, triangles, REST, at_rest=True)
     _caption(axes[0], "At rest", [f"volume {volume:.0f} mL"], BLACK)
     for panel, run in zip(axes[1:], squeezed, strict=False):
         colour = method_colour(run.case.method.name)
-        _draw_ball(panel, run, run.field("snapshots")[-1], run.field("triangles"), colour)
+        _draw_ball(panel, run, run.fields.snapshots[-1], run.fields.triangles, colour)
         if outline is not None:
             _draw_outline(panel, outline)
         _caption(panel, *_words(run), colour)
@@ -74,7 +74,7 @@ def _chosen(runs: Sequence[Run]) -> list[Run]:
 
 
 def _radius(run: Run) -> float:
-    return float(np.ptp(run.field("rest"), axis=0).max()) / 2
+    return float(np.ptp(run.fields.rest, axis=0).max()) / 2
 
 
 def _words(run: Run) -> tuple[str, list[str]]:

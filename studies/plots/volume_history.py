@@ -69,9 +69,9 @@ def _draw_run(upper: Axes, lower: Axes, run: Run, line: LineStyleType, finer: bo
     change = PERCENT * (run.volume_ratio[good] - 1)
     look = {"color": method_colour(run.case.method.name), "linestyle": line}
     if not finer:
-        upper.plot(run.field("t")[good], change, **look)
+        upper.plot(run.fields.t[good], change, **look)
     # Zero has no logarithm; an exact volume lies on the bottom of the axis.
-    lower.plot(run.field("t")[good], np.maximum(np.abs(change), SMALLEST), linewidth=0.9 if finer else 1.6, **look)
+    lower.plot(run.fields.t[good], np.maximum(np.abs(change), SMALLEST), linewidth=0.9 if finer else 1.6, **look)
 
 
 def _draw_reference(upper: Axes, lower: Axes, run: Run) -> None:

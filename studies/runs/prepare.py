@@ -128,6 +128,19 @@ def attachments_for(scene: Scene, mesh: OrganMesh) -> tuple[Attachment, ...]:
     return tuple(Attachment(patch_nodes(mesh, held.name, held.region), held.path) for held in scene.held)
 
 
+def check_applies(case: Case, body: Body, targets: bool) -> None:
+    """Raises DoesNotApply for a body, or surroundings in the scene, that the method does not run with; `targets`:
+    whether a kept volume is to change."""
+    scene, method = case.scene, case.method
+    reason = method.why_not(body)
+    if reason is not None:
+        raise DoesNotApply(f"method '{method.name}' does not apply to the {case.body.kind} body: {reason}")
+    around = Surroundings(scene.obstacles, len(scene.held), scene.gravity, targets, scene.start is not None)
+    reason = method.why_not_among(around)
+    if reason is not None:
+        raise DoesNotApply(f"method '{method.name}' does not apply to scene '{scene.name}': {reason}")
+
+
 def prepare(case: Case) -> Prepared:
     """Mesh, body, clock, surroundings of a case. Raises StudyError, MassSpringError."""
     scene = case.scene
@@ -139,14 +152,8 @@ def prepare(case: Case) -> Prepared:
     body = body_for(scene, case.body, mesh)
     if isinstance(mesh, QuadraticMesh):
         mesh = flat_mesh(mesh, body)
-    reason = case.method.why_not(body)
-    if reason is not None:
-        raise DoesNotApply(f"method '{case.method.name}' does not apply to the {case.body.kind} body: {reason}")
     targets = targets_for(scene, mesh, body)
-    around = Surroundings(scene.obstacles, len(scene.held), scene.gravity, bool(targets), scene.start is not None)
-    reason = case.method.why_not_among(around)
-    if reason is not None:
-        raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
+    check_applies(case, body, bool(targets))
     if case.body.kind in ("surface", "membrane") and mesh.hollow:
         mesh = mesh.outer()
     attachments = attachments_for(scene, mesh)

@@ -1,7 +1,7 @@
 """Records as this version of the code, on this machine, writes them."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -12,20 +12,21 @@ from studies.store.record import SCHEMA, Field, Record, Status
 from studies.store.schema import FieldSpec
 
 
-def new_record(
-    *,
-    kind: str,
-    key: str,
-    name: str,
-    status: Status,
-    message: str,
-    fingerprint: str,
-    attributes: Mapping[str, Any],
-    fields: Mapping[str, Field],
-) -> Record:
+class Header(TypedDict):
+    """What a record is of and how it ended, as in `Record`."""
+
+    kind: str
+    key: str
+    name: str
+    status: Status
+    message: str
+    fingerprint: str
+
+
+def new_record(*, attributes: Mapping[str, Any], fields: Mapping[str, Field], **header: Unpack[Header]) -> Record:
     """A record with the current schema and this machine's id filled in, and whether it was computed portably."""
     known = {**attributes, **portable.attributes()}
-    return Record(SCHEMA, kind, key, name, status, message, fingerprint, machine_id(), known, dict(fields))
+    return Record(schema=SCHEMA, machine=machine_id(), attributes=known, fields=dict(fields), **header)
 
 
 def new_fields(specs: Mapping[str, FieldSpec], values: Mapping[str, np.ndarray]) -> dict[str, Field]:

@@ -3,10 +3,21 @@
 Writers, the reader's check, docs/results.md and the tests take it from here.
 """
 
-from dataclasses import dataclass
 from enum import StrEnum
 
-NUMBER, INDEX, TEXT = "number", "whole number", "text"
+from studies.store.parts import (
+    INDEX,
+    NUMBER,
+    TEXT,
+    AttributeSpec,
+    FieldSpec,
+    Table,
+    array,
+    lines_of,
+    optional_array,
+    optional_value,
+    value,
+)
 
 
 class Status(StrEnum):
@@ -38,29 +49,6 @@ WITHOUT_FIELDS = (Status.FAILED, Status.SKIPPED)
 """Nothing was computed: such a record has no fields, and no attributes but warnings."""
 
 
-@dataclass(frozen=True)
-class FieldSpec:
-    """An array of a record. shape: lengths as letters (LENGTHS) or numbers, with blanks between."""
-
-    shape: str
-    kind: str
-    unit: str
-    description: str
-    optional: bool = False
-
-
-@dataclass(frozen=True)
-class AttributeSpec:
-    """A number or text of a record. length: the letter in shapes that it is the length of; optional: may be None or
-    left out."""
-
-    kind: str
-    unit: str
-    description: str
-    length: str = ""
-    optional: bool = False
-
-
 LENGTHS: dict[str, str] = {
     "F": "frames",
     "m": "kept volumes",
@@ -76,108 +64,123 @@ LENGTHS: dict[str, str] = {
     "q": "stages of a step",
 }
 
-RUN_FIELDS: dict[str, FieldSpec] = {
-    "t": FieldSpec("F", NUMBER, "s", "end of each frame"),
-    "volume": FieldSpec("F m", NUMBER, "m^3", "enclosed volume, one column per kept volume"),
-    "volume_target": FieldSpec("F m", NUMBER, "m^3", "what each kept volume should be"),
-    "pressure": FieldSpec("F m", NUMBER, "Pa", "multiplier of each kept volume in the last step of the frame"),
-    "contact_force": FieldSpec("F o 3", NUMBER, "N", "force of each obstacle on the body, mean of the frame"),
-    "penetration": FieldSpec("F o", NUMBER, "m", "depth of the deepest surface node in each obstacle"),
-    "held_force": FieldSpec("F g 3", NUMBER, "N", "force of each held region on the body, mean of the frame"),
-    "iterations": FieldSpec("F 2", INDEX, "1", "for the multipliers: sum of the frame, most in a step"),
-    "min_j": FieldSpec("F", NUMBER, "1", "smallest tetrahedron volume ratio; NaN without tetrahedra"),
-    "snapshot_frame": FieldSpec("K", INDEX, "1", "number of the frame after which each snapshot was taken"),
-    "snapshots": FieldSpec("K n 3", NUMBER, "m", "positions at the scene's checkpoints"),
-    "rest": FieldSpec("n 3", NUMBER, "m", "rest positions"),
-    "mass": FieldSpec("n", NUMBER, "kg", "mass of each node"),
-    "triangles": FieldSpec("s 3", INDEX, "1", "nodes of each surface triangle, outward"),
-    "tetrahedra": FieldSpec("c 4", INDEX, "1", "nodes of each tetrahedron"),
-    "kinetic": FieldSpec("F", NUMBER, "J", "kinetic energy", optional=True),
-    "elastic": FieldSpec("F", NUMBER, "J", "energy of the springs", optional=True),
-    "surface_frame": FieldSpec("P", INDEX, "1", "frames before each position of the surface, 0 at the start", True),
-    "surface_node": FieldSpec("v", INDEX, "1", "nodes of the outer surface", True),
-    "surface": FieldSpec("P v 3", NUMBER, "m", "their positions, float32", True),
-}
-"""Of a run. Entries after an early end are NaN; what is optional is there where the case asks (`recorded`)."""
+
+class RunFields(Table):
+    """Of a run. Entries after an early end are NaN; what is optional is there where the case asks (`recorded`)."""
+
+    t = array("F", NUMBER, "s", "end of each frame")
+    volume = array("F m", NUMBER, "m^3", "enclosed volume, one column per kept volume")
+    volume_target = array("F m", NUMBER, "m^3", "what each kept volume should be")
+    pressure = array("F m", NUMBER, "Pa", "multiplier of each kept volume in the last step of the frame")
+    contact_force = array("F o 3", NUMBER, "N", "force of each obstacle on the body, mean of the frame")
+    penetration = array("F o", NUMBER, "m", "depth of the deepest surface node in each obstacle")
+    held_force = array("F g 3", NUMBER, "N", "force of each held region on the body, mean of the frame")
+    iterations = array("F 2", INDEX, "1", "for the multipliers: sum of the frame, most in a step")
+    min_j = array("F", NUMBER, "1", "smallest tetrahedron volume ratio; NaN without tetrahedra")
+    snapshot_frame = array("K", INDEX, "1", "number of the frame after which each snapshot was taken")
+    snapshots = array("K n 3", NUMBER, "m", "positions at the scene's checkpoints")
+    rest = array("n 3", NUMBER, "m", "rest positions")
+    mass = array("n", NUMBER, "kg", "mass of each node")
+    triangles = array("s 3", INDEX, "1", "nodes of each surface triangle, outward")
+    tetrahedra = array("c 4", INDEX, "1", "nodes of each tetrahedron")
+    kinetic = optional_array("F", NUMBER, "J", "kinetic energy")
+    elastic = optional_array("F", NUMBER, "J", "energy of the springs")
+    surface_frame = optional_array("P", INDEX, "1", "frames before each position of the surface, 0 at the start")
+    surface_node = optional_array("v", INDEX, "1", "nodes of the outer surface")
+    surface = optional_array("P v 3", NUMBER, "m", "their positions, float32")
+
+
 SURFACE = ("surface_frame", "surface_node", "surface")
 """Fields of a run that the word "surface" asks for."""
 
-SECONDS = {"seconds": AttributeSpec(NUMBER, "s", "wall time without compiling, for estimates", optional=True)}
-RUN_ATTRIBUTES: dict[str, AttributeSpec] = SECONDS | {
-    "rest_volume": AttributeSpec(NUMBER, "m^3", "volume of the body at rest"),
-    "dt": AttributeSpec(NUMBER, "s", "time step"),
-    "dt_limit": AttributeSpec(NUMBER, "s", "stability limit of the time step"),
-    "steps": AttributeSpec(INDEX, "1", "steps per frame"),
-    "frame": AttributeSpec(NUMBER, "s", "length of a frame"),
-    "frames": AttributeSpec(INDEX, "1", "frames of the run", length="F"),
-    "good_frames": AttributeSpec(INDEX, "1", "frames before an early end"),
-    "nodes": AttributeSpec(INDEX, "1", "nodes of the body", length="n"),
-    "springs": AttributeSpec(INDEX, "1", "springs of the body"),
-    "triangles": AttributeSpec(INDEX, "1", "surface triangles of the body", length="s"),
-    "law": AttributeSpec(TEXT, "", "stiffness law"),
-    "skipped_steps": AttributeSpec(INDEX, "1", "steps in which a volume had nothing to push on"),
-    "capped_steps": AttributeSpec(INDEX, "1", "steps that made up for a part of a wrong volume"),
-    "volumes": AttributeSpec(INDEX, "1", "kept volumes", length="m"),
-    "lumen_column": AttributeSpec(INDEX, "1", "which kept volume is a lumen; -1: none"),
-    "unknowns_per_volume": AttributeSpec(NUMBER, "1", "coordinates for each kept volume", optional=True),
-    "alternation": AttributeSpec(
-        NUMBER, "1", "rms of pressure less the mean of its neighbours', over mu", optional=True
-    ),
-    "sway": AttributeSpec(NUMBER, "1", "range of the force at rest about its trend, over its mean", optional=True),
-    "warnings": AttributeSpec(TEXT, "", "what preparing the case warned of, and what its indicators tell"),
-    "entry": AttributeSpec(
-        TEXT, "", "of an entry from outside: its file, with the SHA-256 of its positions", optional=True
-    ),
-    "entry_seconds": AttributeSpec(
-        NUMBER, "s/s", "of an entry from outside: computing time for a simulated second", optional=True
-    ),
-    "own_files": AttributeSpec(
-        TEXT, "", "files of the user with the method and the law: JSON, path to SHA-256", optional=True
-    ),
-    "portable": AttributeSpec(TEXT, "", "settings of a result that is equal on every x86-64 processor", optional=True),
-}
 
-REFERENCE_FIELDS: dict[str, FieldSpec] = {
-    "t": FieldSpec("K", NUMBER, "s", "scene time of each equilibrium"),
-    "contact_force": FieldSpec("K o 3", NUMBER, "N", "force of each obstacle on the body"),
-    "held_force": FieldSpec("K g 3", NUMBER, "N", "force of each held region on the body"),
-    "volume": FieldSpec("K", NUMBER, "1", "volume over rest volume"),
-    "pressure": FieldSpec("K", NUMBER, "Pa", "volume mean of the pressure, compression positive"),
-    "lumen_pressure": FieldSpec("K", NUMBER, "Pa", "pressure of the lumen"),
-    "min_j": FieldSpec("K", NUMBER, "1", "smallest J at a quadrature point"),
-    "max_j": FieldSpec("K", NUMBER, "1", "largest J at a quadrature point"),
-    "penetration": FieldSpec("K", NUMBER, "m", "deepest penetration of an obstacle"),
-    "newton": FieldSpec("K", NUMBER, "1", "Newton iterations"),
-    "energy": FieldSpec("K", NUMBER, "J", "strain energy"),
-    "kinetic": FieldSpec("K", NUMBER, "J", "kinetic energy; NaN without motion"),
-    "balance": FieldSpec("K", NUMBER, "J", "energy gained by the time steps themselves"),
-    "displacement": FieldSpec("K n 3", NUMBER, "m", "displacement of the second-order nodes"),
-    "nodes": FieldSpec("n 3", NUMBER, "m", "rest positions of the second-order nodes"),
-    "tetrahedra": FieldSpec("c 4", INDEX, "1", "vertices of each tetrahedron"),
-}
-"""Of a reference, a row per checkpoint; NaN where the path did not get there."""
+class Timed(Table):
+    """What took time."""
 
-REFERENCE_ATTRIBUTES: dict[str, AttributeSpec] = {
-    "scene": AttributeSpec(TEXT, "", "name of the scene"),
-    "level": AttributeSpec(NUMBER, "1", "mesh of the family: surface nodes, or element size over radius"),
-    "variant": AttributeSpec(TEXT, "", "the setting that was made better; empty for none"),
-    "unknowns": AttributeSpec(INDEX, "1", "unknowns of the finite-element problem"),
-    "steps_done": AttributeSpec(INDEX, "1", "checkpoints that were reached"),
-    "seconds": AttributeSpec(NUMBER, "s", "wall time of the solution"),
-    "portable": AttributeSpec(TEXT, "", "settings of a result that is equal on every x86-64 processor", optional=True),
-}
+    seconds = optional_value(float, "s", "wall time without compiling, for estimates")
 
-TIMING_FIELDS: dict[str, FieldSpec] = {
-    "frame_ns": FieldSpec("r F", NUMBER, "ns", "time of each frame, (repeat, frame)"),
-    "stage_ns": FieldSpec("q F", NUMBER, "ns", "time of each stage in each frame, (stage, frame)", optional=True),
-    "stages": FieldSpec("q", TEXT, "", "names of the stages", optional=True),
-}
-TIMING_ATTRIBUTES: dict[str, AttributeSpec] = SECONDS | {
-    "core": AttributeSpec(INDEX, "1", "core that the process was pinned to; none where it cannot be", optional=True),
-    "threads": AttributeSpec(INDEX, "1", "threads that compiled code was allowed"),
-    "repeats": AttributeSpec(INDEX, "1", "repeats", length="r"),
-}
 
+class RunAttributes(Timed):
+    """Of a run."""
+
+    rest_volume = value(float, "m^3", "volume of the body at rest")
+    dt = value(float, "s", "time step")
+    dt_limit = value(float, "s", "stability limit of the time step")
+    steps = value(int, "1", "steps per frame")
+    frame = value(float, "s", "length of a frame")
+    frames = value(int, "1", "frames of the run", "F")
+    good_frames = value(int, "1", "frames before an early end")
+    nodes = value(int, "1", "nodes of the body", "n")
+    springs = value(int, "1", "springs of the body")
+    triangles = value(int, "1", "surface triangles of the body", "s")
+    law = value(str, "", "stiffness law")
+    skipped_steps = value(int, "1", "steps in which a volume had nothing to push on")
+    capped_steps = value(int, "1", "steps that made up for a part of a wrong volume")
+    volumes = value(int, "1", "kept volumes", "m")
+    lumen_column = value(int, "1", "which kept volume is a lumen; -1: none")
+    unknowns_per_volume = optional_value(float, "1", "coordinates for each kept volume")
+    alternation = optional_value(float, "1", "rms of pressure less the mean of its neighbours', over mu")
+    sway = optional_value(float, "1", "range of the force at rest about its trend, over its mean")
+    warnings = value(str, "", "what preparing the case warned of, and what its indicators tell")
+    entry = optional_value(str, "", "of an entry from outside: its file, with the SHA-256 of its positions")
+    entry_seconds = optional_value(float, "s/s", "of an entry from outside: computing time for a simulated second")
+    own_files = optional_value(str, "", "files of the user with the method and the law: JSON, path to SHA-256")
+    portable = optional_value(str, "", "settings of a result that is equal on every x86-64 processor")
+
+
+class ReferenceFields(Table):
+    """Of a reference, a row per checkpoint; NaN where the path did not get there."""
+
+    t = array("K", NUMBER, "s", "scene time of each equilibrium")
+    contact_force = array("K o 3", NUMBER, "N", "force of each obstacle on the body")
+    held_force = array("K g 3", NUMBER, "N", "force of each held region on the body")
+    volume = array("K", NUMBER, "1", "volume over rest volume")
+    pressure = array("K", NUMBER, "Pa", "volume mean of the pressure, compression positive")
+    lumen_pressure = array("K", NUMBER, "Pa", "pressure of the lumen")
+    min_j = array("K", NUMBER, "1", "smallest J at a quadrature point")
+    max_j = array("K", NUMBER, "1", "largest J at a quadrature point")
+    penetration = array("K", NUMBER, "m", "deepest penetration of an obstacle")
+    newton = array("K", NUMBER, "1", "Newton iterations")
+    energy = array("K", NUMBER, "J", "strain energy")
+    kinetic = array("K", NUMBER, "J", "kinetic energy; NaN without motion")
+    balance = array("K", NUMBER, "J", "energy gained by the time steps themselves")
+    displacement = array("K n 3", NUMBER, "m", "displacement of the second-order nodes")
+    nodes = array("n 3", NUMBER, "m", "rest positions of the second-order nodes")
+    tetrahedra = array("c 4", INDEX, "1", "vertices of each tetrahedron")
+
+
+class ReferenceAttributes(Table):
+    """Of a reference."""
+
+    scene = value(str, "", "name of the scene")
+    level = value(float, "1", "mesh of the family: surface nodes, or element size over radius")
+    variant = value(str, "", "the setting that was made better; empty for none")
+    unknowns = value(int, "1", "unknowns of the finite-element problem")
+    steps_done = value(int, "1", "checkpoints that were reached")
+    seconds = value(float, "s", "wall time of the solution")
+    portable = optional_value(str, "", "settings of a result that is equal on every x86-64 processor")
+
+
+class TimingFields(Table):
+    """Of frame times."""
+
+    frame_ns = array("r F", NUMBER, "ns", "time of each frame, (repeat, frame)")
+    stage_ns = optional_array("q F", NUMBER, "ns", "time of each stage in each frame, (stage, frame)")
+    stages = optional_array("q", TEXT, "", "names of the stages")
+
+
+class TimingAttributes(Timed):
+    """Of frame times."""
+
+    core = optional_value(int, "1", "core that the process was pinned to; none where it cannot be")
+    threads = value(int, "1", "threads that compiled code was allowed")
+    repeats = value(int, "1", "repeats", "r")
+
+
+RUN_FIELDS, RUN_ATTRIBUTES = lines_of(RunFields, FieldSpec), lines_of(RunAttributes, AttributeSpec)
+REFERENCE_FIELDS = lines_of(ReferenceFields, FieldSpec)
+REFERENCE_ATTRIBUTES = lines_of(ReferenceAttributes, AttributeSpec)
+TIMING_FIELDS, TIMING_ATTRIBUTES = lines_of(TimingFields, FieldSpec), lines_of(TimingAttributes, AttributeSpec)
 LAYOUTS: dict[str, tuple[dict[str, FieldSpec], dict[str, AttributeSpec]]] = {
     "run": (RUN_FIELDS, RUN_ATTRIBUTES),
     "reference": (REFERENCE_FIELDS, REFERENCE_ATTRIBUTES),

@@ -34,11 +34,11 @@ class Remembering(Solution):
 
 def shown_run(run: Run, solution: Solution | None, name: str) -> Shown:
     """A stored run; its errors where there is a reference and the scene lets displacements be compared."""
-    rest, frames = run.field("rest"), run.checkpoint_frames
+    rest, frames = run.fields.rest, run.checkpoint_frames
     displacement = np.full((len(frames), *rest.shape), np.nan)
-    reached = run.field("snapshots")
+    reached = run.fields.snapshots
     displacement[: len(reached)] = reached - rest
-    cells = run.field("tetrahedra") if len(run.field("tetrahedra")) else run.field("triangles")
+    cells = run.fields.tetrahedra if len(run.fields.tetrahedra) else run.fields.triangles
     return Shown(
         name=name,
         rest=rest,
@@ -55,7 +55,7 @@ def _error(run: Run, solution: Solution | None, displacement: np.ndarray) -> np.
         return None
     error = np.full_like(displacement, np.nan)
     nodes = run.material_nodes
-    error[:, nodes] = displacement[:, nodes] - solution.displacements(run.field("rest")[nodes])
+    error[:, nodes] = displacement[:, nodes] - solution.displacements(run.fields.rest[nodes])
     return error
 
 

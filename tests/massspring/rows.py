@@ -11,6 +11,7 @@ CONTESTANTS: dict[str, Method] = {
     **{method.name: method() for method in METHODS},
     "element_hard": VARIANTS[0],
     "xpbd_whole": VARIANTS[1],
+    "implicit_volume_recovers": VARIANTS[2],
 }
 """Every method by default, and those with a switch the other way round."""
 KINDS = ("block", "ball", "hollow", "regions", "nodal")
@@ -27,9 +28,15 @@ SUPPORTED = {
 Quadratic bodies have tests of their own (methods/test_quadratic_motion.py), and so have elements (elements)."""
 
 
+def recovers(method: Method) -> bool:
+    """Whether a body that is far from its volumes is another one until it is back."""
+    return getattr(method, "recovers", False)
+
+
 def kinds_of(method: Method) -> tuple[str, ...]:
-    """The kinds of bodies that a method can advance."""
-    return SUPPORTED[method.capabilities.keeps]
+    """The kinds of bodies that a method can advance; what recovers needs tetrahedra."""
+    kinds = SUPPORTED[method.capabilities.keeps]
+    return tuple(kind for kind in kinds if kind != "ball") if recovers(method) else kinds
 
 
 def rows(methods: Iterable[str] = CONTESTANTS, kinds: Sequence[str] = KINDS) -> list:

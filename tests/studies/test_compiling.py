@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from massspring import METHODS, Free, ImplicitVolume
+from massspring import LITERATURE, METHODS, Free, ImplicitVolume
 from massspring.kernels.jit.stage_clock import STAGES
 from massspring.methods import VARIANTS
 from studies.base.errors import StudyError
@@ -26,9 +26,9 @@ def own_folder(tmp_path, monkeypatch):
 
 def test_every_method_is_there_in_each_form_that_it_supports():
     found = variants()
-    assert {variant.method for variant in found} == {*(method() for method in METHODS), *VARIANTS}
+    assert {variant.method for variant in found} == {*(method() for method in (*METHODS, *LITERATURE)), *VARIANTS}
     assert len({variant.name for variant in found}) == len(found)
-    for method in METHODS:
+    for method in (*METHODS, *LITERATURE):
         own = [variant for variant in found if variant.method == method()]
         table = method.capabilities
         assert {variant.option for variant in own} == {
@@ -76,6 +76,15 @@ def test_a_variant_advances_a_body_that_is_pressed(option):
     with logged() as again:
         advance(variant)
     assert again == []
+
+
+@pytest.mark.parametrize("method", LITERATURE, ids=lambda method: method.name)
+def test_those_of_the_literature_advance_too(method):
+    """Without friction, targets or whatever else they refuse."""
+    first = next(variant for variant in variants() if variant.method == method())
+    setup = setup_of(first)
+    moved = setup.method.advance(setup.start(), setup.boundary(0))
+    assert np.isfinite(moved.x).all() and np.abs(moved.x - tiny_body(first.kind).rest).max() > 0
 
 
 def test_compiling_is_logged_with_its_own_time_and_loading_is_not():

@@ -59,7 +59,11 @@ class AngularSprings(Method):
     name: ClassVar[str] = "angular_springs"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
-    capabilities: ClassVar[Capabilities] = Capabilities("none", thin_probes=No("how its angles meet them is not tried"))
+    capabilities: ClassVar[Capabilities] = Capabilities(
+        "none",
+        triangle_springs=No("its angles are as stiff as springs between two nodes"),
+        thin_probes=No("how its angles meet them is not tried"),
+    )
 
     def __post_init__(self) -> None:
         if not 0.0 < self.ratio < float("inf"):

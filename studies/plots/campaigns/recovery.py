@@ -26,7 +26,7 @@ RETURNED = 0.01
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
     """One panel per start."""
-    shown = [run for run in runs if has_frames(run) and len(run.field("tetrahedra"))]
+    shown = [run for run in runs if has_frames(run) and len(run.fields.tetrahedra)]
     if not shown:
         return blank(TITLE, "no run of a body with tetrahedra has recorded a frame yet")
     scenes, looks = by_scene(shown), body_looks(shown)
@@ -68,7 +68,7 @@ def _draw_start(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
     for run in group:
         good = slice(0, good_frames(run))
         look = {"color": _colour(run.case), "linestyle": looks[run.case.body].line}
-        axes.plot(run.field("t")[good], np.maximum(run.field("min_j")[good], LOWEST), **look)
+        axes.plot(run.fields.t[good], np.maximum(run.fields.min_j[good], LOWEST), **look)
     axes.set_ylim(LOWEST - 0.05, HIGHEST)
     log_axis(axes.xaxis)
 

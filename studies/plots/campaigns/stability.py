@@ -49,7 +49,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 def _draw_map(axes: Axes, group: Sequence[Run]) -> None:
     """A tinted cell and a marker for each run; the limit as a line."""
-    dt = np.array([MS * run.record.attributes["dt"] for run in group])
+    dt = np.array([MS * run.attributes.dt for run in group])
     factor = np.array([run.case.body.stiffness for run in group])
     edges_x, edges_y = _edges(dt), _edges(factor)
     for run, x, y in zip(group, dt, factor, strict=True):
@@ -91,7 +91,7 @@ def _edges(values: np.ndarray) -> dict[float, tuple[float, float]]:
 
 def _draw_limit(axes: Axes, group: Sequence[Run]) -> None:
     """The largest stable step of each stiffness, from the largest frequency of the springs at rest."""
-    limits = {run.case.body.stiffness: MS * run.record.attributes["dt_limit"] for run in group}
+    limits = {run.case.body.stiffness: MS * run.attributes.dt_limit for run in group}
     factor = np.array(sorted(limits))
     dt = np.array([limits[value] for value in factor])
     white = {"color": "white", "linewidth": 5, "alpha": 0.8}
@@ -124,7 +124,7 @@ def _handles(placed: Sequence[Run]) -> list:
 def _size_of(placed: Sequence[Run]) -> list[str]:
     """What the map was measured on, and how often it agrees with the limit."""
     nodes = sorted({run.case.body.nodes for run in placed})
-    below = [run for run in placed if run.record.attributes["dt"] < run.record.attributes["dt_limit"]]
+    below = [run for run in placed if run.attributes.dt < run.attributes.dt_limit]
     broken = sum(run.record.status == Status.DIVERGED for run in below)
     survived = sum(run.record.status != Status.DIVERGED for run in placed) - (len(below) - broken)
     return [

@@ -112,7 +112,7 @@ def remarks(runs: Sequence[Run]) -> list[str]:
     ended += [
         f"{run.case.name} {readable(run.record.status)}; shown up to there."
         for run in runs
-        if has_frames(run) and good_frames(run) < len(run.field("t"))
+        if has_frames(run) and good_frames(run) < len(run.fields.t)
     ]
     bare = [name for name, group in by_scene(runs).items() if all(run.reference is None for run in group)]
     missing = [f"No reference for {', '.join(map(readable, bare))}: no error can be given there."] if bare else []
@@ -151,7 +151,7 @@ def has_frames(run: Run) -> bool:
 
 def good_frames(run: Run) -> int:
     """Number of frames before the run broke off."""
-    return int(run.record.attributes.get("good_frames", len(run.field("t"))))
+    return int(run.record.attributes.get("good_frames", len(run.fields.t)))
 
 
 def reference_handle(label: str = "reference (finite elements)", **look: object) -> Line2D:

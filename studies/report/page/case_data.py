@@ -57,7 +57,7 @@ def case_data(run: Run, path: Path, truths: Truths) -> dict[str, Any]:
     }
     if run.reference is not None:
         found["reference"] = reference_points(run)
-    if all(name in record.fields for name in SURFACE) and len(run.field("surface_node")) <= MOST_NODES:
+    if run.fields.surface_node is not None and len(run.fields.surface_node) <= MOST_NODES:
         found["replay"] = replay_of(run, truths)
     return found
 
@@ -71,7 +71,7 @@ def histories(run: Run) -> dict[str, Any]:
         found["force"] = run.force
     if run.timing is not None:
         found["frame"] = 1e-6 * np.median(run.timing.frame_ns, axis=0)
-    shown = {name: thinned(run.field("t"), values) for name, values in found.items()}
+    shown = {name: thinned(run.fields.t, values) for name, values in found.items()}
     return {name: {"t": pack_series(t), "values": pack_series(values)} for name, (t, values) in shown.items() if len(t)}
 
 
@@ -106,13 +106,12 @@ def reference_points(run: Run) -> dict[str, list[float | None]]:
 
 def replay_of(run: Run, truths: Truths) -> dict[str, Any]:
     """The recorded surface, and that of the reference at the same points of the organ at rest."""
-    nodes, surface = run.field("surface_node"), run.field("surface").astype(float)
-    frames = run.field("surface_frame")
-    times = np.concatenate([[0.0], run.field("t")])[frames]
-    triangles = run.field("triangles")
-    place = np.full(len(run.field("rest")), -1)
+    frames, nodes, surface = (run.field(name) for name in SURFACE)
+    times = np.concatenate([[0.0], run.fields.t])[frames]
+    triangles = run.fields.triangles
+    place = np.full(len(run.fields.rest), -1)
     place[nodes] = np.arange(len(nodes))
-    packed = pack_frames(surface, run.size)
+    packed = pack_frames(surface.astype(float), run.size)
     found = {
         "times": [float(f"{t:.6g}") for t in times],
         "triangles": pack_indices(place[triangles[np.isin(triangles, nodes).all(axis=1)]]),
@@ -122,7 +121,7 @@ def replay_of(run: Run, truths: Truths) -> dict[str, Any]:
     }
     if run.reference is None:
         return found
-    rest = run.field("rest")[nodes]
+    rest = run.fields.rest[nodes]
     checkpoints, truth = np.asarray(run.reference.field("t"), float), rest + truths.displacements(run.reference, rest)
     comparable = allowed(run.case.scene, COMPARED)
     largest = largest_error(run, truth) if comparable else 0.0
@@ -148,7 +147,7 @@ def obstacle_of(obstacle: Obstacle, times: np.ndarray) -> dict[str, Any]:
 def largest_error(run: Run, truth: np.ndarray) -> float:
     """Largest distance [m] of a point of the surface from its place in the reference (K, v, 3) [m], at all checkpoints
     that the run reached."""
-    own = run.field("snapshots")[:, run.field("surface_node")]
+    own = run.fields.snapshots[:, run.field("surface_node")]
     return float(np.linalg.norm(own - truth[: len(own)], axis=-1).max(initial=0.0))
 
 

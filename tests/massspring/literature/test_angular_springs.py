@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from massspring import AngularSprings, Clock, Free, MassSpringError, Ramp, Setup, simulate
+from massspring import AngularSprings, Clock, Free, MassSpringError, Ramp, Setup, membrane_body, simulate
 from massspring.methods.literature.angles import Angles, angle_energy, angle_forces_into
 from massspring.methods.literature.angular_springs import angles_of
+from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.methods.test_cells import rest_forces
 from tests.massspring.methods.test_methods import clock_for, squeeze
 from tests.massspring.methods.test_quadratic_motion import CONTRACT
@@ -113,3 +114,6 @@ def test_what_is_none_is_refused(filled_ball):
         AngularSprings(0.0)
     with pytest.raises(MassSpringError, match="could be filled"):
         Setup(filled_ball, AngularSprings(), Clock(0.01, 1, 1), targets={"body": Ramp((0.0, 1.0), (1.0, 1.1))})
+    wall = membrane_body(*icosphere(1), 0.003, SOFT)  # without a spring between two nodes there is no stiffness to take
+    with pytest.raises(MassSpringError, match="its angles are as stiff as springs between two nodes"):
+        Setup(wall, AngularSprings(), Clock(0.01, 1, 1))

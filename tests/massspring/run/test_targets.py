@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from massspring import Clock, ImplicitVolume, Ramp, Setup, Volumes, simulate, step_limit
@@ -34,6 +34,7 @@ def ramps(draw):
     return Ramp(tuple(np.cumsum(gaps) - draw(st.floats(0.0, 1.0))), tuple(values))
 
 
+@settings(deadline=None)
 @given(ramps(), st.floats(0.1, 20.0))
 def test_what_is_followed_is_what_small_steps_towards_the_target_give(target, rate):
     end = max(target.times[-1], 0.0) + 3.0 / rate

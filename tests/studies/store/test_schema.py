@@ -18,7 +18,7 @@ from tests.studies import made_up_run
 from tests.studies.tiny import tiny_case
 
 REPOSITORY = Path(__file__).parents[3]
-BY_NAME = re.compile(r"""\.field\(\s*"(\w+)"\s*\)|\.fields\["(\w+)"\]""")
+BY_NAME = re.compile(r"""\.field\(\s*"(\w+)"\s*\)|\.fields\["(\w+)"\]|(?:run|self)\.fields\.(\w+)""")
 
 
 def test_the_document_shows_the_tables():
@@ -44,7 +44,7 @@ def test_fields_are_read_by_names_of_the_tables():
     known = {name for fields, _ in LAYOUTS.values() for name in fields}
     read = set()
     for file in (REPOSITORY / "studies").rglob("*.py"):
-        read |= {one or other for one, other in BY_NAME.findall(file.read_text(encoding="utf-8"))}
+        read |= {"".join(found) for found in BY_NAME.findall(file.read_text(encoding="utf-8"))}
     assert {"volume", "snapshots", "frame_ns", "displacement"} <= read
     assert read <= known
 

@@ -92,25 +92,10 @@ def test_findings_and_their_exit_code(organbench, tmp_path):
     assert organbench("check", closed)[0] == 0
 
 
-def refusals(folder):
-    """Arguments and the message expected."""
+def asked_wrongly(folder):
+    """Arguments for an egg, or for no file, and the message expected."""
     egg = stored(folder / "egg.ply", POINTS, FACES)
-    nan = POINTS.copy()
-    nan[2] = np.nan
-    bad = stored(folder / "nan.ply", nan, FACES)
-    torn = stored(folder / "torn.ply", POINTS, FACES[3:])
-    single = stored(folder / "single.ply", POINTS, FACES[:1])
-    text = folder / "notes.stl"
-    text.write_text("no mesh at all\n" * 20)
-    cut = folder / "cut.stl"
-    meshio.write_points_cells(cut, POINTS, [("triangle", FACES)], file_format="stl", binary=True)
-    cut.write_bytes(cut.read_bytes()[:5000])
-    huge = folder / "huge.stl"
-    with open(huge, "wb") as file:
-        file.write(bytes(80) + np.uint32(10_000_000).tobytes())
-        file.truncate(84 + 500_000_000)
-    out = ("-o", folder / "out.vtu")
-    scan = ("mesh", "--from", egg, "--unit", "mm")
+    out, scan = ("-o", folder / "out.vtu"), ("mesh", "--from", egg, "--unit", "mm")
     return {
         "nothing to mesh": (("mesh", *out), "say what to mesh"),
         "both": (("mesh", "ball", "--from", egg, *out), "say what to mesh"),
@@ -129,6 +114,29 @@ def refusals(folder):
         "wall of a file": ((*scan, "--wall", 3, *out), "say how many nodes"),
         "few nodes": ((*scan, "--nodes", 10, *out), "10 surface nodes asked for"),
         "few nodes of an organ": (("mesh", "liver", "--nodes", 20, *out), "20 surface nodes asked for"),
+        "folder": (("mesh", "ball", "--nodes", 150, "-o", folder / "egg.ply" / "out.vtu"), "was not written"),
+        "missing": (("check", folder / "none.ply"), "there is no mesh file"),
+    }
+
+
+def no_mesh(folder):
+    """Arguments for files that hold none, or half of one, and the message expected."""
+    nan = POINTS.copy()
+    nan[2] = np.nan
+    bad = stored(folder / "nan.ply", nan, FACES)
+    torn = stored(folder / "torn.ply", POINTS, FACES[3:])
+    single = stored(folder / "single.ply", POINTS, FACES[:1])
+    text = folder / "notes.stl"
+    text.write_text("no mesh at all\n" * 20)
+    cut = folder / "cut.stl"
+    meshio.write_points_cells(cut, POINTS, [("triangle", FACES)], file_format="stl", binary=True)
+    cut.write_bytes(cut.read_bytes()[:5000])
+    huge = folder / "huge.stl"
+    with open(huge, "wb") as file:
+        file.write(bytes(80) + np.uint32(10_000_000).tobytes())
+        file.truncate(84 + 500_000_000)
+    out = ("-o", folder / "out.vtu")
+    return {
         "nan": (("mesh", "--from", bad, "--unit", "mm", *out), "1 points are not finite"),
         "open": (("mesh", "--from", torn, "--unit", "mm", "--nodes", 150, *out), "close the holes (--close-holes)"),
         "open kept": (("mesh", "--from", torn, "--unit", "mm", *out), "the surface is open"),
@@ -137,15 +145,13 @@ def refusals(folder):
         "text checked": (("check", text), "notes.stl"),
         "cut": (("mesh", "--from", cut, "--unit", "mm", *out), "cut.stl is cut short"),
         "cut checked": (("check", cut), "cut.stl is cut short"),
-        "missing": (("check", folder / "none.ply"), "there is no mesh file"),
         "huge": (("mesh", "--from", huge, "--unit", "mm", *out), "about 10,000,000 triangles (500 MB)"),
         "huge checked": (("check", huge), "say --yes to go on"),
-        "folder": (("mesh", "ball", "--nodes", 150, "-o", folder / "egg.ply" / "out.vtu"), "was not written"),
     }
 
 
 def test_bad_input_is_one_sentence_and_nothing_is_written(refused, tmp_path):
-    cases = refusals(tmp_path)
+    cases = asked_wrongly(tmp_path) | no_mesh(tmp_path)
     before = sorted(os.listdir(tmp_path))
     for case, (words, told) in cases.items():
         assert told in refused(*words), case

@@ -40,6 +40,21 @@ def test_the_one_step_residual_is_exact(body):
         assert abs(expected / body.volume - 1) > 1e-9, "the residual is too small to be seen"
 
 
+def held_and_touched(net, nodes, contacts, touched, approach):
+    """Rows of constraints on single velocities and their right sides: `approach` at touched nodes, v* at held ones."""
+    rows, right = [], []
+    for i, a in zip(touched, approach, strict=True):
+        rows.append(np.zeros_like(nodes.x))
+        rows[-1][i] = contacts.normal[i]
+        right.append(a)
+    for i in net.held_nodes:
+        for axis in range(3):
+            rows.append(np.zeros_like(nodes.x))
+            rows[-1][i, axis] = 1.0
+            right.append(nodes.v_star[i, axis])
+    return [row.ravel() for row in rows], right
+
+
 def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     """Outside truth: [M/dt², −Gᵀ; G, 0] with held nodes and touched nodes as further constraints, solved densely."""
     body = ball_body
@@ -55,22 +70,10 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     lam, _ = volume_multiplier(nodes, contacts, net.inverse_mass, error, dt)
 
     n = 3 * body.node_count
-    rows = [dt * nodes.gradient.ravel()]
-    right = [error]
-    for i, a in zip(touched, approach, strict=True):
-        row = np.zeros((body.node_count, 3))
-        row[i] = contacts.normal[i]
-        rows.append(row.ravel())
-        right.append(a)
-    for i in net.held_nodes:
-        for axis in range(3):
-            row = np.zeros((body.node_count, 3))
-            row[i, axis] = 1.0
-            rows.append(row.ravel())
-            right.append(nodes.v_star[i, axis])
-    constraints = np.array(rows)
+    rows, right = held_and_touched(net, nodes, contacts, touched, approach)
+    constraints, right = np.array([dt * nodes.gradient.ravel(), *rows]), [error, *right]
     mass = np.repeat(body.mass, 3)
-    system = np.block([[np.diag(mass), -constraints.T], [constraints, np.zeros((len(rows), len(rows)))]])
+    system = np.block([[np.diag(mass), -constraints.T], [constraints, np.zeros((len(right), len(right)))]])
     solution = np.linalg.solve(system, np.concatenate([mass * nodes.v_star.ravel(), right]))
     assert lam == pytest.approx(solution[n], rel=1e-9)  # the row is dt G, so its multiplier is the pressure
 
