@@ -7,7 +7,8 @@ from skimage.measure import marching_cubes
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume
-from studies.geometry.scanned.distance_grid import DistanceGrid, box_of, distance_grid
+from studies.geometry.scanned.distance_grid import box_of, distance_grid
+from studies.geometry.scanned.level_grid import DistanceGrid, shape_of
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.surface.distance import distance_to_surface
 from studies.geometry.surface.first_surface import first_surface
@@ -65,9 +66,7 @@ def levelled(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: flo
 
 def shape_on(points: np.ndarray, triangles: np.ndarray, cell: float, name: str) -> Shape:
     """The signed distance to the surface on a grid of cells of edge `cell` [m]."""
-    grid = distance_grid(points, triangles, cell, ROOM * cell)
-    low, high = tuple(map(float, grid.low)), tuple(map(float, grid.high))
-    return Shape(name, grid.level(), low, high, cell=cell)  # pyright: ignore[reportArgumentType]
+    return shape_of(distance_grid(points, triangles, cell, ROOM * cell), name)
 
 
 def faithful(points: np.ndarray, triangles: np.ndarray, cell: float, name: str) -> tuple[Shape, Surface]:
