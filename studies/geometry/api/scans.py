@@ -63,7 +63,8 @@ class Remeshing:
         thickness = {} if self.wall is None else {"wall": float(self.wall)}
         count = {} if self.wall is None or self.layers is None else {"layers": int(self.layers)}
         on = {"on_shape": True} if self.on_shape else {}
-        return ({} if self.solid is None else {"solid": float(self.solid)}) | thickness | count | on
+        filled = {} if self.solid is None else {"solid": float(self.solid)}
+        return {"smooth": float(self.smooth)} | filled | thickness | count | on
 
 
 def scan(
@@ -100,10 +101,9 @@ def scan(
         check_watertight(mended, name)
     remeshing.check(name)
     outlines = {key: region_to_dict(region) for key, region in (regions or {}).items()}
-    recipe |= remeshing.recipe | {"kind": "scan", "nodes": int(nodes), "smooth": float(remeshing.smooth)}
-    recipe |= {"fill": bool(fill), "regions": outlines}
-    surface = {"points": mended.points, "triangles": mended.triangles}
-    mesh = mesh_from(recipe, surface | (level_of(level_recipe(recipe), surface) if remeshing.on_shape else {}))
+    recipe |= remeshing.recipe | {"kind": "scan", "nodes": int(nodes), "fill": bool(fill), "regions": outlines}
+    grid = level_arrays(recipe, mended) if remeshing.on_shape else {}
+    mesh = mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles} | grid)
     for sentence in warnings_of(mesh.losses):
         warnings.warn(f"{name}: {sentence}", stacklevel=2)
     return mesh
@@ -119,14 +119,14 @@ def true_shape_of(source: Source, **how: Any) -> Shape:
     if remeshing.solid is None:
         check_watertight(mended, name)
     remeshing.check(name)
-    recipe |= remeshing.recipe | {"smooth": float(remeshing.smooth)}
-    grid = level_of(level_recipe(recipe), {"points": mended.points, "triangles": mended.triangles})
-    return shape_of(grid_from(grid), recipe["name"], remeshing.wall)
+    recipe |= remeshing.recipe
+    return shape_of(grid_from(level_arrays(recipe, mended)), recipe["name"], remeshing.wall)
 
 
-def level_recipe(recipe: Mapping[str, Any]) -> dict[str, Any]:
-    """What of the recipe of a scan decides its true shape."""
-    return {key: recipe[key] for key in LEVEL_KEYS if key in recipe} | {"kind": "level"}
+def level_arrays(recipe: Mapping[str, Any], mended: Mended) -> dict[str, np.ndarray]:
+    """The grid of the true shape of a mended surface; recipe: of a scan."""
+    deciding = {key: recipe[key] for key in LEVEL_KEYS if key in recipe} | {"kind": "level"}
+    return level_of(deciding, {"points": mended.points, "triangles": mended.triangles})
 
 
 def mended_surface(source: Source, remeshing: Remeshing) -> tuple[Mended, dict[str, Any]]:
