@@ -29,8 +29,8 @@ NAME_BYTES = 80
 """Of a mesh's name that stand in the name of its file: file systems allow 255 in all."""
 PARTS = ("points", "triangles", "tetrahedra", "surface_count", "outer_count")
 """What the worker makes and the cache keeps."""
-LEVEL = ("low", "cell", "values")
-"""The same of a recipe of kind "level": corner [m], edge of the cells [m] and distances [m] of a grid."""
+LEVEL = ("low", "cell", "values", "losses")
+"""The same of a recipe of kind "level": corner [m], edge of the cells [m] and distances [m] of a grid; its losses."""
 
 MADE_ELSEWHERE = {
     "scan": "studies.geometry.mesher.scan_recipe",

@@ -17,7 +17,7 @@ from studies.geometry.mesher.worker import Arrays, work
 from studies.geometry.scanned.distance_grid import box_of
 from studies.geometry.scanned.fidelity import fidelity, spread
 from studies.geometry.scanned.level_grid import grid_from, shape_of
-from studies.geometry.scanned.scan_shape import FINEST, Surface, cell_for, faithful, levelled, scan_surface
+from studies.geometry.scanned.scan_shape import COARSEST, Surface, cell_for, faithful, levelled, scan_surface
 from studies.geometry.scanned.shells import solidified
 from studies.geometry.scanned.true_grid import true_grid, wanted_volume
 from studies.geometry.shape.levelset import Shape
@@ -37,7 +37,8 @@ def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     """The shape that a given surface pictures, with `nodes` nodes, some of them where even ones would cut corners, its
     volume and the outlines of its regions; and what was lost on the way.
 
-    With the grid of its true shape among the arrays the nodes lie on that, for sides that will be curved onto it.
+    With the grid of its true shape among the arrays the nodes lie on that, for sides that will be curved onto it, and
+    the losses are those of the shape.
     """
     file = arrays["points"], arrays["triangles"]
     regions = [region_from_dict(data) for data in recipe["regions"].values()]
@@ -48,21 +49,29 @@ def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     else:
         cell = cell_for(*body, recipe["nodes"])
         source = smooth_body(recipe, body, cell)
-        shape, start = faithful(*source, cell, recipe["name"])
+        grid, start = faithful(*source, cell, recipe["name"])
+        shape = shape_of(grid, recipe["name"])
         points, triangles = scan_mesh(shape, start, recipe["nodes"], regions)
         volume = wanted_volume(source, enclosed_volume(shape, 1))
         points = with_volume(points, triangles, volume, shape.level, regions)
     made = finish(replace(shape, wall=recipe.get("wall")), points, triangles, recipe)
+    losses = arrays["losses"] if "losses" in arrays else lost(file, body, (points, triangles))
+    return made | {"losses": losses}
+
+
+def lost(file: Surface, body: Surface, made: Surface) -> np.ndarray:
+    """The losses of a surface made from that of a file, as JSON; body: with what is enclosed filled."""
     stage("distances between mesh and file")
-    losses = fidelity(file, (points, triangles)) | {"volume_file": signed_volume(*body)}
-    return made | {"losses": np.array(json.dumps(losses))}
+    return np.array(json.dumps(fidelity(file, made) | {"volume_file": signed_volume(*body)}))
 
 
 def build_level(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """The grid of the true shape of a scan, the same for all its meshes."""
-    body = solid_body(recipe, (arrays["points"], arrays["triangles"]))
-    grid = true_grid(*smooth_body(recipe, body, FINEST * box_of(*body)[0]), recipe["name"])
-    return {"low": grid.low, "cell": np.array(grid.cell), "values": grid.values}
+    """The grid of the true shape of a scan, the same for all its meshes, and what it lost of the file."""
+    file = arrays["points"], arrays["triangles"]
+    body = solid_body(recipe, file)
+    grid = true_grid(*smooth_body(recipe, body, COARSEST * box_of(*body)[0]), recipe["name"])
+    losses = lost(file, body, scan_surface(shape_of(grid, recipe["name"])))
+    return {"low": grid.low, "cell": np.array(grid.cell), "values": grid.values, "losses": losses}
 
 
 def solid_body(recipe: dict[str, Any], file: Surface) -> Surface:
