@@ -41,9 +41,7 @@ def scan_scenes(path: Path, unit: str = "mm") -> dict[str, Scene]:
     found = proposal(mesh)
     probed = placed_scene(f"{name}_probed", source, found)
     scenes = lifted(probed, mesh, found), pressed(probed, mesh, found), probed
-    return dict(
-        zip(LOADS, (replace(s, name=f"{name}_{load}") for s, load in zip(scenes, LOADS, strict=True)), strict=True)
-    )
+    return {load: replace(one, name=f"{name}_{load}") for load, one in zip(LOADS, scenes, strict=True)}
 
 
 def pressed(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
@@ -53,7 +51,8 @@ def pressed(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
     depth = float(np.ptp(ways))
     path = Trajectory((0.0, UNTIL), ((0.0, 0.0, 0.0), scaled(inward, (PRESSED_IN + GAP) * depth)))
     plane = Plane(scaled(inward, float(ways.min()) - GAP * depth), inward, path)
-    return replace(probed, obstacles=(plane,), probed=ForceOutput("obstacle", 0, inward))
+    title = f"{mesh.name}: held at one end, pressed by a plane from the side"
+    return replace(probed, title=title, obstacles=(plane,), probed=ForceOutput("obstacle", 0, inward))
 
 
 def lifted(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
@@ -66,7 +65,8 @@ def lifted(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
     up = found.axes[2]
     path = Trajectory((0.0, UNTIL), ((0.0, 0.0, 0.0), scaled(up, LIFTED * found.sides[0])))
     grasp = Held("grasp", HalfSpace(vector(last), vector(-away)), path)
-    return replace(probed, obstacles=(), held=(*probed.held, grasp), probed=ForceOutput("held", 1, up))
+    title, held = f"{mesh.name}: held at one end, lifted at the other", (*probed.held, grasp)
+    return replace(probed, title=title, obstacles=(), held=held, probed=ForceOutput("held", 1, up))
 
 
 def solved(root: Path, scene: Scene) -> Reference:
@@ -94,13 +94,16 @@ def row(scene: Scene, reference: Reference) -> str:
 def rows(root: Path, paths: list[Path], loads: list[str]) -> Iterator[str]:
     """A row for every scene, as soon as it is solved; of one that fails, its sentence."""
     for path in paths:
-        for load, scene in scan_scenes(path).items():
-            if load not in loads:
-                continue
+        try:
+            scenes = scan_scenes(path)
+        except StudyError as error:
+            yield f"{path.stem:28}  {error}"
+            continue
+        for load in loads:
             try:
-                yield row(scene, solved(root, scene))
+                yield row(scenes[load], solved(root, scenes[load]))
             except StudyError as error:
-                yield f"{scene.name:28}  {error}"
+                yield f"{scenes[load].name:28}  {error}"
 
 
 def main(words: list[str]) -> int:

@@ -62,7 +62,9 @@ def true_surfaces(mesh: OrganMesh, shape: Shape | None = None) -> list[tuple[np.
     if kind == "organ":
         shape = make_shape(mesh.recipe["organ"], mesh.recipe["parameters"])
     if shape is None:
-        raise StudyError(f"{mesh.name}: its true shape is not known, so it cannot be curved; mesh it from an organ")
+        raise StudyError(
+            f"{mesh.name}: its true shape is not known, so it cannot be curved; ask for a number of nodes (--nodes)"
+        )
     outer = [(mesh.outer_triangles, shape)]
     return [*outer, (mesh.lumen_triangles, at_depth(shape, shape.wall or 0.0))] if mesh.hollow else outer
 
