@@ -86,7 +86,7 @@ def test_a_scan_can_be_curved(organbench, egg, tmp_path):
     read = meshio.read(target)
     points, cells = read.points, read.cells_dict["tetra10"]
     # Flat sides between the same 100 nodes enclose 5 % less.
-    assert curved_volume(points, cells) == pytest.approx(1e-9 * signed_volume(POINTS, FACES), rel=2e-3)
+    assert curved_volume(points, cells) == pytest.approx(1e-9 * signed_volume(POINTS, FACES), rel=4e-3)
     assert signed_volume(points, boundary_triangles(cells[:, :4])) < 0.97e-9 * signed_volume(POINTS, FACES)
 
 
