@@ -60,6 +60,15 @@ def test_the_curved_body_has_the_volume_of_the_surface(scene):
     assert mesh_for(scene, LEVEL).volume == pytest.approx(VOLUME, rel=1e-4)
 
 
+def test_a_graded_quadratic_body_is_on_the_same_shape(scene, shape):
+    """Halved elements too: their nodes and mid-side nodes lie on the shape, those of outlines on the outline."""
+    mesh = mesh_at(scene, LEVEL, 1, 0, True)
+    assert np.abs(shape.level(mesh.points[: mesh.outer_count])).max() < 1e-3 * RADIUS
+    assert mesh.volume == pytest.approx(VOLUME, rel=1e-3) and mesh.smallest_jacobian > 0
+    rim = np.abs(np.abs(mesh.points[mesh.patches["top"], 2]) - CAP * RADIUS) < 1e-9
+    assert rim.sum() >= 12
+
+
 def test_sides_follow_the_true_shape_and_outlines_the_true_outline(scene, shape):
     mesh, patches, _ = reference_mesh(replace(scene, reference=replace(scene.reference, at_outlines=0)), LEVEL)
     points = nodes(mesh)
