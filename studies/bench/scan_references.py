@@ -16,7 +16,7 @@ from studies.base.errors import StudyError
 from studies.geometry import HalfSpace, OrganMesh, scan
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import triangle_areas
-from studies.population.folder import DURATION, NODES, placed_scene
+from studies.population.folder import DURATION, NODES, PLAN, placed_scene
 from studies.reference.load import Reference, load_reference
 from studies.reference.reference_solves import reference_solves
 from studies.reference.solve import solve
@@ -32,6 +32,8 @@ GAP = 0.002
 UNTIL = 0.6 * DURATION
 """When nothing moves any more [s]."""
 LOADS = ("lifted", "pressed", "probed")
+UNDER_PLANE = (1, 2, 2)
+"""Times that elements under a plane are halved: it touches many, a probe few."""
 
 
 def scan_scenes(path: Path, unit: str = "mm") -> dict[str, Scene]:
@@ -52,7 +54,8 @@ def pressed(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
     path = Trajectory((0.0, UNTIL), ((0.0, 0.0, 0.0), scaled(inward, (PRESSED_IN + GAP) * depth)))
     plane = Plane(scaled(inward, float(ways.min()) - GAP * depth), inward, path)
     title = f"{mesh.name}: held at one end, pressed by a plane from the side"
-    return replace(probed, title=title, obstacles=(plane,), probed=ForceOutput("obstacle", 0, inward))
+    plan = replace(PLAN, at_contact=UNDER_PLANE)
+    return replace(probed, title=title, obstacles=(plane,), reference=plan, probed=ForceOutput("obstacle", 0, inward))
 
 
 def lifted(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
@@ -66,7 +69,8 @@ def lifted(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
     path = Trajectory((0.0, UNTIL), ((0.0, 0.0, 0.0), scaled(up, LIFTED * found.sides[0])))
     grasp = Held("grasp", HalfSpace(vector(last), vector(-away)), path)
     title, held = f"{mesh.name}: held at one end, lifted at the other", (*probed.held, grasp)
-    return replace(probed, title=title, obstacles=(), held=held, probed=ForceOutput("held", 1, up))
+    plan = replace(PLAN, at_contact=0)
+    return replace(probed, title=title, obstacles=(), held=held, reference=plan, probed=ForceOutput("held", 1, up))
 
 
 def solved(root: Path, scene: Scene) -> Reference:
