@@ -6,7 +6,7 @@ from studies.base.face import lazy
 
 if TYPE_CHECKING:
     from studies.geometry.api.organs import attach, ball, ball_octant, curved, fill, liver, organ, organ_family
-    from studies.geometry.api.scans import scan
+    from studies.geometry.api.scans import scan, true_shape_of
     from studies.geometry.files.reading import read_mesh
     from studies.geometry.mesh.checks import check_surface, check_tetrahedra
     from studies.geometry.mesh.organ_mesh import OrganMesh
@@ -57,6 +57,7 @@ _FACE = {
     "project_liver": "studies.geometry.organs.liver",
     "read_mesh": "studies.geometry.files.reading",
     "scan": "studies.geometry.api.scans",
+    "true_shape_of": "studies.geometry.api.scans",
     "vary": "studies.geometry.organs.variation",
 }
 """Where each name lives; its module is loaded when the name is asked for."""

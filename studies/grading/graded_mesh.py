@@ -45,13 +45,16 @@ def graded_mesh(
 
 def mesh_at(scene: Scene, level: int, at_outlines: int, at_contact: int, quadratic: bool) -> OrganMesh | QuadraticMesh:
     """The same from `level` vertices on the outer surface before any is halved."""
-    organ_mesh, coarse, fine = halved(scene, level, at_outlines, at_contact)
+    organ_mesh, coarse, fine = halved(scene, level, at_outlines, at_contact, quadratic)
     return (quadratic_mesh if quadratic else linear_mesh)(scene, organ_mesh, coarse, fine)
 
 
-def halved(scene: Scene, level: int, at_outlines: int, at_contact: int) -> tuple[OrganMesh, HeldMesh, HeldMesh]:
-    """The organ's mesh, the same with where it is held, and that one halved; all with straight sides."""
-    organ_mesh = mesh_for(scene, level, layers=1 if is_hollow(scene) else None)
+def halved(
+    scene: Scene, level: int, at_outlines: int, at_contact: int, on_shape: bool = False
+) -> tuple[OrganMesh, HeldMesh, HeldMesh]:
+    """The organ's mesh, the same with where it is held, and that one halved; all with straight sides, whose vertices
+    are `on_shape` for sides that will be curved (studies.scene.meshing.mesh_for)."""
+    organ_mesh = mesh_for(scene, level, layers=1 if is_hollow(scene) else None, on_shape=on_shape)
     coarse = held_mesh(scene, organ_mesh)
     fine = coarse.refined(scene, at_outlines, at_contact)
     return organ_mesh, coarse, coarse if fine.mesh.nelements == coarse.mesh.nelements else fine
@@ -59,8 +62,10 @@ def halved(scene: Scene, level: int, at_outlines: int, at_contact: int) -> tuple
 
 def is_hollow(scene: Scene) -> bool:
     """Whether the scene's organ has a wall."""
+    if scene.organ.shape == "file":
+        return "wall" in scene.organ.parameters
     shape = true_shape(scene.organ)
-    return "wall" in scene.organ.parameters if shape is None else shape.wall is not None
+    return shape is not None and shape.wall is not None
 
 
 def coarse_level(scene: Scene, nodes: int, at_outlines: int, at_contact: int, quadratic: bool) -> int:
@@ -74,7 +79,7 @@ def coarse_level(scene: Scene, nodes: int, at_outlines: int, at_contact: int, qu
     level, failed = max(FEWEST, (nodes + 6) // 4 if quadratic else nodes), None
     for _ in range(TRIES):
         try:
-            found[level] = outer_nodes(halved(scene, level, at_outlines, at_contact)[2], quadratic)
+            found[level] = outer_nodes(halved(scene, level, at_outlines, at_contact, quadratic)[2], quadratic)
         except StudyError as error:
             failed = failed or error  # raised below, unless a neighbour of this level can be meshed
             level += max(1, level // 50)

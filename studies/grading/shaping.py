@@ -25,8 +25,11 @@ OFF = 1e-3
 
 
 def linear_mesh(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh) -> OrganMesh:
-    """The finer mesh with its vertices on the true shape, those of rims on the true outline. Raises StudyError."""
-    cells, shape = upright_cells(fine)[:, :4], true_shape(scene.organ)
+    """The finer mesh with its vertices on the true shape, those of rims on the true outline. Raises StudyError.
+
+    That of a file stays as it is: its flat sides enclose the volume of the file's surface already.
+    """
+    cells, shape = upright_cells(fine)[:, :4], None if scene.organ.shape == "file" else true_shape(scene.organ)
     points = nodes(fine.mesh)[: fine.mesh.nvertices]
     if shape is not None and fine is not coarse:
         aim = aimed(scene, fine, shape, laid_out(scene, organ_mesh, coarse, fine, shape))[: len(points)]
@@ -118,7 +121,7 @@ def laid_out(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMe
     """Nodes of the finer mesh [m], (n, 3), as curved as the coarse one, whose sides follow the true shape as far as
     that folds none of its elements. Raises StudyError."""
     plain = MeshTet2.from_mesh(coarse.mesh)
-    bent = on_true_shape(curved(organ_mesh, may_fold=True), coarse, shape, scene.held)
+    bent = on_true_shape(curved(organ_mesh, may_fold=True, shape=shape), coarse, shape, scene.held)
     cells, straight = upright_cells(coarse), nodes(plain)
     points = moved(straight, nodes(bent), cells, upright_against(straight, cells), organ_mesh.name)
     return nodes(as_curved(fine, coarse, replace(plain, doflocs=np.ascontiguousarray(points.T))))

@@ -8,17 +8,26 @@ from skfem import MeshTet2
 from reference_fem import Evaluator, nodes
 from reference_fem.elements.shapes import edge_index
 from studies.base.lookup import lookup
-from studies.geometry import CurvedMesh
+from studies.geometry import CurvedMesh, true_shape_of
 from studies.geometry.mesh.jacobian import PAIRS
 from studies.geometry.organs import SHAPES
 from studies.geometry.shape.levelset import Shape, project
 from studies.grading.held_mesh import HeldMesh, rim_sides
+from studies.scene.meshing import remeshed, scanned
 from studies.scene.scene import Held, Organ
 
 
 def true_shape(organ: Organ) -> Shape | None:
-    """The organ as a level function; None where only a mesh is known."""
-    return None if organ.shape == "file" else lookup(organ.shape, SHAPES, "organ")(**organ.parameters)
+    """The organ as a level function, the same for all its meshes; None for a mesh file that comes as it is.
+
+    Raises StudyError for an organ that there is not, or a file that cannot be read.
+    """
+    if organ.shape != "file":
+        return lookup(organ.shape, SHAPES, "organ")(**organ.parameters)
+    if not remeshed(organ):
+        return None
+    source, how = scanned(organ, organ.shape)
+    return true_shape_of(source, **how)
 
 
 def on_true_shape(smooth: CurvedMesh, body: HeldMesh, shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:

@@ -28,7 +28,7 @@ NODES = 550
 """Of the mesh on which hold and probe are placed."""
 DURATION, DAMPING = 8.0, 8.0
 """[s], [1/s]: as in the scenes of the liver."""
-PLAN = ReferencePlan("solid", (250, 360, 550), variants=(), at_outlines=(1, 2, 3), at_contact=(2, 3, 3))
+PLAN = ReferencePlan("solid", (250, 360, 550), variants=(), at_outlines=(1, 2, 3), at_contact=(3, 4, 5))
 
 
 @dataclass(frozen=True)

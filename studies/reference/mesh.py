@@ -1,11 +1,14 @@
 """The mesh of a reference: the mesher's, finer where it counts, its sides curved onto the true surface and outlines."""
 
+from dataclasses import replace
+
 import numpy as np
 from skfem import MeshTet, MeshTet2
 
 from reference_fem import curve, nodes
 from studies.geometry import OrganMesh, ball_octant, curved, project_ball
-from studies.grading.held_mesh import held_mesh, rim_sides, straight
+from studies.grading.held_mesh import HeldMesh, held_mesh, rim_sides, straight
+from studies.grading.shaping import laid_out
 from studies.grading.true_shape import as_curved, on_true_shape, true_shape
 from studies.reference.outlines import drawn_to_outlines
 from studies.scene.meshing import mesh_for
@@ -28,18 +31,30 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
     assert plan is not None  # never called for a scene without one
     if scene.symmetric:
         return _curved_octant(scene, straight(_octant(scene, level))), [], np.empty((0, 3))
-    organ_mesh = mesh_for(scene, int(level))
+    organ_mesh = mesh_for(scene, int(level), on_shape=True)
     coarse = held_mesh(scene, organ_mesh)
     at_outlines, at_contact = plan.bisections(level)
     body = coarse.refined(scene, at_outlines, at_contact)
-    shape = true_shape(scene.organ)
-    mesh = MeshTet2.from_mesh(body.mesh)
-    if shape is not None:
-        mesh = as_curved(body, coarse, on_true_shape(curved(organ_mesh, may_fold=True), coarse, shape, scene.held))
+    mesh = on_true_sides(scene, organ_mesh, coarse, body)
     *held, wall = body.facets(mesh)
     if at_outlines:
         mesh = drawn_to_outlines(mesh, np.concatenate([rim_sides(facets)[:, :2].ravel() for facets in held]))
     return mesh, [np.unique(facets) for facets in held], nodes(mesh)[wall[:, :3]].mean(axis=1)
+
+
+def on_true_sides(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, body: HeldMesh) -> MeshTet2:
+    """The second-order mesh of `body`, as curved as the coarse one that follows the true shape; straight where only a
+    mesh is known. Raises StudyError.
+
+    A scan has margins and folds that no coarse element can follow: where one would fold, its sides bend less.
+    """
+    shape, mesh = true_shape(scene.organ), MeshTet2.from_mesh(body.mesh)
+    if shape is None:
+        return mesh
+    if scene.organ.shape == "file":
+        points = laid_out(scene, organ_mesh, coarse, body, shape)
+        return replace(mesh, doflocs=np.ascontiguousarray(points.T))
+    return as_curved(body, coarse, on_true_shape(curved(organ_mesh, may_fold=True), coarse, shape, scene.held))
 
 
 def _octant(scene: Scene, level: float) -> OrganMesh:

@@ -1,5 +1,7 @@
 """The mesh of a scene's organ, and the nodes of its held regions."""
 
+from typing import Any
+
 import numpy as np
 
 from studies.base.errors import StudyError
@@ -15,27 +17,34 @@ FILE_PARAMETERS = (*SOURCE_PARAMETERS, "remesh", "smooth", "wall")
 """Of the organ "file"."""
 
 
-def mesh_for(scene: Scene, nodes: int, filled: bool = True, layers: int | None = None) -> OrganMesh:
+def mesh_for(
+    scene: Scene, nodes: int, filled: bool = True, layers: int | None = None, on_shape: bool = False
+) -> OrganMesh:
     """The scene's organ with `nodes` surface nodes, the wall of a hollow one in `layers` (None: as many as make their
     elements as high as long). Raises StudyError.
 
     A mesh file comes as it is, unless its parameters ask for a new surface: "remesh": true, or "smooth" or "wall" [m].
+    The flat sides of that enclose the volume of the file's surface, or its nodes are `on_shape`, for sides that will be
+    curved; nodes of all other organs always are.
     """
     if lookup(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
         return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters, layers)
-    parameters = scene.organ.parameters
+    source, how = scanned(scene.organ, scene.name)
+    if remeshed(scene.organ):
+        return scan(source, nodes, fill=filled, layers=layers, regions=scene.regions, on_shape=on_shape, **how)
+    mesh = read_mesh(source)
+    return fill(mesh) if filled and not len(mesh.tetrahedra) else mesh
+
+
+def scanned(organ: Organ, name: str) -> tuple[Source, dict[str, Any]]:
+    """The file of an organ, and what is asked of its new surface; name: of the scene. Raises StudyError."""
+    parameters = organ.parameters
     for key in parameters:
         lookup(key, FILE_PARAMETERS, "parameter of an organ from a file")
     if "path" not in parameters or not {"unit", "longest_side"} & set(parameters):
-        raise StudyError(
-            f"scene '{scene.name}': an organ from a file needs a path and a unit, it has {dict(parameters)}"
-        )
+        raise StudyError(f"scene '{name}': an organ from a file needs a path and a unit, it has {dict(parameters)}")
     source = Source(**{key: parameters[key] for key in SOURCE_PARAMETERS if key in parameters})
-    asked = {key: parameters[key] for key in ("smooth", "wall") if key in parameters}
-    if remeshed(scene.organ):
-        return scan(source, nodes, fill=filled, layers=layers, regions=scene.regions, **asked)
-    mesh = read_mesh(source)
-    return fill(mesh) if filled and not len(mesh.tetrahedra) else mesh
+    return source, {key: parameters[key] for key in ("smooth", "wall") if key in parameters}
 
 
 def remeshed(organ: Organ) -> bool:

@@ -10,11 +10,12 @@ import numpy as np
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.checks import check_one_part, check_surface
-from studies.geometry.mesh.organ_mesh import OrganMesh
+from studies.geometry.mesh.organ_mesh import OrganMesh, unique_edges
 from studies.geometry.mesh.quality import MIN_DIHEDRAL, dihedral_angles
 from studies.geometry.mesh.second_order import CurvedMesh, make_curved
 from studies.geometry.mesher.jobs import TIME_LIMIT, cached, mesh_from, patches_of
 from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region, region_to_dict
 from studies.geometry.surface.node_count import FEWEST, MOST
 
@@ -76,19 +77,23 @@ def organ_family(
     return [organ(name, nodes, regions, fill, parameters, layers) for nodes in sizes]
 
 
-def curved(mesh: OrganMesh, may_fold: bool = False) -> CurvedMesh:
+def curved(mesh: OrganMesh, may_fold: bool = False, shape: Shape | None = None) -> CurvedMesh:
     """The filled organ with second-order elements that follow its true shape, its lumen's too; cached.
 
-    The vertices are those of `mesh`, and no element is folded anywhere, unless it `may_fold`. Raises StudyError for a
-    mesh that is not filled, whose true shape is not known, or that is too coarse to be curved.
+    The vertices are those of `mesh`, and no element is folded anywhere, unless it `may_fold`. shape: of a scan, whose
+    recipe does not tell it. Raises StudyError for a mesh that is not filled, whose true shape is not known, or that is
+    too coarse to be curved.
     """
     arrays = {"points": mesh.points, "tetrahedra": mesh.tetrahedra}
+    if shape is not None and mesh.recipe["kind"] == "scan":
+        # How far the straight sides are off it: what tells this shape from others.
+        arrays["depths"] = shape.level(mesh.points[unique_edges(mesh.triangles)].mean(axis=1))
     recipe = {"kind": "curved", "name": f"{mesh.name}-curved", "source": mesh.recipe}
     if may_fold:
         recipe["may_fold"] = True
 
     def make() -> dict[str, np.ndarray]:
-        made = make_curved(mesh, may_fold)
+        made = make_curved(mesh, may_fold, shape)
         return {"points": made.points, "cells": made.cells}
 
     stored = cached(recipe, arrays, ("points", "cells"), make)

@@ -18,10 +18,15 @@ from studies.geometry.files.reading import weld
 from studies.geometry.files.units import LARGEST, SMALLEST, Source, as_source, check_range
 from studies.geometry.mesh.checks import check_finite, check_one_part, check_surface, check_volume
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
-from studies.geometry.mesher.jobs import mesh_from
+from studies.geometry.mesher.jobs import level_of, mesh_from
 from studies.geometry.scanned.fidelity import warnings_of
+from studies.geometry.scanned.level_grid import grid_from, shape_of
+from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region, region_to_dict
 from studies.geometry.surface.repair import Mended, border, mend
+
+LEVEL_KEYS = ("name", "solid", "smooth")
+"""Of a recipe: what decides the true shape, beside the surface itself."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,9 @@ class Remeshing:
     """Thickness of the wall of a hollow organ; needs a number of nodes."""
     layers: int | None = None
     """Of elements in the wall."""
+    on_shape: bool = False
+    """Nodes lie on the true shape, for sides that are curved onto it (true_shape_of); else flat sides enclose the
+    volume."""
 
     def check(self, name: str) -> None:
         """Raise StudyError unless the lengths are such; name: of the file."""
@@ -54,7 +62,9 @@ class Remeshing:
         """What of it decides a remeshed body, JSON-able."""
         thickness = {} if self.wall is None else {"wall": float(self.wall)}
         count = {} if self.wall is None or self.layers is None else {"layers": int(self.layers)}
-        return ({} if self.solid is None else {"solid": float(self.solid)}) | thickness | count
+        on = {"on_shape": True} if self.on_shape else {}
+        filled = {} if self.solid is None else {"solid": float(self.solid)}
+        return {"smooth": float(self.smooth)} | filled | thickness | count | on
 
 
 def scan(
@@ -91,12 +101,32 @@ def scan(
         check_watertight(mended, name)
     remeshing.check(name)
     outlines = {key: region_to_dict(region) for key, region in (regions or {}).items()}
-    recipe |= remeshing.recipe | {"kind": "scan", "nodes": int(nodes), "smooth": float(remeshing.smooth)}
-    recipe |= {"fill": bool(fill), "regions": outlines}
-    mesh = mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles})
+    recipe |= remeshing.recipe | {"kind": "scan", "nodes": int(nodes), "fill": bool(fill), "regions": outlines}
+    grid = level_arrays(recipe, mended) if remeshing.on_shape else {}
+    mesh = mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles} | grid)
     for sentence in warnings_of(mesh.losses):
         warnings.warn(f"{name}: {sentence}", stacklevel=2)
     return mesh
+
+
+def true_shape_of(source: Source, **how: Any) -> Shape:
+    """The true shape of the surface in a file, the same for meshes of any number of nodes; it has the volume of the
+    surface. how: the fields of Remeshing. Raises StudyError for what cannot be read or mended."""
+    remeshing, name = Remeshing(**how), source.path.name
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the meshes of the shape tell of every change
+        mended, recipe = mended_surface(source, remeshing)
+    if remeshing.solid is None:
+        check_watertight(mended, name)
+    remeshing.check(name)
+    recipe |= remeshing.recipe
+    return shape_of(grid_from(level_arrays(recipe, mended)), recipe["name"], remeshing.wall)
+
+
+def level_arrays(recipe: Mapping[str, Any], mended: Mended) -> dict[str, np.ndarray]:
+    """The grid of the true shape of a mended surface; recipe: of a scan."""
+    deciding = {key: recipe[key] for key in LEVEL_KEYS if key in recipe} | {"kind": "level"}
+    return level_of(deciding, {"points": mended.points, "triangles": mended.triangles})
 
 
 def mended_surface(source: Source, remeshing: Remeshing) -> tuple[Mended, dict[str, Any]]:

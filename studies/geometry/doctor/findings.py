@@ -207,7 +207,7 @@ RULES: tuple[Rule, ...] = (
         "inverted",
         _number("inverted_tetrahedra"),
         lambda m: f"{m['inverted_tetrahedra']} tetrahedra have a negative or no volume: they are turned inside out",
-        "organbench mesh --from FILE fills the surface anew",
+        "try organbench mesh --from FILE: it fills the surface anew",
     ),
     (
         "tetrahedron_slivers",

@@ -49,21 +49,24 @@ class CurvedMesh:
         return float(smallest_jacobian(self.points, self.cells).min())
 
 
-def true_surfaces(mesh: OrganMesh) -> list[tuple[np.ndarray, Shape]]:
+def true_surfaces(mesh: OrganMesh, shape: Shape | None = None) -> list[tuple[np.ndarray, Shape]]:
     """Triangles (t, 3) of each curved part of the boundary and the shape on whose f = 0 they lie.
 
-    Raises StudyError for a mesh whose true shape is not known.
+    shape: of a scan, whose recipe does not tell it. Raises StudyError for a mesh whose true shape is not known.
     """
     kind = mesh.recipe.get("kind")
-    if kind == "organ":
-        shape = make_shape(mesh.recipe["organ"], mesh.recipe["parameters"])
-        outer = [(mesh.outer_triangles, shape)]
-        return [*outer, (mesh.lumen_triangles, at_depth(shape, shape.wall or 0.0))] if mesh.hollow else outer
     if kind == "ball_octant":
         round_node = np.isin(np.arange(len(mesh.points)), mesh.patches["sphere"])
         sphere = mesh.triangles[round_node[mesh.triangles].all(axis=1)]
         return [(sphere, make_shape("ball", {"radius": mesh.recipe["radius"]}))]
-    raise StudyError(f"{mesh.name}: its true shape is not known, so it cannot be curved; mesh it from an organ")
+    if kind == "organ":
+        shape = make_shape(mesh.recipe["organ"], mesh.recipe["parameters"])
+    if shape is None:
+        raise StudyError(
+            f"{mesh.name}: its true shape is not known, so it cannot be curved; ask for a number of nodes (--nodes)"
+        )
+    outer = [(mesh.outer_triangles, shape)]
+    return [*outer, (mesh.lumen_triangles, at_depth(shape, shape.wall or 0.0))] if mesh.hollow else outer
 
 
 def true_outlines(mesh: OrganMesh) -> list[tuple[np.ndarray, Region]]:
@@ -76,7 +79,7 @@ def true_outlines(mesh: OrganMesh) -> list[tuple[np.ndarray, Region]]:
     return outlines
 
 
-def make_curved(mesh: OrganMesh, may_fold: bool = False) -> CurvedMesh:
+def make_curved(mesh: OrganMesh, may_fold: bool = False, shape: Shape | None = None) -> CurvedMesh:
     """The second-order mesh of a filled organ, its boundary on the true surfaces and outlines, the rest moved along.
 
     Raises StudyError for a mesh without tetrahedra or true shape, or (unless it `may_fold`) too coarse to be curved
@@ -91,14 +94,15 @@ def make_curved(mesh: OrganMesh, may_fold: bool = False) -> CurvedMesh:
     cells = np.concatenate([mesh.tetrahedra, count + middle], axis=1)
     moved = np.zeros((len(edges), 3))
     key = edges @ [count, 1]
-    for triangles, shape in true_surfaces(mesh):
+    surfaces = true_surfaces(mesh, shape)
+    for triangles, true in surfaces:
         here = np.searchsorted(key, unique_edges(triangles) @ [count, 1])
         straight = mesh.points[edges[here]].mean(axis=1)
-        moved[here] = project(shape, straight) - straight
+        moved[here] = project(true, straight) - straight
     for rim, region in true_outlines(mesh):
         here = np.searchsorted(key, rim @ [count, 1])
         straight = mesh.points[rim].mean(axis=1)
-        moved[here] = project(true_surfaces(mesh)[0][1], straight, (region.level,)) - straight
+        moved[here] = project(surfaces[0][1], straight, (region.level,)) - straight
     fixed = np.isin(key, unique_edges(mesh.triangles) @ [count, 1])
     moved = spread(mesh, middle, moved, fixed)
     points = np.concatenate([mesh.points, mesh.points[edges].mean(axis=1) + moved])

@@ -29,10 +29,16 @@ NAME_BYTES = 80
 """Of a mesh's name that stand in the name of its file: file systems allow 255 in all."""
 PARTS = ("points", "triangles", "tetrahedra", "surface_count", "outer_count")
 """What the worker makes and the cache keeps."""
+LEVEL = ("low", "cell", "values", "losses")
+"""The same of a recipe of kind "level": corner [m], edge of the cells [m] and distances [m] of a grid; its losses."""
 
-MADE_ELSEWHERE = {"scan": "studies.geometry.mesher.scan_recipe", "curved": "studies.geometry.mesh.second_order"}
+MADE_ELSEWHERE = {
+    "scan": "studies.geometry.mesher.scan_recipe",
+    "level": "studies.geometry.mesher.scan_recipe",
+    "curved": "studies.geometry.mesh.second_order",
+}
 """Kinds of recipes that the module of all others does not make."""
-MAKERS = ("studies.geometry.mesher.organ_recipe", *MADE_ELSEWHERE.values())
+MAKERS = ("studies.geometry.mesher.organ_recipe", *dict.fromkeys(MADE_ELSEWHERE.values()))
 """Modules that make meshes, some in a process of their own: no import leads to them."""
 
 
@@ -46,6 +52,11 @@ def mesh_from(
     given = arrays or {}
     parts = (*PARTS, "losses") if recipe["kind"] == "scan" else PARTS
     return to_mesh(recipe, cached(recipe, given, parts, lambda: run_worker(recipe, given, limit)))
+
+
+def level_of(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The grid of the true shape of a scan, whose surface is `arrays`, cached. Raises StudyError."""
+    return cached(recipe, arrays, LEVEL, lambda: run_worker(recipe, arrays, TIME_LIMIT))
 
 
 def cached(
@@ -169,6 +180,6 @@ def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: flo
 
 def wayout(recipe: dict[str, Any]) -> str:
     """What a person can do about a mesh that could not be made."""
-    if recipe["kind"] == "scan":
+    if recipe["kind"] in ("scan", "level"):
         return "smooth the surface (--smooth 3), or ask for another node count"
     return "mend the surface, or make a new one (--nodes N)" if recipe["kind"] == "fill" else "try another node count"

@@ -1,4 +1,4 @@
-"""Making the mesh of a scan from its recipe, inside the worker process."""
+"""Making the mesh of a scan, or its true shape, from a recipe, inside the worker process."""
 
 import json
 import sys
@@ -14,9 +14,12 @@ from studies.geometry.mesher.mmg_calls import EvenRemesher
 from studies.geometry.mesher.organ_recipe import finish, outlined
 from studies.geometry.mesher.progress import stage
 from studies.geometry.mesher.worker import Arrays, work
-from studies.geometry.scanned.fidelity import TOLD, fidelity, spread
-from studies.geometry.scanned.scan_shape import Surface, cell_for, faithful, levelled
+from studies.geometry.scanned.distance_grid import box_of
+from studies.geometry.scanned.fidelity import fidelity, spread
+from studies.geometry.scanned.level_grid import grid_from, shape_of
+from studies.geometry.scanned.scan_shape import COARSEST, Surface, cell_for, faithful, levelled, scan_surface
 from studies.geometry.scanned.shells import solidified
+from studies.geometry.scanned.true_grid import true_grid, wanted_volume
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region, region_from_dict
 from studies.geometry.surface.family import enclosed_volume
@@ -25,23 +28,62 @@ from studies.geometry.surface.node_count import handles_of, surface_with
 from studies.geometry.surface.volume import with_volume
 
 
+def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
+    """What a recipe of kind "scan" or "level" asks for. Raises StudyError when it cannot be made."""
+    return {"scan": build_scan, "level": build_level}[recipe["kind"]](recipe, arrays)
+
+
 def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     """The shape that a given surface pictures, with `nodes` nodes, some of them where even ones would cut corners, its
-    volume and the outlines of its regions; and what was lost on the way."""
+    volume and the outlines of its regions; and what was lost on the way.
+
+    With the grid of its true shape among the arrays the nodes lie on that, for sides that will be curved onto it, and
+    the losses are those of the shape.
+    """
     file = arrays["points"], arrays["triangles"]
-    smooth, name = recipe["smooth"], recipe["name"]
-    stage("distances to the surface of the file")
-    body = file if recipe.get("solid") is None else solidified(*file, recipe["solid"], name)
-    cell = cell_for(*body, recipe["nodes"])
-    source = levelled(*body, cell, smooth, name) if smooth > 0 else body
-    shape, start = faithful(*source, cell, name)
     regions = [region_from_dict(data) for data in recipe["regions"].values()]
-    points, triangles = scan_mesh(shape, start, recipe["nodes"], regions)
-    points = with_volume(points, triangles, wanted_volume(source, shape), shape.level, regions)
+    body = solid_body(recipe, file)
+    if "values" in arrays:
+        shape = shape_of(grid_from(arrays), recipe["name"])
+        points, triangles = scan_mesh(shape, scan_surface(shape), recipe["nodes"], regions)
+    else:
+        cell = cell_for(*body, recipe["nodes"])
+        source = smooth_body(recipe, body, cell)
+        grid, start = faithful(*source, cell, recipe["name"])
+        shape = shape_of(grid, recipe["name"])
+        points, triangles = scan_mesh(shape, start, recipe["nodes"], regions)
+        volume = wanted_volume(source, enclosed_volume(shape, 1))
+        points = with_volume(points, triangles, volume, shape.level, regions)
     made = finish(replace(shape, wall=recipe.get("wall")), points, triangles, recipe)
+    losses = arrays["losses"] if "losses" in arrays else lost(file, body, (points, triangles))
+    return made | {"losses": losses}
+
+
+def lost(file: Surface, body: Surface, made: Surface) -> np.ndarray:
+    """The losses of a surface made from that of a file, as JSON; body: with what is enclosed filled."""
     stage("distances between mesh and file")
-    losses = fidelity(file, (points, triangles)) | {"volume_file": signed_volume(*body)}
-    return made | {"losses": np.array(json.dumps(losses))}
+    return np.array(json.dumps(fidelity(file, made) | {"volume_file": signed_volume(*body)}))
+
+
+def build_level(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
+    """The grid of the true shape of a scan, the same for all its meshes, and what it lost of the file."""
+    file = arrays["points"], arrays["triangles"]
+    body = solid_body(recipe, file)
+    grid = true_grid(*smooth_body(recipe, body, COARSEST * box_of(*body)[0]), recipe["name"])
+    losses = lost(file, body, scan_surface(shape_of(grid, recipe["name"])))
+    return {"low": grid.low, "cell": np.array(grid.cell), "values": grid.values, "losses": losses}
+
+
+def solid_body(recipe: dict[str, Any], file: Surface) -> Surface:
+    """The surface of a file, or what it encloses where the recipe says "solid"."""
+    stage("distances to the surface of the file")
+    return file if recipe.get("solid") is None else solidified(*file, recipe["solid"], recipe["name"])
+
+
+def smooth_body(recipe: dict[str, Any], body: Surface, cell: float) -> Surface:
+    """The surface, levelled where the recipe says so on cells of at most `cell` [m]."""
+    smooth = recipe["smooth"]
+    return levelled(*body, cell, smooth, recipe["name"]) if smooth > 0 else body
 
 
 NEARNESS = (0.2, 0.1, 0.3)
@@ -83,11 +125,5 @@ def farthest(one: Surface, other: Surface) -> float:
     return max(spread(one, other)["max"], spread(other, one)["max"])
 
 
-def wanted_volume(source: Surface, shape: Shape) -> float:
-    """Volume [m^3] of the surface that the shape pictures; the shape's own where parts of that overlap or are lost."""
-    said, seen = signed_volume(*source), enclosed_volume(shape, 1)
-    return said if abs(seen / said - 1.0) < TOLD else seen
-
-
 if __name__ == "__main__":
-    sys.exit(work(build_scan, *sys.argv[1:4]))
+    sys.exit(work(build, *sys.argv[1:4]))

@@ -1,50 +1,14 @@
 """The signed distance to a closed triangulation on a regular grid: what a scan is smoothed, closed and remeshed by."""
 
-from dataclasses import dataclass
-
 import numpy as np
-from scipy.ndimage import distance_transform_edt, map_coordinates, spline_filter
+from scipy.ndimage import distance_transform_edt
 
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.geometry.scanned.band import band_distance_into, far_distance_into
+from studies.geometry.scanned.level_grid import DistanceGrid
 
 BAND = 4.0
 """Cells on either side of the surface where the distance is exact; farther out it is so to a few per cent of a cell."""
-
-
-@dataclass(frozen=True, eq=False)
-class DistanceGrid:
-    """Signed distances, negative inside.
-
-    low: first corner [m], shape (3,)
-    cell: edge of the cells [m]
-    values: distance [m], shape (a, b, c)
-    """
-
-    low: np.ndarray
-    cell: float
-    values: np.ndarray
-
-    @property
-    def high(self) -> np.ndarray:
-        """Last corner [m], shape (3,)."""
-        return self.low + self.cell * (np.array(self.values.shape) - 1)
-
-    @property
-    def volume(self) -> float:
-        """Volume [m^3] where the distance is negative, cells at the surface counted by their share."""
-        # A plane at signed distance d from the centre of a cell cuts off about 1/2 - d/cell of it.
-        return float(np.clip(0.5 - self.values / self.cell, 0.0, 1.0).sum() * self.cell**3)
-
-    def level(self):
-        """f(points (n, 3) [m]) -> (n,) [m]: the cubic spline through the grid, twice differentiable."""
-        coefficients = spline_filter(self.values, order=3, mode="mirror")
-
-        def f(points: np.ndarray) -> np.ndarray:
-            places = (np.asarray(points, float) - self.low).T / self.cell
-            return map_coordinates(coefficients, places, order=3, mode="mirror", prefilter=False)
-
-        return f
 
 
 def distance_grid(points: np.ndarray, triangles: np.ndarray, cell: float, margin: float) -> DistanceGrid:

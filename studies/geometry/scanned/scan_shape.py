@@ -7,7 +7,8 @@ from skimage.measure import marching_cubes
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume
-from studies.geometry.scanned.distance_grid import DistanceGrid, box_of, distance_grid
+from studies.geometry.scanned.distance_grid import box_of, distance_grid
+from studies.geometry.scanned.level_grid import DistanceGrid, shape_of
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.surface.distance import distance_to_surface
 from studies.geometry.surface.first_surface import first_surface
@@ -37,7 +38,7 @@ def scan_shape(points: np.ndarray, triangles: np.ndarray, nodes: int, smooth: fl
     cell = cell_for(points, triangles, nodes)
     if smooth > 0:
         points, triangles = levelled(points, triangles, cell, smooth, name)
-    return shape_on(points, triangles, cell, name)
+    return shape_of(grid_on(points, triangles, cell), name)
 
 
 def cell_for(points: np.ndarray, triangles: np.ndarray, nodes: int) -> float:
@@ -63,29 +64,29 @@ def levelled(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: flo
     return smoothed(points, triangles, min(cell, max(smooth / 2.0, FINEST * diagonal)), smooth, name)
 
 
-def shape_on(points: np.ndarray, triangles: np.ndarray, cell: float, name: str) -> Shape:
-    """The signed distance to the surface on a grid of cells of edge `cell` [m]."""
-    grid = distance_grid(points, triangles, cell, ROOM * cell)
-    low, high = tuple(map(float, grid.low)), tuple(map(float, grid.high))
-    return Shape(name, grid.level(), low, high, cell=cell)  # pyright: ignore[reportArgumentType]
+def grid_on(points: np.ndarray, triangles: np.ndarray, cell: float) -> DistanceGrid:
+    """The signed distance to the surface on cells of edge `cell` [m]."""
+    return distance_grid(points, triangles, cell, ROOM * cell)
 
 
-def faithful(points: np.ndarray, triangles: np.ndarray, cell: float, name: str) -> tuple[Shape, Surface]:
-    """The shape of a surface and its first triangulation, on a grid as fine as keeps its thin parts.
+def faithful(
+    points: np.ndarray, triangles: np.ndarray, cell: float, name: str, allowed: float = MISSED
+) -> tuple[DistanceGrid, Surface]:
+    """The signed distance to a surface and its first triangulation, on a grid as fine as keeps its thin parts.
 
-    Where the triangulation misses more than MISSED of the diagonal, the cells, at first `cell` [m], get finer, down to
-    FINEST. A finer one with more handles is not used: they are holes of the grid in what is too thin for it.
+    Where the triangulation misses more than `allowed` of the diagonal, the cells, at first `cell` [m], get finer, down
+    to FINEST. A finer one with more handles is not used: they are holes of the grid in what is too thin for it.
     """
     diagonal, _ = box_of(points, triangles)
-    shape = shape_on(points, triangles, cell, name)
-    start = scan_surface(shape)
-    while cell > 1.01 * FINEST * diagonal and missed(points, triangles, start) > MISSED * diagonal:
+    grid = grid_on(points, triangles, cell)
+    start = scan_surface(shape_of(grid, name))
+    while cell > 1.01 * FINEST * diagonal and missed(points, triangles, start) > allowed * diagonal:
         cell = max(cell / FINER, FINEST * diagonal)
-        finer = shape_on(points, triangles, cell, name)
-        fine = scan_surface(finer)
+        finer = grid_on(points, triangles, cell)
+        fine = scan_surface(shape_of(finer, name))
         if handles_of(*fine) <= handles_of(*start):
-            shape, start = finer, fine
-    return shape, start
+            grid, start = finer, fine
+    return grid, start
 
 
 def missed(points: np.ndarray, triangles: np.ndarray, start: Surface) -> float:

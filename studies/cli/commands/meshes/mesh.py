@@ -20,7 +20,7 @@ from studies.cli.mesh_files import (
     working,
 )
 from studies.cli.terminal import say
-from studies.geometry import OrganMesh, curved, organ, scan, vary
+from studies.geometry import OrganMesh, curved, organ, scan, true_shape_of, vary
 from studies.geometry.files.units import NAMES, check_unit
 from studies.geometry.files.writing import SURFACES, VOLUMES, check_target, holds_tetrahedra, write_mesh
 from studies.geometry.mesh.quality import dihedral_angles
@@ -53,24 +53,30 @@ def mesh(
     check_unit(write_unit)
     check_target(output, source)
     filled = check_filling(output, fill, order)
-    if bool(name) == (source is not None):
-        raise StudyError("say what to mesh: the name of an organ (see `organbench list`), or --from FILE")
+    check_one(name, source, seed)
     if source is None:
         given = {"--smooth": smooth, "--close-holes": close_holes, "--solid": solid, "--unit": unit}
         refuse_file_options(given | {"--scale": scale != 1.0, "--longest-side": longest_side, "--part": part})
         with working(f"meshing the {name}"):
-            made = synthetic(name, nodes or NODES, seed, wall, filled, exact=order == 1)
+            shape, made = None, synthetic(name, nodes or NODES, seed, wall, filled, exact=order == 1)
     else:
-        if seed is not None:
-            raise StudyError("--seed varies synthetic organs; a file comes as it is, leave it out")
         file = settled(source_of(source, unit, scale, longest_side, part), yes)
-        lengths = {"smooth": smooth * MM, "solid": in_metres(solid), "wall": in_metres(wall)}
+        how = {"smooth": smooth * MM, "solid": in_metres(solid), "wall": in_metres(wall), "holes": close_holes}
         with working(f"meshing {source.name}"):
-            made = scan(file, nodes, fill=filled, holes=close_holes, **lengths)
+            made = scan(file, nodes, fill=filled, on_shape=order == 2, **how)
+            shape = true_shape_of(file, **how) if order == 2 and nodes else None
     with working("curving" if order == 2 else "writing"):
-        write_mesh(made, output, write_unit, curved(made) if order == 2 else None)
+        write_mesh(made, output, write_unit, curved(made, shape=shape) if order == 2 else None)
     for line in (*nearness(made), f"{summary(made)}; written to {output} in {NAMES[write_unit]}"):
         say(line)
+
+
+def check_one(name: str, source: Path | None, seed: int | None) -> None:
+    """Raise StudyError unless an organ or a file is asked for, and no file with a seed."""
+    if bool(name) == (source is not None):
+        raise StudyError("say what to mesh: the name of an organ (see `organbench list`), or --from FILE")
+    if source is not None and seed is not None:
+        raise StudyError("--seed varies synthetic organs; a file comes as it is, leave it out")
 
 
 def check_filling(output: Path, fill: bool | None, order: int) -> bool:

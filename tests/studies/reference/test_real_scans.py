@@ -1,0 +1,78 @@
+"""Real organs lifted, pressed and probed: how the loads are placed, and how far their references can be trusted."""
+
+import warnings
+
+import meshio
+import numpy as np
+import pytest
+
+from studies.bench import scan_references
+from studies.bench.scan_references import LIFTED, LOADS, PRESSED_IN, main, refined, row, scan_scenes, solved
+from studies.geometry import organ
+from tests.geometry.real import real_surface
+
+ORGANS = ("liver_hra_4999", "spleen_hra_4997", "stomach_bp3d_5015")
+
+
+@pytest.fixture(scope="module")
+def kidney(tmp_path_factory, mesh_cache):
+    """A kidney of 200 nodes in a file in millimetres, its nodes [m], and its three scenes."""
+    mesh = organ("kidney", 200, fill=False)
+    path = tmp_path_factory.mktemp("loads") / "kidney.ply"
+    meshio.write(path, meshio.Mesh(1e3 * mesh.points, [("triangle", mesh.triangles)]))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scan_references, "NODES", 150)
+        return mesh.points, scan_scenes(path)
+
+
+def test_the_free_end_is_grasped_and_lifted_across_the_length(kidney):
+    points, scenes = kidney
+    held = [one.region.level(points) <= 0 for one in scenes["lifted"].held]
+    assert not (held[0] & held[1]).any() and all(0.03 < part.mean() < 0.2 for part in held)
+    along = points[held[1]].mean(axis=0) - points[held[0]].mean(axis=0)
+    way = scenes["lifted"].held[1].path(scenes["lifted"].duration)
+    assert abs(along @ way) < 0.2 * np.linalg.norm(along) * np.linalg.norm(way)
+    assert np.linalg.norm(way) == pytest.approx(LIFTED * np.linalg.norm(along), rel=0.3)
+    assert scenes["lifted"].probed.what == "held" and not scenes["lifted"].obstacles
+
+
+def test_the_plane_starts_beside_the_body_and_goes_in(kidney):
+    points, scenes = kidney
+    (plane,) = scenes["pressed"].obstacles
+    before, after = (plane.gap(points, t) for t in (0.0, scenes["pressed"].duration))
+    depth = np.ptp(points @ plane.unit_normal)
+    assert 0 < before.min() < 0.02 * depth
+    assert after.min() == pytest.approx(-PRESSED_IN * depth, rel=0.2)
+
+
+def test_the_scenes_differ_in_name_and_load_alone(kidney):
+    scenes = kidney[1]
+    assert tuple(scenes) == LOADS and [one.name for one in scenes.values()] == [f"kidney_{load}" for load in LOADS]
+    assert len({str(one.organ) for one in scenes.values()}) == 1
+    assert len({(one.reference.levels, one.reference.at_outlines) for one in scenes.values()}) == 1
+
+
+def test_finer_references_are_finer_where_the_scene_holds_and_touches(kidney):
+    plans = {load: refined(scene).reference for load, scene in kidney[1].items()}
+    assert {plan.levels for plan in plans.values()} == {(360, 550, 800)}
+    assert plans["probed"].bisections(800) == (4, 5) and plans["lifted"].bisections(800) == (4, 0)
+    assert plans["pressed"].bisections(800) == (4, kidney[1]["pressed"].reference.bisections(550)[1])
+
+
+def test_a_file_that_is_none_costs_its_own_rows(tmp_path, capsys):
+    (tmp_path / "broken.stl").write_text("no mesh at all")
+    assert main([str(tmp_path / "broken.stl"), "--root", str(tmp_path)]) == 0
+    assert "broken.stl" in capsys.readouterr().out
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("load", LOADS)
+@pytest.mark.parametrize("name", ORGANS)
+def test_references_of_real_organs_can_judge(name, load, tmp_path, mesh_cache):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # thin margins are told of
+        scene = scan_scenes(real_surface(name))[load]
+        reference = solved(tmp_path, scene)
+    bars = reference.total_uncertainty
+    assert bars["force_end"] < 0.03 and bars["surface_mean"] < 0.005
+    assert row(scene, reference).startswith(scene.name)
