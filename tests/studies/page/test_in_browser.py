@@ -187,7 +187,7 @@ def test_the_table_sorts_by_size_of_errors_with_what_is_unknown_last(visit):
         assert head.get_attribute("aria-sort") == word
         cells = [cell.split("±")[0].replace("−", "-").replace("†", "") for cell in column(page, number)]
         known = [abs(float(cell)) for cell in cells if cell.strip() != "–"]
-        assert len(known) == 5 and known == sorted(known)[::order] and cells[5:] == ["–"] * 2
+        assert len(known) == 6 and known == sorted(known)[::order] and cells[6:] == ["–"] * 3
     page.locator("#cases thead th:nth-child(2) button").click()
     assert head.get_attribute("aria-sort") is None and column(page, 2) == sorted(column(page, 2), key=str.lower)
 
@@ -195,7 +195,7 @@ def test_the_table_sorts_by_size_of_errors_with_what_is_unknown_last(visit):
 def test_the_table_filters_by_all_words_and_opens_a_case(visit):
     page = visit()
     page.get_by_label("Filter").fill("clamped FREE")
-    assert page.inner_text("#count") == "2 of 7 cases"
+    assert page.inner_text("#count") == "2 of 9 cases"
     assert set(column(page, 5)) == {"free"} and set(column(page, 2)) == {"ball clamped"}
     page.locator("#cases tbody tr:visible button").first.click()
     page.wait_for_selector("#chosen:focus")
@@ -203,6 +203,34 @@ def test_the_table_filters_by_all_words_and_opens_a_case(visit):
     assert page.locator("#plots figure").count() == 3
     page.get_by_label("Filter").fill("nothing like it")
     assert page.locator("#cases tbody tr:visible").count() == 0
+
+
+def test_an_entry_from_outside_is_found_sorted_and_replayed_under_its_own_name(visit):
+    page = visit()
+    page.get_by_label("Filter").fill("entry")
+    assert page.inner_text("#count") == "2 of 9 cases"
+    assert column(page, 5) == ["theirs-half_step entry", "unable entry"]
+    page.get_by_label("Filter").fill("")
+    heads = page.locator("#cases thead th").all_inner_texts()
+    force = next(k for k, head in enumerate(heads, 1) if head.startswith("force"))
+    page.locator(f"#cases thead th:nth-child({force}) button").click()
+    assert column(page, 5)[0] == "theirs-half_step entry"  # 5 % off, all others more
+    page.locator("#cases tbody tr:visible button").first.click()
+    page.wait_for_selector("#canvas[data-shown]")
+    assert page.locator("#names span").all_inner_texts() == ["theirs-half_step", "reference"]
+    assert "so does the entry" in page.inner_text("#colours") and page.locator("#bar").is_visible()
+    assert "organbench judge ball_clamped" in page.inner_text("#about")
+    to_time(page, "Home")
+    rest = picture(page)
+    to_time(page, "End")
+    moved = np.abs(picture(page) - rest) > 30
+    half = rest.shape[1] // 2
+    assert moved[:, :half].any(axis=2).sum() > 500 and moved[:, half:].any(axis=2).sum() > 500
+    page.locator("#chosen").select_option(label=next(
+        name for name in page.locator("#chosen option").all_inner_texts() if "entry unable" in name
+    ))  # fmt: skip
+    assert page.locator("#replay").is_hidden() and "no replay" in page.inner_text("#no-replay")
+    assert "it knows no caps" in page.inner_text("#about")
 
 
 def test_odd_names_are_shown_as_they_are(visit):
