@@ -1,6 +1,7 @@
 """What tells the rungs from the paper's body to quadratic elements apart in a chart: a name, a colour and a marker."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from massspring import LITERATURE, METHODS
 from massspring.body.smoothed import edge_smoothed
@@ -28,8 +29,8 @@ class Family:
 
     name: str
     colour: str
-    marker: str | tuple[int, int, float]
-    """As matplotlib names it, or a polygon: its corners, whether it is a star, and its turn [degrees]."""
+    marker: str | tuple[int, Literal[0, 1, 2], float]
+    """As matplotlib names it, or corners, kind (0: polygon, 1: star) and turn [degrees]."""
 
 
 SMOOTH = "smooth"
