@@ -1,9 +1,8 @@
 """Bullet (PyBullet): deformable bodies of linear tetrahedra, stable neo-Hookean, explicit in stiffness.
 
-Volume is kept by the second Lame constant; here 49 mu, for stiffer ones need shorter steps. Its energy has a logarithm,
-so its constants are converted (Smith, de Goes and Kim 2018, Section 3.4). Planes are static bodies that are moved by
-hand. It reports no force between a plane and a deformable body: the force is read off the stresses at the nodes that
-touch the plane. Damping is its own, on rates of strain; masses are equal, for it takes one for the whole body.
+Volume is kept by the second Lame constant; here 49 mu, for stiffer ones need shorter steps. Planes are boxes that are
+moved by hand. It reports no force between a box and a deformable body: the force is read off the stresses at the nodes
+that touch the plane. Damping is its own, on rates of strain; masses are equal, for it takes one for the whole body.
 """
 
 # Checked alike where the package is not installed.
@@ -17,9 +16,10 @@ from typing import Any
 import numpy as np
 import pybullet  # pyright: ignore[reportMissingImports]
 
-from studies.peers.scene_folder import SceneFolder, hand_in, moved
+from studies.peers.scene_folder import SceneFolder, hand_in, moved, turn_to
+from studies.peers.stable_neo_hookean import StableNeoHookean
 
-STEP = 2e-4
+STEP = 2.5e-4
 """[s]."""
 LAME = 49.0
 """lambda over mu: a Poisson ratio of 0.49."""
@@ -27,6 +27,8 @@ DAMPING = 0.01
 """Of rates of strain, over the stiffness [s]."""
 MARGIN = 1e-4
 """Of collisions [m]: the surface is so far off the planes."""
+BOX = 0.5
+"""Half the edge of what stands for a plane [m]."""
 FORCES = 20
 """Forces are means over so many steps before a checkpoint."""
 
@@ -42,12 +44,11 @@ class Deformable:
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
         pybullet.setGravity(*scene.data["gravity"])
         pybullet.setTimeStep(dt)
-        corners = scene.points[scene.cells]
-        edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-        self.inverse, self.volume = np.linalg.inv(edges), np.linalg.det(edges) / 6.0
-        self.mu, self.lame = 4.0 / 3.0 * scene.mu, (LAME + 5.0 / 6.0) * scene.mu
+        self.law = StableNeoHookean(scene.points, scene.cells, scene.mu, LAME * scene.mu)
         self.organ = self._organ()
         self.bodies = [self._plane(plane) for plane in self.planes]
+        awake = pybullet.ACTIVATION_STATE_DISABLE_SLEEPING  # the loads are slower than what it takes for rest
+        pybullet.changeDynamics(self.organ, -1, activationState=awake)
         for node in scene.held.tolist():
             pybullet.createSoftBodyAnchor(self.organ, node, -1, -1)
 
@@ -58,10 +59,10 @@ class Deformable:
             return pybullet.loadSoftBody(
                 str(file),
                 simFileName=str(file),
-                mass=self.scene.density * float(self.volume.sum()),
+                mass=self.scene.density * float(self.law.volume.sum()),
                 useNeoHookean=1,
-                NeoHookeanMu=self.mu,
-                NeoHookeanLambda=self.lame,
+                NeoHookeanMu=self.law.m,
+                NeoHookeanLambda=self.law.l,
                 NeoHookeanDamping=DAMPING,
                 useSelfCollision=0,
                 collisionMargin=MARGIN,
@@ -69,16 +70,17 @@ class Deformable:
             )
 
     def _plane(self, plane: dict[str, Any]) -> int:
-        shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=plane["normal"])
-        body = pybullet.createMultiBody(0.0, shape, basePosition=plane["point"])
+        """A box, for its distance field knows no half-spaces."""
+        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[BOX] * 3)
+        body = pybullet.createMultiBody(0.0, shape)
         pybullet.changeDynamics(body, -1, lateralFriction=0.0, collisionMargin=MARGIN)
         return body
 
     def step(self, t: float) -> None:
         """To time t [s], the planes where they are then."""
         for body, plane in zip(self.bodies, self.planes, strict=True):
-            place = np.array(plane["point"]) + moved(plane["path"], t)
-            pybullet.resetBasePositionAndOrientation(body, place.tolist(), [0.0, 0.0, 0.0, 1.0])
+            place = np.array(plane["point"]) + moved(plane["path"], t) - BOX * np.array(plane["normal"])
+            pybullet.resetBasePositionAndOrientation(body, place.tolist(), turn_to(plane["normal"]).tolist())
         pybullet.stepSimulation()
 
     def positions(self) -> np.ndarray:
@@ -91,21 +93,7 @@ class Deformable:
         x, normal = self.positions(), np.array(plane["normal"])
         gap = (x - np.array(plane["point"]) - moved(plane["path"], t)) @ normal
         touching = gap < 3.0 * MARGIN
-        return -float((self.elastic_forces(x)[touching] @ normal).sum())
-
-    def elastic_forces(self, x: np.ndarray) -> np.ndarray:
-        """Of its energy, on the nodes at x (n, 3) [m], (n, 3) [N]."""
-        corners = x[self.scene.cells]
-        f = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ self.inverse
-        trace, j = np.einsum("kij,kij->k", f, f), np.linalg.det(f)
-        cofactor = j[:, None, None] * np.swapaxes(np.linalg.inv(f), 1, 2)
-        shear = self.mu * (1.0 - 1.0 / (trace + 1.0))
-        stress = shear[:, None, None] * f + (self.lame * (j - 1.0) - 0.75 * self.mu)[:, None, None] * cofactor
-        on_three = -self.volume[:, None, None] * stress @ np.swapaxes(self.inverse, 1, 2)
-        on_corners = np.concatenate([-on_three.sum(axis=2, keepdims=True), on_three], axis=2)
-        total = np.zeros_like(x)
-        np.add.at(total, self.scene.cells, np.swapaxes(on_corners, 1, 2))
-        return total
+        return -float((self.law.forces(x)[touching] @ normal).sum())
 
 
 def vtk_text(points: np.ndarray, cells: np.ndarray) -> str:

@@ -43,7 +43,7 @@ PEERS: tuple[Peer, ...] = (
     Peer("felupe", "studies.peers.felupe_quadratic", "curved"),
     Peer("newton", "studies.peers.newton_vbd"),
     Peer("bullet", "studies.peers.bullet"),
-    Peer("sofa", absent="no wheel on PyPI, from which the extra installs; SOFA comes as binaries of its own or by conda"),
+    Peer("sofa", absent="no wheel on PyPI, from which the extra installs; it comes as binaries of its own or by conda"),
 )
 
 
