@@ -29,7 +29,7 @@ class Family:
 
     name: str
     colour: str
-    marker: str | tuple[int, Literal[0, 1, 2], float]
+    marker: str | tuple[int, Literal[0, 1, 2], int]
     """As matplotlib names it, or corners, kind (0: polygon, 1: star) and turn [degrees]."""
 
 
