@@ -134,6 +134,13 @@ def test_report_leaves_readme_and_what_is_published_alone(current, home, organbe
     assert (current / "summary.md").is_file() and shown(home) == before
 
 
+def test_report_shows_a_study_of_a_file_beside_those_of_the_catalogue(results, organbench, monkeypatch, tiny_file):
+    monkeypatch.setattr(report_command, "STUDIES", ())
+    code, out, _ = organbench("report", tiny_file, "--results", results)
+    assert code == 0 and str(results / "tiny" / "tiny.csv") in out.replace("\n", "")
+    assert "tiny squeeze" in (results / "report.html").read_text(encoding="utf-8")
+
+
 def test_a_stamp_holds_for_one_code(tmp_path, monkeypatch):
     assert not is_stamped(tmp_path, "bench.csv")
     set_stamp(tmp_path, "bench.csv")
