@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import is_zipfile
 
 import h5py
 import numpy as np
@@ -77,6 +78,8 @@ def _table(path: Path, columns: Sequence[str]) -> pd.DataFrame:
 
 
 def _read_npz(path: Path) -> Handed:
+    if not is_zipfile(path):
+        raise StudyError(f"{path.name} is no npz file; numpy.savez writes one")
     with np.load(path, allow_pickle=False) as file:
         missing = [name for name in ("t", "positions") if name not in file]
         if missing:

@@ -29,17 +29,21 @@ TIME_LIMIT = 600.0
 
 @dataclass(frozen=True)
 class Peer:
-    """Another program: its adapter, and the mesh that it computes on."""
+    """Another program: its adapter, and the mesh that it computes on; or why it has no adapter."""
 
     name: str
-    module: str
+    module: str = ""
     mesh: str = "straight"
+    absent: str = ""
+    """The reason with which it is skipped."""
 
 
 PEERS: tuple[Peer, ...] = (
     Peer("mujoco", "studies.peers.mujoco_flex"),
     Peer("felupe", "studies.peers.felupe_quadratic", "curved"),
     Peer("newton", "studies.peers.newton_vbd"),
+    Peer("bullet", "studies.peers.bullet"),
+    Peer("sofa", absent="no wheel on PyPI, from which the extra installs; it comes as binaries of its own or by conda"),
 )
 
 
@@ -89,6 +93,8 @@ def judged(attempt: Attempt, given: Path, limit: float) -> Record:
 
 def hand_over(attempt: Attempt, given: Path, out: Path, limit: float) -> tuple[Status, str]:
     """Runs the adapter in a process of its own, in the folder, where programs leave their logs; how it ended."""
+    if attempt.peer.absent:
+        return Status.SKIPPED, f"{attempt.peer.name}: {attempt.peer.absent}"
     words = [attempt.peer.module, str(given.resolve()), str(out.resolve()), attempt.peer.mesh, repr(attempt.shorter)]
     surroundings = os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
     try:

@@ -17,7 +17,7 @@ import newton  # pyright: ignore[reportMissingImports]
 import numpy as np
 import warp as wp  # pyright: ignore[reportMissingImports]
 
-from studies.peers.scene_folder import SceneFolder, hand_in, moved
+from studies.peers.scene_folder import SceneFolder, hand_in, moved, turn_to
 
 STEP, SWEEPS = 5e-3, 10
 """[s]; sweeps over all vertices in a step."""
@@ -96,10 +96,7 @@ def _step(solver: Any, pipeline: Any, contacts: Any, now: Any, after: Any, contr
 def _placed(plane: dict[str, Any], t: float) -> Any:
     """A plane's place and turn at time t [s]: Newton's has its normal along z."""
     place = np.array(plane["point"]) + moved(plane["path"], t)
-    x, y, z = plane["normal"]
-    # Half-way between the z axis and the normal; from one end to the other half a turn about x.
-    turn = np.array([-y, x, 0.0, 1.0 + z]) if z > -1.0 + 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
-    return wp.transform(wp.vec3(*place.tolist()), wp.quat(*(turn / np.linalg.norm(turn)).tolist()))
+    return wp.transform(wp.vec3(*place.tolist()), wp.quat(*turn_to(plane["normal"]).tolist()))
 
 
 def _place(model: Any, planes: list[int], scene: SceneFolder, t: float) -> None:

@@ -103,6 +103,14 @@ def moved(path: dict[str, Any], t: float) -> np.ndarray:
     return np.array([np.interp(t, path["times"], axis) for axis in np.array(path["displacements"]).T])
 
 
+def turn_to(normal: list[float]) -> np.ndarray:
+    """Quaternion (x, y, z, w) that turns the z axis to a unit normal, (4,)."""
+    x, y, z = normal
+    # Half-way between both; from one end to the other half a turn about x.
+    turn = np.array([-y, x, 0.0, 1.0 + z]) if z > -1.0 + 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
+    return turn / np.linalg.norm(turn)
+
+
 def hand_in(out: Path, t: np.ndarray, positions: np.ndarray, force: np.ndarray, seconds: float) -> None:
     """Writes what `organbench judge` reads, and the computing time for a simulated second."""
     np.savez(out, t=t, positions=positions, force=force)

@@ -41,6 +41,8 @@ ROOM, BELOW, SIDE = 1.6, 3.0, 2.0
 """Ends of the axes over the outermost values: above, below, where a name stands, and at the sides."""
 MOST_NAMED = 3
 """Runs that a note names."""
+STARS = ("*", (4, 1, 0))
+"""Markers that have little area."""
 LOWEST, HIGHEST = 1e-3, 1e3
 """Errors outside are drawn at the edge [%]."""
 
@@ -154,7 +156,7 @@ def _draw_point(panel: Axes, one: Judged, error: Measured) -> None:
 
 
 def _size(look: Family) -> float:
-    return 11.0 if look.marker == "*" else 7.0
+    return 11.0 if look.marker in STARS else 8.0
 
 
 def _name(panel: Axes, points: Sequence[tuple[Judged, Measured]], recommended: Judged | None) -> None:

@@ -26,14 +26,16 @@ EXTRAS = {
     "geometry.csv": "python -m studies.bench.meshes",
 }
 """Results that belong to no study, and the command that makes each. What was not made again stays as published."""
+APART = (POPULATION, "peers")
+"""Studies outside of the catalogue: published when they are asked for, and kept meanwhile."""
 SUFFIXES = (".csv", ".md", ".png", ".json")
 
 
 def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path], list[str]]:
     """Copies all tables and charts below `root` to `home`/results/published and the summaries into the pages of `home`.
 
-    The published files, and the names of EXTRAS that were not made below `root` and stay as they are, as does the
-    population where it is none of `studies`. Files that nothing makes any more go. Raises StudyError, before anything
+    The published files, and the names of EXTRAS that were not made below `root` and stay as they are, as do those of
+    APART that are none of `studies`. Files that nothing makes any more go. Raises StudyError, before anything
     is written to `home`, unless every piece of every study, and every one of EXTRAS that is there, is of the present
     code.
     """
@@ -48,7 +50,7 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
     show_summaries(root, studies, home)
     target = home / PUBLISHED
     copies = _copy(sources, root, target)
-    kept = {*absent, POPULATION} - {study.name for study in studies}
+    kept = {*absent, *APART} - {study.name for study in studies}
     _remove([file for file in _files(target) if file.relative_to(target).parts[0] not in kept], copies)
     return copies, absent
 

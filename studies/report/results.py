@@ -130,7 +130,7 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
         write_whole(root / summary.file, (summary.text(runs) + "\n").encode())
     with svg_copies() as pictures:
         draw_charts(root, study, [*runs, *entries])
-    write_part(root, study, runs, rows.head(len(runs)), pictures)
+    write_part(root, study, [*runs, *entries], rows, pictures)
     write_whole(stamp, json.dumps(shown).encode())
     return paths, shown["remarks"]
 

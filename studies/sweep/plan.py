@@ -10,11 +10,16 @@ from studies.catalog.study import Study
 from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.size import record_bytes, timing_bytes
 from studies.store.index.entry import Entry
+from studies.sweep.frame_times import timed_again
 from studies.sweep.stored.known import Known
 from studies.sweep.tasks import Task, tasks_of
 
 PHYSICS, TIMING = "physics", "timing"
 """The stages: the first in several processes, the second alone."""
+
+
+AGAIN = "asked for again"
+"""Why stored cases are timed though their times are current."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,16 @@ def plan(
         if why is not None and (known.can_be_timed(study.name, case) or case.name in runs):
             seconds, size = _cost(known.of_timing(study.name, case))
             found.append(Planned(TIMING, "timing", case.name, why, seconds, size or timing_bytes(case)))
+    return found
+
+
+def plan_again(root: Path, study: Study) -> list[Planned]:
+    """What `measure_again` would time of a study, in its order."""
+    known = Known(root)
+    found = []
+    for case in timed_again(known, study):
+        seconds, size = _cost(known.of_timing(study.name, case))
+        found.append(Planned(TIMING, "timing", case.name, AGAIN, seconds, size or timing_bytes(case)))
     return found
 
 

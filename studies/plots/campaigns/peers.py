@@ -13,9 +13,21 @@ from studies.metrics.judged import FORCE, cost_of
 from studies.metrics.metric import COMPARABLE, Metric
 from studies.metrics.run import Run
 from studies.metrics.table import metric
-from studies.plots.style.families import Family, family_of
+from studies.plots.style.families import FAMILIES, Family, family_of
 from studies.plots.style.page import blank, by_scene, finish, log_axis, page, panels
-from studies.plots.style.style import BLACK, GREY, heading, remark, save, styled
+from studies.plots.style.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    heading,
+    remark,
+    save,
+    styled,
+)
 
 TITLE = "Other programs on the same meshes: down and to the left is better"
 VOLUME = metric("volume_worst")
@@ -25,8 +37,8 @@ LOWEST = {FORCE: 0.1, VOLUME: 1e-5}
 ROOM = 2.0
 HALF_STEP = "-half_step"
 """End of the name of an entry with steps half as long, which shows whether the answer hangs on the step."""
-SPARE = ("s", "^", "D", "v", "h", "d", "<", ">")
-"""Markers of families that would look alike."""
+SPARE = tuple(zip((ORANGE, GREEN, BLUE, PURPLE, BLACK, MUTED[2], MUTED[1], MUTED[0]), "^sDvX<>h", strict=True))
+"""Colours and markers of what has none of its own, in the order of its appearance."""
 NAMED = 2
 """Runs without a number that a note names."""
 
@@ -79,14 +91,16 @@ def _draw(panel: Axes, group: Sequence[Run], entry: Metric, looks: dict[str, Fam
 
 
 def looks_of(runs: Sequence[Run]) -> dict[str, Family]:
-    """The look of each family by its name, no two alike while there are markers; with half the step it is the same."""
-    spare, looks = iter(SPARE), dict[str, Family]()
-    for run in runs:
-        look, used = _family(run), {(other.colour, other.marker) for other in looks.values()}
-        if look.name not in looks:
-            alike = (look.colour, look.marker) in used
-            looks[look.name] = replace(look, marker=next(spare, look.marker)) if alike else look
-    return looks
+    """The look of each family by its name, no two of one colour or marker while there are spare ones; with half the
+    step it is the same."""
+    found = {look.name: look for look in map(_family, runs)}
+    looks = {name: look for name, look in found.items() if look in FAMILIES.values()}
+    spare = iter(SPARE)
+    for name, look in found.items():
+        if name not in looks:
+            colour, marker = next(spare, (look.colour, look.marker))
+            looks[name] = replace(look, colour=colour, marker=marker)
+    return {name: looks[name] for name in found}
 
 
 def family_name(run: Run) -> str:

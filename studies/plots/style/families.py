@@ -1,6 +1,7 @@
 """What tells the rungs from the paper's body to quadratic elements apart in a chart: a name, a colour and a marker."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from massspring import LITERATURE, METHODS
 from massspring.body.smoothed import edge_smoothed
@@ -28,7 +29,8 @@ class Family:
 
     name: str
     colour: str
-    marker: str
+    marker: str | tuple[int, Literal[0, 1, 2], int]
+    """As matplotlib names it, or corners, kind (0: polygon, 1: star) and turn [degrees]."""
 
 
 SMOOTH = "smooth"
@@ -50,10 +52,10 @@ CONTESTANTS: dict[tuple[str, str], Family] = {
     ("explicit_elements", "quadratic"): Family("explicit elements, quadratic", MUTED[2], ">"),
     ("implicit_elements", "tetrahedral"): Family("implicit elements, linear", YELLOW, "p"),
     ("implicit_elements", "quadratic"): Family("implicit elements, quadratic", MUTED[1], "h"),
-    ("angular_springs", "tetrahedral"): Family("angular springs", MUTED[6], "$A$"),
-    ("chain_mail", "tetrahedral"): Family("chain mail", MUTED[3], "$C$"),
-    ("linear_modes", "quadratic"): Family("linear modes", MUTED[5], "$M$"),
-    ("elastic_response", "quadratic"): Family("elastic response, precomputed", MUTED[9], "$R$"),
+    ("angular_springs", "tetrahedral"): Family("angular springs", MUTED[6], "X"),
+    ("chain_mail", "tetrahedral"): Family("chain mail", MUTED[3], "H"),
+    ("linear_modes", "quadratic"): Family("linear modes", MUTED[5], (4, 1, 0)),
+    ("elastic_response", "quadratic"): Family("elastic response, precomputed", MUTED[9], (4, 0, 20)),
 }
 """What is taken instead of mass-spring bodies, by method and kind of body."""
 OUR_METHODS = tuple(method.name for method in (*METHODS, *LITERATURE))

@@ -25,6 +25,15 @@ COMPARED = "surface"
 """Quantity that a scene must allow where points are to be compared: a body that may turn or slip has none."""
 
 
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Of a replay: positions [m] (P, v, 3) of the nodes (v,) of the outer surface at times [s] (P,)."""
+
+    times: np.ndarray
+    nodes: np.ndarray
+    positions: np.ndarray
+
+
 @dataclass
 class Truths:
     """Displacements of references at points of the organ, which are found once for all runs on one mesh."""
@@ -58,7 +67,9 @@ def case_data(run: Run, path: Path, truths: Truths) -> dict[str, Any]:
     if run.reference is not None:
         found["reference"] = reference_points(run)
     if run.fields.surface_node is not None and len(run.fields.surface_node) <= MOST_NODES:
-        found["replay"] = replay_of(run, truths)
+        frames, nodes, positions = (run.field(name) for name in SURFACE)
+        times = np.concatenate([[0.0], run.fields.t])[frames]
+        found["replay"] = replay_of(run, Surface(times, nodes, positions.astype(float)), truths)
     return found
 
 
@@ -104,14 +115,13 @@ def reference_points(run: Run) -> dict[str, list[float | None]]:
     return {name: [float(f"{v:.5g}") if np.isfinite(v) else None for v in values] for name, values in found.items()}
 
 
-def replay_of(run: Run, truths: Truths) -> dict[str, Any]:
-    """The recorded surface, and that of the reference at the same points of the organ at rest."""
-    frames, nodes, surface = (run.field(name) for name in SURFACE)
-    times = np.concatenate([[0.0], run.fields.t])[frames]
+def replay_of(run: Run, surface: Surface, truths: Truths) -> dict[str, Any]:
+    """The surface of a run, and that of the reference at the same points of the organ at rest."""
+    nodes, times = surface.nodes, surface.times
     triangles = run.fields.triangles
     place = np.full(len(run.fields.rest), -1)
     place[nodes] = np.arange(len(nodes))
-    packed = pack_frames(surface.astype(float), run.size)
+    packed = pack_frames(surface.positions, run.size)
     found = {
         "times": [float(f"{t:.6g}") for t in times],
         "triangles": pack_indices(place[triangles[np.isin(triangles, nodes).all(axis=1)]]),
@@ -124,9 +134,8 @@ def replay_of(run: Run, truths: Truths) -> dict[str, Any]:
     rest = run.fields.rest[nodes]
     checkpoints, truth = np.asarray(run.reference.field("t"), float), rest + truths.displacements(run.reference, rest)
     comparable = allowed(run.case.scene, COMPARED)
-    largest = largest_error(run, truth) if comparable else 0.0
-    if run.case.scene.start is None and checkpoints[0] > 0:
-        checkpoints, truth = np.concatenate([[0.0], checkpoints]), np.concatenate([rest[None], truth])
+    largest = largest_error(run, nodes, truth) if comparable else 0.0
+    checkpoints, truth = from_rest(run, checkpoints, rest, truth)
     return found | {
         "checkpoints": checkpoints.tolist(),
         "reference": pack_frames(truth, run.size),
@@ -144,10 +153,17 @@ def obstacle_of(obstacle: Obstacle, times: np.ndarray) -> dict[str, Any]:
     return at | {"radius": obstacle.radius, "span": span}
 
 
-def largest_error(run: Run, truth: np.ndarray) -> float:
-    """Largest distance [m] of a point of the surface from its place in the reference (K, v, 3) [m], at all checkpoints
-    that the run reached."""
-    own = run.fields.snapshots[:, run.field("surface_node")]
+def from_rest(run: Run, t: np.ndarray, rest: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times (K,) [s] and positions (K, v, 3) [m], before them those at rest (v, 3), where the scene begins there."""
+    if run.case.scene.start is not None or t[0] <= 0:
+        return t, positions
+    return np.concatenate([[0.0], t]), np.concatenate([rest[None], positions])
+
+
+def largest_error(run: Run, nodes: np.ndarray, truth: np.ndarray) -> float:
+    """Largest distance [m] of `nodes` (v,) from their places in the reference (K, v, 3) [m], at all checkpoints that
+    the run reached."""
+    own = run.fields.snapshots[:, nodes]
     return float(np.linalg.norm(own - truth[: len(own)], axis=-1).max(initial=0.0))
 
 

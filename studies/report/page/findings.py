@@ -14,6 +14,10 @@ FRAME, REAL = "frame_time [ms]", "real_time [s/s]"
 RECIPE = ("scene", "body", "law", "nodes", "stiffness")
 """What a body with and without a constraint share."""
 KEPT, FREE = "implicit_volume", "free"
+CONTESTED = {FORCE: "force", MEAN: "mean displacement", VOLUME: "worst volume", REAL: "speed"}
+"""Numbers in which entries from outside and our runs are compared."""
+MOST_NAMED = 6
+"""Numbers of entries that a finding names."""
 HALF = 0.51
 """Share of the step limit up to which a step is the usual one, and above whose half it is no fine one [1]."""
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -29,9 +33,11 @@ class Finding:
 
 
 def findings(tables: Tables) -> list[Finding]:
-    """Those that the tables of the studies, by name, bear; each from rows that ended well."""
-    found = (volume(tables), one_volume(tables), nearest_force(tables), cost(tables), real_time(tables), limit(tables))
-    return [finding for finding in found if finding is not None]
+    """Those that the tables of the studies, by name, bear; each from rows that ended well. All but the last are of our
+    own runs."""
+    ours = {name: [row for row in table if not row.get("entry")] for name, table in tables.items()}
+    found = [each(ours) for each in (volume, one_volume, nearest_force, cost, real_time, limit)]
+    return [finding for finding in (*found, entries(tables)) if finding is not None]
 
 
 def volume(tables: Tables) -> Finding | None:
@@ -130,6 +136,45 @@ def limit(tables: Tables) -> Finding | None:
         f"runs below the predicted limit of the time step diverge; above it {len(above) - above.count('diverged')} of "
         f"{len(above)} do not. These are counts of single runs.",
     )
+
+
+def entries(tables: Tables) -> Finding | None:
+    """Where a number of an entry from outside is the best of its scene, of all bodies and methods in all studies."""
+    contests = [found for column in CONTESTED for found in _contests(tables, column)]
+    if not contests:
+        return None
+    won = [_win(column, best, ours) for column, best, ours in contests if best.get("entry")]
+    told = "; ".join(won[:MOST_NAMED]) + (f"; and {len(won) - MOST_NAMED} more" if len(won) > MOST_NAMED else "")
+    return Finding(
+        "Entries from outside",
+        f"{len(won)} of {len(contests)}",
+        "numbers that other programs handed in, scene by scene (force, displacement, volume, speed), are better than "
+        f"those of all our bodies and methods in that scene{': ' if won else '.'}{told}{'.' if won else ''}",
+    )
+
+
+def _contests(tables: Tables, column: str) -> list[tuple[str, Row, Row | None]]:
+    """Of each scene with an entry that has this number: the best row, and the best of ours."""
+    scenes: dict[str, list[Row]] = {}
+    for row in _joined(tables, column):
+        scenes.setdefault(row["scene"], []).append(row)
+    found = []
+    for rows in scenes.values():
+        ranked = sorted(rows, key=lambda row: -row[column] if column == REAL else abs(row[column]))
+        if any(row.get("entry") for row in rows):
+            found.append((column, ranked[0], next((row for row in ranked if not row.get("entry")), None)))
+    return found
+
+
+def _win(column: str, best: Row, ours: Row | None) -> str:
+    """What the best entry reached, and the best of ours."""
+    what, unit = CONTESTED[column], column.split("[")[1].rstrip("]")
+
+    def number(row: Row) -> str:
+        return _small(row[column]) if column == VOLUME else _measured(row, column, signed=column == FORCE)
+
+    against = "" if ours is None else f" (ours at best {number(ours)} {unit}, {_name(ours)} by {ours['method']})"
+    return f"{what} of {best['method']} in {best['scene']}, {number(best)} {unit}{against}"
 
 
 def _joined(tables: Tables, *columns: str) -> list[Row]:

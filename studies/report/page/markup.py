@@ -85,7 +85,7 @@ def table_html(rows: Sequence[Mapping[str, Any]], known: Mapping[str, Any]) -> s
     heads += [_word_head(name, words) for name, words in AFTER.items()]
     body = []
     for number, row in enumerate(sorted(rows, key=lambda row: "replay" not in known.get(row["case"], {})), 1):
-        cells = [_open_cell(row, number, known), *(_word_cell(row.get(name), name) for name in BEFORE)]
+        cells = [_open_cell(row, number, known), *(_before_cell(row, name) for name in BEFORE)]
         cells += [_metric_cell(row, metrics[name]) for name in shown]
         cells += [_word_cell(row.get(name), name) for name in AFTER]
         body.append(f"<tr>{''.join(cells)}</tr>")
@@ -117,6 +117,13 @@ def _word_cell(value: Any, name: str) -> str:
     if name in NUMBERS:
         return f'<td class="number" data-sort="{float(value):.6g}">{plain(float(value))}</td>'
     return f'<td class="words">{escape(readable(str(value)))}</td>'
+
+
+def _before_cell(row: Mapping[str, Any], name: str) -> str:
+    """A column of BEFORE; an entry from outside has the name that it gave itself, and is marked as one."""
+    if name != "method" or not row.get("entry"):
+        return _word_cell(row.get(name), name)
+    return f'<td class="words">{escape(str(row["method"]))} <span class="entry">entry</span></td>'
 
 
 def _value(row: Mapping[str, Any], metric: Any) -> float | None:

@@ -10,14 +10,16 @@ import pandas as pd
 
 from studies.base.atomic import write_whole
 from studies.catalog.study import Study
+from studies.exchange.entry import is_entry
 from studies.metrics.run import Run
 from studies.report.page.case_data import Truths, case_data
-from studies.runs.case import Case
+from studies.report.page.entry_data import entry_data
 from studies.runs.current import case_path
 from studies.store.paths import key_hash
 
 Part = dict[str, Any]
-"""rows: of the study's table, with the id of each case; cases: by id; charts: file, title and SVG; remarks."""
+"""rows: of the study's table, with the id of each case and whether it is an entry from outside; cases: by id; charts:
+file, title and SVG; remarks."""
 
 
 def part_path(root: Path, study: Study) -> Path:
@@ -26,14 +28,14 @@ def part_path(root: Path, study: Study) -> Path:
 
 
 def write_part(root: Path, study: Study, runs: Sequence[Run], table: pd.DataFrame, pictures: Mapping[str, str]) -> None:
-    """Gathers and keeps the part of a study; `table` has a row for each of `runs`, `pictures` its charts as SVG by the
-    names of their files."""
-    ids = [case_id(run.case) for run in runs]
+    """Gathers and keeps the part of a study and of the entries from outside in its scenes; `table` has a row for each
+    of `runs`, `pictures` its charts as SVG by the names of their files."""
+    ids = [run_id(run) for run in runs]
     rows = [{name: _plain(value) for name, value in row.items()} for row in table.to_dict("records")]
     cases: dict[str, Any] = {}
     truths = Truths()
     for number, run in zip(ids, runs, strict=True):
-        cases.setdefault(number, case_data(run, _named(root, case_path(root, study.name, run.case)), truths))
+        cases.setdefault(number, _data(root, study, run, truths))
     files = [chart.file for chart in study.charts]
     charts = [{"file": name, "svg": pictures[name]} for name in files if name in pictures]
     remarks = [
@@ -41,7 +43,8 @@ def write_part(root: Path, study: Study, runs: Sequence[Run], table: pd.DataFram
         for name in files
         if name not in pictures
     ]
-    rows = [{**row, "case": number} for row, number in zip(rows, ids, strict=True)]
+    theirs = [is_entry(run.case) for run in runs]
+    rows = [{**row, "case": n, "entry": entry} for row, n, entry in zip(rows, ids, theirs, strict=True)]
     part: Part = {"rows": rows, "cases": cases, "charts": charts, "remarks": remarks}
     write_whole(part_path(root, study), json.dumps(part, allow_nan=False).encode())
 
@@ -52,9 +55,16 @@ def read_part(root: Path, study: Study) -> Part | None:
     return json.loads(path.read_bytes()) if path.is_file() else None
 
 
-def case_id(case: Case) -> str:
-    """The same for runs with the same numbers, whatever is recorded beside them."""
-    return key_hash(case.replaced(recorded=()).key)
+def _data(root: Path, study: Study, run: Run, truths: Truths) -> dict[str, Any]:
+    if is_entry(run.case):
+        return entry_data(run, truths)
+    return case_data(run, _named(root, case_path(root, study.name, run.case)), truths)
+
+
+def run_id(run: Run) -> str:
+    """The same for runs with the same numbers, whatever is recorded beside them; of an entry the same in all studies
+    with its scene."""
+    return key_hash(run.record.key if is_entry(run.case) else run.case.replaced(recorded=()).key)
 
 
 def _named(root: Path, path: Path) -> Path:

@@ -93,7 +93,7 @@ def page(parts: Parts, cases: dict[str, Any], machine: dict[str, Any]) -> bytes:
     script = "\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)
     text = Template((ASSETS / "page.html").read_text(encoding="utf-8")).substitute(
         style=(ASSETS / "page.css").read_text(encoding="utf-8"),
-        summary=f"{len(shown)} cases of {len(parts)} studies: {', '.join(names)}. Volume-preserving mass-spring organs "
+        summary=f"{_counted(shown)} of {len(parts)} studies: {', '.join(names)}. Volume-preserving mass-spring organs "
         "against nearly incompressible finite elements.",
         findings=findings_html(findings(tables)),
         charts=charts_html(
@@ -108,6 +108,12 @@ def page(parts: Parts, cases: dict[str, Any], machine: dict[str, Any]) -> bytes:
         script=script,
     )
     return text.encode()
+
+
+def _counted(rows: Sequence[dict[str, Any]]) -> str:
+    theirs = sum(bool(row.get("entry")) for row in rows)
+    entries = f", {theirs} of them entries from outside," if theirs else ""
+    return f"{len(rows)} cases{entries}"
 
 
 def first_case(cases: dict[str, Any]) -> str | None:

@@ -61,7 +61,7 @@ def test_tables_charts_and_the_summary_are_copied(current, home):
 
 
 def test_what_nothing_makes_any_more_goes_and_what_was_not_made_again_stays(current, home):
-    for name in ("volume_loss/older.png", "verify/verify.csv", "bench.csv"):
+    for name in ("volume_loss/older.png", "verify/verify.csv", "bench.csv", "peers/peers.csv"):
         (home / PUBLISHED / name).parent.mkdir(parents=True, exist_ok=True)
         (home / PUBLISHED / name).write_text("old")
     (current / "bench.csv").write_text("new")
@@ -69,6 +69,7 @@ def test_what_nothing_makes_any_more_goes_and_what_was_not_made_again_stays(curr
     publish(current, [HEADLINE], home)
     assert not (home / PUBLISHED / "volume_loss/older.png").exists()
     assert (home / PUBLISHED / "verify/verify.csv").read_text() == "old"
+    assert (home / PUBLISHED / "peers/peers.csv").read_text() == "old"
     assert (home / PUBLISHED / "bench.csv").read_text() == "new"
 
 
@@ -133,6 +134,13 @@ def test_report_leaves_readme_and_what_is_published_alone(current, home, organbe
     assert (current / "summary.md").is_file() and shown(home) == before
 
 
+def test_report_shows_a_study_of_a_file_beside_those_of_the_catalogue(results, organbench, monkeypatch, tiny_file):
+    monkeypatch.setattr(report_command, "STUDIES", ())
+    code, out, _ = organbench("report", tiny_file, "--results", results)
+    assert code == 0 and str(results / "tiny" / "tiny.csv") in out.replace("\n", "")
+    assert "tiny squeeze" in (results / "report.html").read_text(encoding="utf-8")
+
+
 def test_a_stamp_holds_for_one_code(tmp_path, monkeypatch):
     assert not is_stamped(tmp_path, "bench.csv")
     set_stamp(tmp_path, "bench.csv")
@@ -182,6 +190,12 @@ def test_some_studies_are_published_and_all_else_stays(current, home, organbench
         "volume_loss/volume_loss.csv",
     }
     assert organbench("publish", "volume_los", "--results", current)[0] == 2
+
+
+def test_a_study_of_a_file_is_published_too(results, home, organbench, monkeypatch, tiny_file):
+    monkeypatch.chdir(home)
+    assert organbench("publish", tiny_file, "--results", results)[0] == 0
+    assert (home / PUBLISHED / "tiny/tiny.csv").read_bytes() == (results / "tiny/tiny.csv").read_bytes()
 
 
 def test_times_of_two_machines_are_not_published_side_by_side(current, home):

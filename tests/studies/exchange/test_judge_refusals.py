@@ -59,7 +59,7 @@ def test_times_and_forces_that_do_not_fit_are_refused(refused, ours, scene_file,
 
 FILES = {
     "a.txt": ("", "entries are read from .npz, .csv, .vtkhdf, .hdf, .pvd or a folder of .vtu files"),
-    "a.npz": ("no zip", "a.npz cannot be read"),
+    "a.npz": ("no zip", "a.npz is no npz file; numpy.savez writes one"),
     "a.vtkhdf": ("no HDF5", "a.vtkhdf cannot be read"),
     "a.pvd": ("<VTKFile>", "a.pvd cannot be read"),
     "a.csv": ("t,node,x,y\n0,0,0,0\n", "a.csv lacks the column 'z'"),

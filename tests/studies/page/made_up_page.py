@@ -7,12 +7,15 @@ import numpy as np
 
 from massspring import Free
 from studies.catalog import Chart, Study
+from studies.exchange.entry import ENTRY, outside
+from studies.exchange.judge import unfinished_record
 from studies.metrics.run import Run
 from studies.metrics.table import study_table
 from studies.plots.style.style import svg_copies
 from studies.report.page.part import write_part
 from studies.report.page.write import write_page
 from studies.report.results import draw_charts
+from studies.runs.case import Case
 from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE
 from studies.store.machine import write_machine
 from studies.store.record import Field, Status
@@ -60,6 +63,20 @@ def rates() -> list[Run]:
     return [run(HELD, error=0.2, frame_ms=1.25), run(HELD, method=Free(), error=0.5, frame_ms=1.0)]
 
 
+def theirs() -> list[Run]:
+    """What other programs handed in: one on the same mesh, the other nothing."""
+    made = moving(run(HELD, error=0.05, frame_ms=0.5))
+    case = Case(HELD, made.case.body, outside("theirs-half_step"))
+    known = {ENTRY: "theirs.npz sha256:0", "dt": float("nan"), "dt_limit": float("nan")}
+    fields = {name: kept for name, kept in made.record.fields.items() if not name.startswith("surface")}
+    record = replace(made.record, key=case.key, attributes=made.record.attributes | known, fields=fields)
+    skipped = Case(HELD, made.case.body, outside("unable"))
+    return [
+        replace(made, case=case, record=record),
+        Run(skipped, unfinished_record(skipped, Status.SKIPPED, "unable: it knows no caps"), made.reference),
+    ]
+
+
 def study(name: str, runs: list[Run], *charts: tuple[str, str]) -> Study:
     """A study of these runs."""
     drawn = tuple(Chart(file, f"studies.plots.{module}:draw") for file, module in charts)
@@ -67,7 +84,7 @@ def study(name: str, runs: list[Run], *charts: tuple[str, str]) -> Study:
 
 
 def made_up_parts(root: Path) -> list[Study]:
-    """Keeps the parts of two studies below `root`."""
+    """Keeps the parts of two studies below `root`; entries from outside are in the scene of both."""
     both = {
         "volume_loss": (losses(), (("volume.png", "volume_history"), ("squeeze.png", "squeeze"))),
         "frame_rate": (rates(), (("cost_ratio.png", "cost_ratio"),)),
@@ -77,7 +94,8 @@ def made_up_parts(root: Path) -> list[Study]:
         made = study(name, runs, *charts)
         with svg_copies() as pictures:
             draw_charts(root, made, runs)
-        write_part(root, made, runs, study_table(runs, COLUMNS), pictures)
+        shown = [*runs, *theirs()]
+        write_part(root, made, shown, study_table(shown, COLUMNS), pictures)
         studies.append(made)
     write_machine(root / "machine.json")
     return studies

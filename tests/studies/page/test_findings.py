@@ -73,6 +73,38 @@ def test_no_tables_no_findings():
     assert findings(empty) == [] and findings({"frame_rate": [row(), row(method="free")]}) == []
 
 
+def beside(*entries):
+    """The same tables with rows of entries from outside in that of volumes."""
+    return {**TABLES, "volume_loss": [*TABLES["volume_loss"], *({**row, "entry": True} for row in entries)]}
+
+
+def test_an_entry_is_told_where_it_is_the_best_of_its_scene_and_only_there():
+    best = loss("tetrahedral", "theirs", 5.0, -0.9, mean=5.0)
+    (finding,) = [one for one in findings(beside(best)) if one.title == "Entries from outside"]
+    assert finding.number == "1 of 3"  # force; neither mean displacement nor volume
+    told = "force of theirs in ball, −0.9 ± 0.2 % (ours at best −35.3 ± 0.2 %, ball, tetrahedral, 550 nodes by "
+    assert told + "implicit_volume)." in finding.text and finding.text.count(" of theirs in ") == 1
+    worse = loss("tetrahedral", "theirs", 5.0, -36.0, mean=5.0)
+    (finding,) = [one for one in findings(beside(worse)) if one.title == "Entries from outside"]
+    assert finding.number == "0 of 3" and finding.text.endswith("in that scene.")
+    alone = loss("tetrahedral", "theirs", 5.0, -36.0, scene="spleen")
+    assert "force of theirs in spleen, −36.0 ± 0.2 %;" in findings(beside(alone))[-1].text
+
+
+def test_an_entry_changes_no_finding_on_ours():
+    quick = {"real_time [s/s]": 1e-3, "frame_time [ms]": 9.0}
+    strange = loss("tetrahedral", "theirs", 99.0, 500.0, **quick)
+    assert findings(beside(strange))[:-1] == findings(TABLES)
+    limits = {**TABLES, "stability_map": [*TABLES["stability_map"], row(status="diverged", entry=True)]}
+    assert findings(limits) == findings(TABLES)
+
+
+def test_no_more_entries_are_named_than_can_be_read():
+    many = [loss("tetrahedral", "theirs", 1e-9, 0.5, mean=0.1, scene=f"scene{k}") for k in range(4)]
+    found = findings(beside(*many))[-1]
+    assert found.number == "12 of 12" and found.text.count(" of theirs in ") == 6 and "and 6 more" in found.text
+
+
 CHANGES = {
     "volume_loss": lambda one: {name: 1.5 * value if "%" in name else value for name, value in one.items()},
     "frame_rate": lambda one: {name: value**2 if "_time " in name else value for name, value in one.items()},

@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from studies.report.page.pack import unpack_frames, unpack_series
+from tests.studies.page.seen import column
 
 FIRST_PICTURE = 2.0
 """[s]."""
@@ -108,6 +109,34 @@ def test_dragging_turns_and_the_button_turns_back(visit):
     assert (np.abs(picture(page) - front) > 30).any()
     page.click("#home")
     assert (picture(page) == front).all()
+
+
+def test_an_entry_from_outside_is_found_sorted_and_replayed_under_its_own_name(visit):
+    page = visit()
+    page.get_by_label("Filter").fill("entry")
+    assert page.inner_text("#count") == "2 of 9 cases"
+    assert column(page, 5) == ["theirs-half_step entry", "unable entry"]
+    page.get_by_label("Filter").fill("")
+    heads = page.locator("#cases thead th").all_inner_texts()
+    force = next(k for k, head in enumerate(heads, 1) if head.startswith("force"))
+    page.locator(f"#cases thead th:nth-child({force}) button").click()
+    assert column(page, 5)[0] == "theirs-half_step entry"  # 5 % off, all others more
+    page.locator("#cases tbody tr:visible button").first.click()
+    page.wait_for_selector("#canvas[data-shown]")
+    assert page.locator("#names span").all_inner_texts() == ["theirs-half_step", "reference"]
+    assert "so does the entry" in page.inner_text("#colours") and page.locator("#bar").is_visible()
+    assert "organbench judge ball_clamped" in page.inner_text("#about")
+    to_time(page, "Home")
+    rest = picture(page)
+    to_time(page, "End")
+    moved = np.abs(picture(page) - rest) > 30
+    half = rest.shape[1] // 2
+    assert moved[:, :half].any(axis=2).sum() > 500 and moved[:, half:].any(axis=2).sum() > 500
+    page.locator("#chosen").select_option(label=next(
+        name for name in page.locator("#chosen option").all_inner_texts() if "entry unable" in name
+    ))  # fmt: skip
+    assert page.locator("#replay").is_hidden() and "no replay" in page.inner_text("#no-replay")
+    assert "it knows no caps" in page.inner_text("#about")
 
 
 def test_a_scene_that_compares_no_points_colours_none_and_an_early_end_is_told(visit):

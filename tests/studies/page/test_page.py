@@ -13,11 +13,13 @@ import pytest
 from studies.catalog import Chart
 from studies.report.page import write as module
 from studies.report.page.markup import script_json
+from studies.report.page.pack import unpack_frames
 from studies.report.page.part import part_path, read_part
 from studies.report.page.svg import inline
 from studies.report.page.write import ASSETS, SCRIPTS, write_page
 from studies.report.results import draw_charts, report
-from tests.studies.page.made_up_page import MOMENTS, NASTY, losses, made_up_parts, rates
+from tests.plots.made_up import POINTS
+from tests.studies.page.made_up_page import HELD, MOMENTS, NASTY, losses, made_up_parts, rates, theirs
 from tests.studies.tiny import tiny_study
 
 VOID = {"meta", "link", "input", "br", "img"}
@@ -103,10 +105,11 @@ def test_json_in_a_script_is_no_markup_and_reads_back(text):
 
 def test_all_cases_are_in_the_table_once_and_all_rows_in_the_csv(page, parsed):
     table = page[1][page[1].index('<table id="cases">') : page[1].index("</table>")]
-    assert table.count("<tr>") - 1 == len(losses())  # those of the other study are the same cases
+    assert table.count("<tr>") - 1 == len(losses()) + len(theirs())  # those of the other study are the same cases
     link = next(attributes["href"] for _, attributes in parsed.found if attributes.get("id") == "csv")
     rows = pd.read_csv(io.BytesIO(base64.b64decode(link.split(",", 1)[1])))
-    assert len(rows) == len(losses()) + len(rates())
+    assert len(rows) == len(losses()) + len(rates()) + 2 * len(theirs())
+    assert set(rows["method"][rows["entry"]]) == {"theirs-half_step", "unable"}
     assert rows["force_end [%]"][0] == pytest.approx(-20.0) and NASTY in set(rows["scene"])
     assert "volume_loss, frame_rate".replace("_", " ") in table
 
@@ -114,20 +117,39 @@ def test_all_cases_are_in_the_table_once_and_all_rows_in_the_csv(page, parsed):
 def test_a_case_of_two_studies_has_replay_and_frame_times(page):
     cases = data_of(page[1])["cases"]
     both = [case for case in cases.values() if "replay" in case and "frame" in case["histories"]]
-    assert len(both) == 2 and len(cases) == len(losses())
+    assert len(both) == 2 and len(cases) == len(losses()) + len(theirs())
     held = [case["replay"] for case in cases.values() if "replay" in case and case["scene"] == "ball_clamped"]
     # Half of the way along z, of the worse of the two.
-    assert [replay["largest"] for replay in held] == pytest.approx([0.5 * 0.3 * 0.05] * 2)
+    assert [replay["largest"] for replay in held] == pytest.approx([0.5 * 0.3 * 0.05] * 3)
     assert both[0]["replay"]["positions"]["shape"] == [len(MOMENTS), 6]
     assert cases[data_of(page[1])["first"]]["replay"]["comparable"]
+
+
+def test_entries_from_outside_stand_beside_ours_under_their_own_names(page):
+    """With the replay of what they handed in: of one that moves 5 % too far."""
+    cases = {case["entry"]: case for case in data_of(page[1])["cases"].values() if "entry" in case}
+    assert set(cases) == {"theirs-half_step", "unable"}
+    assert page[1].count('<span class="entry">entry</span>') == 2
+    judged, unable = cases["theirs-half_step"], cases["unable"]
+    assert judged["again"] == "organbench judge ball_clamped theirs.npz --name theirs-half_step"
+    assert "nan" not in judged["title"] + judged["about"] and set(judged["histories"]) == {"volume", "force"}
+    times, checkpoints = judged["replay"]["times"], HELD.checkpoints
+    assert times == pytest.approx([0.0, *checkpoints]) and judged["replay"]["comparable"]
+    shown = unpack_frames(judged["replay"]["positions"])
+    truth = unpack_frames(judged["replay"]["reference"])
+    assert shown[0] == pytest.approx(POINTS[:6], abs=1e-4)
+    assert shown[-1] - POINTS[:6] == pytest.approx(1.05 * (truth[-1] - POINTS[:6]), abs=2e-4)
+    assert "replay" not in unable and "so there is no replay" in unable["why"]
+    assert "skipped (unable: it knows no caps)" in unable["about"]
+    assert f"{len(losses()) + 2} cases, 2 of them entries from outside, of 2 studies" in page[1]
 
 
 @pytest.mark.parametrize(
     ("less", "said"),
     [
-        (300, ["no replay of 1 of 4 cases"]),
-        (4_000, ["no replay of 4 of 4 cases", "no histories of"]),
-        (10**6, ["no replay of 4 of 4 cases", "no histories of 6 of 6 cases", "more than"]),
+        (300, ["no replay of 1 of 5 cases"]),
+        (5_000, ["no replay of 5 of 5 cases", "no histories of"]),
+        (10**6, ["no replay of 5 of 5 cases", "no histories of 7 of 7 cases", "more than"]),
     ],
 )
 def test_no_more_than_its_limit_and_what_had_to_go_is_said(kept, page, tmp_path, monkeypatch, less, said):

@@ -8,16 +8,18 @@ import typer
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, say
 from studies.report import publish as publishing
-from studies.sweep.find_study import known_studies
+from studies.sweep.find_study import find_study
 
 
 def publish(
-    studies: Annotated[list[str] | None, typer.Argument(help="these alone; all else stays as published")] = None,
+    studies: Annotated[
+        list[str] | None, typer.Argument(help="these alone, also from a FILE.py; all else stays")
+    ] = None,
     results: Results = Path("results"),
 ) -> None:
     """Copies tables and charts to results/published, and the summaries into README and docs; refuses stale results."""
     if studies:
-        copies, absent = publishing.publish_some(results, known_studies(studies), Path(".")), []
+        copies, absent = publishing.publish_some(results, [find_study(name) for name in studies], Path(".")), []
     else:
         copies, absent = publishing.publish(results, STUDIES, Path("."))
     for path in copies:

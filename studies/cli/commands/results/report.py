@@ -8,14 +8,17 @@ import typer
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, say, warn
 from studies.report import results as reports
+from studies.sweep.find_study import find_study
 
 
 def report(
+    studies: Annotated[list[str] | None, typer.Argument(help="also these, such as a FILE.py with a STUDY")] = None,
     results: Results = Path("results"),
     figures: Annotated[bool, typer.Option(help="also the pictures of organs and of the squeezed ball")] = False,
 ) -> None:
-    """All charts and tables, and the summaries; names what it wrote."""
-    written, remarks = reports.report(results, STUDIES)
+    """All charts and tables, the summaries, and report.html; names what it wrote."""
+    more = [study for study in map(find_study, studies or []) if study not in STUDIES]
+    written, remarks = reports.report(results, [*STUDIES, *more])
     if figures:
         written += reports.draw_figures(results)
     warn(remarks)

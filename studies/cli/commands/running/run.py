@@ -25,7 +25,8 @@ from studies.store.staleness import MISSING
 from studies.sweep.engine import Engine
 from studies.sweep.failures import Failures
 from studies.sweep.find_study import ON, find_studies
-from studies.sweep.plan import plan
+from studies.sweep.frame_times import measure_again
+from studies.sweep.plan import TIMING, plan, plan_again
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, warnings_of
 from studies.sweep.stored.known import Known
@@ -51,6 +52,9 @@ def run(
         int | None, typer.Option(min=1, help="processes for the physics; timing always runs alone  [default: 2]")
     ] = None,
     on: Annotated[str, typer.Option(help=f"{WORDS} (docs/cluster.md)")] = "",
+    again: Annotated[
+        str, typer.Option(help="timing: stored cases are timed again on this machine; nothing else runs")
+    ] = "",
     portable: Annotated[bool, typer.Option(help="results equal on every x86-64 processor; slower")] = False,
     organs: Annotated[str, typer.Option(help="a folder of surfaces, FOLDER or FOLDER:mm: the studies on these")] = "",
     dry: Annotated[bool, typer.Option("--dry-run", help="say what would run, why and how long; run nothing")] = False,
@@ -58,16 +62,18 @@ def run(
     """Runs what is missing or stale, then draws the charts. Interrupt it when you like: it goes on where it was."""
     if on and jobs is not None:
         raise StudyError("give either --jobs or --on: --on local:4 stands for --jobs 4")
-    rules = _rules(only)
-    root = results / SMOKE if smoke else results
-    failures = Failures()
+    if again:
+        _check_again(again, {"--on": on, "--only": only, "--portable": portable})
+    root, rules, failures = results / SMOKE if smoke else results, _rules(only), Failures()
     if organs:
         studies = [f"{name}{ON}{organs}" for name in studies or [POPULATION]]
     with engine_for(on, jobs or JOBS, portable, root, say) as engine:
         for found in _checked(studies or []):
             study = found.smoke() if smoke else found
-            if case:
-                study = _case_alone(study, case)
+            study = _case_alone(study, case) if case else study
+            if again:
+                _time_again(root, study, dry, not case)
+                continue
             wanted = _wanted(root, study, rules)
             if dry:
                 dry_run(console, study.name, plan(root, study, wanted), jobs or JOBS, root)
@@ -101,6 +107,31 @@ def _bring_up_to_date(
         warn(refresh(root, study)[1])
     what = "charts" if drawn else "records"
     say(f"{study.name}: {count} pieces ran, {what} in {study_folder(root, study.name)}")
+
+
+def _check_again(again: str, others: dict[str, object]) -> None:
+    """Raises StudyError for anything but timing, and for options that choose or place what runs."""
+    lookup(again, [TIMING], "thing to do again (--again)")
+    given = [name for name, value in others.items() if value]
+    if given:
+        raise StudyError(f"--again {again} times what is stored on this machine, whatever it is; leave {given[0]} out")
+
+
+def _time_again(root: Path, study: Study, dry: bool, drawn: bool) -> None:
+    """Times the stored cases of a study, or says which; nothing of it runs."""
+    planned = plan_again(root, study)
+    if not planned:
+        say(f"{study.name}: nothing is stored of this code that can be timed; `organbench run` runs it")
+        return
+    if dry:
+        dry_run(console, study.name, planned, 1, root)
+        return
+    with TerminalProgress(console, planned) as progress:
+        count = measure_again(root, study, progress, progress.compiling)
+    if drawn:
+        warn(refresh(root, study)[1])
+    say(f"{study.name}: {count} stored cases were timed again, {'charts' if drawn else 'times'} in "
+        f"{study_folder(root, study.name)}")  # fmt: skip
 
 
 def _checked(names: list[str]) -> list[Study]:

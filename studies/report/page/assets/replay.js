@@ -117,7 +117,7 @@ function tellColours(given) {
   if (!replay.reference) said.push("No reference is stored for this scene, so the case stands alone.");
   else if (replay.comparable) said.push(`Colour: distance of each point from the same point of the reference, known ${momentsOf(replay)} and in proportion between them.`);
   else said.push("The body may turn or slip freely in this scene: single points are not comparable, and no error is coloured.");
-  if (replay.reference) said.push("The reference moves in a straight line from checkpoint to checkpoint.");
+  if (replay.reference) said.push(`The reference moves in a straight line from checkpoint to checkpoint${given.entry ? ", and so does the entry, of which no other positions are kept" : ""}.`);
   said.push(`${replay.times.length} frames, rounded to ${replay.rounding} of the body's size.`);
   byId("colours").textContent = said.join(" ");
 }
@@ -133,7 +133,7 @@ async function showReplay(given) {
   const shown = await unpacked(given.replay);
   if (state.given !== given) return; // another case was chosen meanwhile
   state.shown = { ...shown, ...bounds([...shown.positions, ...(shown.truth ?? [])]) };
-  byId("names").replaceChildren(...["this case", "reference"].slice(0, shown.truth ? 2 : 1).map((name) => {
+  byId("names").replaceChildren(...[given.entry ?? "this case", "reference"].slice(0, shown.truth ? 2 : 1).map((name) => {
     const made = document.createElement("span");
     made.textContent = name;
     return made;
@@ -150,7 +150,7 @@ async function choose(id) {
   byId("chosen").value = id;
   const command = document.createElement("code");
   command.textContent = given.again;
-  byId("about").replaceChildren(`${given.about} To run exactly this case again: `, command);
+  byId("about").replaceChildren(`${given.about} ${given.entry ? "What hands it in" : "To run exactly this case again"}: `, command);
   state.marks = showHistories(byId("plots"), given);
   document.querySelectorAll("#cases tr.chosen").forEach((row) => row.classList.remove("chosen"));
   document.querySelectorAll("#cases [data-case]").forEach((button) => {
