@@ -29,6 +29,8 @@ STIFF = 1e4
 """Of the contact, over shear modulus and size: a pressure of mu sinks in by 1e-4 of the size."""
 EXTRA = 2
 """Orders of the quadrature beyond twice that of the displacement."""
+CONTACT = 14
+"""Order of that on the surface: contact ends inside elements."""
 FREE = "free"
 """Name of the surface that is not held."""
 
@@ -39,6 +41,7 @@ class SolidSettings:
 
     stiff: float = STIFF
     extra: int = EXTRA
+    contact: int = CONTACT
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,10 +135,11 @@ class Solid:
         energy = 0.5 * material.mu * (J ** (-2.0 / 3.0) * ng.InnerProduct(F, F) - 3.0)
         energy += p * (J - 1.0) - p * p / (2.0 * material.kappa)
         self.form += ng.Variation(energy.Compile() * ng.dx(bonus_intorder=settings.extra))
+        points = {ng.ET.TRIG: ng.IntegrationRule(ng.ET.TRIG, settings.contact)}
+        self.outside = ng.ds(FREE, intrules=points)
         for number in range(len(problem.obstacles)):
             depth, _ = self.depth(number, u)
-            pressed = (0.5 * self.stiffness * depth * depth).Compile()
-            self.form += ng.Variation(pressed * ng.ds(FREE, bonus_intorder=settings.extra))
+            self.form += ng.Variation((0.5 * self.stiffness * depth * depth).Compile() * self.outside)
         self.newton = Newton(self.form, self.state, self.space.FreeDofs())
 
     def depth(self, number: int, u: Any) -> tuple[Any, Any]:
@@ -175,8 +179,7 @@ class Solid:
         """Of an obstacle on the body, (3,) [N]."""
         ng = load("ngsolve")
         depth, normal = self.depth(number, self.state.components[0])
-        pushed = self.stiffness * depth * normal
-        return np.array(ng.Integrate(pushed, self.mesh, definedon=self.mesh.Boundaries(FREE), order=4 * ORDER))
+        return np.array([ng.Integrate(self.stiffness * depth * part * self.outside, self.mesh) for part in normal])
 
     def held_force(self, number: int) -> np.ndarray:
         """Of a held region on the body, (3,) [N]."""
