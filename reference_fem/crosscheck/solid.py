@@ -27,21 +27,11 @@ PATH_ORDER, ORDER = 2, 3
 """Of the displacement on the way and at the end; the pressure has one less."""
 STIFF = 1e4
 """Of the contact, over shear modulus and size: a pressure of mu sinks in by 1e-4 of the size."""
-EXTRA = 2
-"""Orders of the quadrature beyond twice that of the displacement."""
-CONTACT = 14
-"""Order of that on the surface: contact ends inside elements."""
+EXTRA, CONTACT = 2, 14
+"""Orders of the quadrature: in the body beyond twice that of the displacement; on the surface, for contact ends inside
+facets."""
 FREE = "free"
 """Name of the surface that is not held."""
-
-
-@dataclass(frozen=True)
-class SolidSettings:
-    """What the answer should not depend on."""
-
-    stiff: float = STIFF
-    extra: int = EXTRA
-    contact: int = CONTACT
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +51,13 @@ class SolidSolution:
     """Keeps the curves of NGSolve's mesh alive."""
 
     def displacement(self, points: np.ndarray) -> np.ndarray:
-        """(n, 3) [m] at rest points (n, 3) [m]; a point a little outside is taken to the nearest element's."""
-        elements, local = self._evaluator.locate(points)
+        """(n, 3) [m] at rest points (n, 3) [m]; outside the body extrapolated from the nearest element."""
+        ng, (elements, local) = load("ngsolve"), self._evaluator.locate(points)
         found = np.empty((len(points), 3))
         for k, (element, place) in enumerate(zip(elements, local, strict=True)):
             corners = self.problem.mesh.t[:4, element].tolist()
             weights = dict(zip(corners, (1.0 - place.sum(), *place), strict=True))
-            number = load("ngsolve").ElementId(load("ngsolve").VOL, int(element))
+            number = ng.ElementId(ng.VOL, int(element))
             theirs = [weights[vertex.nr] for vertex in self.mesh[number].vertices]
             element_map = self.mesh.GetTrafo(number)  # must live as long as the point
             found[k] = self.u(element_map(*theirs[:3]))
@@ -100,7 +90,9 @@ def boundaries(problem: Problem) -> dict[str, np.ndarray]:
         inside[surface] = held.where(x[surface].T)
         whole = inside[table].all(axis=1) & rest
         if not whole.any():
-            raise SolveError(f"held region {number} contains no whole boundary facet: choose a larger one, or finer mesh")
+            raise SolveError(
+                f"held region {number} contains no whole boundary facet: choose a larger one, or finer mesh"
+            )
         found[f"held{number}"], rest = table[whole, :3], rest & ~whole
     return found | {FREE: table[rest, :3]}
 
@@ -120,12 +112,12 @@ def curved_body(mesh: MeshTet, facets: dict[str, np.ndarray]) -> tuple[Any, Any]
 class Solid:
     """The body in NGSolve at one order: space, potential, and which unknowns are held."""
 
-    def __init__(self, problem: Problem, body: Any, order: int, settings: SolidSettings):
+    def __init__(self, problem: Problem, body: Any, order: int, stiff: float):
         ng, material = load("ngsolve"), problem.material
         assert isinstance(material, NeoHookean)  # checked before
         size = float(np.ptp(nodes(problem.mesh), axis=0).max())
         self.problem, self.mesh, self.scale = problem, body, material.mu * size**2
-        self.stiffness = settings.stiff * material.mu / size
+        self.stiffness = stiff * material.mu / size
         self.space = ng.VectorH1(body, order=order, dirichlet="held.*") * ng.H1(body, order=order - 1)
         self.state, self.form = ng.GridFunction(self.space), ng.BilinearForm(self.space, symmetric=True)
         self.places = [[ng.Parameter(0.0) for _ in range(3)] for _ in problem.obstacles]
@@ -134,8 +126,8 @@ class Solid:
         J = ng.Det(F)
         energy = 0.5 * material.mu * (J ** (-2.0 / 3.0) * ng.InnerProduct(F, F) - 3.0)
         energy += p * (J - 1.0) - p * p / (2.0 * material.kappa)
-        self.form += ng.Variation(energy.Compile() * ng.dx(bonus_intorder=settings.extra))
-        points = {ng.ET.TRIG: ng.IntegrationRule(ng.ET.TRIG, settings.contact)}
+        self.form += ng.Variation(energy.Compile() * ng.dx(bonus_intorder=EXTRA))
+        points = {ng.ET.TRIG: ng.IntegrationRule(ng.ET.TRIG, CONTACT)}
         self.outside = ng.ds(FREE, intrules=points)
         for number in range(len(problem.obstacles)):
             depth, _ = self.depth(number, u)
@@ -192,14 +184,17 @@ def motion(moving: PrescribedDisplacement | Obstacle, t: float) -> np.ndarray:
     return np.zeros(3) if moving.motion is None else finite_vector(moving.motion(t), f"a motion at t = {t:g} s")
 
 
-def solve_solid(problem: Problem, times: Sequence[float], settings: SolidSettings = SolidSettings()) -> SolidSolution:
-    """The state at the last of the times [s], reached from rest. Raises SolveError."""
+def solve_solid(problem: Problem, times: Sequence[float], stiff: float = STIFF) -> SolidSolution:
+    """The state at the last of the times [s], reached from rest; stiff: of the contact, over shear modulus and size.
+
+    Raises SolveError for a problem that is not covered, elements that fold, and steps that are too long.
+    """
     check_solid(problem)
     body, bend = curved_body(problem.mesh, boundaries(problem))
-    path = Solid(problem, body, PATH_ORDER, settings)
+    path = Solid(problem, body, PATH_ORDER, stiff)
     for before, t in pairwise((0.0, *times)):
         path.advance(before, t)
-    end = Solid(problem, body, ORDER, settings)
+    end = Solid(problem, body, ORDER, stiff)
     for fine, coarse in zip(end.state.components, path.state.components, strict=True):
         fine.Set(coarse)
     end.place(times[-1])
