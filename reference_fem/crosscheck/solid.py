@@ -146,8 +146,8 @@ class Solid:
             normal, gap = off / away, away - row[7]
         return ng.IfPos(gap, 0.0, -gap), normal
 
-    def moved(self, region: int, by: Sequence[float]) -> np.ndarray:
-        """All unknowns of a field that is `by` (3,) [m] on a held region and 0 at all others."""
+    def moved(self, region: int, by: np.ndarray) -> np.ndarray:
+        """All unknowns of a field that is `by`, (3,) [m], on a held region and 0 at all others."""
         ng = load("ngsolve")
         field = ng.GridFunction(self.space)
         field.components[0].Set(ng.CF(tuple(map(float, by))), definedon=self.mesh.Boundaries(f"held{region}"))
@@ -158,7 +158,7 @@ class Solid:
         self.place(t)
         steps = [motion(held, t) - motion(held, before) for held in self.problem.held]
         if np.any(steps):
-            self.newton.lift(sum(self.moved(k, step) for k, step in enumerate(steps)))
+            self.newton.lift(np.sum([self.moved(k, step) for k, step in enumerate(steps)], axis=0))
         self.newton.converge(self.scale)
 
     def place(self, t: float) -> None:
