@@ -51,10 +51,18 @@ class NgsolveSolution:
     """Newton's, in all steps."""
 
 
-def to_ngsolve(mesh: MeshTet):
-    """The straight tetrahedra as an NGSolve mesh, vertices in the same order."""
-    net = load("netgen.meshing").Mesh(dim=3)
+def to_ngsolve(mesh: MeshTet, boundaries: dict[str, np.ndarray] | None = None):
+    """The tetrahedra with straight sides as an NGSolve mesh, vertices in the same order.
+
+    boundaries: name -> facets of the boundary (f, 3), outward.
+    """
+    netgen = load("netgen.meshing")
+    net = netgen.Mesh(dim=3)
     net.AddPoints(np.ascontiguousarray(mesh.p[:, : mesh.nvertices].T))
+    for number, (name, facets) in enumerate((boundaries or {}).items()):
+        face = net.Add(netgen.FaceDescriptor(surfnr=number + 1, domin=1, domout=0, bc=number + 1))
+        net.SetBCName(number, name)
+        net.AddElements(dim=2, index=face, data=np.ascontiguousarray(facets, dtype=np.int32), base=0)
     net.AddElements(dim=3, index=1, data=np.ascontiguousarray(mesh.t[:4].T, dtype=np.int32), base=0)
     return load("ngsolve").Mesh(net)
 

@@ -1,28 +1,55 @@
 """References of scenes judged by another code on meshes of its own, where the extra `crosscheck` is installed.
 
-A ball and its load are bodies of revolution, so NGSolve solves a meridian of third order: nothing of its mesh, its
-elements or its contact is the reference's. What is left is the bar of the reference and the judge's own change.
+A ball and its load are bodies of revolution, so NGSolve solves a meridian of third order; an organ it solves in three
+dimensions, at third order as well. Mesh, elements, solver and contact are not the reference's. What is left is the bar
+of the reference and the judge's own change.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from reference_fem import NeoHookean, crosscheck
 from reference_fem.crosscheck.meridian import Ball, MeridianMesh, MeridianSolution, between_planes, clamped_caps
+from reference_fem.crosscheck.solid import SolidSolution, solve_solid
 from reference_fem.oracles import Check, Oracle, Outcome
 from studies.reference.load import Reference, load_reference
 from studies.reference.reference_solves import reference_solves
 from studies.reference.solve import solve
 from studies.reference.uncertainty import SamplePoints
 from studies.scene.scene import Scene
-from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE
+from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS
 from studies.scenes.ball_clamped import CAP
+from studies.verify.judge_mesh import JudgeMesh, judged_problem
 
-Answer = Callable[[MeridianMesh], MeridianSolution]
+
+@dataclass(frozen=True, eq=False)
+class OrganSolution:
+    """An organ at the end of its scene."""
+
+    scene: Scene
+    solid: SolidSolution
+
+    @property
+    def force(self) -> np.ndarray:
+        """The probed force at the end, (1,) [N]."""
+        return self.scene.output_force(self.solid.obstacle_force[None], self.solid.held_force[None])
+
+    @property
+    def mesh(self) -> Any:
+        """NGSolve's."""
+        return self.solid.mesh
+
+    def displacement(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3) [m] at rest points (n, 3) [m]."""
+        return self.solid.displacement(points)
+
+
+Solution = MeridianSolution | OrganSolution
 
 
 @dataclass(frozen=True)
@@ -30,9 +57,11 @@ class Judge:
     """A scene, how the other code solves it, and its two meshes, coarse and fine."""
 
     scene: Scene
-    answer: Answer
-    coarse: MeridianMesh
-    fine: MeridianMesh
+    answer: Callable[[Any], Solution]
+    coarse: MeridianMesh | JudgeMesh
+    fine: MeridianMesh | JudgeMesh
+    body: str = "meridian"
+    elements: str = "triangles"
 
 
 def ball_of(scene: Scene) -> Ball:
@@ -61,6 +90,12 @@ def squeezed(mesh: MeridianMesh) -> MeridianSolution:
     return between_planes(ball_of(BALL_SQUEEZE), halves(pushes), mesh)
 
 
+def pressed_liver(mesh: JudgeMesh) -> OrganSolution:
+    """liver_press, in two steps: without friction the end does not depend on the way."""
+    times = LIVER_PRESS.checkpoints
+    return OrganSolution(LIVER_PRESS, solve_solid(judged_problem(LIVER_PRESS, mesh), times[2::2]))
+
+
 def moving(scene: Scene, path: Callable) -> list[float]:
     """Checkpoints [s] up to the first at which nothing moves any more: later ones are the same equilibrium."""
     last = np.linalg.norm(path(scene.checkpoints[-1]))
@@ -71,6 +106,7 @@ def moving(scene: Scene, path: Callable) -> list[float]:
 JUDGES = (
     Judge(BALL_SQUEEZE, squeezed, MeridianMesh(0.14, 0), MeridianMesh(0.1, 0)),
     Judge(BALL_CLAMPED, clamped, MeridianMesh(0.2, 4), MeridianMesh(0.1, 4)),
+    Judge(LIVER_PRESS, pressed_liver, JudgeMesh(300, 2), JudgeMesh(480, 3), "solid", "tetrahedra"),
 )
 
 
@@ -78,10 +114,10 @@ def second_judges(root: Path) -> tuple[Oracle, ...]:
     """One oracle to a scene; it solves what is missing of the reference below `root`. Empty without NGSolve."""
     if not crosscheck.available():
         return ()
-    source = f"NGSolve {version('ngsolve')}, meridian of third order on its own mesh"
 
     def oracle(judge: Judge) -> Oracle:
         name, title = f"judge_{judge.scene.name}", f"{judge.scene.name}, second judge"
+        source = f"NGSolve {version('ngsolve')}, {judge.body} of third order on its own mesh"
         return Oracle(name, title, source, lambda: verdict(judge, reference_of(root, judge.scene)), fast=False)
 
     return tuple(oracle(judge) for judge in JUDGES)
@@ -100,7 +136,9 @@ def reference_of(root: Path, scene: Scene) -> Reference:
 def verdict(judge: Judge, reference: Reference) -> Outcome:
     """The reference's numbers beside the judge's; allowed is the reference's bar and the judge's change."""
     coarse, fine = judge.answer(judge.coarse), judge.answer(judge.fine)
-    place = f"{judge.scene.name}, {judge.scene.reference.levels} against {fine.mesh.ne} triangles of third order"  # pyright: ignore[reportOptionalMemberAccess]
+    assert judge.scene.reference is not None  # it has been solved
+    what = f"{fine.mesh.ne} {judge.elements} of third order"
+    place = f"{judge.scene.name}, {judge.scene.reference.levels} against {what}"
     count, bars = int(reference.record.attributes["unknowns"]), reference.total_uncertainty
     ours, theirs = reference.force[-1], fine.force[-1]
     change = abs(coarse.force[-1] / theirs - 1)
@@ -112,7 +150,7 @@ def verdict(judge: Judge, reference: Reference) -> Outcome:
     return Outcome(tuple(checks))
 
 
-def surface_mean(reference: Reference, judge: MeridianSolution, other: MeridianSolution | None = None) -> float:
+def surface_mean(reference: Reference, judge: Solution, other: Solution | None = None) -> float:
     """Area-weighted mean distance of surface points of the reference and of the judge, over the largest displacement
     [1]; of the judge and the other judge where one is given."""
     at = SamplePoints(reference.coarser[-1])
@@ -127,6 +165,7 @@ def surface_mean(reference: Reference, judge: MeridianSolution, other: MeridianS
 
 
 def centred(scene: Scene, moved: np.ndarray) -> np.ndarray:
-    """Displacements (n, 3) [m] about the middle between the held regions, where the judge has its plane of symmetry."""
+    """Displacements (n, 3) [m] about the middle between the held regions: where the judge of a ball has
+    its plane of symmetry."""
     end = scene.checkpoints[-1]
     return moved - np.mean([held.path(end) for held in scene.held], axis=0)

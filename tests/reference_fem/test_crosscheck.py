@@ -106,7 +106,7 @@ def test_what_the_translation_does_not_cover_is_refused(changes, message):
 
 @needs_ngsolve
 def test_a_newton_that_does_not_converge_is_told():
-    model = ngsolve_code.Model(stretched())
+    model = ngsolve_code.NgsolveModel(stretched())
     with pytest.raises(SolveError, match="did not converge in 0 iterations"):
         model.newton("umfpack", 1e-9, most=0)
 

@@ -6,11 +6,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from reference_fem import crosscheck
+from reference_fem import crosscheck, facet_nodes, nodes
 from reference_fem.crosscheck.meridian import MeridianMesh
-from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE
+from studies.geometry.organs.liver import LIVER
+from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS
 from studies.verify import second_judge
-from studies.verify.second_judge import Judge, ball_of, centred, halves, moving, second_judges, verdict
+from studies.verify.judge_mesh import JudgeMesh, judged_problem
+from studies.verify.second_judge import (
+    JUDGES,
+    Judge,
+    OrganSolution,
+    ball_of,
+    centred,
+    halves,
+    moving,
+    second_judges,
+    verdict,
+)
 from tests.studies.octant import SCENE
 
 
@@ -56,5 +68,33 @@ def test_a_reference_beyond_its_bar_and_the_judges_change_is_off(found, share, m
 def test_the_judged_scenes_are_named(monkeypatch, tmp_path):
     monkeypatch.setattr(crosscheck, "available", lambda: True)
     monkeypatch.setattr(second_judge, "version", lambda name: "6.2")
-    assert [oracle.name for oracle in second_judges(tmp_path)] == ["judge_ball_squeeze", "judge_ball_clamped"]
+    assert [oracle.name for oracle in second_judges(tmp_path)] == [
+        "judge_ball_squeeze",
+        "judge_ball_clamped",
+        "judge_liver_press",
+    ]
     assert not any(oracle.fast for oracle in second_judges(tmp_path))
+
+
+def test_an_organ_is_judged_on_a_mesh_of_its_own_that_lies_on_the_true_shape():
+    """No reference has so many surface nodes; the held region is the whole bare area and stays, the plane moves."""
+    assert not {judge.nodes for judge in (JUDGES[-1].coarse, JUDGES[-1].fine)} & set(LIVER_PRESS.reference.levels)
+    plain, halved = (judged_problem(LIVER_PRESS, JudgeMesh(200, times)) for times in (0, 1))
+    assert halved.mesh.nelements > plain.mesh.nelements
+    surface = np.unique(facet_nodes(plain.mesh))
+    x = nodes(plain.mesh)[surface]
+    np.testing.assert_allclose(LIVER.level(x), 0.0, atol=1e-6)
+    held = plain.held[0].where(x.T)
+    region = LIVER_PRESS.held[0].region
+    assert region.level(x[held]).max() < 1e-6
+    assert held.sum() > 0.8 * (region.level(x) < -1e-6).sum()
+    end = LIVER_PRESS.checkpoints[-1]
+    np.testing.assert_allclose(plain.obstacles[0].motion(end), LIVER_PRESS.obstacles[0].path(end))
+    assert plain.material.mu == LIVER_PRESS.tissue.shear_modulus
+
+
+def test_the_force_of_an_organ_is_the_one_that_its_scene_probes():
+    """Along the scene's direction, of the obstacle on the body, whatever the body is held with."""
+    push = 3.0 * np.asarray(LIVER_PRESS.probed.direction)
+    solved: Any = SimpleNamespace(obstacle_force=push[None], held_force=-2 * push[None])
+    np.testing.assert_allclose(OrganSolution(LIVER_PRESS, solved).force, [3.0])
