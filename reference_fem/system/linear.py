@@ -55,7 +55,7 @@ def load_pardiso():
         )
         return None
     # Each solver made without this path searches the whole environment for the library, for up to 1.6 s.
-    os.environ.setdefault("PYPARDISO_MKL_RT", pypardiso.ps.libmkl._name)
+    os.environ.setdefault("PYPARDISO_MKL_RT", pypardiso.ps.libmkl._name)  # pyright: ignore[reportOptionalMemberAccess]
     return pypardiso
 
 
