@@ -35,6 +35,7 @@ from studies.sweep.tasks import Task, tasks_of
 SMOKE = "smoke"
 JOBS = 2
 """Processes, where nothing is said."""
+AGAIN = "timing: stored cases are timed again on this machine; nothing else runs"
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 Wanted = Callable[[Task], bool] | None
 Rule = Callable[[Task, Known], bool]
@@ -52,9 +53,7 @@ def run(
         int | None, typer.Option(min=1, help="processes for the physics; timing always runs alone  [default: 2]")
     ] = None,
     on: Annotated[str, typer.Option(help=f"{WORDS} (docs/cluster.md)")] = "",
-    again: Annotated[
-        str, typer.Option(help="timing: stored cases are timed again on this machine; nothing else runs")
-    ] = "",
+    again: Annotated[str, typer.Option(help=AGAIN)] = "",
     portable: Annotated[bool, typer.Option(help="results equal on every x86-64 processor; slower")] = False,
     organs: Annotated[str, typer.Option(help="a folder of surfaces, FOLDER or FOLDER:mm: the studies on these")] = "",
     dry: Annotated[bool, typer.Option("--dry-run", help="say what would run, why and how long; run nothing")] = False,

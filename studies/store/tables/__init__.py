@@ -1,0 +1,1 @@
+"""Tables of what is stored, for people and other programs."""
