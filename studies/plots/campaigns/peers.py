@@ -40,7 +40,7 @@ HALF_STEP = "-half_step"
 SPARE = tuple(zip((ORANGE, GREEN, BLUE, PURPLE, BLACK, MUTED[2], MUTED[1], MUTED[0]), "^sDvX<>h", strict=True))
 """Colours and markers of what has none of its own, in the order of its appearance."""
 NAMED = 2
-"""Runs without a number that a note names."""
+"""Reasons for having no point that a note gives."""
 
 
 @styled
@@ -135,11 +135,16 @@ def _notes() -> list[str]:
 
 
 def _unfinished(runs: Sequence[Run]) -> list[str]:
-    """What has no point here, and why."""
-    lost = [run for run in runs if run.record.status not in COMPARABLE]
-    named = [f"{run.case.method.name} on {run.case.scene.name} ({run.record.message})" for run in lost[:NAMED]]
-    more = [f"and {len(lost) - NAMED} more"] if len(lost) > NAMED else []
-    return ["Not drawn: " + "; ".join([*named, *more]) + "."] if lost else []
+    """What has no point here, and why: each reason once, with all that it holds for."""
+    reasons: dict[str, list[str]] = {}
+    for run in runs:
+        if run.record.status not in COMPARABLE:
+            found = reasons.setdefault(run.record.message, [])
+            name = f"{run.case.method.name} on {run.case.scene.name}"
+            found += [name] if name not in found else []
+    named = [f"{', '.join(names)} ({reason})" for reason, names in list(reasons.items())[:NAMED]]
+    more = [f"and {len(reasons) - NAMED} more reasons"] if len(reasons) > NAMED else []
+    return ["Not drawn: " + "; ".join([*named, *more]) + "."] if reasons else []
 
 
 def draw(runs: Sequence[Run], path: Path) -> None:

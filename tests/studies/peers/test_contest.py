@@ -9,6 +9,8 @@ import pytest
 from massspring import Free, ImplicitVolume, Plane, Xpbd
 from studies.exchange.entry import entries_beside, outside
 from studies.exchange.export import export
+from studies.exchange.judge import unfinished_record
+from studies.metrics.run import Run
 from studies.metrics.table import study_table
 from studies.peers.contest import PEERS, Attempt, Peer, contest, hand_over
 from studies.peers.scene_folder import CannotDo, SceneFolder, moved, turn_to
@@ -69,7 +71,8 @@ def test_tables_and_the_chart_show_them_all(ended, found, tmp_path):
     assert table.loc["crashed", "status"] == "failed" and np.isnan(table.loc["crashed", "volume_worst [%]"])
     sheet = figure(runs)
     texts = " ".join(text.get_text() for text in sheet.findobj(lambda a: hasattr(a, "get_text")))
-    assert "squeezed, tetrahedral" in texts and "half step," not in texts and "Not drawn" in texts
+    assert "squeezed, tetrahedral" in texts and "half step," not in texts
+    assert "Not drawn: " in texts and "; and 3 more reasons." in " ".join(texts.split())
     drawn = [line for axes in sheet.axes for line in axes.get_lines() if len(line.get_xdata()) == 1]
     assert [line.get_xdata()[0] for line in drawn] == [5.0] * 4
     heights = sorted(float(line.get_ydata()[0]) for line in drawn)
@@ -77,6 +80,15 @@ def test_tables_and_the_chart_show_them_all(ended, found, tmp_path):
     assert sum(line.get_markerfacecolor() == "white" for line in drawn) == 2
     draw(runs, tmp_path / "peers.png")
     assert (tmp_path / "peers.png").stat().st_size > 10_000
+
+
+def test_a_reason_stands_in_the_chart_once(tmp_path):
+    made, known = made_up(timing=FrameTiming(np.full((2, 4), 1e6))), BodyRecipe("tetrahedral", 150)
+    cases = [Case(scene, known, outside("sofa")) for scene in (BALL_SQUEEZE, BALL_SQUEEZE, BALL_CLAMPED)]
+    lost = [Run(case, unfinished_record(case, Status.SKIPPED, "it is not there")) for case in cases]
+    texts = [text.get_text() for text in figure([made, *lost]).findobj(lambda a: hasattr(a, "get_text"))]
+    told = "Not drawn: sofa on ball_squeeze, sofa on ball_clamped (it is not there)."
+    assert told in " ".join(" ".join(texts).split())
 
 
 def test_the_chart_without_a_run_says_so(tmp_path):
