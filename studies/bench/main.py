@@ -26,8 +26,8 @@ from studies.reference.problem import reference_problem, whole_forces
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.scenes.ball_squeeze import BALL_SQUEEZE, PRESS_END, RADIUS
-from studies.store.csv_table import write_table
 from studies.store.stamps import set_stamp
+from studies.store.tables.csv_table import write_table
 from studies.timing.protocol import pinned
 
 APPROACHES = (0.10, 0.20, 0.30)

@@ -14,8 +14,8 @@ from studies.reference.load import Reference, load_reference
 from studies.reference.reference_solves import STUDY, reference_solves
 from studies.reference.solve import VARIANTS
 from studies.scene.scene import Scene
-from studies.store.csv_table import write_table
 from studies.store.paths import study_folder
+from studies.store.tables.csv_table import write_table
 
 TABLE, CHART = "uncertainty.csv", "uncertainty.png"
 

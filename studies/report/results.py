@@ -27,11 +27,11 @@ from studies.report.summary import SUMMARIES
 from studies.runs.digest import case_digest
 from studies.runs.paper import play, slide_case, squeezed_balls
 from studies.store.archived import is_archive, shown_machine
-from studies.store.csv_table import write_table
 from studies.store.index.entry import written
 from studies.store.machine import write_machine
 from studies.store.paths import study_folder, timing_name
 from studies.store.stamps import set_stamp
+from studies.store.tables.csv_table import write_table
 from studies.sweep.load import load_runs
 from studies.sweep.stored.known import Known
 

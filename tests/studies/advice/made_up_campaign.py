@@ -8,8 +8,8 @@ import pandas as pd
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.recipe_text import recipe_text
 from studies.scene.scene import Scene
-from studies.store.csv_table import write_table
 from studies.store.machine import machine_id
+from studies.store.tables.csv_table import write_table
 
 PAPER = BodyRecipe("surface", 550)
 ONE = BodyRecipe(nodes=300)

@@ -13,8 +13,8 @@ from studies.metrics.table import study_table
 from studies.metrics.wish import usual_wish
 from studies.runs.case import BodyRecipe
 from studies.scenes import BALL_CLAMPED, BLADDER_FILL, KIDNEY_PROBE, LIVER_PRESS, LIVER_PROBE, SPLEEN_SAG, STOMACH_PRESS
-from studies.store.csv_table import write_table
 from studies.store.record import Status
+from studies.store.tables.csv_table import write_table
 from tests.plots.made_up import run
 from tests.studies.advice.made_up_campaign import EVEN, FINE, GRADED, LADDER, ONE, PAPER, publish, row, rows_of
 

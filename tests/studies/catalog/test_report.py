@@ -15,9 +15,9 @@ from studies.metrics.cells import UNRESOLVED_MARK
 from studies.report.results import draw_charts, refresh, report
 from studies.report.summary import results_of
 from studies.runs.current import case_path
-from studies.store.csv_table import write_table
 from studies.store.machine import machine_id
 from studies.store.record import Status
+from studies.store.tables.csv_table import write_table
 from studies.sweep.load import load_runs
 from tests.studies.tiny import tiny_case, tiny_study
 

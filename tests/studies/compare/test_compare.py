@@ -10,9 +10,9 @@ import pytest
 from studies.base.errors import StudyError
 from studies.compare.folders import compare, equal_records
 from studies.compare.verdict import MEANING, ROUND_OFF, Verdict, verdict_of
-from studies.store.csv_table import write_table
 from studies.store.paths import record_files
 from studies.store.record import read_record, write_record
+from studies.store.tables.csv_table import write_table
 
 NAN = float("nan")
 

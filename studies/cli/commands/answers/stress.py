@@ -12,8 +12,8 @@ from studies.base.atomic import write_whole
 from studies.cli.progress import TerminalProgress
 from studies.cli.terminal import Results, console, errors, say
 from studies.plots.campaigns.breaking import draw as draw_chart
-from studies.store.csv_table import write_table
 from studies.store.stamps import set_stamp
+from studies.store.tables.csv_table import write_table
 from studies.stress.campaign import counts, run_trials, table_of
 from studies.stress.outcome import UNEXPLAINED, Attempt, Outcome, simplest, tried
 from studies.stress.reference.outcome import tried as try_reference

@@ -10,7 +10,7 @@ from studies.compare.folders import Change, Comparison
 from studies.compare.folders import compare as compared
 from studies.compare.verdict import MEANING
 from studies.metrics.cells import MISSING, plain
-from studies.store.csv_table import write_table
+from studies.store.tables.csv_table import write_table
 
 SHOWN = 40
 """Rows of what moved that are printed."""

@@ -15,8 +15,8 @@ from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED, frame_of, row_of
 from studies.metrics.table import metric as metric_of
 from studies.scene.quantities import ALWAYS
-from studies.store.csv_table import write_table
-from studies.store.parquet_table import write_parquet
+from studies.store.tables.csv_table import write_table
+from studies.store.tables.parquet_table import write_parquet
 from studies.sweep.find_study import find_study
 from studies.sweep.stored.known import Known
 from studies.sweep.stored.rows import table_rows
