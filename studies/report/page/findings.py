@@ -14,7 +14,7 @@ FRAME, REAL = "frame_time [ms]", "real_time [s/s]"
 RECIPE = ("scene", "body", "law", "nodes", "stiffness")
 """What a body with and without a constraint share."""
 KEPT, FREE = "implicit_volume", "free"
-CONTESTED = {FORCE: "force", MEAN: "mean displacement", VOLUME: "worst volume", REAL: "speed"}
+CONTESTED = {FORCE: "force", MEAN: "mean displacement error", VOLUME: "worst volume", REAL: "speed"}
 """Numbers in which entries from outside and our runs are compared."""
 MOST_NAMED = 6
 """Numbers of entries that a finding names."""
