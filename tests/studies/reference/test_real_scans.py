@@ -18,6 +18,7 @@ WITHIN = (
     (SPLEEN, "lifted", 0.03),
     (SPLEEN, "pressed", 0.03),
     (SPLEEN, "probed", 0.03),
+    (STOMACH, "lifted", 0.03),
     (STOMACH, "probed", 0.03),
 )
 """Uncertainty of the last force that was measured, rounded up (docs/own-organ.md)."""
