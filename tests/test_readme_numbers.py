@@ -123,3 +123,20 @@ def test_meshes_and_settings_of_every_reference():
 def test_the_number_of_methods():
     (count,) = said(r"(\w+) methods, from springs alone to XPBD and implicit springs")
     assert count.lower() == WORDS[len(METHODS)]
+
+
+def test_what_other_programs_reach_on_the_liver():
+    best = said(r"implicit quadratic elements are the most accurate, (\d+\.\d) to (\d+\.\d) % off in force")
+    faster, least, most = said(r"our even quadratic bodies are (\d+) times as fast and (\d+) to (\d+) % off")
+    others = said(r"MuJoCo, Newton and PyBullet, on linear tetrahedra, are (\d+) to (\d+) % off")
+    rows = table("peers")
+    rows = rows[(rows["scene"] == "liver_press") & ~rows["method"].str.contains("half_step")]
+    off, method = rows["force_end [%]"].abs(), rows["method"]
+    ours, felupe = rows["body"].eq("quadratic") & method.eq("implicit_volume"), method.eq("felupe")
+    assert best == tuple(f"{v:.1f}" for v in (off[felupe].min(), off[felupe].max()))
+    assert off[felupe].max() < off[~felupe].min()
+    assert (least, most) == tuple(f"{v:.0f}" for v in (off[ours].min(), off[ours].max()))
+    linear = off[method.isin(["mujoco", "newton", "bullet"])]
+    assert others == tuple(f"{v:.0f}" for v in (linear.min(), linear.max()))
+    speeds = [rows.loc[which].sort_values("nodes")["real_time [s/s]"].to_numpy() for which in (ours, felupe)]
+    assert faster == f"{(speeds[0] / speeds[1]).mean():.0f}"
