@@ -108,7 +108,7 @@ def test_the_library_is_searched_once_in_a_process(monkeypatch):
     """A search for the second solver would end in an error here."""
     pypardiso = linear.load_pardiso()
     monkeypatch.setattr(sys.modules[pypardiso.PyPardisoSolver.__module__], "find_library", None)
-    linear.SymmetricSolver("pardiso")
+    assert isinstance(linear.SymmetricSolver("pardiso").factors, linear.PardisoFactors)
 
 
 def test_the_scipy_backend_never_warns():
