@@ -28,8 +28,9 @@ from studies.compiling.bodies import EDGE, KINDS, tiny_body
 FRAMES, STEPS = 2, 2
 PLAIN, PROBE, THREADS = "", "thin probe", "threads"
 OWN_TYPES = ("whole", "several", "quadratic")
-"""Kinds of bodies whose types are not those of another. Options are compiled for them, in double precision; threads in
-single precision too."""
+"""Kinds of bodies whose types are not those of another. Options are compiled for them in double precision, of a method
+that keeps nothing for one of them; threads in single precision for one volume alone. The rest is compiled when it is
+asked for."""
 
 
 @dataclass(frozen=True)
@@ -69,10 +70,11 @@ def variants_of(method: Method) -> Iterator[Variant]:
             continue
         thin_probes = table.thin_probes and kind != "quadratic"  # beside which they are refused
         supported = {PROBE: thin_probes, THREADS: table.threads}
+        own = kind == "whole" if table.keeps == "none" else kind in OWN_TYPES or table.keeps == "elements"
         for precision in precisions:
             yield Variant(method, kind, precision)
-            for option, yes in supported.items() if kind in OWN_TYPES or table.keeps == "elements" else ():
-                if yes and (precision == "float64" or option == THREADS):
+            for option, yes in supported.items() if own else ():
+                if yes and (precision == "float64" or (option == THREADS and kind == "whole")):
                     yield Variant(method, kind, precision, option)
 
 

@@ -39,6 +39,17 @@ def test_every_method_is_there_in_each_form_that_it_supports():
         assert kinds == {kind for kind in KINDS if method().why_not(tiny_body(kind)) is None} and kinds
 
 
+def test_options_are_compiled_for_every_method_that_has_them_and_not_for_all_that_they_go_with():
+    """What no test and no main study asks for is compiled when a user does."""
+    found = {(one.method.name, one.kind, one.precision) for one in variants() if one.option != PLAIN}
+    assert {kind for name, kind, _ in found if name == "free"} == {"whole"}
+    assert {kind for name, kind, _ in found if name == "implicit_volume"} == set(OWN_TYPES)
+    assert {(name, kind) for name, kind, precision in found if precision == "float32"} == {
+        ("free", "whole"),
+        ("implicit_volume", "whole"),
+    }
+
+
 def test_the_shared_kernels_come_first_and_the_reference_beside_them():
     names = list(tasks.tasks())
     kinds = [variant.kind for variant in variants()]

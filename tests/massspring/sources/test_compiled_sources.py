@@ -1,6 +1,7 @@
 """Compiled functions: what they may use, and which edit compiles them anew."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -14,19 +15,19 @@ from massspring.compile_cache import COMPILED, kept
 from massspring.sources import ROOT, own_file
 from tests.massspring.sources.conftest import fresh
 
+DECORATORS = ("compiled", "njit_lean", "njit_inlined", "njit_exposed", "njit_ignoring_nan", "njit_reassociated")
+MARK = re.compile(rf"^ *@({'|'.join(DECORATORS)})\b", re.MULTILINE)
+"""Where one of them stands: to parse all modules takes every process of the tests some seconds."""
+
 
 def compiled_modules() -> list[str]:
     """Modules whose functions carry one of the decorators of compiled code."""
     found = []
     for package in sources.OWN:
         for file in sorted((ROOT / package).rglob("*.py")):
-            tree = ast.parse(file.read_text())
-            if any(decorated(node) for node in ast.walk(tree)):
+            if MARK.search(file.read_text()):
                 found.append(".".join(file.relative_to(ROOT).with_suffix("").parts))
     return found
-
-
-DECORATORS = ("compiled", "njit_lean", "njit_inlined", "njit_exposed", "njit_ignoring_nan", "njit_reassociated")
 
 
 def decorated(node: ast.AST) -> bool:
