@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_fem.compiled import compiled
-from reference_fem.elements.surface import Surface, add_point_stiffness, point_positions, scatter
+from reference_fem.elements.surface import Surface, add_point_stiffness, point_into, point_positions, scatter
 from reference_fem.model.obstacles import gap_into, gaps
 
 
@@ -84,10 +84,7 @@ def add_contact(x, surface, touch, values, residual, tangent):
                 continue
             touched = False
             for q in range(weights.shape[1]):
-                for i in range(3):
-                    y[i] = 0.0
-                    for a in range(count):
-                        y[i] += shapes[q, a] * nodes[a, i]
+                point_into(shapes[q], nodes, y)
                 if not press_point(touch, o, f, q, y, push, k):
                     continue
                 if tangent and not touched:

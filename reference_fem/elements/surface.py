@@ -31,6 +31,15 @@ def point_positions(x, surface: Surface):
 
 
 @compiled()
+def point_into(N, nodes, y):
+    """y = sum N_a x_a (3,), the point of a facet with nodes x (·, 3) where its functions are N [m]."""
+    for i in range(3):
+        y[i] = 0.0
+        for a in range(len(N)):
+            y[i] += N[a] * nodes[a, i]
+
+
+@compiled()
 def add_point_stiffness(N, k, K):
     """K[ia, jb] += k_ij N_a N_b."""
     count = len(N)
