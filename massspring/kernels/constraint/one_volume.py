@@ -53,12 +53,11 @@ def multiplier_of_sums(nodes, contacts, inverse_mass, volume_error, dt, flow, mo
     for k in range(contacts.active_count[0]):
         i = contacts.active[k]
         if mode[i] > FREE:
-            g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
-            v0, v1, v2 = v_star[i, 0], v_star[i, 1], v_star[i, 2]
-            d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
-            mobility -= inverse_mass[i] * taken_share(mode[i], d0, d1, d2, g0, g1, g2, g0, g1, g2)
-            flow -= taken_share(mode[i], d0, d1, d2, g0, g1, g2, v0, v1, v2)
-            flow += g0 * v_target[i, 0] + g1 * v_target[i, 1] + g2 * v_target[i, 2]
+            g = gradient[i, 0], gradient[i, 1], gradient[i, 2]
+            d = direction[i, 0], direction[i, 1], direction[i, 2]
+            mobility -= inverse_mass[i] * taken_share(mode[i], d, g, g)
+            flow -= taken_share(mode[i], d, g, (v_star[i, 0], v_star[i, 1], v_star[i, 2]))
+            flow += g[0] * v_target[i, 0] + g[1] * v_target[i, 1] + g[2] * v_target[i, 2]
     if mobility <= NEGLIGIBLE_MOBILITY * free:
         return 0.0, 0.0
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility

@@ -27,49 +27,49 @@ def predicted_gaps_into(model, nodes, contacts, boundary, step, push, part):
         predicted_gap[i] = math.inf
     for o in range(boundary.radius.shape[0]):
         place, span, radius = boundary.position[step, o], boundary.span[o], real(boundary.radius[o])
-        p0, p1, p2 = real(place[0]), real(place[1]), real(place[2])
+        p = real(place[0]), real(place[1]), real(place[2])
         if boundary.is_plane[o]:
             normal = boundary.plane_normal[o]
-            plane_gap(course, predicted_gap, p0, p1, p2, real(normal[0]), real(normal[1]), real(normal[2]))
+            plane_gap(course, predicted_gap, p, (real(normal[0]), real(normal[1]), real(normal[2])))
         elif span[0] == 0.0 and span[1] == 0.0 and span[2] == 0.0:
-            sphere_gap(course, predicted_gap, p0, p1, p2, radius)
+            sphere_gap(course, predicted_gap, p, radius)
         else:
-            capsule_gap(course, predicted_gap, p0, p1, p2, real(span[0]), real(span[1]), real(span[2]), radius)
+            capsule_gap(course, predicted_gap, p, (real(span[0]), real(span[1]), real(span[2])), radius)
 
 
 @njit_inlined
-def way_from(p0, p1, p2, course, i):
+def way_from(p, course, i):
     """y − p [m] of a node, y = x + dt (v* + dt W f)."""
     x, v_star, direction, inverse_mass, dt, impulse = course
     w = impulse * inverse_mass[i]
-    r0 = x[3 * i] + dt * (v_star[3 * i] + w * direction[3 * i]) - p0
-    r1 = x[3 * i + 1] + dt * (v_star[3 * i + 1] + w * direction[3 * i + 1]) - p1
-    r2 = x[3 * i + 2] + dt * (v_star[3 * i + 2] + w * direction[3 * i + 2]) - p2
+    r0 = x[3 * i] + dt * (v_star[3 * i] + w * direction[3 * i]) - p[0]
+    r1 = x[3 * i + 1] + dt * (v_star[3 * i + 1] + w * direction[3 * i + 1]) - p[1]
+    r2 = x[3 * i + 2] + dt * (v_star[3 * i + 2] + w * direction[3 * i + 2]) - p[2]
     return r0, r1, r2
 
 
 @njit_inlined
-def plane_gap(course, predicted_gap, p0, p1, p2, n0, n1, n2):
+def plane_gap(course, predicted_gap, p, n):
     """n·(y − p) [m]."""
     for i in range(predicted_gap.shape[0]):
-        r0, r1, r2 = way_from(p0, p1, p2, course, i)
-        predicted_gap[i] = min(predicted_gap[i], n0 * r0 + n1 * r1 + n2 * r2)
+        r0, r1, r2 = way_from(p, course, i)
+        predicted_gap[i] = min(predicted_gap[i], n[0] * r0 + n[1] * r1 + n[2] * r2)
 
 
 @njit_inlined
-def sphere_gap(course, predicted_gap, c0, c1, c2, radius):
+def sphere_gap(course, predicted_gap, c, radius):
     """|y − c| − R [m]."""
     for i in range(predicted_gap.shape[0]):
-        r0, r1, r2 = way_from(c0, c1, c2, course, i)
+        r0, r1, r2 = way_from(c, course, i)
         predicted_gap[i] = min(predicted_gap[i], math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius)
 
 
 @njit_inlined
-def capsule_gap(course, predicted_gap, p0, p1, p2, a0, a1, a2, radius):
+def capsule_gap(course, predicted_gap, p, a, radius):
     """Distance of y to the axis p … p + a less R [m]."""
     for i in range(predicted_gap.shape[0]):
-        r0, r1, r2 = way_from(p0, p1, p2, course, i)
-        predicted_gap[i] = min(predicted_gap[i], round_gap(r0, r1, r2, a0, a1, a2, radius))
+        r0, r1, r2 = way_from(p, course, i)
+        predicted_gap[i] = min(predicted_gap[i], round_gap(r0, r1, r2, a[0], a[1], a[2], radius))
 
 
 @njit_inlined

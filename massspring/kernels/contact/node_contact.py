@@ -22,12 +22,12 @@ def allowed_part(mode, d0, d1, d2, g0, g1, g2):
 
 
 @njit_lean
-def taken_share(mode, d0, d1, d2, g0, g1, g2, v0, v1, v2):
+def taken_share(mode, d, g, v):
     """g·(I − P) v, what obstacles take of a product (eq. 3.4)."""
-    along = (g0 * d0 + g1 * d1 + g2 * d2) * (v0 * d0 + v1 * d1 + v2 * d2)
+    along = (g[0] * d[0] + g[1] * d[1] + g[2] * d[2]) * (v[0] * d[0] + v[1] * d[1] + v[2] * d[2])
     if mode == SLIDES:
         return along
-    whole = g0 * v0 + g1 * v1 + g2 * v2
+    whole = g[0] * v[0] + g[1] * v[1] + g[2] * v[2]
     return whole - along if mode == ON_EDGE else whole
 
 

@@ -13,7 +13,7 @@ from massspring.kernels.jit.vectors import at_least, gather, lanes_of, load, roo
 
 
 @njit_inlined
-def gather_slice(padded, slices, s, keeps, shortest, o0, o1, o2, tile):
+def gather_slice(padded, slices, s, keeps, shortest, o, tile):
     """f_i [N] (eq. 1.1) and, where a volume is kept, 6 G_i = Σ_k d_k × d_k+1 [m²] (eq. 2.4) of a slice; its share of V.
 
     The share is the slice's in 18 V = Σ 6 G·(x − o); o is a node of the surface, so that no digits are lost far from
@@ -22,7 +22,7 @@ def gather_slice(padded, slices, s, keeps, shortest, o0, o1, o2, tile):
     first, last = slices.start[s], slices.start[s + 1]
     ring_end = first + (slices.rings[s] if keeps else 0)
     none = spread(0, padded)
-    origin = spread(o0, padded), spread(o1, padded), spread(o2, padded)
+    origin = spread(o[0], padded), spread(o[1], padded), spread(o[2], padded)
     for lane in range(0, LANES, lanes_of(padded)):
         here = gather(padded, slices.node, s, lane)
         force, area = (none, none, none), (none, none, none)
@@ -113,7 +113,7 @@ def save_three(vector, tile, at):
 
 
 @njit_inlined
-def predict_slice(nodes, slices, s, dt, keep, a0, a1, a2, tile):
+def predict_slice(nodes, slices, s, dt, keep, a, tile):
     """v* (eq. 3.1) and G of the nodes of a slice in place of x and 6 G, and their shares of G·v* and G·W·G."""
     v, node, inverse_mass = nodes.v, slices.node, slices.inverse_mass
     sixth = nodes.x.dtype.type(1.0 / 6.0)
@@ -125,9 +125,9 @@ def predict_slice(nodes, slices, s, dt, keep, a0, a1, a2, tile):
             tile[at], tile[at + 1], tile[at + 2] = v[i, 0], v[i, 1], v[i, 2]
     for lane in range(LANES):
         at, w = SPEED + 3 * lane, inverse_mass[s, lane]
-        v0 = keep * tile[at] + dt * w * tile[FORCE + lane] + a0
-        v1 = keep * tile[at + 1] + dt * w * tile[FORCE + LANES + lane] + a1
-        v2 = keep * tile[at + 2] + dt * w * tile[FORCE + 2 * LANES + lane] + a2
+        v0 = keep * tile[at] + dt * w * tile[FORCE + lane] + a[0]
+        v1 = keep * tile[at + 1] + dt * w * tile[FORCE + LANES + lane] + a[1]
+        v2 = keep * tile[at + 2] + dt * w * tile[FORCE + 2 * LANES + lane] + a[2]
         g0, g1 = sixth * tile[AREA + lane], sixth * tile[AREA + LANES + lane]
         g2 = sixth * tile[AREA + 2 * LANES + lane]
         tile[SUMS + lane] = g0 * v0 + g1 * v1 + g2 * v2
@@ -154,22 +154,22 @@ def pass_slices(nodes, work, boundary, slices, part, keeps, tile):
     """
     real = nodes.x.dtype.type
     dt, keep = real(boundary.dt), real(1.0 - boundary.damping * boundary.dt)
-    a0, a1, a2 = (
+    a = (
         real(boundary.dt * boundary.gravity[0]),
         real(boundary.dt * boundary.gravity[1]),
         real(boundary.dt * boundary.gravity[2]),
     )
     padded, pulled, sums, v_star, gradient = work.padded_positions, work.pulled, work.sums, nodes.v_star, nodes.gradient
     shortest = real(SHORTEST)
-    o0, o1, o2 = padded[slices.origin, 0], padded[slices.origin, 1], padded[slices.origin, 2]
+    o = padded[slices.origin, 0], padded[slices.origin, 1], padded[slices.origin, 2]
     for s in range(part[0], part[1]):
-        sums[s, 0] = gather_slice(padded, slices, s, keeps, shortest, o0, o1, o2, tile)
+        sums[s, 0] = gather_slice(padded, slices, s, keeps, shortest, o, tile)
         if s < slices.pieces:
             for entry in range(RESULT):
                 pulled[s, entry] = tile[entry]
             continue
         keep_held(slices, s, nodes.force, tile)
-        predict_slice(nodes, slices, s, dt, keep, a0, a1, a2, tile)
+        predict_slice(nodes, slices, s, dt, keep, a, tile)
         put(tile, HERE, slices, s, v_star)
         # Empty lanes have springs of no stiffness and no ring: they add zeros.
         if keeps:
