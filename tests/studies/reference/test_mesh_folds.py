@@ -22,8 +22,9 @@ from studies.scene.meshing import mesh_for
 
 STRICT = member("kidney", 0, 6)
 """The mesher's bound refuses one element of its mesh of 370 surface nodes."""
-FOLDED = member("kidney", 0, 16)
-"""On its mesh of 250 surface nodes a side that follows the true shape turns a corner of one element inside out."""
+FOLDED = {16: 250, 12: 370, 19: 250, 39: 250}
+"""Kidney of the population -> surface nodes of the mesh in which a side that follows the true shape turns a corner of
+one element inside out."""
 
 
 def curved_sides(scene, level):
@@ -45,18 +46,21 @@ def test_a_mesh_that_only_the_mesher_s_bound_refuses_is_taken():
     assert len(held[0])
 
 
-def test_a_side_that_turns_an_element_inside_out_bends_less():
-    """The middle of one side stays .6 mm off the true shape; 98 of 100 nodes of the surface stay where they were."""
-    mesh, bent, cells = curved_sides(FOLDED, 250)
+@pytest.mark.parametrize("number", [16, *(pytest.param(n, marks=pytest.mark.slow) for n in (12, 19, 39))])
+def test_a_side_that_turns_an_element_inside_out_bends_less(number):
+    """The middle of one side stays .6 to 1.2 mm off the true shape; 98 of 100 nodes of the surface do not move."""
+    scene, level = member("kidney", 0, number), FOLDED[number]
+    mesh, bent, cells = curved_sides(scene, level)
     with pytest.raises(SolveError, match="inverted or flat at rest"):
         check_neighbours(bent)
     check_neighbours(mesh)
     moved = np.linalg.norm(nodes(mesh) - nodes(bent), axis=1)
-    assert 1e-4 < moved.max() < 1e-3
-    assert (moved[np.unique(facet_nodes(mesh))] > 1e-9).mean() < 0.02
+    on_surface = moved[np.unique(facet_nodes(mesh))]
+    assert 0.5e-3 < on_surface.max() < 1.3e-3
+    assert (on_surface > 1e-9).mean() < 0.02
     volume, before = (curved_volume(nodes(one), cells) for one in (mesh, bent))
     assert abs(volume / before - 1.0) < 1e-5
-    drawn, _, _ = reference_mesh(FOLDED, 250)
+    drawn, _, _ = reference_mesh(scene, level)
     build_elements(drawn, 5)
     check_neighbours(drawn)
 
