@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 from skfem import MeshTet, MeshTet2
 
-from reference_fem import curve, nodes
+from reference_fem import SolveError, curve, nodes
+from reference_fem.elements.shapes import check_neighbours
 from studies.geometry import OrganMesh, ball_octant, curved, project_ball
 from studies.grading.held_mesh import HeldMesh, held_mesh, rim_sides, straight
 from studies.grading.shaping import laid_out
@@ -46,15 +47,27 @@ def on_true_sides(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, body: H
     """The second-order mesh of `body`, as curved as the coarse one that follows the true shape; straight where only a
     mesh is known. Raises StudyError.
 
-    A scan has margins and folds that no coarse element can follow: where one would fold, its sides bend less.
+    A scan has margins and folds that no coarse element can follow, and so have a few organs of a population: where an
+    element would fold, its sides bend less.
     """
     shape, mesh = true_shape(scene.organ), MeshTet2.from_mesh(body.mesh)
     if shape is None:
         return mesh
-    if scene.organ.shape == "file":
-        points = laid_out(scene, organ_mesh, coarse, body, shape)
-        return replace(mesh, doflocs=np.ascontiguousarray(points.T))
-    return as_curved(body, coarse, on_true_shape(curved(organ_mesh, may_fold=True), coarse, shape, scene.held))
+    if scene.organ.shape != "file":
+        bent = as_curved(body, coarse, on_true_shape(curved(organ_mesh, may_fold=True), coarse, shape, scene.held))
+        if not _folds(bent):
+            return bent
+    points = laid_out(scene, organ_mesh, coarse, body, shape)
+    return replace(mesh, doflocs=np.ascontiguousarray(points.T))
+
+
+def _folds(mesh: MeshTet2) -> bool:
+    """Whether reference_fem refuses an element of it."""
+    try:
+        check_neighbours(mesh)
+    except SolveError:
+        return True
+    return False
 
 
 def _octant(scene: Scene, level: float) -> OrganMesh:

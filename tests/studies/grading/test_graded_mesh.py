@@ -124,6 +124,24 @@ def test_neighbours_are_tried_where_the_number_of_nodes_jumps(monkeypatch):
     assert search.coarse_level(BALL_CLAMPED, 794, 1, 2, True) not in jumps
 
 
+def told_nodes(monkeypatch, count):
+    """The search asks count(level) instead of meshing; what it finds for 794 nodes."""
+    monkeypatch.setattr(search, "halved", lambda scene, level, *halvings: (None, None, level))
+    monkeypatch.setattr(search, "outer_nodes", lambda level, quadratic: count(level))
+    return search.coarse_level(BALL_CLAMPED, 794, 1, 2, True)
+
+
+def test_the_search_goes_on_where_ten_tries_find_nothing(monkeypatch):
+    """Numbers of nodes of kidney 16 of the population, the last one within 5 %."""
+    kidney = {200: 1098, 145: 898, 128: 714, 142: 978, 115: 674, 135: 726, 148: 874, 134: 1018, 105: 674, 124: 726}
+    assert told_nodes(monkeypatch, (kidney | {136: 742, 146: 798}).__getitem__) == 146
+
+
+def test_what_ten_tries_find_within_the_tolerance_is_taken(monkeypatch):
+    """3.8 % off in all ten; the eleventh level, 138, would meet the number, and meshes would no longer be the same."""
+    assert told_nodes(monkeypatch, lambda level: 824 if level > 140 else 794) == 200
+
+
 @pytest.mark.slow
 def test_a_graded_liver_has_the_nodes_that_were_measured(mesh_cache):
     """200 vertices, outlines halved once and contacts twice: 2,471 nodes, whose error under a probe was measured."""
