@@ -62,12 +62,10 @@ def mean_error(run: Run) -> float:
 
 def silhouette_error(run: Run) -> float:
     """Hausdorff distance of the deformed surface to its deformation by the reference, over the body's size [%]."""
-    assert run.reference is not None
-    rest, triangles = run.fields.rest, run.fields.triangles
-    surface = np.unique(triangles)
+    triangles = run.fields.triangles
     # The same polyhedron, moved by the reference: what the facets cut off the true organ is no error of the model.
-    truth = rest.copy()
-    truth[surface] += run.reference.displacement(rest[surface])
+    truth = run.fields.rest.copy()
+    truth[run.material_nodes] += run.displacement_error[0]
     return PERCENT * hausdorff(run.fields.snapshots[-1], triangles, truth, triangles) / run.size
 
 

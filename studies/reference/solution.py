@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from weakref import WeakValueDictionary
 
 import numpy as np
 from skfem import MeshTet2
@@ -10,6 +11,25 @@ from skfem import MeshTet2
 from reference_fem import Evaluator, surface_triangles
 from studies.scene.scene import Scene
 from studies.store.record import Record
+
+
+class _Remembering(Evaluator):
+    """Finds the same points in its mesh once: all runs on a mesh, and several quantities of each, ask for them."""
+
+    def __init__(self, mesh: MeshTet2) -> None:
+        super().__init__(mesh)
+        self.located: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As Evaluator's; `outside` is that of the points that were not known."""
+        key = points.tobytes()
+        if key not in self.located:
+            self.located[key] = super().locate(points)
+        return self.located[key]
+
+
+_EVALUATORS: WeakValueDictionary[tuple[bytes, bytes], _Remembering] = WeakValueDictionary()
+"""By nodes and tetrahedra: solutions that differ by a setting have one mesh, and several may be loaded twice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +60,11 @@ class Solution:
 
     @cached_property
     def _evaluator(self) -> Evaluator:
-        return Evaluator(self.mesh)
+        key = self.field("nodes").tobytes(), self.field("tetrahedra").tobytes()
+        found = _EVALUATORS.get(key)
+        if found is None:
+            found = _EVALUATORS[key] = _Remembering(self.mesh)
+        return found
 
     @cached_property
     def triangles(self) -> np.ndarray:

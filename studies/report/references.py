@@ -8,29 +8,22 @@ import pandas as pd
 
 from massspring.sources import own_modules, source_fingerprint
 from studies.base.atomic import is_there, write_whole
-from studies.base.errors import StudyError
 from studies.plots.uncertainty import draw
-from studies.reference.load import Reference, load_reference
+from studies.reference.load import Reference
 from studies.reference.reference_solves import STUDY, reference_solves
 from studies.reference.solve import VARIANTS
 from studies.scene.scene import Scene
 from studies.store.paths import study_folder
 from studies.store.tables.csv_table import write_table
+from studies.sweep.stored.references import References
 
 TABLE, CHART = "uncertainty.csv", "uncertainty.png"
 
 
-def known_references(root: Path, scenes: Iterable[Scene]) -> dict[str, Reference]:
+def known_references(references: References, scenes: Iterable[Scene]) -> dict[str, Reference]:
     """Those that are solved on all their meshes, by the name of their scene; the study reports the others."""
-    found = {}
-    for scene in scenes:
-        try:
-            reference = load_reference(root, scene)
-        except StudyError:
-            continue  # load_runs reports which piece is missing, and why
-        if reference is not None:
-            found[scene.name] = reference
-    return found
+    found = {scene.name: references.of(scene) for scene in scenes}
+    return {name: reference for name, reference in found.items() if reference is not None}
 
 
 def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
@@ -67,9 +60,9 @@ def state_of(files: Iterable[Path], others: Iterable[str] = ()) -> str:
     return digest.hexdigest()
 
 
-def refresh_uncertainty(root: Path, scenes: Iterable[Scene]) -> list[Path]:
+def refresh_uncertainty(known: References, scenes: Iterable[Scene]) -> list[Path]:
     """Writes table and chart of the error bars, unless they show what is stored; none where no reference is known."""
-    each = list({scene.name: scene for scene in scenes}.values())
+    each, root = list({scene.name: scene for scene in scenes}.values()), known.known.root
     folder = study_folder(root, STUDY)
     paths = [folder / TABLE, folder / CHART]
     stamp, state = (
@@ -78,7 +71,7 @@ def refresh_uncertainty(root: Path, scenes: Iterable[Scene]) -> list[Path]:
     )
     if all(path.exists() for path in (*paths, stamp)) and stamp.read_bytes() == state.encode():
         return paths
-    references = known_references(root, each)
+    references = known_references(known, each)
     if not references:
         return []
     write_table(paths[0], uncertainty_table(references))

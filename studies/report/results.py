@@ -34,6 +34,7 @@ from studies.store.stamps import set_stamp
 from studies.store.tables.csv_table import write_table
 from studies.sweep.load import load_runs
 from studies.sweep.stored.known import Known
+from studies.sweep.stored.references import References
 
 FIGURES = "figures"
 FIGURE_NODES = 550
@@ -87,14 +88,15 @@ def charts_and_tables(root: Path, studies: Sequence[Study]) -> tuple[list[Path],
     A study of which nothing is stored keeps the charts that are there.
     """
     written, remarks, absent, known = [], [], [], Known(root)
+    references = References(known)
     for study in studies:
         if not any(known.of_case(study.name, case) for case in study.cases):
             absent.append(study.name)
             continue
-        paths, missing = refresh(root, study)
+        paths, missing = refresh(root, study, references)
         written += paths
         remarks += [f"{study.name}: {sentence}" for sentence in missing]
-    written += refresh_uncertainty(root, [scene for study in studies for scene in study.scenes])
+    written += refresh_uncertainty(references, [scene for study in studies for scene in study.scenes])
     kept = kept_volumes(root, studies)
     if len(kept):
         written.append(write_table(root / "kept_volume.csv", kept))
@@ -105,8 +107,9 @@ def charts_and_tables(root: Path, studies: Sequence[Study]) -> tuple[list[Path],
     return written, remarks
 
 
-def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
-    """Draws the charts and writes the tables of a study, unless they show what is stored already.
+def refresh(root: Path, study: Study, known: References | None = None) -> tuple[list[Path], list[str]]:
+    """Draws the charts and writes the tables of a study, unless they show what is stored already. known: references
+    that other studies need too.
 
     Their paths, and what is missing in sentences.
     """
@@ -120,7 +123,7 @@ def refresh(root: Path, study: Study) -> tuple[list[Path], list[str]]:
     before = _stamped(stamp)
     if before.get("inputs") == shown["inputs"] and all(path.exists() for path in (*paths, part_path(root, study))):
         return paths, before["remarks"]
-    runs, shown["remarks"] = load_runs(root, study)
+    runs, shown["remarks"] = load_runs(root, study, known)
     references = {run.case.scene.name: run.reference for run in runs}
     entries, unreadable = entries_beside(root, study.scenes, lambda scene: references.get(scene.name))
     shown["remarks"] += unreadable

@@ -18,14 +18,20 @@ from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.base.lookup import lookup
 from studies.store.checksums import BLOCK, attribute_digest, field_digest, manifest, plain, sealed
 from studies.store.faults import fault
+from studies.store.hdf5 import add_attribute, add_dataset
 from studies.store.opening import AGAIN, open_results
 from studies.store.schema import Status
+from studies.store.trial_read import read_all
+from studies.store.vtk_group import GROUP, add_vtk_group
 
 INDEX_KIND = "index"
 """Of the file that holds links to a study's records and none of their parts."""
 SCHEMA = 2
 """Version of the layout (studies.store.schema); raised when a reader of the old one would misread the new one. 1 had no
 checksums."""
+FORMAT = ("v110", "v110")
+"""Of HDF5: the first that can hold the views of studies.store.vtk_group, has checksums of its own for all but values,
+and needs no tree for a dataset of one chunk."""
 CHECKSUMS = "checksums"
 """Attribute with the digests of all others and of all fields (studies.store.checksums)."""
 
@@ -73,19 +79,16 @@ def write_record(path: Path, record: Record) -> None:
     _check(record)
     # Built in memory: a full disk then fails in one plain write, never half-way inside the HDF5 library.
     image = io.BytesIO()
-    # Since 1.10 the format has checksums of its own for all but the values.
-    with h5py.File(image, "w", userblock_size=BLOCK) as file:
+    with h5py.File(image, "w", libver=FORMAT, userblock_size=BLOCK) as file:
         attributes = {name: getattr(record, name) for name in HEADER} | record.attributes
         for name, value in attributes.items():
-            file.attrs[name] = _storable(value)
-        file.attrs[CHECKSUMS] = manifest(attributes, record.fields)
+            add_attribute(file.id, name, value)
+        add_attribute(file.id, CHECKSUMS, manifest(attributes, record.fields))
+        items = {name: add_dataset(file.id, name, np.asarray(field.values)) for name, field in record.fields.items()}
         for name, item in record.fields.items():
-            data = np.asarray(item.values)
-            text = h5py.string_dtype() if data.dtype.kind == "U" else None
-            # Checksums of values need chunks, which scalars, nothing and text of any length cannot have.
-            checked = {"chunks": data.shape, "fletcher32": True} if data.ndim and data.size and not text else {}
-            dataset = file.create_dataset(name, data=data.astype(object) if text else data, dtype=text, **checked)
-            dataset.attrs["unit"], dataset.attrs["description"] = item.unit, item.description
+            add_attribute(items[name], "unit", item.unit)
+            add_attribute(items[name], "description", item.description)
+        add_vtk_group(file.id, record.kind, record.fields, items)
     write_whole(Path(path), sealed(image.getvalue()))
 
 
@@ -96,10 +99,12 @@ def read_record(path: Path, fields: Iterable[str] | None = None) -> Record:
     Raises StudyError when the file is missing, of another program or lacks a named field, DamagedFile when its content
     is not what was written, OtherVersion for another schema.
     """
-    with open_results(path) as (file, _):
+    with open_results(path) as (file, untouched):
         record, digests = _header(path, file)
         names = digests if fields is None else [lookup(name, list(digests), "field") for name in fields]
         record = replace(record, fields={name: _field(path, file, name, digests[name]) for name in names})
+        if fields is None and not untouched and GROUP in file:
+            read_all(file[GROUP], path.stat().st_size)  # held to the checksums of the format
     wrong = None if fields is not None else fault(record.kind, record.status, record.attributes, record.fields)
     if wrong:
         raise DamagedFile(f"{path} {wrong}: {AGAIN}")
@@ -197,12 +202,6 @@ def _checked(path: Path, attributes: h5py.AttributeManager, name: str, digest: s
     if attribute_digest(value) != digest:
         raise DamagedFile(f"{path}: the attribute {name!r} has changed since it was written: {AGAIN}")
     return value
-
-
-def _storable(value: Any) -> Any:
-    if value is None:
-        return h5py.Empty("f8")
-    return str(value) if isinstance(value, str) else value  # an Enum of text is not text to HDF5
 
 
 def _plain(value: Any) -> Any:

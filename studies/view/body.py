@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-TRIANGLE, TETRAHEDRON, QUADRATIC_TETRAHEDRON = 5, 10, 24
-"""Types of cells as VTK numbers them (vtkCellType.h)."""
+from studies.store.vtk_group import TETRAHEDRON, TRIANGLE
+
+QUADRATIC_TETRAHEDRON = 24
+"""As VTK numbers this type of cells (vtkCellType.h)."""
 TURNED = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]
 """Nodes of a quadratic tetrahedron after the exchange of its second and third vertex."""
 

@@ -7,7 +7,7 @@ from studies.base.errors import StudyError
 from studies.scene.as_json import scene_of_key
 from studies.scenes import SCENES
 from studies.store.record import Status
-from studies.sweep.load import remarks_of
+from studies.sweep.remarks import remarks_of
 from studies.view.stored import Stored, finest_reference, stored_runs
 
 

@@ -14,7 +14,7 @@ from studies.scene.as_json import scene_of_key
 from studies.scene.scene import Scene
 from studies.scenes import SCENES
 from studies.store.record import Status, read_record
-from studies.sweep.load import remarks_of
+from studies.sweep.remarks import remarks_of
 from studies.view.body import Shown
 from studies.view.from_records import Remembering, shown_reference, shown_run
 from studies.view.stored import Stored, chosen_runs, finest_reference, stored_runs

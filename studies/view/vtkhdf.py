@@ -12,10 +12,9 @@ import numpy as np
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
+from studies.store.vtk_group import GRID, GROUP, VERSION
 from studies.view.side_by_side import Data, Grid
 
-VERSION = (2, 0)
-"""Of the format: the first with steps."""
 SUFFIX = ".vtkhdf"
 """The one that ParaView knows."""
 
@@ -33,9 +32,9 @@ def write_grid(path: Path, grid: Grid) -> int:
     check_target(path)
     image = io.BytesIO()
     with h5py.File(image, "w") as file:
-        root = file.create_group("VTKHDF")
+        root = file.create_group(GROUP)
         root.attrs["Version"] = np.array(VERSION, np.int64)
-        root.attrs["Type"] = np.bytes_("UnstructuredGrid")
+        root.attrs["Type"] = GRID
         _geometry(root, grid)
         steps = _steps(root, grid)
         for group, data in (

@@ -146,7 +146,9 @@ _copies: ContextVar[dict[str, str] | None] = ContextVar("copies", default=None)
 
 
 def _svg(figure: Figure, dpi: int) -> str:
+    """With everything where the PNG has it: to lay it out again takes as long as to draw it."""
     text = io.StringIO()
+    figure.set_layout_engine("none")
     with matplotlib.rc_context(VECTOR):
         figure.savefig(text, format="svg", dpi=dpi, metadata=dict.fromkeys(("Creator", "Date")), facecolor="white")
     return text.getvalue()

@@ -20,7 +20,7 @@ from studies.store.index.entry import Entry
 from studies.store.index.room import Room
 from studies.store.paths import timing_name
 from studies.store.record import read_record
-from studies.sweep.load import not_stored, remarks_of
+from studies.sweep.remarks import not_stored, remarks_of
 from studies.sweep.stored.known import Known
 from studies.sweep.stored.references import References
 from studies.timing.cases import read_timing

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import shutil
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -19,6 +20,7 @@ from studies.store.machine import machine_id
 from studies.store.record import Status
 from studies.store.tables.csv_table import write_table
 from studies.sweep.load import load_runs
+from studies.sweep.stored import references
 from tests.studies.tiny import tiny_case, tiny_study
 
 
@@ -140,3 +142,14 @@ def test_a_stamp_that_is_damaged_is_drawn_again(results, text):
     stamp.write_bytes(text.encode(errors="surrogateescape"))
     refresh(results, study)
     assert stamp.read_bytes() == whole
+
+
+def test_studies_of_one_scene_share_its_reference(results, monkeypatch):
+    loaded, load = [], references.load_reference
+    monkeypatch.setattr(
+        references, "load_reference", lambda root, scene: loaded.append(scene.name) or load(root, scene)
+    )
+    shutil.copytree(results / "tiny", results / "twin")
+    written, _ = report(results, [tiny_study(), tiny_study(name="twin")])
+    assert {results / "tiny" / "tiny.csv", results / "twin" / "twin.csv"} <= set(written)
+    assert loaded == [scene.name for scene in tiny_study().scenes]

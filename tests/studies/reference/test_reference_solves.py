@@ -22,6 +22,8 @@ from studies.scenes import SCENES, ReferencePlan
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.store.record import Status, read_record
 from studies.sweep.load import load_runs
+from studies.sweep.stored.known import Known
+from studies.sweep.stored.references import References
 from tests.studies.octant import LEVELS, SCENE
 from tests.studies.tiny import tiny_case, tiny_study
 
@@ -112,7 +114,9 @@ def test_listing_says_how_every_piece_stands(solved, tmp_path, monkeypatch):
 
 def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, tmp_path, found):
     root = shutil.copytree(solved, tmp_path / "results")
-    table, chart = refresh_uncertainty(root, [SCENE, SCENE, replace(SCENE, name="bare", reference=None)])
+    table, chart = refresh_uncertainty(
+        References(Known(root)), [SCENE, SCENE, replace(SCENE, name="bare", reference=None)]
+    )
     rows = pd.read_csv(table)
     assert rows["quantity"].tolist() == list(found.total_uncertainty)
     shares = rows[["mesh [%]", "steps [%]", "contact [%]", "kappa [%]"]].to_numpy()
@@ -120,12 +124,12 @@ def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, 
     assert rows["uncertainty [%]"][0] == pytest.approx(100 * found.total_uncertainty["force"], rel=1e-5)
     assert chart.read_bytes()[:4] == b"\x89PNG"
     chart.write_bytes(b"old")
-    refresh_uncertainty(root, [SCENE])
+    refresh_uncertainty(References(Known(root)), [SCENE])
     assert chart.read_bytes() == b"old"
     solve(root, ReferenceSolve(SCENE, LEVELS[0]))
-    refresh_uncertainty(root, [SCENE])
+    refresh_uncertainty(References(Known(root)), [SCENE])
     assert chart.read_bytes()[:4] == b"\x89PNG"
-    assert refresh_uncertainty(tmp_path / "empty", [SCENE]) == []
+    assert refresh_uncertainty(References(Known(tmp_path / "empty")), [SCENE]) == []
 
 
 class Killed(BaseException):
