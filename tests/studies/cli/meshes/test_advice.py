@@ -64,7 +64,7 @@ def test_the_command_that_is_printed_works(organbench, tmp_path, monkeypatch, fa
 
 
 def test_advice_that_does_not_work_is_a_try(organbench, tmp_path):
-    path = stored(tmp_path / "one.ply", POINTS, FACES[:1])
+    path = stored(tmp_path / "one.ply", 100 * np.eye(3), [[0, 1, 2]])
     code, out, _ = organbench("check", path, "--unit", "mm")
     assert code == 1 and TRIED not in out
     assert "   -> try organbench mesh --from FILE --close-holes" in out
