@@ -8,8 +8,6 @@ from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.spatial.distance import cdist
-from scipy.special import logsumexp
 
 from studies.base.errors import StudyError
 
@@ -101,11 +99,14 @@ class PaintedRegion:
 
     def _odds(self, points: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Logarithm of the density outside over that inside, shape (n,)."""
-        inside, outside = (
-            logsumexp(-cdist(points, part[:, :3], "sqeuclidean") / (2.0 * self.width**2), 1, np.abs(part[:, 3]))
-            for part in (rows[rows[:, 3] > 0], rows[rows[:, 3] < 0])
-        )
-        return outside - inside
+        densities = []
+        for part in (rows[rows[:, 3] > 0], rows[rows[:, 3] < 0]):
+            squared = sum((points[:, k, None] - part[None, :, k]) ** 2 for k in range(3))
+            terms = np.log(np.abs(part[:, 3])) - squared / (2.0 * self.width**2)
+            # The largest is taken out: far away all of them are too small for a number.
+            most = terms.max(axis=1)
+            densities.append(most + np.log(np.exp(terms - most[:, None]).sum(axis=1)))
+        return densities[1] - densities[0]
 
 
 KnownRegion = HalfSpace | BallRegion | EllipsoidRegion | PaintedRegion
