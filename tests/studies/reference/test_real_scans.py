@@ -14,6 +14,7 @@ from tests.geometry.real import real_surface
 LIVER, SPLEEN, STOMACH = "liver_hra_4999", "spleen_hra_4997", "stomach_bp3d_5015"
 WITHIN = (
     (LIVER, "lifted", 0.03),
+    (LIVER, "pressed", 0.035),
     (LIVER, "probed", 0.05),
     (SPLEEN, "lifted", 0.03),
     (SPLEEN, "pressed", 0.03),
