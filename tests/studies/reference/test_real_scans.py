@@ -20,6 +20,7 @@ WITHIN = (
     (SPLEEN, "pressed", 0.03),
     (SPLEEN, "probed", 0.03),
     (STOMACH, "lifted", 0.03),
+    (STOMACH, "pressed", 0.03),
     (STOMACH, "probed", 0.03),
 )
 """Uncertainty of the last force that was measured, rounded up (docs/own-organ.md)."""
