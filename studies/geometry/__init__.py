@@ -6,7 +6,7 @@ from studies.base.face import lazy
 
 if TYPE_CHECKING:
     from studies.geometry.api.organs import attach, ball, ball_octant, curved, fill, liver, organ, organ_family
-    from studies.geometry.api.scans import scan, true_shape_of
+    from studies.geometry.api.scans import painted, scan, true_shape_of
     from studies.geometry.files.reading import read_mesh
     from studies.geometry.mesh.checks import check_surface, check_tetrahedra
     from studies.geometry.mesh.organ_mesh import OrganMesh
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from studies.geometry.organs.spleen import SPLEEN_REGIONS
     from studies.geometry.organs.stomach import STOMACH_REGIONS
     from studies.geometry.organs.variation import vary
-    from studies.geometry.shape.regions import BallRegion, EllipsoidRegion, HalfSpace, Region
+    from studies.geometry.shape.regions import BallRegion, EllipsoidRegion, HalfSpace, PaintedRegion, Region
 
 _FACE = {
     "BLADDER_REGIONS": "studies.geometry.organs.bladder",
@@ -42,6 +42,7 @@ _FACE = {
     "EllipsoidRegion": "studies.geometry.shape.regions",
     "HalfSpace": "studies.geometry.shape.regions",
     "OrganMesh": "studies.geometry.mesh.organ_mesh",
+    "PaintedRegion": "studies.geometry.shape.regions",
     "Region": "studies.geometry.shape.regions",
     "attach": "studies.geometry.api.organs",
     "ball": "studies.geometry.api.organs",
@@ -53,6 +54,7 @@ _FACE = {
     "liver": "studies.geometry.api.organs",
     "organ": "studies.geometry.api.organs",
     "organ_family": "studies.geometry.api.organs",
+    "painted": "studies.geometry.api.scans",
     "project_ball": "studies.geometry.organs.ball",
     "project_liver": "studies.geometry.organs.liver",
     "read_mesh": "studies.geometry.files.reading",

@@ -9,7 +9,7 @@ from studies.geometry.mesher.jobs import MAKERS
 from studies.reference.checkpoints import kept
 from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
-from studies.store.paths import record_path
+from studies.store.paths import key_digest, record_path
 from studies.store.record import peek
 from studies.store.staleness import CASE_CHANGED, CODE_CHANGED, MISSING, why_stale
 
@@ -70,7 +70,7 @@ class ReferenceSolve:
     @property
     def stamp(self) -> str:
         """Problem and code in one text."""
-        return f"{reference_fingerprint()} {self.key}"
+        return f"{reference_fingerprint()} {key_digest(self.key)}"
 
     def state(self, root: Path) -> str:
         """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""

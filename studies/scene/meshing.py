@@ -13,7 +13,7 @@ from studies.scene.scene import Organ, Scene
 
 SOURCE_PARAMETERS = ("path", "unit", "scale", "longest_side", "part")
 """How a file is to be taken."""
-FILE_PARAMETERS = (*SOURCE_PARAMETERS, "remesh", "smooth", "wall")
+FILE_PARAMETERS = (*SOURCE_PARAMETERS, "sha256", "remesh", "smooth", "wall")
 """Of the organ "file"."""
 
 
@@ -37,13 +37,18 @@ def mesh_for(
 
 
 def scanned(organ: Organ, name: str) -> tuple[Source, dict[str, Any]]:
-    """The file of an organ, and what is asked of its new surface; name: of the scene. Raises StudyError."""
+    """The file of an organ, and what is asked of its new surface; name: of the scene. Raises StudyError, also for a
+    file that holds something else than when the scene was made."""
     parameters = organ.parameters
     for key in parameters:
         lookup(key, FILE_PARAMETERS, "parameter of an organ from a file")
     if "path" not in parameters or not {"unit", "longest_side"} & set(parameters):
         raise StudyError(f"scene '{name}': an organ from a file needs a path and a unit, it has {dict(parameters)}")
     source = Source(**{key: parameters[key] for key in SOURCE_PARAMETERS if key in parameters})
+    if "sha256" in parameters and source.sha256 not in (None, parameters["sha256"]):
+        raise StudyError(
+            f"scene '{name}': {source.path.name} does not hold what it held when the scene was made; make it anew"
+        )
     return source, {key: parameters[key] for key in ("smooth", "wall") if key in parameters}
 
 

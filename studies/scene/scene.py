@@ -2,18 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from massspring import Obstacle, Ramp, Trajectory
 from studies.base.errors import StudyError
-from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace
+from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace, PaintedRegion
+from studies.geometry.files.units import Source
 from studies.scene.placing import Vector
 from studies.scene.start import InitialConditions
 from studies.scene.tissues import Tissue
 
-Region = HalfSpace | BallRegion | EllipsoidRegion
+Region = HalfSpace | BallRegion | EllipsoidRegion | PaintedRegion
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,14 @@ class Organ:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     """Of the shape; for "file": {"path": …, "unit": "m", "cm", "mm" or "in"}, "scale", "longest_side" [m] or "part" as
     in studies.geometry.files.units.Source, and "remesh": true, "smooth" or "wall" [m] for a new surface with the nodes
-    that are asked for, the outlines of held regions on its edges."""
+    that are asked for, the outlines of held regions on its edges. "sha256" is added: results belong to what the file
+    holds, wherever it lies."""
+
+    def __post_init__(self) -> None:
+        if self.shape == "file" and "path" in self.parameters and "sha256" not in self.parameters:
+            content = Source(Path(self.parameters["path"])).sha256
+            if content is not None:  # of a file that cannot be read the mesher says why
+                object.__setattr__(self, "parameters", {**self.parameters, "sha256": content})
 
 
 @dataclass(frozen=True)

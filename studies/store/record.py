@@ -128,11 +128,17 @@ def glance(path: Path, attributes: Collection[str]) -> Record:
 
 
 def canonical(key: str) -> str:
-    """The JSON text of a case with sorted names and no blanks, so that equal cases are equal text."""
+    """The JSON text of a case with sorted names and no blanks, so that equal cases are equal text: also where a file
+    that is known by its "sha256" has another "path"."""
     try:
-        return json.dumps(json.loads(key), sort_keys=True, separators=(",", ":"))
+        hook = _without_path if '"sha256"' in key else None
+        return json.dumps(json.loads(key, object_hook=hook), sort_keys=True, separators=(",", ":"))
     except (TypeError, ValueError, RecursionError) as problem:
         raise StudyError(f"a case must be JSON text, not {str(key)[:60]!r} ({problem})") from problem
+
+
+def _without_path(entry: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in entry.items() if name != "path" or "sha256" not in entry}
 
 
 def _check(record: Record) -> None:

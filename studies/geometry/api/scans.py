@@ -1,6 +1,5 @@
 """Real organs: from a surface in a file to a mesh of a wanted number of nodes."""
 
-import hashlib
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from studies.geometry.api.organs import attach
 from studies.geometry.api.organs import fill as fill_mesh
 from studies.geometry.files.content import Content
 from studies.geometry.files.opening import opened
-from studies.geometry.files.reading import weld
+from studies.geometry.files.reading import marked_nodes, weld, with_patches
 from studies.geometry.files.units import LARGEST, SMALLEST, Source, as_source, check_range
 from studies.geometry.mesh.checks import check_finite, check_one_part, check_surface, check_volume
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
@@ -22,7 +21,8 @@ from studies.geometry.mesher.jobs import level_of, mesh_from
 from studies.geometry.scanned.fidelity import warnings_of
 from studies.geometry.scanned.level_grid import grid_from, shape_of
 from studies.geometry.shape.levelset import Shape
-from studies.geometry.shape.regions import Region, region_to_dict
+from studies.geometry.shape.regions import PaintedRegion, Region, region_to_dict
+from studies.geometry.surface.painted import painted_region
 from studies.geometry.surface.repair import Mended, border, mend
 
 LEVEL_KEYS = ("name", "solid", "smooth")
@@ -57,6 +57,16 @@ class Remeshing:
         if self.wall is not None and not 0 < self.wall < np.inf:
             raise StudyError(f"{name}: a wall of {1e3 * self.wall:g} mm asked for; give a thickness above 0")
 
+    def check_count(self, nodes: int | None, name: str) -> None:
+        """Raise StudyError unless `nodes` is a whole number, or None and the triangles of the file can stay."""
+        if nodes is None and (self.smooth or self.wall is not None or self.solid is not None):
+            raise StudyError(
+                f"{name}: smoothing, a wall and a filled shell need a new surface; say how many nodes it shall "
+                "have (--nodes)"
+            )
+        if nodes is not None and (isinstance(nodes, bool) or not isinstance(nodes, int | np.integer)):
+            raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
+
     @property
     def recipe(self) -> dict[str, Any]:
         """What of it decides a remeshed body, JSON-able."""
@@ -80,27 +90,26 @@ def scan(
 
     path: a file, or a Source, which also has a scale or a part. nodes: None keeps the file's own triangles. unit: of
     the file, one of UNITS; None: what the file says, or metres where only they make an organ of it. fill: with
-    tetrahedra. regions: attachments; with `nodes` their outlines lie on edges. how: the fields of Remeshing. With
-    `nodes` the mesh has the volume of the surface, and `losses` says how near it is to the file. Warns of every change
-    to the surface. Raises StudyError for what cannot be read, mended or meshed, TypeError for an unknown field.
+    tetrahedra. regions: attachments; with `nodes` their outlines lie on edges; None: those painted in the file, its
+    point data `patch_NAME`. how: the fields of Remeshing. With `nodes` the mesh has the volume of the surface, and
+    `losses` says how near it is to the file. Warns of every change to the surface. Raises StudyError for what cannot be
+    read, mended or meshed, TypeError for an unknown field.
     """
     source, remeshing = as_source(path, unit), Remeshing(**how)
-    name = source.path.name
-    mended, recipe = mended_surface(source, remeshing)
+    name, content = source.path.name, opened(source)
+    mended, recipe = mended_surface(source, content, remeshing)
+    remeshing.check_count(nodes, name)
     if nodes is None:
-        if remeshing.smooth or remeshing.wall is not None or remeshing.solid is not None:
-            raise StudyError(
-                f"{name}: smoothing, a wall and a filled shell need a new surface; say how many nodes it shall "
-                "have (--nodes)"
-            )
         body = as_it_is(mended, recipe, fill)
+        if regions is None:
+            return with_patches(body, content, source.metres(content.longest_side, content.unit))
         return attach(body, regions) if regions else body
-    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
-        raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
     if remeshing.solid is None:
         check_watertight(mended, name)
     remeshing.check(name)
-    outlines = {key: region_to_dict(region) for key, region in (regions or {}).items()}
+    if regions is None:
+        regions = {key: painted_on(source, content, key) for key in marked_nodes(content)}
+    outlines = {key: region_to_dict(region) for key, region in regions.items()}
     recipe |= remeshing.recipe | {"kind": "scan", "nodes": int(nodes), "fill": bool(fill), "regions": outlines}
     grid = level_arrays(recipe, mended) if remeshing.on_shape else {}
     mesh = mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles} | grid)
@@ -109,13 +118,30 @@ def scan(
     return mesh
 
 
+def painted(path: str | Path | Source, name: str, unit: str | None = None) -> PaintedRegion:
+    """The region painted on the surface in a file, whose point data `patch_NAME` are above 0 there: for every mesh of
+    the organ, by either solver. path, unit: as of `scan`. Raises StudyError for a file that cannot be read, or without
+    such data, or with all of its nodes on one side."""
+    source = as_source(path, unit)
+    return painted_on(source, opened(source), name)
+
+
+def painted_on(source: Source, content: Content, name: str) -> PaintedRegion:
+    """The same of a file that is open."""
+    marked, file = marked_nodes(content), source.path.name
+    if name not in marked:
+        known = f"the patches {', '.join(marked)}" if marked else "no point data called patch_NAME"
+        raise StudyError(f"{file} has {known}; there is no '{name}' among them")
+    return painted_region(*in_metres(source, content), marked[name], f"{file}: the painted patch '{name}'")
+
+
 def true_shape_of(source: Source, **how: Any) -> Shape:
     """The true shape of the surface in a file, the same for meshes of any number of nodes; it has the volume of the
     surface. how: the fields of Remeshing. Raises StudyError for what cannot be read or mended."""
     remeshing, name = Remeshing(**how), source.path.name
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the meshes of the shape tell of every change
-        mended, recipe = mended_surface(source, remeshing)
+        mended, recipe = mended_surface(source, opened(source), remeshing)
     if remeshing.solid is None:
         check_watertight(mended, name)
     remeshing.check(name)
@@ -129,18 +155,16 @@ def level_arrays(recipe: Mapping[str, Any], mended: Mended) -> dict[str, np.ndar
     return level_of(deciding, {"points": mended.points, "triangles": mended.triangles})
 
 
-def mended_surface(source: Source, remeshing: Remeshing) -> tuple[Mended, dict[str, Any]]:
+def mended_surface(source: Source, content: Content, remeshing: Remeshing) -> tuple[Mended, dict[str, Any]]:
     """The surface of a file, welded and mended, and the recipe of the file. Warns of every change."""
     path = source.path
-    content = opened(source)
     welded = weld(*in_metres(source, content))
     # What a shell encloses needs no closed surface, and all parts of it.
     mended = mend(*welded, path.name, remeshing.holes) if remeshing.solid is None else Mended(*welded, ())
     for sentence in mended.remarks:
         warnings.warn(f"{path.name}: {sentence}", stacklevel=3)
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    said = source.unit or content.unit or "m"
-    recipe: dict[str, Any] = {"kind": "file", "name": path.stem, "file": path.name, "sha256": digest, "unit": said}
+    said = {"sha256": source.sha256, "unit": source.unit or content.unit or "m"}
+    recipe: dict[str, Any] = {"kind": "file", "name": path.stem, "file": path.name} | said
     return mended, recipe | {"holes": bool(remeshing.holes)} | source.recipe
 
 

@@ -28,6 +28,8 @@ class Findings:
     measures: dict[str, Any]
     """Numbers by name, SI units, JSON-able; docs/meshes.md has the list."""
     findings: tuple[Finding, ...]
+    command: str | None = None
+    """That was tried and mends all of it (studies.geometry.api.advice); None where none was found."""
 
     @property
     def clean(self) -> bool:
@@ -35,9 +37,11 @@ class Findings:
         return not self.findings
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-able form: {"name", "clean", "measures": {...}, "findings": [{"code", "count", "sentence", "mend"}]}."""
+        """JSON-able form: {"name", "clean", "measures": {...}, "findings": [{"code", "count", "sentence", "mend"}],
+        "command"}."""
         rows = [vars(finding) for finding in self.findings]
-        return {"name": self.name, "clean": self.clean, "measures": self.measures, "findings": rows}
+        told = {"name": self.name, "clean": self.clean, "measures": self.measures, "findings": rows}
+        return told | {"command": self.command}
 
 
 def examine(

@@ -12,6 +12,8 @@ POOR_TRIANGLE = 0.1
 
 SHELL = 0.02
 """Thickness 2 V / A over the diagonal under which a closed surface is a shell and no body; a ball has 0.19."""
+TRY, COMMAND = "try ", "organbench mesh"
+"""Beginnings of advice that may fail, and of advice on a command."""
 REMESH = "try organbench mesh --from FILE --nodes N: it makes a new, even surface"
 EXPORT = "export the file again from the program that made it"
 

@@ -1,6 +1,5 @@
 """Reading a surface or tetrahedral mesh from a file, in metres, welded and checked."""
 
-import hashlib
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -36,9 +35,8 @@ def read_mesh(path: str | Path | Source, unit: str | None = None, flip: bool = F
     said = source.unit or content.unit or "m"
     metres = source.metres(side, said)
     check_range(metres * side, name)
-    digest = hashlib.sha256(source.path.read_bytes()).hexdigest()
-    recipe = {"kind": "file", "name": source.path.stem, "file": name, "sha256": digest, "unit": said, "flip": flip}
-    recipe |= source.recipe
+    recipe = {"kind": "file", "name": source.path.stem, "file": name, "sha256": source.sha256, "unit": said}
+    recipe |= {"flip": flip} | source.recipe
     points, cells = weld(content.points * metres, content.cells)
     warn_about_unit(points, name)
     if len(content.tetrahedra):
@@ -53,14 +51,17 @@ def read_mesh(path: str | Path | Source, unit: str | None = None, flip: bool = F
 
 def with_patches(mesh: OrganMesh, content: Content, metres: float) -> OrganMesh:
     """The mesh with the attachments that the file keeps as point data `patch_NAME`, above 0 at their nodes."""
-    named = {key: values for key, values in content.point_data.items() if key.startswith(PATCH)}
-    if not named:
+    marked = marked_nodes(content)
+    if not marked:
         return mesh
     _, number = KDTree(content.points * metres).query(mesh.points[: mesh.outer_count])
-    patches = {
-        key.removeprefix(PATCH): np.flatnonzero(np.asarray(values).ravel()[number] > 0) for key, values in named.items()
-    }
-    return replace(mesh, patches=patches)
+    return replace(mesh, patches={name: np.flatnonzero(inside[number]) for name, inside in marked.items()})
+
+
+def marked_nodes(content: Content) -> dict[str, np.ndarray]:
+    """By name of each attachment, which points of the file belong to it, shape (n,) bool."""
+    data = {key.removeprefix(PATCH): values for key, values in content.point_data.items() if key.startswith(PATCH)}
+    return {name: np.asarray(values).ravel() > 0 for name, values in data.items()}
 
 
 def warn_about_unit(points: np.ndarray, name: str) -> None:

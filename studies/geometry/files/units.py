@@ -1,5 +1,6 @@
 """Units of length in files that do not name theirs: recognised by the size of organs, never taken without a word."""
 
+import hashlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,6 +60,14 @@ class Source:
         if self.longest_side is not None:
             return self.longest_side / side if side > 0 else 1.0
         return self.scale * UNITS[settled_unit(self.path.name, self.scale * side, self.unit or said)]
+
+    @property
+    def sha256(self) -> str | None:
+        """Of the file's bytes (hex), by which it is known wherever it lies; None where it cannot be read."""
+        try:
+            return hashlib.sha256(self.path.read_bytes()).hexdigest()
+        except OSError:
+            return None
 
     @property
     def recipe(self) -> dict[str, object]:

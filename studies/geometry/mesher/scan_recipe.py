@@ -15,7 +15,7 @@ from studies.geometry.mesher.organ_recipe import finish, outlined
 from studies.geometry.mesher.progress import stage
 from studies.geometry.mesher.worker import Arrays, work
 from studies.geometry.scanned.distance_grid import box_of
-from studies.geometry.scanned.fidelity import fidelity, spread
+from studies.geometry.scanned.fidelity import TOLD, fidelity, spread
 from studies.geometry.scanned.level_grid import grid_from, shape_of
 from studies.geometry.scanned.scan_shape import COARSEST, Surface, cell_for, faithful, levelled, scan_surface
 from studies.geometry.scanned.shells import solidified
@@ -52,7 +52,10 @@ def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
         grid, start = faithful(*source, cell, recipe["name"])
         shape = shape_of(grid, recipe["name"])
         points, triangles = scan_mesh(shape, start, recipe["nodes"], regions)
-        volume = wanted_volume(source, enclosed_volume(shape, 1))
+        volume = signed_volume(*source)
+        # A second on a fine grid: only where the first triangulation, a little too small, leaves a doubt.
+        if abs(signed_volume(*start) / volume - 1.0) > 0.5 * TOLD:
+            volume = wanted_volume(source, enclosed_volume(shape, 1))
         points = with_volume(points, triangles, volume, shape.level, regions)
     made = finish(replace(shape, wall=recipe.get("wall")), points, triangles, recipe)
     losses = arrays["losses"] if "losses" in arrays else lost(file, body, (points, triangles))

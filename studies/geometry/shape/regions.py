@@ -71,10 +71,48 @@ class EllipsoidRegion:
         return (np.linalg.norm(scaled, axis=1) - 1.0) * axes.min()
 
 
-KnownRegion = HalfSpace | BallRegion | EllipsoidRegion
+BATCH = 4096
+"""Points whose distances to all samples are held at once."""
+
+
+@dataclass(frozen=True)
+class PaintedRegion:
+    """What is painted on a surface, between samples of it; `studies.geometry.painted` makes one.
+
+    samples: x, y, z of a place on the surface [m] and the area that it stands for [m²], negative where not painted
+    width: standard deviation [m] of the Gaussian that rounds the steps of the painted border
+    """
+
+    samples: tuple[tuple[float, float, float, float], ...]
+    width: float
+
+    def level(self, points: np.ndarray) -> np.ndarray:
+        """About the distance [m] along the surface to the painted border, shape (n,), of points near the surface.
+
+        The border is where the samples inside and those outside, each a Gaussian of its area, have the same density.
+        """
+        points, rows = np.asarray(points, float), np.asarray(self.samples, float)
+        odds = np.concatenate([self._odds(points[k : k + BATCH], rows) for k in range(0, max(len(points), 1), BATCH)])
+        # Beside a straight border log(Phi(t) / Phi(-t)), t = s / width: 4 phi(0) t near it, t² / 2 far from it.
+        slope = 4.0 / np.sqrt(2.0 * np.pi)
+        return self.width * odds / (slope * np.sqrt(1.0 + np.abs(odds) / (2.0 * slope**2)))
+
+    def _odds(self, points: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Logarithm of the density outside over that inside, shape (n,)."""
+        densities = []
+        for part in (rows[rows[:, 3] > 0], rows[rows[:, 3] < 0]):
+            squared = sum((points[:, k, None] - part[None, :, k]) ** 2 for k in range(3))
+            terms = np.log(np.abs(part[:, 3])) - squared / (2.0 * self.width**2)
+            # The largest is taken out: far away all of them are too small for a number.
+            most = terms.max(axis=1)
+            densities.append(most + np.log(np.exp(terms - most[:, None]).sum(axis=1)))
+        return densities[1] - densities[0]
+
+
+KnownRegion = HalfSpace | BallRegion | EllipsoidRegion | PaintedRegion
 """Those that can be stored as JSON."""
 
-KINDS: dict[str, type] = {cls.__name__: cls for cls in (HalfSpace, BallRegion, EllipsoidRegion)}
+KINDS: dict[str, type] = {cls.__name__: cls for cls in (HalfSpace, BallRegion, EllipsoidRegion, PaintedRegion)}
 
 
 def region_to_dict(region: Any) -> dict[str, Any]:

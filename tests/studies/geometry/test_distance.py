@@ -44,6 +44,18 @@ def test_each_region_of_a_triangle(query, distance):
     assert found == pytest.approx([distance], abs=1e-14)
 
 
+def test_a_triangle_without_area_is_its_longest_side():
+    """Beyond its ends, on its line, the normal is rounding and would put every tenth point onto it."""
+    rng = np.random.default_rng(1)
+    a, way, share, place = (rng.uniform(-1, 2, size=(300, width)) for width in (3, 3, 1, 1))
+    for k in range(300):
+        middle = np.abs(share[k]) / 2
+        flat = np.array([a[k], a[k] + way[k], a[k] + middle * way[k]])
+        beyond = np.abs(place[k] - np.clip(place[k], 0, 1)) * np.linalg.norm(way[k])
+        found = distance_to_surface((a[k] + place[k] * way[k])[None], flat, ONE)
+        np.testing.assert_allclose(found, beyond, atol=1e-12)
+
+
 def test_nearest_vertex_would_be_noticed():
     inner = [name for name in REGIONS if "vertex" not in name]
     for name in inner:

@@ -14,11 +14,13 @@ from tests.geometry.real import real_surface
 LIVER, SPLEEN, STOMACH = "liver_hra_4999", "spleen_hra_4997", "stomach_bp3d_5015"
 WITHIN = (
     (LIVER, "lifted", 0.03),
+    (LIVER, "pressed", 0.035),
     (LIVER, "probed", 0.05),
     (SPLEEN, "lifted", 0.03),
     (SPLEEN, "pressed", 0.03),
     (SPLEEN, "probed", 0.03),
     (STOMACH, "lifted", 0.03),
+    (STOMACH, "pressed", 0.03),
     (STOMACH, "probed", 0.03),
 )
 """Uncertainty of the last force that was measured, rounded up (docs/own-organ.md)."""

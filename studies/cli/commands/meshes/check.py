@@ -11,6 +11,7 @@ from rich.text import Text
 
 from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, ask_before_large, source_of, working
 from studies.cli.terminal import console
+from studies.geometry.api.advice import NODES, tried
 from studies.geometry.doctor.examine import TISSUE, Findings, examine
 from studies.geometry.files.parts import LISTED
 
@@ -31,7 +32,7 @@ def check(
     ask_before_large(path, yes)
     with working(f"examining {path.name}"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found = examine(source, tissue=(modulus, density))
+        found = tried(source, examine(source, tissue=(modulus, density)))
     if as_json:
         print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
     else:
@@ -50,6 +51,9 @@ def show(found: Findings) -> None:
     for number, finding in enumerate(found.findings, start=1):
         console.print(f"{number}. {finding.sentence}", markup=False, highlight=False)
         console.print(f"   -> {finding.mend}", markup=False, highlight=False)
+    if found.command:
+        console.print(f"tried, and a clean body of {NODES} surface nodes came out:", highlight=False)
+        console.print(found.command, markup=False, highlight=False, soft_wrap=True)
     if found.clean:
         console.print("nothing is wrong with it")
 

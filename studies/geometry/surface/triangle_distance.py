@@ -1,0 +1,63 @@
+"""The exact distance from points to triangles, compiled."""
+
+import numpy as np
+
+from massspring.kernels.jit.decorators import compiled
+
+FLAT = 1e-20
+"""Squared sine of the angle at a corner under which a triangle is a line: its normal would be rounding."""
+
+
+@compiled
+def squared_to_segment(w0, w1, w2, d0, d1, d2):
+    """|w - s d|² at the nearest s in [0, 1]: w from the start of the segment to the point, d along the segment."""
+    length = d0 * d0 + d1 * d1 + d2 * d2
+    along = w0 * d0 + w1 * d1 + w2 * d2
+    s = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
+    r0, r1, r2 = w0 - s * d0, w1 - s * d1, w2 - s * d2
+    return r0 * r0 + r1 * r1 + r2 * r2
+
+
+@compiled
+def squared_to_triangle(p, triangle, u, v, n):
+    """Squared distance of the point p (3,) to a triangle (3, 3) with edges u, v from its first corner, n = u x v.
+
+    Over the face it is the height, (w·n)²/n², elsewhere the distance to the nearest edge: also of a triangle so flat
+    that its normal would be rounding.
+    """
+    w0, w1, w2 = p[0] - triangle[0, 0], p[1] - triangle[0, 1], p[2] - triangle[0, 2]
+    square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2]
+    if square > FLAT * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]):
+        # Barycentric coordinates of the foot: s = (w x v)·n / n², t = (u x w)·n / n².
+        s = (w1 * v[2] - w2 * v[1]) * n[0] + (w2 * v[0] - w0 * v[2]) * n[1] + (w0 * v[1] - w1 * v[0]) * n[2]
+        t = (u[1] * w2 - u[2] * w1) * n[0] + (u[2] * w0 - u[0] * w2) * n[1] + (u[0] * w1 - u[1] * w0) * n[2]
+        if s >= 0.0 and t >= 0.0 and s + t <= square:
+            height = w0 * n[0] + w1 * n[1] + w2 * n[2]
+            return height * height / square
+    first = squared_to_segment(w0, w1, w2, u[0], u[1], u[2])
+    second = squared_to_segment(w0, w1, w2, v[0], v[1], v[2])
+    e0, e1, e2 = p[0] - triangle[1, 0], p[1] - triangle[1, 1], p[2] - triangle[1, 2]
+    third = squared_to_segment(e0, e1, e2, v[0] - u[0], v[1] - u[1], v[2] - u[2])
+    return min(first, second, third)
+
+
+@compiled
+def edges_into(triangle, u, v, n):
+    """Edges u, v (3,) from the first corner of a triangle (3, 3), and n = u x v; returns n²."""
+    for k in range(3):
+        u[k] = triangle[1, k] - triangle[0, k]
+        v[k] = triangle[2, k] - triangle[0, k]
+    n[0], n[1], n[2] = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    return n[0] * n[0] + n[1] * n[1] + n[2] * n[2]
+
+
+@compiled
+def nearest_into(queries, corners, near, scratch, found):
+    """found (q,): squared distance of each of `queries` (q, 3) to the nearest of its triangles `near` (q, k) among
+    corners (f, 3, 3); scratch (3, 3)."""
+    u, v, n = scratch
+    for q in range(len(queries)):
+        found[q] = np.inf
+        for f in near[q]:
+            edges_into(corners[f], u, v, n)
+            found[q] = min(found[q], squared_to_triangle(queries[q], corners[f], u, v, n))

@@ -1,0 +1,75 @@
+"""Results of an organ from a file belong to what the file holds: it may move, and an edit makes them stale."""
+
+from dataclasses import replace
+
+import pytest
+
+from massspring import ImplicitVolume
+from studies.base.errors import StudyError
+from studies.catalog import Study
+from studies.metrics.run import Run
+from studies.reference.reference_solves import ReferenceSolve
+from studies.runs.case import BodyRecipe, Case, case_from_json
+from studies.runs.current import case_path, why_case_is_stale
+from studies.runs.digest import case_digest
+from studies.scene.meshing import mesh_for
+from studies.scene.scene import Organ
+from studies.scenes import BALL_SQUEEZE
+from studies.store.paths import key_digest
+from studies.store.staleness import MISSING
+from studies.sweep.run_studies import run_studies
+from tests.studies.tiny import Silent, cube, file_scene, write_obj
+
+
+def case_of(path):
+    return Case(file_scene(path), BodyRecipe(), ImplicitVolume(), frames=2)
+
+
+def written(path, edge=0.1):
+    points, triangles, _ = cube(2, edge)
+    used = sorted(set(triangles.ravel().tolist()))
+    number = {node: k for k, node in enumerate(used)}
+    path.parent.mkdir(exist_ok=True)
+    return write_obj(path, points[used], [[number[node] for node in row] for row in triangles.tolist()])
+
+
+def test_a_moved_file_keeps_its_results_and_an_edited_one_does_not(tmp_path):
+    root, path = tmp_path / "results", written(tmp_path / "here" / "box.obj")
+    case = case_of(path)
+    run_studies(root, [Study("own", "Does it fall?", (case,), (), ())], 1, Silent())
+    assert why_case_is_stale(root, "own", case) is None
+    moved = path.rename(tmp_path / "moved.obj")
+    same = case_of(moved)
+    assert why_case_is_stale(root, "own", same) is None and case_digest(same) == key_digest(same.key)
+    # The record itself is read without the file, and still names where it was.
+    run = Run.load(case_path(root, "own", same))
+    assert run.case.scene.organ.parameters["path"] == str(path) and len(run.fields.t) == 2
+    written(moved, edge=0.11)
+    other = case_of(moved)
+    assert why_case_is_stale(root, "own", other) == MISSING and case_digest(other) != case_digest(same)
+
+
+def test_references_are_known_by_content_too(tmp_path):
+    plan = replace(BALL_SQUEEZE.reference, mesh="solid", levels=(60, 90))
+    solves = []
+    for name, edge in (("a", 0.1), ("b", 0.1), ("c", 0.11)):
+        scene = file_scene(written(tmp_path / name / "box.obj", edge), reference=plan)
+        solves.append(ReferenceSolve(scene, 60))
+    here, there, other = solves
+    assert here.path(tmp_path) == there.path(tmp_path) != other.path(tmp_path)
+    assert here.stamp == there.stamp != other.stamp and here.key != there.key
+
+
+def test_a_scene_is_meshed_from_the_file_that_it_was_made_for(tmp_path):
+    path = written(tmp_path / "box.obj")
+    scene = file_scene(path)
+    assert case_from_json(case_of(path).key) == case_of(path)
+    assert mesh_for(scene, 0, filled=False).volume == pytest.approx(1e-3)
+    written(path, edge=0.11)
+    with pytest.raises(StudyError, match=r"box\.obj does not hold what it held when the scene was made"):
+        mesh_for(scene, 0)
+    assert mesh_for(file_scene(path), 0, filled=False).volume == pytest.approx(1.331e-3)
+    path.unlink()
+    with pytest.raises(StudyError, match="there is no mesh file"):
+        mesh_for(scene, 0)
+    assert "sha256" not in Organ("file", {"path": str(path), "unit": "m"}).parameters
