@@ -9,7 +9,7 @@ from studies.scene.tissues import LIVER
 RADIUS = 0.020  # m, a thumb; twice the edge of the coarsest reference mesh, so that the contact is resolved
 DEPTH = 0.010  # m
 GAP = 0.0005  # m between probe and surface at the start
-PRESS_END = 6.0  # s: slow enough that damping drags with less than 3 % of the force
+PRESS_END = 6.0  # s: slow enough that damping drags with 1.3 % of the force (docs/accuracy.md)
 DURATION = 8.0  # s
 INWARD = scaled(LIVER_PROBE_NORMAL, -1.0)
 

@@ -1,0 +1,110 @@
+"""What of the error of the force on the way is drag: the table of docs/accuracy.md, and what it says of the cure."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from massspring import Trajectory
+from studies.reference.reference_solves import ReferenceSolve
+from studies.reference.solve import solve
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.run import measure
+from studies.scenes import LIVER_PRESS, LIVER_PROBE, STOMACH_PRESS, STOMACH_PROBE, Scene
+from studies.store.record import Record, read_record
+
+ROOT = Path(__file__).parents[3]
+SCENES = (LIVER_PRESS, LIVER_PROBE, STOMACH_PRESS, STOMACH_PROBE)
+SIZE = 794
+EQUILIBRIA = {"liver_press": (-2, 2, 3, 3, 3), "liver_probe": (14, 0, -7, -4, 3)}
+"""Scene -> what the force is above the reference at each checkpoint when nothing drags [%]."""
+
+
+def told() -> dict[str, list[float]]:
+    """Scene -> the numbers of its row."""
+    page = (ROOT / "docs/accuracy.md").read_text(encoding="utf-8")
+    part = page.split("## Force on the way\n")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| (\w+) \| ([-−+\d. |]+) \|$", part, re.M)
+    return {name: [float(cell.replace("−", "-")) for cell in cells.split(" | ")] for name, cells in rows}
+
+
+def graded(scene: Scene) -> bool:
+    """Whether its row is of the graded body."""
+    return scene.name.startswith("liver")
+
+
+def slower(scene: Scene, times: int) -> Scene:
+    """The same obstacles on the same way in so many times the time."""
+    moved = tuple(
+        replace(o, path=Trajectory(tuple(times * t for t in o.path.times), o.path.displacements))
+        for o in scene.obstacles
+    )
+    checkpoints = tuple(times * t for t in scene.checkpoints)
+    return replace(
+        scene,
+        duration=times * scene.duration,
+        frames=times * scene.frames,
+        checkpoints=checkpoints,
+        obstacles=moved,
+    )
+
+
+def run(scene: Scene, damping: float, times: int = 1) -> tuple[np.ndarray, Record]:
+    """The force at the checkpoints [N], and the record."""
+    scene = replace(slower(scene, times), damping=damping)
+    body = BodyRecipe("quadratic", SIZE, graded=graded(scene), mass="stiffness")
+    record = measure(Case(scene, body, dt_fraction=0.8))
+    force = scene.output_force(*(record.fields[name].values for name in ("contact_force", "held_force")))
+    t = record.fields["t"].values
+    return force[[int(np.argmin(np.abs(t - at))) for at in scene.checkpoints]], record
+
+
+def published(scene: Scene, series: str = "") -> list[float]:
+    """force_error of the table's body [%], at the longest step first."""
+    table = pd.read_csv(ROOT / "results/published/accuracy/accuracy.csv")
+    series = series or ("graded " if graded(scene) else "") + "quadratic, masses by stiffness"
+    mine = (table["scene"] == scene.name) & (table["body"] == series) & (table["nodes"] == SIZE)
+    longest_first = np.argsort(-table["dt [ms]"].to_numpy()[mine])
+    return table["force_error [%]"].to_numpy()[mine][longest_first].tolist()
+
+
+def test_the_errors_told_are_the_published_ones():
+    """To the last digit: of the table, and of other masses, contacts and steps."""
+    assert set(told()) == {scene.name for scene in SCENES}
+    for scene in SCENES:
+        assert told()[scene.name][0] == pytest.approx(published(scene)[0], abs=0.0501)
+    assert published(LIVER_PRESS, "graded quadratic") == pytest.approx([5.2], abs=0.05)
+    nodes = "graded quadratic, contact at nodes, masses by stiffness"
+    assert published(LIVER_PROBE, nodes) == pytest.approx([2.4], abs=0.05)
+    for scene in (LIVER_PRESS, LIVER_PROBE):
+        whole, half = published(scene)
+        assert half == pytest.approx(whole, abs=0.1)
+
+
+def coarsest(scene: Scene, root: Path) -> np.ndarray:
+    """The force at the checkpoints on the coarsest mesh of the reference's family [N]."""
+    assert scene.reference is not None
+    fields = read_record(solve(root, ReferenceSolve(scene, scene.reference.levels[0]))).fields
+    return scene.output_force(fields["contact_force"].values, fields["held_force"].values)
+
+
+def apart(force: np.ndarray, truth: np.ndarray) -> float:
+    """Of all checkpoints [%]."""
+    return 100 * float(np.linalg.norm(force - truth) / np.linalg.norm(truth))
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+def test_errors_and_drag_are_what_the_table_says(scene, mesh_cache, tmp_path):
+    """Minutes for each scene: a reference, and runs of eight presses' time."""
+    truth, still = coarsest(scene, tmp_path), run(scene, 1.0, 4)[0]
+    dragged, slow, (calm, record) = run(scene, scene.damping)[0], run(scene, scene.damping, 2)[0], run(scene, 2.0)
+    if scene.name in EQUILIBRIA:
+        assert 100 * (still / truth - 1) == pytest.approx(EQUILIBRIA[scene.name], abs=0.6)
+    found = [apart(force, truth) for force in (dragged, calm, still)]
+    found += [apart(force, still) for force in (dragged, slow, calm)]
+    found += [100 * float(calm[-1] / dragged[-1] - 1), 100 * float(record.attributes["sway"])]
+    assert found == pytest.approx(told()[scene.name][1:], abs=0.1)
