@@ -18,11 +18,11 @@ from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.base.lookup import lookup
 from studies.store.checksums import BLOCK, attribute_digest, field_digest, manifest, plain, sealed
 from studies.store.faults import fault
-from studies.store.hdf5 import add_attribute, add_dataset
+from studies.store.layout.hdf5 import add_attribute, add_dataset
+from studies.store.layout.vtk_group import GROUP, add_vtk_group
 from studies.store.opening import AGAIN, open_results
 from studies.store.schema import Status
 from studies.store.trial_read import read_all
-from studies.store.vtk_group import GROUP, add_vtk_group
 
 INDEX_KIND = "index"
 """Of the file that holds links to a study's records and none of their parts."""
@@ -30,8 +30,8 @@ SCHEMA = 2
 """Version of the layout (studies.store.schema); raised when a reader of the old one would misread the new one. 1 had no
 checksums."""
 FORMAT = ("v110", "v110")
-"""Of HDF5: the first that can hold the views of studies.store.vtk_group, has checksums of its own for all but values,
-and needs no tree for a dataset of one chunk."""
+"""Of HDF5: the first that can hold the views of studies.store.layout.vtk_group, has checksums of its own for all but
+values, and needs no tree for a dataset of one chunk."""
 CHECKSUMS = "checksums"
 """Attribute with the digests of all others and of all fields (studies.store.checksums)."""
 

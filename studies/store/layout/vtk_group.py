@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.store.hdf5 import ID, add_attribute, add_constant, add_dataset, add_group, add_small, add_view, link
+from studies.store.layout.hdf5 import ID, add_attribute, add_constant, add_dataset, add_group, add_small, add_view, link
 from studies.store.schema import LAYOUTS
 
 GROUP, GRID = "VTKHDF", np.bytes_("UnstructuredGrid")
