@@ -51,7 +51,7 @@ MODULES = {
     "studies.fingerprint": "massspring.sources",
     "studies.floors": "studies.reference.uncertainty",
     "studies.geometry.api": "studies.geometry.api.organs",
-    "studies.geometry.band": "studies.geometry.scanned.band",
+    "studies.geometry.band": "studies.geometry.surface.triangle_distance",
     "studies.geometry.blends": "studies.geometry.shape.blends",
     "studies.geometry.boxes": "studies.geometry.surface.boxes",
     "studies.geometry.build": "studies.geometry.mesher.organ_recipe",

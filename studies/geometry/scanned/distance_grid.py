@@ -4,8 +4,8 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from studies.geometry.mesh.organ_mesh import triangle_areas
-from studies.geometry.scanned.band import band_distance_into, far_distance_into
 from studies.geometry.scanned.level_grid import DistanceGrid
+from studies.geometry.surface.triangle_distance import band_distance_into, far_distance_into
 
 BAND = 4.0
 """Cells on either side of the surface where the distance is exact; farther out it is so to a few per cent of a cell."""
