@@ -60,9 +60,9 @@ def state_of(files: Iterable[Path], others: Iterable[str] = ()) -> str:
     return digest.hexdigest()
 
 
-def refresh_uncertainty(known: References, scenes: Iterable[Scene]) -> list[Path]:
+def refresh_uncertainty(references: References, scenes: Iterable[Scene]) -> list[Path]:
     """Writes table and chart of the error bars, unless they show what is stored; none where no reference is known."""
-    each, root = list({scene.name: scene for scene in scenes}.values()), known.known.root
+    each, root = list({scene.name: scene for scene in scenes}.values()), references.known.root
     folder = study_folder(root, STUDY)
     paths = [folder / TABLE, folder / CHART]
     stamp, state = (
@@ -71,10 +71,10 @@ def refresh_uncertainty(known: References, scenes: Iterable[Scene]) -> list[Path
     )
     if all(path.exists() for path in (*paths, stamp)) and stamp.read_bytes() == state.encode():
         return paths
-    references = known_references(known, each)
-    if not references:
+    solved = known_references(references, each)
+    if not solved:
         return []
-    write_table(paths[0], uncertainty_table(references))
-    draw({name: reference.uncertainty for name, reference in references.items()}, paths[1])
+    write_table(paths[0], uncertainty_table(solved))
+    draw({name: reference.uncertainty for name, reference in solved.items()}, paths[1])
     write_whole(stamp, state.encode())
     return paths
