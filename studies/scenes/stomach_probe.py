@@ -34,6 +34,6 @@ STOMACH_PROBE = Scene(
     held=tuple(Held(name, STOMACH_REGIONS[name]) for name in ("cardia", "pylorus")),
     lumen=Lumen(),
     probed=ForceOutput("obstacle", 0, INWARD),
-    damping=8.0,
+    damping=2.0,
     reference=ReferencePlan("solid", (430, 620, 800), at_outlines=(2, 3, 4), at_contact=3),
 )

@@ -17,6 +17,7 @@ from studies.grading.graded_mesh import graded_mesh, halved, is_hollow, mesh_at,
 from studies.grading.true_shape import true_shape
 from studies.scene.meshing import mesh_for
 from studies.scene.scene import Held
+from studies.scenes import KIDNEY_PROBE, LIVER_PRESS
 from studies.scenes.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scenes.liver_probe import LIVER_PROBE
 from studies.scenes.spleen_sag import SPLEEN_SAG
@@ -24,6 +25,7 @@ from studies.scenes.stomach_probe import STOMACH_PROBE
 from tests.studies.tiny import cube, file_scene, write_obj
 
 NODES = 600
+DOWN = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.01, 0.0)))
 CAP_AREA = 2 * np.pi * RADIUS * (1 - CAP) * RADIUS
 """Of the sphere beyond a plane (Archimedes)."""
 
@@ -143,9 +145,18 @@ def test_what_ten_tries_find_within_the_tolerance_is_taken(monkeypatch):
 
 
 @pytest.mark.slow
+def test_what_a_plane_presses_is_halved_at_outlines_where_vertices_suffice(mesh_cache):
+    """The long outline of a kidney's hilum would leave two fifths of them; a probe needs them under itself."""
+    kidney = replace(KIDNEY_PROBE, obstacles=(Plane((0.0, -0.03, 0.0), (0.0, 1.0, 0.0), DOWN),))
+    assert [usual_grading(s, 794, True) for s in (LIVER_PRESS, kidney, LIVER_PROBE)] == [(3, 1), (1, 2), (1, 2)]
+    with pytest.raises(StudyError, match="surface nodes asked for"):
+        usual_grading(LIVER_PRESS, -1, True)
+
+
+@pytest.mark.slow
 def test_a_graded_liver_has_the_nodes_that_were_measured(mesh_cache):
     """200 vertices, outlines halved once and contacts twice: 2,471 nodes, whose error under a probe was measured."""
-    mesh = mesh_at(LIVER_PROBE, 200, *usual_grading(LIVER_PROBE), True)
+    mesh = mesh_at(LIVER_PROBE, 200, *usual_grading(LIVER_PROBE, 794, True), True)
     assert len(mesh.points) == 2471
     sphere = LIVER_PROBE.obstacles[0]
     even = mesh_at(LIVER_PROBE, 200, 0, 0, True)
@@ -169,7 +180,7 @@ def test_elements_that_would_fold_take_their_sides_back(mesh_cache):
 @pytest.mark.slow
 def test_the_wall_of_a_stomach_has_one_layer_and_its_lumen_is_known(mesh_cache):
     assert is_hollow(STOMACH_PROBE)
-    assert usual_grading(STOMACH_PROBE) == (0, 1)
+    assert usual_grading(STOMACH_PROBE, 794, True) == (0, 1)
     mesh = mesh_at(STOMACH_PROBE, 200, 0, 1, True)
     assert mesh.hollow and mesh.outer_count > 794
     level = true_shape(STOMACH_PROBE.organ).level(mesh.points)
