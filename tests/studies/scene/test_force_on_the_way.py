@@ -21,7 +21,7 @@ SCENES = (LIVER_PRESS, LIVER_PROBE, STOMACH_PRESS, STOMACH_PROBE)
 SIZE = 794
 MORE = 8.0
 """Damping [1/s] that the scenes had."""
-EQUILIBRIA = {"liver_press": (-2, 2, 3, 3, 3), "liver_probe": (14, 0, -7, -4, 3)}
+EQUILIBRIA = {"liver_press": (21, 6, 1, 0, 1), "liver_probe": (14, 0, -7, -4, 3)}
 """Scene -> what the force is above the reference at each checkpoint when nothing drags [%]."""
 
 
