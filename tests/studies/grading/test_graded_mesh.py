@@ -25,7 +25,8 @@ from studies.scenes.stomach_probe import STOMACH_PROBE
 from tests.studies.tiny import cube, file_scene, write_obj
 
 NODES = 600
-DOWN = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.01, 0.0)))
+PRESS = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.01, 0.0)))
+"""Of a plane, 10 mm."""
 CAP_AREA = 2 * np.pi * RADIUS * (1 - CAP) * RADIUS
 """Of the sphere beyond a plane (Archimedes)."""
 
@@ -147,7 +148,7 @@ def test_what_ten_tries_find_within_the_tolerance_is_taken(monkeypatch):
 @pytest.mark.slow
 def test_what_a_plane_presses_is_halved_at_outlines_where_vertices_suffice(mesh_cache):
     """The long outline of a kidney's hilum would leave two fifths of them; a probe needs them under itself."""
-    kidney = replace(KIDNEY_PROBE, obstacles=(Plane((0.0, -0.03, 0.0), (0.0, 1.0, 0.0), DOWN),))
+    kidney = replace(KIDNEY_PROBE, obstacles=(Plane((0.0, -0.03, 0.0), (0.0, 1.0, 0.0), PRESS),))
     assert [usual_grading(s, 794, True) for s in (LIVER_PRESS, kidney, LIVER_PROBE)] == [(3, 1), (1, 2), (1, 2)]
     with pytest.raises(StudyError, match="surface nodes asked for"):
         usual_grading(LIVER_PRESS, -1, True)
