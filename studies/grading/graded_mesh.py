@@ -15,39 +15,18 @@ from studies.scene.kind import load_of
 from studies.scene.meshing import mesh_for, remeshed
 from studies.scene.scene import Scene
 
-SOLID, PRESSED, HOLLOW = (1, 2), (3, 1), (0, 1)
-"""Times that elements are halved at outlines and at contacts (measured: docs/accuracy.md). A probe on a liver of 2,471
-nodes: force within 2.3 %, surface within 0.7 %, against 5.9 and 5.8 % on an even mesh of 1,473. What a plane presses
-errs at the outlines: three halvings halve each side there, and halve the error. The wall of a stomach is thin
-everywhere and gains from contacts alone."""
-LEAST_BASE = 0.55
-"""Of a body's vertices, those there must be before elements are halved so often as PRESSED says: a kidney, whose hilum
-has a long outline, would keep 0.4, and at 0.3 its force fell by a tenth."""
+SOLID, HOLLOW = (1, 2), (0, 1)
+"""Times that elements are halved at outlines and at contacts (measured: docs/accuracy.md). The wall of a stomach is
+thin everywhere and gains from contacts alone."""
 CLOSE, TOLERANCE = 0.03, 0.05
 """Deviation from the wanted number of nodes at which the search stops, and beyond which it has failed."""
 TRIES, MOST_TRIES = 10, 20
 """After so many the search ends with what is within TOLERANCE, and goes on to the second number where nothing is."""
 
 
-def usual_grading(scene: Scene, nodes: int, quadratic: bool) -> tuple[int, int]:
-    """Times that elements are halved at outlines and at contacts of a scene's organ with `nodes` nodes on its outer
-    surface. Raises StudyError for a number of nodes that is none."""
-    if is_hollow(scene):
-        return HOLLOW
-    pressed = load_of(scene) == "press" and remeshed(scene.organ)
-    return PRESSED if pressed and _leaves_enough(scene, nodes, quadratic) else SOLID
-
-
-def _leaves_enough(scene: Scene, nodes: int, quadratic: bool) -> bool:
-    """Whether PRESSED leaves LEAST_BASE of the vertices to the mesh that it halves; also false where a mesh of so few
-    cannot be made."""
-    check_nodes(scene, nodes, quadratic)
-    level = max(FEWEST, round(LEAST_BASE * vertices_of(nodes, quadratic)))
-    try:
-        fine = halved(scene, level, *PRESSED, quadratic)[2]
-    except StudyError:
-        return False
-    return outer_nodes(fine, quadratic) <= nodes
+def usual_grading(scene: Scene) -> tuple[int, int]:
+    """Times that elements are halved at outlines and at contacts of a scene's organ."""
+    return HOLLOW if is_hollow(scene) else SOLID
 
 
 def graded_mesh(
@@ -68,7 +47,16 @@ def graded_mesh(
 def mesh_at(scene: Scene, level: int, at_outlines: int, at_contact: int, quadratic: bool) -> OrganMesh | QuadraticMesh:
     """The same from `level` vertices on the outer surface before any is halved."""
     organ_mesh, coarse, fine = halved(scene, level, at_outlines, at_contact, quadratic)
-    return (quadratic_mesh if quadratic else linear_mesh)(scene, organ_mesh, coarse, fine)
+    if not quadratic:
+        return linear_mesh(scene, organ_mesh, coarse, fine)
+    return quadratic_mesh(scene, organ_mesh, coarse, fine, at_outlines > 0 and draws(scene))
+
+
+def draws(scene: Scene) -> bool:
+    """Whether the middles of sides are drawn to outlines, near which displacement goes as √r where strains are small.
+    What hangs by its outline, as a spleen under its weight, is strained so much there that drawn elements turn inside
+    out (docs/accuracy.md)."""
+    return bool(scene.held) and load_of(scene) != "sag"
 
 
 def halved(
@@ -92,9 +80,13 @@ def is_hollow(scene: Scene) -> bool:
 
 def coarse_level(scene: Scene, nodes: int, at_outlines: int, at_contact: int, quadratic: bool) -> int:
     """Surface vertices before halving that end in `nodes` nodes on the outer surface. Raises StudyError."""
-    check_nodes(scene, nodes, quadratic)
+    most = 4 * MOST - 6 if quadratic else MOST
+    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or not FEWEST <= nodes <= most:
+        raise StudyError(
+            f"scene '{scene.name}': {nodes!r} surface nodes asked for; give a whole number from {FEWEST} to {most}"
+        )
     found: dict[int, int] = {}
-    level, failed = max(FEWEST, vertices_of(nodes, quadratic)), None
+    level, failed = max(FEWEST, (nodes + 6) // 4 if quadratic else nodes), None
     for tried in range(MOST_TRIES):
         if tried >= TRIES and (not found or _off(found, nodes) <= TOLERANCE):
             break
@@ -118,20 +110,6 @@ def coarse_level(scene: Scene, nodes: int, at_outlines: int, at_contact: int, qu
             f"scene '{scene.name}': no graded mesh has {nodes} surface nodes; ask for {found[best]}, the nearest found"
         )
     return best
-
-
-def check_nodes(scene: Scene, nodes: int, quadratic: bool) -> None:
-    """Raises StudyError for a number of surface nodes that no mesh has."""
-    most = 4 * MOST - 6 if quadratic else MOST
-    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or not FEWEST <= nodes <= most:
-        raise StudyError(
-            f"scene '{scene.name}': {nodes!r} surface nodes asked for; give a whole number from {FEWEST} to {most}"
-        )
-
-
-def vertices_of(nodes: int, quadratic: bool) -> int:
-    """Those of a closed surface with so many nodes (Euler: E = 3V - 6 mid-side nodes)."""
-    return (nodes + 6) // 4 if quadratic else nodes
 
 
 def _best(found: dict[int, int], nodes: int) -> int:

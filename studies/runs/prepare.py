@@ -50,8 +50,7 @@ def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
         # Loaded where it is asked for: it brings the finite elements.
         from studies.grading.graded_mesh import graded_mesh, usual_grading
 
-        halvings = usual_grading(scene, recipe.nodes, quadratic) if recipe.graded else (0, 0)
-        return graded_mesh(scene, recipe.nodes, *halvings, quadratic)
+        return graded_mesh(scene, recipe.nodes, *(usual_grading(scene) if recipe.graded else (0, 0)), quadratic)
     # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.
     return mesh_for(scene, recipe.nodes, filled=recipe.kind == "tetrahedral" or scene.lumen is not None)
 

@@ -6,7 +6,7 @@ import pytest
 
 from massspring import ImplicitVolume
 from studies.catalog import STUDIES
-from studies.catalog.accuracy import ACCURACY, BUDGETS, COARSE_STEP, LONG, can_be_graded, headline, judged_at_rest
+from studies.catalog.accuracy import ACCURACY, COARSE_STEP, LONG, can_be_graded, headline, judged_at_rest
 from studies.catalog.work_precision import WORK_PRECISION
 from studies.grading.graded_mesh import usual_grading
 from studies.metrics.metrics import METRICS
@@ -86,6 +86,6 @@ def test_columns_are_what_advice_is_read_off():
 
 @pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)
 def test_bodies_are_graded_where_grading_changes_them(scene):
-    at_outlines, at_contact = usual_grading(scene, BUDGETS[1], True)
+    at_outlines, at_contact = usual_grading(scene)
     assert can_be_graded(scene) == bool((at_outlines and scene.held) or (at_contact and scene.obstacles))
     assert any(case.body.graded for case in of(scene)) == can_be_graded(scene)

@@ -63,7 +63,7 @@ def test_a_graded_quadratic_body_is_on_the_same_shape(scene, shape):
     """Halved elements too: their nodes and mid-side nodes lie on the shape, those of outlines on the outline."""
     mesh = mesh_at(scene, LEVEL, 1, 0, True)
     assert np.abs(shape.level(mesh.points[: mesh.outer_count])).max() < 1e-3 * RADIUS
-    assert mesh.volume == pytest.approx(VOLUME, rel=1e-3) and mesh.smallest_jacobian > 0
+    assert mesh.volume == pytest.approx(VOLUME, rel=2e-3) and mesh.smallest_jacobian > 0
     rim = np.abs(np.abs(mesh.points[mesh.patches["top"], 2]) - CAP * RADIUS) < 1e-9
     assert rim.sum() >= 12
 
