@@ -1,10 +1,12 @@
 """Compiled functions: what they may use, and which edit compiles them anew."""
 
 import ast
+import gc
 import re
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import numba
 import pytest
@@ -66,19 +68,22 @@ def kernel(x):
 
 @pytest.fixture(autouse=True)
 def no_arguments(monkeypatch):
-    """The kernels of the copies are given numbers."""
+    """The kernels of the copies are given numbers, and their module is known: numba looks for it by its name."""
     monkeypatch.setattr(compile_cache, "ARGUMENTS", ())
+    monkeypatch.setitem(sys.modules, "massspring.kernel", ModuleType("massspring.kernel"))
 
 
 def compiled_now(folder: Path):
-    """The kernel of the copy, as a new process would import it, called once."""
+    """The kernel of the copy, as a new process would import it, called once: nothing of an earlier one is left."""
     fresh("massspring.kernel")
-    names = {"LIMIT": 3, "__name__": "massspring.kernel"}
+    gc.collect()
+    names = vars(sys.modules["massspring.kernel"])
+    names["LIMIT"] = 3
     file = folder / "massspring" / "kernel.py"
     body = "\n" + file.read_text().split("\n", 1)[1]  # the import is of the copy, LIMIT is given
     exec(compile(body, file, "exec"), names)
     with kept():
-        function = numba.njit(cache=True)(names["kernel"])
+        function = numba.njit(cache=True)(names.pop("kernel"))
     assert function(1) == 4
     return function.stats
 
