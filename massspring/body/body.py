@@ -12,6 +12,7 @@ from massspring.body.volumes import Volumes, tetrahedron_volumes
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.spring_layout import Membrane
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
+from massspring.kernels.forces.tetrahedra import smallest_ratio
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
 
 SAME_VOLUME = 1e-9
@@ -192,10 +193,19 @@ class Body:
         springs = self.springs
         return float(spring_energy(self.rest, springs.ends, springs.rest_length, springs.stiffness))
 
-    @property
+    @cached_property
     def tetrahedron_volumes(self) -> np.ndarray:
         """Rest volumes [m³], (k,)."""
         return tetrahedron_volumes(self.rest, self.tetrahedra)
+
+    def smallest_ratio(self, x: np.ndarray) -> float:
+        """Smallest J [1] at positions `x` (n, 3) [m]: of quadratic elements det F at their points (eq. 8.9), as in a
+        reference, of linear ones V_t / V_t0 (eq. 2.3); NaN without elements, or where one is not a number."""
+        if isinstance(self.kept, PointVolumes):
+            return float(self.kept.jacobians(x).min())
+        if not len(self.tetrahedra):
+            return float("nan")
+        return float(smallest_ratio(tetrahedron_volumes(x, self.tetrahedra), self.tetrahedron_volumes))
 
     @property
     def size(self) -> float:

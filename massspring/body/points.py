@@ -80,7 +80,8 @@ class PointVolumes:
 
     def deformation(self, x: np.ndarray) -> np.ndarray:
         """F_q = Σ_a x_a ⊗ ∇N_a [1] at positions `x` (n, 3) [m], (k, 4, 3, 3)."""
-        return np.einsum("kai,kqaj->kqij", x[self.cells], self.gradient)
+        columns = np.swapaxes(self.gradient, 2, 3) @ x[self.cells][:, None]
+        return np.swapaxes(columns, 2, 3)
 
     def jacobians(self, x: np.ndarray) -> np.ndarray:
         """J_q = det F_q [1], (k, 4)."""

@@ -9,7 +9,6 @@ from massspring.body.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.forces.membrane import membrane_energy
 from massspring.kernels.forces.springs import spring_energy
-from massspring.kernels.forces.tetrahedra import smallest_ratio, tetrahedron_volumes_into
 from massspring.kernels.probe.arrays import COUNTS
 from massspring.layout.probe_arrays import tip_depth
 from massspring.layout.state import State
@@ -45,7 +44,7 @@ class History:
     held_force: np.ndarray
     """Mean force of each attachment on the body during the frame [N], (F, g, 3)."""
     min_j: np.ndarray
-    """Smallest tetrahedron volume ratio [1], (F,); NaN for a surface body."""
+    """Smallest J of an element [1], (F,); NaN for a surface body."""
     snapshot_frames: np.ndarray
     """Frame numbers, 1 … F, (s,)."""
     snapshots: np.ndarray
@@ -90,9 +89,7 @@ class Recorder:
         self.extra = frozenset(extra)
         self.body = body
         self.clock = clock
-        self.rest_volumes = body.tetrahedron_volumes
         self.rest_energy = body.rest_energy
-        self.cell_volumes = np.empty_like(self.rest_volumes)
         self.t = clock.frame * np.arange(1, frames + 1)
         self.scalars = {name: np.full(frames, np.nan) for name in ("kinetic", "elastic", "min_j")}
         self.volumes = body.kept
@@ -127,9 +124,7 @@ class Recorder:
         if "elastic" in self.extra:
             taut = spring_energy(inside_x, net.ends, net.rest_length, net.stiffness) - self.rest_energy
             self.scalars["elastic"][frame] = taut + membrane_energy(inside_x, net.membrane) + self.body.local_energy(x)
-        if len(self.rest_volumes):
-            tetrahedron_volumes_into(x, self.body.tetrahedra, self.cell_volumes)
-            self.scalars["min_j"][frame] = smallest_ratio(self.cell_volumes, self.rest_volumes)
+        self.scalars["min_j"][frame] = self.body.smallest_ratio(x)
         self.contact_force[frame, self.rank] = state.diagnostics.contact_impulse / self.clock.frame
         for o, obstacle in enumerate(self.obstacles):
             t = float(self.t[frame])

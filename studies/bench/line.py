@@ -20,6 +20,12 @@ class BenchLine:
         return "" if self.target is None else f"{'<=' if self.at_most else '>='} {self.target:g}"
 
     @property
+    def words(self) -> str:
+        """The line as `make bench` prints it, in columns."""
+        note = f"  {self.note}" if self.note else ""
+        return f"{self.verdict:>3}  {self.measured:>10.4g} {self.unit:<10} {self.promise:<11} {self.what}{note}"
+
+    @property
     def verdict(self) -> str:
         """Whether the target is reached."""
         if self.target is None:

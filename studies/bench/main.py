@@ -1,4 +1,5 @@
-"""The promised numbers, measured: `make bench` on a quiet machine. Prints a table, writes results/bench.csv."""
+"""The promised numbers, measured: `make bench` on a quiet machine. Prints each stage as it ends, writes
+results/bench.csv."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -131,7 +132,11 @@ def main() -> None:
         second_code_lines,
         geometry_lines,
     )
-    lines = [line for stage in stages for line in stage()]
+    lines, console = [], Console(soft_wrap=True)
+    for stage in stages:
+        for line in stage():
+            console.print(line.words, markup=False, highlight=False)
+            lines.append(line)
     table = pd.DataFrame(
         {
             "what": [line.what for line in lines],
@@ -142,7 +147,6 @@ def main() -> None:
             "note": [line.note for line in lines],
         }
     )
-    Console(soft_wrap=True).print(table.to_string(index=False, float_format=lambda v: f"{v:.4g}"), markup=False)
     root = Path("results")
     write_table(root / "bench.csv", table)
     set_stamp(root, "bench.csv")

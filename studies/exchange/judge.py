@@ -9,7 +9,6 @@ from typing import Any, cast
 import numpy as np
 
 from massspring import History
-from massspring.kernels.forces.tetrahedra import smallest_ratio, tetrahedron_volumes_into
 from massspring.layout.probe_arrays import tip_depth
 from massspring.sources import source_fingerprint
 from massspring.world.obstacles import Obstacle, Probe
@@ -53,7 +52,7 @@ def entry_record(
         key=case.key,
         name=entry_name(case),
         status=Status.INVERTED if inverted else Status.OK,
-        message="a tetrahedron ends inside out" if inverted else "",
+        message="an element ends inside out" if inverted else "",
         fingerprint=source_fingerprint(__name__),
         attributes=_attributes(fitting) | _sway(fitting, values) | {ENTRY: _named(path, fitting), SECONDS: seconds},
         fields=new_fields(RUN_FIELDS, values),
@@ -79,7 +78,7 @@ def measured(fitting: Fitting) -> dict[str, np.ndarray]:
         **_forces(scene, fitting.histories.get("force"), steps),
         "penetration": np.array(depth).reshape(steps, len(scene.obstacles)),
         "iterations": np.zeros((steps, 2), dtype=np.int64),
-        "min_j": _smallest_j(body.rest, body.tetrahedra, x),
+        "min_j": np.array([body.smallest_ratio(each) for each in x]),
         "snapshot_frame": np.array(at) + 1,
         "snapshots": x[at],
         "rest": body.rest,
@@ -104,17 +103,6 @@ def _forces(scene: Scene, force: np.ndarray | None, steps: int) -> dict[str, np.
         among = contact if scene.probed.what == "obstacle" else held
         among[:, scene.probed.number] = force[:, None] * direction / (direction @ direction)
     return {"contact_force": contact, "held_force": held}
-
-
-def _smallest_j(rest: np.ndarray, cells: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Smallest volume ratio of a tetrahedron at each step, (F,)."""
-    at_rest, now = np.empty(len(cells)), np.empty(len(cells))
-    tetrahedron_volumes_into(rest, cells, at_rest)
-    found = []
-    for each in x:
-        tetrahedron_volumes_into(np.ascontiguousarray(each), cells, now)
-        found.append(smallest_ratio(now, at_rest))
-    return np.array(found)
 
 
 def _attributes(fitting: Fitting) -> dict[str, Any]:

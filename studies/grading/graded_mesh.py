@@ -18,6 +18,11 @@ from studies.scene.scene import Scene
 SOLID, HOLLOW = (1, 2), (0, 1)
 """Times that elements are halved at outlines and at contacts (measured: docs/accuracy.md). The wall of a stomach is
 thin everywhere and gains from contacts alone."""
+MIDDLE, DRAWN, HUNG = 0.5, 0.4, 0.45
+"""Where the middle of a side stands that leaves an outline, as a share of its length from there: near it displacement
+goes as √r where strains are small. What hangs by its outline is strained so much there that sides drawn to 0.4 turn
+elements inside out (docs/accuracy.md). Three sides drawn leave (4 share − 1)³ of the Jacobian at the outline, 0.22 and
+0.51; below a share of 0.37 that is less than studies.grading.retreat allows."""
 CLOSE, TOLERANCE = 0.03, 0.05
 """Deviation from the wanted number of nodes at which the search stops, and beyond which it has failed."""
 TRIES, MOST_TRIES = 10, 20
@@ -49,14 +54,14 @@ def mesh_at(scene: Scene, level: int, at_outlines: int, at_contact: int, quadrat
     organ_mesh, coarse, fine = halved(scene, level, at_outlines, at_contact, quadratic)
     if not quadratic:
         return linear_mesh(scene, organ_mesh, coarse, fine)
-    return quadratic_mesh(scene, organ_mesh, coarse, fine, at_outlines > 0 and draws(scene))
+    return quadratic_mesh(scene, organ_mesh, coarse, fine, middles(scene) if at_outlines else MIDDLE)
 
 
-def draws(scene: Scene) -> bool:
-    """Whether the middles of sides are drawn to outlines, near which displacement goes as √r where strains are small.
-    What hangs by its outline, as a spleen under its weight, is strained so much there that drawn elements turn inside
-    out (docs/accuracy.md)."""
-    return bool(scene.held) and load_of(scene) != "sag"
+def middles(scene: Scene) -> float:
+    """Where the middles of sides stand that leave an outline of the scene's held regions (DRAWN)."""
+    if not scene.held:
+        return MIDDLE
+    return HUNG if load_of(scene) == "sag" else DRAWN
 
 
 def halved(

@@ -21,10 +21,6 @@ from studies.grading.retreat import Measure, retreat
 from studies.grading.true_shape import as_curved, on_true_shape, true_shape
 from studies.scene.scene import Scene
 
-SHARE = 0.4
-"""Where the middle of a side stands that leaves an outline, as a share of its length; ½ elsewhere. Three sides drawn
-leave (4 SHARE − 1)³ = 0.22 of the Jacobian at the outline; below 0.37 that is less than studies.grading.retreat
-allows."""
 OFF = 1e-3
 """Of the body's size: nodes farther than this from where they belong are told of."""
 
@@ -54,9 +50,11 @@ def linear_mesh(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: Hel
     )
 
 
-def quadratic_mesh(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh, drawn: bool) -> QuadraticMesh:
-    """The finer mesh with mid-side nodes, curved where the true shape is known: where not, a warning says so; drawn:
-    those of sides that leave an outline nearer to it.
+def quadratic_mesh(
+    scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh, share: float
+) -> QuadraticMesh:
+    """The finer mesh with mid-side nodes, curved where the true shape is known: where not, a warning says so;
+    those of sides that leave an outline at `share` of them from it.
 
     Raises StudyError.
     """
@@ -68,8 +66,8 @@ def quadratic_mesh(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: 
         )
     else:
         points = curved_points(scene, organ_mesh, coarse, fine, shape)
-    if drawn:
-        points = drawn_points(points, fine, organ_mesh.name)
+    if share != 0.5:
+        points = drawn_points(points, fine, share, organ_mesh.name)
     order, outer_count, surface_count = boundary_first(fine, cells)
     new = inverse(order)
     *held, outer, lumen = all_facets(fine)
@@ -101,14 +99,14 @@ def curved_points(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: H
     return points
 
 
-def drawn_points(points: np.ndarray, body: HeldMesh, name: str) -> np.ndarray:
-    """Nodes at `points` (n, 3) [m] with the middles of sides that leave an outline at SHARE of them, as far as no
-    element folds."""
+def drawn_points(points: np.ndarray, body: HeldMesh, share: float, name: str) -> np.ndarray:
+    """Nodes at `points` (n, 3) [m] with the middles of sides that leave an outline at `share` of them, as far as
+    no element folds."""
     held, mesh = all_facets(body)[:-2], MeshTet2.from_mesh(body.mesh)
     outlines = np.concatenate([rim_sides(facets)[:, :2].ravel() for facets in held])
     cells = upright_cells(body)
     measure = upright_against(nodes(body.mesh), cells)
-    return moved(points, drawn_middles(points, mesh, outlines, SHARE), cells, measure, name)
+    return moved(points, drawn_middles(points, mesh, outlines, share), cells, measure, name)
 
 
 def less_bent(points: np.ndarray, body: HeldMesh, name: str) -> np.ndarray:

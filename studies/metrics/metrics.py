@@ -70,7 +70,7 @@ def silhouette_error(run: Run) -> float:
 
 
 def min_j(run: Run) -> float:
-    """Smallest tetrahedron volume ratio over all frames [1]; NaN for a surface body."""
+    """Smallest J of an element over all frames [1]; NaN for a surface body."""
     return float(np.min(run.fields.min_j))
 
 

@@ -37,7 +37,7 @@ class Status(StrEnum):
 STATUSES: dict[Status, str] = {
     Status.OK: "finished, with nothing to object to",
     Status.DIVERGED: "values not finite, or nodes that left",
-    Status.INVERTED: "a tetrahedron ends inside out",
+    Status.INVERTED: "an element ends inside out",
     Status.DRIFTED: "a kept volume more than 1 % off",
     Status.NOT_CONVERGED: "the reference found no equilibrium at a checkpoint",
     Status.BLOCKED: "a thin probe was driven through tissue that had nowhere to go",
@@ -76,7 +76,9 @@ class RunFields(Table):
     penetration = array("F o", NUMBER, "m", "depth of the deepest surface node in each obstacle")
     held_force = array("F g 3", NUMBER, "N", "force of each held region on the body, mean of the frame")
     iterations = array("F 2", INDEX, "1", "for the multipliers: sum of the frame, most in a step")
-    min_j = array("F", NUMBER, "1", "smallest tetrahedron volume ratio; NaN without tetrahedra")
+    min_j = array(
+        "F", NUMBER, "1", "smallest volume ratio of tetrahedra, J at points of quadratic ones; NaN without"
+    )
     snapshot_frame = array("K", INDEX, "1", "number of the frame after which each snapshot was taken")
     snapshots = array("K n 3", NUMBER, "m", "positions at the scene's checkpoints")
     rest = array("n 3", NUMBER, "m", "rest positions")

@@ -19,7 +19,7 @@ def named(setup: Setup, history: History) -> tuple[str, str]:
     """What a finished run is called, and why: ok, inverted, drifted or penetrated."""
     smallest = float(history.min_j[-1])
     if smallest <= 0.0:
-        return "inverted", f"a tetrahedron ends inside out (smallest volume ratio {smallest:.3g})"
+        return "inverted", f"an element ends inside out (smallest volume ratio {smallest:.3g})"
     deepest = float(np.max(history.penetration[-1], initial=0.0))
     if deepest > INSIDE * setup.body.size:
         return "penetrated", f"a node lies {1e3 * deepest:.3g} mm inside an obstacle"

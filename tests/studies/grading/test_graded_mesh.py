@@ -13,8 +13,7 @@ from studies.geometry.mesh.jacobian import PAIRS
 from studies.geometry.mesh.organ_mesh import signed_volume, tetrahedron_volumes
 from studies.geometry.surface.family import true_volume
 from studies.grading import graded_mesh as search
-from studies.grading.graded_mesh import graded_mesh, halved, is_hollow, mesh_at, usual_grading
-from studies.grading.shaping import SHARE
+from studies.grading.graded_mesh import DRAWN, graded_mesh, halved, is_hollow, mesh_at, usual_grading
 from studies.grading.true_shape import true_shape
 from studies.scene.meshing import mesh_for
 from studies.scene.scene import Held
@@ -200,7 +199,7 @@ def test_a_mesh_from_a_file_keeps_its_straight_sides_and_says_so(tmp_path, mesh_
     with pytest.warns(UserWarning, match="its true shape is not known, so the sides"):
         mesh = graded_mesh(scene, NODES, 1, 1, True)
     assert mesh.volume == pytest.approx(1e-3, rel=1e-12)
-    assert mesh.smallest_jacobian == pytest.approx((4 * SHARE - 1) ** 3, rel=1e-9)  # where three sides are drawn
+    assert mesh.smallest_jacobian == pytest.approx((4 * DRAWN - 1) ** 3, rel=1e-9)  # where three sides are drawn
     bottom = mesh.points[: mesh.surface_count, 2] == -0.05
     np.testing.assert_array_equal(mesh.patches["bottom"], np.flatnonzero(bottom))
     with warnings.catch_warnings():

@@ -61,7 +61,8 @@ def test_masses_and_the_origin_are_where_they_are_asked():
         ({"steps": 12 * 10**12}, "refused"),
     ],
 )
-def test_each_end_has_its_name(changes, status):
+def test_each_end_has_its_name(changes, status, monkeypatch):
+    monkeypatch.setattr(module, "SECONDS", 600.0)  # compiling counts, on a busy machine
     found = tried(replace(CALM, **changes))
     assert found.status == status
     assert bool(found.message) == (status != "ok")

@@ -51,6 +51,8 @@ def test_a_line_is_judged_by_its_target_or_not_at_all():
     assert faster.verdict == "NO" and faster.promise == ">= 1.6"
     limit = BenchLine("the machine", 1e9, "ms")
     assert limit.verdict == limit.promise == ""
+    assert faster.words.split() == ["NO", "1.5", "1", ">=", "1.6", "times", "faster"]
+    assert limit.words.split() == ["1e+09", "ms", "the", "machine"]
 
 
 def test_the_loop_beside_the_steps_does_the_same_each_time():
