@@ -18,7 +18,7 @@ WITHIN = (
     (LIVER, "probed", 0.05),
     (SPLEEN, "lifted", 0.03),
     (SPLEEN, "pressed", 0.03),
-    (SPLEEN, "probed", 0.03),
+    (SPLEEN, "probed", 0.045),
     (STOMACH, "lifted", 0.03),
     (STOMACH, "pressed", 0.03),
     (STOMACH, "probed", 0.03),
