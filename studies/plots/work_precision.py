@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 
 from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, front, judged
 from studies.metrics.metric import Metric
@@ -164,7 +165,7 @@ def _name(panel: Axes, points: Sequence[tuple[Judged, Measured]], recommended: J
     papers = [(one, error) for one, error in points if family_of(one.case).name == PAPER]
     if papers:
         one, error = max(papers, key=lambda pair: pair[0].cost.value)
-        _write(panel, one, error, PAPER, "center")
+        _write(panel, one, error, PAPER, "bottom")
     for one, error in points:
         if one is recommended:
             # To the lower left of the best for the time there is nothing.
@@ -179,13 +180,14 @@ def _write(panel: Axes, one: Judged, error: Measured, words: str, vertical: str)
     panel.annotate(
         words,
         (one.cost.value, _height(error)),
-        xytext=(9 if in_left else -9, -7 if vertical == "top" else 0),
+        xytext=(9 if in_left else -9, -7 if vertical == "top" else 2),
         textcoords="offset points",
         ha="left" if in_left else "right",
         va=vertical,
         size=SMALL,
         weight="bold" if vertical == "top" else "normal",
         zorder=3,
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],  # readable on the front and its points
     )
 
 
