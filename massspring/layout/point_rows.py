@@ -5,7 +5,7 @@ from scipy.sparse import csr_array, diags_array
 
 from massspring.body.body import Body
 from massspring.body.points import FAR, NEAR, PointVolumes
-from massspring.kernels.points.arrays import BLOCK, CORNERS, POINTS, ROWS, PointRows
+from massspring.kernels.points.arrays import AREAS, BLOCK, CORNERS, POINTS, ROWS, SUMS, PointRows
 from massspring.layout.facet_rows import facet_rows
 from massspring.layout.sell_chunks import aligned
 
@@ -23,8 +23,7 @@ def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> P
     volume_start, volume_entry = _entries(volumes.corner_volume, volumes.vertex_count, 1)
     return PointRows(
         node=_in_blocks(volumes.cells.astype(np.uint32)),
-        gradient=_in_blocks(volumes.gradient.reshape(-1, POINTS * ROWS), padding=0),
-        weight=_in_blocks(volumes.weight, padding=0),
+        per_weight=_in_blocks(1.0 / volumes.weight),
         own=float(NEAR),
         other=float(FAR),
         bulk=body.local_bulk,
@@ -37,12 +36,12 @@ def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> P
         closed_nodes=np.unique(closed).astype(np.uint32),
         closed_gradient=np.zeros((n, 3)),
         heavier=body.mass - body.moved_mass,
-        area=aligned((blocks * POINTS * ROWS, BLOCK), REAL),
+        area=aligned((blocks * POINTS * AREAS, BLOCK), REAL),
         stretch=aligned((blocks * POINTS, BLOCK), REAL),
         corner_pressure=aligned((blocks * CORNERS, BLOCK), REAL),
         corner_share=aligned((blocks * CORNERS, BLOCK), REAL),
         element_push=aligned((blocks * ROWS, BLOCK), REAL),
-        tile=aligned((ROWS + POINTS, BLOCK), REAL),
+        tile=aligned((SUMS + POINTS, BLOCK), REAL),
         push=aligned((n, 3), REAL),
         diagonal=diagonal,
         inverse=inverse,
@@ -61,14 +60,11 @@ def _compliance(rows: csr_array, inverse_mass: np.ndarray) -> csr_array:
     return csr_array(rows @ diags_array(np.repeat(inverse_mass, 3)) @ rows.T)
 
 
-def _in_blocks(table: np.ndarray, padding: int | None = None) -> np.ndarray:
-    """Of elements (k, c) the numbers of each column side by side, (c b, BLOCK).
-
-    Empty places have `padding`, or repeat the first element.
-    """
+def _in_blocks(table: np.ndarray) -> np.ndarray:
+    """Of elements (k, c) the numbers of each column side by side, (c b, BLOCK); empty places repeat the first."""
     count, width = table.shape
     blocks = -(-count // BLOCK)
-    filled = np.full((blocks * BLOCK, width), table[:1] if padding is None else padding, dtype=table.dtype)
+    filled = np.full((blocks * BLOCK, width), table[:1], dtype=table.dtype)
     filled[:count] = table
     found = aligned((blocks * width, BLOCK), table.dtype)
     found[:] = filled.reshape(blocks, BLOCK, width).transpose(0, 2, 1).reshape(-1, BLOCK)

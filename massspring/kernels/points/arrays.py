@@ -7,8 +7,10 @@ import numpy as np
 BLOCK = 16
 """Elements side by side: a multiple of what a vector register holds."""
 NODES, POINTS, CORNERS = 10, 4, 4
-ROWS = 3 * NODES
-"""Of a point in `gradient` and `area`: x, y, z of every node."""
+ROWS, AREAS = 3 * NODES, 9
+"""Of an element: x, y, z of every node; of a point in `area`: x, y, z of three corners."""
+SUMS = ROWS + AREAS
+"""Row of the first point's sum in the tile."""
 
 
 class FacetRows(NamedTuple):
@@ -57,15 +59,14 @@ class FacetRows(NamedTuple):
 class PointRows(NamedTuple):
     """m volumes over b blocks of quadratic tetrahedra, v of vertices and then those inside closed surfaces.
 
-    Numbers of the elements of a block follow each other in a row. Empty elements have no weight and no gradient.
+    Numbers of the elements of a block follow each other in a row. Empty elements repeat the first, and
+    nothing asks for what they give.
     """
 
     node: np.ndarray
     """(10 b, BLOCK) uint32."""
-    gradient: np.ndarray
-    """∇N_a at rest [1/m], (120 b, BLOCK)."""
-    weight: np.ndarray
-    """w_q [m³], (4 b, BLOCK)."""
+    per_weight: np.ndarray
+    """1/w_q [1/m³], (4 b, BLOCK)."""
     own: float
     """ρ of the corner next to a point; `other` of each of the three others."""
     other: float
@@ -90,7 +91,7 @@ class PointRows(NamedTuple):
     heavier: np.ndarray
     """What gravity pulls at beyond the mass that resists motion [kg], (n,)."""
     area: np.ndarray
-    """Scratch: w_q cof F_q ∇N_a [m²], (120 b, BLOCK)."""
+    """Scratch: w_q cof F_q ∇b_i of three corners [m²], (36 b, BLOCK)."""
     stretch: np.ndarray
     """Scratch: −b (J_q − 1) [Pa], (4 b, BLOCK)."""
     corner_pressure: np.ndarray
@@ -100,7 +101,7 @@ class PointRows(NamedTuple):
     element_push: np.ndarray
     """Scratch: forces of the elements on their nodes [N], (30 b, BLOCK)."""
     tile: np.ndarray
-    """Scratch: a vector of the nodes of a block, and w_q J_q of its points, (34, BLOCK)."""
+    """Scratch: a vector of the nodes of a block, what points share of its slopes, a sum of each, (43, BLOCK)."""
     volume: np.ndarray
     """V_r [m³], (m,)."""
     lam: np.ndarray

@@ -1,6 +1,8 @@
 """Sums over the points of quadratic tetrahedra: volumes, their gradients, and products with both.
 
-A vector register holds the same number of several elements.
+A vector register holds the same number of several elements. b_i are the linear shape functions of the corners; at a
+point n is that of the nearest corner, o that of the others. F_q = Σ_i W_i ⊗ ∇b_i over three corners, with
+W_i = ∂x/∂b_i − ∂x/∂b_0, so w_q J_q = det W / 24 and w_q cof F_q ∇b_i = W_j × W_k / 24: no slope at rest is needed.
 """
 
 from massspring.kernels.forces.volume import volume_gradient_into
@@ -8,7 +10,10 @@ from massspring.kernels.fused.sweep import cross, dot
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.jit.vectors import gather, lanes_of, load, save, spread
-from massspring.kernels.points.arrays import BLOCK, CORNERS, NODES, POINTS, ROWS
+from massspring.kernels.points.arrays import AREAS, BLOCK, CORNERS, NODES, POINTS, ROWS, SUMS
+
+AT_0, AT_1, AT_2, AT_3 = (0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3)
+"""Of the point near each corner: the nodes between that corner and the four, itself among them."""
 
 
 @njit_inlined
@@ -37,46 +42,73 @@ def load_three(table, row, lane):
 
 
 @njit_inlined
-def plus_scaled(sums, vector, factor):
-    return sums[0] + vector[0] * factor, sums[1] + vector[1] * factor, sums[2] + vector[2] * factor
-
-
-@njit_inlined
 def times(vector, factor):
     return vector[0] * factor, vector[1] * factor, vector[2] * factor
 
 
 @njit_inlined
-def open_point(rows, block, q, lane):
-    """F_q of the positions in the tile, D_qa = w_q cof F_q ∇N_a of all nodes into `area`, −b (J_q − 1) into `stretch`,
+def open_block(rows, lane):
+    """B_i = (4 o − 1)(x_i − x_0) + 4 o Σ_j (x_ij − x_0j), of the tile's vector x at the corners and between them: what
+    all points share of ∂x/∂b_i − ∂x/∂b_0 (eq. 8.9)."""
+    corner, side = spread(4.0 * rows.other - 1.0, rows.tile), spread(4.0 * rows.other, rows.tile)
+    x, tile = rows.tile, flat(rows.tile, 0, rows.tile.shape[0])
+    for axis in range(3):
+        x0, x1, x2, x3 = load(x, axis, lane), load(x, 3 + axis, lane), load(x, 6 + axis, lane), load(x, 9 + axis, lane)
+        x01, x12, x02 = load(x, 12 + axis, lane), load(x, 15 + axis, lane), load(x, 18 + axis, lane)
+        x03, x13, x23 = load(x, 21 + axis, lane), load(x, 24 + axis, lane), load(x, 27 + axis, lane)
+        at = (ROWS + axis) * BLOCK + lane
+        save(corner * (x1 - x0) + side * (x12 + x13 - x02 - x03), tile, at)
+        save(corner * (x2 - x0) + side * (x12 + x23 - x01 - x03), tile, at + 3 * BLOCK)
+        save(corner * (x3 - x0) + side * (x13 + x23 - x01 - x02), tile, at + 6 * BLOCK)
+
+
+@njit_inlined
+def slope(rows, side, near, first, lane):
+    """W_i = ∂x/∂b_i − ∂x/∂b_0 = B_i + 4 (n − o)(x_iq − x_0q) at point q; `near` and `first` are the nodes iq and 0q."""
+    nearer, base = spread(4.0 * (rows.own - rows.other), rows.tile), load_three(rows.tile, ROWS + 3 * side, lane)
+    to, of = load_three(rows.tile, 3 * near, lane), load_three(rows.tile, 3 * first, lane)
+    return base[0] + nearer * (to[0] - of[0]), base[1] + nearer * (to[1] - of[1]), base[2] + nearer * (to[2] - of[2])
+
+
+@njit_inlined
+def slopes(rows, between, lane):
+    """W_1, W_2 and W_3 at the point whose corner has `between`, the nodes half-way to each corner."""
+    first, one, two, three = between
+    return slope(rows, 0, one, first, lane), slope(rows, 1, two, first, lane), slope(rows, 2, three, first, lane)
+
+
+@njit_inlined
+def open_point(rows, block, q, between, lane):
+    """A_i = W_j × W_k / 24 = w_q cof F_q ∇b_i of the positions in the tile into `area`, −b (J_q − 1) into `stretch`,
     w_q J_q into the tile."""
-    none, point = spread(0, rows.weight), block * POINTS + q
-    first = ROWS * point
-    f1, f2, f3 = (none, none, none), (none, none, none), (none, none, none)
-    for a in range(NODES):
-        x, g = load_three(rows.tile, 3 * a, lane), load_three(rows.gradient, first + 3 * a, lane)
-        f1, f2, f3 = plus_scaled(f1, x, g[0]), plus_scaled(f2, x, g[1]), plus_scaled(f3, x, g[2])
-    c1, c2, c3 = cross(f2, f3), cross(f3, f1), cross(f1, f2)
-    weight, ratio = load(rows.weight, point, lane), dot(f1, c1)
-    stretch, tile = flat(rows.stretch, point, point + 1), flat(rows.tile, ROWS + q, ROWS + q + 1)
-    save(spread(-rows.bulk, rows.weight) * (ratio - spread(1, rows.weight)), stretch, lane)
-    save(weight * ratio, tile, lane)
-    c1, c2, c3 = times(c1, weight), times(c2, weight), times(c3, weight)
-    area = flat(rows.area, first, first + ROWS)
-    for a in range(NODES):
-        g, at = load_three(rows.gradient, first + 3 * a, lane), 3 * a * BLOCK + lane
-        d = plus_scaled(plus_scaled(times(c1, g[0]), c2, g[1]), c3, g[2])
-        save(d[0], area, at)
-        save(d[1], area, at + BLOCK)
-        save(d[2], area, at + 2 * BLOCK)
+    w1, w2, w3 = slopes(rows, between, lane)
+    part, point = spread(1.0 / 24.0, rows.tile), block * POINTS + q
+    a1, a2, a3 = times(cross(w2, w3), part), times(cross(w3, w1), part), times(cross(w1, w2), part)
+    now = dot(w1, a1)
+    stretch, tile = flat(rows.stretch, point, point + 1), flat(rows.tile, SUMS + q, SUMS + q + 1)
+    ratio = now * load(rows.per_weight, point, lane)
+    save(spread(-rows.bulk, rows.tile) * (ratio - spread(1, rows.tile)), stretch, lane)
+    save(now, tile, lane)
+    area = flat(rows.area, AREAS * point, AREAS * (point + 1))
+    save_three(a1, area, lane)
+    save_three(a2, area, lane + 3 * BLOCK)
+    save_three(a3, area, lane + 6 * BLOCK)
+
+
+@njit_inlined
+def save_three(vector, table, at):
+    """x, y and z into rows that follow each other."""
+    save(vector[0], table, at)
+    save(vector[1], table, at + BLOCK)
+    save(vector[2], table, at + 2 * BLOCK)
 
 
 @njit_inlined
 def share_among_corners(rows, block, lane):
     """Σ_q ρ_rq s_q of the corners r, of the numbers s_q in the tile, into `corner_share`."""
-    own, other = spread(rows.own - rows.other, rows.weight), spread(rows.other, rows.weight)
-    s0, s1 = load(rows.tile, ROWS, lane), load(rows.tile, ROWS + 1, lane)
-    s2, s3 = load(rows.tile, ROWS + 2, lane), load(rows.tile, ROWS + 3, lane)
+    own, other = spread(rows.own - rows.other, rows.tile), spread(rows.other, rows.tile)
+    s0, s1 = load(rows.tile, SUMS, lane), load(rows.tile, SUMS + 1, lane)
+    s2, s3 = load(rows.tile, SUMS + 2, lane), load(rows.tile, SUMS + 3, lane)
     all_of = other * (s0 + s1 + s2 + s3)
     share = flat(rows.corner_share, CORNERS * block, CORNERS * (block + 1))
     save(all_of + own * s0, share, lane)
@@ -99,12 +131,15 @@ def add_corners(rows, out):
 
 @njit_lean
 def measure_into(rows, x, padded):
-    """D_qa and −b (J_q − 1) of all points, V_r [m³], and dV/dx of the closed surface; `padded` (n, 4) holds `x`."""
+    """A_i and −b (J_q − 1) of all points, V_r [m³], and dV/dx of the closed surface; `padded` (n, 4) holds `x`."""
     for block in range(blocks_of(rows)):
         gather_block(rows, padded, block)
         for lane in range(0, BLOCK, lanes_of(padded)):
-            for q in range(POINTS):
-                open_point(rows, block, q, lane)
+            open_block(rows, lane)
+            open_point(rows, block, 0, AT_0, lane)
+            open_point(rows, block, 1, AT_1, lane)
+            open_point(rows, block, 2, AT_2, lane)
+            open_point(rows, block, 3, AT_3, lane)
             share_among_corners(rows, block, lane)
     add_corners(rows, rows.volume)
     if rows.closed_nodes.shape[0] > 0:
@@ -116,7 +151,7 @@ def measure_into(rows, x, padded):
 def push_block(rows, block, lane, stretched):
     """f_a = Σ_q p_q D_qa [N] of the elements of a block, p_q = Σ_r ρ_rq p_r and, where `stretched`, −b (J_q − 1)."""
     first = POINTS * block
-    own, other = spread(rows.own - rows.other, rows.weight), spread(rows.other, rows.weight)
+    own, other = spread(rows.own - rows.other, rows.tile), spread(rows.other, rows.tile)
     p0, p1 = load(rows.corner_pressure, first, lane), load(rows.corner_pressure, first + 1, lane)
     p2, p3 = load(rows.corner_pressure, first + 2, lane), load(rows.corner_pressure, first + 3, lane)
     all_of = other * (p0 + p1 + p2 + p3)
@@ -124,11 +159,41 @@ def push_block(rows, block, lane, stretched):
     if stretched:
         p0, p1 = p0 + load(rows.stretch, first, lane), p1 + load(rows.stretch, first + 1, lane)
         p2, p3 = p2 + load(rows.stretch, first + 2, lane), p3 + load(rows.stretch, first + 3, lane)
-    area, push, at = rows.area, flat(rows.element_push, ROWS * block, ROWS * (block + 1)), ROWS * first
-    for k in range(ROWS):
-        force = p0 * load(area, at + k, lane) + p1 * load(area, at + ROWS + k, lane)
-        force = force + p2 * load(area, at + 2 * ROWS + k, lane) + p3 * load(area, at + 3 * ROWS + k, lane)
-        save(force, push, k * BLOCK + lane)
+    for axis in range(3):
+        push_along(rows, block, axis, (p0, p1, p2, p3), lane)
+
+
+@njit_inlined
+def pushes(rows, point, axis, pressure, lane):
+    """p_q A_i of the four corners along an axis; those of a point sum to 0."""
+    first = AREAS * point + axis
+    g1, g2 = pressure * load(rows.area, first, lane), pressure * load(rows.area, first + 3, lane)
+    g3 = pressure * load(rows.area, first + 6, lane)
+    return spread(0, rows.tile) - (g1 + g2 + g3), g1, g2, g3
+
+
+@njit_inlined
+def push_along(rows, block, axis, pressure, lane):
+    """Forces of a block along an axis: (4 o − 1) Σ_q g_iq + 4 (n − o) g_ii on corner i, 4 o Σ_q (g_iq + g_jq) +
+    4 (n − o)(g_ij + g_ji) between i and j, with g_iq = p_q A_i at point q."""
+    point, out = POINTS * block, flat(rows.element_push, ROWS * block, ROWS * (block + 1))
+    g00, g10, g20, g30 = pushes(rows, point, axis, pressure[0], lane)
+    g01, g11, g21, g31 = pushes(rows, point + 1, axis, pressure[1], lane)
+    g02, g12, g22, g32 = pushes(rows, point + 2, axis, pressure[2], lane)
+    g03, g13, g23, g33 = pushes(rows, point + 3, axis, pressure[3], lane)
+    corner, side = spread(4.0 * rows.other - 1.0, rows.tile), spread(4.0 * rows.other, rows.tile)
+    nearer, at, row = spread(4.0 * (rows.own - rows.other), rows.tile), axis * BLOCK + lane, 3 * BLOCK
+    s0, s1, s2, s3 = g00 + g01 + g02 + g03, g10 + g11 + g12 + g13, g20 + g21 + g22 + g23, g30 + g31 + g32 + g33
+    save(corner * s0 + nearer * g00, out, at)
+    save(corner * s1 + nearer * g11, out, at + row)
+    save(corner * s2 + nearer * g22, out, at + 2 * row)
+    save(corner * s3 + nearer * g33, out, at + 3 * row)
+    save(side * (s0 + s1) + nearer * (g01 + g10), out, at + 4 * row)
+    save(side * (s1 + s2) + nearer * (g12 + g21), out, at + 5 * row)
+    save(side * (s0 + s2) + nearer * (g02 + g20), out, at + 6 * row)
+    save(side * (s0 + s3) + nearer * (g03 + g30), out, at + 7 * row)
+    save(side * (s1 + s3) + nearer * (g13 + g31), out, at + 8 * row)
+    save(side * (s2 + s3) + nearer * (g23 + g32), out, at + 9 * row)
 
 
 @njit_inlined
@@ -141,7 +206,7 @@ def push_elements(rows, p, stretched):
     for e in range(pressure.shape[0]):
         pressure[e] = p[volume[e]]
     for block in range(blocks_of(rows)):
-        for lane in range(0, BLOCK, lanes_of(rows.weight)):
+        for lane in range(0, BLOCK, lanes_of(rows.tile)):
             push_block(rows, block, lane, stretched)
 
 
@@ -168,17 +233,27 @@ def push_into(rows, p):
         rows.push[i, 0], rows.push[i, 1], rows.push[i, 2] = push_of(rows, force, p, i)
 
 
+@njit_inlined
+def flow_point(rows, block, q, between, lane):
+    """Σ_a D_qa·u_a = Σ_i A_i·W_i of the tile's vector u, into the tile."""
+    w1, w2, w3 = slopes(rows, between, lane)
+    first = AREAS * (POINTS * block + q)
+    a1, a2 = load_three(rows.area, first, lane), load_three(rows.area, first + 3, lane)
+    total = dot(a1, w1) + dot(a2, w2) + dot(load_three(rows.area, first + 6, lane), w3)
+    save(total, flat(rows.tile, SUMS + q, SUMS + q + 1), lane)
+
+
 @njit_lean
 def times_into(rows, u, product):
     """(J u)_r = Σ_q ρ_rq Σ_a D_qa·u_a of `u` (n, 4) with 0 as fourth number, (m,)."""
     for block in range(blocks_of(rows)):
         gather_block(rows, u, block)
         for lane in range(0, BLOCK, lanes_of(u)):
-            for q in range(POINTS):
-                first, total = ROWS * (POINTS * block + q), spread(0, u)
-                for k in range(ROWS):
-                    total = total + load(rows.area, first + k, lane) * load(rows.tile, k, lane)
-                save(total, flat(rows.tile, ROWS + q, ROWS + q + 1), lane)
+            open_block(rows, lane)
+            flow_point(rows, block, 0, AT_0, lane)
+            flow_point(rows, block, 1, AT_1, lane)
+            flow_point(rows, block, 2, AT_2, lane)
+            flow_point(rows, block, 3, AT_3, lane)
             share_among_corners(rows, block, lane)
     add_corners(rows, product)
     if rows.closed_nodes.shape[0] > 0:

@@ -60,7 +60,7 @@ def kept_body(row, request):
 def test_rest_stays_at_rest(kept_body, method):
     history = simulate(Setup(kept_body, method, clock_for(kept_body, 5, 20, method=method)))
     assert np.abs(history.final - kept_body.rest).max() < 1e-13 * kept_body.size
-    assert np.abs(history.volume / kept_body.rest_volumes - 1).max() < 1e-13
+    assert np.abs(history.volume / kept_body.rest_volumes - 1).max() < 2e-13
 
 
 def test_free_flight_keeps_momentum_and_spin(kept_body, method):
