@@ -76,9 +76,7 @@ class RunFields(Table):
     penetration = array("F o", NUMBER, "m", "depth of the deepest surface node in each obstacle")
     held_force = array("F g 3", NUMBER, "N", "force of each held region on the body, mean of the frame")
     iterations = array("F 2", INDEX, "1", "for the multipliers: sum of the frame, most in a step")
-    min_j = array(
-        "F", NUMBER, "1", "smallest volume ratio of tetrahedra, J at points of quadratic ones; NaN without"
-    )
+    min_j = array("F", NUMBER, "1", "smallest volume ratio of tetrahedra, J at points of quadratic ones; NaN without")
     snapshot_frame = array("K", INDEX, "1", "number of the frame after which each snapshot was taken")
     snapshots = array("K n 3", NUMBER, "m", "positions at the scene's checkpoints")
     rest = array("n 3", NUMBER, "m", "rest positions")

@@ -1,80 +1,27 @@
 """Sums over the points of quadratic tetrahedra: volumes, their gradients, and products with both.
 
-A vector register holds the same number of several elements. b_i are the linear shape functions of the corners; at a
-point n is that of the nearest corner, o that of the others. F_q = Σ_i W_i ⊗ ∇b_i over three corners, with
-W_i = ∂x/∂b_i − ∂x/∂b_0, so w_q J_q = det W / 24 and w_q cof F_q ∇b_i = W_j × W_k / 24: no slope at rest is needed.
+W_i, A_i and numbers n and o of a point: massspring.kernels.points.slopes.
 """
 
 from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.fused.sweep import cross, dot
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.flat import flat
-from massspring.kernels.jit.vectors import gather, lanes_of, load, save, spread
-from massspring.kernels.points.arrays import AREAS, BLOCK, CORNERS, NODES, POINTS, ROWS, SUMS
-
-AT_0, AT_1, AT_2, AT_3 = (0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3)
-"""Of the point near each corner: the nodes between that corner and the four, itself among them."""
-
-
-@njit_inlined
-def blocks_of(rows):
-    """How many blocks of elements there are."""
-    return rows.node.shape[0] // NODES
-
-
-@njit_inlined
-def gather_block(rows, vector, block):
-    """What `vector` (n, 4) is at the nodes of a block, x, y, z of each, into the tile."""
-    tile = flat(rows.tile, 0, rows.tile.shape[0])
-    for a in range(NODES):
-        for lane in range(0, BLOCK, lanes_of(vector)):
-            x, y, z = gather(vector, rows.node, NODES * block + a, lane)
-            at = 3 * a * BLOCK + lane
-            save(x, tile, at)
-            save(y, tile, at + BLOCK)
-            save(z, tile, at + 2 * BLOCK)
-
-
-@njit_inlined
-def load_three(table, row, lane):
-    """x, y and z from rows that follow each other."""
-    return load(table, row, lane), load(table, row + 1, lane), load(table, row + 2, lane)
-
-
-@njit_inlined
-def times(vector, factor):
-    return vector[0] * factor, vector[1] * factor, vector[2] * factor
-
-
-@njit_inlined
-def open_block(rows, lane):
-    """B_i = (4 o − 1)(x_i − x_0) + 4 o Σ_j (x_ij − x_0j), of the tile's vector x at the corners and between them: what
-    all points share of ∂x/∂b_i − ∂x/∂b_0 (eq. 8.9)."""
-    corner, side = spread(4.0 * rows.other - 1.0, rows.tile), spread(4.0 * rows.other, rows.tile)
-    x, tile = rows.tile, flat(rows.tile, 0, rows.tile.shape[0])
-    for axis in range(3):
-        x0, x1, x2, x3 = load(x, axis, lane), load(x, 3 + axis, lane), load(x, 6 + axis, lane), load(x, 9 + axis, lane)
-        x01, x12, x02 = load(x, 12 + axis, lane), load(x, 15 + axis, lane), load(x, 18 + axis, lane)
-        x03, x13, x23 = load(x, 21 + axis, lane), load(x, 24 + axis, lane), load(x, 27 + axis, lane)
-        at = (ROWS + axis) * BLOCK + lane
-        save(corner * (x1 - x0) + side * (x12 + x13 - x02 - x03), tile, at)
-        save(corner * (x2 - x0) + side * (x12 + x23 - x01 - x03), tile, at + 3 * BLOCK)
-        save(corner * (x3 - x0) + side * (x13 + x23 - x01 - x02), tile, at + 6 * BLOCK)
-
-
-@njit_inlined
-def slope(rows, side, near, first, lane):
-    """W_i = ∂x/∂b_i − ∂x/∂b_0 = B_i + 4 (n − o)(x_iq − x_0q) at point q; `near` and `first` are the nodes iq and 0q."""
-    nearer, base = spread(4.0 * (rows.own - rows.other), rows.tile), load_three(rows.tile, ROWS + 3 * side, lane)
-    to, of = load_three(rows.tile, 3 * near, lane), load_three(rows.tile, 3 * first, lane)
-    return base[0] + nearer * (to[0] - of[0]), base[1] + nearer * (to[1] - of[1]), base[2] + nearer * (to[2] - of[2])
-
-
-@njit_inlined
-def slopes(rows, between, lane):
-    """W_1, W_2 and W_3 at the point whose corner has `between`, the nodes half-way to each corner."""
-    first, one, two, three = between
-    return slope(rows, 0, one, first, lane), slope(rows, 1, two, first, lane), slope(rows, 2, three, first, lane)
+from massspring.kernels.jit.vectors import lanes_of, load, save, spread
+from massspring.kernels.points.arrays import AREAS, BLOCK, CORNERS, POINTS, ROWS, SUMS
+from massspring.kernels.points.slopes import (
+    AT_0,
+    AT_1,
+    AT_2,
+    AT_3,
+    blocks_of,
+    gather_block,
+    load_three,
+    open_block,
+    save_three,
+    slopes,
+    times,
+)
 
 
 @njit_inlined
@@ -93,14 +40,6 @@ def open_point(rows, block, q, between, lane):
     save_three(a1, area, lane)
     save_three(a2, area, lane + 3 * BLOCK)
     save_three(a3, area, lane + 6 * BLOCK)
-
-
-@njit_inlined
-def save_three(vector, table, at):
-    """x, y and z into rows that follow each other."""
-    save(vector[0], table, at)
-    save(vector[1], table, at + BLOCK)
-    save(vector[2], table, at + 2 * BLOCK)
 
 
 @njit_inlined

@@ -72,9 +72,9 @@ def test_a_block_rests_below_the_angle_and_without_slip(angle, friction):
     while the pressure builds up, which only the plane without slip takes back."""
     history, _ = slid(angle, friction, 1.2)
     weight = WEAK * slab().mass.sum()
-    force = history.contact_force[-1, 0]
+    force = history.contact_force[-10:, 0].mean(axis=0)  # without slip points come and go: that of one frame scatters
     tilt = np.radians(angle)
-    assert np.allclose(force, weight * np.array([-np.sin(tilt), 0.0, np.cos(tilt)]), atol=1e-2 * weight)
+    assert np.allclose(force, weight * np.array([-np.sin(tilt), 0.0, np.cos(tilt)]), atol=3e-3 * weight)
     low = places(slab(), slab().rest)[:, 2] < 1e-9
     first, middle, end = (places(slab(), x)[low, :2].mean(axis=0) for x in (slab().rest, *history.snapshots))
     assert np.abs(end - middle).max() < CREEP and np.abs(mean_motion(history, 0, 1)).max() < CREEP
