@@ -1,9 +1,9 @@
 """Questions asked of both solvers: scenes, runs, metrics, results and charts. What a user imports is here."""
 
-from typing import TYPE_CHECKING
-
 from studies.base.face import lazy
 
+TYPE_CHECKING = False
+"""As typing has it, which would be loaded first: the command line listens for Ctrl-C right after this file."""
 if TYPE_CHECKING:
     from massspring.methods import METHODS
     from massspring.methods.barycentre import Barycentre

@@ -120,6 +120,7 @@ LINES, LENGTH, ARGUMENTS, FOLDER = 250, 40, 7, 16
 MORE_ARGUMENTS = {
     "massspring/kernels/jit/row_sums.py": "code for vector registers is given one by one what it loads",
     "massspring/kernels/points/facet_forces.py": "what is solved for, and what it acts on",
+    "studies/geometry/api/organs.py": "each decides the mesh, and most have a usual value",
     "reference_fem/system/assembly.py": "loops are unrolled by lengths that are given one by one, a fifth faster",
 }
 """Files with functions of more arguments, and why; the options of a command are as many as it has."""

@@ -23,7 +23,8 @@ def build(tmp_path, monkeypatch):
 
 def test_every_page_is_in_the_menu_and_what_it_shows_is_copied(build, tmp_path):
     menu = [file for entry in build.copy_pages() for file in entry.values()]
-    pages = {f"docs/{page.name}" for page in ROOT.glob("docs/*.md")} | {"README.md", "CONTRIBUTING.md", "CHANGELOG.md"}
+    pages = {f"docs/{page.name}" for page in ROOT.glob("docs/*.md")}
+    pages |= {"README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"}
     assert set(menu) == pages and len(menu) == len(pages)
     assert menu[:3] == ["README.md", "docs/how-a-run-works.md", "docs/theory.md"]
     shown = re.findall(r"\]\((results/[^)]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))

@@ -44,10 +44,11 @@ print({block.type: len(block.data) for block in body.cells}, f"{1e6 * kidney.vol
 # %% [markdown]
 # ## Where it is held and palpated
 #
-# By rule: the blunter end of the longest axis is held, the flattest patch that can be reached is palpated.
+# By rule: the blunter end of the longest axis is held, the flattest patch that can be reached is palpated. `--hold` and
+# `--probe` choose other places. The name of the file does not say which organ it is, so `--tissue` does.
 
 # %% language="bash"
-# organbench place body.vtu --nodes 150 -o my_scene.py --picture my_scene.png
+# organbench place body.vtu --tissue kidney --nodes 150 -o my_scene.py --picture my_scene.png
 
 # %%
 Image("my_scene.png", width=700)
@@ -55,16 +56,16 @@ Image("my_scene.png", width=700)
 # %% [markdown]
 # ## Run it
 #
-# The scene file is a study like all others: `organbench run my_scene.py` solves the reference too, which takes minutes
-# to an hour. Here the body alone runs, for 50 frames.
+# The scene file is a study like all others: `organbench run my_scene.py` solves the reference too and runs a second
+# body, the recommended one, in minutes to an hour. Here the first body alone runs, for 50 frames.
 
 # %%
 import matplotlib.pyplot as plt
-from my_scene import CASE
+from my_scene import CASES
 
 from studies import Run, measure
 
-case = CASE.replaced(frames=50)
+case = CASES[0].replaced(frames=50)
 record = measure(case)
 run = Run(case, record)
 figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")

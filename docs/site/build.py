@@ -1,8 +1,8 @@
 """Builds the documentation site: `python docs/site/build.py`, then open site/index.html (no network needed).
 
-Pages: README, CONTRIBUTING, CHANGELOG and docs/*.md as they stand, the notebooks of docs/gallery with what they show,
-and one for every folder of the three packages with the docstrings of its modules, which are read from the sources, not
-imported. A broken link ends with exit code 1, and so does a notebook that fails.
+Pages: README, CONTRIBUTING, SECURITY, CHANGELOG and docs/*.md as they stand, the notebooks of docs/gallery with what
+they show, and one for every folder of the three packages with the docstrings of its modules, which are read from the
+sources, not imported. A broken link ends with exit code 1, and so does a notebook that fails.
 """
 
 import json
@@ -37,7 +37,7 @@ def copy_pages() -> list:
     shutil.rmtree(STAGE, ignore_errors=True)
     shutil.copytree(ROOT / "docs", STAGE / "docs", ignore=shutil.ignore_patterns("site"))
     shutil.copytree(SITE / "assets", STAGE / "assets")
-    for file in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"):
+    for file in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "LICENSE"):
         shutil.copy(ROOT / file, STAGE / file)
     for page in STAGE.rglob("*.md"):
         for shown in LINK.findall(page.read_text(encoding="utf-8")):
@@ -45,7 +45,8 @@ def copy_pages() -> list:
                 (STAGE / shown).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(ROOT / shown, STAGE / shown)
     names = sorted((page.stem for page in STAGE.glob("docs/*.md")), key=lambda name: (*FIRST, name).index(name))
-    pages = [STAGE / "docs" / f"{name}.md" for name in names] + [STAGE / "CONTRIBUTING.md", STAGE / "CHANGELOG.md"]
+    pages = [STAGE / "docs" / f"{name}.md" for name in names]
+    pages += [STAGE / f"{name}.md" for name in ("CONTRIBUTING", "SECURITY", "CHANGELOG")]
     return [{"organbench": "README.md"}] + [{title(page): str(page.relative_to(STAGE))} for page in pages]
 
 

@@ -91,9 +91,11 @@ def _why_not_points(body: Body) -> str | None:
 
 
 def _why_not_elements(body: Body) -> str | None:
-    if body.rest_pressure:
-        return None
-    return "its springs must have no length; take law 'cotangent' with one volume per node, or a quadratic body"
+    if not body.rest_pressure:
+        return "its springs must have no length; take law 'cotangent' with one volume per node, or a quadratic body"
+    if _why_not_one_volume(body) is None:
+        return "it keeps the volume of each element, the body keeps the whole alone; keep one volume per node"
+    return None
 
 
 def _why_not_one_volume(body: Body) -> str | None:

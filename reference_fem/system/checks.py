@@ -118,13 +118,16 @@ def check_times(times, start):
 
 
 def check_resumed(rest, state):
-    """Refuse a stored state that does not fit the problem, whose state at rest is `rest`."""
-    for name in ("x", "multiplier", "pressure"):
-        wanted, given = getattr(rest, name).shape, getattr(state, name).shape
-        if wanted != given:
+    """Refuse a stored state that does not fit the problem, whose state at rest is `rest`: compiled loops do not look at
+    the length of an array."""
+    wanted, given = rest.to_arrays(), state.to_arrays()
+    for name in wanted:
+        one, other = wanted[name], given[name]
+        if one.shape != other.shape or (one.ndim and one.dtype != other.dtype):
             raise SolveError(
-                f"the load step to go on from has {name} of shape {given}, this problem {wanted}: it is of another "
-                f"mesh, element or set of obstacles, solve the path from its start"
+                f"the load step to go on from has {name} of shape {other.shape} ({other.dtype}), this problem "
+                f"{one.shape} ({one.dtype}): it is of another mesh, element or set of obstacles, solve the path from "
+                f"its start"
             )
 
 

@@ -10,7 +10,7 @@ from studies.advice.population import Unseen, unseen
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog.accuracy import ACCURACY
-from studies.metrics.judged import Judged, cheapest, cost_of_frames, nearest
+from studies.metrics.judged import UNKNOWN, Judged, cheapest, cost_of_frames, nearest
 from studies.metrics.wish import Wish
 from studies.runs.case import BodyRecipe
 from studies.scene.kind import kind_of
@@ -51,6 +51,8 @@ class Advice:
     """Scenes of the same kind, where the scene itself was never run; the errors are the worst of them."""
     short: ShortTiming | None = None
     """The timing that was taken for this answer."""
+    misshapen: Judged | None = None
+    """The cheapest that meets the wish and would be chosen if it kept the shape of its organ."""
     unseen: Unseen | None = None
     """What the chosen recipe did on other organs of the kind; None where no population was run with it."""
 
@@ -68,7 +70,7 @@ def advise(
     results: Path | str = RESULTS,
     timing: bool = True,
 ) -> Advice:
-    """The cheapest recipe whose measured errors meet a wish.
+    """The cheapest recipe whose measured errors meet a wish, and whose body keeps the shape of its organ.
 
     scene: one of SCENES by name, or any other; force, displacement: largest |force_end| and mean_error [1]; where
     neither is given 0.03 and 0.01, of a hollow organ 0.06 and 0.03; budget: computing over simulated time [1];
@@ -128,7 +130,8 @@ def _known(scene: Scene, results: Path) -> tuple[Stored, tuple[str, ...]]:
 
 
 def _chosen(scene: Scene, named: Wish, rows: list[Judged], found: Stored) -> Advice:
-    """The cheapest that meets the wish, else the nearest. No error is wished finer than the reference is known."""
+    """The cheapest that meets the wish and keeps the shape, else the nearest. No error is wished finer than the
+    reference is known."""
     wish = named.or_usual(scene)
     errors = {name: bound for name in ERRORS if (bound := getattr(wish, name)) is not None}
     ignored = tuple(name for name in errors if not any(getattr(one, name).known for one in rows))
@@ -137,7 +140,15 @@ def _chosen(scene: Scene, named: Wish, rows: list[Judged], found: Stored) -> Adv
     )
     best = None if unknowable else cheapest(rows, wish)
     chosen = best or nearest(rows, wish)
-    return Advice(scene, wish, wish != named, found, chosen, best is not None, unknowable, ignored)
+    misshapen = None if unknowable else _misshapen(rows, wish)
+    return Advice(scene, wish, wish != named, found, chosen, best is not None, unknowable, ignored, misshapen=misshapen)
+
+
+def _misshapen(rows: list[Judged], wish: Wish) -> Judged | None:
+    """The cheapest that meets the wish if nobody looks at its shape; None where it keeps that."""
+    whole = {one.case.key: one for one in rows}
+    blind = cheapest((replace(one, shape=UNKNOWN, shape_volume=UNKNOWN) for one in rows), wish)
+    return whole[blind.case.key] if blind is not None and whole[blind.case.key].off_shape else None
 
 
 def _timed(answer: Advice) -> Advice:

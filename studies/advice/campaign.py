@@ -10,7 +10,7 @@ import pandas as pd
 from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.accuracy import ACCURACY
-from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, judged
+from studies.metrics.judged import DISPLACEMENT, DISTANCE, FORCE, VOLUME, Judged, Measured, judged
 from studies.metrics.metric import Metric
 from studies.runs.case import Case
 from studies.runs.current import case_path
@@ -80,7 +80,7 @@ def _published(results: Path, scene: Scene) -> list[Judged]:
         return []
     try:
         rows = pd.read_csv(path)
-        here = machine_of(results / PUBLISHED) == machine_id()
+        here = machine_of(results / PUBLISHED, ACCURACY.name) == machine_id()
         chosen = rows.loc[(rows["scene"] == scene.name) & (rows["status"] == Status.OK)]
         return [_judged_row(scene, row, here) for row in chosen.to_dict("records")]
     except (KeyError, ValueError, OSError) as error:
@@ -94,7 +94,8 @@ def _published(results: Path, scene: Scene) -> list[Judged]:
 def _judged_row(scene: Scene, row: dict[Any, Any], here: bool) -> Judged:
     case: Case = case_of_recipe(scene, row["recipe"])
     cost = Measured(1.0 / float(row[COST]) if float(row.get(COST, "nan")) > 0 else float("nan"))
-    return Judged(case, _of(row, FORCE), _of(row, DISPLACEMENT), cost, 1e-3 * float(row["dt [ms]"]), here)
+    force, displacement, shape, volume = (_of(row, entry) for entry in (FORCE, DISPLACEMENT, DISTANCE, VOLUME))
+    return Judged(case, force, displacement, cost, 1e-3 * float(row["dt [ms]"]), here, shape, volume)
 
 
 def _of(row: dict[Any, Any], metric: Metric) -> Measured:

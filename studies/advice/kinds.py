@@ -10,6 +10,9 @@ from studies.runs.recipe_text import recipe_text
 from studies.scene.kind import kind_of
 from studies.scene.scene import Scene
 
+NUMBERS = ("force", "displacement", "cost", "shape", "shape_volume")
+"""Of Judged: what is measured."""
+
 
 def same_kind(scene: Scene, known: Iterable[Scene]) -> list[Scene]:
     """The scenes that are as hollow and loaded in the same way."""
@@ -28,10 +31,8 @@ def worst_of(scene: Scene, groups: Sequence[Sequence[Judged]]) -> list[Judged]:
         case = same[0].case.replaced(scene=scene)
         if _refused(scene, case):
             continue
-        force, displacement, cost = (
-            _largest([getattr(one, name) for one in same]) for name in ("force", "displacement", "cost")
-        )
-        found.append(Judged(case, force, displacement, cost))
+        force, displacement, cost, shape, volume = (_largest([getattr(one, name) for one in same]) for name in NUMBERS)
+        found.append(Judged(case, force, displacement, cost, shape=shape, shape_volume=volume))
     return found
 
 

@@ -1,34 +1,57 @@
 """Whether an archive, packed or unpacked, is what was packed."""
 
 import hashlib
+import os
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable
-from pathlib import Path
+from functools import partial
+from pathlib import Path, PurePosixPath
 from typing import IO
 
 from studies.base.errors import DamagedFile, StudyError
 from studies.store.archived import MANIFEST
 
 AGAIN = "get the archive again"
+LARGEST = 50_000_000
+"""Bytes of a manifest: half a million files."""
+ENCRYPTED = 1
+"""Of the flags of a file in a zip."""
 Opener = Callable[[str], IO[bytes]]
 
 
 def check(path: Path) -> int:
     """Compares every file of a zip, or of a folder that one was unpacked to, with its checksum; how many there are.
 
-    Files that others added to a folder are left alone. Raises StudyError for what is no archive, DamagedFile with the
-    first file that is missing or has changed.
+    Files that others added to a folder are left alone; only regular files of the folder are opened, and nothing is
+    unpacked. Raises StudyError for what is no archive or is encrypted, DamagedFile with the first file that is missing,
+    has changed or lies outside.
     """
     if path.is_dir():
-        return _compare(path, lambda name: open(path / name, "rb"))
+        return _compare(path, partial(_of_folder, path))
     if not path.is_file():
         raise StudyError(f"there is no archive {path}; give the zip file, or the folder that it was unpacked to")
     try:
         with zipfile.ZipFile(path) as archive:
-            return _compare(path, archive.open)
+            return _compare(path, partial(_of_zip, path, archive))
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as problem:
         raise DamagedFile(f"{path} is cut off or damaged ({problem}): {AGAIN}") from problem
+
+
+def _of_folder(folder: Path, name: str) -> IO[bytes]:
+    """A file of a folder, opened. A pipe or a device would be read for ever, also where a link leads to it."""
+    file = folder / name
+    if file.exists() and not file.is_file():
+        raise DamagedFile(f"{folder}: {name} is no regular file: {AGAIN}")
+    if not Path(os.path.realpath(file)).is_relative_to(os.path.realpath(folder)):
+        raise DamagedFile(f"{folder}: {name} is a link that leads outside: {AGAIN}")
+    return open(file, "rb")
+
+
+def _of_zip(path: Path, archive: zipfile.ZipFile, name: str) -> IO[bytes]:
+    if archive.getinfo(name).flag_bits & ENCRYPTED:
+        raise StudyError(f"{path} is encrypted: unpack it with its password, and check the folder")
+    return archive.open(name)
 
 
 def _compare(path: Path, opened: Opener) -> int:
@@ -51,11 +74,25 @@ def _entries(path: Path, opened: Opener) -> Iterable[tuple[str, str]]:
     """(name, SHA-256) of every file that was packed."""
     try:
         with opened(MANIFEST) as file:
-            lines = file.read().decode("utf-8", errors="replace").splitlines()
+            content = file.read(LARGEST + 1)
     except (KeyError, FileNotFoundError) as problem:
         raise StudyError(f"{path} is no archive of organbench: it has no {MANIFEST}") from problem
-    for line in lines:
+    except OSError as problem:
+        raise StudyError(f"{path / MANIFEST} cannot be read ({problem.strerror}): change its permissions") from problem
+    if len(content) > LARGEST:
+        raise DamagedFile(f"{path}: {MANIFEST} has more than {LARGEST / 1e6:.0f} MB: {AGAIN}")
+    names = set[str]()
+    for line in content.decode("utf-8", errors="replace").splitlines():
         expected, separator, name = line.partition("  ")
-        if not separator or len(expected) != 64:
+        if not separator or len(expected) != 64 or name in names:
             raise DamagedFile(f"{path}: {MANIFEST} is not what was packed: {AGAIN}")
+        if not _inside(name):
+            raise DamagedFile(f"{path}: {MANIFEST} names {name!r}, which lies outside: it is no archive of ours")
+        names.add(name)
         yield name, expected
+
+
+def _inside(name: str) -> bool:
+    """Whether a name leads to a place below the folder, and is the only name of that place."""
+    place = PurePosixPath(name)
+    return not place.is_absolute() and ".." not in place.parts and place.as_posix() == name and name != "."

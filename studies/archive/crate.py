@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.archive.citation import ABSTRACT, AUTHORS, LICENSE
-from studies.catalog.study import Study
+from studies.catalog.study import Study, command_line
 from studies.store.archived import CRATE
 from studies.store.paths import study_folder
 
@@ -19,6 +19,7 @@ FORMATS = {
     ".csv": "text/csv",
     ".h5": "application/x-hdf5",
     ".html": "text/html",
+    ".js": "text/javascript",
     ".json": "application/json",
     ".md": "text/markdown",
     ".png": "image/png",
@@ -126,7 +127,7 @@ def _action(folder: Path, study: Study, files: Sequence[Entity]) -> Entity:
     return {
         "@id": _action_id(study),
         "@type": "CreateAction",
-        "name": f"organbench run {study.name}",
+        "name": command_line("run", [study], elsewhere=True),
         "description": study.question,
         "instrument": {"@id": "#organbench"},
         "result": [{"@id": file["@id"]} for file in files if file["@id"].startswith(home)],

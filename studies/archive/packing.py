@@ -126,7 +126,9 @@ def describe(stage: Path, studies: Sequence[Study], day: str, extra: Iterable[Pa
     for name in OWN:
         shutil.copytree(ROOT / name, stage / CODE / name, ignore=shutil.ignore_patterns("__pycache__"))
     names = [study.name for study in studies]
-    page = README.format(version=version, names=", ".join(names), first=names[0], manifest=MANIFEST)
+    page = README.format(
+        version=version, names=", ".join(names), first=Path(studies[0].word).name or names[0], manifest=MANIFEST
+    )
     (stage / "README.md").write_text(page, encoding="utf-8")
     (stage / "CITATION.cff").write_text(citation(version), encoding="utf-8")
     (stage / "constraints.txt").write_text(pins(), encoding="utf-8")

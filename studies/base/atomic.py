@@ -68,12 +68,15 @@ def _host() -> str:
 
 
 def is_there(path: Path) -> bool:
-    """Whether `path` exists. Raises StudyError when that cannot be seen, as in a folder that may not be entered."""
+    """Whether `path` exists; a link that leads nowhere, or to itself, does not. Raises StudyError when that cannot be
+    seen, as in a folder that may not be entered."""
     try:
         os.stat(path)
     except (FileNotFoundError, NotADirectoryError):
         return False
     except OSError as problem:
+        if problem.errno == errno.ELOOP:
+            return False
         reason = problem.strerror or str(problem)
         raise StudyError(f"{path} cannot be looked at ({reason}): change the permissions of its folder") from problem
     return True
@@ -139,6 +142,8 @@ def _sentence(path: Path, size: int | None, problem: OSError) -> str:
             f"{path}{megabytes} was not written, the disk is full: free some space and run again; "
             "everything stored before is kept"
         )
+    if path.is_dir():
+        return f"{path} was not written, a folder lies in its place: move that folder or delete it, and run again"
     reason = problem.strerror or str(problem)
     return (
         f"{path} was not written ({reason}): choose a results folder that can be written to; "

@@ -1,9 +1,14 @@
 """Lazy faces of packages (PEP 562): a name of the face loads the module it lives in, the others stay unloaded."""
 
-from collections.abc import Callable, Mapping
+from __future__ import annotations
+
 from importlib import import_module
 from sys import modules
-from typing import Any
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import Any
 
 DISTRIBUTION = "organbench"
 """Name under which pip knows the three packages."""

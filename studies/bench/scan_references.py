@@ -20,8 +20,9 @@ from studies.population.folder import DURATION, NODES, PLAN, placed_scene
 from studies.reference.load import Reference, load_reference
 from studies.reference.reference_solves import reference_solves
 from studies.reference.solve import solve
+from studies.scene.chosen_place import vector
 from studies.scene.placing import scaled
-from studies.scene.proposal import HELD, Proposal, proposal, vector
+from studies.scene.proposal import HELD, Proposal, proposal
 from studies.scene.scene import ForceOutput, Held, Scene
 from studies.scene.scene_file import python_name
 
@@ -66,6 +67,7 @@ def lifted(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
     """The same organ without a probe, its free end grasped as much as the other is held, and lifted across its length,
     along its shortest axis."""
     centres, areas = mesh.points[mesh.outer_triangles].mean(axis=1), triangle_areas(mesh.points, mesh.outer_triangles)
+    assert isinstance(found.hold, HalfSpace)  # by rule, not at a point
     away = np.asarray(found.hold.normal)
     order = np.argsort(-(centres @ away))
     last = centres[order[int(np.searchsorted(np.cumsum(areas[order]) / areas.sum(), HELD))]]

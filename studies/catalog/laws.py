@@ -33,5 +33,14 @@ LAWS_STUDY = Study(
         ),
     ),
     charts=(Chart("laws.png", "studies.plots.laws:draw"),),
-    columns=("force_error", "force_end", "silhouette_error", "pressure_error", "volume_worst", "min_j"),
+    columns=(
+        "force_error",
+        "force_end",
+        "silhouette_error",
+        "shape_error",
+        "shape_volume",
+        "pressure_error",
+        "volume_worst",
+        "min_j",
+    ),
 )

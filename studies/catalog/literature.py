@@ -42,5 +42,16 @@ LITERATURE_STUDY = Study(
     question=__doc__ or "",
     cases=tuple(case for scene in judged_at_rest() for case in (*ours(scene), *literature_cases(scene))),
     charts=(Chart("literature.png", "studies.plots.work_precision:draw"),),
-    columns=("force_end", "mean_error", "real_time", "step_time", "volume_worst", "min_j", "surface_error", "sway"),
+    columns=(
+        "force_end",
+        "mean_error",
+        "shape_error",
+        "shape_volume",
+        "real_time",
+        "step_time",
+        "volume_worst",
+        "min_j",
+        "surface_error",
+        "sway",
+    ),
 )

@@ -51,6 +51,8 @@ METHODS_STUDY = Study(
         "force_error",
         "force_end",
         "silhouette_error",
+        "shape_error",
+        "shape_volume",
         "interior_error",
         "pressure_error",
         "volume_worst",

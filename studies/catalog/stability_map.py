@@ -4,6 +4,7 @@ from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.store.schema import Status
 
 FRAMES = 100
 STEPS_PER_FRAME = (4, 6, 8, 12, 16, 24, 32, 48, 64, 96)
@@ -30,4 +31,5 @@ STABILITY_MAP = Study(
     charts=(Chart("stability.png", "studies.plots.campaigns.stability:draw"),),
     columns=("volume_worst", "min_j"),
     main=True,
+    expects=(Status.DIVERGED,),
 )

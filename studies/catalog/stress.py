@@ -4,6 +4,7 @@ from massspring import Free, ImplicitVolume, Shake
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.stress import STRESS_SCENES
+from studies.store.schema import Status
 
 NODES = 230
 """On the surface: about 316 with those inside, as many as in docs/theory.md, section 5."""
@@ -30,4 +31,5 @@ STRESS = Study(
     ),
     charts=(Chart("recovery.png", "studies.plots.campaigns.recovery:draw"),),
     columns=("inverted_share", "rest_distance", "volume_end", "min_j"),
+    expects=(Status.DIVERGED, Status.INVERTED, Status.DRIFTED),
 )

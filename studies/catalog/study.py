@@ -1,15 +1,18 @@
 """A study: a question, the cases that answer it, the charts that show the answer."""
 
+import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from studies.base.errors import StudyError
+from studies.base.lookup import lookup
 from studies.runs.case import Case
 from studies.scene.scene import Scene
 from studies.store.paths import readable
+from studies.store.schema import Status
 
 if TYPE_CHECKING:
     from studies.metrics.metric import Metric
@@ -22,7 +25,7 @@ SMOKE_NODES, SMOKE_NODES_HOLLOW = 150, 400
 """A wall folds on a coarser surface."""
 SMOKE_QUADRATIC = (594, 794)
 """Of 150 and 200 vertices: fewer hold no node of a small region."""
-RESERVED = ("cache", "calibration", "entries", "figures", "main", "reference", "smoke", "verify")
+RESERVED = ("cache", "calibration", "entries", "figures", "main", "reference", "report-cases", "smoke", "verify")
 """Folders of the results that are no study's, and the word for the main studies."""
 SMOKE_FRAMES = 20
 
@@ -42,11 +45,15 @@ class Chart:
             return self.drawing
         module, _, function = self.drawing.partition(":")
         try:
-            return getattr(import_module(module), function)
-        except (ImportError, AttributeError, ValueError) as error:
+            drawing = getattr(import_module(module), function)
+        except Exception as error:  # a module of a user may fail in any way
             raise StudyError(
-                f"chart {self.file}: there is no function {self.drawing!r} ({error}); give 'package.module:function'"
+                f"chart {self.file}: there is no function {self.drawing!r} ({type(error).__name__}: {error}); "
+                "give 'package.module:function'"
             ) from error
+        if callable(drawing):
+            return cast("Drawing", drawing)
+        raise StudyError(f"chart {self.file}: {self.drawing!r} is no function; give one of the runs and a path")
 
     def __post_init__(self) -> None:
         if readable(self.file) != self.file:
@@ -74,27 +81,53 @@ class Study:
     """Whether it belongs to `make study`, and to `organbench run` without a name."""
     counts_losses: bool = False
     """Whether cases and references that fail are part of its answer: it is published with them."""
+    word: str = field(default="", compare=False)
+    """What the command line calls it where that is not its name: FILE.py, or NAME@FOLDER."""
+    expects: tuple[str, ...] = ()
+    """How its cases may end besides ok and skipped: with any other status, `organbench run` ends with exit code 1."""
 
     def __post_init__(self) -> None:
         if self.name in RESERVED:
             raise StudyError(f"a study cannot be called '{self.name}': that word has another meaning for the program")
-        for what, kind in (("cases", Case), ("charts", Chart), ("columns", str)):
+        for what, kind in (("cases", Case), ("charts", Chart), ("columns", str), ("expects", str)):
             given = getattr(self, what)
             if not isinstance(given, tuple | list):
                 raise StudyError(f"{what} is {given!r}; give a tuple, such as ({given!r},)")
             odd = [item for item in given if not isinstance(item, kind) and not (kind is str and _is_metric(item))]
             if odd:
                 raise StudyError(f"{what} holds {odd[0]!r}, which is no {kind.__name__}")
+        for status in self.expects:
+            lookup(status, [str(known) for known in Status], "status that a study expects")
 
     def smoke(self) -> "Study":
         """The same study on small meshes, few frames and the two coarsest reference meshes: does it work at all?"""
         small = {case.key: case for case in map(smoke_case, self.cases)}
         return replace(self, cases=tuple(small.values()))
 
+    def accepts(self, status: str) -> bool:
+        """Whether a case may end so."""
+        return self.counts_losses or status in (Status.OK, Status.SKIPPED, *self.expects)
+
     @property
     def scenes(self) -> tuple[Scene, ...]:
         """The scenes of the cases, each once."""
         return tuple({case.scene.name: case.scene for case in self.cases}.values())
+
+
+def command_line(verb: str, studies: Sequence[Study], *options: str, elsewhere: bool = False) -> str:
+    """The line for a shell that calls a command with studies, such as "organbench run FILE.py --case NAME".
+
+    elsewhere: whether others read the line, on a page or in an archive; it then has of an absolute path the last part
+    alone.
+    """
+    words = [word_elsewhere(study) if elsewhere else study.word or study.name for study in studies]
+    return shlex.join(["organbench", verb, *words, *options])
+
+
+def word_elsewhere(study: Study) -> str:
+    """What the command line calls a study: its name, FILE.py, or NAME@FOLDER; of an absolute path the last part."""
+    name, on, path = (study.word or study.name).rpartition("@")
+    return name + on + (Path(path).name if Path(path).is_absolute() else path)
 
 
 def _is_metric(item: object) -> bool:

@@ -34,6 +34,8 @@ VOLUME_LOSS = Study(
         "force_end",
         "interior_error",
         "mean_error",
+        "shape_error",
+        "shape_volume",
         "silhouette_error",
         "min_j",
         "force_error",

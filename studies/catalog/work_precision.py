@@ -24,6 +24,16 @@ WORK_PRECISION = Study(
     question=__doc__ or "",
     cases=(*cases(BALL_CLAMPED), *cases(LIVER_PRESS)),
     charts=(Chart("work_precision.png", "studies.plots.work_precision:draw"),),
-    columns=("force_end", "mean_error", "real_time", "step_time", "interior_error", "silhouette_error", "volume_worst"),
+    columns=(
+        "force_end",
+        "mean_error",
+        "shape_error",
+        "shape_volume",
+        "real_time",
+        "step_time",
+        "interior_error",
+        "silhouette_error",
+        "volume_worst",
+    ),
     main=True,
 )

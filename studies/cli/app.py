@@ -16,7 +16,7 @@ from studies.cli.terminal import say
 COMMANDS = {
     name: Entry(f"studies.cli.commands.{module}", function, line)
     for name, module, function, line in (
-        ("list", "results.list_names", "list_all", "Studies, scenes, organs, methods and metrics, a line each."),
+        ("list", "results.list_names", "list_names", "Studies, scenes, organs, methods and metrics, a line each."),
         ("run", "running.run", "run", "Runs what is missing or stale, then draws the charts."),
         ("worker", "running.worker", "worker", "Does pieces of studies for `organbench run --on` elsewhere."),
         ("status", "running.status", "status", "How many cases are ok, failed, stale or missing, and why."),
@@ -37,7 +37,7 @@ COMMANDS = {
         ("cost", "running.cost", "cost", "Microseconds per stage of a step, and what the scene leaves out."),
         ("mesh", "meshes.mesh", "mesh", "Makes a mesh: of a synthetic organ, or from a file."),
         ("check", "meshes.check", "check", "Tells what is wrong with a mesh and what mends it."),
-        ("place", "meshes.place", "place", "Proposes hold and probe for a scan, and writes a scene file."),
+        ("place", "meshes.place", "place", "Places hold and probe on a scan, and writes a study."),
         ("archive", "house.archive", "archive", "Packs records, tables, charts and code into one zip file."),
         ("prune", "house.prune", "prune", "Lists stored files that nothing needs, and removes them."),
         ("doctor", "house.doctor", "doctor", "What is missing on this machine, and what mends it."),
@@ -60,7 +60,9 @@ def organbench(
         bool, typer.Option("--version", callback=show_version, is_eager=True, help="Show the version and end.")
     ] = False,
 ) -> None:
-    """How accurate, how fast and how stable are volume-preserving mass-spring organs, against finite elements."""
+    """How accurate, how fast and how stable are volume-preserving mass-spring organs, against finite elements.
+
+    A FILE.py is a program, whichever command gets it: run only files you trust (SECURITY.md)."""
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ from typer.core import TyperCommand
 from studies.cli import outline
 
 KIND = {
+    "list": "kinds",
     "run": "studies",
     "status": "studies",
     "table": "studies",
@@ -43,6 +44,7 @@ def organs() -> list[str]:
 
 
 NAMES: dict[str, Callable[[], list[str]]] = {
+    "kinds": lambda: ["studies", "scenes", "organs", "methods", "metrics"],
     "studies": lambda: [name for name, _ in outline.studies()],
     "scenes": scenes,
     "organs": organs,

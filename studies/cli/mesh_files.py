@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.status import Status
 
 from studies.base.errors import StudyError
-from studies.cli.terminal import busy, errors
+from studies.cli.terminal import busy, errors, visible
 from studies.geometry.files.estimate import size_warning
 from studies.geometry.files.faults import check_promises
 from studies.geometry.files.opening import opened
@@ -48,7 +48,7 @@ def ask_before_large(path: Path, yes: bool) -> None:
         return
     if yes:
         errors.print(f"warning: {sentence}", markup=False, highlight=False)
-    elif not (sys.stdin.isatty() and typer.confirm(f"{sentence}. Go on?")):
+    elif not (sys.stdin.isatty() and typer.confirm(visible(f"{sentence}. Go on?"))):
         raise StudyError(f"{sentence}; say --yes to go on, or thin it out in the program that made it")
 
 
@@ -62,7 +62,8 @@ def asked_unit(source: Source) -> Source:
     if content.unit is not None or likely_units(side) == ["m"]:
         return source
     likely = (likely_units(side) or ["mm"])[-1]
-    answer = typer.prompt(f"{unit_question(path.name, side)}. Which unit is it ({', '.join(UNITS)})?", default=likely)
+    question = f"{unit_question(path.name, side)}. Which unit is it ({', '.join(UNITS)})?"
+    answer = typer.prompt(visible(question), default=likely)
     check_unit(answer)
     return replace(source, unit=str(answer))
 

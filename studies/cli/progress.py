@@ -1,6 +1,7 @@
 """Progress on the terminal: a bar for what takes longer than a moment, plain lines where there is no terminal."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -9,9 +10,10 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from studies.base.counting import amounts
 from studies.base.interrupts import stop_if_pressed
 from studies.store.staleness import MISSING
-from studies.sweep.plan import TIMING, Planned, expected, expected_bytes, free_bytes
+from studies.sweep.plan import Planned, expected, expected_bytes, free_bytes, kind_of
 
 QUIET_SECONDS = 10.0
 """Without a terminal (a log file), a line at most this often."""
@@ -39,6 +41,8 @@ class TerminalProgress:
         self.totals: dict[str, list[int]] = {}
         self.pending = {(piece.stage, piece.label): piece for piece in planned}
         self.jobs = jobs
+        self.done: Counter[str] = Counter()
+        """What is done, by kind."""
         self.compiled: set[str] = set()
         self.last_report = time.monotonic()
         self.compiling_told = 0.0
@@ -64,6 +68,7 @@ class TerminalProgress:
         """One piece is done; a Ctrl-C that was lost on the way counts here."""
         stop_if_pressed()
         self.pending.pop((what, note), None)
+        self.done[kind_of(what, note)] += 1
         left = self.left()
         self.bars.update(self.tasks[what], advance=1, note=left or note)
         self.totals[what][0] += 1
@@ -74,9 +79,9 @@ class TerminalProgress:
             self._line(f"{what} {done}/{total}: {note}" + (f", {left}" if left else ""))
 
     def left(self) -> str:
-        """The time that is left, from the seconds of earlier runs; nothing where they say nothing."""
-        seconds = expected(list(self.pending.values()), self.jobs) if self.pending else None
-        return "" if seconds is None else f"about {words(seconds)} left"
+        """The time that is left; nothing where nothing is planned."""
+        seconds = expected(list(self.pending.values()), self.jobs)
+        return f"about {words(seconds)} left" if seconds else ""
 
     def compiling(self, name: str) -> None:
         """A function is being compiled, here or in another process; from any thread."""
@@ -121,29 +126,32 @@ def dry_run(console: Console, study: str, planned: list[Planned], jobs: int, roo
     if not planned:
         say(f"{study}: nothing would run, all is current")
         return
-    say(f"{study}: {len(planned)} pieces would run")
+    say(f"{study}: {amounts(Counter(piece.kind for piece in planned))} would run")
     groups: dict[tuple[str, str], list[Planned]] = {}
     for piece in planned:
         groups.setdefault((piece.kind, "missing" if piece.why == MISSING else piece.why), []).append(piece)
     for (kind, why), found in groups.items():
-        seconds = expected(found, 1)
-        cost = "no estimate" if seconds is None else f"about {words(seconds)} of computing"
-        say(f"  {len(found)} {kind}{'s' if len(found) > 1 and kind != TIMING else ''} ({why}): {cost}")
-    known = sum(piece.seconds is not None for piece in planned)
-    total = expected(planned, jobs)
-    basis = f"from earlier runs of {known} of the {len(planned)} pieces; compiling comes on top"
-    if total is not None:
-        say(f"  about {words(total)} with {jobs} processes, {basis}")
-    else:
-        say("  no estimate: nothing of it has run yet")
+        say(f"  {amounts(Counter({kind: len(found)}))} ({why}): about {words(expected(found, 1))} of computing")
+    say(f"  about {words(expected(planned, jobs))} with {jobs} processes, {basis(planned)}; compiling comes on top")
     say(f"  {disk(planned, root)}")
+
+
+def basis(planned: list[Planned]) -> str:
+    """Where an estimate comes from: "from earlier runs of 3 cases, from the rate of another machine for 2 timings"."""
+    sources = {
+        "from earlier runs of": [piece for piece in planned if piece.seconds is not None],
+        "from the rate of this machine for": [p for p in planned if p.seconds is None and p.here],
+        "from the rate of another machine for": [p for p in planned if p.seconds is None and not p.here],
+    }
+    kinds = {source: Counter(piece.kind for piece in pieces) for source, pieces in sources.items() if pieces}
+    return ", ".join(f"{source} {amounts(count)}" for source, count in kinds.items())
 
 
 def disk(planned: list[Planned], root: Path) -> str:
     """What pieces will store, beside what the disk has left."""
     stored, unknown = expected_bytes(planned)
     free = free_bytes(root)
-    more = f" (without {unknown} references of unknown size)" if unknown else ""
+    more = f" (without {unknown} reference solutions of unknown size)" if unknown else ""
     if stored > free:
         return (
             f"about {amount(stored)}{more}, more than the {amount(free)} that are free: make room (`organbench prune` "

@@ -1,17 +1,62 @@
 """What all commands share: where they print, and the words for results and studies."""
 
+import unicodedata
+from collections.abc import Iterable
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 
-console = Console(soft_wrap=True)
-errors = Console(stderr=True, soft_wrap=True)
+STEERING = {"Cc", "Cf", "Cs"}
+"""Categories of Unicode whose characters steer a terminal, or the direction of a text, and have no shape."""
+KEPT = "\n\t"
+
+
+def visible(text: str) -> str:
+    """The text with every character that would steer the terminal as its number: ESC is \\x1b."""
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(_number(c) if unicodedata.category(c) in STEERING and c not in KEPT else c for c in text)
+
+
+def _number(character: str) -> str:
+    return character.encode("unicode_escape", "surrogatepass").decode("ascii")
+
+
+class VisibleConsole(Console):
+    """A console on which texts of files cannot steer the terminal: names, messages, parts of meshes, whoever wrote
+    them. Colours and moving lines are Rich's own."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Every text that is printed comes by here; a segment with control codes is Rich's."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else Segment(visible(segment.text), segment.style)
+
+
+console = VisibleConsole(soft_wrap=True)
+errors = VisibleConsole(stderr=True, soft_wrap=True)
 
 Results = Annotated[Path, typer.Option("--results", envvar="ORGANBENCH_RESULTS", help="folder of the results")]
-StudyName = Annotated[str, typer.Argument(help="a study (see `organbench list`), or a FILE.py that defines STUDY")]
+PROGRAM = "FILE.py is a program: run only files you trust"
+StudyName = Annotated[
+    str,
+    typer.Argument(
+        help=f"a study (see `organbench list studies`), or a FILE.py that defines STUDY or SCENE ({PROGRAM})"
+    ),
+]
+SceneName = Annotated[
+    str,
+    typer.Argument(
+        help="a scene (see `organbench list scenes`), or a FILE.py that defines SCENE or STUDY; FILE.py:NAME where it "
+        f"has several ({PROGRAM})"
+    ),
+]
+SMOKE = "smoke"
+"""Folder below the results for small meshes and few frames."""
+Smoke = Annotated[bool, typer.Option("--smoke", help="small meshes, few frames; kept apart in results/smoke")]
 
 
 def say(text: object) -> None:

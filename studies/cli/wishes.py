@@ -16,7 +16,7 @@ def share(text: str, noun: str) -> float | None:
     found = re.fullmatch(f"{NUMBER}(%?)\\s*", text)
     value = float(found[1]) / (100.0 if found[2] else 1.0) if found else 0.0
     if not 0.0 < value <= 1.0:
-        raise StudyError(f"{noun} {text!r} is no error; give a share above 0 and up to 100 %, such as 3% or 0.03")
+        raise StudyError(f"{noun} {text!r} is no tolerance; give a share above 0 and up to 100 %, such as 3% or 0.03")
     return value
 
 

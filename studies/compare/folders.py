@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Hashable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,8 +11,10 @@ import pandas as pd
 
 from studies.base.errors import StudyError
 from studies.compare.verdict import Verdict, verdict_of
+from studies.metrics.metrics import METRICS
 from studies.runs.case import case_from_json
 from studies.runs.recipe_text import recipe_text
+from studies.store.machine import machine_of
 from studies.store.paths import record_files
 from studies.store.record import Record, read_record
 
@@ -21,6 +23,11 @@ Key = tuple[str, str]
 Row = dict[Hashable, Any]
 METRIC = re.compile(r"^(?P<name>\w+) \[(?P<unit>[^\]]+)\]$")
 STATUS = "status"
+ROW = ("scene", "body", "method", "nodes", "law", "dt/dt_c", "recipe")
+"""Columns of a table that say which case a row is."""
+TIMES = tuple(metric.name for metric in METRICS if metric.spread is not None)
+SPEEDS = tuple(metric.name for metric in METRICS if metric.spread is not None and metric.better == "higher")
+"""Metrics that depend on the machine; of these the ones that are speeds."""
 
 
 class Named(NamedTuple):
@@ -30,6 +37,10 @@ class Named(NamedTuple):
     scene: str
     body: str
     method: str
+    nodes: str
+    law: str
+    step: str
+    """Over the stability limit."""
     recipe: str
 
 
@@ -46,6 +57,11 @@ class Change:
     """How well it is known, the larger of both, in its unit; NaN where it is not said."""
     verdict: Verdict
 
+    @property
+    def is_time(self) -> bool:
+        """Whether the number is a computing time, or a speed: it depends on the machine."""
+        return self.metric in TIMES
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -55,18 +71,36 @@ class Comparison:
     only_old: int
     only_new: int
 
+    machines: tuple[str | None, str | None]
+    """Ids of the machines that measured the old and the new times; None where nothing says so."""
+
+    @property
+    def same_machine(self) -> bool:
+        """Whether times are compared: one machine has measured both, and both folders say so."""
+        old, new = self.machines
+        return old is not None and old == new
+
     @property
     def moved(self) -> list[Change]:
-        """What moved."""
-        return [change for change in self.changes if change.verdict == Verdict.MOVED]
+        """What moved, accuracy before times."""
+        moved = [change for change in self.changes if change.verdict == Verdict.MOVED]
+        return sorted(moved, key=lambda change: change.is_time)
+
+    @property
+    def time_ratio(self) -> float:
+        """Median of new over old computing times [1]; NaN where both folders share none."""
+        pairs = [(c.old, c.new) if c.metric not in SPEEDS else (c.new, c.old) for c in self.changes if c.is_time]
+        ratios = [new / old for old, new in pairs if old > 0 and new > 0]  # type: ignore[operator]
+        return float(np.median(ratios)) if ratios else float("nan")
 
     def table(self) -> pd.DataFrame:
         """A row per change."""
         return pd.DataFrame([change.case._asdict() | _numbers(change) for change in self.changes])
 
-    def counts(self) -> dict[Verdict, int]:
-        """How many changes there are of each verdict, in the order of Verdict."""
-        return {verdict: sum(change.verdict == verdict for change in self.changes) for verdict in Verdict}
+    def counts(self, times: bool) -> dict[Verdict, int]:
+        """How many times, or how many other numbers, there are of each verdict, in the order of Verdict."""
+        verdicts = [change.verdict for change in self.changes if change.is_time == times]
+        return {verdict: verdicts.count(verdict) for verdict in Verdict}
 
 
 def _numbers(change: Change) -> dict[str, object]:
@@ -81,16 +115,20 @@ def compare(old: Path, new: Path) -> Comparison:
     """
     mine, theirs = tables_of(old), tables_of(new)
     changes, only_old, only_new = list[Change](), 0, 0
+    machines = machine_of(old), machine_of(new)
     for study in sorted(set(mine) & set(theirs)):
         before, after = mine[study], theirs[study]
         common = [key for key in before if key in after]
         only_old, only_new = only_old + len(before) - len(common), only_new + len(after) - len(common)
         same = equal_records(old, new, study)
-        for key in common:
-            changes += changes_of(study, before[key], after[key], key in same)
+        new_changes = [one for key in common for one in changes_of(study, before[key], after[key], key in same)]
+        pair = {machine_of(old, study), machine_of(new, study)}
+        if None in pair or len(pair) > 1:
+            new_changes = [replace(one, verdict=Verdict.OTHER_MACHINE) if one.is_time else one for one in new_changes]
+        changes += new_changes
     if not changes:
         raise StudyError(f"{old} and {new} have no case in common; compare folders in which the same study has run")
-    return Comparison(changes, only_old, only_new)
+    return Comparison(changes, only_old, only_new, machines)
 
 
 def tables_of(folder: Path) -> dict[str, dict[Key, Row]]:
@@ -121,7 +159,7 @@ def _read(path: Path) -> dict[Key, Row]:
 
 def changes_of(study: str, old: Row, new: Row, same_bits: bool) -> list[Change]:
     """How a case ended and all its metrics that one of the folders has."""
-    case = Named(study, *(str(new.get(name, "")) for name in ("scene", "body", "method", "recipe")))
+    case = Named(study, *(_text(new.get(name, "")) for name in ROW))
     found = []
     if old.get(STATUS) != new.get(STATUS):
         before, after = str(old.get(STATUS)), str(new.get(STATUS))
@@ -136,6 +174,10 @@ def changes_of(study: str, old: Row, new: Row, same_bits: bool) -> list[Change]:
         verdict = verdict_of(float(before), float(after), floor, same_bits)
         found.append(Change(case, name, unit, float(before), float(after), floor, verdict))
     return found
+
+
+def _text(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def _floor(row: Row, name: str, unit: str) -> float:

@@ -14,6 +14,7 @@ class Verdict(StrEnum):
     WITHIN_FLOOR = "within floor"
     MOVED = "moved"
     NOT_RESOLVABLE = "not resolvable"
+    OTHER_MACHINE = "other machine"
 
 
 MEANING: dict[Verdict, str] = {
@@ -23,6 +24,7 @@ MEANING: dict[Verdict, str] = {
     "spread of the timing",
     Verdict.MOVED: "the change is larger than that",
     Verdict.NOT_RESOLVABLE: "nothing says how well the number is known, or one folder lacks it",
+    Verdict.OTHER_MACHINE: "a time that another machine measured; it is not judged",
 }
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from dask import config
 from distributed import LocalCluster
 from distributed.utils import get_ip
 
@@ -19,6 +20,7 @@ from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.engines.scripts import QUEUES, script
 from studies.engines.settings import Settings
+from studies.engines.tls import KEY, make_key, settings_of
 from studies.sweep.workers import PATIENCE
 
 QUEUE_SECONDS = 60.0
@@ -28,15 +30,18 @@ Told = Callable[[str], object]
 
 @contextmanager
 def scheduler_with_jobs(settings: Settings, root: Path, tell: Told) -> Iterator[str]:
-    """The address of a scheduler of this process, for which workers are started; `tell` hears how.
+    """The address of a scheduler of this process, for which workers are started; `tell` hears how. Inside, clients of
+    this process hold its key; without it nobody talks to the scheduler.
 
     Raises StudyError where they cannot be started."""
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     folder = root.absolute() / "cache" / f"workers-{secrets.token_hex(4)}"
     file = folder / "scheduler.json"
     host = settings.host or get_ip()
-    options = {"host": host, "scheduler_port": 0, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
-    with LocalCluster(n_workers=0, **options) as cluster:
+    make_key(folder)
+    options = {"host": host, "scheduler_port": 0, "silence_logs": logging.CRITICAL}
+    no_pages = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
+    with config.set(settings_of(folder)), LocalCluster(n_workers=0, **options, **no_pages) as cluster:
         address: str = cluster.scheduler_address  # pyright: ignore[reportAttributeAccessIssue]
         write_whole(file, json.dumps({"address": address}).encode())
         started = _commands if settings.kind == "command" else _array
@@ -44,7 +49,8 @@ def scheduler_with_jobs(settings: Settings, root: Path, tell: Told) -> Iterator[
             with started(settings, folder, file, tell):
                 yield address
         finally:
-            file.unlink(missing_ok=True)
+            for gone in (file, folder / KEY):
+                gone.unlink(missing_ok=True)
 
 
 def worker_command(settings: Settings, file: Path) -> list[str]:

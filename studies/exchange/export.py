@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,28 +13,44 @@ from studies.base.errors import StudyError
 from studies.exchange.description import FILES, HELD, LUMEN, OUTER, description
 from studies.exchange.meshes import STRAIGHT, GivenMesh, given_meshes
 from studies.exchange.readme import readme
+from studies.exchange.starter import NAME, SOLVER
 from studies.geometry.files.grids import write_grid_file
 from studies.geometry.mesh.organ_mesh import OrganMesh
 from studies.scene.scene import Scene
 
 DESCRIPTION, README = "scene.json", "README.md"
+DIGITS = 12
+"""Of a number: 3.6 and not 3.5999999999999996."""
 
 
-def export(scene: Scene, folder: Path, nodes: int) -> tuple[list[Path], str]:
+def export(scene: Scene, folder: Path, nodes: int, rows: Sequence[Sequence[str]] = ()) -> tuple[list[Path], str]:
     """Writes the scene into `folder` with `nodes` vertices on its outer surface; the files, and why there is no curved
-    mesh (nothing where there is one). Raises StudyError for a folder that is a file, and a mesh that cannot be made."""
+    mesh (nothing where there is one). rows: a body of ours, its error of force and of displacement [%], each as text.
+
+    Raises StudyError for a folder that is a file, and a mesh that cannot be made.
+    """
     if folder.exists() and not folder.is_dir():
         raise StudyError(f"{folder} is a file; give the name of a folder")
     meshes, why_not = given_meshes(scene, nodes)
     written = [_write_mesh(mesh, folder) for mesh in meshes]
     written.append(_write_surface(meshes, folder / FILES["surface"]))
     written.append(folder / FILES["paths"])
-    write_whole(written[-1], paths_table(scene).to_csv(index=False).encode())
-    found = description(scene, meshes, why_not)
-    for name, text in ((DESCRIPTION, json.dumps(found, indent=1) + "\n"), (README, readme(found, nodes))):
+    write_whole(written[-1], paths_table(scene).to_csv(index=False, float_format=f"%.{DIGITS}g").encode())
+    found = rounded(description(scene, meshes, why_not))
+    texts = {DESCRIPTION: json.dumps(found, indent=1) + "\n", README: readme(found, nodes, rows), NAME: SOLVER}
+    for name, text in texts.items():
         written.append(folder / name)
         write_whole(written[-1], text.encode())
     return written, why_not
+
+
+def rounded(value: Any) -> Any:
+    """The same with every number in it to DIGITS digits, and no zero with a sign."""
+    if isinstance(value, dict):
+        return {name: rounded(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [rounded(part) for part in value]
+    return float(f"{value:.{DIGITS}g}") + 0.0 if isinstance(value, float) else value
 
 
 def _write_mesh(mesh: GivenMesh, folder: Path) -> Path:
@@ -71,10 +88,10 @@ def paths_table(scene: Scene) -> pd.DataFrame:
     keys = [t for path in moving.values() for t in path.times] + list(scene.checkpoints)
     if scene.lumen is not None:
         keys += scene.lumen.filling.times
-    t = np.unique(np.concatenate([np.linspace(0.0, scene.duration, scene.frames + 1), keys]))
+    t = np.unique(rounded(np.concatenate([np.linspace(0.0, scene.duration, scene.frames + 1), keys]).tolist()))
     columns = {"t": t}
     for name, path in moving.items():
-        columns |= {f"{name}_{axis}": values for axis, values in zip("xyz", path(t).T, strict=True)}
+        columns |= {f"{name}_{axis}": values for axis, values in zip("xyz", path(t).T + 0.0, strict=True)}
     if scene.lumen is not None:
         columns["lumen_volume_factor"] = scene.lumen.filling(t)
     return pd.DataFrame(columns)

@@ -114,6 +114,10 @@ def _check_rest(name: str, rest: np.ndarray, mesh: GivenMesh) -> None:
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     if _gap(rest, points) <= SAME * size:
         return
+    if _gap(rest, np.zeros_like(rest)) <= SAME * size:
+        raise StudyError(
+            f"{name}: the positions at t = 0 are all zero, so these are displacements; add the rest positions of {file}"
+        )
     tree = KDTree(points)
     for unit, metres in UNITS.items():
         scaled = metres * rest

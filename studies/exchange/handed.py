@@ -1,5 +1,6 @@
 """What another program hands in, read from its file as it stands."""
 
+import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -66,6 +67,7 @@ def _table(path: Path, columns: Sequence[str]) -> pd.DataFrame:
     if not path.is_file():
         raise StudyError(f"there is no file {path}")
     try:
+        _check_separators(path)
         table = pd.read_csv(path, dtype=str, skipinitialspace=True)  # as floats some would lose their last bit
         missing = [name for name in columns if name not in table.columns]
         if missing:
@@ -77,13 +79,27 @@ def _table(path: Path, columns: Sequence[str]) -> pd.DataFrame:
         raise StudyError(f"{path.name} cannot be read as a table ({str(error).splitlines()[0]})") from error
 
 
+def _check_separators(path: Path) -> None:
+    """Raises StudyError for a table with semicolons between its columns, and for one with commas in its numbers."""
+    with open(path, encoding="utf-8", newline="") as file:
+        head, first = (next(file, "") for _ in range(2))
+    semicolons = ";" in head
+    commas = re.search(r"\d,\d", first) if semicolons else first.count(",") > head.count(",")
+    found = ["semicolons between its columns"] * semicolons + ["commas in its numbers"] * bool(commas)
+    if found:
+        raise StudyError(f"{path.name} has {' and '.join(found)}: write commas between columns and points in numbers")
+
+
 def _read_npz(path: Path) -> Handed:
     if not is_zipfile(path):
         raise StudyError(f"{path.name} is no npz file; numpy.savez writes one")
     with np.load(path, allow_pickle=False) as file:
         missing = [name for name in ("t", "positions") if name not in file]
         if missing:
-            raise StudyError(f"{path.name} lacks {missing[0]!r}; it needs t (F) and positions (F, n, 3)")
+            raise StudyError(
+                f"{path.name} lacks {missing[0]!r}; it needs t (F) and positions (F, n, 3), and holds "
+                f"{', '.join(file.files) or 'nothing'}"
+            )
         found = {name: np.asarray(file[name], np.float64) for name in ("t", "positions", *OPTIONAL) if name in file}
     return Handed(path.name, found.pop("t"), found.pop("positions"), found)
 

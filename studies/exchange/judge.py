@@ -14,7 +14,7 @@ from massspring.sources import source_fingerprint
 from massspring.world.obstacles import Obstacle, Probe
 from studies.base.errors import StudyError
 from studies.exchange.entry import ENTRY, SECONDS, entry_name, outside
-from studies.exchange.fit import Fitting, fitted, force_at
+from studies.exchange.fit import SAME, Fitting, fitted, force_at
 from studies.exchange.handed import read_force, read_handed
 from studies.exchange.meshes import given_meshes
 from studies.runs.case import Case
@@ -24,6 +24,9 @@ from studies.scene.scene import Scene
 from studies.store.new_record import new_fields, new_record
 from studies.store.record import Record, Status
 from studies.store.schema import RUN_FIELDS
+
+STILL = "the body did not move"
+"""Warning of an entry whose positions are those at rest in every step."""
 
 
 def entry_record(
@@ -124,8 +127,14 @@ def _attributes(fitting: Fitting) -> dict[str, Any]:
         "capped_steps": 0,
         "volumes": len(names),
         "lumen_column": names.index(LUMEN) if LUMEN in names else -1,
-        "warnings": "",
+        "warnings": "" if _has_moved(fitting) else STILL,
     }
+
+
+def _has_moved(fitting: Fitting) -> bool:
+    rest = fitting.mesh.points
+    size = np.linalg.norm(np.ptp(rest, axis=0))
+    return bool(np.linalg.norm(fitting.positions - rest, axis=-1).max() > SAME * size)
 
 
 def _sway(fitting: Fitting, values: dict[str, np.ndarray]) -> dict[str, float]:

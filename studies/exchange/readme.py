@@ -1,6 +1,6 @@
 """README.md of an exported scene: what the files are, in which units, and how to hand results in."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 TEXT = """# {name}
@@ -18,6 +18,7 @@ more, each beside words; {version_words}.
 | surface.vtu | the outer surface: triangles, turned outward, with the first nodes of straight.vtu |
 | paths.csv | displacement [m] of every obstacle and held region{lumen_column} over time [s] |
 | scene.json | material, loads, checkpoints, what is judged |
+| solve.py | a program to start from: reads the above, and hands in a body that does not move |
 
 Point data of the meshes is 1 or 0: {point_data}.
 
@@ -39,6 +40,7 @@ Point data of the meshes is 1 or 0: {point_data}.
 
 Errors of displacement and force are against a finite-element reference whose uncertainty is known. The *last
 checkpoint* is t = {last:g} s.
+{yardsticks}
 
 ## Handing results in
 
@@ -54,6 +56,8 @@ smallest J and penetration are taken over all steps that are handed in. Store 64
 | NAME.pvd | VTU files with their times (`timestep`), points or `displacement` as above |
 | a folder | VTU files in order of their names: rest and every checkpoint, nothing else |
 
+    python solve.py
+    organbench judge {name} mine.npz --nodes {nodes} --name mine     accepted as "the body did not move"
     organbench judge {name} FILE --nodes {nodes} --name NAME --force FORCE.csv --seconds S
 
 FORCE.csv has the columns t and force [N]. S is the computing time [s] for one simulated second, on one core where you
@@ -61,8 +65,8 @@ can. `pressure` is positive in compression.
 """
 
 
-def readme(found: Mapping[str, Any], nodes: int) -> str:
-    """The text for what `description` gives; nodes: vertices on the outer surface."""
+def readme(found: Mapping[str, Any], nodes: int, rows: Sequence[Sequence[str]] = ()) -> str:
+    """The text for what `description` gives; nodes: vertices on the outer surface; rows: as `export` takes them."""
     return TEXT.format(
         name=found["name"],
         title=found["title"],
@@ -86,7 +90,15 @@ def readme(found: Mapping[str, Any], nodes: int) -> str:
         metrics="\n".join(_metric_rows(found)),
         last=found["checkpoints"][-1],
         nodes=nodes,
+        yardsticks="\n".join(_yardsticks(rows)),
     )
+
+
+def _yardsticks(rows: Sequence[Sequence[str]]) -> list[str]:
+    if not rows:
+        return ["", "No measured body of ours was at hand for this scene."]
+    head = ["", "What our own bodies reach at the last checkpoint:", "", "| body | force_end [%] | mean_error [%] |"]
+    return [*head, "|---|---|---|", *(f"| {' | '.join(row)} |" for row in rows)]
 
 
 def _mesh_rows(found: Mapping[str, Any]) -> list[str]:

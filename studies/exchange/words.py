@@ -23,7 +23,7 @@ def moved(path: Trajectory) -> str:
     """A path in words."""
     if not any(any(row) for row in path.displacements):
         return "does not move"
-    keys = [f"({x:g}, {y:g}, {z:g}) m at {t:g} s" for t, (x, y, z) in zip(path.times, path.displacements, strict=True)]
+    keys = [f"{_at(shift)} at {t:g} s" for t, shift in zip(path.times, path.displacements, strict=True)]
     return "is displaced by " + ", ".join(keys) + "; linear in between"
 
 
@@ -88,4 +88,5 @@ def start_words(scene: Scene) -> str:
 
 
 def _at(vector: object, unit: str = " m") -> str:
-    return "(" + ", ".join(f"{float(x):.9g}" for x in vector) + f"){unit}"  # pyright: ignore[reportGeneralTypeIssues]
+    # + 0.0: no zero with a sign
+    return "(" + ", ".join(f"{float(x) + 0.0:.9g}" for x in vector) + f"){unit}"  # pyright: ignore[reportGeneralTypeIssues]

@@ -45,7 +45,9 @@ def graded_mesh(
     """
     if not remeshed(scene.organ):
         return mesh_at(scene, nodes, at_outlines, at_contact, quadratic)
-    level = coarse_level(scene, nodes, at_outlines, at_contact, quadratic)
+    # Counts hardly depend on where nodes lie, and even ones are quick to make.
+    level = coarse_level(scene, nodes, at_outlines, at_contact, quadratic, even=True)
+    level = coarse_level(scene, nodes, at_outlines, at_contact, quadratic, start=level)
     return mesh_at(scene, level, at_outlines, at_contact, quadratic)
 
 
@@ -65,11 +67,11 @@ def middles(scene: Scene) -> float:
 
 
 def halved(
-    scene: Scene, level: int, at_outlines: int, at_contact: int, on_shape: bool = False
+    scene: Scene, level: int, at_outlines: int, at_contact: int, on_shape: bool = False, even: bool = False
 ) -> tuple[OrganMesh, HeldMesh, HeldMesh]:
     """The organ's mesh, the same with where it is held, and that one halved; all with straight sides, whose vertices
-    are `on_shape` for sides that will be curved (studies.scene.meshing.mesh_for)."""
-    organ_mesh = mesh_for(scene, level, layers=1 if is_hollow(scene) else None, on_shape=on_shape)
+    are `on_shape` for sides that will be curved, or `even` (studies.scene.meshing.mesh_for)."""
+    organ_mesh = mesh_for(scene, level, layers=1 if is_hollow(scene) else None, on_shape=on_shape, even=even)
     coarse = held_mesh(scene, organ_mesh)
     fine = coarse.refined(scene, at_outlines, at_contact)
     return organ_mesh, coarse, coarse if fine.mesh.nelements == coarse.mesh.nelements else fine
@@ -83,20 +85,26 @@ def is_hollow(scene: Scene) -> bool:
     return shape is not None and shape.wall is not None
 
 
-def coarse_level(scene: Scene, nodes: int, at_outlines: int, at_contact: int, quadratic: bool) -> int:
-    """Surface vertices before halving that end in `nodes` nodes on the outer surface. Raises StudyError."""
-    most = 4 * MOST - 6 if quadratic else MOST
-    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or not FEWEST <= nodes <= most:
-        raise StudyError(
-            f"scene '{scene.name}': {nodes!r} surface nodes asked for; give a whole number from {FEWEST} to {most}"
-        )
+def coarse_level(
+    scene: Scene,
+    nodes: int,
+    at_outlines: int,
+    at_contact: int,
+    quadratic: bool,
+    start: int | None = None,
+    even: bool = False,
+) -> int:
+    """Surface vertices before halving that end in `nodes` nodes on the outer surface, near `start` where given; `even`:
+    of a mesh whose nodes are evenly spread. Raises StudyError."""
+    _check_number(scene, nodes, quadratic)
     found: dict[int, int] = {}
-    level, failed = max(FEWEST, (nodes + 6) // 4 if quadratic else nodes), None
+    level, failed = start or max(FEWEST, (nodes + 6) // 4 if quadratic else nodes), None
     for tried in range(MOST_TRIES):
         if tried >= TRIES and (not found or _off(found, nodes) <= TOLERANCE):
             break
         try:
-            found[level] = outer_nodes(halved(scene, level, at_outlines, at_contact, quadratic)[2], quadratic)
+            body = halved(scene, level, at_outlines, at_contact, quadratic, even)[2]
+            found[level] = outer_nodes(body, quadratic)
         except StudyError as error:
             failed = failed or error  # raised below, unless a neighbour of this level can be meshed
             level += max(1, level // 50)
@@ -115,6 +123,14 @@ def coarse_level(scene: Scene, nodes: int, at_outlines: int, at_contact: int, qu
             f"scene '{scene.name}': no graded mesh has {nodes} surface nodes; ask for {found[best]}, the nearest found"
         )
     return best
+
+
+def _check_number(scene: Scene, nodes: object, quadratic: bool) -> None:
+    most = 4 * MOST - 6 if quadratic else MOST
+    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or not FEWEST <= nodes <= most:
+        raise StudyError(
+            f"scene '{scene.name}': {nodes!r} surface nodes asked for; give a whole number from {FEWEST} to {most}"
+        )
 
 
 def _best(found: dict[int, int], nodes: int) -> int:

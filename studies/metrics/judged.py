@@ -1,6 +1,6 @@
 """A recipe in a scene with what was measured of it, and how it stands to a wish."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -9,12 +9,13 @@ import numpy as np
 from massspring import ImplicitVolume
 from studies.metrics.run import Run
 from studies.metrics.table import metric
-from studies.metrics.wish import Wish
+from studies.metrics.wish import SHAPE, SHAPE_VOLUME, Wish
 from studies.runs.case import Case
 from studies.store.record import Status
 
 NAN = float("nan")
 FORCE, DISPLACEMENT = metric("force_end"), metric("mean_error")
+DISTANCE, VOLUME = metric("shape_error"), metric("shape_volume")
 
 
 class Measured(NamedTuple):
@@ -47,6 +48,10 @@ class Judged:
     """[s]."""
     timed_here: bool = False
     """Whether the cost is of this machine."""
+    shape: Measured = UNKNOWN
+    """shape_error [%]; unknown in tables of older code."""
+    shape_volume: Measured = UNKNOWN
+    """shape_volume [%], signed."""
 
     @property
     def advisable(self) -> bool:
@@ -58,11 +63,17 @@ class Judged:
         """Whether anything is known of its errors."""
         return self.force.known or self.displacement.known
 
+    @property
+    def off_shape(self) -> dict[str, float]:
+        """The bounds of the shape that it misses -> measured over bound [1]."""
+        shares = _shares({"shape": (self.shape, SHAPE), "shape_volume": (self.shape_volume, SHAPE_VOLUME)})
+        return {name: share for name, share in shares.items() if share > 1.0}
+
     def shares(self, wish: Wish) -> dict[str, float]:
-        """Every bound of a wish that can be judged here -> measured over wished for [1]: 1 or less meets it."""
-        found = {"force": self.force, "displacement": self.displacement, "budget": self.cost}
-        wished = {name: getattr(wish, name) for name in found}
-        return {name: abs(found[name].value) / bound for name, bound in wished.items() if bound and found[name].known}
+        """Every bound of a wish that can be judged here, and those of the shape that are missed -> measured over bound
+        [1]: 1 or less meets it."""
+        errors = {"force": (self.force, wish.force), "displacement": (self.displacement, wish.displacement)}
+        return _shares({**errors, "budget": (self.cost, wish.budget)}) | self.off_shape
 
     def untold(self, wish: Wish) -> bool:
         """Whether an error is wished finer than the reference is known."""
@@ -72,7 +83,11 @@ class Judged:
     def worst(self, wish: Wish) -> float:
         """The largest of its shares: 1 or less meets the wish; infinite where none of its errors is known."""
         shares = self.shares(wish)
-        return max(shares.values()) if set(shares) - {"budget"} else np.inf
+        return max(shares.values()) if {"force", "displacement"} & set(shares) else np.inf
+
+
+def _shares(bounds: Mapping[str, tuple[Measured, float | None]]) -> dict[str, float]:
+    return {name: abs(one.value) / bound for name, (one, bound) in bounds.items() if bound and one.known}
 
 
 def judged(run: Run) -> Judged | None:
@@ -80,8 +95,9 @@ def judged(run: Run) -> Judged | None:
     if run.record.status != Status.OK:
         return None
     force, displacement = (Measured(entry(run), entry.uncertainty(run)) for entry in (FORCE, DISPLACEMENT))
-    dt = float(run.attributes.dt)
-    return Judged(run.case, force, displacement, cost_of(run), dt, run.timing is not None)
+    dt, timed = float(run.attributes.dt), run.timing is not None
+    shape, volume = Measured(DISTANCE(run)), Measured(VOLUME(run))
+    return Judged(run.case, force, displacement, cost_of(run), dt, timed, shape, volume)
 
 
 def cost_of(run: Run) -> Measured:
@@ -101,14 +117,15 @@ def cost_of_frames(frame_ns: np.ndarray, frame: float) -> Measured:
 
 
 def cheapest(found: Iterable[Judged], wish: Wish) -> Judged | None:
-    """The advisable one of least cost that meets a wish; those of unknown cost come last. None where none does, or
-    where the reference is less well known than is wished."""
+    """The advisable one of least cost that meets a wish and keeps the shape; those of unknown cost come last. None
+    where none does, or where the reference is less well known than is wished."""
     meeting = [one for one in found if one.advisable and one.worst(wish) <= 1.0 and not one.untold(wish)]
     return min(meeting, key=by_cost, default=None)
 
 
 def nearest(found: Iterable[Judged], wish: Wish) -> Judged | None:
-    """The advisable one that misses a wish by the smallest factor; None of those whose errors are not known."""
+    """The advisable one that misses a wish, or the shape, by the smallest factor; None of those whose errors are not
+    known."""
     known = [one for one in found if one.advisable and one.worst(wish) < np.inf]
     return min(known, key=lambda one: one.worst(wish), default=None)
 

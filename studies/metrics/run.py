@@ -8,6 +8,9 @@ import numpy as np
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import triangle_areas
+from studies.metrics.rest_surface import RestSurface, rest_surfaces, six_node_facets
+from studies.metrics.true_surface import UNKNOWN, ShapeErrors, shape_errors
+from studies.metrics.wish import SHAPE
 from studies.reference.load import Reference
 from studies.runs.case import Case, case_from_json
 from studies.store.record import Record, read_record
@@ -93,11 +96,53 @@ class Run:
         return truth, self.fields.snapshots[-1][self.material_nodes] - rest - truth
 
     @cached_property
+    def true_surface_error(self) -> tuple[float, float]:
+        """Mean error of the displacement over the true surface at the last checkpoint, and the largest true
+        displacement there [m]; NaN where `sides` is None.
+
+        Each boundary node of the reference, weighted by its area, is compared with the nearest point of the body at
+        rest and the displacement interpolated there. A distance beyond SHAPE of the size counts as an error.
+        """
+        assert self.reference is not None  # Metric checked it
+        truth, sides = self.reference.boundary, self.sides or {}
+        far = SHAPE / 100.0 * float(np.linalg.norm(np.ptp(truth.points, axis=0)))
+        moved = self.fields.snapshots[-1] - self.fields.rest
+        errors, weights, sizes = [], [], []
+        for name, side in rest_surfaces(truth.points, truth.facets).items():
+            if name in sides:
+                nodes = np.unique(side.facets)
+                at = sides[name].nearest(truth.points[nodes])
+                wrong = np.linalg.norm(sides[name].interpolated(moved, at) - truth.displacement[nodes], axis=1)
+                errors.append(wrong + np.maximum(0.0, at.distance - far))
+                weights.append(side.areas[nodes])
+                sizes.append(np.linalg.norm(truth.displacement[nodes], axis=1))
+        if not errors:
+            return float("nan"), float("nan")
+        mean = np.average(np.concatenate(errors), weights=np.concatenate(weights))
+        return float(mean), float(np.concatenate(sizes).max())
+
+    @cached_property
     def material_nodes(self) -> np.ndarray:
         """Nodes that are points of the organ: virtual nodes on an axis are none."""
         if len(self.fields.tetrahedra):
             return np.arange(len(self.fields.rest))
         return np.unique(self.fields.triangles)
+
+    @property
+    def sides(self) -> dict[str, RestSurface] | None:
+        """The surfaces of the body at rest, "outer" and of a hollow one "lumen", those of a quadratic body curved; None
+        where the record of one does not tell its facets."""
+        triangles = self.fields.triangles
+        facets = six_node_facets(triangles) if self.case.body.kind == "quadratic" else triangles
+        return None if facets is None else rest_surfaces(self.fields.rest, facets)
+
+    @cached_property
+    def shape(self) -> ShapeErrors:
+        """How far the body at rest is from the true shape of its organ."""
+        sides = self.sides
+        if sides is None:
+            return UNKNOWN
+        return shape_errors(self.case.scene.organ, sides, filled=len(self.fields.tetrahedra) > 0)
 
     @cached_property
     def size(self) -> float:

@@ -26,5 +26,14 @@ STUDY = Study(
         for method in methods
     ),
     charts=(Chart("peers.png", "studies.plots.campaigns.peers:draw"),),
-    columns=("force_end", "mean_error", "volume_worst", "real_time", "silhouette_error", "min_j"),
+    columns=(
+        "force_end",
+        "mean_error",
+        "shape_error",
+        "shape_volume",
+        "volume_worst",
+        "real_time",
+        "silhouette_error",
+        "min_j",
+    ),
 )

@@ -11,7 +11,7 @@ from massspring import Free
 from studies.metrics.run import Run
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, finish, grouped, page
-from studies.plots.style.style import BLACK, GREY, NORMAL, heading, method_colour, readable, save, styled
+from studies.plots.style.style import BLACK, GREY, NORMAL, heading, method_colour, method_label, save, styled
 from studies.timing.statistics import Ratio, ratio_with_spread
 
 TITLE = "Cost of keeping the volume"
@@ -37,7 +37,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     axes.set(xlim=(min(0.95, 0.97 * low), max(1.1, 1.03 * high)), ylim=(len(rows) - 0.4, -0.6))
     axes.set_xlabel("frame time with the constraint over frame time without [1]")
     methods = dict.fromkeys(method for _, method, _ in rows)
-    handles = [Line2D([], [], color=method_colour(m), marker="o", label=f"{readable(m)} / free") for m in methods]
+    handles = [Line2D([], [], color=method_colour(m), marker="o", label=f"{method_label(m)} / free") for m in methods]
     unclear = "not resolvable: too few repeats, or 1 inside the interval"
     handles.append(Line2D([], [], color=GREY, marker="o", markerfacecolor="white", label=unclear))
     confidence = ", ".join(sorted({f"{100 * ratio.confidence:.0f} %" for _, _, ratio in rows}))

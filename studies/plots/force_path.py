@@ -1,6 +1,7 @@
 """The probed force while a scene is pressed and then held, beside the reference at its checkpoints."""
 
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -77,9 +78,21 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
     _label(axes, ends, top)
     axes.set(xlim=(0, 1.015 * group[0].case.scene.duration), ylim=(0, top), xlabel="time [s]", ylabel="force [N]")
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
-    deep = 1e3 * float(np.linalg.norm(motion.displacements[-1]))
     mark = unresolved_mark(group, FORCES)
-    axes.set_title(f"{heading(group[0].case.scene.name)}{mark}, {deep:.3g} mm in {motion.times[-1]:g} s")
+    axes.set_title(f"{heading(group[0].case.scene.name)}{mark}, {_way(group[0], motion)}in {motion.times[-1]:g} s")
+
+
+def _way(run: Run, motion: Trajectory) -> str:
+    """How far the press goes in from its first touch: "20 mm "; empty where no reference tells where that is. The nodes
+    of a coarse body leave out the points that are touched first."""
+    way = float(np.linalg.norm(motion.displacements[-1]))
+    if run.case.scene.probed.what == "obstacle":
+        if run.reference is None:
+            return ""
+        press, corners = run.case.scene.obstacles[run.case.scene.probed.number], run.reference.field("nodes")
+        signs = np.array(list(product((1.0, -1.0), repeat=3))) if run.case.scene.symmetric else np.ones((1, 3))
+        way -= float(press.gap((signs[:, None] * corners).reshape(-1, 3), 0.0).min())
+    return f"{round(1e3 * way, 1):g} mm "
 
 
 def _motion(scene: Scene) -> Trajectory:

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from studies.metrics.run import Run
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import band_handle, blank, finish, grouped, log_axis, page, panels, remarks
-from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, method_label, save, styled
 from studies.timing.protocol import FrameTiming
 from studies.timing.statistics import percentiles
 
@@ -125,7 +125,7 @@ def _draw_percentiles(
 
 def _handles(timed: Sequence[tuple[Run, FrameTiming]]) -> list:
     methods = dict.fromkeys(run.case.method.name for run, _ in timed)
-    lines = [Line2D([], [], color=method_colour(name), label=readable(name)) for name in methods]
+    lines = [Line2D([], [], color=method_colour(name), label=method_label(name)) for name in methods]
     marks = [
         Line2D([], [], color=BLACK, marker=marker, linestyle="", markeredgewidth=1.8, markersize=6, label=name)
         for name, marker in QUANTILE_MARKERS.items()

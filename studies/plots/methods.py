@@ -24,7 +24,19 @@ from studies.plots.style.page import (
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, heading, readable, save, styled
+from studies.plots.style.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SMALL,
+    heading,
+    method_label,
+    readable,
+    save,
+    styled,
+)
 from studies.runs.case import chosen_settings
 
 TITLE = "Ways to keep a volume, on the same bodies, at one share of their step limits unless a step is named"
@@ -50,7 +62,7 @@ def label(method: Method) -> str:
     for name, value in chosen_settings(method).items():
         number = f" {value:g}" if not isinstance(value, (bool, str)) else f" {value}" if isinstance(value, str) else ""
         label.append(readable(name) + number)
-    return readable(method.name) + (f" ({', '.join(label)})" if label else "")
+    return method_label(method.name) + (f" ({', '.join(label)})" if label else "")
 
 
 def row_names(runs: Sequence[Run]) -> dict[int, str]:

@@ -15,7 +15,7 @@ from studies.metrics.metrics import force_end, volume_end, volume_worst
 from studies.metrics.run import Run
 from studies.plots.style.page import blank, finish, page, panels
 from studies.plots.style.render import Camera, draw_surface, frame, scale_bar, uniform
-from studies.plots.style.style import BLACK, GREY, NORMAL, SMALL, method_colour, readable, save, styled
+from studies.plots.style.style import BLACK, GREY, NORMAL, SMALL, method_colour, method_label, readable, save, styled
 
 TITLE = "A soft ball between two planes"
 SCENE, BODY = "ball_squeeze", "tetrahedral"
@@ -81,7 +81,7 @@ def _words(run: Run) -> tuple[str, list[str]]:
     force = float(run.force[run.checkpoint_frames[-1]])
     error = "" if run.reference is None else f" ({force_end(run):+.0f} %)".replace("-", "−")
     lines = [volume_words(volume_end(run), volume_worst(run)), f"force {force:.2f} N{error}"]
-    return NAMES.get(run.case.method.name, readable(run.case.method.name)), lines
+    return NAMES.get(run.case.method.name, method_label(run.case.method.name)), lines
 
 
 def volume_words(end: float, worst: float) -> str:

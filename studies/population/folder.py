@@ -9,14 +9,15 @@ import studies.geometry as geometry
 from massspring import Sphere, Trajectory
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
-from studies.geometry.files.units import Source, check_unit
+from studies.geometry.files.units import Source, check_unit, stem_of
 from studies.population.draw import CHECKPOINTS, FRAMES, GAP, PRESSED
+from studies.scene.chosen_place import DEPTH, RADIUS
 from studies.scene.kind import has_wall
 from studies.scene.placing import along, press_times, scaled
 from studies.scene.proposal import Proposal, proposal
 from studies.scene.scene import ForceOutput, Held, Organ, ReferencePlan, Scene
-from studies.scene.scene_file import DEPTH, RADIUS, python_name
-from studies.scene.tissues import LIVER
+from studies.scene.scene_file import python_name
+from studies.scene.tissues import LIVER, Tissue
 from studies.store.paths import readable
 
 SURFACES = (
@@ -54,7 +55,7 @@ def placed_organs(folder: Path, unit: str | None = None) -> Iterator[Placed]:
         raise StudyError(f"{folder} holds no surface; known are {', '.join(SURFACES)}")
     names = dict[str, int]()
     for path in files:
-        name = python_name(path.stem)
+        name = python_name(stem_of(path))
         names[name] = names.get(name, 0) + 1
         yield _placed(path, unit, name if names[name] == 1 else f"{name}_{names[name]}")
 
@@ -71,17 +72,18 @@ def _placed(path: Path, unit: str | None, name: str) -> Placed:
     return Placed(path, scene, tuple(str(warning.message) for warning in told))
 
 
-def placed_scene(name: str, source: Source, found: Proposal) -> Scene:
+def placed_scene(name: str, source: Source, found: Proposal, tissue: Tissue = LIVER) -> Scene:
     """The scene of a body from a file: held at an end, palpated as proposed by a probe in proportion to its size."""
     radius, depth = (round(share * found.sides[0], 4) for share in (RADIUS, DEPTH))
     point, outward, end = found.palpation.point, found.palpation.normal, PRESSED * DURATION
     inward = scaled(outward, -1.0)
     path = Trajectory((0.0, end), ((0.0, 0.0, 0.0), scaled(inward, depth + GAP)))
+    pressed = f"a probe of {1e3 * radius:.3g} mm radius pushed in by {1e3 * depth:.3g} mm"
     return Scene(
         name=name,
-        title=f"{name}: held at one end, a probe of {1e3 * radius:.3g} mm radius pushed in by {1e3 * depth:.3g} mm",
+        title=f"{name}: held at {found.held_where}, {pressed}",
         organ=Organ("file", {"path": str(source.path), "unit": source.unit, "remesh": True}),
-        tissue=LIVER,
+        tissue=tissue,
         duration=DURATION,
         frames=FRAMES,
         checkpoints=press_times(0.0, end, CHECKPOINTS, DURATION),

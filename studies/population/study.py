@@ -46,5 +46,14 @@ def population_study(populations: Sequence[Population] = MEMBERS, name: str = PO
         ),
         charts=(Chart("distributions.png", "studies.plots.campaigns.population:draw"),),
         counts_losses=True,
-        columns=("force_end", "mean_error", "interior_error", "volume_worst", "min_j", "sway"),
+        columns=(
+            "force_end",
+            "mean_error",
+            "shape_error",
+            "shape_volume",
+            "interior_error",
+            "volume_worst",
+            "min_j",
+            "sway",
+        ),
     )

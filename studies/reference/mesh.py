@@ -32,7 +32,7 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
     assert plan is not None  # never called for a scene without one
     if scene.symmetric:
         return _curved_octant(scene, straight(_octant(scene, level))), [], np.empty((0, 3))
-    organ_mesh = mesh_for(scene, int(level), on_shape=True)
+    organ_mesh = mesh_for(scene, int(level), on_shape=True, even=True)
     coarse = held_mesh(scene, organ_mesh)
     at_outlines, at_contact = plan.bisections(level)
     body = coarse.refined(scene, at_outlines, at_contact)

@@ -22,7 +22,7 @@ def element_size(scene: Scene, level: float) -> float:
     """
     if scene.symmetric:
         return level * float(scene.organ.parameters["radius"])
-    mesh = mesh_for(scene, int(level), on_shape=True)
+    mesh = mesh_for(scene, int(level), on_shape=True, even=True)
     return mean_edge(mesh.points, tetrahedron_facets(mesh.tetrahedra))
 
 

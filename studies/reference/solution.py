@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 from weakref import WeakValueDictionary
 
 import numpy as np
 from skfem import MeshTet2
 
-from reference_fem import Evaluator, surface_triangles
+from reference_fem import Evaluator, facet_nodes, surface_triangles
 from studies.scene.scene import Scene
 from studies.store.record import Record
 
@@ -30,6 +31,24 @@ class _Remembering(Evaluator):
 
 _EVALUATORS: WeakValueDictionary[tuple[bytes, bytes], _Remembering] = WeakValueDictionary()
 """By nodes and tetrahedra: solutions that differ by a setting have one mesh, and several may be loaded twice."""
+
+
+OCTANTS = np.array(list(product((1.0, -1.0), repeat=3)))
+"""Signs that mirror an octant into the whole body, (8, 3)."""
+TURNED = [0, 2, 1, 5, 4, 3]
+"""A six-node facet seen from its other side."""
+
+
+class Boundary(NamedTuple):
+    """The boundary of the whole body."""
+
+    points: np.ndarray
+    """Nodes at rest [m], (n, 3); those inside the body are among them."""
+    facets: np.ndarray
+    """Six nodes of each facet, outward, (f, 6): corners, then the nodes between first and second, second and third,
+    third and first."""
+    displacement: np.ndarray
+    """Of the nodes at the last checkpoint [m], (n, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,10 +121,23 @@ class Solution:
         return {}
 
     def outside(self, triangles: np.ndarray) -> np.ndarray:
-        """Those of the boundary triangles (s, 3) that do not lie in a plane of symmetry."""
+        """Those of the boundary triangles or facets (s, 3 or 6) that do not lie in a plane of symmetry."""
         if not self.scene.symmetric:
             return triangles
         return triangles[~np.any(np.all(np.abs(self.field("nodes")[triangles]) < 1e-12, axis=1), axis=1)]
+
+    @cached_property
+    def boundary(self) -> Boundary:
+        """Where the reference knows the surface and its displacement exactly; of an octant all eight mirror images."""
+        nodes, moved, facets = self.field("nodes"), self.field("displacement")[-1], facet_nodes(self.mesh)
+        if not self.scene.symmetric:
+            return Boundary(nodes, facets, moved)
+        part, count = self.outside(facets), len(nodes)
+        every = [part if sign.prod() > 0 else part[:, TURNED] for sign in OCTANTS]
+        images = (OCTANTS[:, None, :] * nodes).reshape(-1, 3) + 0.0  # no -0, which is no 0 to `unique`
+        points, first, new = np.unique(images, axis=0, return_index=True, return_inverse=True)
+        facets = new.ravel()[np.vstack([facets + k * count for k, facets in enumerate(every)])]
+        return Boundary(points, facets, (OCTANTS[:, None, :] * moved).reshape(-1, 3)[first])
 
     def surface(self, checkpoint: int = -1) -> tuple[np.ndarray, np.ndarray]:
         """Deformed surface of the whole body: points (n, 3) [m], triangles (s, 3)."""
@@ -113,8 +145,7 @@ class Solution:
         if not self.scene.symmetric:
             return points, self.triangles
         part = self.outside(self.triangles)
-        signs = np.array(list(product((1.0, -1.0), repeat=3)))
         faces = [
-            part + k * len(points) if s.prod() > 0 else part[:, ::-1] + k * len(points) for k, s in enumerate(signs)
+            part + k * len(points) if s.prod() > 0 else part[:, ::-1] + k * len(points) for k, s in enumerate(OCTANTS)
         ]
-        return (signs[:, None, :] * points).reshape(-1, 3), np.vstack(faces)
+        return (OCTANTS[:, None, :] * points).reshape(-1, 3), np.vstack(faces)

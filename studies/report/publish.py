@@ -6,10 +6,11 @@ from pathlib import Path
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.catalog import Study
+from studies.catalog.study import command_line
 from studies.population import POPULATION
 from studies.report.results import FIGURES, charts_and_tables, refresh
 from studies.report.summary import SUMMARIES
-from studies.store.machine import machine_id, machine_of
+from studies.store.machine import machine_id, machine_of, write_machine
 from studies.store.stamps import is_stamped
 from studies.sweep.standings import standings
 from studies.timing.cases import timing_is_current
@@ -56,13 +57,12 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
 
 
 def publish_some(root: Path, studies: Sequence[Study], home: Path) -> list[Path]:
-    """The same for the tables, charts and summaries of some studies; all else stays as published.
+    """The same for the tables, charts and summaries of some studies; all else stays as published. Where that was
+    measured on another machine, the folder of a study gets a machine.json of its own.
 
-    Raises StudyError as `publish` does, and where the rest was measured on another machine.
+    Raises StudyError as `publish` does.
     """
     check_studies(root, studies)
-    if machine_of(home / PUBLISHED) not in (None, machine_id()):
-        raise StudyError("not published: the other tables are of another machine; publish all studies together")
     sources = []
     for study in studies:
         written, missing = refresh(root, study)
@@ -72,6 +72,10 @@ def publish_some(root: Path, studies: Sequence[Study], home: Path) -> list[Path]
     show_summaries(root, studies, home)
     target = home / PUBLISHED
     copies = _copy(sources, root, target)
+    if machine_of(target) not in (None, machine_id()):
+        for study in studies:
+            write_machine(target / study.name / "machine.json")
+            copies.append(target / study.name / "machine.json")
     _remove([file for study in studies for file in _files(target / study.name)], copies)
     return copies
 
@@ -106,7 +110,7 @@ def show_summaries(root: Path, studies: Sequence[Study], home: Path) -> None:
 def check_studies(root: Path, studies: Sequence[Study], done: str = "published") -> None:
     """Raises StudyError when a piece of a study is missing or stale, a timing of this machine too; done: what is not
     done then."""
-    behind: dict[str, list[str]] = {}
+    behind = dict[str, list[str]]()
     for study in studies:
         pieces = [s for s in standings(root, study) if s.status in ("missing", "stale")]
         lacking = [f"{piece.task.label} is {piece.status}" for piece in pieces]
@@ -121,7 +125,7 @@ def check_studies(root: Path, studies: Sequence[Study], done: str = "published")
         count, first = sum(map(len, behind.values())), next(iter(behind.values()))[0]
         raise StudyError(
             f"not {done}: {first}" + (f", and {count - 1} more are missing or stale" if count > 1 else "") + "; "
-            f"run `organbench run {' '.join(behind)}` first"
+            f"run `{command_line('run', [study for study in studies if study.name in behind])}` first"
         )
 
 

@@ -8,6 +8,8 @@ import pandas as pd
 
 from massspring.sources import own_modules, source_fingerprint
 from studies.base.atomic import is_there, write_whole
+from studies.metrics.rest_surface import rest_surfaces
+from studies.metrics.true_surface import ShapeErrors, shape_errors
 from studies.plots.uncertainty import draw
 from studies.reference.load import Reference
 from studies.reference.reference_solves import STUDY, reference_solves
@@ -26,10 +28,18 @@ def known_references(references: References, scenes: Iterable[Scene]) -> dict[st
     return {name: reference for name, reference in found.items() if reference is not None}
 
 
+def shape_of_reference(reference: Reference) -> ShapeErrors:
+    """How far the finest mesh of a reference, its sides as curved as they are, is from the true shape."""
+    points, facets, _ = reference.boundary
+    return shape_errors(reference.scene.organ, rest_surfaces(points, facets), filled=True)
+
+
 def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
-    """A row per scene and quantity: its shares, their sum, order, shift; relative [%]."""
+    """A row per scene and quantity: its shares, their sum, order, shift; relative [%]. The same in all rows of a scene:
+    how far the finest mesh is from the true shape."""
     rows = []
     for scene, reference in references.items():
+        shape = shape_of_reference(reference)
         levels = [s.record.attributes["level"] for s in (*reversed(reference.coarser), reference)]
         for quantity, known in reference.uncertainty.items():
             shares = {f"{name} [%]": 100 * known.shares.get(name, float("nan")) for name in ("mesh", *VARIANTS)}
@@ -43,6 +53,8 @@ def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
                     "extrapolated shift [%]": 100 * known.shift,
                     "levels": " ".join(f"{level:g}" for level in levels),
                     "unknowns": reference.record.attributes["unknowns"],
+                    "shape_error [%]": 100 * shape.distance,
+                    "shape_volume [%]": 100 * shape.volume,
                 }
             )
     return pd.DataFrame(rows)

@@ -20,7 +20,7 @@ from studies.plots.figures.organs import draw_organs
 from studies.plots.style.style import svg_copies
 from studies.reference.reference_solves import reference_solves
 from studies.report.kept_volume import kept_volumes
-from studies.report.page.part import part_path, write_part
+from studies.report.page.part import read_part, write_part
 from studies.report.page.write import write_page
 from studies.report.references import refresh_uncertainty, state_of
 from studies.report.summary import SUMMARIES
@@ -121,7 +121,8 @@ def refresh(root: Path, study: Study, known: References | None = None) -> tuple[
     stamp = root / "cache" / f"{study.name}.drawn.json"
     shown = {"inputs": inputs_of(root, study), "remarks": []}
     before = _stamped(stamp)
-    if before.get("inputs") == shown["inputs"] and all(path.exists() for path in (*paths, part_path(root, study))):
+    current = before.get("inputs") == shown["inputs"] and all(path.exists() for path in paths)
+    if current and read_part(root, study) is not None:
         return paths, before["remarks"]
     runs, shown["remarks"] = load_runs(root, study, known)
     references = {run.case.scene.name: run.reference for run in runs}
@@ -162,7 +163,7 @@ def inputs_of(root: Path, study: Study) -> str:
     shown = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
     own = {file.sha256[:16] for file in map(file_of, shown) if file is not None}
     state = state_of([*entry_files(root), *references], files)
-    return "-".join([state, *(entry.name for entry in metrics), *sorted(own)])
+    return "-".join([state, *(entry.name for entry in metrics), *sorted(own), study.word])
 
 
 def draw_figures(root: Path) -> list[Path]:

@@ -20,6 +20,9 @@ LADDER_SCENES = ("ball_clamped", "liver_press")
 """Scenes in which every rung has a force and a displacement."""
 
 
+WHY_NONE = "no body meets the usual wish and keeps the shape, or the reference is too coarse to tell"
+
+
 @dataclass(frozen=True)
 class Summary:
     """A text that is read off a study, and the page that shows it between its marks."""
@@ -57,13 +60,24 @@ def results_of(runs: Sequence[Run]) -> str:
     return "\n".join(lines)
 
 
-SUMMARY_METRICS = ("volume_worst", "force_end", "interior_error", "mean_error", "silhouette_error", "min_j")
+SUMMARY_METRICS = (
+    "volume_worst",
+    "force_end",
+    "interior_error",
+    "mean_error",
+    "silhouette_error",
+    "shape_error",
+    "shape_volume",
+    "min_j",
+)
 SUMMARY_COLUMNS = (
     "volume_worst [%]",
     "force_end [%]",
     "interior_error [%]",
     "mean_error [%]",
     "silhouette_error [%]",
+    "shape_error [%]",
+    "shape_volume [%]",
     "min_j [1]",
 )
 SUMMARY_HEADS = (
@@ -72,6 +86,8 @@ SUMMARY_HEADS = (
     "interior rel. L2 [%]",
     "surface mean / max u [%]",
     "silhouette / size [%]",
+    "rest shape / size [%]",
+    "rest volume [%]",
     "min J",
 )
 
@@ -83,20 +99,20 @@ def _cell(row: Mapping[Hashable, Any], column: str) -> str:
         return MISSING
     if column.startswith("min_j"):
         return f"{value:.2f}"
-    if column.startswith("volume"):
+    if column.startswith(("volume", "shape_error")):
         return f"{value:.2g}"
     uncertainty = float(row.get(column.replace(" [", " floor ["), float("nan")))
     unresolved = column.split(" [")[0] in str(row.get(UNRESOLVED, "")).split()
-    return value_cell(value, uncertainty, signed=column.startswith("force"), unresolved=unresolved)
+    return value_cell(value, uncertainty, signed=column.startswith(("force", "shape_volume")), unresolved=unresolved)
 
 
 def recommended_of(runs: Sequence[Run]) -> str:
     """Of every scene the paper's body and the body that `organbench advise` chooses for the usual wish: the cheapest
-    that meets it, else the nearest, marked."""
+    that meets it and keeps the shape, else the nearest, marked."""
     lines = [
         "| scene | the paper's body: force [%] | mean [%] | recommended: body, surface nodes, step / limit | force [%] "
-        "| mean [%] | simulated / computing time |",
-        "|---|---|---|---|---|---|---|",
+        "| mean [%] | rest shape / size [%] | rest volume [%] | simulated / computing time |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     marked = False
     for name, found in _by_scene(runs).items():
@@ -108,26 +124,26 @@ def recommended_of(runs: Sequence[Run]) -> str:
             continue
         marked |= best is None
         words = f"{body_words(chosen.case.body)}, {chosen.case.dt_fraction:g}{'' if best else ' ‡'}"
-        cells = [*_errors(paper), words, *_errors(chosen), _real_time(chosen)]
+        cells = [*_errors(paper), words, *_errors(chosen), *_shape(chosen), _real_time(chosen)]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     if marked:
-        lines += ["", "‡ the nearest: no body meets the usual wish there, or the reference is too coarse to tell"]
+        lines += ["", f"‡ the closest candidate: {WHY_NONE}"]
     return "\n".join(lines)
 
 
 def ladder_of(runs: Sequence[Run]) -> str:
     """Every body of LADDER_SCENES by *implicit_volume*, from the paper's to graded quadratic ones."""
     lines = [
-        "| scene | body, surface nodes | kept volumes | step / limit | force [%] | mean [%] "
-        "| simulated / computing time |",
-        "|---|---|---|---|---|---|---|",
+        "| scene | body, surface nodes | kept volumes | step / limit | force [%] | mean [%] | rest shape / size [%] "
+        "| rest volume [%] | simulated / computing time |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     volumes = {run.case.key: int(run.record.attributes.get("volumes", 0)) for run in runs}
     for name, found in _by_scene(runs).items():
         for one in found:
             if name in LADDER_SCENES and one.advisable:
                 cells = [body_words(one.case.body), str(volumes[one.case.key]), f"{one.case.dt_fraction:g}"]
-                lines.append(f"| {name} | " + " | ".join([*cells, *_errors(one), _real_time(one)]) + " |")
+                lines.append(f"| {name} | " + " | ".join([*cells, *_errors(one), *_shape(one), _real_time(one)]) + " |")
     return "\n".join(lines)
 
 
@@ -185,6 +201,11 @@ def _is_paper(body: BodyRecipe) -> bool:
 
 def _errors(one: Judged) -> list[str]:
     return [_percent(one.force, signed=True), _percent(one.displacement, signed=False)]
+
+
+def _shape(one: Judged) -> list[str]:
+    """How far a body at rest is from the true shape: two digits, for the sampling is not better."""
+    return [f"{one.shape.value:.2g}" if one.shape.known else MISSING, value_cell(one.shape_volume.value, signed=True)]
 
 
 def _percent(error: Measured, signed: bool) -> str:

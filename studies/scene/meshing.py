@@ -13,22 +13,31 @@ from studies.scene.scene import Organ, Scene
 
 SOURCE_PARAMETERS = ("path", "unit", "scale", "longest_side", "part")
 """How a file is to be taken."""
-FILE_PARAMETERS = (*SOURCE_PARAMETERS, "sha256", "remesh", "smooth", "wall")
+MADE = ("smooth", "wall", "holes", "solid")
+"""What is done to a surface on its way to a body, as in studies.geometry.api.scans.Remeshing."""
+FILE_PARAMETERS = (*SOURCE_PARAMETERS, "sha256", "remesh", *MADE)
 """Of the organ "file"."""
 
 
 def mesh_for(
-    scene: Scene, nodes: int, filled: bool = True, layers: int | None = None, on_shape: bool = False
+    scene: Scene,
+    nodes: int,
+    filled: bool = True,
+    layers: int | None = None,
+    on_shape: bool = False,
+    even: bool = False,
 ) -> OrganMesh:
     """The scene's organ with `nodes` surface nodes, the wall of a hollow one in `layers` (None: as many as make their
     elements as high as long). Raises StudyError.
 
     A mesh file comes as it is, unless its parameters ask for a new surface: "remesh": true, or "smooth" or "wall" [m].
     The flat sides of that enclose the volume of the file's surface, or its nodes are `on_shape`, for sides that will be
-    curved; nodes of all other organs always are.
+    curved; nodes of all other organs always are. Nodes lie where the sides need them to follow the shape; those of
+    references are `even`, for these are halved until the shape is met.
     """
     if lookup(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
-        return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters, layers)
+        sides = None if even else "curved" if on_shape else "straight"
+        return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters, layers, sides=sides)
     source, how = scanned(scene.organ, scene.name)
     if remeshed(scene.organ):
         return scan(source, nodes, fill=filled, layers=layers, regions=scene.regions, on_shape=on_shape, **how)
@@ -49,7 +58,7 @@ def scanned(organ: Organ, name: str) -> tuple[Source, dict[str, Any]]:
         raise StudyError(
             f"scene '{name}': {source.path.name} does not hold what it held when the scene was made; make it anew"
         )
-    return source, {key: parameters[key] for key in ("smooth", "wall") if key in parameters}
+    return source, {key: parameters[key] for key in MADE if key in parameters}
 
 
 def remeshed(organ: Organ) -> bool:

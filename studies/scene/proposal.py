@@ -1,4 +1,4 @@
-"""Where a body may be held and palpated, proposed by rule from its shape: a first scene for an organ of one's own."""
+"""Where a body is held and palpated: proposed by rule from its shape, or where a person says."""
 
 from dataclasses import dataclass
 
@@ -6,9 +6,10 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from studies.base.errors import StudyError
-from studies.geometry import HalfSpace, OrganMesh
+from studies.geometry import BallRegion, HalfSpace, OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas, vertex_normals
 from studies.geometry.shape.levelset import PalpationPoint
+from studies.scene.chosen_place import PATCH, SIDES, Place, palpated_at, snapped, vector
 from studies.scene.placing import Vector
 
 HELD = 0.10
@@ -17,10 +18,12 @@ END = 0.15
 """Of the length: how far from an end its surface is measured, to tell which end is blunter."""
 FAR = 0.4
 """Of the length: how far from the held end the palpation point is at least."""
-PATCH = 0.12
-"""Of the length: radius of the patch whose flatness counts."""
 FREE = 0.02
 """Of the length: how far the body may reach beyond the plane that touches it in the palpation point."""
+HALF = 0.5
+"""Of the largest distance from the hold: a palpation point need not be farther away than this, however long it is."""
+FACING = 0.5
+"""Cosine of the angle to a side from which a patch looks to that side."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,9 @@ class Proposal:
     """Unit vectors, the longest extent first."""
     sides: Vector
     """Extents along the axes [m]."""
-    hold: HalfSpace
+    hold: HalfSpace | BallRegion
+    held_where: str
+    """In words, for titles: "one end", "the top"."""
     held_share: float
     """Of the surface's area."""
     palpation: PalpationPoint
@@ -41,34 +46,56 @@ class Proposal:
     """Length of the mean unit normal round the point: 1 is a plane."""
 
 
-def proposal(mesh: OrganMesh) -> Proposal:
-    """The blunter end of the longest principal axis is held, a tenth of the surface; the flattest patch that is freely
-    reachable and far from it is palpated. Raises StudyError for a body without such a patch."""
+def proposal(mesh: OrganMesh, hold: Place | None = None, probe: Place | None = None) -> Proposal:
+    """A tenth of the surface is held, at the blunter end of the longest principal axis or at `hold`. The flattest patch
+    that is freely reachable and far from it is palpated, or `probe`: a patch that looks to that side, or the nearest
+    point of the surface. Raises StudyError for a body without such a patch, and for a point that is off the surface,
+    held, or out of the probe's reach."""
     points, triangles = mesh.points[: mesh.outer_count], mesh.outer_triangles
     areas, centres = triangle_areas(points, triangles), points[triangles].mean(axis=1)
     middle = (areas[:, None] * centres).sum(axis=0) / areas.sum()
     spread = ((areas[:, None] * (centres - middle)).T @ (centres - middle)) / areas.sum()
     axes = np.linalg.eigh(spread)[1].T[::-1]
-    along = (points - middle) @ axes.T
-    sides = np.ptp(along, axis=0)
+    along_axes = (points - middle) @ axes.T
+    sides = np.ptp(along_axes, axis=0)
     axes, sides = axes[np.argsort(-sides)], sides[np.argsort(-sides)]
-    hold, share = held_end(centres, areas, axes[0])
-    point, normal, flatness = palpated(points, vertex_normals(points, triangles), hold, float(sides[0]), mesh.name)
+    surface, length = (points, triangles), float(sides[0])
+    if hold is None or isinstance(hold, str):
+        outward = blunter_end(centres, areas, axes[0]) if hold is None else np.asarray(SIDES[hold])
+        region, share = held_end(centres, areas, outward)
+    else:
+        region, share = held_around(snapped(surface, hold, length, f"{mesh.name}: --hold"), centres, areas)
+    normals = vertex_normals(points, triangles)
+    if probe is None or isinstance(probe, str):
+        point, normal, flatness = palpated(points, normals, region, length, mesh.name, probe)
+    else:
+        point, normal, flatness = palpated_at(surface, normals, region, length, f"{mesh.name}: --probe", probe)
     rows = tuple(vector(axis) for axis in axes)
     return Proposal(
-        vector(middle), (rows[0], rows[1], rows[2]), vector(sides), hold, share, PalpationPoint(point, normal), flatness
+        middle=vector(middle),
+        axes=(rows[0], rows[1], rows[2]),
+        sides=vector(sides),
+        hold=region,
+        held_where="one end" if hold is None else f"the {hold}" if isinstance(hold, str) else "a chosen point",
+        held_share=share,
+        palpation=PalpationPoint(point, normal),
+        flatness=flatness,
     )
 
 
-def held_end(centres: np.ndarray, areas: np.ndarray, axis: np.ndarray) -> tuple[HalfSpace, float]:
-    """The half space that holds HELD of the surface at the end with more surface near it; the share that it holds."""
+def blunter_end(centres: np.ndarray, areas: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """The direction (3,) along `axis` of the end with more surface near it."""
     places = centres @ axis
     length = float(np.ptp(places))
     at_low, at_high = (
         areas[places < places.min() + END * length].sum(),
         areas[places > places.max() - END * length].sum(),
     )
-    outward = axis if at_high >= at_low else -axis
+    return axis if at_high >= at_low else -axis
+
+
+def held_end(centres: np.ndarray, areas: np.ndarray, outward: np.ndarray) -> tuple[HalfSpace, float]:
+    """The half space that holds HELD of the surface at the end in direction `outward`; the share that it holds."""
     order = np.argsort(-(centres @ outward))
     held = np.cumsum(areas[order]) / areas.sum()
     last = int(np.searchsorted(held, HELD))
@@ -77,24 +104,38 @@ def held_end(centres: np.ndarray, areas: np.ndarray, axis: np.ndarray) -> tuple[
     return HalfSpace(vector(beside), vector(-outward)), float(held[last])
 
 
+def held_around(point: np.ndarray, centres: np.ndarray, areas: np.ndarray) -> tuple[BallRegion, float]:
+    """The ball round a point that holds HELD of the surface; the share that it holds."""
+    away = np.linalg.norm(centres - point, axis=1)
+    order = np.argsort(away)
+    held = np.cumsum(areas[order]) / areas.sum()
+    last = int(np.searchsorted(held, HELD))
+    return BallRegion(vector(point), round(float(away[order[last]]), 6)), float(held[last])
+
+
 def palpated(
-    points: np.ndarray, normals: np.ndarray, hold: HalfSpace, length: float, name: str
+    points: np.ndarray,
+    normals: np.ndarray,
+    hold: HalfSpace | BallRegion,
+    length: float,
+    name: str,
+    side: str | None = None,
 ) -> tuple[Vector, Vector, float]:
     """The node in the middle of the flattest patch far from the hold and freely reachable, the patch's normal, and its
-    flatness. Raises StudyError where there is none."""
+    flatness; of the patches that look to a side, where one is given. Raises StudyError where there is none."""
     around = KDTree(points).query_ball_point(points, PATCH * length)
     mean = np.stack([normals[near].mean(axis=0) for near in around])
     flat = np.linalg.norm(mean, axis=1)
     outward = mean / np.maximum(flat, 1e-300)[:, None]
     beyond = ((points[None] - points[:, None]) * outward[:, None]).sum(axis=2).max(axis=1)
-    able = (hold.level(points) > FAR * length) & (beyond < FREE * length)
+    level = hold.level(points)
+    able = (level > min(FAR * length, HALF * float(level.max()))) & (beyond < FREE * length)
+    score = flat
+    if side is not None:
+        able &= outward @ np.asarray(SIDES[side]) > FACING
+        score = mean @ np.asarray(SIDES[side])
     if not able.any():
-        raise StudyError(f"{name}: no freely reachable patch lies far from its held end; place the instrument by hand")
-    best = int(np.flatnonzero(able)[flat[able].argmax()])
+        which = "lies far from its held end" if side is None else f"far from its held end looks to the {side}"
+        raise StudyError(f"{name}: no freely reachable patch {which}; choose a point: organbench place --probe x,y,z")
+    best = int(np.flatnonzero(able)[score[able].argmax()])
     return vector(points[best]), vector(outward[best]), float(flat[best])
-
-
-def vector(values: np.ndarray) -> Vector:
-    """Three plain numbers, rounded to micrometres, or for unit vectors to a millionth."""
-    x, y, z = (round(float(value), 6) for value in values)
-    return (x, y, z)

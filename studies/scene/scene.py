@@ -27,7 +27,8 @@ class Organ:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     """Of the shape; for "file": {"path": …, "unit": "m", "cm", "mm" or "in"}, "scale", "longest_side" [m] or "part" as
     in studies.geometry.files.units.Source, and "remesh": true, "smooth" or "wall" [m] for a new surface with the nodes
-    that are asked for, the outlines of held regions on its edges. "sha256" is added: results belong to what the file
+    that are asked for, the outlines of held regions on its edges; "holes": true and "solid" [m] as in
+    studies.geometry.api.scans.Remeshing. "sha256" is added: results belong to what the file
     holds, wherever it lies."""
 
     def __post_init__(self) -> None:

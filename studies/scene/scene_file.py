@@ -1,33 +1,36 @@
 """A scene file for an organ of one's own, written for a person to read and change."""
 
 import json
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
-from studies.geometry.files.units import Source
+from studies.geometry.files.units import Source, stem_of
+from studies.scene.chosen_place import DEPTH, GAP, RADIUS
 from studies.scene.proposal import Proposal
 
-TEXT = '''"""{name}: held at an end, palpated on a flat side. Proposed by `organbench place`; change what you like."""
+TEXT = '''"""{name}: held at {where}, palpated on a patch. Written by `organbench place`; change what you like."""
 
 from pathlib import Path
 
 from massspring import Sphere, Trajectory
-from studies import BodyRecipe, Case, ForceOutput, Held, ImplicitVolume, Organ, ReferencePlan, Scene, Study
-from studies.geometry import HalfSpace
+from studies import BodyRecipe, Case, Chart, ForceOutput, Held, ImplicitVolume, Organ, ReferencePlan, Scene, Study
+from studies.geometry import {region}
 from studies.scene.placing import along, press_times, scaled
-from studies.scene.tissues import LIVER
+from studies.scene.tissues import {tissue}
 
 FILE = Path(__file__).parent / "{file}"
 POINT = {point}  # m, on the surface
 NORMAL = {normal}  # outward
-RADIUS, DEPTH, GAP = {radius}, {depth}, 0.0005  # m, of the probe
+RADIUS, DEPTH, GAP = {radius}, {depth}, {gap}  # m, of the probe
 PRESS_END, DURATION = 6.0, 8.0  # s
 INWARD = scaled(NORMAL, -1.0)
 
 SCENE = Scene(
     name="{name}",
-    title="{name}: held at one end, a probe of {radius_mm:.3g} mm radius pushed in by {depth_mm:.3g} mm",
+    title="{name}: held at {where}, a probe of {radius_mm:.3g} mm radius pushed in by {depth_mm:.3g} mm",
     organ=Organ("file", {{{organ}}}),
-    tissue=LIVER,
+    tissue={tissue},
     duration=DURATION,
     frames=240,
     checkpoints=press_times(0.0, PRESS_END, 5, DURATION),
@@ -43,37 +46,87 @@ SCENE = Scene(
     damping=8.0,
     reference=ReferencePlan("solid", (250, 360, 550), at_outlines=(1, 2, 3), at_contact=(3, 4, 5)),
 )
-CASE = Case(SCENE, BodyRecipe("tetrahedral", {nodes}), ImplicitVolume())
-COLUMNS = ("force_end", "mean_error", "volume_worst")
-STUDY = Study("{name}", "How near is it to the reference?", (CASE,), (), COLUMNS)
+CASES = (
+    # One volume, which the paper keeps: quick, but its force is about a third too small.
+    Case(SCENE, BodyRecipe("tetrahedral", {nodes}), ImplicitVolume(), recorded=("surface",)),
+{recommended})
+CHARTS = (
+    Chart("volume.png", "studies.plots.volume_history:draw"),
+    Chart("force.png", "studies.plots.force_path:draw"),
+    Chart("accuracy.png", "studies.plots.accuracy:draw"),
+)
+COLUMNS = ("force_end", "mean_error", "shape_error", "shape_volume", "volume_worst")
+STUDY = Study("{name}", "How near are these bodies to the reference?", CASES, CHARTS, COLUMNS)
 '''
-RADIUS, DEPTH = 0.10, 0.05
-"""Of the longest side: the probe's radius, and how far it goes in."""
+RECOMMENDED = """    # What `organbench advise` recommends: the worst errors that it had in {alike}.
+    Case(
+        SCENE,
+        {body},
+        ImplicitVolume(),
+        dt_fraction={dt_fraction:g},
+        recorded=("surface",),
+    ),
+"""
 
 
-def scene_text(found: Proposal, source: Source, options: dict[str, object], nodes: int, folder: Path) -> str:
+@dataclass(frozen=True)
+class Recommended:
+    """The second body of a scene file."""
+
+    body: str
+    """As Python: "BodyRecipe(kind='quadratic')"."""
+    dt_fraction: float
+    """Time step over the stability limit."""
+    alike: tuple[str, ...]
+    """Scenes where it was measured."""
+
+
+def scene_text(
+    found: Proposal,
+    organ: Mapping[str, object],
+    tissue: str,
+    nodes: int,
+    recommended: Recommended | None,
+    folder: Path,
+) -> str:
     """A Python file, in `folder`, that defines SCENE and STUDY for the organ in a file.
 
-    options: of Organ("file") beside path, unit, scale, longest_side and part."""
-    given = {"unit": source.unit, "scale": None if source.scale == 1.0 else source.scale}
-    given |= {"longest_side": source.longest_side, "part": source.part, "remesh": True}
-    shown = {key: value for key, value in (given | options).items() if value is not None}
-    texts = {key: json.dumps(value) if isinstance(value, str) else repr(value) for key, value in shown.items()}
-    entries = ", ".join(['"path": str(FILE)', *(f'"{key}": {text}' for key, text in texts.items())])
+    organ: parameters of Organ("file"), see organ_options; tissue: a name of TISSUES; nodes: of the body of one volume;
+    recommended: a second body, None where no other is known to be better."""
+    path = Path(str(organ["path"]))
+    given = {key: json.dumps(value) if isinstance(value, str) else repr(value) for key, value in organ.items()}
+    entries = ", ".join(f'"{key}": {text}' for key, text in (given | {"path": "str(FILE)"}).items())
     radius, depth = (round(share * found.sides[0], 4) for share in (RADIUS, DEPTH))
+    second = ""
+    if recommended is not None:
+        names = " and ".join(recommended.alike)
+        second = RECOMMENDED.format(body=recommended.body, dt_fraction=recommended.dt_fraction, alike=names)
     return TEXT.format(
-        name=python_name(source.path.stem),
-        file=relative(source.path, folder),
+        name=python_name(stem_of(path)),
+        where=found.held_where,
+        file=relative(path, folder),
         point=found.palpation.point,
         normal=found.palpation.normal,
         radius=radius,
         depth=depth,
+        gap=GAP,
         radius_mm=1e3 * radius,
         depth_mm=1e3 * depth,
         organ=entries,
-        hold=f"HalfSpace({found.hold.point}, {found.hold.normal})",
+        tissue=tissue.upper(),
+        region=type(found.hold).__name__,
+        hold=", ".join(str(value) for value in vars(found.hold).values()).join((f"{type(found.hold).__name__}(", ")")),
         nodes=nodes,
+        recommended=second,
     )
+
+
+def organ_options(source: Source, how: Mapping[str, object]) -> dict[str, object]:
+    """The parameters of Organ("file") that give the same body; how: what was asked of the mesher, by the names of
+    studies.geometry.api.scans.Remeshing."""
+    given = {"path": str(source.path), "unit": source.unit, "scale": None if source.scale == 1.0 else source.scale}
+    given |= {"longest_side": source.longest_side, "part": source.part, "remesh": True}
+    return {key: value for key, value in (given | dict(how)).items() if value not in (None, False, 0.0)}
 
 
 def relative(path: Path, folder: Path) -> str:

@@ -1,6 +1,9 @@
 """Tissues with the sources of their constants."""
 
+import re
 from dataclasses import dataclass
+
+from studies.base.errors import StudyError
 
 
 @dataclass(frozen=True)
@@ -32,3 +35,19 @@ BLADDER = Tissue(10_000.0, 1040.0, "bladder wall, assumed: published moduli span
 
 
 LIVER = Tissue(1800.0, 1060.0, "liver, MR elastography: 1.8 ± 0.4 kPa; density 1,060 kg/m³")
+
+
+TISSUES = {"bladder": BLADDER, "kidney": KIDNEY, "liver": LIVER, "spleen": SPLEEN, "stomach": STOMACH}
+
+
+def tissue_named(text: str) -> str:
+    """The one of TISSUES that is a word of a text, such as a file's name: "spleen" of "VH_F_Spleen.stl".
+
+    Raises StudyError where none is, or several are.
+    """
+    words = {word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", text)}
+    names = [name for name in TISSUES if name in words]
+    if len(names) != 1:
+        what = f"names {' and '.join(names)}" if names else "does not name its organ"
+        raise StudyError(f"{text} {what}; say which tissue it is: --tissue {', '.join(TISSUES)}")
+    return names[0]

@@ -19,7 +19,8 @@ def link_study(root: Path, study: str) -> list[str]:
     """Writes results/STUDY/STUDY.h5: an external link (relative file name, so that the folder can be moved) to every
     record by its name, and below "timing/MACHINE" to every timing file. Also removes what killed writers left.
 
-    Returns one sentence for each file that had to be left out because it cannot be read.
+    Returns one sentence for each file that had to be left out because it cannot be read, and for a folder that lies in
+    the index's place.
     Raises StudyError when the index cannot be written.
     """
     index = index_path(root, study)
@@ -36,6 +37,11 @@ def link_study(root: Path, study: str) -> list[str]:
         for name, target in targets.items():
             file[name] = h5py.ExternalLink(target, "/")
     content = sealed(image.getvalue())
+    if index.is_dir():
+        return [
+            *unreadable,
+            f"{index} is a folder in the place of the study's index: delete it, and run the study again",
+        ]
     if not is_there(index) or index.read_bytes() != content:  # a folder that cannot be written to may be looked at
         write_whole(index, content)
     return unreadable

@@ -66,9 +66,11 @@ def machine_id() -> str:
     return this_machine().id
 
 
-def machine_of(folder: Path) -> str | None:
-    """The short id of the machine whose results lie in a folder; None where nothing says so."""
-    path = folder / "machine.json"
+def machine_of(folder: Path, study: str = "") -> str | None:
+    """The short id of the machine whose results lie in a folder, or that measured one study there where this was
+    another; None where nothing says so."""
+    own = folder / study / "machine.json"
+    path = own if own.is_file() else folder / "machine.json"
     return json.loads(path.read_text(encoding="utf-8")).get("id") if path.is_file() else None
 
 

@@ -26,11 +26,18 @@ class Failures:
         self.causes[task.label] = cause
         store_failure(task, cause)
 
+    def can_store(self, task: Task) -> bool:
+        """Whether the file of a piece can be written; notes a folder in its place as the cause of a failure."""
+        path = task.path()
+        if path.is_dir():
+            self.causes[task.label] = f"{path} is a folder in the place of its file: delete it"
+        return not path.is_dir()
+
     def sentence(self, again: str) -> str:
         """All of them in one sentence; again: the command that tries them once more."""
         (label, cause), *others = self.causes.items()
         more = f", and {len(others)} more" if others else ""
-        return f"stored as failed: {label} ({cause}){more}; the rest is done, `{again}` tries again"
+        return f"failed: {label} ({cause}){more}; the rest is done, `{again}` tries again"
 
 
 def store_failure(task: Task, cause: str) -> Path:

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,35 +13,39 @@ from studies.catalog import STUDIES, Study
 from studies.population import POPULATION, population_study, study_on
 from studies.runs.case import Case, case_from_json, case_to_dict
 from studies.runs.digest import parts_of
-from studies.sweep.own_files import load_file
+from studies.scene.clock import check_clock
+from studies.sweep.find_scene import SUFFIX, read_user_file
 
 ON = "@"
 """Between the name of a study and a folder of surfaces: "population@meshes", or "population@meshes:mm"."""
+NO_CASE = "the text is no stored case: "
+"""How `case_from_json` begins; of a case that was never stored these words say nothing."""
 MAIN = "main"
 """Stands for the main studies of the catalogue; no study has this name."""
 
 
 @uncollected()
 def find_study(name: str) -> Study:
-    """A study of the catalogue, or STUDY of a Python file; either on a folder of surfaces, where ON and one follow.
+    """A study of the catalogue, or that of a Python file (STUDY, else one of SCENE); either on a folder of surfaces,
+    where ON and one follow.
 
     Warns of files in the folder that are mended or refused. Raises StudyError, for whatever is wrong with the file.
     """
     if ON in name:
         return _on_folder(*name.split(ON, 1))
-    if not name.endswith(".py"):
+    if not name.endswith(SUFFIX):
         return known_studies([name])[0]
-    if not Path(name).is_file():
-        raise StudyError(f"there is no study file {name}; give a Python file that defines STUDY")
-    study = getattr(load_file(Path(name)), "STUDY", None)
-    if not isinstance(study, Study):
-        raise StudyError(f"{name} defines no STUDY of type studies.catalog.Study; see CONTRIBUTING.md")
+    study = replace(read_user_file(name).as_study, word=name)
+    for scene in study.scenes:
+        check_clock(scene, f"{Path(name).name}: ")
     seen: set[object] = set()
-    for case in study.cases:
-        parts, numbers = parts_of(case), _types(case)
-        if parts is None or numbers not in seen or not seen.issuperset(parts):
-            _check_stored(name, case)
-            seen.update((*(parts or ()), numbers))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Pydantic serializer warnings")  # the sentence for an odd setting is ours
+        for case in study.cases:
+            parts, numbers = parts_of(case), _types(case)
+            if parts is None or numbers not in seen or not seen.issuperset(parts):
+                _check_stored(name, case)
+                seen.update((*(parts or ()), numbers))
     return study
 
 
@@ -51,7 +56,7 @@ def _on_folder(name: str, given: str) -> Study:
         said = "; ".join(one.words)
         if said:
             warnings.warn(said if one.scene else f"{one.path.name} is refused: {said}", stacklevel=2)
-    return study
+    return replace(study, word=f"{name}{ON}{given}")
 
 
 def known_studies(names: Sequence[str]) -> list[Study]:
@@ -77,16 +82,16 @@ def _types(case: Case) -> tuple[object, ...]:
 
 def _check_stored(name: str, case: Case) -> None:
     """Raises StudyError for a case that would not come back from its record as it is, with the first odd setting."""
+    which = f"{Path(name).name}: scene '{case.scene.name}', case {case.name}"
     try:
         back = case_from_json(case.key)
         odd = _difference(case_to_dict(case.replaced(timed=False)), case_to_dict(back))
-    except StudyError:
-        raise
+    except StudyError as error:
+        raise StudyError(f"{which}: {str(error).removeprefix(NO_CASE)}; correct this setting") from error
     except Exception as error:  # a setting of a user may be anything
-        raise StudyError(f"{name}: a case cannot be stored ({error}); use the project's own types") from error
+        raise StudyError(f"{which}: a setting is neither a number, a text nor a tuple of these ({error})") from error
     if odd is not None or back != case.replaced(timed=False):
-        what = f" {odd}" if odd else ""
-        raise StudyError(f"{name}: case {case.name}{what} cannot be stored and read back; use the project's own types")
+        raise StudyError(f"{which}: {odd or 'a setting'} cannot be stored and read back; use the project's own types")
     if not case.name.isprintable():
         raise StudyError(f"{name}: case {case.name!r} has a name with characters that cannot be printed; rename it")
 
@@ -98,5 +103,7 @@ def _difference(given: Any, back: Any, where: str = "") -> str | None:
     elif isinstance(given, list | tuple) and isinstance(back, list | tuple) and len(given) == len(back):
         pairs = [(f"{where}[{k}]", a, b) for k, (a, b) in enumerate(zip(given, back, strict=True))]
     else:
+        if type(given) is int and type(back) is float:
+            return f"{where} = {given!r} (write {float(given)})"
         return None if type(given) is type(back) and given == back else f"{where} = {given!r}"
     return next((odd for odd in (_difference(a, b, path) for path, a, b in pairs) if odd), None)

@@ -1,18 +1,20 @@
 """What a sweep would run, why, how long that may take, from the seconds that stored results carry, and its size."""
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.reference.reference_solves import ReferenceSolve
+from studies.runs.case import Case
 from studies.runs.size import record_bytes, timing_bytes
 from studies.store.index.entry import Entry
 from studies.sweep.frame_times import timed_again
+from studies.sweep.stored.estimate import predicted, rates, timing_seconds
 from studies.sweep.stored.known import Known
-from studies.sweep.tasks import Task, tasks_of
+from studies.sweep.tasks import REFERENCE, Task, tasks_of
 
 PHYSICS, TIMING = "physics", "timing"
 """The stages: the first in several processes, the second alone."""
@@ -36,45 +38,60 @@ class Planned:
     """What it took when it last ran [s], without compiling; None where nothing is stored."""
     size: int | None = None
     """Bytes that it will store: as then, else from what a case records; None of a reference that is not stored."""
+    guess: float = 0.0
+    """Seconds by its size and a rate (studies.sweep.stored.estimate), which count where it has not run."""
+    here: bool = False
+    """Whether that rate is one of this machine."""
 
 
 def plan(
     root: Path, study: Study, wanted: Callable[[Task], bool] | None = None, known: Known | None = None
 ) -> list[Planned]:
     """What `run_studies` would run of a study, in its order; `wanted` as there."""
-    known = known or Known(root)
-    found = [_of_task(task, known) for task in tasks_of(root, [study]) if _runs(task, wanted, known)]
+    known, tasks = known or Known(root), tasks_of(root, [study])
+    chosen = [task for task in tasks if _runs(task, wanted, known)]
+    measured = rates(known, tasks) if chosen else {}
+    found = [_of_task(task, known, measured) for task in chosen]
     runs = {piece.label for piece in found}
     for case in study.cases:
         if not case.timed or (wanted is not None and case.name not in runs):
             continue
         why = known.why_untimed(study.name, case)
         if why is not None and (known.can_be_timed(study.name, case) or case.name in runs):
-            seconds, size = _cost(known.of_timing(study.name, case))
-            found.append(Planned(TIMING, "timing", case.name, why, seconds, size or timing_bytes(case)))
+            found.append(_of_timing(study, case, why, known, measured))
     return found
 
 
 def plan_again(root: Path, study: Study) -> list[Planned]:
     """What `measure_again` would time of a study, in its order."""
     known = Known(root)
-    found = []
-    for case in timed_again(known, study):
-        seconds, size = _cost(known.of_timing(study.name, case))
-        found.append(Planned(TIMING, "timing", case.name, AGAIN, seconds, size or timing_bytes(case)))
-    return found
+    measured = rates(known, tasks_of(root, [study]))
+    return [_of_timing(study, case, AGAIN, known, measured) for case in timed_again(known, study)]
+
+
+def kind_of(stage: str, label: str) -> str:
+    """ "reference", "case" or "timing", by the stage and the label of a task."""
+    return TIMING if stage == TIMING else "reference" if label.startswith(REFERENCE) else "case"
 
 
 def _runs(task: Task, wanted: Callable[[Task], bool] | None, known: Known) -> bool:
     return known.why_stale(task) is not None if wanted is None else wanted(task)
 
 
-def _of_task(task: Task, known: Known) -> Planned:
+def _of_task(task: Task, known: Known, measured: Mapping[str, float]) -> Planned:
     why = known.why_stale(task) or "its result is a failure"
     seconds, size = _cost(known.entry(task))
-    if isinstance(task.work, ReferenceSolve):
-        return Planned(PHYSICS, "reference", task.label, why, seconds, size)
-    return Planned(PHYSICS, "case", task.label, why, seconds, size or record_bytes(task.work))
+    kind = "reference" if isinstance(task.work, ReferenceSolve) else "case"
+    guess = 0.0 if seconds is not None else predicted(task) * measured.get(kind, 1.0)
+    if not isinstance(task.work, ReferenceSolve):
+        size = size or record_bytes(task.work)
+    return Planned(PHYSICS, kind, task.label, why, seconds, size, guess, kind in measured)
+
+
+def _of_timing(study: Study, case: Case, why: str, known: Known, measured: Mapping[str, float]) -> Planned:
+    seconds, size = _cost(known.of_timing(study.name, case))
+    guess = 0.0 if seconds is not None else timing_seconds(case) * measured.get("case", 1.0)
+    return Planned(TIMING, TIMING, case.name, why, seconds, size or timing_bytes(case), guess, "case" in measured)
 
 
 def _cost(entry: Entry | None) -> tuple[float | None, int | None]:
@@ -82,17 +99,10 @@ def _cost(entry: Entry | None) -> tuple[float | None, int | None]:
     return (None, None) if entry is None or entry.fault else (entry.seconds, entry.size)
 
 
-def expected(found: Sequence[Planned], jobs: int) -> float | None:
-    """Seconds that `found` takes in `jobs` processes, timing alone. A piece that never ran counts as the mean of its
-    kind, or not at all where none of its kind ran; None where none of any kind did."""
-    total, known = 0.0, False
-    for kind in {piece.kind for piece in found}:
-        pieces = [piece for piece in found if piece.kind == kind]
-        seconds = [piece.seconds for piece in pieces if piece.seconds is not None]
-        if seconds:
-            known = True
-            total += sum(seconds) / len(seconds) * len(pieces) / (1 if pieces[0].stage == TIMING else jobs)
-    return total if known else None
+def expected(found: Sequence[Planned], jobs: int) -> float:
+    """Seconds that `found` takes in `jobs` processes, timing alone: what each took, or would by its size."""
+    shared = {PHYSICS: jobs, TIMING: 1}
+    return sum((piece.guess if piece.seconds is None else piece.seconds) / shared[piece.stage] for piece in found)
 
 
 def expected_bytes(found: Sequence[Planned]) -> tuple[int, int]:

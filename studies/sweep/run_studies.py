@@ -26,9 +26,9 @@ def run_studies(
     """Brings the studies up to date below `root`; the number of pieces that had to run.
 
     `jobs`: so many processes of this machine, or an engine. `wanted` replaces the rule "what is not current".
-    `on_compile` hears what is being compiled, from any thread. `failures` hears of pieces whose process died; they are
-    stored as failed. Another command may work on the same folder. Raises StudyError when results cannot be written, and
-    for a root that is an archive.
+    `on_compile` hears what is being compiled, from any thread. `failures` hears of pieces whose process died, which are
+    stored as failed, and of those that do not run because a folder lies in the place of their file. Another command may
+    work on the same folder. Raises StudyError when results cannot be written, and for a root that is an archive.
     """
     check_no_archive(root)
     root = root.absolute()
@@ -39,9 +39,10 @@ def run_studies(
 
     rule = wanted or stale
     todo = [replace(task, seen=task.state()) for task in tasks_of(root, studies) if rule(task)]
+    failures = failures or Failures()
     if todo:
         check_writable(root)
-        engine.perform(todo, progress, on_compile, (failures or Failures()).add)
+        engine.perform([task for task in todo if failures.can_store(task)], progress, on_compile, failures.add)
     among = None if wanted is None else {task.path() for task in todo}
     measured = sum(engine.measure(root, study, progress, on_compile, among) for study in studies)
     return len(todo) + measured

@@ -1,13 +1,21 @@
 """How every piece of a study stands, by the index of what is stored."""
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from studies.base.collection import uncollected
+from studies.base.counting import amounts, status_counts
 from studies.catalog.study import Study
+from studies.reference.reference_solves import ReferenceSolve
+from studies.store.schema import Status
 from studies.store.staleness import MISSING
 from studies.sweep.stored.known import FAILURES, Known
 from studies.sweep.tasks import Task, tasks_of
+
+CAUSES = 8
+"""Of failures that are named one by one."""
 
 
 def warnings_of(root: Path, study: Study) -> list[str]:
@@ -25,6 +33,11 @@ class Standing:
     status: str
     """A Status, "stale" or "missing"."""
     message: str
+
+    @property
+    def of_reference(self) -> bool:
+        """Whether it is a reference solution, and no case."""
+        return isinstance(self.task.work, ReferenceSolve)
 
 
 @uncollected()
@@ -46,3 +59,33 @@ def failed(task: Task, known: Known | None = None) -> bool:
     """Whether the stored result of a task is no success; a damaged file is stale instead."""
     entry = (known or Known(task.root)).entry(task)
     return entry is not None and entry.status in FAILURES
+
+
+def summary(found: Sequence[Standing]) -> str:
+    """ "9 cases: 7 ok, 2 failed; 6 reference solutions: 6 ok"."""
+    groups = {"case": [], "reference": []}
+    for standing in found:
+        groups["reference" if standing.of_reference else "case"].append(standing.status)
+    parts = [f"{amounts(Counter({kind: len(each)}))}: {status_counts(each)}" for kind, each in groups.items() if each]
+    return "; ".join(parts) or "no cases"
+
+
+def unexpected(study: Study, found: Sequence[Standing]) -> list[Standing]:
+    """What ended in a way that the study does not expect; what is stale or missing has not ended."""
+    ended = [standing for standing in found if standing.status not in ("stale", "missing")]
+    references = [s for s in ended if s.of_reference and s.status != Status.OK and not study.counts_losses]
+    return [s for s in ended if not s.of_reference and not study.accepts(s.status)] + references
+
+
+def causes(found: Sequence[Standing]) -> list[str]:
+    """A sentence for each distinct cause, with the first label; messages that differ in numbers alone are one."""
+    groups: dict[tuple[str, str], list[Standing]] = {}
+    for standing in found:
+        kind = "".join(letter for letter in standing.message if letter not in "0123456789.e+-")
+        groups.setdefault((standing.status, kind), []).append(standing)
+    sentences = []
+    for (status, _), each in list(groups.items())[:CAUSES]:
+        more = f", and {len(each) - 1} more" if len(each) > 1 else ""
+        sentences.append(f"{status.replace('-', ' ')}: {each[0].message} ({each[0].task.label}{more})")
+    left = len(groups) - CAUSES
+    return [*sentences, f"and {left} more causes; `organbench status` names them"] if left > 0 else sentences

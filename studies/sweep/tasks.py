@@ -12,6 +12,9 @@ from studies.runs.case import Case
 from studies.runs.current import case_path, why_case_is_stale
 from studies.runs.digest import case_digest
 
+REFERENCE = "reference "
+"""Before the name of a reference solution in its label."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -33,7 +36,7 @@ class Task:
     @property
     def label(self) -> str:
         """For progress and messages."""
-        return f"reference {self.work.name}" if isinstance(self.work, ReferenceSolve) else self.work.name
+        return REFERENCE + self.work.name if isinstance(self.work, ReferenceSolve) else self.work.name
 
     def is_current(self) -> bool:
         """Whether it need not run."""

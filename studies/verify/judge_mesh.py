@@ -26,7 +26,7 @@ class JudgeMesh:
 
 def judged_problem(scene: Scene, mesh: JudgeMesh) -> Problem:
     """The scene on a mesh of the judge's, curved onto the true shape and outlines. Raises StudyError."""
-    organ_mesh, shape = mesh_for(scene, mesh.nodes), true_shape(scene.organ)
+    organ_mesh, shape = mesh_for(scene, mesh.nodes, even=True), true_shape(scene.organ)
     assert shape is not None  # the judged organs are of the catalogue
     coarse = held_mesh(scene, organ_mesh)
     body = coarse.refined(scene, mesh.at_outlines, 0)

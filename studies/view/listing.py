@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from studies.base.counting import counted
 from studies.base.errors import StudyError
 from studies.scene.as_json import scene_of_key
 from studies.scenes import SCENES
@@ -23,7 +24,7 @@ def listing(root: Path) -> tuple[list[str], list[str]]:
         reference, more = _reference(root, name, cases)
         problems += more
         if cases or reference:
-            lines.append(f"{name}: {_count(len(cases))}, {reference or 'no reference'}")
+            lines.append(f"{name}: {counted(len(cases), 'case')}, {reference or 'no reference'}")
             lines += [f"  {_line(case)}" for case in cases]
     if not lines:
         raise StudyError(f"nothing to view is stored in {root}: `organbench run` does that")
@@ -42,10 +43,6 @@ def _reference(root: Path, name: str, cases: list[Stored]) -> tuple[str, list[St
     except StudyError as problem:
         return "", [problem]
     return "", []
-
-
-def _count(cases: int) -> str:
-    return "1 case" if cases == 1 else f"{cases} cases"
 
 
 def _line(case: Stored) -> str:

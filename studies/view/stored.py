@@ -1,7 +1,7 @@
 """What is stored and can be viewed: runs, and the reference of their scene."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +12,6 @@ from studies.base.lookup import lookup
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import reference_solves
 from studies.scene.scene import Scene
-from studies.scenes import SCENES
 from studies.store.paths import record_files
 from studies.store.record import Record, Status, peek
 from studies.store.schema import WITHOUT_FIELDS
@@ -84,12 +83,12 @@ def finest_reference(root: Path, scene: Scene) -> Path | None:
     return path if path.is_file() and peek(path).status == Status.OK else None
 
 
-def chosen_runs(words: Sequence[str], runs: Sequence[Stored]) -> list[Stored]:
-    """The runs that words name: a scene (all of its runs), a case, or a results file.
+def chosen_runs(words: Sequence[str], runs: Sequence[Stored], scenes: Iterable[str]) -> list[Stored]:
+    """The runs that words name: one of `scenes` by name (all of its runs), a case, or a results file.
 
     Raises StudyError for a word that names nothing, and for a file without a run to see.
     """
-    known: dict[str, list[Stored]] = {scene.name: [] for scene in SCENES}
+    known: dict[str, list[Stored]] = {scene: [] for scene in scenes}
     for run in runs:
         for word in dict.fromkeys((run.scene, *run.words)):
             known.setdefault(word, []).append(run)

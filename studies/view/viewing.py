@@ -60,8 +60,10 @@ class _References:
         return self.read[path]
 
 
-def view(root: Path, words: Sequence[str]) -> View:
+def view(root: Path, words: Sequence[str], own: Sequence[Scene] = ()) -> View:
     """The runs below `root` that words name (a scene, a case, a results file), with the reference of their scene.
+
+    own: scenes of the user beside those of SCENES.
 
     Raises StudyError for a word that names nothing stored, for cases of several scenes or with other checkpoints, and
     where nothing can be read.
@@ -69,14 +71,15 @@ def view(root: Path, words: Sequence[str]) -> View:
     files = all(word.endswith(".h5") for word in words)
     runs, problems = ([], []) if files else stored_runs(root)
     references = _References()
+    scenes = {scene.name: scene for scene in (*SCENES, *own)}
     loaded = []
-    for stored in chosen_runs(words, runs):
+    for stored in chosen_runs(words, runs, scenes):
         try:
             loaded.append((stored, _run(stored)))
         except StudyError as problem:
             problems.append(problem)
     remarks = remarks_of(problems)
-    scene = _one_scene(root, words, [run for _, run in loaded], remarks)
+    scene = _one_scene(root, [scenes[word] for word in words if word in scenes], [run for _, run in loaded], remarks)
     cases = [_shown(stored, run, references) for stored, run in loaded]
     if not loaded:
         references.of(root, scene)
@@ -98,11 +101,9 @@ def _shown(stored: Stored, run: Run, references: _References) -> Shown:
     return shown_run(run, references.of(stored.path.parent.parent, run.case.scene), name)
 
 
-def _one_scene(root: Path, words: Sequence[str], runs: Sequence[Run], remarks: Sequence[str]) -> Scene:
+def _one_scene(root: Path, named: Sequence[Scene], runs: Sequence[Run], remarks: Sequence[str]) -> Scene:
     """The scene of all runs; without runs the one that was named. Raises StudyError where there are several."""
-    scenes = [run.case.scene for run in runs]
-    if not scenes:
-        scenes = [scene for scene in SCENES if scene.name in words]
+    scenes = [run.case.scene for run in runs] or list(named)
     if not scenes:
         raise StudyError(remarks[0] if remarks else f"nothing is stored in {root}: `organbench run` does that")
     for other in scenes[1:]:

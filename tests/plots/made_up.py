@@ -6,7 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from massspring import Free, ImplicitVolume
+from massspring.body.quadratic import boundary_facets, parts_of_facets
 from studies.metrics.run import Run
+from studies.reference.solution import Boundary
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
@@ -14,6 +16,7 @@ from studies.scenes.liver_press import LIVER_PRESS
 from studies.store.new_record import new_record
 from studies.store.record import Field, Status
 from studies.timing.protocol import FrameTiming
+from tests.massspring.quadratic import second_order
 
 FRAMES = 40
 """So many that every scene has a frame at each of its checkpoints."""
@@ -23,6 +26,10 @@ POINTS = RADIUS * np.array(
 )
 TRIANGLES = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
 CELLS = np.column_stack([TRIANGLES, np.full(len(TRIANGLES), 6)])[:, [3, 0, 1, 2]]
+FINE, TEN_NODES = second_order(POINTS, CELLS)
+"""The same of quadratic tetrahedra with straight sides."""
+SURFACES = {"quadratic": (FINE, parts_of_facets(boundary_facets(TEN_NODES)).astype(int))}
+"""Nodes and surface triangles of a kind of body; POINTS and TRIANGLES of the others."""
 VOLUME = 4 / 3 * RADIUS**3
 STRETCH = np.array([1.2, 1.2, 0.7])
 UNCERTAINTY = {
@@ -46,10 +53,20 @@ def reference(scene):
     t = np.array(scene.checkpoints)
     return SimpleNamespace(
         displacement=truth,
+        boundary=Boundary(POINTS, TRIANGLES, truth(POINTS)),
         surface=lambda: (POINTS[:6] * STRETCH, TRIANGLES),
         force=4.0 * t / t[-1],
         total_uncertainty=UNCERTAINTY | {"pressure": 0.05, "surface_mean": 0.01},
-        field=lambda name: {"t": t, "volume": 1 - 3e-5 * t / t[-1]}[name],
+        scene=scene,
+        displacements=lambda points: (t / t[-1])[:, None, None] * truth(points),
+        triangles=TRIANGLES,
+        outside=lambda triangles: triangles,
+        field=lambda name: {
+            "t": t,
+            "volume": 1 - 3e-5 * t / t[-1],
+            "nodes": POINTS,
+            "displacement": (t / t[-1])[:, None, None] * truth(POINTS),
+        }[name],
     )
 
 
@@ -63,7 +80,8 @@ def fields(scene, kind, error, volume_end, good):
     direction = np.asarray(scene.probed.direction)
     felt = {"obstacle": np.zeros((FRAMES, len(scene.obstacles), 3)), "held": np.zeros((FRAMES, len(scene.held), 3))}
     felt[scene.probed.what][:, scene.probed.number] = force[:, None] * direction
-    final = POINTS + (1 + error) * truth(POINTS)
+    points, triangles = SURFACES.get(kind, (POINTS, TRIANGLES))
+    final = points + (1 + error) * truth(points)
     values = {
         "t": t,
         "volume": volume[:, None],
@@ -71,10 +89,10 @@ def fields(scene, kind, error, volume_end, good):
         "contact_force": felt["obstacle"],
         "held_force": felt["held"],
         "min_j": np.where(np.arange(FRAMES) < good, np.linspace(1.0, 0.5 if error < 0.3 else -0.4, FRAMES), np.nan),
-        "snapshots": np.stack([final] * len(scene.checkpoints)) if good == FRAMES else np.zeros((0, 7, 3)),
-        "rest": POINTS,
-        "mass": np.ones(len(POINTS)),
-        "triangles": TRIANGLES,
+        "snapshots": np.stack([final] * len(scene.checkpoints)) if good == FRAMES else np.zeros((0, *points.shape)),
+        "rest": points,
+        "mass": np.ones(len(points)),
+        "triangles": triangles,
         "tetrahedra": CELLS if kind == "tetrahedral" else np.zeros((0, 4), int),
     }
     return {name: Field(value, "1", "") for name, value in values.items()}

@@ -8,6 +8,7 @@ import numpy as np
 from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
 from studies.metrics.table import metric
+from studies.reference.solution import Boundary
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.store.new_record import new_fields, new_record
@@ -72,6 +73,7 @@ def reference(motion=bend, force=(1.0, 2.0), pressure=(10.0, 20.0)):
     return SimpleNamespace(
         displacement=motion,
         force=np.array(force),
+        boundary=Boundary(POINTS, TRIANGLES, motion(POINTS)),
         surface=lambda: (POINTS + motion(POINTS), TRIANGLES),
         field=lambda name: {"pressure": np.array(pressure), "lumen_pressure": np.array(pressure)}[name],
         total_uncertainty={

@@ -29,12 +29,12 @@ def stale(root, case):
     return path
 
 
-def test_from_nothing_everything_is_planned_without_an_estimate(tmp_path):
+def test_from_nothing_everything_is_planned_with_an_estimate_by_its_size(tmp_path):
     found = plan(tmp_path, tiny_study())
     assert sorted(p.kind for p in found) == ["case"] * 3 + ["timing"] * 3
     assert {p.seconds for p in found} == {None}
     assert {p.why for p in found} == {MISSING}
-    assert expected(found, 2) is None
+    assert all(p.guess > 0 and not p.here for p in found) and expected(found, 2) > 0
 
 
 def test_what_is_planned_is_what_runs(results):
@@ -68,9 +68,8 @@ def test_the_estimate_shares_the_physics_and_not_the_timing():
     known = [piece(PHYSICS, "case", 4.0), piece(PHYSICS, "case", 2.0), piece(TIMING, "timing", 5.0)]
     assert expected(known, 1) == pytest.approx(11.0)
     assert expected(known, 2) == pytest.approx(8.0)
-    assert expected([*known, piece(PHYSICS, "case", None)], 1) == pytest.approx(14.0)  # as long as the mean
-    assert expected([*known, piece(PHYSICS, "reference", None)], 1) == pytest.approx(11.0)  # nothing to go by
-    assert expected([piece(PHYSICS, "reference", None)], 1) is None
+    assert expected([*known, replace(piece(PHYSICS, "case", None), guess=3.0)], 1) == pytest.approx(14.0)
+    assert expected([replace(piece(PHYSICS, "case", 2.0), guess=3.0)], 1) == pytest.approx(2.0), "measured counts first"
 
 
 @pytest.mark.parametrize(("seconds", "said"), [(0.2, "1 s"), (80, "80 s"), (200, "3 min"), (6000, "1 h 40 min")])
@@ -82,14 +81,14 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
     code, out, err = organbench("run", tiny_file, "--dry-run", "--results", tmp_path / "empty")
     assert (code, err) == (0, "")
     assert not (tmp_path / "empty").exists()
-    assert "tiny: 6 pieces would run" in out
-    assert "  3 cases (missing): no estimate" in out
-    assert "no estimate: nothing of it has run yet" in out
+    assert "tiny: 3 cases, 3 timings would run" in out
+    assert re.search(r"  3 cases \(missing\): about \d+ s of computing\n", out)
+    assert re.search(r"about \d+ s with 2 processes, from the rate of another machine for 3 cases, 3 timings;", out)
     assert re.search(r"  about \d+ kB will be stored, [\d.]+ [GT]B are free\n", out)
     stale(results, tiny_case(timed=True))
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--results", results)
     assert re.search(r"  1 case \(the code has changed since\): about \d+ s of computing\n", out)
-    assert "with 2 processes, from earlier runs of 1 of the 1 pieces; compiling comes on top" in out
+    assert "with 2 processes, from earlier runs of 1 case; compiling comes on top" in out
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--only", "failed", "--results", results)
     assert out.strip() == "tiny: nothing would run, all is current"
 

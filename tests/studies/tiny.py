@@ -49,7 +49,8 @@ def tiny_case(**changes) -> Case:
 def tiny_study(**changes) -> Study:
     """Both methods timed, and one case that diverges."""
     cases = (tiny_case(timed=True), tiny_case(method=Free(), timed=True), diverging_case())
-    return replace(Study("tiny", "Does it run?", cases, (), ("volume_worst", "step_time")), **changes)
+    study = Study("tiny", "Does it run?", cases, (), ("volume_worst", "step_time"), expects=("diverged",))
+    return replace(study, **changes)
 
 
 def diverging_case() -> Case:

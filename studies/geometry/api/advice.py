@@ -2,7 +2,7 @@
 
 import shlex
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,37 +10,52 @@ from studies.base.errors import StudyError
 from studies.geometry.api.scans import scan
 from studies.geometry.doctor.examine import Findings, examine
 from studies.geometry.doctor.findings import COMMAND, TRY
-from studies.geometry.files.units import Source
+from studies.geometry.files.units import Source, likely_units, stem_of
 
 NODES = 550
 OPENINGS, FOLDS = 5e-3, 3e-3
 """[m] that --solid and --smooth are tried with."""
 MOST = 100_000
 """Triangles up to which advice is tried: seconds, which the mesh command does not need again."""
-BEYOND = {"bad_points", "size", "one_sided", "duplicate_tetrahedra"}
+BEYOND = {"bad_points", "size", "small", "far_away", "one_sided", "duplicate_tetrahedra"}
 """Findings that no option of the command mends."""
 
 
 def tried(source: Source, found: Findings) -> Findings:
-    """The findings of the file with the command that mends all of them, and makes a clean body of NODES surface nodes;
-    advice that does not work, or was not tried, begins with "try"."""
+    """The findings of the file with the command that mends all of them, and makes a clean body of NODES surface nodes.
+
+    Where no command does, each advice says what was tried and what came nearest; advice that was not tried begins with
+    "try"."""
     codes = {finding.code for finding in found.findings} - {"unit"}
     if not codes:
         return found
     if source.unit is None and not found.measures["unit_said"]:
         source = replace(source, unit=found.measures["unit"])
-    works = None
-    if not codes & BEYOND and found.measures["triangles"] <= MOST:
-        works = next((how for how in ways(codes) if is_clean(source, how)), None)
-    mends = [marked(finding.mend, works is not None) for finding in found.findings]
-    rows = tuple(replace(finding, mend=mend) for finding, mend in zip(found.findings, mends, strict=True))
+    works, attempts = None, dict[str, Findings | None]()
+    if not codes & BEYOND and found.measures["triangles"] <= MOST and likely_units(max(found.measures["size"])):
+        for how in ways(codes):
+            body = attempts[options(how)] = examined(source, how)
+            if body is not None and body.clean:
+                works = how
+                break
+    rows = tuple(replace(row, mend=marked(row.mend, works is not None, attempts)) for row in found.findings)
     return replace(found, findings=rows, command=None if works is None else command(source, works))
 
 
-def marked(mend: str, works: bool) -> str:
-    """The advice with "try" in front where it may fail."""
+def marked(mend: str, works: bool, attempts: Mapping[str, Findings | None]) -> str:
+    """The advice: as it is where it works, with "try" in front where it was not tried, else what was tried instead."""
     plain = mend.removeprefix(TRY)
-    return plain if works or not plain.startswith(COMMAND) else TRY + plain
+    if works or not plain.startswith(COMMAND):
+        return plain
+    if not attempts:
+        return TRY + plain
+    words = f"no option was found that mends all of it; tried: {'; '.join(attempts)}"
+    bodies = {name: body for name, body in attempts.items() if body is not None}
+    if not bodies:
+        return f"{words}; none makes a body: repair it in the program that made it"
+    name, body = min(bodies.items(), key=lambda item: len(item[1].findings))
+    left = ", ".join(finding.code.replace("_", " ") for finding in body.findings)
+    return f"{words}; {name} makes a body, in which this is left: {left}"
 
 
 def ways(codes: set[str]) -> Iterator[dict[str, Any]]:
@@ -51,16 +66,24 @@ def ways(codes: set[str]) -> Iterator[dict[str, Any]]:
             yield lids
         yield lids | {"smooth": FOLDS}
     yield {"solid": OPENINGS}
+    if "shell" not in codes and "handles" in codes:
+        yield lids
 
 
-def is_clean(source: Source, how: dict[str, Any]) -> bool:
-    """Whether a body without findings comes out."""
+def examined(source: Source, how: dict[str, Any]) -> Findings | None:
+    """What the doctor says of the body that comes out; None where none does."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the mesh command tells of every change
         try:
-            return examine(scan(source, NODES, **how)).clean
+            return examine(scan(source, NODES, **how))
         except StudyError:
-            return False
+            return None
+
+
+def options(how: dict[str, Any]) -> str:
+    """What asks it of the mesh command: "--nodes 550 --smooth 3"."""
+    given = [f"--{key} {1e3 * how[key]:g}" for key in ("smooth", "solid") if key in how]
+    return " ".join([f"--nodes {NODES}", *given, *(["--close-holes"] if "holes" in how else [])])
 
 
 def command(source: Source, how: dict[str, Any]) -> str:
@@ -68,9 +91,7 @@ def command(source: Source, how: dict[str, Any]) -> str:
     words = ["organbench", "mesh", "--from", str(source.path)]
     side = None if source.longest_side is None else f"{source.longest_side:g}m"
     given = {"--unit": source.unit, "--scale": None if source.scale == 1.0 else f"{source.scale:g}"}
-    given |= {"--longest-side": side, "--part": source.part, "--nodes": str(NODES)}
-    given |= {f"--{key}": f"{1e3 * how[key]:g}" for key in ("smooth", "solid") if key in how}
+    given |= {"--longest-side": side, "--part": source.part}
     for option, value in given.items():
         words += [] if value is None else [option, value]
-    words += ["--close-holes"] if "holes" in how else []
-    return shlex.join([*words, "-o", f"{source.path.stem}_body.vtu"])
+    return shlex.join([*words, *options(how).split(), "-o", f"{stem_of(source.path)}_body.vtu"])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from studies.base.errors import StudyError
+from studies.base.lookup import lookup
 from studies.geometry.mesh.checks import check_one_part, check_surface
 from studies.geometry.mesh.organ_mesh import OrganMesh, unique_edges
 from studies.geometry.mesh.quality import MIN_DIHEDRAL, dihedral_angles
@@ -19,6 +20,9 @@ from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region, region_to_dict
 from studies.geometry.surface.node_count import FEWEST, MOST
 
+SIDES = ("straight", "curved")
+"""Sides of elements that follow an organ's shape."""
+
 
 def organ(
     name: str,
@@ -28,13 +32,16 @@ def organ(
     parameters: Mapping[str, Any] | None = None,
     layers: int | None = None,
     exact: bool = False,
+    sides: str | None = None,
 ) -> OrganMesh:
     """The organ `name` of SHAPES with `nodes` nodes on its outer surface (exactly or within 2 %).
 
     Outlines of the regions (None: the organ's own) lie on edges. A hollow organ is filled between its surface and its
     lumen, in `layers` of prisms (None: as many as make them as high as long); with fill=False only the outer surface
     is made. exact: flat sides enclose exactly the organ's volume, so nodes are a little off its surface, outlines on
-    theirs; else the nodes are on it and the volume is 1 to 12 % too small. Raises StudyError when the mesher cannot.
+    theirs; else the nodes are on it and the volume is 1 to 12 % too small. sides: "straight" or "curved", those that
+    are to follow the organ's shape, for which nodes go where it needs them; None: nodes are evenly spread. Raises
+    StudyError when the mesher cannot.
     """
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
@@ -50,9 +57,8 @@ def organ(
         "parameters": dict(parameters or {}),
         "regions": {key: region_to_dict(region) for key, region in own.items()},
         "fill": bool(fill),
-    }
-    if exact:
-        recipe["exact"] = True
+    } | ({"exact": True} if exact else {})
+    recipe |= {} if sides is None else {"sides": lookup(sides, SIDES, "kind of sides")}
     if layers is not None:
         if shape.wall is None:
             raise StudyError(f"{name}: {layers} layers asked for, but it is solid; only a hollow organ has layers")

@@ -14,9 +14,18 @@ from studies.geometry.api.organs import fill as fill_mesh
 from studies.geometry.files.content import Content
 from studies.geometry.files.opening import opened
 from studies.geometry.files.reading import marked_nodes, weld, with_patches
-from studies.geometry.files.units import LARGEST, SMALLEST, Source, as_source, check_range
+from studies.geometry.files.units import (
+    FAR_AWAY,
+    LARGEST,
+    LEAST_VOLUME,
+    SMALLEST,
+    Source,
+    as_source,
+    check_range,
+    stem_of,
+)
 from studies.geometry.mesh.checks import check_finite, check_one_part, check_surface, check_volume
-from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
+from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles, signed_volume
 from studies.geometry.mesher.jobs import level_of, mesh_from
 from studies.geometry.scanned.fidelity import warnings_of
 from studies.geometry.scanned.level_grid import grid_from, shape_of
@@ -113,6 +122,7 @@ def scan(
     recipe |= remeshing.recipe | {"kind": "scan", "nodes": int(nodes), "fill": bool(fill), "regions": outlines}
     grid = level_arrays(recipe, mended) if remeshing.on_shape else {}
     mesh = mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles} | grid)
+    check_amount(mesh.volume + mesh.lumen_volume, name)
     for sentence in warnings_of(mesh.losses):
         warnings.warn(f"{name}: {sentence}", stacklevel=2)
     return mesh
@@ -164,7 +174,7 @@ def mended_surface(source: Source, content: Content, remeshing: Remeshing) -> tu
     for sentence in mended.remarks:
         warnings.warn(f"{path.name}: {sentence}", stacklevel=3)
     said = {"sha256": source.sha256, "unit": source.unit or content.unit or "m"}
-    recipe: dict[str, Any] = {"kind": "file", "name": path.stem, "file": path.name} | said
+    recipe: dict[str, Any] = {"kind": "file", "name": stem_of(path), "file": path.name} | said
     return mended, recipe | {"holes": bool(remeshing.holes)} | source.recipe
 
 
@@ -189,6 +199,12 @@ def in_metres(source: Source, content: Content) -> tuple[np.ndarray, np.ndarray]
     points, triangles = surface_of(content, name)
     metres = source.metres(content.longest_side, content.unit)
     check_range(metres * content.longest_side, name, SMALLEST, LARGEST)
+    distance = metres * float(np.linalg.norm(points.mean(axis=0)))
+    if distance > FAR_AWAY:
+        raise StudyError(
+            f"{name}: it lies {distance:.3g} m from the origin of its coordinates, where numbers have too few digits "
+            "left; move it to the origin in the program that made it"
+        )
     return points * metres, triangles
 
 
@@ -196,6 +212,7 @@ def as_it_is(mended: Mended, recipe: dict[str, Any], fill: bool) -> OrganMesh:
     """The mended surface with the file's own triangles, filled when asked."""
     check_surface(mended.points, mended.triangles, recipe["file"])
     check_one_part(mended.triangles, recipe["file"])
+    check_amount(signed_volume(mended.points, mended.triangles), recipe["file"])
     none = np.empty((0, 4), np.int64)
     surface = OrganMesh(recipe["name"], mended.points, mended.triangles, none, len(mended.points), {}, recipe)
     return fill_mesh(surface) if fill else surface
@@ -207,3 +224,13 @@ def check_watertight(mended: Mended, name: str) -> None:
     if left:
         raise StudyError(f"{name}: the surface is open at {left} edges; close the holes (--close-holes)")
     check_volume(mended.points, mended.triangles, name)
+    check_amount(signed_volume(mended.points, mended.triangles), name)
+
+
+def check_amount(volume: float, name: str) -> None:
+    """Raise StudyError for a volume [m³] below that of any organ."""
+    if abs(volume) < LEAST_VOLUME:
+        raise StudyError(
+            f"{name}: the surface encloses {1e6 * volume:.2g} mL, and no organ is smaller than 1 mL; correct the unit "
+            "or the scale, or choose another --part"
+        )

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from studies.geometry.files.units import UNITS, likely_units
+from studies.geometry.files.units import FAR_AWAY, LEAST_VOLUME, UNITS, likely_units
 from studies.geometry.mesh.quality import MIN_DIHEDRAL
 
 POOR_TRIANGLE = 0.1
@@ -60,6 +60,20 @@ def _wrong_size(m: dict[str, Any]) -> int:
     return int(m["unit_said"] and side > 0 and "m" not in likely_units(side))
 
 
+def _too_small(m: dict[str, Any]) -> int:
+    return int(m["unit_said"] and bool(m.get("closed")) and 0 < abs(m["volume"]) < LEAST_VOLUME)
+
+
+def _open_sentence(m: dict[str, Any]) -> str:
+    count, edges = m["holes"], m["open_edges"]
+    holes = "a hole" if count == 1 else f"{count} holes"
+    sentence = f"the surface has {holes} ({edges} edges with one triangle only), so it has no inside and no volume"
+    for widest in m["hole_list"][:1]:
+        where = ", ".join(f"{1e3 * x:.4g}" for x in widest["middle"])
+        sentence += f"; the widest is {1e3 * widest['width']:.3g} mm wide, at ({where}) mm"
+    return sentence
+
+
 def _sliver_sentence(m: dict[str, Any]) -> str:
     ratio = m["triangle_radius_ratio"]
     return (
@@ -95,6 +109,18 @@ RULES: tuple[Rule, ...] = (
     ),
     ("size", _wrong_size, _size_sentence, "say another --unit"),
     (
+        "small",
+        _too_small,
+        lambda m: f"it encloses {1e6 * abs(m['volume']):.2g} mL, and no organ is smaller than 1 mL",
+        "say another --unit, or choose another --part",
+    ),
+    (
+        "far_away",
+        lambda m: int(m.get("distance", 0.0) > FAR_AWAY),
+        lambda m: f"it lies {m['distance']:.3g} m from the origin of its coordinates, where digits are lost",
+        "move it to the origin in the program that made it",
+    ),
+    (
         "duplicate_points",
         _number("duplicate_points"),
         lambda m: f"{m['duplicate_points']} points lie on others: triangles that look joined are not",
@@ -121,10 +147,7 @@ RULES: tuple[Rule, ...] = (
     (
         "open",
         _number("open_edges"),
-        lambda m: (
-            f"the surface has {m['holes']} holes ({m['open_edges']} edges with one triangle only), so it has no "
-            "inside and no volume"
-        ),
+        _open_sentence,
         "organbench mesh --from FILE --close-holes puts flat lids on them; for large ones try --nodes N --solid L [mm]",
     ),
     (

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial.distance import pdist
 
 from massspring import MassSpringError, Material, step_limit, surface_body, tetrahedral_body
 from studies.base.errors import StudyError
@@ -17,6 +18,9 @@ from studies.geometry.surface.repair import border, edge_pairs, oriented, part_o
 
 MEASURED_BODY = 6000
 """Nodes up to which the largest frequency of the springs is computed (seconds); above it is estimated."""
+
+RIM = 500
+"""Nodes of a border between which distances are measured: more are thinned out evenly."""
 
 
 def describe_welding(points: np.ndarray, cells: np.ndarray, repeats: bool) -> dict[str, Any]:
@@ -39,6 +43,7 @@ def describe_surface(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any
     found |= describe_edges(sound)
     found |= describe_parts(points, sound, found)
     found |= describe_size(points, sound)
+    found["hole_list"] = hole_list(points, oriented(sound, "")[0]) if found["holes"] and found["two_sided"] else []
     found["self_intersections"] = len(crossing_triangles(points, sound))
     return found
 
@@ -70,11 +75,27 @@ def describe_edges(triangles: np.ndarray) -> dict[str, Any]:
 
 def hole_count(triangles: np.ndarray) -> int:
     """Borders that hang together."""
-    edges = border(triangles)
-    nodes, local = np.unique(edges, return_inverse=True)
+    return len(set(borders(triangles)[1]))
+
+
+def borders(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes on borders (n,), and for each the number of the border that it belongs to (n,)."""
+    nodes, local = np.unique(border(triangles), return_inverse=True)
     i, j = local.reshape(-1, 2).T
     graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(nodes), len(nodes)))
-    return int(connected_components(graph, directed=False)[0])
+    return nodes, connected_components(graph, directed=False)[1]
+
+
+def hole_list(points: np.ndarray, triangles: np.ndarray) -> list[dict[str, Any]]:
+    """Of each hole, the widest first: width [m], the largest distance between nodes of its border, and middle [m]."""
+    nodes, number = borders(triangles)
+    rims = [points[nodes[number == k]] for k in range(number.max() + 1)]
+    thinned = [rim[:: -(-len(rim) // RIM)] for rim in rims]
+    rows = [
+        {"width": float(pdist(few).max(initial=0.0)), "middle": rim.mean(axis=0).tolist()}
+        for rim, few in zip(rims, thinned, strict=True)
+    ]
+    return sorted(rows, key=lambda row: -row["width"])
 
 
 def describe_parts(points: np.ndarray, triangles: np.ndarray, known: dict[str, Any]) -> dict[str, Any]:
@@ -110,6 +131,7 @@ def describe_size(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
     return {
         "size": [float(side) for side in size],
         "diagonal": float(np.linalg.norm(size)),
+        "distance": float(np.linalg.norm(used.mean(axis=0))) if len(used) else 0.0,
         "area": float(areas.sum()),
         "volume": signed_volume(points, triangles) if len(triangles) else 0.0,
         "thickness": 2.0 * abs(signed_volume(points, triangles)) / float(areas.sum()) if areas.sum() > 0 else 0.0,

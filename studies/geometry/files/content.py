@@ -20,6 +20,7 @@ class Content:
     names: parts that the file names, in its order; empty where it names none
     part: of each triangle the index into `names`, shape (t,); empty where the file names none
     unit: what the file's format or its header says, or None
+    unit_by_custom: whether the header does not say it, and the format's usual one is taken
     """
 
     points: np.ndarray
@@ -29,6 +30,7 @@ class Content:
     names: tuple[str, ...] = ()
     part: np.ndarray = field(default_factory=lambda: NONE)
     unit: str | None = None
+    unit_by_custom: bool = False
 
     @property
     def cells(self) -> np.ndarray:

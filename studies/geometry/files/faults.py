@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree.ElementTree import ParseError
 
 from studies.base.errors import StudyError
-from studies.geometry.files.estimate import check_whole, is_ascii_stl
+from studies.geometry.files.estimate import HEADER, check_whole, is_ascii_stl, is_text
 
 KNOWN = "STL, PLY, OBJ, OFF, VTK, VTU, VTP, MSH, glTF, or a label mask in NIfTI or NRRD"
 """What can be given instead."""
@@ -26,6 +26,18 @@ OTHER_KINDS = {
     b"version https://git-lfs": "a Git LFS pointer: the file itself was not downloaded",
 }
 """First bytes of files that are no meshes."""
+NO_STL = {
+    b"ply": "a PLY file",
+    b"OFF": "an OFF file",
+    b"# vtk": "a VTK file",
+    b"<?xml": "an XML file such as VTU or VTP",
+    b"<VTKFile": "a VTU or VTP file",
+    b"$MeshFormat": "an MSH file",
+    b"glTF": "a glTF file",
+}
+"""First bytes of meshes that are sometimes called .stl."""
+COMMA = rb"^\s*(?:vertex|facet normal)\b[^\n]*?[-+0-9],\d[^\n]*"
+"""A line of a text STL with a decimal comma."""
 PACKED = b"\x1f\x8b"
 PROMISES = {
     ".ply": rb"element (vertex|face)\s+(\d+)",
@@ -47,12 +59,13 @@ def check_promises(path: Path) -> None:
     size = path.stat().st_size
     if not size:
         raise unreadable(path, "it is empty")
-    check_whole(path)
     with open(path, "rb") as file:
         head = file.read(HEAD)
-    for first, kind in OTHER_KINDS.items():
-        if head.lstrip().lower().startswith(first.lower()):
-            raise unreadable(path, f"it is {kind}")
+    check_stl(path, head)
+    check_whole(path)
+    kind = known_kind(head)
+    if kind is not None:
+        raise unreadable(path, f"it is {kind}")
     if head.startswith(PACKED) and not path.name.lower().endswith((".nii.gz", ".nrrd.gz")):
         raise unreadable(path, "it is packed by gzip: unpack it first")
     suffix = path.suffix.lower()
@@ -61,6 +74,22 @@ def check_promises(path: Path) -> None:
             kind = str(what.decode()).lower()
             things = "points" if kind in ("", "vertex", "nodes") else kind
             raise unreadable(path, f"its header promises {int(count):,} {things}, but it has only {size:,} bytes")
+
+
+def check_stl(path: Path, head: bytes) -> None:
+    """Raise StudyError for another file that is called .stl; head: its first bytes."""
+    if path.suffix.lower() != ".stl" or is_ascii_stl(head):
+        return
+    kind = next((kind for first, kind in NO_STL.items() if head.startswith(first)), None)
+    if kind is not None:
+        raise unreadable(path, f"it is no STL but {kind}: give it the ending of its format")
+    if is_text(head[:HEADER]) and not head.lstrip().startswith(b"solid") and known_kind(head) is None:
+        raise unreadable(path, "it is no STL: it is a text without facets")
+
+
+def known_kind(head: bytes) -> str | None:
+    """The kind of a file that is no mesh, by its first bytes."""
+    return next((kind for first, kind in OTHER_KINDS.items() if head.lstrip().lower().startswith(first.lower())), None)
 
 
 def unreadable(path: Path, reason: str) -> StudyError:
@@ -73,6 +102,9 @@ def reason_of(path: Path, error: BaseException, said: str) -> str:
     end = ENDS.get(path.suffix.lower())
     if (end and end not in tail(path)) or is_open_stl(path):
         return "it is cut short: its end is missing"
+    comma = comma_of(path)
+    if comma:
+        return comma
     told = sentence_in(said) or (sentence_in(str(error)) if "ReadError" in type(error).__name__ else "")
     return told or next((words for kinds, words in WORDS if isinstance(error, kinds)), OTHERWISE)
 
@@ -97,6 +129,17 @@ def sentence_in(said: str) -> str:
         if line and not re.search(r"Couldn't read|\w+Error\b|\w+Exception\b|Traceback|<class|0x[0-9a-f]{6}|/", line):
             return line[:120]
     return ""
+
+
+def comma_of(path: Path) -> str | None:
+    """Where a text STL has decimal commas; None of other files."""
+    if path.suffix.lower() != ".stl" or not is_ascii_stl((data := path.read_bytes())[:HEAD]):
+        return None
+    first = re.search(COMMA, data, re.MULTILINE)
+    if first is None:
+        return None
+    line, text = data[: first.start()].count(b"\n") + 1, " ".join(first[0].decode("ascii", "replace").split())
+    return f"line {line} has decimal commas, '{text[:60]}': export it with decimal points"
 
 
 def tail(path: Path) -> bytes:

@@ -14,7 +14,10 @@ from studies.geometry.mesh.organ_mesh import signed_volume
 
 NIFTI, NRRD = (".nii", ".nii.gz"), (".nrrd", ".nhdr")
 MOST_LABELS = 300
-"""More different values are grey levels and no labels."""
+"""More different values are grey values and no labels."""
+ALIKE = 0.5
+"""Share of neighbouring voxels with the same label, of those that both have one: more in a mask, less in an image."""
+SEGMENT = "segment it first (3D Slicer, ITK-SNAP, TotalSegmentator …) and give the label map"
 BLUR = 0.8
 """Width of the Gaussian, in voxels, that rounds the staircase of the voxels; the volume is kept."""
 ROOM = 5
@@ -34,12 +37,14 @@ class Mask:
     affine: shape (4, 4), from the index of a voxel to its middle in the file's unit
     unit: what the header says, or None
     names: name of a label where the file gives it one
+    by_custom: whether the header does not say the unit, and its format's usual one is taken
     """
 
     labels: np.ndarray
     affine: np.ndarray
     unit: str | None
     names: dict[int, str]
+    by_custom: bool = False
 
     @property
     def voxel(self) -> float:
@@ -62,7 +67,8 @@ def read_mask(path: Path, wanted: str | None) -> tuple[Content, str | None]:
     points, triangles, cut = label_surface(mask, label)
     name = mask.names.get(label, str(label))
     remark = f"label {name} reaches the edge of the image: the organ is cut off flat there" if cut else None
-    return Content(points, triangles, np.empty((0, 4), np.int64), unit=mask.unit), remark
+    none = np.empty((0, 4), np.int64)
+    return Content(points, triangles, none, unit=mask.unit, unit_by_custom=mask.by_custom), remark
 
 
 def load_nifti(path: Path) -> Mask:
@@ -73,7 +79,8 @@ def load_nifti(path: Path) -> Mask:
         raise missing("nibabel", path) from error
     image: Any = nibabel.load(path)
     said = image.header.get_xyzt_units()[0] if hasattr(image.header, "get_xyzt_units") else ""
-    return Mask(whole_numbers(np.asanyarray(image.dataobj), path), np.asarray(image.affine, float), unit_of(said), {})
+    labels, unit = whole_numbers(np.asanyarray(image.dataobj), path), unit_of(said)
+    return Mask(labels, np.asarray(image.affine, float), unit or "mm", {}, by_custom=unit is None)
 
 
 def load_nrrd(path: Path) -> Mask:
@@ -119,11 +126,34 @@ def whole_numbers(data: np.ndarray, path: Path) -> np.ndarray:
         )
     if data.dtype.kind == "f":
         if not np.isfinite(data).all() or (data != np.round(data)).any():
-            raise StudyError(f"{path.name} holds fractions: it is an image and no label mask; give the segmentation")
+            raise no_mask(path.name, "fractions")
         data = data.astype(np.int64)
     if data.dtype.kind not in "iub":
         raise StudyError(f"{path.name} holds colours or records: it is no label mask; give the segmentation")
     return data
+
+
+def no_mask(name: str, why: str) -> StudyError:
+    """The sentence for a CT or MR image; why: what it holds."""
+    return StudyError(f"{name} holds grey values ({why}), not a mask: {SEGMENT}")
+
+
+def check_labels(labels: np.ndarray, count: int, name: str) -> None:
+    """Raise StudyError for grey values: of an image most neighbours differ, of a mask few; count: of labels."""
+    if labels.min() < -1:
+        raise no_mask(name, f"down to {int(labels.min()):,}")
+    if count > MOST_LABELS:
+        raise no_mask(name, f"{count:,} different ones")
+    if count <= 2:
+        return
+    same = both = 0
+    for axis in range(3):
+        one, next_one = (np.moveaxis(labels, axis, 0)[cut] for cut in (slice(None, -1), slice(1, None)))
+        inside = (one != 0) & (next_one != 0)
+        both += int(inside.sum())
+        same += int((inside & (one == next_one)).sum())
+    if same < ALIKE * both:
+        raise no_mask(name, f"{count:,} different ones, and {1 - same / both:.0%} of neighbouring voxels differ")
 
 
 def chosen_label(mask: Mask, wanted: str | None, name: str) -> int:
@@ -131,8 +161,7 @@ def chosen_label(mask: Mask, wanted: str | None, name: str) -> int:
     known = voxels_of(mask.labels)
     if not known:
         raise StudyError(f"{name} holds no label: every voxel is 0; give the segmentation")
-    if len(known) > MOST_LABELS:
-        raise StudyError(f"{name} holds {len(known):,} different values: it is an image and no label mask")
+    check_labels(mask.labels, len(known), name)
     if wanted is None and len(known) == 1:
         return next(iter(known))
     by_name = {mask.names.get(k, str(k)).lower(): k for k in known} | {str(k): k for k in known}

@@ -44,6 +44,12 @@ def opened(source: Source) -> Content:
         raise unreadable(path, reason_of(path, error, output.getvalue())) from error
     if remark:
         warnings.warn(f"{path.name}: {remark}", stacklevel=3)
+    if content.unit_by_custom and source.unit is None and source.longest_side is None:
+        warnings.warn(
+            f"{path.name}: its header does not say the unit; millimetres are taken, as is the custom; "
+            "--unit names another",
+            stacklevel=3,
+        )
     content = check_content(content, path.name)
     return content if is_mask(path) else chosen(content, source.part, path.name)
 

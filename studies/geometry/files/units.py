@@ -16,6 +16,10 @@ ORGAN = 0.02, 0.6
 """Longest side [m] of an organ: from a foetal kidney to the lungs of an adult."""
 LARGEST, SMALLEST = 5.0, 1e-3
 """Longest side [m] beyond which nothing is an organ."""
+LEAST_VOLUME = 1e-6
+"""Volume [m³] below which nothing is an organ: a pituitary gland has half of it, an adrenal one four times as much."""
+FAR_AWAY = 1e3
+"""Distance from the origin [m] beyond which coordinates have too few digits left for an organ."""
 ABSURD = 1e6, 1e-9
 """Longest side [m] beyond which a file is not even examined: squares and cubes of it would leave the numbers' range."""
 NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches"}
@@ -74,6 +78,11 @@ class Source:
         """What of it decides a mesh beside the content of the file, JSON-able, without the place of the file."""
         given = {"scale": None if self.scale == 1.0 else self.scale, "longest_side": self.longest_side}
         return {key: value for key, value in (given | {"part": self.part}).items() if value is not None}
+
+
+def stem_of(path: Path) -> str:
+    """The name without its ending, ".nii.gz" as a whole: "spleen" of "spleen.nii.gz"."""
+    return path.stem.removesuffix(".nii") if path.suffix == ".gz" else path.stem
 
 
 def as_source(path: "str | Path | Source", unit: str | None) -> Source:

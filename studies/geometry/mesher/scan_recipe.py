@@ -9,13 +9,13 @@ import numpy as np
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas
-from studies.geometry.mesh.wall_layers import mean_edge
 from studies.geometry.mesher.mmg_calls import EvenRemesher
-from studies.geometry.mesher.organ_recipe import finish, outlined
+from studies.geometry.mesher.organ_recipe import finish
+from studies.geometry.mesher.organ_surface import MOST_SPARE
 from studies.geometry.mesher.progress import stage
 from studies.geometry.mesher.worker import Arrays, work
 from studies.geometry.scanned.distance_grid import box_of
-from studies.geometry.scanned.fidelity import TOLD, fidelity, spread
+from studies.geometry.scanned.fidelity import TOLD, fidelity
 from studies.geometry.scanned.level_grid import grid_from, shape_of
 from studies.geometry.scanned.scan_shape import COARSEST, Surface, cell_for, faithful, levelled, scan_surface
 from studies.geometry.scanned.shells import solidified
@@ -23,8 +23,8 @@ from studies.geometry.scanned.true_grid import true_grid, wanted_volume
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region, region_from_dict
 from studies.geometry.surface.family import enclosed_volume
-from studies.geometry.surface.fit import evenly_spread, followed
-from studies.geometry.surface.node_count import handles_of, surface_with
+from studies.geometry.surface.fit import Fit, fitted
+from studies.geometry.surface.node_count import FEWEST, MOST, handles_of, surface_with
 from studies.geometry.surface.volume import with_volume
 
 
@@ -45,13 +45,13 @@ def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     body = solid_body(recipe, file)
     if "values" in arrays:
         shape = shape_of(grid_from(arrays), recipe["name"])
-        points, triangles = scan_mesh(shape, scan_surface(shape), recipe["nodes"], regions)
+        points, triangles = scan_mesh(shape, scan_surface(shape), recipe["nodes"], regions, curved=True)
     else:
         cell = cell_for(*body, recipe["nodes"])
         source = smooth_body(recipe, body, cell)
         grid, start = faithful(*source, cell, recipe["name"])
         shape = shape_of(grid, recipe["name"])
-        points, triangles = scan_mesh(shape, start, recipe["nodes"], regions)
+        points, triangles = scan_mesh(shape, start, recipe["nodes"], regions, curved=False)
         volume = signed_volume(*source)
         # A second on a fine grid: only where the first triangulation, a little too small, leaves a doubt.
         if abs(signed_volume(*start) / volume - 1.0) > 0.5 * TOLD:
@@ -91,41 +91,36 @@ def smooth_body(recipe: dict[str, Any], body: Surface, cell: float) -> Surface:
 
 NEARNESS = (0.2, 0.1, 0.3)
 """Distances over the size that the remesher keeps to, tried in turn: which one serves a thin margin best is chance."""
-BESIDE = 2.5
-"""Edges beside an outline within which the surface is evened out again: elsewhere it lies where its margins need it."""
-NEAR = 0.01
-"""Distance over the diagonal at which no other is tried; half of what a person is told of."""
+SPARE = 0.1
+"""Share of the nodes that is put where the evenly spread ones leave the mesh farthest from its shape."""
 
 
-def scan_mesh(shape: Shape, start: Surface, nodes: int, regions: list[Region]) -> Surface:
-    """A surface of `nodes` nodes on f = 0, near to it everywhere, with every region's outline on its edges.
+def scan_mesh(shape: Shape, start: Surface, nodes: int, regions: list[Region], curved: bool) -> Surface:
+    """A surface of `nodes` nodes on f = 0, near to it everywhere, with every region's outline on its edges; curved: its
+    sides will be quadratic, their middles on f = 0.
 
     Raises StudyError when none is well shaped."""
     area, handles = float(triangle_areas(*start).sum()), handles_of(*start)
-    best: tuple[float, Surface] | None = None
+    best: Fit | None = None
     refusals = []
     for nearness in NEARNESS:
         stage(f"a surface of {nodes} nodes, try {NEARNESS.index(nearness) + 1} of {len(NEARNESS)}")
         mesh_at = EvenRemesher(*start, nearness).mesh
         try:
-            points, triangles = surface_with(evenly_spread(nodes), area, mesh_at, shape, handles)
-            points, triangles = followed(shape, points, triangles, start[0], nodes)
-            made = outlined(shape, points, triangles, regions, BESIDE * mean_edge(points, triangles))
+            spare = min(round(SPARE * nodes), MOST_SPARE)
+            count = max(FEWEST, nodes - spare) if FEWEST <= nodes <= MOST else nodes  # refused by surface_with
+            base = surface_with(count, area, mesh_at, shape, handles)
+            made = fitted(shape, base, nodes, regions, start, curved)
         except StudyError as error:
             refusals.append(error)
             continue
-        far = farthest(start, made)
-        best = (far, made) if best is None or far < best[0] else best
-        if far <= NEAR * float(np.linalg.norm(np.ptp(start[0], axis=0))):
+        if best is None or made.badness() < best.badness():
+            best = made
+        if best.badness() <= 1.0:
             break
     if best is None:
         raise refusals[0]
-    return best[1]
-
-
-def farthest(one: Surface, other: Surface) -> float:
-    """Largest distance [m] between two surfaces, either way."""
-    return max(spread(one, other)["max"], spread(other, one)["max"])
+    return best.surface
 
 
 if __name__ == "__main__":

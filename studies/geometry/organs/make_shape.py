@@ -1,9 +1,11 @@
 """The true shape behind a name and its parameters."""
 
 import inspect
+import numbers
 from collections.abc import Mapping
 from typing import Any
 
+from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.geometry.organs import SHAPES
 from studies.geometry.shape.levelset import Shape
@@ -13,6 +15,9 @@ def make_shape(name: str, parameters: Mapping[str, Any]) -> Shape:
     """The shape `name` of SHAPES with some parameters; raises StudyError for an unknown name, parameter or value."""
     make = lookup(name, SHAPES, "organ")
     known = inspect.signature(make).parameters
-    for parameter in parameters:
+    for parameter, value in parameters.items():
         lookup(parameter, known, f"parameter of the {name}")
+        none = value is None and known[parameter].default is None
+        if not none and (isinstance(value, bool) or not isinstance(value, numbers.Real)):
+            raise StudyError(f"the {parameter} of the {name} is {value!r}; give a number")
     return make(**parameters)

@@ -7,23 +7,34 @@ CANDIDATES = 24
 """Triangles looked at first per point, by their centroids: more than twice the six around a node of a graded mesh."""
 
 
+class SurfaceDistance:
+    """Distances to one surface, of as many sets of points as wanted."""
+
+    def __init__(self, points: np.ndarray, triangles: np.ndarray):
+        """points (n, 3) [m], triangles (f, 3)."""
+        self.corners = np.asarray(points, float)[triangles]
+        centroids = self.corners.mean(axis=1)
+        self.reach = np.linalg.norm(self.corners - centroids[:, None], axis=2).max()
+        self.tree = KDTree(centroids)
+
+    def __call__(self, queries: np.ndarray) -> np.ndarray:
+        """Distance [m] of each of `queries` (q, 3), (q,)."""
+        found, total = np.empty(len(queries)), len(self.corners)
+        pending, count = np.arange(len(queries)), min(CANDIDATES, total)
+        while len(pending):
+            away, near = (a.reshape(len(pending), -1) for a in self.tree.query(queries[pending], k=count))
+            found[pending] = _to_triangles(queries[pending], self.corners, near)
+            if count == total:
+                break
+            # A triangle not looked at has its centroid beyond the last one's, and no point nearer than that less reach.
+            pending = pending[away[:, -1] - self.reach < found[pending]]
+            count = min(2 * count, total)
+        return found
+
+
 def distance_to_surface(queries: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Distance [m] of each of `queries` (q, 3) to the surface `triangles` (f, 3) on `points` (n, 3), (q,)."""
-    corners = np.asarray(points, float)[triangles]
-    centroids = corners.mean(axis=1)
-    reach = np.linalg.norm(corners - centroids[:, None], axis=2).max()
-    tree = KDTree(centroids)
-    found = np.empty(len(queries))
-    pending, count = np.arange(len(queries)), min(CANDIDATES, len(triangles))
-    while len(pending):
-        away, near = (a.reshape(len(pending), -1) for a in tree.query(queries[pending], k=count))
-        found[pending] = _to_triangles(queries[pending], corners, near)
-        if count == len(triangles):
-            break
-        # A triangle not looked at has its centroid beyond the last one's, and no point nearer than that less `reach`.
-        pending = pending[away[:, -1] - reach < found[pending]]
-        count = min(2 * count, len(triangles))
-    return found
+    return SurfaceDistance(points, triangles)(queries)
 
 
 def _to_triangles(queries: np.ndarray, corners: np.ndarray, near: np.ndarray) -> np.ndarray:

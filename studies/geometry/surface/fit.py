@@ -1,92 +1,214 @@
 """A surface mesh brought nearer to its shape where even nodes cut corners: thin margins, tips, the floor of folds."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from studies.geometry.mesh.organ_mesh import triangle_normals, unique_edges
+from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import triangle_areas, triangle_normals, unique_edges
 from studies.geometry.mesh.quality import triangle_radius_ratio
-from studies.geometry.shape.levelset import Shape, project
-from studies.geometry.surface.distance import distance_to_surface
-from studies.geometry.surface.edit import split_edge, with_node_count
+from studies.geometry.shape.levelset import Shape
+from studies.geometry.shape.regions import Region
+from studies.geometry.surface.distance import SurfaceDistance
+from studies.geometry.surface.edit import flip_edges, split_edge
 from studies.geometry.surface.intersections import crossing_triangles
-from studies.geometry.surface.node_count import FEWEST, MOST
-from studies.geometry.surface.repair import edge_pairs
+from studies.geometry.surface.sides import (
+    along_facets,
+    outline_edges,
+    places_on,
+    region_area,
+    region_side,
+    with_middles,
+)
+from studies.geometry.surface.snap import outlined
 
 Surface = tuple[np.ndarray, np.ndarray]
 
-SPARE = 0.04
-"""Share of the nodes that is put where the evenly spread ones leave the mesh farthest from its shape."""
-ALLOWED = 0.01
-"""Deviation over the diagonal at which no node is added for the sake of the shape: a third of what is promised."""
 FLOOR = 0.3
 """Smallest radius ratio of a triangle that a new node may make; the fill still has good elements above 0.2."""
-POOR = 0.2
-"""Smallest radius ratio that putting nodes back may leave: that of an even mesh (count.QUALITY)."""
 SHARPEST = -0.5
 """Cosine between the normals of neighbours, 120 degrees, beyond which a new node may not fold them: slivers follow."""
+ROUNDS = 16
+"""Distances are measured at least so many times while nodes are added: each answers what the last nodes changed."""
+TRIED = 30
+"""Places, the farthest first, at which a node is tried in vain before the search ends."""
+ENOUGH = 0.003
+"""Deviation over the size below which no node is added for the sake of the shape."""
+APART = 2.0
+"""Mean edges between nodes that are added in one round."""
+BEFORE = 0.6
+"""Share of the added nodes that come before the outlines of regions are laid: these cost some of the shape."""
+BESIDE = 2.5
+"""Edges from an outline within which the surface is evened out again: elsewhere it lies where its shape needs it."""
+STRAIGHT, CURVED, AREA = 0.01, 0.007, 0.02
+"""Deviation from the shape over the size, of straight and of curved sides, and deviation of a region's area at which
+no other surface is tried."""
+FEWEST_AT_OUTLINE = 10
+"""Nodes on the outline of a region: with fewer the region loses more than a few per cent of its area."""
 
 
-def evenly_spread(nodes: int) -> int:
-    """How many of `nodes` nodes are spread evenly; SPARE of them are left for where they are needed."""
-    return max(FEWEST, round((1.0 - SPARE) * nodes)) if FEWEST <= nodes <= MOST else nodes
+def fitted(shape: Shape, base: Surface, nodes: int, regions: Sequence[Region], truth: Surface, curved: bool) -> "Fit":
+    """A surface with `nodes` nodes that follows its shape, the outline of every region on its edges.
 
-
-def followed(shape: Shape, points: np.ndarray, triangles: np.ndarray, samples: np.ndarray, nodes: int) -> Surface:
-    """An even surface on f = 0 brought near to its shape, with `nodes` nodes where single edits allow that.
-
-    points (n, 3) [m], triangles (t, 3); samples (m, 3) [m] on f = 0, finer than the mesh.
+    base: a surface of evenly spread nodes on f = 0, fewer than `nodes`; truth: a fine one; curved: the sides will be
+    quadratic. Raises StudyError where an outline cannot be laid, or triangles would cross.
     """
-    points, triangles = refined(points, triangles, samples, nodes)
-    points, triangles = with_node_count(points, triangles, nodes)
-    return unspoilt(points, project(shape, points), triangles), triangles
+    fit = Fit(shape, base, [], truth, curved)
+    fit.grow(len(base[0]) + round(BEFORE * (nodes - len(base[0]))))
+    edges = unique_edges(fit.triangles)
+    edge = float(np.linalg.norm(np.diff(fit.points[edges], axis=1), axis=2).mean())
+    fit = Fit(shape, outlined(shape, *fit.surface, regions, BESIDE * edge), regions, truth, curved)
+    fit.fill_outlines(nodes)
+    fit.grow(nodes)
+    fit.split_longest(nodes)
+    if len(crossing_triangles(*fit.surface)):
+        raise StudyError(f"{shape.name}: its surface of {nodes} nodes would cut through itself; use more nodes")
+    return fit
 
 
-def refined(points: np.ndarray, triangles: np.ndarray, samples: np.ndarray, nodes: int) -> Surface:
-    """The mesh with further nodes, up to `nodes`, each at the sample that is then farthest from the mesh.
+class Fit:
+    """A surface on f = 0 to which nodes are added where it is farthest from its shape, in either direction."""
 
-    points (n, 3) [m], triangles (t, 3), samples (m, 3) [m] on the shape. The edge whose middle is nearest to the sample
-    is split; a node that spoils the mesh stays in that middle. Stops early where all samples are within ALLOWED of the
-    diagonal.
-    """
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    middles = points
-    # Only what is far may get farther away; fine samples are many.
-    samples = samples[distance_to_surface(samples, points, triangles) > 0.5 * ALLOWED * diagonal]
-    while len(points) < nodes and len(samples):
-        away = distance_to_surface(samples, points, triangles)
-        order = np.argsort(-away)[: nodes - len(points)]
-        if away[order[0]] <= ALLOWED * diagonal:
-            break
-        for sample in samples[order]:
-            edges = unique_edges(triangles)
-            edge = edges[np.linalg.norm(points[edges].mean(axis=1) - sample, axis=1).argmin()]
-            split, more = split_edge(points, triangles, edge)
-            split[-1] = sample
-            around = more[(more == len(points)).any(axis=1)]
-            if triangle_radius_ratio(split, around).min() > FLOOR:
-                middles = np.vstack([middles, middles[edge].mean(axis=0)])
-                points, triangles = split, more
+    def __init__(self, shape: Shape, surface: Surface, regions: Sequence[Region], truth: Surface, curved: bool):
+        """surface: points (n, 3) [m] and triangles (t, 3) with the outlines of `regions` on edges; truth: the same of a
+        surface fine enough to stand for f = 0; curved: the sides will be quadratic, their middles on f = 0."""
+        self.shape, self.regions, self.curved = shape, list(regions), curved
+        self.points, self.triangles = surface
+        self.outlines = self.find_outlines()
+        self.truth, self.from_truth = truth, SurfaceDistance(*truth)
+        self.size = float(np.linalg.norm(np.ptp(truth[0], axis=0)))
+
+    def deviation(self) -> float:
+        """Largest distance between the surface and its shape, in either direction, over the size [1]."""
+        return float(max(away.max() for _, away in self.distances())) / self.size
+
+    def area_error(self) -> float:
+        """Largest deviation of a region's area from that of the region on the true surface, over the latter [1]."""
+        errors = [0.0]
+        for region in self.regions:
+            inside = (region_side(region, self.points) <= 0)[self.triangles].all(axis=1)
+            points, facets = with_middles(self.shape, self.points, self.triangles, self.regions, self.curved)
+            area = triangle_areas(*along_facets(points, facets[inside])).sum()
+            errors.append(abs(float(area) / region_area(region, *self.truth) - 1.0))
+        return max(errors)
+
+    def badness(self) -> float:
+        """The worse of its deviation and its area error, each over the bound at which a search ends; 1 or less is good
+        enough [1]."""
+        return max(self.deviation() / (CURVED if self.curved else STRAIGHT), self.area_error() / AREA)
+
+    def distances(self) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Places (m, 3) [m] on the true surface and their distances (m,) [m] to this one, and the reverse."""
+        places, pieces = along_facets(*with_middles(self.shape, self.points, self.triangles, self.regions, self.curved))
+        samples = self.truth[0]
+        return (samples, SurfaceDistance(places, pieces)(samples)), (places, self.from_truth(places))
+
+    def grow(self, nodes: int) -> None:
+        """Adds nodes until there are `nodes`, or until none of the farthest places takes one."""
+        batch = max(1, (nodes - len(self.points)) // ROUNDS)
+        while len(self.points) < nodes and self.add(min(batch, nodes - len(self.points))):
+            pass
+
+    def add(self, count: int) -> int:
+        """Adds up to `count` nodes where the surface is farthest from its shape, far from each other; how many."""
+        (samples, ahead), (places, behind) = self.distances()
+        targets, away = np.concatenate([samples, places]), np.concatenate([ahead, behind])
+        edges = unique_edges(self.triangles)
+        apart = APART * float(np.linalg.norm(np.diff(self.points[edges], axis=1), axis=2).mean())
+        added, left = 0, np.argsort(-away, kind="stable")
+        for _ in range(TRIED + count):
+            left = left[away[left] > ENOUGH * self.size]
+            if added == count or not len(left):
                 break
-        else:
-            break
-    return unspoilt(middles, points, triangles), triangles
+            target = targets[left[0]]
+            grown = self.add_near(target, on_shape=left[0] < len(samples))
+            added += grown
+            # Where no node could be added, no neighbour takes one; where one was, the distances around it have changed.
+            reach = apart if grown else apart / 8.0
+            left = left[np.linalg.norm(targets[left] - target, axis=1) > reach]
+        return added
+
+    def add_near(self, target: np.ndarray, on_shape: bool) -> bool:
+        """Splits an edge near `target` (3,) [m], the new node there if that is `on_shape`, else above the middle of the
+        edge; whether one could be split without spoiling a triangle."""
+        near = np.argsort(np.linalg.norm(self.points - target, axis=1))[:6]
+        edges = unique_edges(self.triangles[np.isin(self.triangles, near).any(axis=1)])
+        middles = places_on(self.shape, self.points, edges, self.outlines, self.regions)
+        for k in np.argsort(np.linalg.norm(middles - target, axis=1))[:3]:
+            on_outline = self.is_outline(edges[k])
+            for place in [middles[k]] if on_outline or not on_shape else [target, middles[k]]:
+                if self.split(edges[k], place, on_outline):
+                    return True
+        return False
+
+    def fill_outlines(self, nodes: int) -> None:
+        """Splits the longest edges of outlines until they have FEWEST_AT_OUTLINE, twice as many where the area of the
+        region asks for it, as long as there are fewer than `nodes` nodes in all."""
+        for region in self.regions:
+            alone = Fit(self.shape, self.surface, [region], self.truth, self.curved)
+            fewest = FEWEST_AT_OUTLINE * (2 if alone.area_error() > AREA else 1)
+            while len(edges := outline_edges(*self.surface, region)) < fewest and len(self.points) < nodes:
+                if not self.split_first(edges):
+                    break
+
+    def split_longest(self, nodes: int) -> None:
+        """Splits the longest edges until there are `nodes` nodes, or none can be split."""
+        while len(self.points) < nodes and self.split_first(unique_edges(self.triangles)):
+            pass
+
+    def split_first(self, edges: np.ndarray) -> bool:
+        """Splits the longest of the edges (e, 2) that allows it, those of outlines on their curve."""
+        length = np.linalg.norm(np.diff(self.points[edges], axis=1)[:, 0], axis=1)
+        for edge in edges[np.argsort(-length, kind="stable")]:
+            place = places_on(self.shape, self.points, edge[None], self.outlines, self.regions)[0]
+            if self.split(edge, place, self.is_outline(edge)):
+                return True
+        return False
+
+    def find_outlines(self) -> np.ndarray:
+        """Edges (o, 2) of the outlines of all regions."""
+        return np.concatenate([np.empty((0, 2), int), *(outline_edges(*self.surface, r) for r in self.regions)])
+
+    @property
+    def surface(self) -> Surface:
+        """Points and triangles."""
+        return self.points, self.triangles
+
+    def split(self, edge: np.ndarray, place: np.ndarray, on_outline: bool) -> bool:
+        """Splits an edge at a place (3,) [m] on f = 0, then turns edges around it; whether that spoils no triangle."""
+        count = len(self.points)
+        points, triangles = split_edge(self.points, self.triangles, edge)
+        points[-1] = place
+        if not on_outline and self.crosses(points, triangles, count):
+            return False
+        around = triangles[(triangles == count).any(axis=1)]
+        ring = unique_edges(around)
+        ring = ring[[(row != count).all() and not self.is_outline(row) for row in ring]]
+        triangles = flip_edges(points, triangles, ring, lambda k, m: True, 1.0)
+        around = np.isin(triangles, around).sum(axis=1) == 3
+        if triangle_radius_ratio(points, triangles[around]).min() < FLOOR or folds(points, triangles, count):
+            return False
+        self.points, self.triangles = points, triangles
+        if on_outline:
+            self.outlines = self.find_outlines()
+        return True
+
+    def is_outline(self, edge: np.ndarray) -> bool:
+        """Whether an edge (2,), lower index first, belongs to an outline."""
+        return bool((edge == self.outlines).all(axis=1).any())
+
+    def crosses(self, points: np.ndarray, triangles: np.ndarray, node: int) -> bool:
+        """Whether a new node lies on another side of a region's outline than its neighbours."""
+        ring = np.unique(triangles[(triangles == node).any(axis=1)])
+        sides = [region_side(region, points[ring]) for region in self.regions]
+        own = ring == node
+        return any(side[own][0] == 0 or (side[own][0] * side < 0).any() for side in sides)
 
 
-def unspoilt(before: np.ndarray, after: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """`after`, but with nodes of triangles that cross, fold back or flatten put to where they were, if they moved."""
-    after = after.copy()
-    while True:
-        bad = np.concatenate([crossing_triangles(after, triangles), folded_pairs(after, triangles)])
-        poor = np.flatnonzero(triangle_radius_ratio(after, triangles) < POOR)
-        nodes = np.unique(triangles[np.concatenate([bad.ravel(), poor])])
-        moved = nodes[(after[nodes] != before[nodes]).any(axis=1)]
-        if not len(moved):
-            return after
-        after[moved] = before[moved]
-
-
-def folded_pairs(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Pairs (p, 2) of neighbouring triangles whose normals are farther apart than SHARPEST."""
-    normals = triangle_normals(points, triangles)
+def folds(points: np.ndarray, triangles: np.ndarray, node: int) -> bool:
+    """Whether neighbouring triangles around a node meet at an angle sharper than SHARPEST allows."""
+    near = triangles[np.isin(triangles, triangles[(triangles == node).any(axis=1)]).any(axis=1)]
+    normals = triangle_normals(points, near)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    pairs, _ = edge_pairs(triangles)
-    return pairs[(normals[pairs[:, 0]] * normals[pairs[:, 1]]).sum(axis=1) < SHARPEST]
+    shared = (near[:, None, :, None] == near[None, :, None, :]).any(axis=3).sum(axis=2)
+    return bool(((normals @ normals.T)[shared == 2] < SHARPEST).any())

@@ -3,6 +3,8 @@
 Without this a held patch is bounded by a staircase of facets; the force on it differed by 15 per cent between meshes.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from studies.base.errors import StudyError
@@ -17,6 +19,19 @@ FLOORS = (0.35, 0.2, 0.1, 0.05)
 """Smallest triangle radius ratio accepted in successive rounds: the good moves first, relaxation between rounds."""
 POOR = 0.4
 """Triangles below this radius ratio are worth turning an edge for."""
+
+
+def outlined(
+    shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: Sequence[Region], near: float = np.inf
+) -> tuple[np.ndarray, np.ndarray]:
+    """The surface with every region's outline on its edges; earlier outlines stay where they are, and so does what is
+    farther from an outline than `near` [m]."""
+    fixed = np.zeros(len(points), bool)
+    for region in regions:
+        far = np.abs(region.level(points)) > near
+        points, triangles, on_curve = snap_region(shape, points, triangles, region, fixed | far)
+        fixed |= on_curve
+    return points, triangles
 
 
 def snap_region(

@@ -20,7 +20,7 @@ from studies.plots.style.style import (
     SKY,
     VERMILLION,
     YELLOW,
-    readable,
+    method_label,
     save,
     styled,
 )
@@ -61,7 +61,7 @@ def figure(table: pd.DataFrame) -> Figure:
     left, right = panels(sheet, 1, 2, sharey=True)[0]
     shown = [name for name in LOOKS if (status == name).any()]
     _draw_bars(left, {s: [float(np.mean(status[method == name] == s)) for name in methods] for s in shown})
-    left.set_yticks(range(len(methods)), [f"{readable(name)} ({(method == name).sum()})" for name in methods])
+    left.set_yticks(range(len(methods)), [f"{method_label(name)} ({(method == name).sum()})" for name in methods])
     place = np.clip(np.digitize([row[2] for row in runs], EDGES) - 1, 0, len(EDGES) - 2)
     for row, name in enumerate(methods):
         _draw_shares(right, row, place[method == name], status[method == name] == "ok")

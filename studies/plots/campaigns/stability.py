@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from studies.metrics.run import Run
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, finish, grouped, log_axis, page, panels
-from studies.plots.style.style import BLACK, STATUS_LOOKS, heading, readable, save, styled
+from studies.plots.style.style import BLACK, STATUS_LOOKS, heading, method_label, readable, save, styled
 from studies.store.record import Status
 
 TITLE = "Stability: time step × stiffness"
@@ -75,7 +75,7 @@ def _draw_map(axes: Axes, group: Sequence[Run]) -> None:
 
 def _title(run: Run, body: str) -> str:
     """Scene, body and method, on two lines where one is too short."""
-    return textwrap.fill(f"{heading(run.case.scene.name)}, {body}, {readable(run.case.method.name)}", TITLE_LETTERS)
+    return textwrap.fill(f"{heading(run.case.scene.name)}, {body}, {method_label(run.case.method.name)}", TITLE_LETTERS)
 
 
 def _edges(values: np.ndarray) -> dict[float, tuple[float, float]]:

@@ -10,7 +10,7 @@ from matplotlib.typing import LineStyleType
 
 from studies.metrics.run import Run
 from studies.plots.style.page import by_scene
-from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, readable
+from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, method_label, readable
 from studies.runs.case import BodyRecipe
 
 OPTIONS = ("law", "axis", "weights", "stiffness", "nodes")
@@ -67,7 +67,7 @@ def body_method_handles(runs: Sequence[Run], looks: dict[BodyRecipe, BodyLook], 
 
 def body_handle(look: BodyLook, method: str, markers: bool = False) -> Line2D:
     """The legend entry of one body with one method."""
-    entry = Line2D([], [], color=method_colour(method), label=f"{look.name}, {readable(method)}")
+    entry = Line2D([], [], color=method_colour(method), label=f"{look.name}, {method_label(method)}")
     if markers:
         entry.set(marker=look.marker, linestyle="", markersize=7)
     else:

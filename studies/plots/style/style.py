@@ -173,6 +173,12 @@ def readable(name: str) -> str:
     return name.replace("_", " ").replace("-", " ")
 
 
+def method_label(name: str) -> str:
+    """The name of a method in a legend: that of a user's own method, or of an entry from outside, stays as it is."""
+    ours = [method.name for method in (*METHODS, *LITERATURE)]
+    return readable(name) if name in ours else name
+
+
 def heading(name: str) -> str:
     """The same with a capital letter."""
     words = readable(name)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,14 +12,13 @@ from studies.metrics.run import Run
 from studies.plots.style.style import readable
 from studies.reference.load import Reference
 from studies.report.page.pack import STEP, pack_frames, pack_indices, pack_series
+from studies.report.page.reference_shape import MOST_NODES, from_rest, reference_id
 from studies.scene.quantities import allowed
 from studies.store.record import Status
 from studies.store.schema import SURFACE
 
 BINS = 40
 """Stretches of a history; of each the smallest and the largest value are shown."""
-MOST_NODES = 65_535
-"""Numbers of nodes have two bytes on the page."""
 COMPARED = "surface"
 """Quantity that a scene must allow where points are to be compared: a body that may turn or slip has none."""
 
@@ -32,6 +30,8 @@ class Surface:
     times: np.ndarray
     nodes: np.ndarray
     positions: np.ndarray
+    straight: bool = False
+    """Whether the times are the checkpoints alone, between which the page moves all points in straight lines."""
 
 
 @dataclass
@@ -48,8 +48,8 @@ class Truths:
         return self.known[key]
 
 
-def case_data(run: Run, path: Path, truths: Truths) -> dict[str, Any]:
-    """JSON-able; `path`: the file that holds the run, as it is named in the command that repeats it."""
+def case_data(run: Run, again: str, truths: Truths) -> dict[str, Any]:
+    """JSON-able; `again`: the command that repeats the run."""
     case, record = run.case, run.record
     law = f", law {readable(case.body.law)}" if case.body.law != "van_gelder" else ""
     title = f"{readable(case.scene.name)} · {case.body.series}{law}, {case.body.nodes} nodes · {case.method_words}"
@@ -59,18 +59,46 @@ def case_data(run: Run, path: Path, truths: Truths) -> dict[str, Any]:
         "title": f"{title} · step {step}",
         "scene": case.scene.name,
         "about": f"{case.scene.title}. Time step {step}; it ended {ended}.",
-        "again": f"organbench replay {path}",
+        "again": again,
         "duration": case.scene.duration,
         "histories": histories(run),
-        "why": "Of this case no positions are recorded beside those at checkpoints, so there is no replay.",
     }
     if run.reference is not None:
         found["reference"] = reference_points(run)
-    if run.fields.surface_node is not None and len(run.fields.surface_node) <= MOST_NODES:
-        frames, nodes, positions = (run.field(name) for name in SURFACE)
-        times = np.concatenate([[0.0], run.fields.t])[frames]
-        found["replay"] = replay_of(run, Surface(times, nodes, positions.astype(float)), truths)
-    return found
+    surface = recorded_surface(run) or checkpoint_surface(run)
+    return found | ({"why": why_still(run)} if surface is None else {"replay": replay_of(run, surface, truths)})
+
+
+def recorded_surface(run: Run) -> Surface | None:
+    """The surface where the case records it; None where it does not, or where it has too many nodes."""
+    if "surface" not in run.record.fields or len(run.field("surface_node")) > MOST_NODES:
+        return None
+    frames, nodes, positions = (run.field(name) for name in SURFACE)
+    return Surface(np.concatenate([[0.0], run.fields.t])[frames], nodes, positions.astype(float))
+
+
+def checkpoint_surface(run: Run) -> Surface | None:
+    """The surface at rest and at the checkpoints that were reached, which every record holds; None where no checkpoint
+    was reached, or where it has too many nodes."""
+    if "snapshots" not in run.record.fields:
+        return None
+    nodes, snapshots = np.unique(run.field("triangles")), run.field("snapshots")
+    good = np.array([np.isfinite(positions).all() for positions in snapshots], bool)
+    snapshots = snapshots[: int(np.logical_and.accumulate(good).sum()), nodes]
+    if not len(snapshots) or len(nodes) > MOST_NODES:
+        return None
+    reached = np.array(run.case.scene.checkpoints[: len(snapshots)], float)
+    times, positions = from_rest(run.case.scene, reached, run.field("rest")[nodes], snapshots)
+    return Surface(times, nodes, positions, straight=True)
+
+
+def why_still(run: Run) -> str:
+    """Why there is nothing that moves."""
+    if not run.record.fields:
+        return "Nothing was computed, so there is no replay."
+    if not len(run.field("snapshots")):
+        return "It ended before the first checkpoint, so no positions are stored and there is no replay."
+    return f"Its surface has more than {MOST_NODES:,} nodes, so there is no replay."
 
 
 def histories(run: Run) -> dict[str, Any]:
@@ -116,7 +144,7 @@ def reference_points(run: Run) -> dict[str, list[float | None]]:
 
 
 def replay_of(run: Run, surface: Surface, truths: Truths) -> dict[str, Any]:
-    """The surface of a run, and that of the reference at the same points of the organ at rest."""
+    """The surface of a run; where there is a reference, its id, and how far points are from their places in it."""
     nodes, times = surface.nodes, surface.times
     triangles = run.fields.triangles
     place = np.full(len(run.fields.rest), -1)
@@ -124,6 +152,7 @@ def replay_of(run: Run, surface: Surface, truths: Truths) -> dict[str, Any]:
     packed = pack_frames(surface.positions, run.size)
     found = {
         "times": [float(f"{t:.6g}") for t in times],
+        "straight": surface.straight,
         "triangles": pack_indices(place[triangles[np.isin(triangles, nodes).all(axis=1)]]),
         "positions": packed,
         "obstacles": [obstacle_of(obstacle, times) for obstacle in run.case.scene.obstacles],
@@ -131,16 +160,23 @@ def replay_of(run: Run, surface: Surface, truths: Truths) -> dict[str, Any]:
     }
     if run.reference is None:
         return found
-    rest = run.fields.rest[nodes]
-    checkpoints, truth = np.asarray(run.reference.field("t"), float), rest + truths.displacements(run.reference, rest)
     comparable = allowed(run.case.scene, COMPARED)
-    largest = largest_error(run, nodes, truth) if comparable else 0.0
-    checkpoints, truth = from_rest(run, checkpoints, rest, truth)
-    return found | {
-        "checkpoints": checkpoints.tolist(),
-        "reference": pack_frames(truth, run.size),
-        "comparable": comparable,
-        "largest": largest,
+    found |= {"reference": reference_id(run.case.scene), "comparable": comparable}
+    return found | errors_of(run, nodes, truths) if comparable else found
+
+
+def errors_of(run: Run, nodes: np.ndarray, truths: Truths) -> dict[str, Any]:
+    """Distances [m] of `nodes` (v,) from their places in the reference at all checkpoints that the run reached, one row
+    after the other, before them those at rest; and the largest."""
+    assert run.reference is not None  # the caller checked it
+    rest, own = run.fields.rest[nodes], run.fields.snapshots[:, nodes]
+    error = np.linalg.norm(own - rest - truths.displacements(run.reference, rest)[: len(own)], axis=-1)
+    reached = np.array(run.case.scene.checkpoints[: len(own)], float)
+    times, rows = from_rest(run.case.scene, reached, np.zeros(len(nodes)), error)
+    return {
+        "reached": times.tolist(),
+        "errors": pack_series(rows.ravel()),
+        "largest": float(error.max(initial=0.0, where=np.isfinite(error))),
     }
 
 
@@ -153,20 +189,9 @@ def obstacle_of(obstacle: Obstacle, times: np.ndarray) -> dict[str, Any]:
     return at | {"radius": obstacle.radius, "span": span}
 
 
-def from_rest(run: Run, t: np.ndarray, rest: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times (K,) [s] and positions (K, v, 3) [m], before them those at rest (v, 3), where the scene begins there."""
-    if run.case.scene.start is not None or t[0] <= 0:
-        return t, positions
-    return np.concatenate([[0.0], t]), np.concatenate([rest[None], positions])
-
-
-def largest_error(run: Run, nodes: np.ndarray, truth: np.ndarray) -> float:
-    """Largest distance [m] of `nodes` (v,) from their places in the reference (K, v, 3) [m], at all checkpoints that
-    the run reached."""
-    own = run.fields.snapshots[:, nodes]
-    return float(np.linalg.norm(own - truth[: len(own)], axis=-1).max(initial=0.0))
-
-
 def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Two views of the same case, of two studies: what one lacks, the other has."""
-    return {**other, **one, "histories": {**other["histories"], **one["histories"]}}
+    """Two views of the same case, of two studies: what one lacks, the other has; recorded positions go before those at
+    checkpoints."""
+    both = {**other, **one, "histories": {**other["histories"], **one["histories"]}}
+    replays = [view["replay"] for view in (one, other) if "replay" in view]
+    return both | {"replay": min(replays, key=lambda replay: replay["straight"])} if replays else both

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from studies.base.counting import counted
 from studies.metrics.cells import plain, value_cell
 
 Row = Mapping[str, Any]
@@ -50,9 +51,9 @@ def volume(tables: Tables) -> Finding | None:
     return Finding(
         "How well volumes are kept",
         f"{_small(kept[VOLUME])} %",
-        f"is the farthest that a volume kept by {KEPT} is off in {len(pairs)} pairs of runs ({_name(kept)}). "
-        f"Without the constraint the same bodies are off by up to {plain(lost[VOLUME])} % ({_name(lost)}). "
-        "A volume is compared with the body's own at rest, which rounding alone blurs.",
+        f"is the farthest that a volume kept by {KEPT} is off in {counted(len(pairs), 'pair')} of runs "
+        f"({_name(kept)}). Without the constraint the same bodies are off by up to {plain(lost[VOLUME])} % "
+        f"({_name(lost)}). A volume is compared with the body's own at rest, which rounding alone blurs.",
     )
 
 
@@ -68,7 +69,7 @@ def one_volume(tables: Tables) -> Finding | None:
         "Forces of bodies with one volume",
         f"{_measured(worst, FORCE)} %",
         f"is the largest error of a force at the deepest point ({_name(worst)}). Bodies that keep one volume are off "
-        f"by {' and by '.join(said)}, over {len({row['scene'] for row in rows})} scenes.",
+        f"by {' and by '.join(said)}, over {counted(len({row['scene'] for row in rows}), 'scene')}.",
     )
 
 
@@ -102,11 +103,11 @@ def cost(tables: Tables) -> Finding | None:
     kept, free = max(pairs, key=lambda pair: pair[0][FRAME] / pair[1][FRAME])
     return Finding(
         "What keeping a volume costs",
-        f"{cells[0]} to {cells[-1]} %",
-        f"is what {KEPT} adds to the time of a frame in {len(pairs)} pairs of runs. The most is in {_name(kept)}: "
-        f"{_measured(kept, FRAME, signed=False)} ms against {_measured(free, FRAME, signed=False)} ms. In "
-        f"{sum(spread > abs(percent) for percent, spread in added)} pairs the repeats spread by more than the "
-        "difference.",
+        f"{' to '.join(dict.fromkeys((cells[0], cells[-1])))} %",
+        f"is what {KEPT} adds to the time of a frame in {counted(len(pairs), 'pair')} of runs. The most is in "
+        f"{_name(kept)}: {_measured(kept, FRAME, signed=False)} ms against {_measured(free, FRAME, signed=False)} ms. "
+        f"In {counted(sum(spread > abs(percent) for percent, spread in added), 'pair')} the repeats spread by more "
+        "than the difference.",
     )
 
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from studies.catalog.study import Study, command_line
 from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED
@@ -13,21 +14,24 @@ from studies.report.page.findings import Finding
 from studies.report.page.svg import inline
 
 COLUMNS = {
-    "volume_worst": "worst |V/V0 − 1|",
     "force_end": "force",
     "mean_error": "displacement, mean",
+    "shape_error": "shape / size",
+    "shape_volume": "volume of the shape",
+    "volume_worst": "worst |V/V0 − 1|",
+    "real_time": "simulated / computing",
     "interior_error": "interior, rel. L2",
     "silhouette_error": "silhouette / size",
     "min_j": "min J",
     "frame_time": "frame",
-    "real_time": "simulated / computing",
 }
-"""Metrics that the page's table shows; the CSV holds them all."""
-SIGNED = ("force_end",)
-BEFORE = {"scene": "scene", "body": "body", "nodes": "nodes", "method": "method"}
-AFTER = {"dt/dt_c": "step / limit", "status": "status", "law": "law", "study": "study"}
-"""Columns of words on both sides of the metrics, and their heads."""
+"""Metrics that the page's table shows where they are measured, the most asked for first; the CSV holds them all."""
+SIGNED = ("force_end", "shape_volume")
+AFTER = {"nodes": "nodes", "dt/dt_c": "step / limit", "law": "law", "status": "status", "study": "study"}
+"""Columns behind the metrics, and their heads."""
 NUMBERS = ("nodes", "dt/dt_c")
+JUDGED = ("force_end", "mean_error", "real_time")
+"""Rows with one of these come before rows without: a stability map has hundreds of those."""
 
 
 def findings_html(found: Sequence[Finding]) -> str:
@@ -76,19 +80,20 @@ def _panel(name: str, charts: Sequence[Mapping[str, str]], question: str) -> str
 
 
 def table_html(rows: Sequence[Mapping[str, Any]], known: Mapping[str, Any]) -> str:
-    """Rows (as `study_table`, with "study" and "case") as a table, those with a replay first; a button opens the cases
-    that are `known`."""
+    """Rows (as `study_table`, with "study" and "case") as a table, those with errors or times first; the name of a case
+    that is `known` is a link that opens it."""
     metrics = {metric.name: metric for metric in METRICS if metric.name in COLUMNS}
-    shown = [name for name in COLUMNS if any(_value(row, metrics[name]) is not None for row in rows)]
-    heads = [_head("case", "text", ""), *(_word_head(name, words) for name, words in BEFORE.items())]
+    shown = [
+        name for name in COLUMNS if name in metrics and any(_value(row, metrics[name]) is not None for row in rows)
+    ]
+    heads = [_head("case", "text", "")]
     heads += [_head(f"{COLUMNS[name]} [{metrics[name].unit}]", "number", metrics[name].description) for name in shown]
-    heads += [_word_head(name, words) for name, words in AFTER.items()]
+    heads += [_head(words, "number" if name in NUMBERS else "text", "") for name, words in AFTER.items()]
+    judged = [metrics[name] for name in JUDGED if name in metrics]
     body = []
-    for number, row in enumerate(sorted(rows, key=lambda row: "replay" not in known.get(row["case"], {})), 1):
-        cells = [_open_cell(row, number, known), *(_before_cell(row, name) for name in BEFORE)]
-        cells += [_metric_cell(row, metrics[name]) for name in shown]
-        cells += [_word_cell(row.get(name), name) for name in AFTER]
-        body.append(f"<tr>{''.join(cells)}</tr>")
+    for row in sorted(rows, key=lambda row: all(_value(row, metric) is None for metric in judged)):
+        cells = [_name_cell(row, known), *(_metric_cell(row, metrics[name]) for name in shown)]
+        body.append(f"<tr>{''.join(cells)}{''.join(_word_cell(row.get(name), name) for name in AFTER)}</tr>")
     return f'<table id="cases"><thead><tr>{"".join(heads)}</tr></thead><tbody>{"".join(body)}</tbody></table>'
 
 
@@ -97,18 +102,19 @@ def _head(words: str, kind: str, description: str) -> str:
     return f'<th scope="col" data-kind="{kind}"{title}><button type="button">{escape(words)}</button></th>'
 
 
-def _open_cell(row: Mapping[str, Any], number: int, known: Mapping[str, Any]) -> str:
+def _name_cell(row: Mapping[str, Any], known: Mapping[str, Any]) -> str:
+    """Scene, body and method; an entry from outside is marked as one, and so is a run that did not end well."""
+    scene = escape(readable(row["scene"]))
     case = known.get(row["case"])
-    if case is None:
-        return f'<th scope="row" data-sort="{number}">{number}</th>'
-    words = "Replay" if "replay" in case else "Histories"
-    label = escape(f"{words} of {case['title']}", quote=True)
-    button = f'<button type="button" data-case="{escape(row["case"])}" aria-label="{label}">{words}</button>'
-    return f'<th scope="row" data-sort="{words} {number}">{button}</th>'
-
-
-def _word_head(name: str, words: str) -> str:
-    return _head(words, "number" if name in NUMBERS else "text", "")
+    if case is not None:
+        title = escape(case["title"], quote=True)
+        scene = f'<a href="#case={escape(row["case"])}" title="{title}">{scene}</a>'
+    marks = ["entry"] if row.get("entry") else []
+    marks += [row["status"]] if row["status"] != "ok" else []
+    marked = "".join(f' <span class="entry">{escape(str(mark))}</span>' for mark in marks)
+    lines = (f"{scene}{marked}", escape(f"{row['body']}, {row['nodes']} nodes"), escape(str(row["method"])))
+    order = escape(f"{row['scene']} {row['body']} {row['nodes']} {row['method']}", quote=True)
+    return f'<th scope="row" data-sort="{order}">{"".join(f"<span>{line} </span>" for line in lines)}</th>'
 
 
 def _word_cell(value: Any, name: str) -> str:
@@ -117,13 +123,6 @@ def _word_cell(value: Any, name: str) -> str:
     if name in NUMBERS:
         return f'<td class="number" data-sort="{float(value):.6g}">{plain(float(value))}</td>'
     return f'<td class="words">{escape(readable(str(value)))}</td>'
-
-
-def _before_cell(row: Mapping[str, Any], name: str) -> str:
-    """A column of BEFORE; an entry from outside has the name that it gave itself, and is marked as one."""
-    if name != "method" or not row.get("entry"):
-        return _word_cell(row.get(name), name)
-    return f'<td class="words">{escape(str(row["method"]))} <span class="entry">entry</span></td>'
 
 
 def _value(row: Mapping[str, Any], metric: Any) -> float | None:
@@ -142,14 +141,15 @@ def _metric_cell(row: Mapping[str, Any], metric: Any) -> str:
     return f'<td class="number" data-sort="{abs(float(value)):.6g}">{cell}</td>'
 
 
-def again_html(studies: Sequence[str], machine: Mapping[str, Any]) -> str:
+def again_html(studies: Sequence[Study], machine: Mapping[str, Any]) -> str:
     """Commands that make all of it again, and where the times were measured."""
-    commands = [f"organbench run {' '.join(studies)}", "organbench report"]
+    own = [study for study in studies if study.word]
+    commands = [command_line("run", studies, elsewhere=True), command_line("report", own, elsewhere=True)]
     lines = "<br>".join(f"<code>{escape(command)}</code>" for command in commands)
     facts = [str(machine[name]) for name in ("cpu", "system", "python") if machine.get(name)]
     facts += [f"{name} {version}" for name, version in machine.get("packages", {}).items() if version]
-    told = f'<p class="soft">The machine: {escape(", ".join(facts))}.</p>' if facts else ""
-    return f"<p>{lines}</p>{told}"
+    measured = f'<p class="soft">The machine: {escape(", ".join(facts))}.</p>' if facts else ""
+    return f"<p>{lines}</p>{measured}"
 
 
 def script_json(data: Any) -> str:

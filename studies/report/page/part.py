@@ -1,25 +1,39 @@
 """What the page shows of one study, gathered while its runs are at hand and kept until they change."""
 
+import hashlib
 import json
 import math
+import re
+import shlex
 from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from studies.base.atomic import write_whole
-from studies.catalog.study import Study
+from studies.catalog.study import RESERVED, Study, command_line, word_elsewhere
 from studies.exchange.entry import is_entry
 from studies.metrics.run import Run
+from studies.report.page.best import best_bodies
 from studies.report.page.case_data import Truths, case_data
 from studies.report.page.entry_data import entry_data
+from studies.report.page.reference_shape import reference_id, reference_shape
 from studies.runs.current import case_path
-from studies.store.paths import key_hash
+from studies.runs.own import files_of
+from studies.store.paths import key_hash, record_files
 
 Part = dict[str, Any]
-"""rows: of the study's table, with the id of each case and whether it is an entry from outside; cases: by id; charts:
-file, title and SVG; remarks."""
+"""study: its name, question and word; rows: of the study's table, with the id of each case and whether it is an entry
+from outside; cases and references: by id; charts: file and SVG; remarks; best: the best body of each scene."""
+KEYS = {"study", "rows", "cases", "references", "charts", "remarks", "best"}
+ID = re.compile("[0-9a-f]+")
+"""Of a case or reference. It names a file of the page's folder, and a part may come from a stranger."""
+
+
+ABOUT = ("name", "question", "word")
+"""Of a study, what the page says of it."""
 
 
 def part_path(root: Path, study: Study) -> Path:
@@ -33,9 +47,12 @@ def write_part(root: Path, study: Study, runs: Sequence[Run], table: pd.DataFram
     ids = [run_id(run) for run in runs]
     rows = [{name: _plain(value) for name, value in row.items()} for row in table.to_dict("records")]
     cases: dict[str, Any] = {}
+    references: dict[str, Any] = {}
     truths = Truths()
     for number, run in zip(ids, runs, strict=True):
         cases.setdefault(number, _data(root, study, run, truths))
+        if run.reference is not None and (name := reference_id(run.case.scene)) not in references:
+            references[name] = reference_shape(run.reference)
     files = [chart.file for chart in study.charts]
     charts = [{"file": name, "svg": pictures[name]} for name in files if name in pictures]
     remarks = [
@@ -45,20 +62,69 @@ def write_part(root: Path, study: Study, runs: Sequence[Run], table: pd.DataFram
     ]
     theirs = [is_entry(run.case) for run in runs]
     rows = [{**row, "case": n, "entry": entry} for row, n, entry in zip(rows, ids, theirs, strict=True)]
-    part: Part = {"rows": rows, "cases": cases, "charts": charts, "remarks": remarks}
-    write_whole(part_path(root, study), json.dumps(part, allow_nan=False).encode())
+    about = {name: getattr(study, name) for name in ABOUT}
+    part: Part = {"study": about, "rows": rows, "cases": cases, "references": references, "charts": charts}
+    part |= {"remarks": remarks, "best": best_bodies([run for run in runs if not is_entry(run.case)], run_id)}
+    content = json.dumps(part, allow_nan=False).encode()
+    write_whole(part_path(root, study), _digest(content) + b"\n" + content)
 
 
 def read_part(root: Path, study: Study) -> Part | None:
-    """None where none is kept."""
-    path = part_path(root, study)
-    return json.loads(path.read_bytes()) if path.is_file() else None
+    """None where none is kept, or where it is damaged or no part of this version: then it is gathered again."""
+    try:
+        digest, _, content = part_path(root, study).read_bytes().partition(b"\n")
+    except OSError:
+        return None
+    part = json.loads(content) if digest == _digest(content) else None
+    if not isinstance(part, dict) or set(part) != KEYS:
+        return None
+    return part if all(map(ID.fullmatch, (*part["cases"], *part["references"]))) else None
+
+
+def _digest(content: bytes) -> bytes:
+    """The first line of the file: SHA-256 of all below."""
+    return hashlib.sha256(content).hexdigest().encode()
+
+
+def other_studies(root: Path, studies: Sequence[Study]) -> tuple[list[Study], list[str]]:
+    """Studies whose part is kept in `root` though they are not among `studies`: those of the user's files, and of a
+    folder of surfaces. Each is empty but for what the page says of it, and no file of the user is run for it.
+
+    Also a sentence for each study that is stored and has no part, or an older one.
+    """
+    names, others, remarks = {study.name for study in studies}, [], []
+    for folder in sorted(path for path in root.glob("*") if path.is_dir() and path.name not in (*RESERVED, *names)):
+        records = record_files(root, folder.name)
+        if not records:
+            continue
+        kept = Study(folder.name, "", (), (), ())
+        part = read_part(root, kept)
+        if part is None:
+            remarks.append(f"report.html: {folder.name} is not on the page; `organbench report FILE.py`, with the file "
+                           "that defines the study, adds it")  # fmt: skip
+            continue
+        others.append(replace(kept, **{name: str(part["study"][name]) for name in ABOUT if name != "name"}))
+        if max(path.stat().st_mtime_ns for path in records) > part_path(root, kept).stat().st_mtime_ns:
+            again = command_line("report", others[-1:])
+            remarks.append(f"report.html: {folder.name} is shown as it was drawn last; `{again}` draws it again")
+    return others, remarks
 
 
 def _data(root: Path, study: Study, run: Run, truths: Truths) -> dict[str, Any]:
     if is_entry(run.case):
-        return entry_data(run, truths)
-    return case_data(run, _named(root, case_path(root, study.name, run.case)), truths)
+        return entry_data(run, truths, _scene_word(study, run.case.scene.name))
+    path = _named(root, case_path(root, study.name, run.case))
+    own = files_of(run.case.method, run.case.body.law)
+    files = [word for file in own for word in ("--file", file.path.name)]
+    again = shlex.join(["organbench", "replay", str(path), *files])
+    return case_data(run, again, truths) | {
+        "run": command_line("run", [study], "--case", run.case.name, elsewhere=True)
+    }
+
+
+def _scene_word(study: Study, scene: str) -> str:
+    """A scene as the command line takes it: of a study of the user's with the file, in which several may be."""
+    return shlex.quote(f"{word_elsewhere(study)}:{scene}") if study.word.endswith(".py") else scene
 
 
 def run_id(run: Run) -> str:

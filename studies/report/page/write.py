@@ -1,8 +1,13 @@
-"""report.html: findings, one case, charts and the table of a results folder in one file of at most LIMIT bytes."""
+"""report.html: findings, one case, charts and the table of a results folder in one file of at most LIMIT bytes.
+
+Cases that have no room in it lie in FOLDER beside it, a file each, which the page loads when they are opened.
+"""
 
 import base64
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -10,33 +15,76 @@ from typing import Any
 import pandas as pd
 
 from studies.base.atomic import write_whole
+from studies.base.counting import counted
+from studies.base.errors import StudyError
 from studies.catalog.study import Study
+from studies.report.page.best import best_html, joined_best
 from studies.report.page.case_data import merged
 from studies.report.page.findings import findings
 from studies.report.page.markup import again_html, charts_html, findings_html, script_json, table_html
-from studies.report.page.part import Part, read_part
+from studies.report.page.part import Part, other_studies, part_path, read_part
 
 Parts = list[tuple[Study, Part]]
 NAME = "report.html"
+FOLDER = "report-cases"
 LIMIT = 3_000_000
-"""Bytes."""
-NO_ROOM = "Its replay had no room in this file."
+"""Bytes of the page; its folder may hold as many cases as there are."""
+DETAILS = ("histories", "reference", "replay", "why")
+"""What a case keeps in a file of its own where the page has no room for it."""
 ASSETS = Path(__file__).parent / "assets"
-SCRIPTS = ("data.js", "table.js", "tabs.js", "histories.js", "bodies.js", "obstacles.js", "replay.js", "controls.js")
+SCRIPTS = (
+    "data.js",
+    "table.js",
+    "tabs.js",
+    "histories.js",
+    "bodies.js",
+    "obstacles.js",
+    "replay.js",
+    "controls.js",
+    "address.js",
+)
 """In this order they make one script."""
 
 
+@dataclass(frozen=True)
+class Page:
+    """What is written: the page, and the files of its folder by name."""
+
+    content: bytes
+    files: dict[str, bytes]
+
+
 def write_page(root: Path, studies: Sequence[Study]) -> tuple[Path | None, list[str]]:
-    """Writes the page of what is kept of `studies` (studies.report.page.part); None where nothing is. And what had no
-    room or could not be drawn, in sentences. Raises StudyError when it cannot be written."""
-    parts = [(study, part) for study in studies if (part := read_part(root, study)) is not None and part["rows"]]
+    """Writes the page of what is kept of `studies` and of others in `root` (studies.report.page.part), and its folder;
+    None where nothing is. And what could not be drawn or is older, in sentences. Raises StudyError when something
+    cannot be written."""
+    others, remarks = other_studies(root, studies)
+    parts = []
+    for study in (*studies, *others):
+        part = read_part(root, study)
+        if part is None and part_path(root, study).exists():
+            remarks.append(f"report.html: {study.name} is left out: {part_path(root, study)} is damaged; delete it")
+        if part is not None and part["rows"]:
+            parts.append((study, part))
+            remarks += [f"report.html: {remark}" for remark in part["remarks"]]
     if not parts:
-        return None, []
-    cases = joined_cases([part for _, part in parts])
-    remarks = [f"report.html: {remark}" for _, part in parts for remark in part["remarks"]]
-    content, dropped = fitting(parts, cases, _machine(root))
-    write_whole(root / NAME, content)
-    return root / NAME, [*remarks, *dropped]
+        return None, remarks
+    page, more = fitting(parts, _machine(root))
+    for name, content in page.files.items():
+        write_whole(root / FOLDER / name, content)
+    write_whole(root / NAME, page.content)
+    _remove_others(root / FOLDER, set(page.files))
+    return root / NAME, [*remarks, *more]
+
+
+def _remove_others(folder: Path, names: set[str]) -> None:
+    """Files of cases that an earlier page loaded. Raises StudyError where one cannot be removed."""
+    for path in folder.glob("*.js"):
+        if path.name not in names:
+            try:
+                path.unlink()
+            except OSError as error:
+                raise StudyError(f"{path} cannot be removed ({error.strerror}); delete {folder}") from error
 
 
 def joined_cases(parts: Sequence[Part]) -> dict[str, Any]:
@@ -64,28 +112,54 @@ def joined_rows(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return list(found.values())
 
 
-def fitting(parts: Parts, cases: dict[str, Any], machine: dict[str, Any]) -> tuple[bytes, list[str]]:
-    """The page within LIMIT, and what had to go for that, a sentence each: replays, then histories, the last first."""
-    content, told = page(parts, cases, machine), []
-    for what, empty in (("replay", None), ("histories", {})):
-        holding = [number for number, case in cases.items() if case.get(what)]
-        over, gone = len(content) - LIMIT, 0
-        while over > 0 and gone < len(holding):
-            gone += 1
-            number = holding[-gone]
-            over -= len(script_json(cases[number][what]))
-            rest = {name: value for name, value in cases[number].items() if name != what}
-            cases = {**cases, number: rest | ({"why": NO_ROOM} if empty is None else {what: empty})}
-        if gone:
-            content = page(parts, cases, machine)
-            told.append(f"report.html holds no {what} of {gone} of {len(holding)} cases, to stay below {LIMIT:,} bytes")
-    if len(content) > LIMIT:
-        told.append(f"report.html has {len(content):,} bytes, more than {LIMIT:,}: its charts and its table are large")
-    return content, told
+def fitting(parts: Parts, machine: dict[str, Any]) -> tuple[Page, list[str]]:
+    """The page with as many cases as LIMIT has room for, the first one and those with the most to see before others;
+    a sentence where even without cases it is larger."""
+    cases = joined_cases([part for _, part in parts])
+    first = first_case(cases)
+    given = {"cases": _heads(cases), "first": first, "folder": FOLDER, "pieces": {}}
+    room, files = LIMIT - len(page(parts, given, machine)), {}
+    for name, piece in _pieces(parts, cases, first).items():
+        text = script_json(piece)
+        size = len(text.encode()) + len(name) + len('"":,')
+        if size <= room:
+            given["pieces"][name] = piece
+            room -= size
+        else:
+            files[f"{name}.js"] = f"keepPiece({json.dumps(name)}, {text});\n".encode()
+    content = page(parts, given, machine)
+    large = f"report.html has {len(content):,} bytes, more than {LIMIT:,}: its charts and its table are large"
+    return Page(content, files), [large] if len(content) > LIMIT else []
 
 
-def page(parts: Parts, cases: dict[str, Any], machine: dict[str, Any]) -> bytes:
-    """The file."""
+def _heads(cases: Mapping[str, Any]) -> dict[str, Any]:
+    """What the page always holds of each case: its words, the commands that run it, whether it moves."""
+    return {
+        number: {name: value for name, value in case.items() if name not in DETAILS} | {"replayed": "replay" in case}
+        for number, case in cases.items()
+    }
+
+
+def _pieces(parts: Parts, cases: Mapping[str, Any], first: str | None) -> dict[str, Any]:
+    """What may lie beside the page, by name, in the order in which it gets room: of each case the rest, and before it
+    the shape of its reference."""
+    references = {name: shape for _, part in parts for name, shape in part["references"].items()}
+    pieces: dict[str, Any] = {}
+    for number in sorted(cases, key=lambda number: (number != first, _rank(cases[number]))):
+        shape = cases[number].get("replay", {}).get("reference")
+        if shape is not None:
+            pieces.setdefault(f"reference-{shape}", references[shape])
+        pieces[f"case-{number}"] = {name: value for name, value in cases[number].items() if name in DETAILS}
+    return pieces
+
+
+def _rank(case: dict[str, Any]) -> int:
+    """Recorded motions before those from checkpoint to checkpoint, cases that stand still last."""
+    return 2 if "replay" not in case else int(case["replay"]["straight"])
+
+
+def page(parts: Parts, given: Mapping[str, Any], machine: dict[str, Any]) -> bytes:
+    """The file. given: what its script reads."""
     rows = [{"study": study.name, **row} for study, part in parts for row in part["rows"]]
     shown = joined_rows(rows)
     tables = {study.name: part["rows"] for study, part in parts}
@@ -93,32 +167,34 @@ def page(parts: Parts, cases: dict[str, Any], machine: dict[str, Any]) -> bytes:
     script = "\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)
     text = Template((ASSETS / "page.html").read_text(encoding="utf-8")).substitute(
         style=(ASSETS / "page.css").read_text(encoding="utf-8"),
-        summary=f"{_counted(shown)} of {len(parts)} studies: {', '.join(names)}. Volume-preserving mass-spring organs "
-        "against nearly incompressible finite elements.",
+        summary=f"{_counted(shown)} of {counted(len(parts), 'study', 'studies')}: {', '.join(names)}. "
+        "Volume-preserving mass-spring organs against nearly incompressible finite elements.",
+        best=best_html(joined_best([part["best"] for _, part in parts], shown)),
         findings=findings_html(findings(tables)),
         charts=charts_html(
             {study.name: part["charts"] for study, part in parts},
             {study.name: " ".join(study.question.split()) for study, _ in parts},
         ),
-        table=table_html(shown, cases),
-        count=len(shown),
+        table=table_html(shown, given["cases"]),
+        count=counted(len(shown), "case"),
         csv=base64.b64encode(csv_of(rows).encode()).decode("ascii"),
-        again=again_html(names, machine),
-        data=script_json({"cases": cases, "first": first_case(cases)}),
+        again=again_html([study for study, _ in parts], machine),
+        data=script_json(given),
         script=script,
+        digest=base64.b64encode(sha256(script.encode()).digest()).decode("ascii"),
     )
     return text.encode()
 
 
 def _counted(rows: Sequence[dict[str, Any]]) -> str:
     theirs = sum(bool(row.get("entry")) for row in rows)
-    entries = f", {theirs} of them entries from outside," if theirs else ""
-    return f"{len(rows)} cases{entries}"
+    entries = f", among them {counted(theirs, 'entry', 'entries')} from outside," if theirs else ""
+    return f"{counted(len(rows), 'case')}{entries}"
 
 
 def first_case(cases: dict[str, Any]) -> str | None:
-    """The one that is shown at first: a replay with errors in colour, else any replay, else any case."""
-    ranked = sorted(cases, key=lambda n: -2 * _comparable(cases[n]) - ("replay" in cases[n]))
+    """The one that is shown at first: errors in colour before none, and a recorded motion before others."""
+    ranked = sorted(cases, key=lambda number: (not _comparable(cases[number]), _rank(cases[number])))
     return ranked[0] if ranked else None
 
 

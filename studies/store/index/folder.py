@@ -7,10 +7,10 @@ import os
 import time
 import warnings
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 
+from studies.base.atomic import is_there
 from studies.base.collection import uncollected
 from studies.base.errors import StudyError
 from studies.base.shelf import Kept, Shelf
@@ -90,7 +90,7 @@ def _files(folder: Path, links: str) -> Iterator[tuple[str, str]]:
         with os.scandir(folder) as found:
             files = [file for file in found if file.name.endswith(SUFFIX) and file.name != links]
         for file in files:
-            with suppress(FileNotFoundError):  # replaced meanwhile
+            if is_there(Path(file.path)):  # neither a link to itself nor replaced meanwhile
                 yield file.name, state_of(file.stat())
     except (FileNotFoundError, NotADirectoryError):
         return

@@ -96,6 +96,10 @@ def test_damaged_files_get_a_sentence_in_words(tmp_path):
     assert tried > 200 and len(refused) > tried / 2
 
 
+COMMAS = b"solid x\nfacet normal 0 0 1\n outer loop\n  vertex 1.5 0.25 -3e0\n  vertex 1 2 3\n  vertex 4 5.5 6\n"
+COMMAS += b" endloop\nendfacet\nendsolid x\n"
+
+
 @pytest.mark.parametrize(
     ("name", "content", "told"),
     [
@@ -110,6 +114,14 @@ def test_damaged_files_get_a_sentence_in_words(tmp_path):
         ("a.vtk", b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\n", "a.vtk"),
         ("a.vtp", b'<VTKFile type="PolyData"><PolyData><Piece NumberOfPoints="3"', "it is cut short"),
         ("a.stl", b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "it is cut short: its end is missing"),
+        ("a.stl", b"ply\nformat ascii 1.0\n" + bytes(900), "it is no STL but a PLY file: give it the ending of its"),
+        ("a.stl", b"glTF\x02\x00\x00\x00" + b"\xf7" * 900, "it is no STL but a glTF file"),
+        (
+            "a.stl",
+            b"Dear reader, this is a letter of more than eighty-four letters and no surface. " * 9,
+            "it is no STL: it",
+        ),
+        ("a.stl", COMMAS.replace(b".", b","), "line 4 has decimal commas, 'vertex 1,5 0,25 -3e0': export it with"),
     ],
 )
 def test_the_reason_is_the_true_one(tmp_path, name, content, told):

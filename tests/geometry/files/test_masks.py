@@ -1,6 +1,7 @@
 """Label masks: the surface of one label, as large as its voxels, in the place that the header gives it."""
 
 import builtins
+import warnings
 
 import nibabel
 import nrrd
@@ -90,13 +91,22 @@ def test_an_organ_cut_off_by_the_image_is_told(tmp_path):
 def test_what_is_no_mask_gets_a_sentence(tmp_path, mask):
     labels, affine = ellipsoid()
     grey = np.random.default_rng(0).integers(0, 4000, labels.shape).astype(np.int16)
+    few = np.random.default_rng(1).integers(0, 239, labels.shape).astype(np.int16)
     half = tmp_path / "half.nii.gz"
     half.write_bytes(mask.read_bytes()[:900])
     cases = {
         "liver.nii.gz holds 2 labels: .*; there is no '7' among them": Source(mask, part="7"),
         "holds 2 labels: 1 of .* voxels, 2 of 27 voxels; choose one by --part": Source(mask),
-        "different values: it is an image and no label mask": Source(nifti(tmp_path / "grey.nii", grey, affine)),
-        "holds fractions": Source(nifti(tmp_path / "soft.nii", (0.3 * labels).astype(np.float32), affine)),
+        r"grey\.nii holds grey values \(3,999 .*\), not a mask: segment it first \(3D": Source(
+            nifti(tmp_path / "grey.nii", grey, affine)
+        ),
+        r"holds grey values \(238 different ones, and 100% of neigh.*\), not a mask: segment": Source(
+            nifti(tmp_path / "few.nii", few, affine), part="204"
+        ),
+        r"holds grey values \(down to -1,000\)": Source(nifti(tmp_path / "ct.nii", grey - np.int16(1000), affine)),
+        r"holds grey values \(fractions\)": Source(
+            nifti(tmp_path / "soft.nii", (0.3 * labels).astype(np.float32), affine)
+        ),
         "holds no label: every voxel is 0": Source(nifti(tmp_path / "no.nii", 0 * labels, affine)),
         "has 4 dimensions": Source(nifti(tmp_path / "two.nii", np.stack([labels, labels], axis=-1), affine)),
         "half.nii.gz is not a mesh that can be read .it is cut short": Source(half),
@@ -105,6 +115,24 @@ def test_what_is_no_mask_gets_a_sentence(tmp_path, mask):
         with pytest.raises(StudyError, match=told) as caught:
             opened(source)
         assert "\n" not in str(caught.value)
+
+
+def test_many_labels_side_by_side_are_a_mask(tmp_path):
+    """Up to as many as a segmentation of the whole body has: 117 blocks, each the neighbour of others."""
+    blocks = np.arange(1, 118).reshape(13, 9, 1).repeat(5, 0).repeat(5, 1).repeat(20, 2).astype(np.int16)
+    path = nifti(tmp_path / "body.nii", blocks, np.diag([3.0, 3.0, 3.0, 1.0]))
+    assert len(opened(Source(path, part="60")).triangles) > 100
+
+
+def test_a_header_without_a_unit_means_millimetres(tmp_path):
+    path = nifti(tmp_path / "liver.nii", *ellipsoid(), unit="unknown")
+    sentence = r"liver\.nii: its header does not say the unit; millimetres are taken, as is the custom; --unit names"
+    with pytest.warns(UserWarning, match=sentence):
+        surface = scan(Source(path, part="1"), fill=False)
+    assert 1e3 * np.ptp(surface.points[:, 0]) == pytest.approx(2 * AXES[0], rel=0.05)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert opened(Source(path, "cm", part="1")).unit == "mm"
 
 
 def test_without_the_reader_the_sentence_says_how_to_install_it(mask, monkeypatch):

@@ -1,79 +1,120 @@
-"""Nodes where even ones cut corners, and none that spoils the mesh."""
+"""Nodes where even ones cut corners, and none that spoils the mesh or an outline."""
 
 import numpy as np
 import pytest
 
+from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import unique_edges
 from studies.geometry.mesh.quality import triangle_radius_ratio
-from studies.geometry.surface.distance import distance_to_surface
-from studies.geometry.surface.fit import ALLOWED, evenly_spread, folded_pairs, refined, unspoilt
+from studies.geometry.shape.levelset import Shape, project
+from studies.geometry.shape.regions import HalfSpace
+from studies.geometry.surface.first_surface import first_surface
+from studies.geometry.surface.fit import ENOUGH, FEWEST_AT_OUTLINE, Fit, fitted, folds
 from studies.geometry.surface.intersections import crossing_triangles
-from studies.geometry.surface.node_count import MOST
+from studies.geometry.surface.node_count import QUALITY
+from studies.geometry.surface.sides import outline_edges, region_side
+from studies.geometry.surface.snap import crossing_edges
 from tests.geometry.boxes import box, split
 
-
-@pytest.fixture
-def lens():
-    """A flat lens with a sharp rim, coarse, and fine samples of it."""
-
-    def bent(times):
-        points, faces = split(*box((-1, -1, -1), (1, 1, 1)), times=times)
-        points = points / np.linalg.norm(points, axis=1, keepdims=True)
-        radius = np.linalg.norm(points[:, :2], axis=1)
-        return np.column_stack([points[:, :2], np.sign(points[:, 2]) * 0.3 * (1 - radius**2)]), faces
-
-    return *bent(2), bent(5)[0]
+TIP = np.array([0.3, 0.25, 0.92]) / np.linalg.norm([0.3, 0.25, 0.92])
+"""Between the nodes of the coarse mesh."""
 
 
-def test_nodes_go_where_the_mesh_cuts_corners():
-    # A ball with one narrow tip, between the nodes of the coarse mesh.
-    tip = np.array([0.3, 0.25, 0.92]) / np.linalg.norm([0.3, 0.25, 0.92])
-
-    def tipped(times):
-        points, faces = split(*box((-1, -1, -1), (1, 1, 1)), times=times)
-        points = points / np.linalg.norm(points, axis=1, keepdims=True)
-        return points * (1 + 0.4 * np.exp(-(((points @ tip - 1) / 0.02) ** 2)))[:, None], faces
-
-    points, faces = tipped(3)
-    samples = np.vstack([tipped(5)[0], 1.4 * tip])
-    before = distance_to_surface(samples, points, faces).max()
-    new, triangles = refined(points, faces, samples, len(points) + 12)
-    assert before > 0.1
-    assert len(points) < len(new) <= len(points) + 12 and len(triangles) == 2 * len(new) - 4
-    assert (new[: len(points)] == points).all()
-    assert distance_to_surface(samples, new, triangles).max() < 0.5 * before
-    assert triangle_radius_ratio(new, triangles).min() > 0.2 and len(crossing_triangles(new, triangles)) == 0
+def tipped(points):
+    """A ball of radius 1 with one narrow tip, 0.4 high."""
+    radius = np.linalg.norm(points, axis=1)
+    cosine = points @ TIP / np.maximum(radius, 1e-9)
+    return radius - 1.0 - 0.4 * np.exp(-(((cosine - 1.0) / 0.04) ** 2))
 
 
-def test_a_mesh_that_is_near_enough_is_left_alone():
-    points, faces = split(*box(), times=3)
-    inner = points[::3] + 1e-3 * ALLOWED
-    new, triangles = refined(points, faces, inner, len(points) + 5)
-    assert (new == points).all() and (triangles == faces).all()
+SHAPE = Shape("tipped ball", tipped, (-1.6, -1.6, -1.6), (1.6, 1.6, 1.6), 0.1)
+BALL = Shape("ball", lambda x: np.linalg.norm(x, axis=1) - 1.0, (-1.6, -1.6, -1.6), (1.6, 1.6, 1.6), 0.05)
+CAP = HalfSpace((0.0, 0.0, -0.6), (0.0, 0.0, 1.0))
 
 
-def test_nodes_that_spoil_the_mesh_go_back(lens):
-    points, faces, _ = lens
-    far, folded, flat = points.copy(), points.copy(), points.copy()
-    top = points[:, 2].argmax()
-    far[top] -= (0, 0, 1.0)  # through the other side
-    neighbour = np.setdiff1d(faces[(faces == top).any(axis=1)][0], top)[0]
-    folded[top] = points[top] + 1.7 * (points[neighbour] - points[top]) + (0, 0, 1e-3)
-    flat[top] = points[top] + 0.97 * (points[neighbour] - points[top])
-    sound = points.copy()
-    sound[top] += (0, 0, 0.02)
-    for moved in (far, folded, flat):
-        assert (unspoilt(points, moved, faces) == points).all()
-    assert (unspoilt(points, sound, faces) == sound).all()
+def surface_of(shape, times):
+    points, faces = split(*box((-1, -1, -1), (1, 1, 1)), times=times)
+    points = points / np.linalg.norm(points, axis=1, keepdims=True)
+    # Along rays: both shapes are stars.
+    for _ in range(50):
+        points = points * (1.0 - shape.level(points) / np.linalg.norm(points, axis=1))[:, None]
+    return project(shape, points), faces
 
 
-def test_folds_are_pairs_of_neighbours_back_to_back():
+@pytest.fixture(scope="module")
+def truth():
+    return first_surface(SHAPE)
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    return surface_of(SHAPE, 3)
+
+
+@pytest.mark.parametrize("curved", [False, True])
+def test_nodes_go_where_the_surface_is_far_from_its_shape(truth, coarse, curved):
+    fit = Fit(SHAPE, coarse, [], truth, curved)
+    before = fit.deviation()
+    fit.grow(len(coarse[0]) + 14)
+    points, triangles = fit.surface
+    assert before > 2 * ENOUGH and fit.deviation() <= max(0.4 * before, ENOUGH)
+    assert len(points) == len(coarse[0]) + 14 and len(triangles) == 2 * len(points) - 4
+    assert (points[: len(coarse[0])] == coarse[0]).all()
+    assert np.abs(SHAPE.level(points)).max() < 1e-9
+    assert triangle_radius_ratio(points, triangles).min() > QUALITY and len(crossing_triangles(points, triangles)) == 0
+    # Most of the new nodes are at the tip.
+    assert (points[len(coarse[0]) :] @ TIP > 0.8).mean() > 0.5
+
+
+def test_both_directions_count():
+    """A surface that is a tenth too long, and one that is a tenth too short: the same deviation."""
+    truth = surface_of(BALL, 5)
+    small = surface_of(BALL, 4)
+    size = np.linalg.norm([2.0, 2.0, 2.0])
+    for stretch in (0.9, 1.1):
+        fit = Fit(BALL, (small[0] * [1.0, 1.0, stretch], small[1]), [], truth, False)
+        assert fit.deviation() == pytest.approx(0.1 / size, rel=0.04)  # with the sagitta of the facets
+
+
+def test_a_surface_that_is_near_enough_gets_no_node():
+    fit = Fit(BALL, surface_of(BALL, 3), [], surface_of(BALL, 5), True)
+    count = len(fit.points)
+    fit.grow(count + 5)
+    assert len(fit.points) == count
+    fit.split_longest(count + 5)
+    assert len(fit.points) == count + 5
+
+
+def test_outlines_stay_on_edges_and_have_nodes_enough(truth, coarse):
+    nodes = len(coarse[0]) + 40
+    fit = fitted(SHAPE, coarse, nodes, [CAP], truth, True)
+    points, triangles = fit.surface
+    assert len(points) == nodes and len(crossing_triangles(points, triangles)) == 0
+    assert len(crossing_edges(CAP, points, unique_edges(triangles), 1e-9)) == 0
+    rim = outline_edges(points, triangles, CAP)
+    assert len(rim) >= FEWEST_AT_OUTLINE
+    assert np.abs(points[np.unique(rim), 2] + 0.6).max() < 1e-9
+    # The cap of a ball: 2 pi r h.
+    assert fit.area_error() < 0.02
+    inside = (region_side(CAP, points) <= 0)[triangles].all(axis=1)
+    assert inside.any() and not inside.all()
+
+
+def test_the_area_of_a_region_is_judged():
+    truth = surface_of(BALL, 5)
+    fit = fitted(BALL, surface_of(BALL, 3), 120, [CAP], truth, True)
+    assert fit.badness() <= 1.0
+    fit.regions = [HalfSpace((0.0, 0.0, -0.5), (0.0, 0.0, 1.0))]
+    # No edge lies on this outline, so facets that it crosses do not count.
+    assert fit.area_error() > 0.05 and fit.badness() > 1.0
+
+
+def test_a_node_that_folds_the_surface_is_refused():
     points = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, 0.9, 0.1], [0.5, -1, 0]], float)
-    assert folded_pairs(points, np.array([[0, 1, 2], [1, 0, 3]])).tolist() == [[0, 1]]
-    assert len(folded_pairs(points, np.array([[0, 1, 2], [1, 0, 4]]))) == 0
+    assert folds(points, np.array([[0, 1, 2], [1, 0, 3]]), 3)
+    assert not folds(points, np.array([[0, 1, 2], [1, 0, 4]]), 4)
 
 
-def test_some_nodes_are_spared_between_the_limits():
-    assert evenly_spread(550) == 528 and evenly_spread(60) == 60
-    assert (
-        evenly_spread(10) == 10 and evenly_spread(MOST + 1) == MOST + 1
-    )  # refused further on, by the number asked for
+def test_an_outline_that_cannot_be_laid_is_refused(truth, coarse):
+    with pytest.raises(StudyError, match="no length"):
+        fitted(SHAPE, coarse, len(coarse[0]) + 10, [HalfSpace((0, 0, 0), (0, 0, 0))], truth, True)

@@ -80,7 +80,7 @@ def test_summary_shows_numbers_or_a_dash(finished_sweep):
     assert kept[:3] == ["tiny_squeeze", "tetrahedral", "implicit_volume"]
     assert float(kept[3]) < float(free[3])
     assert kept[4] == "–"  # no reference, no force error
-    assert lost[3:] == ["–"] * 6
+    assert lost[3:] == ["–"] * 8
 
 
 def test_summary_marks_what_the_reference_does_not_know_well_enough(finished_sweep, monkeypatch):
@@ -103,7 +103,7 @@ def test_fine_steps_are_no_headline(finished_sweep):
 def test_a_case_that_failed_is_not_left_out(finished_sweep):
     runs, _ = load_runs(finished_sweep, tiny_study())
     failed = replace(runs[0].record, attributes={}, fields={}, status=Status.FAILED)
-    assert headline([replace(runs[0], record=failed)])[0][3:] == ["–"] * 6
+    assert headline([replace(runs[0], record=failed)])[0][3:] == ["–"] * 8
 
 
 def test_what_is_shown_already_is_not_drawn_again(results):

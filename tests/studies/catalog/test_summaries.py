@@ -6,11 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from massspring.body.quadratic import boundary_facets, parts_of_facets
+from studies.metrics.true_surface import ShapeErrors
 from studies.report.summary import ladder_of, recommended_of
 from studies.runs.case import BodyRecipe
 from studies.scenes.spleen_sag import SPLEEN_SAG
 from studies.store.record import Status
+from tests.massspring.quadratic import second_order
 from tests.studies import made_up_run
+from tests.studies.tiny import cube
 
 PAPER = BodyRecipe("surface", 550)
 EVEN = BodyRecipe("quadratic", 594, mass="stiffness")
@@ -18,16 +22,27 @@ GRADED = BodyRecipe("quadratic", 794, graded=True, mass="stiffness")
 DEVIATION = {PAPER: -0.7, EVEN: -0.02, GRADED: 0.01}
 FRAME_NS = {PAPER: 1e7, EVEN: 1e8, GRADED: 5e8}
 FLOORS = 0.001
+KEPT = ShapeErrors(0.0042, -0.0013)
 
 
-def run(body, deviation, *, uncertainty=FLOORS, **changes):
+def six_node_parts():
+    """Surface triangles of the cube as quadratic tetrahedra, numbered as POINTS."""
+    points, cells = second_order(*cube(1, made_up_run.EDGE)[::2])
+    number = np.linalg.norm(made_up_run.POINTS - points[:, None], axis=2).argmin(axis=1)
+    return number[parts_of_facets(boundary_facets(cells))]
+
+
+def run(body, deviation, *, uncertainty=FLOORS, shape=KEPT, **changes):
     """A body whose force is off by `deviation` and whose displacement is right; a frame is a second."""
     truth = made_up_run.reference()
     truth.total_uncertainty = dict.fromkeys(truth.total_uncertainty, uncertainty)
     force = np.array([0.5, 1.0, 1.5, 2.0]) * (1.0 + deviation)
-    made = made_up_run.run(force=force, reference=truth, attributes={"volumes": 7}, **changes)
+    values = {"triangles": six_node_parts()} if body.kind == "quadratic" else {}
+    made = made_up_run.run(force=force, reference=truth, attributes={"volumes": 7}, values=values, **changes)
     timing = SimpleNamespace(frame_ns=np.full((3, 4), FRAME_NS[body]))
-    return replace(made, case=replace(made.case, body=body, dt_fraction=0.8), timing=timing)
+    made = replace(made, case=replace(made.case, body=body, dt_fraction=0.8), timing=timing)
+    vars(made)["shape"] = shape  # a cube is no ball
+    return made
 
 
 def runs(**changes):
@@ -38,7 +53,7 @@ def test_the_cheapest_body_that_suffices_stands_beside_the_papers():
     (row,) = recommended_of(runs()).splitlines()[2:]
     assert row == (
         "| ball_clamped | −70.0 ± 0.1 | 0.0 ± 0.1 "
-        "| quadratic, masses by stiffness, 594, 0.8 | −2.0 ± 0.1 | 0.0 ± 0.1 | 10 |"
+        "| quadratic, masses by stiffness, 594, 0.8 | −2.0 ± 0.1 | 0.0 ± 0.1 | 0.42 | −0.13 | 10 |"
     )
 
 
@@ -53,6 +68,22 @@ def test_the_cheapest_body_that_suffices_stands_beside_the_papers():
 def test_the_nearest_is_marked(found, named):
     row, note = (line for line in recommended_of(found).splitlines()[2:] if line)
     assert f"{named}, 0.8 ‡" in row and note.startswith("‡")
+
+
+@pytest.mark.parametrize("shape", [ShapeErrors(0.0101, 0.0), ShapeErrors(0.0, -0.0051), ShapeErrors(0.0, 0.0051)])
+def test_a_body_that_does_not_keep_the_shape_is_not_recommended(shape):
+    """The cheaper one meets the wish, but lacks a piece of its organ."""
+    short = run(EVEN, -0.02, shape=shape)
+    assert "594" not in recommended_of([run(PAPER, -0.7), short, run(GRADED, 0.01)])
+    row, note = (line for line in recommended_of([run(PAPER, -0.7), short]).splitlines()[2:] if line)
+    assert "594, 0.8 ‡" in row and "keeps the shape" in note
+    assert f"| {100 * shape.distance:.2g} |" in row
+
+
+def test_a_shape_that_was_not_measured_is_a_dash():
+    unknown = run(EVEN, -0.02, shape=ShapeErrors(np.nan, np.nan))
+    (row,) = recommended_of([run(PAPER, -0.7), unknown]).splitlines()[2:]
+    assert "594, 0.8 | −2.0 ± 0.1 | 0.0 ± 0.1 | – | – |" in row
 
 
 def test_what_ended_badly_is_not_named():

@@ -85,12 +85,12 @@ def test_a_budget_without_a_time_is_not_met(organbench, tmp_path):
     ("words", "said"),
     [
         (("liver_pres",), "unknown scene 'liver_pres'; did you mean 'liver_press'"),
-        (("liver_press", "--force", "much"), "force 'much' is no error"),
-        (("liver_press", "--displacement", "-1%"), "displacement '-1%' is no error"),
+        (("liver_press", "--force", "much"), "force 'much' is no tolerance"),
+        (("liver_press", "--displacement", "-1%"), "displacement '-1%' is no tolerance"),
         (("liver_press", "--budget", "1"), "budget '1' is no time"),
         (("liver_press",), "nothing is stored of the study 'accuracy'"),
         (("ball_ringing",), "nothing is known for scene 'ball_ringing'"),
-        (("nothing.py",), "there is no study file nothing.py"),
+        (("nothing.py",), "there is no file nothing.py"),
     ],
 )
 def test_bad_input_is_one_sentence(refused, tmp_path, words, said):
@@ -100,7 +100,7 @@ def test_bad_input_is_one_sentence(refused, tmp_path, words, said):
 def test_a_file_of_two_scenes_is_one_sentence(refused, tmp_path):
     file = tmp_path / "two.py"
     file.write_text(STUDY.format(scenes="[MINE, BALL_CLAMPED]"))
-    assert "has 2 scenes; advice is given for one" in refused("advise", file, "--results", tmp_path)
+    assert "has 2 scenes: mine, ball_clamped; name one of them" in refused("advise", file, "--results", tmp_path)
 
 
 def test_a_case_that_there_is_not_is_answered_with_the_nearest(refused, tmp_path):

@@ -45,12 +45,13 @@ def test_help_comes_without_words():
 def test_run_a_file_from_nothing(organbench, tiny_file, tmp_path):
     code, out, err = organbench("run", tiny_file, "--results", tmp_path / "results", "--jobs", 1)
     assert code == 0
-    assert f"tiny: 5 pieces ran, charts in {tmp_path / 'results' / 'tiny'}" in out  # three cases, two of them timed
+    assert f"tiny: 3 cases, 2 timings ran, charts in {tmp_path / 'results' / 'tiny'}" in out
+    assert out.splitlines()[-1] == "tiny: 3 cases: 2 ok, 1 diverged"
     assert (tmp_path / "results" / "tiny" / "picture.txt").read_text() == "3 runs"
     assert err == ""  # the case that diverges is there on purpose
     again, out, err = organbench("run", tiny_file, "--results", tmp_path / "results")
     assert (again, err) == (0, "")
-    assert "tiny: 0 pieces ran" in out
+    assert "tiny: nothing ran" in out
 
 
 @pytest.mark.slow
@@ -76,7 +77,7 @@ def test_status_counts_and_says_why(organbench, tiny_file, results):
     code, out, _ = organbench("status", tiny_file, "--results", results)
     assert code == 0
     first, *why = out.splitlines()
-    assert first == "tiny: 1 ok, 1 diverged, 1 stale"
+    assert first == "tiny: 3 cases: 1 ok, 1 diverged, 1 stale"
     stale = next(k for k, line in enumerate(why) if line.startswith("  stale: ") and "changed" in line)
     assert why[stale + 1] == f"    {tiny_case().name}"
     diverged = next(k for k, line in enumerate(why) if line.startswith("  diverged: "))
@@ -189,9 +190,9 @@ def test_only_failed_leaves_the_rest(organbench, tiny_file, results):
     write_record(path, replace(read_record(path), fingerprint="0"))
     code, out, _ = organbench("run", tiny_file, "--results", results, "--only", "failed")
     assert code == 0
-    assert "0 pieces ran" in out
+    assert "tiny: nothing ran" in out
     code, out, _ = organbench("run", tiny_file, "--results", results, "--only", "failed, stale", "--jobs", 1)
-    assert "1 pieces ran" in out
+    assert "tiny: 1 case ran" in out
     after = content(results / "tiny")
     assert all(after[name] == data for name, data in before.items() if name.name != path.name and name.suffix == ".h5")
 

@@ -42,7 +42,7 @@ REPOSITORY = Path(__file__).parents[3]
         (("safe-dt", "ball_squeeze", "--nodes", "-3"), "-3"),
         (("show", "nothing.h5"), "there is no results file nothing.h5"),
         (("replay", "nothing.h5"), "there is no results file nothing.h5"),
-        (("run", "nothing.py"), "there is no study file nothing.py"),
+        (("run", "nothing.py"), "there is no file nothing.py"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
@@ -128,8 +128,9 @@ def test_bad_meshes_fail_and_the_study_goes_on(organbench, tmp_path):
     )
     results = tmp_path / "results"
     code, out, err = organbench("run", file, "--results", results, "--jobs", 1)
-    assert code == 0
-    assert "tiny: 4 pieces ran" in out
+    assert code == 1
+    assert "tiny: 4 cases ran" in out and "tiny: 4 cases: 2 ok, 2 failed\n" in out
+    assert "  failed: open.obj: the surface is open" in out and "missing.obj; check the name (file_3-" in out
     assert "large.obj: the bounding box is 100 x 100 x 100 m; if the file is in millimetres, say unit='mm'" in err
     assert "Traceback" not in err
     found = [read_record(path) for path in record_files(results, "tiny")]

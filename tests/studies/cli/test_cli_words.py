@@ -7,6 +7,8 @@ from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.cli import app as cli
 from studies.cli import outline
+from studies.cli.commands.results.list_names import KINDS
+from studies.cli.completing import NAMES
 from studies.cli.group import loaded
 from studies.metrics.metrics import METRICS
 from studies.population import Population, population_study
@@ -37,3 +39,10 @@ def test_the_line_of_a_command_begins_as_its_help(name):
 
 def test_a_misspelt_command_is_one_sentence_and_names_the_nearest(refused):
     assert "unknown command 'stauts'; did you mean 'status'" in refused("stauts")
+
+
+def test_list_takes_a_kind(organbench, refused):
+    assert NAMES["kinds"]() == list(KINDS)
+    code, out, _ = organbench("list", "scenes")
+    assert code == 0 and "ball_squeeze" in out and "volume_loss" not in out
+    assert "unknown kind of name 'scene'; did you mean 'scenes'" in refused("list", "scene")

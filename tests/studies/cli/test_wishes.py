@@ -25,7 +25,7 @@ def test_no_text_is_no_bound():
 
 @pytest.mark.parametrize("text", ["3", "0", "0%", "-3%", "101%", "three", "%", "3%%", "3,0%", "nan", "inf", "1 2"])
 def test_what_is_no_share_is_refused(text):
-    with pytest.raises(StudyError, match="is no error; give a share above 0 and up to 100 %"):
+    with pytest.raises(StudyError, match="is no tolerance; give a share above 0 and up to 100 %"):
         share(text, "force")
 
 

@@ -1,19 +1,24 @@
 """What moved between two results folders: verdicts, rows that belong together, folders that cannot be compared."""
 
+import re
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from studies.base.errors import StudyError
+from studies.cli.commands.results import compare as compare_command
+from studies.cli.commands.results.compare import rows_of
 from studies.compare.folders import compare, equal_records
 from studies.compare.verdict import MEANING, ROUND_OFF, Verdict, verdict_of
 from studies.store.paths import record_files
 from studies.store.record import read_record, write_record
 from studies.store.tables.csv_table import write_table
 
+PUBLISHED = Path(__file__).parents[3] / "results" / "published"
 NAN = float("nan")
 
 
@@ -63,7 +68,7 @@ def test_each_case_is_compared_with_itself(tmp_path):
     (moved,) = found.moved
     assert (moved.case.recipe, moved.old, moved.new, moved.floor, moved.unit) == ("{}", -30.0, -31.0, 0.5, "%")
     assert {change.metric for change in found.changes} == {"force_end", "min_j"}
-    assert sum(found.counts().values()) == len(found.changes) == 4
+    assert sum(found.counts(times=False).values()) == len(found.changes) == 4
 
 
 def test_the_larger_floor_of_both_counts(tmp_path):
@@ -138,12 +143,82 @@ def test_folders_that_cannot_be_compared_are_refused_in_a_sentence(tmp_path, mak
         compare(make(tmp_path), new)
 
 
+TIMED = {"nodes": 550, "step_time [µs]": 20.0, "step_time floor [µs]": 0.5, "real_time [s/s]": 8.0}
+SLOW = {"step_time [µs]": 40.0, "real_time [s/s]": 4.0}
+
+
+def timed(path, machine, **changes):
+    made = folder(path, [TIMED | row for row in rows(**changes)])  # times before accuracy
+    if machine:
+        (made / "machine.json").write_text(f'{{"id": "{machine}"}}')
+    return made
+
+
+@pytest.mark.parametrize("machines", [("one", "other"), ("one", ""), ("", ""), ("one", "one")])
+def test_times_are_judged_on_one_machine_alone(tmp_path, organbench, machines):
+    old, new = timed(tmp_path / "old", machines[0]), timed(tmp_path / "new", machines[1], **SLOW)
+    found, same = compare(old, new), machines == ("one", "one")
+    verdicts = {change.metric: change.verdict for change in found.changes if change.old != change.new}
+    assert verdicts == {
+        "step_time": Verdict.MOVED if same else Verdict.OTHER_MACHINE,
+        "real_time": Verdict.NOT_RESOLVABLE if same else Verdict.OTHER_MACHINE,
+    }
+    code, out, _ = organbench("compare", old, new)
+    assert code == same and out.startswith("accuracy: 4 equal, 0 within uncertainty, 0 moved\nspeed: ")
+    if not same:
+        machine = "another machine" if all(machines) else "machine not known"
+        assert f"speed: {machine}, median ratio 1.5 (new / old), 4 times not judged" in out
+
+
+def test_accuracy_that_moves_ends_with_one_on_any_machine_and_comes_first(tmp_path, organbench):
+    worse = SLOW | {"force_end [%]": -31.0}
+    old = timed(tmp_path / "old", "one")
+    assert organbench("compare", old, timed(tmp_path / "other", "other", **worse))[0] == 1
+    found = compare(old, timed(tmp_path / "same", "one", **dict(reversed(worse.items()))))
+    assert [change.metric for change in found.moved] == ["force_end", "step_time"]
+
+
+def test_no_two_rows_are_equal_and_they_name_the_nodes(tmp_path):
+    more = {"nodes": 300, "law": "lloyd", "recipe": "{1}"}
+    first = rows()[0] | {"law": "uniform", "dt/dt_c": 0.5}
+    table = [
+        first | {"nodes": 550},
+        first | {"nodes": 300},
+        first | more,
+        first | more | {"dt/dt_c": 0.05, "recipe": "{2}"},
+    ]
+    table = [row | {"recipe": f"{{{number}}}"} for number, row in enumerate(table)]
+    moved = [row | {"force_end [%]": -40.0} for row in table]
+    found = compare(folder(tmp_path / "old", table), folder(tmp_path / "new", moved))
+    assert [row[2] for row in rows_of(found.moved, found)] == [
+        "surface, 550, free",
+        "surface, 300, free, uniform, step 0.5",
+        "surface, 300, free, lloyd, step 0.5",
+        "surface, 300, free, lloyd, step 0.05",
+    ]
+
+
+def test_the_published_tables_have_no_two_equal_rows():
+    found = compare(PUBLISHED, PUBLISHED)
+    shown = [tuple(row[:4]) for row in rows_of(found.changes, found)]
+    assert len(shown) > 5000 and len(set(shown)) == len(shown)
+
+
+def test_a_terminal_gets_80_columns(tmp_path, organbench, monkeypatch):
+    old, new = timed(tmp_path / "old", "one"), timed(tmp_path / "new", "one", **SLOW, **{"force_end [%]": -31.0})
+    monkeypatch.setattr(compare_command.console, "_force_terminal", True)
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = organbench("compare", old, new)
+    assert "force_end" in out and "|" not in out
+    assert max(len(line) for line in re.sub(r"\x1b\[[0-9;]*m", "", out).splitlines()) <= 80
+
+
 def test_the_command_prints_markdown_and_ends_with_one_where_something_moved(tmp_path, organbench):
     old, new = folder(tmp_path / "old", rows()), folder(tmp_path / "new", rows(**{"force_end [%]": -31.0}))
     code, out, _ = organbench("compare", old, new, "--csv", tmp_path / "all.csv")
-    assert code == 1 and "| made_up | ball | surface, free | force_end [%] | −30 | −31 | −1 | 0.5 |" in out
+    assert code == 1 and "| made_up | ball | surface, free, {} | force_end [%] | −30 | −31 | −1 | 0.5 |" in out
     assert len(pd.read_csv(tmp_path / "all.csv")) == 4
     code, out, _ = organbench("compare", old, old)
-    assert code == 0 and "Nothing moved." in out
+    assert code == 0 and "0 moved" in out
     code, _, err = organbench("compare", tmp_path / "nowhere", new)
     assert code == 2 and err.count("\n") == 1

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import time
 from pathlib import Path
 
@@ -45,7 +46,7 @@ def test_a_job_array_does_a_study_and_is_ended(slurm, organbench):
     file.write_text("kind: slurm\nworkers: 1\nprocesses: 2\nhost: 127.0.0.1\n")
     code, out, err = organbench("run", study, "--results", results, "--on", file)
     assert (code, err) == (0, "")
-    assert "job 4711 with 1 workers; what they print is in" in out and "tiny: 1 pieces ran" in out
+    assert "job 4711 with 1 workers; what they print is in" in out and "tiny: 1 case ran" in out
     assert "#SBATCH --array=1-1" in (slurm / "script").read_text()
     assert (slurm / "ended").read_text() == "4711\n"
     group = int((slurm / "process").read_text())
@@ -74,6 +75,7 @@ def refusal(tmp_path, text, refused):
 
 
 def test_a_queueing_system_that_is_not_here_is_a_sentence(tmp_path, monkeypatch, refused):
+    (tmp_path / "openssl").symlink_to(str(shutil.which("openssl")))
     monkeypatch.setenv("PATH", str(tmp_path))
     said = refusal(tmp_path, "kind: pbs\nworkers: 2\nhost: 127.0.0.1", refused)
     assert re.search(r"`qsub .*workers\.sh` cannot be run \(.*\): correct `kind`, or run where it is", said)
@@ -91,7 +93,7 @@ def test_a_program_that_starts_workers_is_started_for_each_and_ended(tmp_path):
         "command", workers=2, processes=3, memory_gb=8, command=command, setup=("EXTRA=x",), host="127.0.0.1"
     )
     with jobs.scheduler_with_jobs(settings, tmp_path, told.append) as address:
-        assert re.fullmatch(r"tcp://127\.0\.0\.1:\d+", address)
+        assert re.fullmatch(r"tls://127\.0\.0\.1:\d+", address)
         (folder,) = (tmp_path / "cache").iterdir()
         assert address in (folder / "scheduler.json").read_text()
         until = time.monotonic() + 20

@@ -2,21 +2,28 @@
 
 import csv
 import json
+import re
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import meshio
 import numpy as np
+import pandas as pd
 import pytest
 
 from massspring import Capsule, Probe
+from studies.advice.answer import advise
 from studies.exchange.description import description, judged_metrics
-from studies.exchange.export import paths_table
+from studies.exchange.export import DIGITS, paths_table, rounded
 from studies.exchange.words import obstacle_words
+from studies.runs.recipe_text import body_words
 from studies.scenes import SCENES
 from studies.scenes.ball_clamped import BALL_CLAMPED, CAP, PUSH, RADIUS
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 
 NODES = 150
+TABLE = Path(__file__).parents[3] / "results" / "published" / "accuracy" / "accuracy.csv"
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +33,12 @@ def folder(tmp_path_factory, mesh_cache):
 
 @pytest.fixture
 def exported(organbench, folder):
-    """The clamped ball, by the command line."""
-    code, out, err = organbench("export", "ball_clamped", "-o", folder, "--nodes", NODES)
+    """The clamped ball, by the command line, with the published table and no runs."""
+    published = folder.parent / "results" / "published" / "accuracy"
+    published.mkdir(parents=True, exist_ok=True)
+    shutil.copy(TABLE, published)
+    results = folder.parent / "results"
+    code, out, err = organbench("export", "ball_clamped", "-o", folder, "--nodes", NODES, "--results", results)
     assert code == 0 and not err
     assert sorted(out.split()) == sorted(str(path) for path in folder.iterdir())
     return folder
@@ -89,7 +100,7 @@ def test_material_times_and_what_is_judged_are_said(exported):
     assert (found["schema"], found["version"]) == ("organbench-scene", 1)
     assert found["material"]["shear_modulus"] == 1800.0 and found["material"]["bulk_modulus"] == 5000 * 1800.0
     assert found["material"]["density"] == 1060.0 and found["damping"]["rate"] == 15.0
-    assert found["checkpoints"] == list(BALL_CLAMPED.checkpoints)
+    assert found["checkpoints"] == [0.6, 1.2, 1.8, 2.4, 4.0] == pytest.approx(list(BALL_CLAMPED.checkpoints))
     judged = {metric["name"]: metric for metric in found["judged"]}
     assert {"force_end", "surface_error", "volume_worst"} <= set(judged) and "frequency_error" not in judged
     assert all(metric["unit"] and "[" in metric["definition"] for metric in judged.values())
@@ -97,6 +108,30 @@ def test_material_times_and_what_is_judged_are_said(exported):
     assert "organbench judge ball_clamped FILE --nodes 150" in page and "{" not in page
     for said in ("metres", "mu = 1800 Pa", "held_top", *judged, "positive in compression"):
         assert said in page
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+def test_numbers_are_as_people_write_them(scene):
+    text = json.dumps(rounded(description(scene, [], ""))) + paths_table(scene).to_csv(float_format=f"%.{DIGITS}g")
+    numbers = re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text)
+    assert not [number for number in numbers if len(number.lstrip("-").replace(".", "")) > DIGITS + 4]
+    assert not re.search(r"(?<![\d.e])-0(\.0)?(?![\d.])", text)
+    assert np.allclose(rounded(description(scene, [], ""))["checkpoints"], scene.checkpoints, rtol=1e-11)
+
+
+def test_the_page_holds_what_our_own_bodies_reach(exported, tmp_path, organbench, mesh_cache):
+    page = (exported / "README.md").read_text()
+    table = pd.read_csv(TABLE).query("scene == 'ball_clamped' and body == 'surface' and nodes == 550")
+    (paper,) = re.findall(r"the paper's body: surface, 550 surface nodes \| (\S+) ± \S+ \| (\S+) ± ", page)
+    assert [float(cell.replace("−", "-")) for cell in paper] == [
+        pytest.approx(table[column].item(), abs=0.06) for column in ("force_end [%]", "mean_error [%]")
+    ]
+    chosen = advise("ball_clamped", results=exported.parent / "results", timing=False).chosen
+    assert chosen is not None and f"| recommended: {body_words(chosen.case.body)} surface nodes | " in page
+    words = ("export", "ball_clamped", "-o", tmp_path / "out", "--nodes", NODES, "--results", tmp_path)
+    code, _, err = organbench(*words)
+    assert code == 0 and "warning: README.md names no measured body: nothing is stored" in err
+    assert "No measured body of ours was at hand" in (tmp_path / "out" / "README.md").read_text()
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
@@ -136,5 +171,5 @@ def test_what_cannot_be_exported_is_refused(refused, tmp_path):
     assert "is a file; give the name of a folder" in refused("export", "ball_squeeze", "-o", tmp_path / "taken")
     assert "there is no file" in refused("export", tmp_path / "none.py")
     (tmp_path / "empty.py").write_text("")
-    assert "defines no SCENE" in refused("export", tmp_path / "empty.py")
+    assert "defines neither STUDY nor SCENE" in refused("export", tmp_path / "empty.py")
     assert "nodes" in refused("export", "ball_squeeze", "-o", tmp_path / "few", "--nodes", 3)

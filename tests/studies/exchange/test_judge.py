@@ -1,6 +1,8 @@
 """Our own run, handed in as another program would, is judged as our own run is."""
 
 import shutil
+import subprocess
+import sys
 
 import h5py
 import meshio
@@ -171,3 +173,30 @@ def test_without_its_reference_nothing_but_errors_is_left_out(organbench, ours, 
     code, out, err = organbench("judge", scene_file, path, "--nodes", NODES, "--results", tmp_path / "none")
     assert code == 0 and "no errors are judged, the reference is not there" in err
     assert "volume_worst" in out and "force_end" not in out
+
+
+def test_a_force_of_the_other_sign_is_named_and_ours_is_not(organbench, ours, scene_file, results, tmp_path):
+    for sign, named in ((-1, True), (1, False)):
+        path = ours.npz(tmp_path / "a.npz", force=sign * ours.force)
+        code, out, err = organbench("judge", scene_file, path, "--nodes", NODES, "--results", results)
+        assert code == 0 and ("the force has the other sign: reversed, its error is" in err) == named, err
+    own = next(line.split()[1] for line in out.splitlines() if "force_end" in line)
+    assert f"is {own}" not in err
+
+
+def test_the_starter_of_an_export_runs_and_is_accepted_as_a_body_that_did_not_move(
+    organbench, scene_file, results, tmp_path
+):
+    folder = tmp_path / "exported"
+    code, _, err = organbench("export", scene_file, "-o", folder, "--nodes", NODES, "--results", results)
+    assert code == 0, err
+    subprocess.run([sys.executable, folder / "solve.py"], check=True, cwd=tmp_path)
+    words = ("judge", scene_file, folder / "mine.npz", "--nodes", NODES, "--results", results)
+    code, out, err = organbench(*words)
+    assert code == 0 and out.startswith("mine: ok, 188 nodes of the straight mesh, 2 steps")
+    assert err.splitlines() == ["warning: the body did not move"]
+    assert len([line for line in (folder / "solve.py").read_text().splitlines() if line]) <= 25
+
+
+def test_a_body_that_moved_is_not_said_to_stand_still(ours, tmp_path):
+    assert judged(ours.npz(tmp_path / "a.npz")).record.attributes["warnings"] == ""

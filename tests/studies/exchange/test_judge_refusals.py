@@ -14,7 +14,14 @@ def wrong(ours, which):
         x[:, [3, 9]] = x[:, [9, 3]]
     elif which == "both":
         x = 1e3 * x[:, ::-1]
-    return {"mm": 1e3 * x, "inch": x / 0.0254, "moved": x + 0.002, "few": x[:, :-1], "flat": x[..., :2]}.get(which, x)
+    return {
+        "mm": 1e3 * x,
+        "inch": x / 0.0254,
+        "moved": x + 0.002,
+        "few": x[:, :-1],
+        "displacements": x - x[0],
+        "flat": x[..., :2],
+    }.get(which, x)
 
 
 POSITIONS = {
@@ -23,6 +30,7 @@ POSITIONS = {
     "both": "those of straight.vtu in millimetres",
     "permuted": "the nodes are those of straight.vtu in another order (number 3 is its number 9)",
     "moved": "the positions at t = 0 are up to 0.00346 m from those of straight.vtu",
+    "displacements": "are all zero, so these are displacements; add the rest positions of straight.vtu",
     "few": "positions of 187 nodes, but straight.vtu 188 and curved.vtu 1112 at this number of vertices",
     "nan": "positions of node 5 at t = 0.7 s is not a finite number",
     "flat": "positions have shape (41, 188, 2); they must be (steps, nodes, 3)",
@@ -43,6 +51,10 @@ HISTORIES = {
     "milliseconds": (lambda o: {"t": 1e3 * o.t}, "the times go to 4000, the scene to 4 s: give seconds, not ms"),
     "descending": (lambda o: {"t": o.t[::-1]}, "must be numbers that ascend"),
     "no times": (lambda o: {"t": None}, "a.npz lacks 't'"),
+    "other names": (
+        lambda o: {"t": None, "time": o.t, "x": o.positions},
+        "a.npz lacks 't'; it needs t (F) and positions (F, n, 3), and holds positions, force, pressure, time, x",
+    ),
     "short force": (lambda o: {"force": o.force[:-1]}, "force has shape (40,) for 41 steps"),
     "force nan": (lambda o: {"force": np.where(o.t == 2.0, np.nan, o.force)}, "force at t = 2 s is not a finite"),
     "other times": (lambda o: {"t": o.t[:5]}, "41 steps for 5 times"),
@@ -65,6 +77,9 @@ FILES = {
     "a.csv": ("t,node,x,y\n0,0,0,0\n", "a.csv lacks the column 'z'"),
     "b.csv": ("t,node,x,y,z\n0,1,0,0,0\n0,2,0,0,0\n", "nodes are numbered 1 to 2; number them from 0 on"),
     "c.csv": ("t,node,x,y,z\n0,0,0,0,0\n0,1,0,0,0\n1,0,0,0,0\n", "step t = 1 s has 1 nodes, others have 2"),
+    "e.csv": ("t;node;x;y;z\n0;0;0,5;0;0\n", "e.csv has semicolons between its columns and commas in its numbers"),
+    "f.csv": ("t;node;x;y;z\n0;0;0.5;0;0\n", "semicolons between its columns: write commas between columns and points"),
+    "g.csv": ("t,node,x,y,z\n0,0,0,5,0,1,0,0\n", "g.csv has commas in its numbers"),
     "d.csv": ("t,node,x,y,z\n0,0,zero,0,0\n", "d.csv cannot be read as a table"),
 }
 

@@ -5,8 +5,11 @@ import json
 import pytest
 
 from studies.base import own_file
+from studies.report.page.part import read_part
+from studies.report.results import refresh
 from studies.runs import own
 from studies.runs.current import case_path
+from studies.runs.own import files_of
 from studies.runs.run import measure
 from studies.store.paths import timing_files
 from studies.store.record import Status, read_record
@@ -54,7 +57,7 @@ def ran(organbench, mine, folder):
 
 def test_it_runs_and_is_current_and_its_records_name_the_file(organbench, mine, ran):
     _, out, err = organbench("status", mine, "--results", ran)
-    assert out.startswith("calm: 3 ok\n") and not err
+    assert out.startswith("calm: 3 cases: 3 ok\n") and not err
     study = find_study(str(mine))
     records = [read_record(case_path(ran, "calm", case)) for case in study.cases]
     assert [record.status for record in records] == [Status.OK] * 3
@@ -88,7 +91,7 @@ EDITS = {
 def test_an_edit_makes_stale_what_uses_the_file(organbench, mine, ran, what):
     before, after, found = EDITS[what]
     edit(mine, before, after)
-    assert organbench("status", mine, "--results", ran)[1].startswith(f"calm: {found}\n")
+    assert organbench("status", mine, "--results", ran)[1].startswith(f"calm: 3 cases: {found}\n")
 
 
 def test_an_edit_of_a_module_beside_it_does_too(mine):
@@ -111,17 +114,34 @@ def test_a_new_chart_or_metric_is_drawn_without_running(organbench, mine, ran):
     assert path.stat().st_mtime_ns == before
 
 
-def test_replay_finds_the_file_and_asks_for_it(organbench, refused, mine, ran):
+def test_lines_of_the_page_name_the_file(mine, ran):
+    """Both run the case again: from the study, and bit for bit from its record, with the file that its method is in."""
+    study = find_study(str(mine))
+    refresh(ran, study)
+    part = read_part(ran, study)
+    assert part is not None
+    for case, name in zip(part["cases"].values(), (case.name for case in study.cases), strict=True):
+        assert case["run"] == f"organbench run {mine.name} --case {name}"
+    assert [case["again"].endswith(f".h5 --file {mine.name}") for case in part["cases"].values()] == [
+        bool(files_of(case.method, case.body.law)) for case in study.cases
+    ]
+    assert any(" --file " in case["again"] for case in part["cases"].values())
+
+
+def test_replay_runs_the_file_that_the_user_names(organbench, refused, mine, ran):
     record = case_path(ran, "calm", find_study(str(mine)).cases[2])
     own.forget()
-    assert "the same, bit for bit" in organbench("replay", record)[1]
+    assert f"was made with the program {mine}, and" in (sentence := refused("replay", record))
+    assert f"add --file {mine}, or where it is now" in sentence
+    code, out, err = organbench("replay", record, "--file", mine)
+    assert code == 0 and "the same, bit for bit" in out and not err
     moved = mine.rename(mine.with_name("elsewhere.py"))
     own.forget()
-    assert f"{mine}, which is not there; --file" in refused("replay", record)
     assert "the same, bit for bit" in organbench("replay", record, "--file", moved)[1]
     edit(moved, "1.0 / edges.length,", "1.0 / edges.length**2,")
-    code, out, _ = organbench("replay", record, "--file", moved)
+    code, out, err = organbench("replay", record, "--file", moved)
     assert code == 1 and "differs by up to" in out and "the code has changed since it was stored" in out
+    assert f"warning: {moved} is not the file that {record} was made with: its content has changed" in err
 
 
 def test_a_view_needs_no_file(organbench, mine, ran, tmp_path):

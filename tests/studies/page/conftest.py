@@ -34,7 +34,7 @@ def visit(browser, file):
     """Opens the page; afterwards nothing may have been asked for or complained of but what `complaints` lists."""
     contexts, asked, complaints = [], [], []
 
-    def go(before: str = "", **options):
+    def go(before: str = "", where: str = "", **options):
         context = browser.new_context(offline=True, **{"viewport": {"width": 1280, "height": 900}} | options)
         contexts.append(context)
         if before:
@@ -43,7 +43,7 @@ def visit(browser, file):
         page.on("request", lambda request: asked.append(request.url))
         page.on("console", lambda message: complaints.append(message.text))
         page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.goto(file.as_uri())
+        page.goto(file.as_uri() + where)
         if not before:
             page.wait_for_selector("#canvas[data-shown]")
         return page
@@ -51,4 +51,4 @@ def visit(browser, file):
     yield go
     for context in contexts:
         context.close()
-    assert set(asked) <= {file.as_uri()} and complaints == []
+    assert {url.split("#")[0] for url in asked} <= {file.as_uri()} and complaints == []

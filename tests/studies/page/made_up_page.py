@@ -19,18 +19,18 @@ from studies.runs.case import Case
 from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE
 from studies.store.machine import write_machine
 from studies.store.record import Field, Status
-from tests.plots.made_up import FRAMES, POINTS, STRETCH, run
+from tests.plots.made_up import FRAMES, POINTS, run
 
 NASTY = '</script><img src=x onerror=alert(1)> & "quoted"'
 MOMENTS = np.arange(0, FRAMES + 1, 2)
 HELD = replace(BALL_CLAMPED, title="A ball of six nodes")
 ODD = replace(BALL_CLAMPED, name=NASTY, title=NASTY)
-ERRORS = ("volume_worst", "force_end", "mean_error", "silhouette_error", "min_j")
+ERRORS = ("volume_worst", "force_end", "mean_error", "shape_error", "shape_volume", "silhouette_error", "min_j")
 COLUMNS = (*ERRORS, "step_time", "frame_time", "real_time")
 
 
 def moving(made: Run) -> Run:
-    """The same run with its surface recorded, and a reference that knows all its checkpoints."""
+    """The same run with its surface recorded, and its snapshots on the way."""
     share = (MOMENTS / FRAMES)[:, None, None]
     final = made.field("snapshots")[-1] if len(made.field("snapshots")) else POINTS
     surface = (POINTS + share * (final - POINTS))[:, :6].astype(np.float32)
@@ -38,10 +38,6 @@ def moving(made: Run) -> Run:
     fields = {"surface_frame": MOMENTS, "surface_node": np.arange(6), "surface": surface}
     fields["snapshots"] = POINTS + at * (final - POINTS)
     record = replace(made.record, fields=made.record.fields | {k: Field(v, "1", "x") for k, v in fields.items()})
-    known = made.reference
-    if known is not None:
-        t = known.field("t")  # type: ignore[attr-defined]
-        known.displacements = lambda points: (t / t[-1])[:, None, None] * points * (STRETCH - 1)  # type: ignore[attr-defined]
     return replace(made, record=record, case=made.case.replaced(recorded=("surface",)))
 
 

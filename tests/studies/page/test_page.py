@@ -1,25 +1,29 @@
 """The page as a file: complete, within its size, nothing from elsewhere, and whole whatever names and texts hold."""
 
 import base64
+import hashlib
 import io
 import json
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from studies.catalog import Chart
+from studies.metrics.table import study_table
 from studies.report.page import write as module
 from studies.report.page.markup import script_json
-from studies.report.page.pack import unpack_frames
-from studies.report.page.part import part_path, read_part
+from studies.report.page.pack import unpack_frames, unpack_series
+from studies.report.page.part import part_path, read_part, write_part
 from studies.report.page.svg import inline
 from studies.report.page.write import ASSETS, SCRIPTS, write_page
 from studies.report.results import draw_charts, report
-from tests.plots.made_up import POINTS
-from tests.studies.page.made_up_page import HELD, MOMENTS, NASTY, losses, made_up_parts, rates, theirs
+from tests.plots.made_up import POINTS, STRETCH
+from tests.studies.page.made_up_page import COLUMNS, HELD, MOMENTS, NASTY, losses, made_up_parts, rates, theirs
 from tests.studies.tiny import tiny_study
 
 VOID = {"meta", "link", "input", "br", "img"}
@@ -69,6 +73,12 @@ def parsed(page):
     return Parsed(page[1])
 
 
+def cases_of(text):
+    """Cases by id, with what is kept of them."""
+    data = data_of(text)
+    return {number: case | data["pieces"][f"case-{number}"] for number, case in data["cases"].items()}
+
+
 def data_of(text):
     return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1])
 
@@ -86,9 +96,20 @@ def test_nothing_comes_from_elsewhere(page, parsed):
     names = ("src", "href", "xlink:href")
     links = [attributes[name] for _, attributes in parsed.found for name in names if name in attributes]
     assert links and all(link.startswith(("#", "data:")) for link in links)
-    assert all(link[1:] in parsed.ids() for link in links if link.startswith("#"))
+    inside = [link for link in links if link.startswith("#")]
+    cases = {link.removeprefix("#case=") for link in inside if link.startswith("#case=")}
+    assert cases == set(data_of(page[1])["cases"])
+    assert all(link[1:] in parsed.ids() for link in inside if not link.startswith("#case="))
     assert "default-src 'none'" in page[1] and "@import" not in page[1]
     assert not re.search(r"url\((?!#)", page[1])
+
+
+def test_no_script_runs_but_its_own(page):
+    """The policy names the script by its digest: no other runs, and no handler in an attribute."""
+    script = page[1].split("<script>")[1].split("</script>")[0]
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = re.search(r"script-src ([^;]*);", page[1])
+    assert policy is not None and policy[1] == f"'sha256-{digest}' 'strict-dynamic'"
 
 
 def test_no_name_or_text_can_break_it(page, parsed):
@@ -104,7 +125,7 @@ def test_json_in_a_script_is_no_markup_and_reads_back(text):
 
 
 def test_all_cases_are_in_the_table_once_and_all_rows_in_the_csv(page, parsed):
-    table = page[1][page[1].index('<table id="cases">') : page[1].index("</table>")]
+    table = page[1][page[1].index('<table id="cases">') : page[1].rindex("</table>")]
     assert table.count("<tr>") - 1 == len(losses()) + len(theirs())  # those of the other study are the same cases
     link = next(attributes["href"] for _, attributes in parsed.found if attributes.get("id") == "csv")
     rows = pd.read_csv(io.BytesIO(base64.b64decode(link.split(",", 1)[1])))
@@ -115,19 +136,48 @@ def test_all_cases_are_in_the_table_once_and_all_rows_in_the_csv(page, parsed):
 
 
 def test_a_case_of_two_studies_has_replay_and_frame_times(page):
-    cases = data_of(page[1])["cases"]
+    cases, data = cases_of(page[1]), data_of(page[1])
     both = [case for case in cases.values() if "replay" in case and "frame" in case["histories"]]
     assert len(both) == 2 and len(cases) == len(losses()) + len(theirs())
     held = [case["replay"] for case in cases.values() if "replay" in case and case["scene"] == "ball_clamped"]
-    # Half of the way along z, of the worse of the two.
-    assert [replay["largest"] for replay in held] == pytest.approx([0.5 * 0.3 * 0.05] * 3)
-    assert both[0]["replay"]["positions"]["shape"] == [len(MOMENTS), 6]
-    assert cases[data_of(page[1])["first"]]["replay"]["comparable"]
+    # Along z, of the worst of the four: it is at its end, which goes 1.6 times as far, from the first checkpoint on.
+    worst = (1.6 - HELD.checkpoints[0] / HELD.checkpoints[-1]) * 0.3 * 0.05
+    assert [replay["largest"] for replay in held] == [pytest.approx(worst)] * 4
+    recorded = [case["replay"] for case in cases.values() if not case.get("replay", {"straight": True})["straight"]]
+    assert [replay["positions"]["shape"] for replay in recorded] == [[len(MOMENTS), 6]] * 4
+    first = cases[data["first"]]["replay"]
+    assert first["comparable"] and not first["straight"]
+
+
+def test_a_case_without_recorded_positions_moves_between_its_checkpoints(page):
+    """Of every record that reached one; the rest says why not."""
+    cases = cases_of(page[1]).values()
+    straight = [case for case in cases if case.get("replay", {}).get("straight") and "entry" not in case]
+    assert [case["scene"] for case in straight] == ["ball_clamped"] and "surface, 550" in straight[0]["title"]
+    assert straight[0]["replay"]["times"] == pytest.approx([0.0, *HELD.checkpoints])
+    why = {case["why"] for case in cases if "replay" not in case}
+    assert why == {
+        "Nothing was computed, so there is no replay.",
+        "It ended before the first checkpoint, so no positions are stored and there is no replay.",
+    }
+
+
+def test_the_reference_has_its_own_shape_and_moves_as_it_did(page):
+    """Nodes and triangles of its own surface; here it has six nodes, and each case another six."""
+    data, cases = data_of(page[1]), cases_of(page[1])
+    shape = data["pieces"][f"reference-{cases[data['first']]['replay']['reference']}"]
+    moved = unpack_frames(shape["positions"])
+    share = np.array(shape["checkpoints"]) / HELD.checkpoints[-1]
+    assert shape["checkpoints"] == pytest.approx([0.0, *HELD.checkpoints])
+    assert moved == pytest.approx((1 + share[:, None, None] * (STRETCH - 1)) * POINTS[:6], abs=2e-5)
+    errors = unpack_series(cases[data["first"]]["replay"]["errors"]).reshape(len(share), 6)
+    truth = np.linalg.norm(0.2 * share[:, None, None] * (STRETCH - 1) * POINTS[:6], axis=-1)
+    assert errors == pytest.approx(truth, abs=1e-6)
 
 
 def test_entries_from_outside_stand_beside_ours_under_their_own_names(page):
     """With the replay of what they handed in: of one that moves 5 % too far."""
-    cases = {case["entry"]: case for case in data_of(page[1])["cases"].values() if "entry" in case}
+    cases = {case["entry"]: case for case in cases_of(page[1]).values() if "entry" in case}
     assert set(cases) == {"theirs-half_step", "unable"}
     assert page[1].count('<span class="entry">entry</span>') == 2
     judged, unable = cases["theirs-half_step"], cases["unable"]
@@ -136,30 +186,36 @@ def test_entries_from_outside_stand_beside_ours_under_their_own_names(page):
     times, checkpoints = judged["replay"]["times"], HELD.checkpoints
     assert times == pytest.approx([0.0, *checkpoints]) and judged["replay"]["comparable"]
     shown = unpack_frames(judged["replay"]["positions"])
-    truth = unpack_frames(judged["replay"]["reference"])
+    truth = unpack_frames(data_of(page[1])["pieces"][f"reference-{judged['replay']['reference']}"]["positions"])
     assert shown[0] == pytest.approx(POINTS[:6], abs=1e-4)
     assert shown[-1] - POINTS[:6] == pytest.approx(1.05 * (truth[-1] - POINTS[:6]), abs=2e-4)
-    assert "replay" not in unable and "so there is no replay" in unable["why"]
+    assert "replay" not in unable and unable["why"] == "Nothing was computed, so there is no replay."
     assert "skipped (unable: it knows no caps)" in unable["about"]
-    assert f"{len(losses()) + 2} cases, 2 of them entries from outside, of 2 studies" in page[1]
+    assert f"{len(losses()) + 2} cases, among them 2 entries from outside, of 2 studies" in page[1]
 
 
-@pytest.mark.parametrize(
-    ("less", "said"),
-    [
-        (300, ["no replay of 1 of 5 cases"]),
-        (5_000, ["no replay of 5 of 5 cases", "no histories of"]),
-        (10**6, ["no replay of 5 of 5 cases", "no histories of 7 of 7 cases", "more than"]),
-    ],
-)
-def test_no_more_than_its_limit_and_what_had_to_go_is_said(kept, page, tmp_path, monkeypatch, less, said):
+@pytest.mark.parametrize(("less", "outside"), [(300, 1), (5_000, 4), (10**6, 12)])
+def test_what_has_no_room_in_the_page_lies_beside_it(kept, page, tmp_path, monkeypatch, less, outside):
+    """Whole: nothing is left out. The first case and its reference have room before all others."""
     root = shutil.copytree(kept[0], tmp_path / "kept")
     limit = len(page[1].encode()) - less
     monkeypatch.setattr(module, "LIMIT", limit)
+    (root / module.FOLDER).mkdir()
+    (root / module.FOLDER / "case-00000000.js").write_text("of an earlier page")
     path, remarks = write_page(root, kept[1])
-    assert (len(path.read_bytes()) <= limit) == (less < 10**6) and len(remarks) == len(said)
-    assert all(words in remark for words, remark in zip(said, remarks, strict=True))
-    assert Parsed(path.read_text(encoding="utf-8")).wrong == []
+    assert path is not None
+    assert (len(path.read_bytes()) <= limit) == (less < 10**6) and len(remarks) == (less == 10**6)
+    text = path.read_text(encoding="utf-8")
+    assert Parsed(text).wrong == []
+    files = sorted((root / module.FOLDER).iterdir())
+    inside, whole = data_of(text), data_of(page[1])
+    assert len(files) >= outside and (less < 10**6) == (f"case-{whole['first']}" in inside["pieces"])
+    loaded = {}
+    for file in files:
+        call = re.fullmatch(r'keepPiece\("(.*?)", (.*)\);\n', file.read_text(encoding="utf-8"))
+        assert call is not None and file.name == f"{call[1]}.js"
+        loaded[call[1]] = json.loads(call[2])
+    assert inside["pieces"] | loaded == whole["pieces"] and not set(inside["pieces"]) & set(loaded)
 
 
 def test_without_results_there_is_no_page(tmp_path):
@@ -175,6 +231,51 @@ def test_report_writes_it_the_same_again(results):
     assert report(results, [tiny_study()])[0][-1].read_bytes() == before
 
 
+@pytest.mark.parametrize("text", ['{"rows"', "[]", "{}", "", "null", "of this {}"])
+def test_a_damaged_part_is_gathered_again(results, text):
+    before = report(results, [tiny_study()])[0][-1].read_bytes()
+    path = part_path(results, tiny_study())
+    whole = path.read_bytes()
+    path.write_text(text.replace("of this", whole.decode().splitlines()[0] + "\n"))
+    assert report(results, [tiny_study()])[0][-1].read_bytes() == before and path.read_bytes() == whole
+
+
+def test_a_damaged_part_of_a_study_without_results_is_left_out_and_named(kept, tmp_path):
+    root = shutil.copytree(kept[0], tmp_path / "kept")
+    part_path(root, kept[1][0]).write_text("[]")
+    path, (remark,) = write_page(root, kept[1])
+    assert path is not None and "volume_loss is left out" in remark and "volume_loss.page.json is damaged" in remark
+
+
+@pytest.mark.parametrize("kind", ["cases", "references"])
+@pytest.mark.parametrize("name", ["/../../../stray", "xyz", "'"])
+def test_no_part_writes_a_file_elsewhere(kept, tmp_path, monkeypatch, kind, name):
+    """A stranger may write a part with its digest: what names files in it is refused."""
+    monkeypatch.setattr(module, "LIMIT", 0)
+    root = shutil.copytree(kept[0], tmp_path / "kept")
+    path = part_path(root, kept[1][0])
+    part = json.loads(path.read_bytes().split(b"\n", 1)[1])
+    part[kind] = {name: next(iter(part[kind].values()))}
+    content = json.dumps(part).encode()
+    path.write_bytes(hashlib.sha256(content).hexdigest().encode() + b"\n" + content)
+    remarks = write_page(root, kept[1])[1]
+    assert "volume_loss is left out" in remarks[0] and not list(tmp_path.rglob("*stray*"))
+
+
+def test_commands_name_the_file_of_an_own_study(kept, tmp_path):
+    root = shutil.copytree(kept[0], tmp_path / "kept")
+    own = replace(kept[1][0], word="my rod.py")
+    write_part(root, own, losses(), study_table(losses(), COLUMNS), {})
+    path, _ = write_page(root, [own, kept[1][1]])
+    assert path is not None
+    text = path.read_text(encoding="utf-8")
+    assert (
+        "organbench run &#x27;my rod.py&#x27; frame_rate" in text and "organbench report &#x27;my rod.py&#x27;" in text
+    )
+    runs = [case["run"] for case in data_of(text)["cases"].values() if "entry" not in case]
+    assert len(runs) == len(losses()) and all(run.startswith("organbench run 'my rod.py' --case ") for run in runs)
+
+
 def test_a_chart_that_keeps_no_svg_is_left_out_and_said(results):
     study = tiny_study(charts=(Chart("own.png", lambda runs, path: path.write_bytes(b"own")),))
     assert any("chart own.png is left out" in remark for remark in report(results, [study])[1])
@@ -183,7 +284,9 @@ def test_a_chart_that_keeps_no_svg_is_left_out_and_said(results):
 def test_charts_are_the_same_again_small_and_without_what_a_page_has_no_use_for(kept, tmp_path):
     made_up_parts(tmp_path)
     charts = [read_part(root, kept[1][0])["charts"] for root in (kept[0], tmp_path)]
-    assert charts[0] == charts[1] and [chart["file"] for chart in charts[0]] == ["volume.png", "squeeze.png"]
+    assert [chart["file"] for chart in charts[0]] == ["volume.png", "squeeze.png"]
+    shown = [[inline(chart["svg"], "c", "A") for chart in each] for each in charts]
+    assert shown[0] == shown[1]
     for chart in charts[0]:
         shown = inline(chart["svg"], "c", "A <title>")
         assert len(shown) < len(chart["svg"]) and "<metadata" not in shown and "&lt;title&gt;" in shown

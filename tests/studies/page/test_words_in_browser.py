@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.studies.page.made_up_page import NASTY
-from tests.studies.page.seen import column
+from tests.studies.page.seen import column, pixels
 
 CONTRAST = 4.5
 RATIOS = (Path(__file__).parent / "contrast.js").read_text(encoding="utf-8")
@@ -37,21 +37,46 @@ def test_the_table_sorts_by_size_of_errors_with_what_is_unknown_last(visit):
         cells = [cell.split("±")[0].replace("−", "-").replace("†", "") for cell in column(page, number)]
         known = [abs(float(cell)) for cell in cells if cell.strip() != "–"]
         assert len(known) == 6 and known == sorted(known)[::order] and cells[6:] == ["–"] * 3
-    page.locator("#cases thead th:nth-child(2) button").click()
-    assert head.get_attribute("aria-sort") is None and column(page, 2) == sorted(column(page, 2), key=str.lower)
+    page.locator("#cases thead th:nth-child(1) button").click()
+    assert head.get_attribute("aria-sort") is None and "onerror" in column(page, 1)[0]
+    kinds = [cell.split("\n")[1].strip() for cell in column(page, 1)[1:7]]
+    assert kinds == [
+        "surface, 550 nodes free",
+        *["surface, 550 nodes implicit_volume"],
+        *kinds[2:],
+    ] and kinds == sorted(kinds)
 
 
 def test_the_table_filters_by_all_words_and_opens_a_case(visit):
     page = visit()
     page.get_by_label("Filter").fill("clamped FREE")
     assert page.inner_text("#count") == "2 of 9 cases"
-    assert set(column(page, 5)) == {"free"} and set(column(page, 2)) == {"ball clamped"}
-    page.locator("#cases tbody tr:visible button").first.click()
+    assert all("ball clamped" in name and "free" in name for name in column(page, 1))
+    page.locator("#cases tbody tr:visible a").first.click()
     page.wait_for_selector("#chosen:focus")
     assert "free" in page.locator("#chosen option:checked").inner_text()
     assert page.locator("#plots figure").count() == 3
+
+
+@pytest.mark.parametrize("words", ["implicit_volume", "implicit volume", "Implicit_Volume ball"])
+def test_filters_know_names_with_underscores_and_without(visit, words):
+    page = visit()
+    page.get_by_label("Filter").fill(words)
+    names = column(page, 1)
+    assert page.inner_text("#count") == f"{len(names)} of 9 cases" and len(names) == 4 - ("ball" in words)
+    assert all("implicit_volume" in name for name in names)
+    page.get_by_label("Filter").fill(f"{words} ball_clamped")
+    assert len(column(page, 1)) == 2 and all("ball clamped" in name for name in column(page, 1))
+
+
+def test_a_filter_that_finds_nothing_says_so(visit):
+    page = visit()
+    assert page.locator("#no-rows").is_hidden()
     page.get_by_label("Filter").fill("nothing like it")
-    assert page.locator("#cases tbody tr:visible").count() == 0
+    assert page.locator("#cases tbody tr:visible").count() == 0 and page.inner_text("#count") == "0 of 9 cases"
+    assert page.inner_text("#no-rows").startswith("No case holds all of these words: nothing, like, it.")
+    page.get_by_label("Filter").fill("")
+    assert page.locator("#no-rows").is_hidden()
 
 
 def test_odd_names_are_shown_as_they_are(visit):
@@ -70,7 +95,9 @@ def test_text_can_be_read_and_the_switch_changes_sides(visit, scheme):
         assert len(worst) > 100 and worst[0]["ratio"] >= CONTRAST, (side, worst[:3])
         ground = page.evaluate("getComputedStyle(document.body).backgroundColor")
         light = sum(int(part) for part in ground[4:-1].split(",")) > 380
-        assert light == (side == "light") and page.get_attribute("#theme", "aria-pressed") == str(not light).lower()
+        assert light == (side == "light") and page.inner_text("#theme") == ("Dark page" if light else "Light page")
+        chart = pixels(page.locator(".chart:visible").first.screenshot())
+        assert (chart.mean() > 200) == light and (chart.mean() < 60) == (not light)
         page.click("#theme")
 
 
@@ -89,6 +116,23 @@ def test_a_narrow_window_scrolls_down_alone(visit):
     page = visit(viewport={"width": 400, "height": 800})
     assert page.evaluate("document.documentElement.scrollWidth") == 400
     assert page.locator("#canvas").bounding_box()["width"] > 300
+
+
+@pytest.mark.parametrize(("width", "shown"), [(1400, 7), (390, 2)])
+def test_names_and_the_first_numbers_are_seen_without_scrolling(visit, width, shown):
+    page = visit(viewport={"width": width, "height": 800})
+    box = page.locator("#cases").locator("xpath=..").bounding_box()
+    first = ("case", "force", "displacement", "shape / size", "volume of the shape", "worst", "computing")
+    heads = page.locator("#cases thead th").all_inner_texts()[: len(first)]
+    assert [word for word, head in zip(first, heads, strict=True) if word not in head] == []
+    for k in range(shown):
+        cell = page.locator(f"#cases tbody tr:first-child > :nth-child({k + 1})").bounding_box()
+        assert box["x"] <= cell["x"] and cell["x"] + cell["width"] <= box["x"] + box["width"], k
+    heights = [row.bounding_box()["height"] for row in page.locator("#cases tbody tr").all()]
+    assert max(heights) - min(heights) < 1.0
+    page.evaluate("document.querySelector('#cases').parentNode.scrollLeft = 300")
+    name = page.locator("#cases tbody tr:first-child th").bounding_box()
+    assert name["x"] == pytest.approx(box["x"], abs=2)
 
 
 def test_without_webgl_a_sentence_stands_in_and_the_rest_works(visit):

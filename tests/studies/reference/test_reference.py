@@ -14,6 +14,7 @@ from studies.reference.problem import whole_forces
 from studies.reference.reference_solves import reference_solves
 from studies.reference.solve import solve
 from studies.reference.uncertainty import QUANTITIES
+from studies.report.references import uncertainty_table
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from tests.studies.octant import SCENE
@@ -68,6 +69,13 @@ def test_every_quantity_has_a_positive_floor_in_shares(found):
     # kappa = 5000 mu lets the volume change by p/kappa, here under 2e-4; contact and mesh hardly do.
     volume = found.uncertainty["volume"]
     assert volume.shares["kappa"] == pytest.approx(np.abs(found.field("volume") - 1).max(), rel=0.05)
+
+
+def test_the_table_of_references_tells_how_far_the_finest_mesh_is_from_the_true_shape(found):
+    """Of an octant as a whole ball: some fifty curved elements."""
+    table = uncertainty_table({"ball": found})
+    (distance,), (volume,) = table["shape_error [%]"].unique(), table["shape_volume [%]"].unique()
+    assert 0 < distance < 0.5 and -0.3 < volume < 0
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from reference_fem import Checkpoint, SolveError
+from reference_fem import SolveError
 from studies.base.errors import StudyError
-from studies.reference import checkpoints
 from studies.reference import reference_solves as known
 from studies.reference import solve as module
 from studies.reference.load import load_reference
@@ -166,33 +165,6 @@ def test_a_crash_half_way_costs_no_finished_step(solved, tmp_path, monkeypatch):
         np.testing.assert_allclose(again.fields[name].values, known, rtol=0, atol=1e-9 * np.abs(known).max())
     assert states(tmp_path)[0] == "ok"
     assert not list(tmp_path.rglob("*.steps"))
-
-
-def test_steps_of_other_code_are_not_gone_on_from(tmp_path, monkeypatch):
-    reference_solve, asked = ReferenceSolve(SCENE, LEVELS[0]), []
-    checkpoints.keep(reference_solve.path(tmp_path), "other code", Checkpoint([], None))
-
-    def watched(problem, times, settings, on_checkpoint, resume):
-        asked.append(resume)
-        raise SolveError("enough")
-
-    monkeypatch.setattr(module, "equilibrium_path", watched)
-    solve(tmp_path, reference_solve)
-    checkpoints.steps_path(reference_solve.path(tmp_path)).write_bytes(b"cut off")
-    solve(tmp_path, reference_solve)
-    assert asked == [None, None]
-
-
-def test_steps_that_have_changed_are_not_gone_on_from(tmp_path):
-    """A bit among their numbers would be in every later step."""
-    record = tmp_path / "a.h5"
-    checkpoints.keep(record, "this code", Checkpoint([], None))
-    assert checkpoints.kept(record, "this code") is not None
-    file = checkpoints.steps_path(record)
-    whole = file.read_bytes()
-    for place in range(0, len(whole), 5):
-        file.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
-        assert checkpoints.kept(record, "this code") is None
 
 
 def broken(problem, times, settings, **_):

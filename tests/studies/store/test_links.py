@@ -128,7 +128,7 @@ def test_show_an_index(tmp_path):
     gone = store(tmp_path, "ball/implicit", '{"a": 2}', Status.TIMED_OUT, "after 60 s")
     link_study(tmp_path, "volume_loss")
     text = shown(describe(index_path(tmp_path, "volume_loss")))
-    assert "index of 2 files" in text
+    assert "index of 2 cases" in text
     assert "free  status ok" in text
     assert "implicit  status timed-out: after 60 s" in text
     gone.unlink()

@@ -140,3 +140,9 @@ def test_a_method_that_forgets_the_volume_is_found(monkeypatch):
 def test_errors_of_bodies_are_sentences():
     with pytest.raises(MassSpringError, match="regions asked of 1 tetrahedra"):
         body_of(replace(CALM, shape="cell", volumes="regions"))
+
+
+def test_elements_refuse_a_body_whose_only_volume_is_the_whole():
+    """A single tetrahedron: its one patch is its surface, which no sums over elements keep."""
+    found = tried(draw(7, 156))
+    assert found.status == "refused" and "keep one volume per node" in found.message

@@ -58,7 +58,7 @@ def test_a_piece_that_died_is_stored_as_failed(tmp_path):
     assert "the reference of 'ball_squeeze' on mesh 0.9 is failed: its process died" in remarks[0]
     assert [standing_of(tmp_path, solve).state for solve in reference_solves(scene)] == ["failed"] * 6
     said = failures.sentence("again")
-    assert said.startswith(f"stored as failed: {tasks[0].label} (its process died), and 6 more; the rest is done")
+    assert said.startswith(f"failed: {tasks[0].label} (its process died), and 6 more; the rest is done")
 
 
 def test_what_another_command_has_done_meanwhile_is_not_done_again(results):
@@ -107,12 +107,14 @@ def test_a_case_that_ends_its_process_is_stored_and_the_rest_goes_on(organbench,
     file, results = tmp_path / "fatal.py", tmp_path / "results"
     file.write_text(FATAL)
     code, out, err = organbench("run", file, "--results", results)
-    assert code == 1 and "tiny: 2 pieces ran, charts in" in out
+    assert code == 1 and "tiny: 2 cases ran, charts in" in out
+    assert "tiny: 2 cases: 1 ok, 1 failed\n  failed: its process died 3 times" in out
     (sentence,) = err.splitlines()
-    assert sentence.startswith("warning: stored as failed: tiny_squeeze-tetrahedral-60-fatal-dt0.5 (its process died 3")
+    assert sentence.startswith("warning: failed: tiny_squeeze-tetrahedral-60-fatal-dt0.5 (its process died 3")
     assert sentence.endswith(f"the rest is done, `organbench run {file} --only failed` tries again")
-    assert organbench("status", file, "--results", results)[1].splitlines()[0] == "tiny: 1 ok, 1 failed"
-    assert organbench("run", file, "--results", results)[0] == 0, "what failed is known, and does not run again"
+    assert organbench("status", file, "--results", results)[1].splitlines()[0] == "tiny: 2 cases: 1 ok, 1 failed"
+    code, out, _ = organbench("run", file, "--results", results)
+    assert code == 1 and "tiny: nothing ran" in out, "what failed is known, does not run again, and is not forgotten"
 
 
 @pytest.mark.slow

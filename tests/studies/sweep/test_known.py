@@ -168,11 +168,11 @@ def test_status_check_reads_every_byte(organbench, many, trusted):
     study = many / "many.py"
     study.write_text(f"from studies.bench.many_cases import many_study\nSTUDY = many_study({COUNT})\n")
     path = record_files(many, NAME)[0]
-    assert organbench("status", study, "--results", many)[1].startswith(f"many: {COUNT} ok\n")
+    assert organbench("status", study, "--results", many)[1].startswith(f"many: {COUNT} cases: {COUNT} ok\n")
     lose_silently(many, path)
-    assert organbench("status", study, "--results", many)[1].startswith(f"many: {COUNT} ok\n")
+    assert organbench("status", study, "--results", many)[1].startswith(f"many: {COUNT} cases: {COUNT} ok\n")
     code, out, _ = organbench("status", study, "--check", "--results", many)
-    assert code == 0 and out.startswith(f"many: {COUNT - 1} ok, 1 stale\n  stale: {DAMAGED}\n")
+    assert code == 0 and out.startswith(f"many: {COUNT} cases: {COUNT - 1} ok, 1 stale\n  stale: {DAMAGED}\n")
     assert f"{COUNT - 1} ok, 1 stale" in organbench("status", study, "--results", many)[1]
 
 

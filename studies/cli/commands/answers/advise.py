@@ -8,17 +8,15 @@ import typer
 from studies.advice.answer import advise as answered
 from studies.advice.words import lines_of
 from studies.base.compile_watch import watching
-from studies.base.errors import StudyError
 from studies.cli.progress import compiling
-from studies.cli.terminal import Results, errors, say
+from studies.cli.terminal import Results, SceneName, errors, say
 from studies.cli.wishes import budget as in_time
 from studies.cli.wishes import share
-from studies.scene.scene import Scene
-from studies.sweep.find_study import find_study
+from studies.sweep.find_scene import find_scene
 
 
 def advise(
-    scene: Annotated[str, typer.Argument(help="a scene (see `organbench list`), or a FILE.py whose STUDY has one")],
+    scene: SceneName,
     force: Annotated[str, typer.Option(help="largest error of the last force: 3% or 0.03")] = "",
     displacement: Annotated[
         str, typer.Option(help="largest mean error of the surface over the largest displacement: 1% or 0.01")
@@ -33,15 +31,6 @@ def advise(
     """
     bounds = share(force, "force"), share(displacement, "displacement"), in_time(budget)
     with compiling(errors, "timing") as told, watching(told):
-        found = answered(_scene(scene), *bounds, results=results, timing=timing)
+        found = answered(find_scene(scene), *bounds, results=results, timing=timing)
     for line in lines_of(found):
         say(line)
-
-
-def _scene(name: str) -> Scene | str:
-    if not name.endswith(".py"):
-        return name
-    scenes = find_study(name).scenes
-    if len(scenes) != 1:
-        raise StudyError(f"the STUDY of {name} has {len(scenes)} scenes; advice is given for one")
-    return scenes[0]

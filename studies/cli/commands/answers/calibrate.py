@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.calibration.calibrate import calibrate as calibrated_on
 from studies.calibration.calibrate import starting_recipe
@@ -15,6 +16,7 @@ from studies.calibration.words import lines_of
 from studies.cli.progress import TerminalProgress
 from studies.cli.terminal import Results, console, say
 from studies.runs.case import BodyRecipe
+from studies.sweep.find_scene import SUFFIX
 
 BOTH = "both"
 
@@ -33,6 +35,11 @@ def calibrate(
     if organ.endswith(".json"):
         _tell(read_calibration(organ))
         return
+    if organ.endswith(SUFFIX):
+        raise StudyError(
+            "springs are fitted in the scenes that the catalogue has of an organ, not in those of a file; give an "
+            "organ, such as liver"
+        )
     folds_of(organ)
     kind = lookup(body, (*KINDS, BOTH), "body")
     for start in [starting_recipe(organ, each, nodes) for each in (KINDS if kind == BOTH else (kind,))]:

@@ -5,22 +5,35 @@ from typing import Annotated
 
 import typer
 
-from studies.cli.terminal import busy, say, warn
+from studies.advice.yardsticks import yardsticks
+from studies.base.errors import StudyError
+from studies.cli.terminal import Results, SceneName, busy, say, warn
 from studies.exchange.export import export as exported
 from studies.exchange.meshes import NODES
 from studies.sweep.find_scene import find_scene
 
 
 def export(
-    scene: Annotated[str, typer.Argument(help="a scene (see `organbench list`), or a FILE.py that defines SCENE")],
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="a folder; SCENE without")] = None,
+    scene: SceneName,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="a folder  [default: the name of the scene]")
+    ] = None,
     nodes: Annotated[int, typer.Option(help="vertices on the outer surface")] = NODES,
+    results: Results = Path("results"),
 ) -> None:
-    """Writes a scene for another program: meshes, material, loads, checkpoints, and how to hand results in."""
+    """Writes a scene for another program: meshes, material, loads, checkpoints, and how to hand results in.
+
+    Its README.md holds what our own bodies reach, from the results.
+    """
     found = find_scene(scene)
     folder = output if output is not None else Path(found.name)
+    try:
+        rows = yardsticks(results, found)
+    except StudyError as problem:
+        warn([f"README.md names no measured body: {problem}"])
+        rows = []
     with busy(f"meshing for {found.name}"):
-        written, why_not = exported(found, folder, nodes)
+        written, why_not = exported(found, folder, nodes, rows)
     if why_not:
         warn([f"there is no curved mesh: {why_not}"])
     for path in written:

@@ -7,12 +7,13 @@ import typer
 
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
-from studies.cli.terminal import Results, busy, say, warn
+from studies.cli.terminal import Results, SceneName, busy, say, warn
 from studies.exchange.description import judged_metrics
 from studies.exchange.entry import entry_path, run_of_entry
 from studies.exchange.judge import entry_record
 from studies.exchange.meshes import NODES
-from studies.metrics.cells import UNRESOLVED_MARK, value_cell
+from studies.metrics.cells import UNRESOLVED_MARK, plain, value_cell
+from studies.metrics.judged import FORCE
 from studies.metrics.run import Run
 from studies.reference.load import Reference, load_reference
 from studies.scene.quantities import ALWAYS
@@ -20,9 +21,12 @@ from studies.scene.scene import Scene
 from studies.store.record import write_record
 from studies.sweep.find_scene import find_scene
 
+REVERSED = -100.0
+"""force_end [%] below which a force of the other sign fits better."""
+
 
 def judge(
-    scene: Annotated[str, typer.Argument(help="a scene (see `organbench list`), or a FILE.py that defines SCENE")],
+    scene: SceneName,
     file: Annotated[Path, typer.Argument(help="npz, CSV, VTKHDF or PVD file, a folder of VTU files, or a pattern")],
     name: Annotated[str, typer.Option(help="of the entry in tables and charts; that of the file without")] = "",
     force: Annotated[Path | None, typer.Option(help="CSV file with the columns t [s] and force [N]")] = None,
@@ -42,6 +46,7 @@ def judge(
     say(f"{run.case.method.name}: {record.status}, {record.attributes['nodes']} nodes of {mesh}, {steps} steps")
     for line in lines_of(run):
         say(line)
+    warn(hints_of(run))
     beside = [study.name for study in STUDIES if found.name in [each.name for each in study.scenes]]
     shown = f", shown beside our methods by `organbench table {beside[-1]}`" if beside else ""
     say(f"stored in {path}{shown}")
@@ -56,6 +61,18 @@ def reference_of(results: Path, scene: Scene) -> Reference | None:
         return None
 
 
+def hints_of(run: Run) -> list[str]:
+    """What is probably a mistake though it can be judged."""
+    hints = [text] if (text := str(run.record.attributes["warnings"])) else []
+    error = FORCE(run)
+    if error < REVERSED:
+        hints.append(
+            f"the force has the other sign: reversed, its error is {plain(2 * REVERSED - error, '+')} % and not "
+            f"{plain(error)} %; a press is positive (force in scene.json)"
+        )
+    return hints
+
+
 def lines_of(run: Run) -> list[str]:
     """Each metric with its value and how well it is known."""
     lines, marked = [], False
@@ -67,5 +84,5 @@ def lines_of(run: Run) -> list[str]:
         unresolved = metric.unresolved(run)
         marked |= unresolved
         shown = value_cell(value, uncertainty, signed=metric.better == "-", unresolved=unresolved)
-        lines.append(f"  {metric.name:18} {shown} {metric.unit}".replace(" 1\n", "\n"))
+        lines.append(f"  {metric.name:18} {shown} {metric.unit}".removesuffix(" 1"))
     return [*lines, f"{UNRESOLVED_MARK} the reference is not ten times better than this error"] if marked else lines

@@ -30,9 +30,11 @@ def check(
     """Tells what is wrong with a mesh and what mends it: exit code 0 clean, 1 findings, 2 unreadable."""
     source = source_of(path, unit, scale, longest_side, part)
     ask_before_large(path, yes)
-    with working(f"examining {path.name}"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        found = tried(source, examine(source, tissue=(modulus, density)))
+    with working(f"examining {path.name}"):
+        found = examine(source, tissue=(modulus, density))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the file is read again
+            found = tried(source, found)
     if as_json:
         print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
     else:

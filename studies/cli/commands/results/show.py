@@ -12,12 +12,16 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
+from studies.base.counting import amounts
 from studies.cli.terminal import console
 from studies.store.index.entry import Entry, read_entry
 from studies.store.index.folder import FolderIndex
 from studies.store.opening import open_results
+from studies.store.paths import TIMING
 from studies.store.record import INDEX_KIND, Field, Record, Status, read_record
 
+REFERENCES = "reference"
+"""Folder of the references, which belong to no study."""
 LEAVES = 200
 """Files of a study that are named; `--all` names the rest."""
 WIDE, NARROW = 120, 70
@@ -116,7 +120,9 @@ def _links(file: h5py.File) -> dict[str, str]:
 
 
 def _index(path: Path, links: dict[str, str], every: bool) -> Tree:
-    tree = Tree(Text.assemble((path.stem, "bold"), f"  (index of {len(links)} files, {path})"))
+    records = "reference" if path.stem == REFERENCES else "case"
+    kinds = Counter("timing" if TIMING in file else records for file in links.values())
+    tree = Tree(Text.assemble((path.stem, "bold"), f"  (index of {amounts(kinds)}, {path})"))
     known, branches = _entries(path), {"": tree}
     leaves = Counter[str]()
     for name in sorted(links):

@@ -10,7 +10,7 @@ from rich.table import Table
 from studies.base.compile_watch import watching
 from studies.cli.case_options import BodyKind, MethodName, SurfaceNodes, chosen_case
 from studies.cli.progress import compiling
-from studies.cli.terminal import console, errors
+from studies.cli.terminal import SceneName, console, errors
 from studies.store.tables.csv_table import write_table
 from studies.timing.stage_cost import FRAME, SKIPPED, STAGE, cost_table
 
@@ -18,7 +18,7 @@ HEADINGS = {STAGE: "stages of a step", SKIPPED: "left out here; what it would co
 
 
 def cost(
-    scene: str,
+    scene: SceneName,
     method: MethodName = "implicit_volume",
     body: BodyKind = "tetrahedral",
     nodes: SurfaceNodes = 550,

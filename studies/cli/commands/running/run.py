@@ -8,14 +8,16 @@ from typing import Annotated
 import typer
 
 from studies.base.atomic import sweep_parts
+from studies.base.counting import amounts
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
+from studies.catalog.checks import check_study
+from studies.cli.case_options import case_named
 from studies.cli.progress import TerminalProgress, dry_run
-from studies.cli.terminal import Results, console, say, warn
+from studies.cli.terminal import PROGRAM, SMOKE, Results, Smoke, console, say, warn
 from studies.engines.choose import WORDS, engine_for
 from studies.geometry.mesher.jobs import cache_folder
-from studies.metrics.table import check_columns
 from studies.population import POPULATION
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.report.results import refresh
@@ -28,26 +30,24 @@ from studies.sweep.find_study import ON, find_studies
 from studies.sweep.frame_times import measure_again
 from studies.sweep.plan import TIMING, plan, plan_again
 from studies.sweep.run_studies import run_studies
-from studies.sweep.standings import failed, warnings_of
+from studies.sweep.standings import causes, failed, standings, summary, unexpected, warnings_of
 from studies.sweep.stored.known import Known
 from studies.sweep.tasks import Task, tasks_of
 
-SMOKE = "smoke"
 JOBS = 2
 """Processes, where nothing is said."""
 AGAIN = "timing: stored cases are timed again on this machine; nothing else runs"
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
+GIVEN = f"studies, or a FILE.py with STUDY or SCENE ({PROGRAM}); without: {MAIN_STUDIES}"
 Wanted = Callable[[Task], bool] | None
 Rule = Callable[[Task, Known], bool]
 
 
 def run(
-    studies: Annotated[
-        list[str] | None, typer.Argument(help=f"studies or a FILE.py that defines STUDY; without: {MAIN_STUDIES}")
-    ] = None,
+    studies: Annotated[list[str] | None, typer.Argument(help=GIVEN)] = None,
     results: Results = Path("results"),
-    smoke: Annotated[bool, typer.Option(help="small meshes, few frames; kept apart in results/smoke")] = False,
-    case: Annotated[str, typer.Option(help="this case alone, by its name, with its reference; no charts")] = "",
+    smoke: Smoke = False,
+    case: Annotated[str, typer.Option(help="this case alone, by (part of) its name; no charts")] = "",
     only: Annotated[str, typer.Option(help="failed, stale, or both with a comma: nothing else runs")] = "",
     jobs: Annotated[
         int | None, typer.Option(min=1, help="processes for the physics; timing always runs alone  [default: 2]")
@@ -66,10 +66,12 @@ def run(
     root, rules, failures = results / SMOKE if smoke else results, _rules(only), Failures()
     if organs:
         studies = [f"{name}{ON}{organs}" for name in studies or [POPULATION]]
+    chosen, well = [_chosen(study, smoke, case) for study in find_studies(studies or [])], True
+    for study in [] if again else chosen:
+        if plan(root, study, _wanted(root, study, rules)):
+            warn(check_study(study, drawn=not case))
     with engine_for(on, jobs or JOBS, portable, root, say) as engine:
-        for found in _checked(studies or []):
-            study = found.smoke() if smoke else found
-            study = _case_alone(study, case) if case else study
+        for study in chosen:
             if again:
                 _time_again(root, study, dry, not case)
                 continue
@@ -77,21 +79,27 @@ def run(
             if dry:
                 dry_run(console, study.name, plan(root, study, wanted), jobs or JOBS, root)
             else:
-                _bring_up_to_date(root, study, engine, wanted, not case, failures)
+                well = _bring_up_to_date(root, study, engine, wanted, not case, failures) and well
+    _exit(well, failures, studies or [])
+
+
+def _exit(well: bool, failures: Failures, names: list[str]) -> None:
+    """Ends with exit code 1 where something ended as its study does not expect."""
     if failures.causes:
-        warn([failures.sentence(f"organbench run {' '.join(studies or [])}".rstrip() + " --only failed")])
+        warn([failures.sentence(f"organbench run {' '.join(names)}".rstrip() + " --only failed")])
+    if failures.causes or not well:
         raise typer.Exit(1)
 
 
-def _case_alone(study: Study, name: str) -> Study:
-    """A study of one of its cases. Raises StudyError with the nearest name."""
-    chosen = lookup(name, {case.name: case for case in study.cases}, f"case of {study.name}")
-    return replace(study, cases=(chosen,))
+def _chosen(study: Study, smoke: bool, case: str) -> Study:
+    study = study.smoke() if smoke else study
+    return replace(study, cases=(case_named(study, case),)) if case else study
 
 
 def _bring_up_to_date(
     root: Path, study: Study, engine: Engine, wanted: Wanted, drawn: bool, failures: Failures
-) -> None:
+) -> bool:
+    """Runs what must run, and tells how it ended: whether as the study expects."""
     planned = plan(root, study, wanted)
     with TerminalProgress(console, planned, engine.processes if planned else 1) as progress:
         count = run_studies(root, [study], engine, progress, wanted, progress.compiling, failures)
@@ -105,7 +113,13 @@ def _bring_up_to_date(
     if drawn:
         warn(refresh(root, study)[1])
     what = "charts" if drawn else "records"
-    say(f"{study.name}: {count} pieces ran, {what} in {study_folder(root, study.name)}")
+    say(f"{study.name}: {amounts(progress.done) or 'nothing'} ran, {what} in {study_folder(root, study.name)}")
+    ended = [standing for standing in standings(root, study) if wanted is None or wanted(standing.task)]
+    odd = unexpected(study, ended)
+    say(f"{study.name}: {summary(ended)}")
+    for sentence in causes(odd):
+        say(f"  {sentence}")
+    return not odd
 
 
 def _check_again(again: str, others: dict[str, object]) -> None:
@@ -131,13 +145,6 @@ def _time_again(root: Path, study: Study, dry: bool, drawn: bool) -> None:
         warn(refresh(root, study)[1])
     say(f"{study.name}: {count} stored cases were timed again, {'charts' if drawn else 'times'} in "
         f"{study_folder(root, study.name)}")  # fmt: skip
-
-
-def _checked(names: list[str]) -> list[Study]:
-    studies = find_studies(names)
-    for study in studies:
-        check_columns(study.columns)
-    return studies
 
 
 def _rules(only: str) -> list[Rule]:

@@ -1,12 +1,12 @@
 """`organbench safe-dt`: how long a step may be."""
 
 from studies.cli.case_options import BodyKind, MethodName, SurfaceNodes, chosen_case
-from studies.cli.terminal import console
+from studies.cli.terminal import SceneName, console
 from studies.runs.safe_dt import safe_step
 
 
 def safe_dt(
-    scene: str, method: MethodName = "implicit_volume", body: BodyKind = "tetrahedral", nodes: SurfaceNodes = 550
+    scene: SceneName, method: MethodName = "implicit_volume", body: BodyKind = "tetrahedral", nodes: SurfaceNodes = 550
 ) -> None:
     """The stability limit of a scene, predicted and then verified by running just below and just above it."""
     found = safe_step(chosen_case(scene, method, body, nodes))

@@ -1,6 +1,5 @@
 """`organbench status`: what is done, what is not, and why."""
 
-from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
@@ -8,32 +7,36 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from studies.base.counting import status_counts
 from studies.catalog import STUDIES
-from studies.cli.terminal import Results, busy, console, say
+from studies.cli.terminal import SMOKE, Results, Smoke, busy, console, say
 from studies.reference.reference_solves import SolveStanding, reference_solves
 from studies.scene.scene import Scene
 from studies.sweep.find_study import find_study
 from studies.sweep.machines import machines_of, mixture
-from studies.sweep.standings import Standing, standings
+from studies.sweep.standings import Standing, standings, summary
 from studies.sweep.stored.known import Known
 
 SHOWN = 8
-"""Pieces named per reason; `--all` names the rest."""
+"""Cases and reference solutions named per reason; `--all` names the rest."""
 
 
 def status(
     study: Annotated[str, typer.Argument(help="one study, with what is not ok; all, in numbers, without")] = "",
     results: Results = Path("results"),
-    every: Annotated[bool, typer.Option("--all", help="name every piece that is not ok, and every mesh")] = False,
+    smoke: Smoke = False,
+    every: Annotated[bool, typer.Option("--all", help="name everything that is not ok, and every mesh")] = False,
     check: Annotated[bool, typer.Option(help="hold every file to its checksums, not only those that changed")] = False,
 ) -> None:
     """How many cases are ok, failed, stale or missing, and why; and how the references stand, mesh by mesh."""
     chosen = [find_study(study)] if study else list(STUDIES)
+    if smoke:
+        chosen, results = [entry.smoke() for entry in chosen], results / SMOKE
     known = Known(results, check)
     for entry in chosen:
         with busy(f"looking at {entry.name}"):
             found = standings(results, entry, known)
-        say(f"{entry.name}: {counted(standing.status for standing in found)}")
+        say(f"{entry.name}: {summary(found)}")
         if study:
             show_reasons(found, every)
             mixed = mixture(machines_of(found, known))
@@ -42,14 +45,8 @@ def status(
     show_references(known, {scene.name: scene for entry in chosen for scene in entry.scenes}.values(), every)
 
 
-def counted(words: Iterable[str]) -> str:
-    """ "16 ok, 2 stale": ok first, then by number."""
-    counts = Counter(words)
-    return ", ".join(f"{n} {word}" for word, n in sorted(counts.items(), key=lambda c: (c[0] != "ok", -c[1], c[0])))
-
-
 def show_reasons(found: list[Standing], every: bool) -> None:
-    """What is not ok: each reason once, and under it the pieces."""
+    """What is not ok: each reason once, and under it the cases and reference solutions."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for standing in found:
         if standing.status != "ok":
@@ -75,12 +72,12 @@ def show_references(known: Known, scenes: Iterable[Scene], every: bool) -> None:
 
 def _scenes(found: dict[str, list[SolveStanding]]) -> Table:
     table = Table(box=None, pad_edge=False)
-    for heading in ("scene", "finest mesh", "unknowns", "seconds", "pieces"):
-        table.add_column(heading, justify="left" if heading in ("scene", "pieces") else "right")
+    for heading in ("scene", "finest mesh", "unknowns", "seconds", "solutions"):
+        table.add_column(heading, justify="left" if heading in ("scene", "solutions") else "right")
     for name, rows in found.items():
         finest = max(rows, key=lambda row: row.reference_solve.weight)
         seconds = sum(row.seconds for row in rows if row.seconds == row.seconds)
-        state = counted(_state(row) for row in rows)
+        state = status_counts(_state(row) for row in rows)
         table.add_row(name, f"{finest.reference_solve.level:g}", _count(finest.unknowns), f"{seconds:.0f}", state)
     return table
 

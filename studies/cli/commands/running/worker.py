@@ -10,9 +10,12 @@ import typer
 
 from studies.base.errors import StudyError
 from studies.engines.choose import NEEDED
+from studies.engines.tls import words_of
 
 LONELY_SECONDS = 120
 """Without a scheduler, after which a worker ends."""
+NO_PAGES = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
+"""Dask opens the port of its web pages in any case: here, and for this machine alone."""
 
 
 def worker(
@@ -29,8 +32,8 @@ def worker(
         raise StudyError("give either the address of a scheduler or a --scheduler-file")
     if find_spec("distributed") is None:
         raise StudyError(f"a worker {NEEDED}")
-    where = [scheduler] if file is None else ["--scheduler-file", str(file)]
-    words = [*where, "--nthreads", str(processes), "--nworkers", "1", "--no-dashboard"]
+    where = [scheduler] if file is None else ["--scheduler-file", str(file), *words_of(file.absolute().parent)]
+    words = [*where, "--nthreads", str(processes), "--nworkers", "1", *NO_PAGES]
     words += ["--memory-limit", f"{memory:g}GB" if memory else "auto", "--death-timeout", str(LONELY_SECONDS)]
     words += ["--name", name] if name else []
     os.execv(sys.executable, [sys.executable, "-m", "distributed.cli.dask_worker", *words])

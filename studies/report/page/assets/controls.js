@@ -34,23 +34,19 @@ function listen() {
   byId("home").addEventListener("click", home);
   byId("time").addEventListener("input", (event) => { play(false); goTo(event.target.value / event.target.max * state.given.duration); });
   byId("one-scale").addEventListener("change", () => { scaleColours(); draw(); });
-  byId("chosen").addEventListener("change", (event) => choose(event.target.value));
+  byId("chosen").addEventListener("change", (event) => { location.hash = `case=${event.target.value}`; });
   document.addEventListener("theme", draw);
   new ResizeObserver(draw).observe(canvas);
 }
 
-/** The list of cases: those with a replay first. */
+/** The list of cases, scene by scene. */
 function listCases() {
-  const groups = { "with a replay": [], "histories alone": [] };
+  const groups = {};
   for (const [id, given] of Object.entries(DATA.cases)) {
-    groups[given.replay ? "with a replay" : "histories alone"].push(new Option(given.title, id));
+    groups[given.scene] ??= Object.assign(document.createElement("optgroup"), { label: given.scene.replaceAll("_", " ") });
+    groups[given.scene].append(new Option(given.replayed ? given.title : `${given.title} (no replay)`, id));
   }
-  for (const [words, options] of Object.entries(groups).filter(([, found]) => found.length)) {
-    const group = document.createElement("optgroup");
-    group.label = words;
-    group.append(...options);
-    byId("chosen").append(group);
-  }
+  byId("chosen").append(...Object.values(groups));
 }
 
 function begin() {
@@ -59,13 +55,4 @@ function begin() {
   byId("ramp").style.background = `linear-gradient(90deg, ${RAMP.join(", ")})`;
   byId("viewer").hidden = false;
   listen();
-  document.querySelectorAll("#cases [data-case]").forEach((button) => button.addEventListener("click", async () => {
-    await choose(button.dataset.case);
-    byId("case").scrollIntoView();
-    byId("chosen").focus({ preventScroll: true });
-  }));
-  choose(DATA.first);
 }
-
-if (Object.keys(DATA.cases).length) begin();
-showTheme();

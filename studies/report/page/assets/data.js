@@ -5,6 +5,24 @@ const DATA = JSON.parse(document.getElementById("data").textContent);
 const byId = (id) => document.getElementById(id);
 const MISSING = 65535;
 
+/** Keeps a part of the page that lies in a file of its own; each of these files calls it once. */
+function keepPiece(name, given) {
+  DATA.pieces[name] = given;
+}
+
+/** A part of the page by name, from its file where it is not in here; null where that file is not there. A page of
+ *  file:// may load scripts, and nothing else. */
+function piece(name) {
+  if (name in DATA.pieces) return Promise.resolve(DATA.pieces[name]);
+  return new Promise((resolve) => {
+    const script = document.createElement("script");
+    script.onload = () => resolve(DATA.pieces[name] ?? null);
+    script.onerror = () => resolve(null);
+    script.src = `${DATA.folder}/${name}.js`;
+    document.head.append(script);
+  });
+}
+
 function bytesOf(text) {
   return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 }

@@ -7,22 +7,17 @@ const calm = matchMedia("(prefers-reduced-motion: reduce)");
 const plainColour = () => getComputedStyle(document.documentElement).getPropertyValue("--body").trim();
 let paint = null;
 
-/** Positions, triangles and errors of a packed replay. */
+/** Positions, triangles and errors of a packed replay, and the reference in its own shape. */
 async function unpacked(replay) {
   const positions = await frames(replay.positions), triangles = await indices(replay.triangles);
-  const truth = replay.reference && await frames(replay.reference);
+  const shape = replay.reference && await piece(`reference-${replay.reference}`);
+  const truth = shape && { ...shape, positions: await frames(shape.positions), triangles: await indices(shape.triangles) };
   const found = { ...replay, positions, triangles, truth, errors: null, shapes: shapes(replay) };
-  if (truth && replay.comparable) {
-    const end = replay.times[replay.times.length - 1];
-    found.reached = replay.checkpoints.filter((t) => t < 1.000001 * end + 1e-9); // a run may end early
-    found.errors = found.reached.map((t, k) => distances(blended(positions, replay.times, t), truth[k]));
+  if (replay.errors) {
+    const values = Float32Array.from(series(replay.errors)), nodes = positions[0].length / 3;
+    found.errors = replay.reached.map((t, k) => values.subarray(k * nodes, (k + 1) * nodes));
   }
   return found;
-}
-
-function distances(x, y) {
-  return Float32Array.from({ length: x.length / 3 }, (_, i) =>
-    Math.hypot(x[3 * i] - y[3 * i], x[3 * i + 1] - y[3 * i + 1], x[3 * i + 2] - y[3 * i + 2]));
 }
 
 /** The middle of all frames and the radius that holds them from every side. */
@@ -52,7 +47,10 @@ function bodiesAt(shown, t) {
   const x = blended(shown.positions, shown.times, t), none = new Float32Array(x.length / 3).fill(-1);
   const levels = shown.errors ? blended(shown.errors, shown.reached, t).map((value) => value / shown.most) : none;
   const bodies = [{ x, triangles: shown.triangles, levels }];
-  if (shown.truth) bodies.push({ x: blended(shown.truth, shown.checkpoints, t), triangles: shown.triangles, levels: none });
+  if (shown.truth) {
+    const y = blended(shown.truth.positions, shown.truth.checkpoints, t);
+    bodies.push({ x: y, triangles: shown.truth.triangles, levels: new Float32Array(y.length / 3).fill(-1) });
+  }
   return bodies;
 }
 
@@ -99,7 +97,7 @@ function roundUp(metres) {
 }
 
 function scaleColours() {
-  const shown = state.shown, own = shown?.errors && Math.max(1e-9, ...shown.errors.flatMap((error) => Math.max(...error)));
+  const shown = state.shown, own = shown?.errors && Math.max(1e-9, ...shown.errors.map((error) => Math.max(...error)));
   byId("bar").hidden = byId("shared").hidden = !own;
   if (!own) return;
   const all = byId("one-scale").checked ? Math.max(own, shown.largest) : own;
@@ -108,17 +106,26 @@ function scaleColours() {
 }
 
 function momentsOf(replay) {
-  const later = replay.checkpoints.filter((t) => t > 0).length, words = `at ${later} checkpoint${later === 1 ? "" : "s"}`;
-  return later < replay.checkpoints.length ? `at the start, ${words}` : words;
+  const later = replay.reached.filter((t) => t > 0).length, words = `at ${later} checkpoint${later === 1 ? "" : "s"}`;
+  return later < replay.reached.length ? `at the start, ${words}` : words;
 }
 
-function tellColours(given) {
+/** The last moment at which the reference is known and the case still runs: there the difference is. */
+function fullLoad(given) {
+  const end = given.replay ? given.replay.times[given.replay.times.length - 1] : given.duration;
+  const reached = given.reference ? given.reference.t.filter((t) => t < 1.000001 * end) : [];
+  return Math.min(given.duration, reached.length ? reached[reached.length - 1] : end);
+}
+
+function tellColours(given, truth) {
   const replay = given.replay, said = [];
   if (!replay.reference) said.push("No reference is stored for this scene, so the case stands alone.");
   else if (replay.comparable) said.push(`Colour: distance of each point from the same point of the reference, known ${momentsOf(replay)} and in proportion between them.`);
   else said.push("The body may turn or slip freely in this scene: single points are not comparable, and no error is coloured.");
-  if (replay.reference) said.push(`The reference moves in a straight line from checkpoint to checkpoint${given.entry ? ", and so does the entry, of which no other positions are kept" : ""}.`);
-  said.push(`${replay.times.length} frames, rounded to ${replay.rounding} of the body's size.`);
+  if (truth) said.push("The reference is drawn in its own shape; it moves in a straight line from checkpoint to checkpoint.");
+  else if (replay.reference) said.push(`The reference cannot be drawn: its file is not in the folder ${DATA.folder} beside this page, or it has too many nodes.`);
+  if (replay.straight) said.push(`So does ${given.entry ? "the entry" : "this case"}: of its positions those at checkpoints are stored, no others.`);
+  said.push(`${replay.times.length} moments, rounded to ${replay.rounding} of the body's size.`);
   byId("colours").textContent = said.join(" ");
 }
 
@@ -129,10 +136,10 @@ async function showReplay(given) {
   const why = given.replay ? "This browser offers no WebGL2, so the moving body cannot be shown; the histories below do without." : given.why;
   byId("no-replay").textContent = given.replay && paint ? "" : why;
   if (!given.replay || !paint) return;
-  tellColours(given);
   const shown = await unpacked(given.replay);
   if (state.given !== given) return; // another case was chosen meanwhile
-  state.shown = { ...shown, ...bounds([...shown.positions, ...(shown.truth ?? [])]) };
+  tellColours(given, shown.truth);
+  state.shown = { ...shown, ...bounds([...shown.positions, ...(shown.truth?.positions ?? [])]) };
   byId("names").replaceChildren(...[given.entry ?? "this case", "reference"].slice(0, shown.truth ? 2 : 1).map((name) => {
     const made = document.createElement("span");
     made.textContent = name;
@@ -143,19 +150,34 @@ async function showReplay(given) {
   scaleColours();
 }
 
+function command(text) {
+  const made = document.createElement("code");
+  made.textContent = text;
+  return made;
+}
+
+/** Words of a case, and the commands that make it again. */
+function tellAbout(given) {
+  const words = [`${given.about} `];
+  if (given.entry) words.push("What hands it in: ", command(given.again));
+  else words.push("To run it again: ", command(given.run), ", or bit for bit: ", command(given.again));
+  byId("about").replaceChildren(...words);
+}
+
+/** Shows a case at full load. */
 async function choose(id) {
-  const given = DATA.cases[id];
+  const head = DATA.cases[id];
   play(false);
-  Object.assign(state, { given, t: 0 });
+  state.id = id;
   byId("chosen").value = id;
-  const command = document.createElement("code");
-  command.textContent = given.again;
-  byId("about").replaceChildren(`${given.about} ${given.entry ? "What hands it in" : "To run exactly this case again"}: `, command);
-  state.marks = showHistories(byId("plots"), given);
   document.querySelectorAll("#cases tr.chosen").forEach((row) => row.classList.remove("chosen"));
-  document.querySelectorAll("#cases [data-case]").forEach((button) => {
-    if (button.dataset.case === id) button.closest("tr").classList.add("chosen");
-  });
+  document.querySelectorAll(`#cases a[href="#case=${id}"]`).forEach((link) => link.closest("tr").classList.add("chosen"));
+  tellAbout(head);
+  const absent = { histories: {}, why: `Histories and replay of this case lie in ${DATA.folder}/case-${id}.js beside this page, and that file is not there. Copy the folder along with the page.` };
+  const given = { ...head, ...(await piece(`case-${id}`) ?? absent) };
+  if (state.id !== id) return; // another case was chosen meanwhile
+  Object.assign(state, { given, t: fullLoad(given) });
+  state.marks = showHistories(byId("plots"), given);
   await showReplay(given);
   draw();
 }

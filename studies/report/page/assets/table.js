@@ -16,15 +16,21 @@ function sortBy(head, column) {
   byId("cases").tBodies[0].append(...rows.sort(order));
 }
 
+const plainly = (text) => text.toLowerCase().replaceAll("_", " ");
+const said = new Map(rows.map((row) => [row, plainly([...row.children].map((cell) => cell.textContent).join(" "))]));
+
+/** A word with underscores stands for the words between them, one behind the other: implicit_volume. */
 function filterRows(text) {
-  const words = text.toLowerCase().split(/\s+/).filter(Boolean);
+  const words = text.split(/\s+/).filter(Boolean).map(plainly);
   let shown = 0;
   for (const row of rows) {
-    const said = row.textContent.toLowerCase();
-    row.hidden = !words.every((word) => said.includes(word));
+    row.hidden = !words.every((word) => said.get(row).includes(word));
     shown += !row.hidden;
   }
-  byId("count").textContent = shown === rows.length ? `${shown} cases` : `${shown} of ${rows.length} cases`;
+  const all = rows.length === 1 ? "1 case" : `${rows.length} cases`;
+  byId("count").textContent = shown === rows.length ? all : `${shown} of ${all}`;
+  byId("no-rows").hidden = shown > 0;
+  byId("no-rows").textContent = shown ? "" : `No case holds all of these words: ${words.join(", ")}. Fewer or shorter words find more.`;
 }
 
 document.querySelectorAll("#cases thead th").forEach((head, column) => {

@@ -28,7 +28,7 @@ const themeButton = byId("theme"), systemDark = matchMedia("(prefers-color-schem
 const isDark = () => (document.documentElement.dataset.theme || (systemDark.matches ? "dark" : "light")) === "dark";
 
 function showTheme() {
-  themeButton.setAttribute("aria-pressed", isDark());
+  themeButton.textContent = isDark() ? "Light page" : "Dark page";
   document.dispatchEvent(new Event("theme"));
 }
 

@@ -1,9 +1,10 @@
-"""What `organbench check` advises has been tried: its command makes a clean body; else the advice begins with "try"."""
+"""What `organbench check` advises has been tried: its command makes a clean body, or it says what was tried."""
 
 import json
 import shlex
 
 import meshio
+import nibabel
 import numpy as np
 import pytest
 
@@ -63,11 +64,13 @@ def test_the_command_that_is_printed_works(organbench, tmp_path, monkeypatch, fa
     assert code == 0, out
 
 
-def test_advice_that_does_not_work_is_a_try(organbench, tmp_path):
+def test_advice_that_does_not_work_is_not_printed(organbench, tmp_path):
+    """Of an open triangle, and of a bowl with a double wall: nothing that is tried makes a body of it."""
     path = stored(tmp_path / "one.ply", 100 * np.eye(3), [[0, 1, 2]])
     code, out, _ = organbench("check", path, "--unit", "mm")
-    assert code == 1 and TRIED not in out
-    assert "   -> try organbench mesh --from FILE --close-holes" in out
+    assert code == 1 and TRIED not in out and "-> try" not in out and "FILE" not in out
+    assert "tried: --nodes 550 --close-holes; --nodes 550 --smooth 3 --close-holes; --nodes 550 --solid 5; none" in out
+    assert "the widest is 141 mm wide, at (33.33, 33.33, 33.33) mm" in out
     assert json.loads(organbench("check", path, "--unit", "mm", "--json")[1])["command"] is None
 
 
@@ -107,3 +110,58 @@ def test_a_real_organ_with_a_hole_and_turned_triangles(organbench, tmp_path, mon
     code, out, _ = organbench("check", "spleen.ply")
     assert code == 1 and TRIED in out
     assert organbench(*shlex.split(out.splitlines()[-1])[1:])[0] == 0
+
+
+def test_what_is_left_is_named(monkeypatch, tmp_path):
+    """Of a body that comes out with a finding: the options that make it, and the finding."""
+    source = Source(stored(tmp_path / "open.ply", POINTS, FACES[3:]), "mm")
+    ring = examine(source)
+    monkeypatch.setattr(advice, "examined", lambda source, how: None if "solid" in how else ring)
+    (finding,) = advice.tried(source, ring).findings
+    assert finding.mend.endswith("; --nodes 550 --close-holes makes a body, in which this is left: open")
+
+
+def test_a_file_of_no_organs_size_is_not_meshed(monkeypatch, tmp_path):
+    """First its unit must be known: 2 m is no organ's length in m, cm or mm."""
+    monkeypatch.setattr(advice, "scan", lambda *words, **how: pytest.fail("meshed"))
+    source = Source(stored(tmp_path / "large.ply", POINTS / 30.5, FACES[3:]))
+    findings = advice.tried(source, examine(source)).findings
+    assert "an organ's in no unit we know" in findings[0].sentence and findings[1].mend.startswith("try ")
+
+
+def test_what_is_no_organ_is_refused_and_found(organbench, tmp_path, monkeypatch):
+    """0.5 mL, and a body a million metres from the origin: by check as findings, by mesh and place as a sentence."""
+    monkeypatch.chdir(tmp_path)
+    small = (0.5e3 / (4 / 3 * np.pi * 30 * 25 * 20)) ** (1 / 3)
+    stored("small_liver.ply", small * POINTS, FACES)
+    meshio.write_points_cells("far_liver.vtu", POINTS + np.array([1e9, 0, 0]), [("triangle", FACES)])
+    for name, told in (
+        ("small_liver.ply", "encloses 0.49 mL, and no organ is smaller than 1 mL"),
+        ("far_liver.vtu", "it lies 1e+06 m from the origin of its coordinates"),
+    ):
+        code, out, _ = organbench("check", name, "--unit", "mm")
+        assert code == 1 and told in out and TRIED not in out
+        for words in (("mesh", "--from", name, "--nodes", 200), ("mesh", "--from", name), ("place", name)):
+            code, _, err = organbench(*words, "--unit", "mm")
+            assert code == 2 and told in err, words
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["far_liver.vtu", "small_liver.ply"]
+
+
+def test_grey_values_are_refused_by_all_three(organbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    grey = np.random.default_rng(0).integers(0, 239, (30, 30, 30)).astype(np.int16)
+    nibabel.save(nibabel.Nifti1Image(grey, np.eye(4)), "liver_ct.nii.gz")
+    for words in (("check",), ("mesh", "--nodes", 200, "--from"), ("place",)):
+        code, out, err = organbench(*words, "liver_ct.nii.gz", "--part", "204")
+        assert code == 2 and not out and "grey values" in err and "not a mask: segment it first" in err
+
+
+def test_a_mask_has_a_plain_file_name_and_is_in_millimetres(organbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    axes = np.meshgrid(*[np.arange(-25.0, 26.0)] * 3, indexing="ij")
+    ball = (sum(axis**2 for axis in axes) < 20**2).astype(np.uint8)
+    ball[1:4, 1:4, 1:4] = 1
+    nibabel.save(nibabel.Nifti1Image(ball, np.eye(4)), "spleen_mask.nii.gz")
+    code, out, err = organbench("check", "spleen_mask.nii.gz")
+    assert code == 1 and out.rstrip().endswith("-o spleen_mask_body.vtu")
+    assert err.count("its header does not say the unit; millimetres are taken") == 1

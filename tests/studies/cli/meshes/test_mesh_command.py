@@ -31,11 +31,21 @@ def stored(path, points, faces):
     return path
 
 
+def test_an_organ_that_few_nodes_cannot_hold_names_the_number_that_does(organbench, tmp_path):
+    _, out, _ = organbench("mesh", "liver", "--nodes", 100, "-o", tmp_path / "liver.stl")
+    enough = int(re.search(r"about ([\d,]+) nodes keep it within 1 %", out)[1].replace(",", ""))
+    assert enough > 100
+    _, out, _ = organbench("mesh", "liver", "--nodes", enough, "-o", tmp_path / "liver.stl")
+    assert "nodes keep it" not in out
+
+
 def test_an_organ_is_meshed_and_found_clean(organbench, tmp_path):
     target = tmp_path / "kidney.vtu"
     code, out, err = organbench("mesh", "kidney", "--nodes", 200, "--seed", 3, "-o", target)
     assert (code, err) == (0, "")
-    assert out.startswith("kidney: 200 outer nodes, 396 outer triangles, ")
+    shape, body = out.splitlines()[0], out[out.index("kidney") :]
+    assert shape.startswith("shape: up to 0.") and shape.endswith("% of the organ's size off its true surface")
+    assert body.startswith("kidney: 200 outer nodes, 396 outer triangles, ")
     assert out.strip().endswith(f"written to {target} in metres")
     made = read_mesh(target)
     assert made.surface_count == 200 and "hilum" in made.patches

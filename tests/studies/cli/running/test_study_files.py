@@ -3,8 +3,8 @@
 import pytest
 
 BROKEN = {
-    "no STUDY": ("CASES = 3\n", "defines no STUDY of type studies.catalog.Study"),
-    "another type": ("STUDY = 'volume_loss'\n", "defines no STUDY of type studies.catalog.Study"),
+    "no STUDY": ("CASES = 3\n", "defines neither STUDY nor SCENE"),
+    "another type": ("STUDY = 'volume_loss'\n", "is str; give a Study, as `from studies import Study`"),
     "syntax": ("import os\nSTUDY = (\n", "SyntaxError in line 2: '(' was never closed"),
     "import": ("\nimport massspringg\n", "ModuleNotFoundError in line 2: No module named 'massspringg'"),
     "name": ("def f():\n    return nothing\nf()\n", "NameError in line 2: name 'nothing' is not defined"),
@@ -66,7 +66,24 @@ BROKEN |= {
     ),
     "half a node": (
         OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes=100.5)),))\n",
-        "nodes = '100.5': Input should be a valid integer",
+        "'tiny_squeeze', case tiny_squeeze-tetrahedral-100.5-implicit_volume-dt0.5: nodes = '100.5': Input should be a",
+    ),
+    "whole weight": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe('surface', weights=(1, 0.5, 1.0, 1.0))),))\n",
+        "mine.py: scene 'tiny_squeeze', case tiny_squeeze-surface-550-implicit_volume-dt0.5-w1_0.5_1_1: "
+        "body.weights[0] = 1 (write 1.0) cannot be stored",
+    ),
+    "frames of a scene": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(scene=replace(SQUEEZE, frames=None)),))\n",
+        "mine.py: scene 'tiny_squeeze': frames is None; give a whole number from 1 on",
+    ),
+    "damping in words": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(scene=replace(SQUEEZE, damping='none')),))\n",
+        "mine.py: scene 'tiny_squeeze', case tiny_squeeze-tetrahedral-60-implicit_volume-dt0.5: damping = 'none'",
+    ),
+    "endless": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(scene=replace(SQUEEZE, duration=float('inf'))),))\n",
+        "mine.py: scene 'tiny_squeeze': the duration is inf s; give a finite number above 0",
     ),
     "columns": (OWN + "STUDY = tiny_study(columns='volume_worst')\n", "columns is 'volume_worst'; give a tuple"),
     "no case": (OWN + "STUDY = tiny_study(cases=(3,))\n", "cases holds 3, which is no Case"),

@@ -41,7 +41,7 @@ def test_all_times_are_new_and_no_run_is(organbench, tiny_file, results, quick):
 def test_a_dry_run_says_what_and_how_long_and_times_nothing(organbench, tiny_file, results):
     before = content(results / "tiny")
     code, out, _ = organbench("run", tiny_file, "--results", results, "--again", "timing", "--dry-run")
-    assert code == 0 and "tiny: 2 pieces would run" in out and f"2 timing ({AGAIN}): about" in out
+    assert code == 0 and "tiny: 2 timings would run" in out and f"2 timings ({AGAIN}): about" in out
     assert content(results / "tiny") == before
     assert [(piece.stage, piece.label) for piece in plan_again(results, tiny_study())] == [
         (TIMING, case.name) for case in tiny_study().cases[:2]

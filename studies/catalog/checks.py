@@ -1,0 +1,20 @@
+"""What can be told of a study before anything is meshed."""
+
+from studies.catalog.study import Study
+from studies.metrics.table import check_columns
+from studies.scene.checks import check_scene
+from studies.store.schema import Status
+
+
+def check_study(study: Study, drawn: bool = True) -> list[str]:
+    """Warnings of numbers that are hardly meant; `drawn`: whether its charts will be.
+
+    Raises StudyError for a chart without a function, a column that is no metric, and for a scene that cannot start
+    (studies.scene.checks) in a study that does not expect failures.
+    """
+    check_columns(study.columns)
+    for chart in study.charts if drawn else ():
+        _ = chart.draw
+    if study.accepts(Status.FAILED):
+        return []
+    return [sentence for scene in study.scenes for sentence in check_scene(scene)]

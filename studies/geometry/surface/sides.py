@@ -1,0 +1,99 @@
+"""The sides of a surface mesh as elements have them: straight, or quadratic with their middles on the true surface."""
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from studies.geometry.mesh.organ_mesh import triangle_areas, unique_edges
+from studies.geometry.shape.levelset import Shape, project
+from studies.geometry.shape.regions import Region
+
+PARTS = 4
+"""Each side of a facet is cut into so many where distances are measured: 15 places a facet."""
+
+
+def region_side(region: Region, points: np.ndarray) -> np.ndarray:
+    """-1 inside the region, 1 outside, 0 on its outline, (n,), of points (n, 3) [m] of a whole surface or near one."""
+    level = region.level(points)
+    return np.sign(np.where(np.abs(level) <= OUTLINE, 0.0, level))
+
+
+OUTLINE = 1e-9
+"""Distance [m] within which a node is on an outline, far above rounding and far below an edge."""
+
+
+def region_area(region: Region, points: np.ndarray, triangles: np.ndarray) -> float:
+    """Area [m²] of a surface, points (n, 3) [m] and triangles (t, 3), inside the region, its level linear on each."""
+    level = np.sort(region.level(points)[triangles], axis=1)
+    low, middle, high = level.T
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # A corner alone on its side cuts off a triangle that is similar along both of its edges.
+        below = low**2 / ((middle - low) * (high - low))
+        above = high**2 / ((high - low) * (high - middle))
+    share = np.where(high <= 0, 1.0, np.where(low >= 0, 0.0, np.where(middle >= 0, below, 1.0 - above)))
+    return float((triangle_areas(points, triangles) * share).sum())
+
+
+def outline_edges(points: np.ndarray, triangles: np.ndarray, region: Region) -> np.ndarray:
+    """Edges (e, 2), lower index first, between a triangle (t, 3) inside the region and one outside."""
+    inside = (region_side(region, points) <= 0)[triangles].all(axis=1)
+    half = np.sort(triangles[inside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges, count = np.unique(half, axis=0, return_counts=True)
+    return edges[count == 1]
+
+
+def places_on(
+    shape: Shape, points: np.ndarray, edges: np.ndarray, outlines: np.ndarray, regions: Sequence[Region]
+) -> np.ndarray:
+    """The middles of edges (e, 2), brought onto f = 0, those of `outlines` (o, 2) onto the curve too, (e, 3) [m]."""
+    middles = points[edges].mean(axis=1)
+    on = np.zeros(len(edges), bool)
+    if len(outlines):
+        on = (edges[:, None] == outlines[None]).all(axis=2).any(axis=1)
+    middles[~on] = project(shape, middles[~on])
+    for k in np.flatnonzero(on):
+        at = [r for r in regions if (region_side(r, points[edges[k]]) == 0).all()][:1]
+        middles[k] = project(shape, middles[k : k + 1], tuple(r.level for r in at))[0]
+    return middles
+
+
+def with_middles(
+    shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: Sequence[Region], curved: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points and the middles of all edges (m, 3) [m], and facets (t, 6): corners, then the nodes between first and
+    second, second and third, third and first. curved: middles lie on f = 0 and on outlines; else half way."""
+    edges, count = unique_edges(triangles), len(points)
+    middles = points[edges].mean(axis=1)
+    if curved:
+        middles = project(shape, middles)
+        for region in regions:
+            rim = outline_edges(points, triangles, region)
+            here = np.searchsorted(edges @ [count, 1], rim @ [count, 1])
+            middles[here] = project(shape, middles[here], (region.level,))
+    pairs = [np.sort(triangles[:, pair], axis=1) @ [count, 1] for pair in ([0, 1], [1, 2], [2, 0])]
+    return np.vstack([points, middles]), np.column_stack(
+        [triangles, *(count + np.searchsorted(edges @ [count, 1], pair) for pair in pairs)]
+    )
+
+
+def along_facets(points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (m, 3) [m] evenly on quadratic facets (t, 6), and the flat pieces (p, 3) between them."""
+    values, pieces = lattice()
+    places = np.einsum("mi,fik->fmk", values, points[facets])
+    first = len(values) * np.arange(len(facets))
+    return places.reshape(-1, 3), (pieces[None] + first[:, None, None]).reshape(-1, 3)
+
+
+@cache
+def lattice() -> tuple[np.ndarray, np.ndarray]:
+    """Values (m, 6) of a quadratic facet's functions at places on it, and triangles (p, 3) between these places."""
+    rows = [(i, j) for i in range(PARTS + 1) for j in range(PARTS + 1 - i)]
+    number = {row: k for k, row in enumerate(rows)}
+    up = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in rows if i + j < PARTS]
+    down = [(number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]) for i, j in rows if i + j < PARTS - 1]
+    second, third = np.array(rows, float).T / PARTS
+    first = 1.0 - second - third
+    corners = [share * (2.0 * share - 1.0) for share in (first, second, third)]
+    middles = [4.0 * one * other for one, other in ((first, second), (second, third), (third, first))]
+    return np.column_stack([*corners, *middles]), np.array(up + down)

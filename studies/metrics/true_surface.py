@@ -1,0 +1,132 @@
+"""The true surface of an organ, sampled once per process, and how near a body at rest is to it."""
+
+import hashlib
+import json
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.geometry import read_mesh
+from studies.geometry.mesh.organ_mesh import signed_volume
+from studies.geometry.shape.levelset import Shape, at_depth
+from studies.geometry.surface.distance import hausdorff
+from studies.grading.true_shape import true_shape
+from studies.metrics.rest_surface import LUMEN, OUTER, RestSurface, rest_surfaces
+from studies.scene.meshing import scanned
+from studies.scene.scene import Organ
+
+ORGANS = 128
+"""Organs whose surfaces are kept: about 2 MB each."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrueSurface:
+    """The outer surface of an organ and, of a hollow one, its lumen."""
+
+    sides: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    """OUTER and LUMEN -> points (n, 3) [m] on the surface and triangles (t, 3) between them, finer than a body's."""
+    volumes: Mapping[str, float]
+    """What each encloses [m³], of a lumen negative: their sum is the tissue."""
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the organ's box [m]."""
+        return float(np.linalg.norm(np.ptp(self.sides[OUTER][0], axis=0)))
+
+
+class ShapeErrors(NamedTuple):
+    """How far a body at rest is from the true shape of its organ; NaN where that is not known."""
+
+    distance: float
+    """Largest distance between both surfaces, seen from either, over the organ's size [1]."""
+    volume: float
+    """Volume over the true one, less 1 [1]."""
+
+
+UNKNOWN = ShapeErrors(float("nan"), float("nan"))
+_MEASURED: dict[tuple[str, bytes], ShapeErrors] = {}
+"""By organ and body: cases that differ by method or step have the same body."""
+
+
+def shape_errors(organ: Organ, sides: Mapping[str, RestSurface], filled: bool) -> ShapeErrors:
+    """Of the surfaces of a body at rest, as `rest_surfaces` gives them, against those of its organ.
+
+    filled: whether the body has the tissue alone inside, so that a hollow organ's lumen counts; the outer surface alone
+    otherwise. Unknown where the organ's surface is, or where the body has other sides than the organ.
+    """
+    digest = hashlib.sha256(f"{filled}".encode())
+    for surface in sides.values():
+        digest.update(surface.points.tobytes() + surface.facets.tobytes())
+    key = _text(organ), digest.digest()
+    if key not in _MEASURED:
+        _MEASURED[key] = _measured(true_surface(organ), sides, filled)
+    return _MEASURED[key]
+
+
+def _measured(truth: TrueSurface | None, sides: Mapping[str, RestSurface], filled: bool) -> ShapeErrors:
+    if truth is None or set(sides) != (set(truth.sides) if filled else {OUTER}):
+        return UNKNOWN
+    apart = [hausdorff(*surface.lattice(), *truth.sides[name]) for name, surface in sides.items()]
+    volume = sum(surface.volume for surface in sides.values()) / sum(truth.volumes[name] for name in sides)
+    return ShapeErrors(max(apart) / truth.size, volume - 1.0)
+
+
+def true_surface(organ: Organ) -> TrueSurface | None:
+    """The surface of an organ's level function; of a mesh file that comes as it is, the file's own. None, with a
+    warning, where it cannot be had: a file that is gone or holds something else."""
+    return _sampled(_text(organ))
+
+
+def _text(organ: Organ) -> str:
+    return json.dumps([organ.shape, dict(organ.parameters)], sort_keys=True, default=str)
+
+
+@lru_cache(maxsize=ORGANS)
+def _sampled(text: str) -> TrueSurface | None:
+    organ = Organ(*json.loads(text))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # the mesher has told what it mended in a file
+            shape = true_shape(organ)
+            return _of_file(organ) if shape is None else _of_shape(shape, organ.shape == "file")
+    except StudyError as error:
+        warnings.warn(f"the shape of bodies is not measured: {error}", stacklevel=2)
+        return None
+
+
+def _of_file(organ: Organ) -> TrueSurface:
+    mesh = read_mesh(scanned(organ, organ.shape)[0])
+    sides = rest_surfaces(mesh.points, mesh.triangles)
+    return TrueSurface(
+        {name: (side.points, side.facets) for name, side in sides.items()},
+        {name: side.volume for name, side in sides.items()},
+    )
+
+
+def _of_shape(shape: Shape, scan: bool) -> TrueSurface:
+    shapes = {OUTER: shape} if shape.wall is None else {OUTER: shape, LUMEN: at_depth(shape, shape.wall)}
+    found = {name: _fine(each, scan) for name, each in shapes.items()}
+    signs = {OUTER: 1.0, LUMEN: -1.0}
+    return TrueSurface(
+        {name: surface for name, (surface, _) in found.items()},
+        {name: signs[name] * volume for name, (_, volume) in found.items()},
+    )
+
+
+def _fine(shape: Shape, scan: bool) -> tuple[tuple[np.ndarray, np.ndarray], float]:
+    """Points and triangles on f = 0, and the volume [m³] inside, to about 1e-5: its error falls with the squared edge,
+    which the finer of two triangulations halves."""
+    # Loaded where they are used: scikit-image takes half a second.
+    from studies.geometry.scanned.scan_shape import scan_surface
+    from studies.geometry.surface.family import quartered
+    from studies.geometry.surface.first_surface import first_surface
+
+    coarse = scan_surface(shape) if scan else first_surface(shape)
+    fine = quartered(shape, *coarse)
+    volume = signed_volume(*fine)
+    return fine, volume + (volume - signed_volume(*coarse)) / 3.0

@@ -1,0 +1,176 @@
+"""The first lines of the page: which body to take, how wrong it is, how fast, and what the paper's body does."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+from studies.advice.words import wish_words
+from studies.base.counting import counted
+from studies.metrics.cells import MISSING, value_cell
+from studies.metrics.judged import Judged, Measured, by_cost, cheapest, judged, nearest
+from studies.metrics.run import Run
+from studies.metrics.wish import SHAPE, SHAPE_VOLUME, usual_wish
+from studies.plots.style.page import by_scene
+from studies.plots.style.style import readable
+from studies.report.summary import PAPER
+from studies.runs.recipe_text import body_words
+
+Best = dict[str, Any]
+"""Of a scene, JSON-able: the target in words, whether the body meets it, the body with its step over the limit, the id
+of its case, each number as [value, uncertainty] or None; `paper`: the same of the paper's body, or None."""
+NUMBERS = ("force", "displacement", "shape", "speed")
+HEADS = ("body, surface nodes, step / limit", "force [%]", "mean [%]", "shape [%]", "speed [s/s]")
+SHAPE_WORDS = f"shape within {SHAPE:g} % of the organ's size, its volume within {SHAPE_VOLUME:g} %"
+"""The bounds that `cheapest` adds to every wish."""
+SPEED, SPEED_FLOOR = "real_time [s/s]", "real_time floor [s/s]"
+
+
+def best_bodies(runs: Sequence[Run], run_id: Callable[[Run], str]) -> list[Best]:
+    """Of every scene in which an error of a body by implicit_volume is known: the cheapest body within the usual
+    target, else the nearest."""
+    best = []
+    for name, group in by_scene(runs).items():
+        ids = {run.case.key: run_id(run) for run in group}
+        bodies = [one for one in map(judged, group) if one is not None and one.compared]
+        wish = usual_wish(group[0].case.scene)
+        within = cheapest(bodies, wish)
+        chosen = within or nearest(bodies, wish)
+        if chosen is None:
+            continue
+        paper = next((one for one in bodies if one.advisable and _is_paper(one)), None)
+        # Among studies: bodies within the target by their cost, others by how far they miss it.
+        order = [0.0, *map(float, by_cost(chosen))] if within else [1.0, chosen.worst(wish)]
+        row = _row(chosen, ids) | {
+            "scene": name,
+            "target": f"{wish_words(wish)}, {SHAPE_WORDS}",
+            "meets": within is not None,
+        }
+        best.append(row | {"order": order, "paper": None if paper is None else _row(paper, ids)})
+    return best
+
+
+def _is_paper(one: Judged) -> bool:
+    return one.case.body.kind == "surface" and one.case.body.nodes == PAPER
+
+
+def _row(one: Judged, ids: Mapping[str, str]) -> Best:
+    cost = one.cost
+    speed = Measured(1 / cost.value, cost.uncertainty / cost.value**2) if cost.known else cost
+    numbers = {"force": one.force, "displacement": one.displacement, "shape": one.shape, "speed": speed}
+    packed = {
+        name: [number.value, number.uncertainty if number.uncertainty == number.uncertainty else 0.0]
+        if number.known
+        else None
+        for name, number in numbers.items()
+    }
+    return {"body": f"{body_words(one.case.body)}, {one.case.dt_fraction:g}", "case": ids[one.case.key], **packed}
+
+
+def joined_best(parts: Sequence[Sequence[Best]], rows: Sequence[Mapping[str, Any]]) -> list[Best]:
+    """A row for each scene of all studies: the best body of any, and the paper's body of the first that has it; speeds
+    that one study did not measure are those of the table's `rows`."""
+    scenes: dict[str, list[Best]] = {}
+    for row in (row for part in parts for row in part):
+        scenes.setdefault(row["scene"], []).append(row)
+    speeds = {row["case"]: [row[SPEED], row.get(SPEED_FLOOR) or 0.0] for row in rows if row.get(SPEED) is not None}
+    best = []
+    for group in scenes.values():
+        chosen = min(group, key=lambda row: row["order"])
+        paper = next((row["paper"] for row in group if row["paper"]), None)
+        best.append(_timed(chosen, speeds) | {"paper": _timed(paper, speeds) if paper else None})
+    return best
+
+
+def _timed(row: Best, speeds: Mapping[str, list[float]]) -> Best:
+    return row | {"speed": row["speed"] or speeds.get(row["case"])}
+
+
+def best_html(best: Sequence[Best]) -> str:
+    """Three lines in words, and a row for each scene."""
+    if not best:
+        return (
+            "<p>No body can be named yet: that takes a case by implicit_volume and the reference of its scene, which "
+            "<code>organbench run</code> computes.</p>"
+        )
+    papers = [row["paper"] for row in best if row["paper"]]
+    lines = {
+        "Which body?": _which(best),
+        "How wrong?": f"{_capital(_errors(best))}.{_beside(_errors(papers))}",
+        "How fast?": f"{_capital(_speed(best) or 'no time is measured')}.{_beside(_speed(papers))}",
+    }
+    items = "".join(f"<li><strong>{head}</strong> {escape(text)}</li>" for head, text in lines.items())
+    heads = "".join(f'<th scope="col">{head}</th>' for head in HEADS)
+    rows = "".join(_scene_rows(row) for row in best)
+    return (
+        f'<ul class="answer">{items}</ul><div class="scroll" role="region" aria-label="The best body of each scene" '
+        f'tabindex="0"><table class="best"><thead><tr>{heads}</tr></thead>{rows}</table></div>'
+    )
+
+
+def _which(best: Sequence[Best]) -> str:
+    within = [row for row in best if row["meets"]]
+    if len(best) == 1:
+        row = best[0]
+        start = f"In {readable(row['scene'])}: {_body(row['body'])}"
+        if within:
+            return f"{start}. It is the cheapest body within the target ({row['target']})."
+        return f"{start}. No body here meets the target ({row['target']}); this one is nearest."
+    bodies = Counter(_body(row["body"]) for row in within).most_common()
+    named = "; ".join(f"{body} in {counted(count, 'scene')}" for body, count in bodies)
+    start = f"A body meets the target in {len(within)} of {len(best)} scenes"
+    nearest_in = [readable(row["scene"]) for row in best if not row["meets"]]
+    missed = f" None meets it in {', '.join(nearest_in)}; the table names the nearest." if nearest_in else ""
+    return f"{start}{': ' if named else ''}{named}.{missed}"
+
+
+def _body(words: str) -> str:
+    """ "quadratic, 594, 0.8" as "quadratic, 594 nodes"."""
+    body, nodes, _ = words.rsplit(", ", 2)
+    return f"{body}, {nodes} nodes"
+
+
+def _errors(rows: Sequence[Best]) -> str:
+    force, displacement, shape = (_span(rows, name) for name in ("force", "displacement", "shape"))
+    words = {
+        f"force off by {force} %": force,
+        f"displacement off by {displacement} % on the mean": displacement,
+        f"shape off by {shape} % of the organ's size at most": shape,
+    }
+    return ", ".join(part for part, known in words.items() if known)
+
+
+def _speed(rows: Sequence[Best]) -> str:
+    speed = _span(rows, "speed")
+    return f"{speed} s simulated in a second of computing on one core" if speed else ""
+
+
+def _beside(words: str) -> str:
+    return f" The paper's body ({PAPER} surface nodes, one volume): {words}." if words else ""
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]
+
+
+def _span(rows: Sequence[Best], name: str) -> str:
+    """The number of one row with its uncertainty, or the range of sizes over several."""
+    known = sorted((row[name] for row in rows if row[name]), key=lambda number: abs(number[0]))
+    if len(known) < 2:
+        return "".join(value_cell(*number, signed=name == "force") for number in known)
+    low, high = (f"{abs(number[0]):.2g}" for number in (known[0], known[-1]))
+    return low if low == high else f"{low} to {high}"
+
+
+def _scene_rows(row: Best) -> str:
+    """The name of a scene, its body, and the paper's."""
+    mark = "" if row["meets"] else ' <span class="entry">misses the target</span>'
+    scene = f'<tr><th scope="rowgroup" colspan="{len(HEADS)}">{escape(readable(row["scene"]))}</th></tr>'
+    paper = f'<tr class="soft">{_cells(row["paper"], " (the paper’s)")}</tr>' if row["paper"] else ""
+    return f"<tbody>{scene}<tr>{_cells(row, mark)}</tr>{paper}</tbody>"
+
+
+def _cells(row: Best, mark: str) -> str:
+    numbers = [value_cell(*row[name], signed=name == "force") if row[name] else MISSING for name in NUMBERS]
+    link = f'<a href="#case={escape(row["case"])}">{escape(row["body"])}</a>{mark}'
+    return f"<td>{link}</td>" + "".join(f'<td class="number">{number}</td>' for number in numbers)

@@ -1,0 +1,196 @@
+"""What a scene and its organ's surface tell before there is a mesh: obstacles inside, regions off it, units."""
+
+import json
+import warnings
+from functools import lru_cache
+
+import numpy as np
+
+from massspring import Capsule, Obstacle, Plane, Trajectory
+from massspring.body.surface import winding_number
+from studies.base.errors import StudyError
+from studies.base.lookup import lookup
+from studies.geometry.api.scans import Remeshing, mended_surface
+from studies.geometry.files.opening import opened
+from studies.geometry.organs import SHAPES
+from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.surface.first_surface import first_surface
+from studies.scene.clock import check_clock, is_number
+from studies.scene.kind import has_wall
+from studies.scene.meshing import scanned
+from studies.scene.scene import Organ, Scene
+
+Surface = tuple[np.ndarray, np.ndarray]
+"""Points (n, 3) [m] and outward triangles (t, 3)."""
+START_DEPTH = 1e-3
+"""Of the body's size: how deep an obstacle may start in the true surface, as in the reference (reference_fem.system).
+What a mesh adds to that, the run checks."""
+MODULUS, DENSITY, DURATION = (100.0, 1e5), (500.0, 2000.0), (1e-3, 1e3)
+"""Usual shear moduli [Pa], densities [kg/m³] and durations [s]: from fat to cartilage, from lung to bone."""
+UNUSUAL = 100.0
+"""A number this many times outside its range cannot be meant."""
+LARGE = 10.0
+"""Times the body's size: a longer length cannot be meant."""
+AXIS_POINTS = 9
+
+
+def check_scene(scene: Scene) -> list[str]:
+    """Warnings of numbers that are hardly meant, a sentence each. Raises StudyError for a scene that cannot start, and
+    for numbers that cannot be meant. Meshes nothing; takes a second or two where something touches or holds the body.
+    """
+    check_clock(scene)
+    _check_names(scene)
+    found = [
+        *_unusual(scene, "shear modulus", scene.tissue.shear_modulus, MODULUS, "Pa"),
+        *_unusual(scene, "density", scene.tissue.density, DENSITY, "kg/m³"),
+        *_unusual(scene, "duration", scene.duration, DURATION, "s"),
+    ]
+    _check_organ(scene)
+    if not scene.obstacles and not scene.held:
+        return found
+    try:
+        points, triangles = surface_of(scene.organ, scene.name)
+    except StudyError as error:
+        if scene.organ.shape != "file":
+            raise
+        return [*found, f"the cases of scene '{scene.name}' will fail: {error}"]
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    for number, obstacle in enumerate(scene.obstacles):
+        found += _too_large(scene, f"obstacle {number}", _width(obstacle), size)
+        found += _too_large(scene, f"the path of obstacle {number}", _reach(obstacle.path), size)
+        if scene.start is None or not scene.start.shaped:
+            _check_start(scene, number, depth_at_start(obstacle, points, triangles, has_wall(scene)), size)
+        found += _pressed_through(scene, number, points)
+    for held in scene.held:
+        found += _too_large(scene, f"the path of region '{held.name}'", _reach(held.path), size)
+        _check_region(scene, held.name, held.region.level(points), points, triangles)
+    return found
+
+
+def surface_of(organ: Organ, name: str) -> Surface:
+    """The true surface of an organ, finely sampled; name: of the scene. Raises StudyError for an organ that there is
+    not, and a file that cannot be read."""
+    if organ.shape == "file":
+        return _scan_surface(json.dumps(dict(organ.parameters), sort_keys=True), name)
+    return _shape_surface(organ.shape, json.dumps(dict(organ.parameters), sort_keys=True))
+
+
+@lru_cache(maxsize=64)
+def _shape_surface(shape: str, parameters: str) -> Surface:
+    return first_surface(make_shape(shape, json.loads(parameters)))
+
+
+@lru_cache(maxsize=4)
+def _scan_surface(parameters: str, name: str) -> Surface:
+    source, how = scanned(Organ("file", json.loads(parameters)), name)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the mesh warns of every change to the surface
+        mended, _ = mended_surface(source, opened(source), Remeshing(**how))
+    return mended.points, mended.triangles
+
+
+def depth_at_start(obstacle: Obstacle, points: np.ndarray, triangles: np.ndarray, hollow: bool = False) -> float:
+    """How deep an obstacle starts inside a closed surface [m], negative where it is outside; one in the lumen of a
+    `hollow` organ is outside its wall."""
+    depth = -float(obstacle.gap(points, 0.0).min())
+    if isinstance(obstacle, Plane) or hollow:
+        return depth
+    start = obstacle.anchor + obstacle.path(0.0)
+    along = obstacle.span if isinstance(obstacle, Capsule) else np.zeros(3)
+    for share in np.linspace(0.0, 1.0, AXIS_POINTS if along.any() else 1):
+        place = start + share * along
+        if abs(winding_number(place, points, triangles)) > 0.5:
+            depth = max(depth, obstacle.radius + float(np.linalg.norm(points - place, axis=1).min()))
+    return depth
+
+
+def _check_organ(scene: Scene) -> None:
+    """Raises StudyError for an organ that there is not, and parameters that it cannot have."""
+    try:
+        if lookup(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
+            make_shape(scene.organ.shape, scene.organ.parameters)
+    except StudyError as error:
+        raise StudyError(f"scene '{scene.name}': {error}") from error
+
+
+def _check_names(scene: Scene) -> None:
+    names = [held.name for held in scene.held]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise StudyError(f"scene '{scene.name}' holds two regions called '{twice[0]}'; give each a name of its own")
+    probed, count = scene.probed, len(scene.obstacles if scene.probed.what == "obstacle" else scene.held)
+    if scene.reference is not None and "force" in scene.quantities and not 0 <= probed.number < count:
+        what = "obstacles" if probed.what == "obstacle" else "held regions"
+        raise StudyError(
+            f"scene '{scene.name}' probes the force at {probed.what} {probed.number}, and has {count} {what}, counted "
+            "from 0; correct the number"
+        )
+
+
+def _check_start(scene: Scene, number: int, depth: float, size: float) -> None:
+    limit = START_DEPTH * size
+    if depth > limit:
+        turn = ", or turn its normal towards the body" if isinstance(scene.obstacles[number], Plane) else ""
+        raise StudyError(
+            f"scene '{scene.name}': obstacle {number} starts {1e3 * depth:.3g} mm inside the body "
+            f"({1e3 * limit:.2g} mm are allowed): move it back{turn}"
+        )
+
+
+def _check_region(scene: Scene, name: str, level: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> None:
+    """Raises StudyError for a region off the surface, by more than the spacing of its samples."""
+    spacing = float(np.linalg.norm(points[triangles[:, 0]] - points[triangles[:, 1]], axis=1).mean())
+    if level.min() > spacing:
+        raise StudyError(
+            f"scene '{scene.name}': region '{name}' holds nothing, the body begins {1e3 * level.min():.3g} mm away "
+            "from it: move or enlarge it"
+        )
+
+
+def _pressed_through(scene: Scene, number: int, points: np.ndarray) -> list[str]:
+    """A plane that ends behind a body that cannot get out of its way."""
+    plane = scene.obstacles[number]
+    if not isinstance(plane, Plane) or not (scene.held or len(scene.obstacles) > 1):
+        return []
+    thick = float(np.ptp(points @ plane.unit_normal))
+    deepest = max(-float(plane.gap(points, t).min()) for t in plane.path.times)
+    if deepest <= thick:
+        return []
+    return [
+        f"scene '{scene.name}': obstacle {number} is pressed {1e3 * deepest:.3g} mm into a body that is "
+        f"{1e3 * thick:.3g} mm thick there: is its path in metres?"
+    ]
+
+
+def _unusual(scene: Scene, what: str, value: float, usual: tuple[float, float], unit: str) -> list[str]:
+    """A warning for a number outside its usual range. Raises StudyError for one that cannot be meant."""
+    low, high = usual
+    sentence = (
+        f"scene '{scene.name}': the {what} is {value!r} {unit}, usual are {low:,g} to {high:,g}: is it in {unit}?"
+    )
+    if not is_number(value) or not low / UNUSUAL <= value <= high * UNUSUAL:
+        raise StudyError(sentence)
+    return [] if low <= value <= high else [sentence]
+
+
+def _too_large(scene: Scene, what: str, length: float, size: float) -> list[str]:
+    """A warning for a length above the body's size. Raises StudyError for one that cannot be meant."""
+    if length <= size:
+        return []
+    sentence = f"scene '{scene.name}': {what} is {length:.3g} m long, the body {size:.3g} m: are all lengths in metres?"
+    if length > LARGE * size:
+        raise StudyError(sentence)
+    return [sentence]
+
+
+def _width(obstacle: Obstacle) -> float:
+    """Longest side of an obstacle [m]; a plane has none."""
+    if isinstance(obstacle, Plane):
+        return 0.0
+    span = float(np.linalg.norm(obstacle.span)) if isinstance(obstacle, Capsule) else 0.0
+    return span + 2.0 * obstacle.radius
+
+
+def _reach(path: Trajectory) -> float:
+    """How far a path leads from its start [m]."""
+    return float(np.linalg.norm(np.subtract(path.displacements, path.displacements[0]), axis=1).max())

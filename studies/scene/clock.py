@@ -1,0 +1,30 @@
+"""What the times of a scene may be."""
+
+import math
+
+from studies.base.errors import StudyError
+from studies.scene.scene import Scene
+
+
+def check_clock(scene: Scene, file: str = "") -> None:
+    """Raises StudyError for a duration, a number of frames or checkpoints that no run could have; file: first words of
+    the sentence."""
+    if not is_number(scene.duration) or not scene.duration > 0:
+        raise StudyError(
+            f"{file}scene '{scene.name}': the duration is {scene.duration!r} s; give a finite number above 0"
+        )
+    if type(scene.frames) is not int or scene.frames < 1:
+        raise StudyError(f"{file}scene '{scene.name}': frames is {scene.frames!r}; give a whole number from 1 on")
+    times = scene.checkpoints
+    if not all(is_number(t) for t in times) or any(b <= a for a, b in zip((0.0, *times), times, strict=False)):
+        raise StudyError(f"{file}scene '{scene.name}': the checkpoints are {times} s; give ascending times above 0")
+    if scene.reference is not None and (not times or times[-1] > scene.duration * (1 + 1e-9)):
+        raise StudyError(
+            f"{file}scene '{scene.name}': its checkpoints end at {times[-1] if times else None} s and the scene at "
+            f"{scene.duration:g} s; a run is compared with its reference at times within the scene"
+        )
+
+
+def is_number(value: object) -> bool:
+    """Whether it is a finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,129 @@
+"""Seconds of what has never run: its size, known before there is a mesh, times a rate that was measured."""
+
+import math
+
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.geometry.organs.make_shape import make_shape
+from studies.reference.reference_solves import STUDY as REFERENCES
+from studies.reference.reference_solves import ReferenceSolve
+from studies.runs.case import Case
+from studies.scene.checks import surface_of
+from studies.scene.scene import Scene
+from studies.store.machine import machine_id
+from studies.sweep.stored.known import Known
+from studies.sweep.tasks import Task
+from studies.timing.cases import BUDGET, REPEATS
+
+SECONDS_PER_UNKNOWN = 2e-3
+"""Of a load path, [s]: the median of 51 reference solutions of the catalogue with 10,832 to 89,683 unknowns, on two
+cores of an AMD EPYC (family 25, model 17) that did other work too; each is within a factor of seven of it."""
+SECONDS_PER_UNKNOWN_STEP = 4e-4
+"""Of a motion, for each time step [s]: a fifth of a load path, which has five checkpoints; not measured."""
+FACTOR, POWER, AT_OUTLINES, AT_CONTACT, HOLLOW = 283.0, 0.606, 1.391, 1.097, 1.088
+"""Unknowns of a mesh of n surface nodes: FACTOR n^POWER, times a factor for each halving at outlines and at contacts,
+and for a wall. Fitted to 24 meshes of the catalogue, whose unknowns it meets within 20 % (one standard deviation)."""
+OCTANT = 28.5
+"""Unknowns of an octant, times the cube of its element size over the radius: 16,482 at 0.12."""
+STEP = {"surface": 0.40, "membrane": 0.40, "tetrahedral": 0.30, "quadratic": 0.23}
+"""Stability limit over size √(rho/mu) / √n of a body with n surface nodes: medians of results/published, as are all
+numbers from here on (426 cases; the organ's size is the diagonal of its box)."""
+STEP_BY_STIFFNESS, HOLLOW_STEP, GRADED_STEP = 1.8, 0.6, 0.7
+"""Factors on the limit: masses by stiffness, a wall, elements that are halved."""
+MICROSECONDS = {"surface": 0.04, "membrane": 0.04, "tetrahedral": 0.06, "quadratic": 0.7}
+"""Of a step, per surface node, with one volume or with one per vertex of a quadratic body."""
+BY_VOLUMES = {"nodal": 0.5, "patches": 0.5, "regions": 0.13}
+"""The same of a tetrahedral body with more volumes."""
+BY_METHOD = {
+    "implicit_elements": 45.0,
+    "implicit_springs": 16.0,
+    "linear_modes": 3.6,
+    "elastic_response": 1.7,
+    "chain_mail": 1.0,
+    "xpbd": 0.5,
+    "element": 0.4,
+}
+"""The same of methods that take longer than the body alone tells."""
+MESH, GRADED_MESH = 3.0, 10.0
+"""Seconds for the mesh and the body of a case."""
+MARGIN = 1.2
+"""Box of an organ over the extent of its surface."""
+
+
+def predicted(task: Task) -> float:
+    """Seconds of a reference solution or a case [s], on the machine of results/published."""
+    return solve_seconds(task.work) if isinstance(task.work, ReferenceSolve) else case_seconds(task.work)
+
+
+def unknowns(solve: ReferenceSolve) -> float:
+    """About how many unknowns a reference solution will have."""
+    plan, scene = solve.scene.reference, solve.scene
+    assert plan is not None  # a reference solution belongs to a plan
+    if plan.mesh == "octant":
+        return OCTANT / solve.level**3
+    outlines, contact = plan.bisections(solve.level)
+    touched = contact if scene.obstacles else 0
+    return FACTOR * solve.level**POWER * AT_OUTLINES**outlines * AT_CONTACT**touched * (HOLLOW if scene.lumen else 1.0)
+
+
+def solve_seconds(solve: ReferenceSolve) -> float:
+    """Of a reference solution."""
+    dt = solve.scene.reference and solve.scene.reference.dt
+    each = SECONDS_PER_UNKNOWN if dt is None else SECONDS_PER_UNKNOWN_STEP * solve.scene.duration / dt
+    return unknowns(solve) * each
+
+
+def case_seconds(case: Case) -> float:
+    """Of a run with its mesh. One whose organ cannot be read fails before its first step."""
+    mesh = GRADED_MESH if case.body.graded else MESH
+    try:
+        return mesh + run_seconds(case)
+    except StudyError:
+        return mesh
+
+
+def timing_seconds(case: Case) -> float:
+    """Of measuring the frame times of a case that runs: none of one whose organ cannot be read."""
+    try:
+        once = run_seconds(case)
+    except StudyError:
+        return 0.0
+    return once * min(max(BUDGET / once, 1.0), REPEATS)
+
+
+def run_seconds(case: Case) -> float:
+    """Of all steps of a run, each at the median cost of its kind. Raises StudyError for an organ that is not read."""
+    scene, body = case.scene, case.body
+    wave = math.sqrt(scene.tissue.shear_modulus * body.stiffness / scene.tissue.density)
+    limit = STEP[body.kind] * organ_size(scene) / math.sqrt(body.nodes) / wave
+    limit *= STEP_BY_STIFFNESS if body.mass == "stiffness" else 1.0
+    limit *= HOLLOW_STEP if scene.lumen is not None and body.kind != "surface" else 1.0
+    limit *= GRADED_STEP if body.graded else 1.0
+    dt = case.dt_fraction * limit if case.dt == "auto" else float(case.dt)
+    steps = max(scene.duration / dt, case.frames or scene.frames)
+    usual = BY_VOLUMES.get(body.volumes, MICROSECONDS[body.kind]) if body.kind == "tetrahedral" else None
+    return 1e-6 * steps * body.nodes * BY_METHOD.get(case.method.name, usual or MICROSECONDS[body.kind])
+
+
+def organ_size(scene: Scene) -> float:
+    """Diagonal of the box around an organ [m]. Raises StudyError."""
+    if scene.organ.shape != "file":
+        return make_shape(scene.organ.shape, scene.organ.parameters).size
+    return MARGIN * float(np.linalg.norm(np.ptp(surface_of(scene.organ, scene.name)[0], axis=0)))
+
+
+def rates(known: Known, tasks: list[Task]) -> dict[str, float]:
+    """Measured over predicted seconds of what this machine has stored: of all references by their unknowns, of the
+    cases of a study; a kind of which nothing is stored is left out."""
+    here, sums = machine_id(), {"case": [0.0, 0.0], "reference": [0.0, 0.0]}
+    for entry in known.folder(REFERENCES).entries.values():
+        if entry.seconds and entry.unknowns and entry.machine == here:
+            sums["reference"][0] += entry.seconds
+            sums["reference"][1] += SECONDS_PER_UNKNOWN * entry.unknowns
+    for task in tasks:
+        entry = known.entry(task)
+        if isinstance(task.work, Case) and entry and entry.seconds and entry.machine == here:
+            sums["case"][0] += entry.seconds
+            sums["case"][1] += predicted(task)
+    return {kind: measured / expected for kind, (measured, expected) in sums.items() if measured > 0}

@@ -1,0 +1,46 @@
+"""Runs of real bodies at rest, whose shape is judged without a simulation."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from massspring import Body
+from studies.metrics.run import Run
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.prepare import prepare
+from studies.scene.scene import Organ, Scene
+from studies.scenes.ball_clamped import BALL_CLAMPED
+from studies.scenes.liver_press import LIVER_PRESS
+from tests.studies import made_up_run
+
+LIVER = BodyRecipe("quadratic", 794, graded=True, mass="stiffness")
+"""The body that was recommended for liver_press when it lacked 26 mm of the left lobe."""
+
+
+def rest_run(scene: Scene, recipe: BodyRecipe, body: Body, rest: np.ndarray | None = None) -> Run:
+    """A run of `body` that stays where it is, at `rest` (n, 3) [m] in place of its own."""
+    points = body.rest if rest is None else rest
+    values = {
+        "rest": points,
+        "snapshots": points[None],
+        "mass": body.mass,
+        "triangles": body.triangles,
+        "tetrahedra": body.tetrahedra,
+    }
+    made = made_up_run.run(values=values, reference=None)
+    return replace(made, case=Case(scene, recipe))
+
+
+def ball_run(body: Body, rest: np.ndarray | None = None, kind: str = "quadratic", radius: float = 0.05) -> Run:
+    """Such a run whose organ is a ball."""
+    scene = replace(BALL_CLAMPED, organ=Organ("ball", {"radius": radius}))
+    return rest_run(scene, BodyRecipe(kind), body, rest)  # pyright: ignore[reportArgumentType]
+
+
+def liver_runs(*stretches: tuple[float, float, float]) -> list[Run]:
+    """The recommended body of the liver, stretched about its middle along each axis."""
+    body = prepare(Case(LIVER_PRESS, LIVER)).setup.body
+    middle = 0.5 * (body.rest.min(axis=0) + body.rest.max(axis=0))
+    return [
+        rest_run(LIVER_PRESS, LIVER, body, middle + np.array(stretch) * (body.rest - middle)) for stretch in stretches
+    ]

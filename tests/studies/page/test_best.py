@@ -1,0 +1,101 @@
+"""The first lines of the page: which body, how wrong, how fast, and the paper's body, from made-up runs."""
+
+from dataclasses import replace
+
+import pytest
+
+from massspring import Free
+from studies.metrics.true_surface import ShapeErrors
+from studies.report.page.best import best_bodies, best_html, joined_best
+from studies.scenes import BALL_CLAMPED, LIVER_PRESS
+from tests.plots.made_up import run
+
+
+def named(made):
+    return f"{made.case.body.kind}-{made.case.body.nodes}-{made.case.method.name}"
+
+
+def lines(best):
+    """The three lines, without markup."""
+    return best_html(best).split("</ul>")[0].replace("</li>", "\n").replace("<strong>", "").replace("</strong>", "")
+
+
+def shaped(made, distance, volume=-0.001):
+    """The run with errors of its shape [1] that are not those of the made-up body."""
+    made.__dict__["shape"] = ShapeErrors(distance, volume)
+    return made
+
+
+def good(scene=LIVER_PRESS, distance=0.003, **options):
+    return shaped(run(scene, **{"error": 0.004, "nodes": 300, "frame_ms": 10.0} | options), distance)
+
+
+def paper(scene=LIVER_PRESS, **options):
+    return shaped(run(scene, "surface", nodes=550, error=0.5, **options), 0.08)
+
+
+def test_a_body_beyond_the_bounds_of_the_shape_is_not_the_best():
+    (best,) = best_bodies([good(distance=0.011, frame_ms=1.0), good(nodes=400)], named)
+    assert best["meets"] and best["case"] == "tetrahedral-400-implicit_volume"
+    (best,) = best_bodies([good(distance=0.011), paper()], named)
+    assert not best["meets"] and best["case"] == "tetrahedral-300-implicit_volume"
+    target = "shape within 1 % of the organ&#x27;s size, its volume within 0.5 %"
+    assert f"No body here meets the target (force within 3 %, displacement within 1 %, {target})" in lines([best])
+    assert "shape off by 1.1 % of the organ&#x27;s size at most." in lines([best])
+    assert "shape off by 8 % of the organ&#x27;s size at most." in lines([best])
+
+
+def test_the_cheapest_body_within_the_target_is_named_beside_the_papers():
+    runs = [
+        paper(frame_ms=5.0),
+        good(frame_ms=40.0, nodes=400),
+        good(),
+        good(method=Free(), nodes=9),
+    ]
+    (best,) = best_bodies(runs, named)
+    assert best["meets"] and best["case"] == "tetrahedral-300-implicit_volume"
+    assert best["paper"]["case"] == "surface-550-implicit_volume"
+    text = lines([best])
+    assert "Which body? In liver press: tetrahedral, 300 nodes. It is the cheapest body within the target" in text
+    assert "(force within 3 %, displacement within 1 %, shape within 1 % of" in text
+    assert "How wrong? Force off by −0 ± 2 %, displacement off by 0 ± 1 % on the mean, shape off by 0.3 % of" in text
+    assert "The paper's body (550 surface nodes, one volume): force off by −50 ± 2 %" in text.replace("&#x27;", "'")
+    # A frame is 0.2 s long and takes 10.2 ms, the median of five repeats that grow by a hundredth each.
+    assert "How fast? 19.6 ± 0.4 s simulated in a second of computing on one core." in text
+
+
+def test_without_a_body_within_the_target_the_nearest_is_named_as_such():
+    best = best_bodies([paper(), good(error=0.2)], named)
+    assert not best[0]["meets"] and best[0]["case"] == "tetrahedral-300-implicit_volume"
+    assert "No body here meets the target" in lines(best) and "misses the target" in best_html(best)
+
+
+def test_several_scenes_are_counted_and_ranges_given():
+    best = best_bodies([good(), good(BALL_CLAMPED), paper(BALL_CLAMPED)], named)
+    text = lines(best)
+    assert "A body meets the target in 2 of 2 scenes: tetrahedral, 300 nodes in 2 scenes." in text
+    best = best_bodies([good(), good(BALL_CLAMPED, error=0.2)], named)
+    assert "in 1 of 2 scenes: tetrahedral, 300 nodes in 1 scene. None meets it in ball clamped;" in lines(best)
+    assert "Force off by 0.4 to 20 %" in lines(best)
+
+
+def test_of_several_studies_the_best_body_counts_and_a_time_of_either():
+    slow, quick = (best_bodies([good(frame_ms=ms, nodes=nodes)], named) for ms, nodes in ((40.0, 300), (10.0, 400)))
+    missed = best_bodies([good(error=0.2, frame_ms=1.0), paper()], named)
+    (row,) = joined_best([slow, missed, quick], [])
+    assert row["case"] == "tetrahedral-400-implicit_volume" and row["paper"]["speed"] is None
+    assert "How fast? 19.6" in lines([row]) and lines([row]).endswith("on one core.\n")
+    rows = [{"case": "surface-550-implicit_volume", "real_time [s/s]": 7.0, "real_time floor [s/s]": 0.5}]
+    assert joined_best([slow, missed, quick], rows)[0]["paper"]["speed"] == [7.0, 0.5]
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        good(with_reference=False),
+        good(method=Free()),
+        replace(good(), record=replace(good().record, status="diverged")),
+    ],
+)
+def test_where_no_error_of_a_body_is_known_none_is_named(made):
+    assert best_bodies([made], named) == [] and "No body can be named yet" in best_html([])

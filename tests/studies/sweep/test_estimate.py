@@ -1,0 +1,110 @@
+"""First runs are estimated: unknowns and seconds predicted before there is a mesh, held to what was published."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.reference.reference_solves import ReferenceSolve, reference_solves
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.current import case_path
+from studies.runs.own import methods_by_name
+from studies.scenes import JUDGED, SCENES, Organ
+from studies.store.machine import machine_id
+from studies.store.record import read_record, write_record
+from studies.sweep.failures import store_failure
+from studies.sweep.plan import plan
+from studies.sweep.stored.estimate import (
+    MESH,
+    SECONDS_PER_UNKNOWN,
+    case_seconds,
+    rates,
+    run_seconds,
+    solve_seconds,
+    timing_seconds,
+    unknowns,
+)
+from studies.sweep.stored.known import Known
+from studies.sweep.tasks import tasks_of
+from tests.studies.tiny import SQUEEZE, tiny_case, tiny_study
+
+PUBLISHED = Path(__file__).parents[3] / "results" / "published"
+
+
+def rows_of(path):
+    with path.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_unknowns_are_predicted_from_the_plan():
+    """Of the finest mesh of every scene of the catalogue, within a factor of 1.6."""
+    scenes = {scene.name: scene for scene in JUDGED}
+    ratios = {
+        row["scene"]: unknowns(ReferenceSolve(scene, scene.reference.levels[-1])) / float(row["unknowns"])
+        for row in rows_of(PUBLISHED / "reference" / "uncertainty.csv")
+        if (scene := scenes.get(row["scene"])) is not None
+    }
+    assert len(ratios) == len(JUDGED) - 1 and all(1 / 1.6 < ratio < 1.6 for ratio in ratios.values()), ratios
+
+
+def published_runs():
+    """(case, seconds of its steps) of every timed row of the table of accuracy whose method has its usual settings."""
+    scenes = {scene.name: scene for scene in SCENES}
+    for row in rows_of(PUBLISHED / "accuracy" / "accuracy.csv"):
+        if row["scene"] not in scenes or not row["step_time [µs]"] or " " in row["method"]:
+            continue
+        body = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(row["recipe"]).get("body", {}).items()}
+        method = methods_by_name()[row["method"]]()
+        case = Case(scenes[row["scene"]], BodyRecipe(**body), method, dt_fraction=float(row["dt/dt_c"]))
+        yield case, float(row["step_time [µs]"]) * 1e-3 * case.scene.duration / float(row["dt [ms]"])
+
+
+def test_seconds_of_runs_are_those_that_were_published():
+    """Half of them within a factor of 1.6, nine in ten within 4, all together within a third."""
+    measured, predicted = np.array([(seconds, run_seconds(case)) for case, seconds in published_runs()]).T
+    off = np.abs(np.log(predicted / measured))
+    assert len(off) > 100 and np.median(off) < np.log(1.6) and np.quantile(off, 0.9) < np.log(4.0)
+    assert predicted.sum() == pytest.approx(measured.sum(), rel=1 / 3)
+
+
+def test_a_reference_costs_by_its_unknowns_and_a_motion_by_its_steps():
+    still, moving = SCENES[3], SCENES[2]
+    for solve in reference_solves(still):
+        assert solve_seconds(solve) == pytest.approx(SECONDS_PER_UNKNOWN * unknowns(solve))
+    slower = replace(moving, duration=2 * moving.duration)
+    assert solve_seconds(ReferenceSolve(slower, 0.5)) == pytest.approx(2 * solve_seconds(ReferenceSolve(moving, 0.5)))
+
+
+def test_rates_are_those_of_this_machine(results):
+    study = tiny_study()
+    tasks = tasks_of(results, [study])
+    measured = rates(Known(results), tasks)["case"]
+    stored = [read_record(task.path()).attributes["seconds"] for task in tasks]
+    assert measured == pytest.approx(sum(stored) / sum(case_seconds(task.work) for task in tasks))
+    path = case_path(results, "tiny", tiny_case())
+    path.unlink()
+    (piece, *_) = plan(results, study)
+    assert piece.here and piece.guess > 0
+    for task in tasks[1:]:
+        write_record(task.path(), replace(read_record(task.path()), machine="0" * len(machine_id())))
+    assert rates(Known(results), tasks) == {}, "what another machine stored says nothing of this one"
+
+
+def test_the_rate_of_references_is_that_of_all_that_this_machine_has_solved(tmp_path):
+    task = tasks_of(tmp_path, [tiny_study(cases=(tiny_case(scene=SCENES[0]),))])[0]
+    path = store_failure(task, "no mesh")
+    assert rates(Known(tmp_path), []) == {}, "what failed at once has no rate"
+    solved = read_record(path)
+    solved = replace(solved, attributes={**solved.attributes, "unknowns": 1000, "seconds": 4.0})
+    write_record(path, solved)
+    assert rates(Known(tmp_path), []) == {"reference": pytest.approx(4.0 / (1000 * SECONDS_PER_UNKNOWN))}
+    write_record(path, replace(solved, machine="0" * len(machine_id())))
+    assert rates(Known(tmp_path), []) == {}, "another machine solved it"
+
+
+def test_an_organ_that_cannot_be_read_fails_at_once():
+    case = tiny_case(scene=replace(SQUEEZE, organ=Organ("file", {"path": "nowhere.stl", "unit": "m"})))
+    assert (case_seconds(case), timing_seconds(case)) == (MESH, 0.0)
