@@ -21,7 +21,7 @@ SCENES = (LIVER_PRESS, LIVER_PROBE, STOMACH_PRESS, STOMACH_PROBE)
 SIZE = 794
 MORE = 8.0
 """Damping [1/s] that the scenes had."""
-EQUILIBRIA = {"liver_press": (-3, 0, 0, 0, 0), "liver_probe": (12, -1, -8, -5, 2)}
+EQUILIBRIA = {"liver_press": (-1.7, -1.0, 1.2, 1.5, 1.8), "liver_probe": (4.5, -1.5, 5.2, 1.4, -1.4)}
 """Scene -> what the force is above the reference at each checkpoint when nothing drags [%]."""
 
 
@@ -78,11 +78,11 @@ def test_the_errors_told_are_the_published_ones():
     assert set(told()) == {scene.name for scene in SCENES}
     for scene in SCENES:
         assert told()[scene.name][0] == pytest.approx(published(scene)[0], abs=0.0501)
-    assert published(LIVER_PRESS, "graded quadratic") == pytest.approx([0.9], abs=0.05)
-    assert published(LIVER_PROBE, nodes=1194) == pytest.approx([2.5], abs=0.05)
+    assert published(LIVER_PRESS, "graded quadratic") == pytest.approx([2.2], abs=0.05)
+    assert published(LIVER_PROBE, nodes=1194) == pytest.approx([2.8], abs=0.05)
     for scene in (LIVER_PRESS, LIVER_PROBE):
         whole, half = published(scene)
-        assert half == pytest.approx(whole, abs=0.1)
+        assert half == pytest.approx(whole, abs=0.2)
 
 
 def coarsest(scene: Scene, root: Path) -> np.ndarray:
@@ -104,7 +104,7 @@ def test_errors_and_drag_are_what_the_table_says(scene, mesh_cache, tmp_path):
     truth, still = coarsest(scene, tmp_path), run(scene, 1.0, 4)[0]
     dragged, slow, (calm, record) = run(scene, MORE)[0], run(scene, MORE, 2)[0], run(scene, scene.damping)
     if scene.name in EQUILIBRIA:
-        assert 100 * (still / truth - 1) == pytest.approx(EQUILIBRIA[scene.name], abs=0.6)
+        assert 100 * (still / truth - 1) == pytest.approx(EQUILIBRIA[scene.name], abs=0.2)
     found = [apart(force, truth) for force in (dragged, calm, still)]
     found += [apart(force, still) for force in (dragged, slow, calm)]
     found += [100 * float(calm[-1] / dragged[-1] - 1), 100 * float(record.attributes["sway"])]
