@@ -26,7 +26,7 @@ def scanned(organ: Organ, name: str) -> tuple[Source, dict[str, Any]]:
     source = Source(**{key: parameters[key] for key in SOURCE_PARAMETERS if key in parameters})
     if "sha256" in parameters and source.sha256 not in (None, parameters["sha256"]):
         raise StudyError(
-            f"scene '{name}': {source.path.name} does not hold what it held when the scene was made; make the scene again"
+            f"scene '{name}': {source.path.name} has changed since the scene was made; make the scene again"
         )
     return source, {key: parameters[key] for key in MADE if key in parameters}
 
