@@ -37,7 +37,7 @@ def run_case(root: Path, study: str, case: Case, on_frame: Callable[[int], objec
     Raises StudyError only when it cannot be stored."""
     path = case_path(root, study, case)
     started = time.perf_counter()
-    with watching(lambda name: None) as watch:
+    with watching() as watch:
         record = measure(case, on_frame)
     seconds = time.perf_counter() - started - watch.seconds
     write_record(path, replace(record, attributes={**record.attributes, "seconds": seconds}))

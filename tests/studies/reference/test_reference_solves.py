@@ -13,7 +13,7 @@ from studies.base.errors import StudyError
 from studies.reference import reference_solves as known
 from studies.reference import solve as module
 from studies.reference.load import load_reference
-from studies.reference.reference_solves import ReferenceSolve, reference_solves, standing_of
+from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.reference.solve import solve
 from studies.report.references import refresh_uncertainty
 from studies.scene.as_json import scene_from_dict, scene_to_json
@@ -88,7 +88,8 @@ def test_settings_are_varied_only_where_they_matter():
 
 
 def listed(root):
-    return [standing_of(root, reference_solve) for reference_solve in reference_solves(SCENE)]
+    known = Known(root)
+    return [known.standing(reference_solve) for reference_solve in reference_solves(SCENE)]
 
 
 def states(root):
