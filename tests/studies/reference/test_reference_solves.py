@@ -108,7 +108,7 @@ def test_listing_says_how_every_piece_stands(solved, tmp_path, monkeypatch):
     assert sorted(unknowns := [row.unknowns for row in whole[:3]]) == unknowns
     assert states(root) == ["ok", "missing", "ok", "ok", "ok", "unreadable"]
     assert [row.unknowns for row in listed(root) if row.state in ("missing", "unreadable")] == [None, None]
-    monkeypatch.setattr(known, "reference_fingerprint", lambda: "other")
+    monkeypatch.setattr("studies.sweep.stored.known.reference_fingerprint", lambda: "other")
     assert states(solved) == ["stale"] * 6
 
 
