@@ -13,10 +13,10 @@ from studies.stress import outcome as module
 from studies.stress.bodies import body_of, mesh_of
 from studies.stress.outcome import UNEXPLAINED, simplest, tried
 from studies.stress.surroundings import setup_of
-from studies.stress.trial import CHOICES, PLAIN, Trial, draw
+from studies.stress.trial import CHOICES, Trial, draw
 from studies.stress.truths import broken, named, other_bits
 
-CALM = Trial(seed=0, number=0, method="implicit_volume", **PLAIN)
+CALM = Trial(seed=0, number=0, method="implicit_volume")
 
 
 def test_a_trial_is_its_seed_and_number():
