@@ -130,6 +130,11 @@ def test_a_failure_is_reduced_to_the_choices_that_matter():
     assert "dt_fraction" in found.trial.changed
 
 
+def test_a_trial_is_made_gentler_choice_by_choice_and_by_halves():
+    trials = replace(CALM, nodes=80, gravity=9.81).gentler()
+    assert [(trial.nodes, trial.gravity) for trial in trials] == [(12, 9.81), (80, 0.0), (36, 9.81)]
+
+
 def test_a_method_that_forgets_the_volume_is_found(monkeypatch):
     """The mutant: implicit_volume that runs as free."""
     monkeypatch.setattr(ImplicitVolume, "advance", lambda self, state, boundary: Free().advance(state, boundary))
