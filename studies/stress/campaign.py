@@ -10,7 +10,8 @@ from tempfile import TemporaryDirectory
 import pandas as pd
 
 from studies.base.interrupts import die_quietly
-from studies.stress.outcome import UNEXPLAINED, Attempt, Drawn, Outcome, tried
+from studies.stress.choices import Choices
+from studies.stress.outcome import UNEXPLAINED, Attempt, Outcome, tried
 from studies.sweep.pool import environment_of_workers
 from studies.sweep.workers import done_or_dead
 
@@ -19,7 +20,7 @@ CHUNK = 25
 
 
 def run_trials(
-    trials: Iterable[Drawn], jobs: int, done: Callable[[Outcome], object], attempt: Attempt = tried
+    trials: Iterable[Choices], jobs: int, done: Callable[[Outcome], object], attempt: Attempt = tried
 ) -> list[Outcome]:
     """What `attempt` made of every trial, in their order; `done` hears of each."""
     trials = list(trials)
@@ -32,7 +33,7 @@ def run_trials(
     return [found[trial.number] for trial in trials]
 
 
-def _each(chunks: list[list[Drawn]], jobs: int, folder: Path, attempt: Attempt) -> Iterator[Outcome]:
+def _each(chunks: list[list[Choices]], jobs: int, folder: Path, attempt: Attempt) -> Iterator[Outcome]:
     """A chunk that ends its process is tried again trial by trial."""
     with closing(done_or_dead(chunks, jobs, partial(try_all, folder, attempt), die_quietly)) as ended:
         for chunk, cause in ended:
@@ -44,12 +45,12 @@ def _each(chunks: list[list[Drawn]], jobs: int, folder: Path, attempt: Attempt) 
                 yield from _each([[trial] for trial in chunk], jobs, folder, attempt)
 
 
-def try_all(folder: Path, attempt: Attempt, trials: list[Drawn]) -> None:
+def try_all(folder: Path, attempt: Attempt, trials: list[Choices]) -> None:
     """In a process: what came of each, left in `folder`."""
     _file(folder, trials).write_bytes(pickle.dumps([attempt(trial) for trial in trials]))
 
 
-def _file(folder: Path, trials: list[Drawn]) -> Path:
+def _file(folder: Path, trials: list[Choices]) -> Path:
     return folder / f"{trials[0].number}-{len(trials)}"
 
 
