@@ -9,8 +9,8 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Chart
-from studies.cli.commands.results import publish as command
-from studies.cli.commands.results import report as report_command
+from studies.cli.commands import publish as command
+from studies.cli.commands import report as report_command
 from studies.report.publish import EXTRAS, PUBLISHED, between, publish, publish_some
 from studies.report.summary import SUMMARIES
 from studies.runs import current as runs
