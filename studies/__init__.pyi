@@ -31,8 +31,8 @@ from .metrics.run import Run as Run
 from .metrics.table import study_table as study_table
 from .runs.case import BodyRecipe as BodyRecipe
 from .runs.case import Case as Case
-from .runs.own import own_law as own_law
 from .runs.run import measure as measure
+from .runs.user_code import own_law as own_law
 from .scene.scene import ForceOutput as ForceOutput
 from .scene.scene import Held as Held
 from .scene.scene import Lumen as Lumen

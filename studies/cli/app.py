@@ -14,7 +14,6 @@ from massspring.errors import MassSpringError
 from reference_fem.errors import SolveError
 from studies.base import interrupts
 from studies.base.errors import StudyError
-from studies.base.study_file import fault_of_study_file
 from studies.cli.loading import Commands
 from studies.cli.terminal import errors, say
 
@@ -73,9 +72,11 @@ def message(error: Exception) -> str:
     """The sentence for an error. Raises an unforeseen error again: a fault of this program keeps its traceback."""
     if isinstance(error, (StudyError, MassSpringError, SolveError)):
         return str(error)
-    own = fault_of_study_file(error)
-    if own is not None:
-        return own
+    from studies.runs.user_code import AGAIN, fault_of  # half a second, for an error alone
+
+    fault = fault_of(error)
+    if fault is not None:
+        return fault + AGAIN
     # An error with a file name is not one of the terminal's.
     if isinstance(error, OSError) and error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF):
         return unwritten(error)

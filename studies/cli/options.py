@@ -9,7 +9,7 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog.study import Study
 from studies.runs.case import BodyRecipe, Case
-from studies.runs.own import methods_by_name
+from studies.runs.user_code import methods_by_name
 from studies.sweep.find_scene import find_scene
 
 MethodName = Annotated[str, typer.Option(help="see `organbench list`")]

@@ -12,8 +12,8 @@ from studies.cli.terminal import say, warn
 from studies.exchange.entry import ENTRY
 from studies.runs.run import own_files_of
 from studies.runs.run import replay as replay_run
+from studies.runs.user_code import load_file
 from studies.store.record import Record, peek
-from studies.sweep.own_files import load_file
 
 
 def replay(

@@ -4,17 +4,15 @@ import json
 
 import pytest
 
-from studies.base import own_file
 from studies.report.page.part import read_part
 from studies.report.results import refresh
-from studies.runs import own
+from studies.runs import user_code
 from studies.runs.current import case_path
-from studies.runs.own import files_of
 from studies.runs.run import measure
+from studies.runs.user_code import files_of, given_files, load_given
 from studies.store.paths import timing_files
 from studies.store.record import Status, read_record
 from studies.sweep.find_study import find_study
-from studies.sweep.own_files import given_files, load_given
 from tests.studies.tiny import tiny_case
 from tests.test_docs import code
 
@@ -24,7 +22,7 @@ EXAMPLE = code("CONTRIBUTING.md", "Keep it in a file of your own")
 @pytest.fixture(autouse=True)
 def alone():
     """Names that another test has given are free again."""
-    own.forget()
+    user_code.forget()
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +59,7 @@ def test_it_runs_and_is_current_and_its_records_name_the_file(organbench, mine, 
     study = find_study(str(mine))
     records = [read_record(case_path(ran, "calm", case)) for case in study.cases]
     assert [record.status for record in records] == [Status.OK] * 3
-    named = {str(mine): own_file.read_own(mine).sha256}
+    named = {str(mine): user_code.read_code(mine).sha256}
     assert [json.loads(record.attributes.get("own_files", "{}")) for record in records] == [{}, named, named]
     assert records[2].attributes["law"] == "bars"
     assert len(timing_files(ran, "calm")) == 1
@@ -79,8 +77,7 @@ def test_its_table_has_its_metric(organbench, mine, ran):
 
 
 EDITS = {
-    "a comment": ("share: float = 0.1", "share: float = 0.1  # a tenth", "3 ok"),
-    "a docstring": ("after each frame a share", "after every frame a share", "3 ok"),
+    "a comment": ("share: float = 0.1", "share: float = 0.1  # a tenth", "1 ok, 2 stale"),
     "the method": ("1.0 - self.share", "1.0 - 0.5 * self.share", "1 ok, 2 stale"),
     "the law": ("1.0 / edges.length,", "1.0 / edges.length**2,", "1 ok, 2 stale"),
     "the scene": ("-1.62", "-1.63", "3 missing"),
@@ -95,12 +92,12 @@ def test_an_edit_makes_stale_what_uses_the_file(organbench, mine, ran, what):
 
 
 def test_an_edit_of_a_module_beside_it_does_too(mine):
-    before = own_file.read_own(mine).fingerprint
+    before = user_code.read_code(mine).fingerprint
     edit(mine, "from typing import ClassVar", "from typing import ClassVar\nfrom helpers import tenth")
     (mine.parent / "helpers.py").write_text("tenth = 0.1\n")
-    with_helper = own_file.read_own(mine).fingerprint
+    with_helper = user_code.read_code(mine).fingerprint
     (mine.parent / "helpers.py").write_text("tenth = 0.2\n")
-    assert len({before, with_helper, own_file.read_own(mine).fingerprint}) == 3
+    assert len({before, with_helper, user_code.read_code(mine).fingerprint}) == 3
 
 
 def test_a_new_chart_or_metric_is_drawn_without_running(organbench, mine, ran):
@@ -130,13 +127,13 @@ def test_lines_of_the_page_name_the_file(mine, ran):
 
 def test_replay_runs_the_file_that_the_user_names(organbench, refused, mine, ran):
     record = case_path(ran, "calm", find_study(str(mine)).cases[2])
-    own.forget()
+    user_code.forget()
     assert f"was made with the program {mine}, and" in (sentence := refused("replay", record))
     assert f"add --file {mine}, or where it is now" in sentence
     code, out, err = organbench("replay", record, "--file", mine)
     assert code == 0 and "the same, bit for bit" in out and not err
     moved = mine.rename(mine.with_name("elsewhere.py"))
-    own.forget()
+    user_code.forget()
     assert "the same, bit for bit" in organbench("replay", record, "--file", moved)[1]
     edit(moved, "1.0 / edges.length,", "1.0 / edges.length**2,")
     code, out, err = organbench("replay", record, "--file", moved)
@@ -146,7 +143,7 @@ def test_replay_runs_the_file_that_the_user_names(organbench, refused, mine, ran
 
 def test_a_view_needs_no_file(organbench, mine, ran, tmp_path):
     find_study(str(mine))
-    own.forget()
+    user_code.forget()
     _, out, err = organbench("view", "ball_on_the_moon", "--results", ran, "-o", tmp_path / "a.vtkhdf")
     assert "3 bodies" in out and not err
 
@@ -199,19 +196,19 @@ def test_a_worker_runs_what_this_process_has_read(mine):
     assert files == ((str(mine), EXAMPLE.encode()),)
     mine.write_text("broken (")
     module = type(case.method).__module__
-    own.forget()
+    user_code.forget()
     load_given(files)
-    assert type(own.methods_by_name()["calm"]()).__module__ == module
+    assert type(user_code.methods_by_name()["calm"]()).__module__ == module
 
 
 def test_compiled_code_is_kept_by_the_state_of_the_kernels(mine, monkeypatch):
     """numba files what it compiles under the name of the module: another kernel, another name."""
-    before = own_file.read_own(mine).module
-    monkeypatch.setattr(own_file, "source_fingerprint", lambda *modules: "edited")
-    assert own_file.read_own(mine).module != before
+    before = user_code.read_code(mine).module
+    monkeypatch.setattr(user_code, "source_fingerprint", lambda *modules: "edited")
+    assert user_code.read_code(mine).module != before
 
 
 def test_a_method_and_a_law_name_their_file_each_alone_and_ours_none(mine):
     calm, ours = find_study(str(mine)).cases[1].method, tiny_case().method
-    named = [own.files_of(method, law) for method in (calm, ours) for law in ("bars", "van_gelder")]
+    named = [user_code.files_of(method, law) for method in (calm, ours) for law in ("bars", "van_gelder")]
     assert [[file.path for file in files] for files in named] == [[mine], [mine], [mine], []]
