@@ -86,6 +86,11 @@ def test_make_alone_lists_the_targets():
         assert re.search(rf"^  {re.escape(target)} +\S", text, re.MULTILINE), target
 
 
+def test_an_old_target_is_refused_with_its_new_name():
+    done = subprocess.run(["make", "-s", "stress"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and done.stderr.startswith("make stress is now make fuzz\n")
+
+
 @pytest.mark.parametrize(("goals", "fast", "all_of_them"), [("check", 1, 0), ("test", 0, 1), ("check test", 0, 1)])
 def test_tests_run_once_also_where_check_and_test_are_asked_for(goals, fast, all_of_them):
     command = ["make", "--dry-run", "--silent", *goals.split()]

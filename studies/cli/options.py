@@ -12,7 +12,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.user_code import methods_by_name
 from studies.sweep.find_scene import find_scene
 
-MethodName = Annotated[str, typer.Option(help="see `organbench list`")]
+MethodName = Annotated[str, typer.Option(help="see `organbench list methods`")]
 BodyKind = Annotated[str, typer.Option(help="tetrahedral, quadratic or surface")]
 SurfaceNodes = Annotated[int, typer.Option(help="surface nodes")]
 SHOWN = 8

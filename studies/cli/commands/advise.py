@@ -17,12 +17,12 @@ from studies.sweep.find_scene import find_scene
 
 def advise(
     scene: SceneName,
-    force: Annotated[str, typer.Option(help="largest error of the last force: 3% or 0.03")] = "",
+    force: Annotated[str, typer.Option(help="largest error of the final force: 3% or 0.03")] = "",
     displacement: Annotated[
-        str, typer.Option(help="largest mean error of the surface over the largest displacement: 1% or 0.01")
+        str, typer.Option(help="largest mean surface error relative to the largest displacement: 1% or 0.01")
     ] = "",
-    budget: Annotated[str, typer.Option(help="computing time per 1 ms of simulated time: 1ms or 250us")] = "",
-    timing: Annotated[bool, typer.Option(help="time the answer here where no time of it is stored")] = True,
+    budget: Annotated[str, typer.Option(help="largest computing time per 1 ms of simulated time: 1ms or 250us")] = "",
+    timing: Annotated[bool, typer.Option(help="measure the recommended body if no timing is stored")] = True,
     results: Results = Path("results"),
 ) -> None:
     """Recommend the cheapest accurate body for a scene, with its measured errors and its cost.

@@ -15,12 +15,12 @@ from studies.sweep.find_study import find_studies
 
 def archive(
     studies: Annotated[
-        list[str] | None, typer.Argument(metavar="STUDY", help="these; all that are stored without")
+        list[str] | None, typer.Argument(metavar="STUDY", help="studies to pack; default: all with stored results")
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="the zip file")] = Path("organbench-results.zip"),
     results: Results = Path("results"),
     checked: Annotated[
-        Path | None, typer.Option("--check", metavar="FILE", help="compare an archive with its checksums; pack nothing")
+        Path | None, typer.Option("--check", metavar="FILE", help="only compare this archive with its checksums")
     ] = None,
 ) -> None:
     """Pack records, tables, charts and code into a zip file. Stale results are refused."""

@@ -22,7 +22,7 @@ BOTH = "both"
 
 
 def calibrate(
-    organ: Annotated[str, typer.Argument(help="an organ (see `organbench list`), or a FILE.json that this wrote")],
+    organ: Annotated[str, typer.Argument(help="an organ, or a FILE.json with a stored calibration to print")],
     body: Annotated[str, typer.Option(help="tetrahedral (one volume), surface (the paper's), or both")] = BOTH,
     nodes: Annotated[int, typer.Option(min=1, help="surface nodes")] = 550,
     jobs: Annotated[int, typer.Option(min=1, help="processes for references and first runs")] = 2,

@@ -22,8 +22,8 @@ HEADS = ("study", "scene", "body, nodes, method", "metric", "old", "new", "chang
 
 def compare(
     old: Annotated[Path, typer.Argument(help="a results folder, such as results/published")],
-    new: Annotated[Path, typer.Argument(help="another one")] = Path("results"),
-    csv: Annotated[Path | None, typer.Option(help="file for every number of every case")] = None,
+    new: Annotated[Path, typer.Argument(help="the other results folder")] = Path("results"),
+    csv: Annotated[Path | None, typer.Option(help="write every number of every case to this file")] = None,
 ) -> None:
     """Compare two results folders number by number.
 

@@ -20,12 +20,12 @@ def doctor(results: Results = Path("results")) -> None:
     for finding in found:
         show(finding)
     faults = sum(finding.level is Level.FAULT for finding in found)
-    say(f"{faults} of {len(found)} need mending" if faults else "nothing that is needed is missing")
+    say(f"{faults} of {len(found)} checks failed" if faults else "nothing required is missing")
     raise typer.Exit(1 if faults else 0)
 
 
 def show(finding: Finding) -> None:
-    """A line, and below it the one that mends it."""
+    """A line, and below it how to repair it."""
     say(f"{finding.level:<6} {finding.said}")
     if finding.mend:
         say(f"       {finding.mend}")

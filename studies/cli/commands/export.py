@@ -16,7 +16,7 @@ from studies.sweep.find_scene import find_scene
 def export(
     scene: SceneName,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="a folder  [default: the name of the scene]")
+        Path | None, typer.Option("-o", "--output", help="folder to write  [default: the name of the scene]")
     ] = None,
     nodes: Annotated[int, typer.Option(help="vertices on the outer surface")] = NODES,
     results: Results = Path("results"),

@@ -32,10 +32,10 @@ CAMPAIGNS: Mapping[bool, tuple[Callable[[int, int], Any], Attempt, Mapping[str, 
 
 
 def fuzz(
-    cases: Annotated[int, typer.Option(min=1, help="how many trials")] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="another seed draws other trials")] = 0,
-    trial: Annotated[int | None, typer.Option(min=0, help="this one alone, and the simplest that ends alike")] = None,
-    reference: Annotated[bool, typer.Option("--reference", help="try the finite-element reference instead")] = False,
+    cases: Annotated[int, typer.Option(min=1, help="number of trials")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the random trials")] = 0,
+    trial: Annotated[int | None, typer.Option(min=0, help="repeat this trial and simplify it")] = None,
+    reference: Annotated[bool, typer.Option("--reference", help="test the finite-element reference instead")] = False,
     jobs: Annotated[int, typer.Option(min=1, help="processes")] = 2,
     results: Results = Path("results"),
 ) -> None:

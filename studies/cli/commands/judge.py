@@ -28,10 +28,10 @@ REVERSED = -100.0
 def judge(
     scene: SceneName,
     file: Annotated[Path, typer.Argument(help="npz, CSV, VTKHDF or PVD file, a folder of VTU files, or a pattern")],
-    name: Annotated[str, typer.Option(help="of the entry in tables and charts; that of the file without")] = "",
+    name: Annotated[str, typer.Option(help="name of the entry in tables and charts; default: the file's name")] = "",
     force: Annotated[Path | None, typer.Option(help="CSV file with the columns t [s] and force [N]")] = None,
     seconds: Annotated[float | None, typer.Option(help="computing time for one simulated second")] = None,
-    nodes: Annotated[int, typer.Option(help="vertices on the outer surface, as exported")] = NODES,
+    nodes: Annotated[int, typer.Option(help="vertices on the outer surface, as in the exported mesh")] = NODES,
     results: Results = Path("results"),
 ) -> None:
     """Judge the results of another program as our own: positions, forces, times. Keep them with our results."""

@@ -23,7 +23,7 @@ KINDS: dict[str, Callable[[], Sequence[tuple[str, str]]]] = {
 """What can be listed: names, each with its line."""
 
 
-def list(kind: Annotated[str, typer.Argument(help=f"one of {', '.join(KINDS)}; all without")] = "") -> None:
+def list(kind: Annotated[str, typer.Argument(help=f"one of {', '.join(KINDS)}; default: all")] = "") -> None:
     """List studies, scenes, organs, methods and metrics."""
     if kind:
         lookup(kind, KINDS, "kind of name")

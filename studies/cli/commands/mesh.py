@@ -9,16 +9,7 @@ import typer
 
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.cli.mesh_files import (
-    LongestSide,
-    Part,
-    Scale,
-    Unit,
-    Yes,
-    settled,
-    source_of,
-    working,
-)
+from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, settled, source_of, working
 from studies.cli.terminal import say
 from studies.geometry import OrganMesh, curved, organ, scan, true_shape_of, vary
 from studies.geometry.files.units import NAMES, check_unit
@@ -33,22 +24,22 @@ NODES = 550
 
 
 def mesh(
-    name: Annotated[str, typer.Argument(help="an organ (see `organbench list`); none with --from")] = "",
+    name: Annotated[str, typer.Argument(help="an organ (see `organbench list organs`); leave it out with --from")] = "",
     source: Annotated[Path | None, typer.Option("--from", help="a file instead: STL, OBJ, VTK, glTF, a mask …")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help=f"{' '.join(VOLUMES + SURFACES)}")] = Path("mesh.vtu"),
-    nodes: Annotated[int | None, typer.Option(help="of the outer surface; a file keeps its own without it")] = None,
-    fill: Annotated[bool | None, typer.Option("--fill/--surface", help="with tetrahedra, or without")] = None,
+    nodes: Annotated[int | None, typer.Option(help="outer nodes; without it a file keeps its own")] = None,
+    fill: Annotated[bool | None, typer.Option("--fill/--surface", help="with tetrahedra, or only the surface")] = None,
     order: Annotated[int, typer.Option(min=1, max=2, help="2: curved elements that follow the true shape")] = 1,
-    wall: Annotated[float | None, typer.Option(help="hollow, with a wall of so many millimetres")] = None,
-    seed: Annotated[int | None, typer.Option(help="a random but plausible variation of the organ")] = None,
-    smooth: Annotated[float, typer.Option(help="close folds, level bumps of so many millimetres (--from)")] = 0.0,
-    solid: Annotated[float | None, typer.Option(help="fill a shell, openings of so many mm closed (--from)")] = None,
-    close_holes: Annotated[bool, typer.Option("--close-holes", help="put flat lids on holes (--from)")] = False,
+    wall: Annotated[float | None, typer.Option(help="wall thickness of a hollow body in mm")] = None,
+    seed: Annotated[int | None, typer.Option(help="seed of a random, plausible variation of the organ")] = None,
+    smooth: Annotated[float, typer.Option(help="close folds and level bumps of this size in mm (--from)")] = 0.0,
+    solid: Annotated[float | None, typer.Option(help="fill a shell, close openings up to so many mm (--from)")] = None,
+    close_holes: Annotated[bool, typer.Option("--close-holes", help="close holes with flat lids (--from)")] = False,
     unit: Unit = None,
     scale: Scale = 1.0,
     longest_side: LongestSide = None,
     part: Part = None,
-    write_unit: Annotated[str, typer.Option(help="of the lengths that are written: m, cm, mm or in")] = "m",
+    write_unit: Annotated[str, typer.Option(help="unit of the written lengths: m, cm, mm or in")] = "m",
     yes: Yes = False,
 ) -> None:
     """Mesh a synthetic organ or a surface in a file, which is welded, oriented, remeshed and filled."""

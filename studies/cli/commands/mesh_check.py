@@ -22,7 +22,7 @@ def mesh_check(
     scale: Scale = 1.0,
     longest_side: LongestSide = None,
     part: Part = None,
-    as_json: Annotated[bool, typer.Option("--json", help="for machines; the keys are in docs/meshes.md")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON (docs/meshes.md lists the keys)")] = False,
     modulus: Annotated[float, typer.Option(help="shear modulus of the tissue \\[Pa], for the time step")] = TISSUE[0],
     density: Annotated[float, typer.Option(help="density of the tissue \\[kg/m³], for the time step")] = TISSUE[1],
     yes: Yes = False,

@@ -17,20 +17,20 @@ SHOWN = 8
 
 
 def prune(
-    studies: Annotated[list[str] | None, typer.Argument(metavar="STUDY", help="of these")] = None,
-    every: Annotated[bool, typer.Option("--all", help="of all studies of `organbench list`")] = False,
-    rules: Annotated[str, typer.Option("--rule", help=f"one or more, with commas: {', '.join(Rule)}")] = "",
-    older: Annotated[float, typer.Option("--older-than", metavar="DAYS", min=0.0, help="spare younger files")] = 0.0,
-    references: Annotated[bool, typer.Option(help="also of the references of their scenes, which cost hours")] = False,
+    studies: Annotated[list[str] | None, typer.Argument(metavar="STUDY", help="the studies to examine")] = None,
+    every: Annotated[bool, typer.Option("--all", help="examine all studies")] = False,
+    rules: Annotated[str, typer.Option("--rule", help=f"rules to apply, separated by commas: {', '.join(Rule)}")] = "",
+    older: Annotated[float, typer.Option("--older-than", metavar="DAYS", min=0.0, help="keep younger files")] = 0.0,
+    references: Annotated[bool, typer.Option(help="also examine their references (hours of computing)")] = False,
     results: Results = Path("results"),
     listed: Annotated[bool, typer.Option("--list", help="name every file")] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="remove them; without, they are only listed")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="remove the files; without it they are only listed")] = False,
 ) -> None:
     """List and remove stored files that nothing needs. Nothing is removed without --rule and --yes."""
     if bool(studies) == every:
-        raise StudyError("name the studies whose files are to be looked at, or give --all")
+        raise StudyError("name the studies whose files are examined, or give --all")
     if yes and not rules:
-        raise StudyError("--yes removes nothing without --rule: name the rules whose files are to go")
+        raise StudyError("--yes removes nothing without --rule: name the rules to apply")
     known = {str(rule): rule for rule in Rule}
     chosen = [lookup(word.strip(), known, "rule") for word in rules.split(",")] if rules else list(Rule)
     found = prunable(results, list(STUDIES) if every else find_studies(studies or []), chosen, older, references)
@@ -42,7 +42,7 @@ def prune(
         gone = remove(found)
         say(f"removed {len(gone)} files, {size(gone)}" + _left(found, gone))
     else:
-        say(f"nothing is removed yet ({size(found)}): --rule with the rules that you mean, and --yes, does")
+        say(f"dry run: {size(found)} could be removed. Repeat with --rule RULE --yes to delete")
 
 
 def show(found: list[Prunable], rule: Rule, listed: bool) -> None:
@@ -64,4 +64,4 @@ def size(found: list[Prunable]) -> str:
 
 def _left(found: list[Prunable], gone: list[Prunable]) -> str:
     left = len(found) - len(gone)
-    return f"; {left} were written anew meanwhile and stay" if left else ""
+    return f"; {left} were rewritten in the meantime and stay" if left else ""

@@ -13,7 +13,7 @@ from studies.sweep.find_study import find_study
 
 def publish(
     studies: Annotated[
-        list[str] | None, typer.Argument(metavar="STUDY", help="these alone, also from a FILE.py; all else stays")
+        list[str] | None, typer.Argument(metavar="STUDY", help="publish only these studies, also from a FILE.py")
     ] = None,
     results: Results = Path("results"),
 ) -> None:
@@ -26,4 +26,4 @@ def publish(
         say(path)
     if absent:
         again = "; ".join(f"{name}: {publishing.EXTRAS[name]}" for name in absent)
-        say(f"not made again, stays as published: {again}")
+        say(f"kept as published: {again}")

@@ -20,7 +20,7 @@ def replay(
     path: Annotated[Path, typer.Argument(help="a results file")],
     file: Annotated[
         list[Path] | None,
-        typer.Option(help="FILE.py that it was made with, which then runs: it is a program, name only one you trust"),
+        typer.Option(help="the FILE.py that made it. It runs as a program: name only a file you trust"),
     ] = None,
 ) -> None:
     """Run one stored case again and compare the results. Exit code 1: they differ.

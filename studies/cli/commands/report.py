@@ -12,9 +12,11 @@ from studies.sweep.find_study import find_study
 
 
 def report(
-    studies: Annotated[list[str] | None, typer.Argument(metavar="STUDY", help="also these, such as FILE.py")] = None,
+    studies: Annotated[
+        list[str] | None, typer.Argument(metavar="STUDY", help="more studies, such as a FILE.py")
+    ] = None,
     results: Results = Path("results"),
-    figures: Annotated[bool, typer.Option(help="also the pictures of organs and of the squeezed ball")] = False,
+    figures: Annotated[bool, typer.Option(help="also draw the organs and the squeezed ball")] = False,
 ) -> None:
     """Draw all charts and tables and write report.html. The files are named."""
     more = [study for study in map(find_study, studies or []) if study not in STUDIES]

@@ -36,9 +36,9 @@ from studies.sweep.tasks import Task, tasks_of
 
 JOBS = 2
 """Processes, where nothing is said."""
-AGAIN = "timing: stored cases are timed again on this machine; nothing else runs"
+AGAIN = "timing: measure the stored cases again on this machine; run nothing else"
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
-GIVEN = f"studies, or a FILE.py with STUDY or SCENE ({PROGRAM}); without: {MAIN_STUDIES}"
+GIVEN = f"studies, or a FILE.py with STUDY or SCENE ({PROGRAM}); default: {MAIN_STUDIES}"
 Wanted = Callable[[Task], bool] | None
 Rule = Callable[[Task, Known], bool]
 
@@ -47,16 +47,16 @@ def run(
     studies: Annotated[list[str] | None, typer.Argument(metavar="STUDY", help=GIVEN)] = None,
     results: Results = Path("results"),
     smoke: Smoke = False,
-    case: Annotated[str, typer.Option(help="this case alone, by (part of) its name; no charts")] = "",
-    only: Annotated[str, typer.Option(help="failed, stale, or both with a comma: nothing else runs")] = "",
+    case: Annotated[str, typer.Option(help="only the case with this name or part of a name; draws no charts")] = "",
+    only: Annotated[str, typer.Option(help="run only cases that are failed, stale, or both (failed,stale)")] = "",
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="processes for the physics; timing always runs alone  [default: 2]")
+        int | None, typer.Option(min=1, help="processes for the physics; timings always run alone  [default: 2]")
     ] = None,
     on: Annotated[str, typer.Option(help=f"{WORDS} (docs/cluster.md)")] = "",
     again: Annotated[str, typer.Option(help=AGAIN)] = "",
-    portable: Annotated[bool, typer.Option(help="results equal on every x86-64 processor; slower")] = False,
-    organs: Annotated[str, typer.Option(help="a folder of surfaces, FOLDER or FOLDER:mm: the studies on these")] = "",
-    dry: Annotated[bool, typer.Option("--dry-run", help="say what would run, why and how long; run nothing")] = False,
+    portable: Annotated[bool, typer.Option(help="the same bits on every x86-64 processor; slower")] = False,
+    organs: Annotated[str, typer.Option(help="run on the surfaces of this folder: FOLDER or FOLDER:mm")] = "",
+    dry: Annotated[bool, typer.Option("--dry-run", help="only print what would run, why, and for how long")] = False,
 ) -> None:
     """Run what is missing or stale, then draw the charts. Interrupt it any time: the same command continues it."""
     if on and jobs is not None:

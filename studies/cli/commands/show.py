@@ -30,7 +30,7 @@ WIDE, NARROW = 120, 70
 
 def show(
     path: Annotated[Path, typer.Argument(help="results/STUDY/CASE.h5, or a study's index results/STUDY/STUDY.h5")],
-    every: Annotated[bool, typer.Option("--all", help="also the case as JSON, and what each field means")] = False,
+    every: Annotated[bool, typer.Option("--all", help="also the case as JSON and the meaning of each field")] = False,
 ) -> None:
     """Show a results file: status, numbers, fields with units."""
     console.print(describe(path, console.width, every))

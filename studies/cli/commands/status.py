@@ -22,11 +22,11 @@ SHOWN = 8
 
 
 def status(
-    study: Annotated[str, typer.Argument(help="one study, with what is not ok; all, in numbers, without")] = "",
+    study: Annotated[str, typer.Argument(help="a study, with its problems; default: all studies, in numbers")] = "",
     results: Results = Path("results"),
     smoke: Smoke = False,
-    every: Annotated[bool, typer.Option("--all", help="name everything that is not ok, and every mesh")] = False,
-    check: Annotated[bool, typer.Option(help="hold every file to its checksums, not only those that changed")] = False,
+    every: Annotated[bool, typer.Option("--all", help="name every problem and every mesh")] = False,
+    check: Annotated[bool, typer.Option(help="verify the checksums of all files, not only changed ones")] = False,
 ) -> None:
     """Count what is ok, failed, stale or missing, and say why. References are listed mesh by mesh."""
     chosen = [find_study(study)] if study else list(STUDIES)

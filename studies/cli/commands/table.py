@@ -29,10 +29,10 @@ SETTINGS = {"law": "law {}", "nodes": "{} nodes", "stiffness": "stiffness {}", "
 def table(
     study: StudyName,
     results: Results = Path("results"),
-    csv: Annotated[Path | None, typer.Option(help="write it there instead of printing it, with all columns")] = None,
-    parquet: Annotated[Path | None, typer.Option(help="the same as Parquet: all digits, typed columns")] = None,
-    metrics: Annotated[str, typer.Option(help="names with commas, instead of the study's own")] = "",
-    every: Annotated[bool, typer.Option("--all", help="all metrics, below one another where they do not fit")] = False,
+    csv: Annotated[Path | None, typer.Option(help="write all columns to this file instead of printing")] = None,
+    parquet: Annotated[Path | None, typer.Option(help="the same as Parquet, with all digits and typed columns")] = None,
+    metrics: Annotated[str, typer.Option(help="separated by commas; default: those of the study")] = "",
+    every: Annotated[bool, typer.Option("--all", help="all metrics, in several blocks where they do not fit")] = False,
 ) -> None:
     """Print one row per case with the metrics of a study. ± is the uncertainty of the reference."""
     entry = find_study(study)
@@ -51,7 +51,7 @@ def table(
                 say(write(path, frame))
         return
     if not rows:
-        say("nothing is stored of it yet: `organbench run` does that")
+        say(f"no results for this study yet; run `organbench run {study}` first")
         return
     draw(rows, chosen, every)
 

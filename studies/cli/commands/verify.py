@@ -7,7 +7,7 @@ import pandas as pd
 import typer
 
 from reference_fem import crosscheck
-from studies.cli.terminal import console
+from studies.cli.terminal import Results, console
 from studies.store.stamps import set_stamp
 from studies.verify.verification import FOLDER, Verdict, run_pack, tolerance, write_kappa, write_verdicts
 
@@ -16,10 +16,8 @@ FAST = "smoke"
 
 
 def verify(
-    fast: Annotated[bool, typer.Option("--fast", help="the half that every change must pass, in a minute")] = False,
-    results: Annotated[
-        Path, typer.Option("--results", envvar="ORGANBENCH_RESULTS", help="folder of the results")
-    ] = Path("results"),
+    fast: Annotated[bool, typer.Option("--fast", help="only the fast half, in a minute")] = False,
+    results: Results = Path("results"),
 ) -> None:
     """Check the reference against known solutions and other codes. Exit code 1: a check failed."""
     verdicts = run_pack(results, fast, show)
@@ -34,7 +32,7 @@ def verify(
         console.print("no second opinion: NGSolve is not installed (pip install organbench[crosscheck])", markup=False)
     count = sum(len(verdict.outcome.checks) for verdict in verdicts)
     failed = [f"{v.oracle.name}: {check.quantity}" for v in verdicts for check in v.failed]
-    console.print(f"{count - len(failed)} of {count} numbers are where they must be", highlight=False)
+    console.print(f"{count - len(failed)} of {count} checks passed", highlight=False)
     if failed:
         console.print("off: " + "; ".join(failed), markup=False, highlight=False)
         raise typer.Exit(1)

@@ -17,9 +17,11 @@ from studies.view.vtkhdf import SUFFIX, check_target, write_grid
 def view(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="SCENE|CASE", help="a scene, also of a FILE.py: all of its cases; or a results file"),
+        typer.Argument(metavar="SCENE|CASE", help="a scene or a FILE.py for all its cases, or a results file"),
     ] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help=f"{SUFFIX}; SCENE{SUFFIX} without")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help=f"{SUFFIX} file  [default: SCENE{SUFFIX}]")
+    ] = None,
     results: Results = Path("results"),
 ) -> None:
     """Write cases and their reference to a file for ParaView. Without an argument: list the cases."""

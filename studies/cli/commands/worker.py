@@ -19,11 +19,11 @@ NO_PAGES = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
 
 
 def worker(
-    scheduler: Annotated[str, typer.Argument(help="address of the scheduler, as tcp://HOST:8786")] = "",
-    file: Annotated[Path | None, typer.Option("--scheduler-file", help="a file that holds it")] = None,
-    processes: Annotated[int, typer.Option(min=1, help="pieces that it does at a time")] = 1,
-    memory: Annotated[float, typer.Option(min=0, help="GB for all of them; 0: its share of the machine's")] = 0,
-    name: Annotated[str, typer.Option(help="name in messages")] = "",
+    scheduler: Annotated[str, typer.Argument(help="address of the scheduler, such as tcp://HOST:8786")] = "",
+    file: Annotated[Path | None, typer.Option("--scheduler-file", help="a file with that address")] = None,
+    processes: Annotated[int, typer.Option(min=1, help="tasks at a time")] = 1,
+    memory: Annotated[float, typer.Option(min=0, help="memory limit in GB for all tasks; 0: the machine's share")] = 0,
+    name: Annotated[str, typer.Option(help="name of this worker in messages")] = "",
 ) -> None:
     """Run tasks for `organbench run --on` until stopped.
 

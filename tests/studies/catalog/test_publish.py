@@ -119,7 +119,7 @@ def test_the_command_publishes_where_it_stands_or_says_one_sentence(current, hom
     monkeypatch.setattr(command, "STUDIES", (HEADLINE,))
     code, out, err = organbench("publish", "--results", current)
     assert (code, err) == (0, "") and str(PUBLISHED / "volume_loss" / "one.png") in out
-    assert "not made again, stays as published: verify: organbench verify; figures: organbench report" in out
+    assert "kept as published: verify: organbench verify; figures: organbench report" in out
     before = shown(home)
     miss(current, monkeypatch)
     code, out, err = organbench("publish", "--results", current)
