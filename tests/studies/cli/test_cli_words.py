@@ -7,7 +7,6 @@ import pytest
 from typer.testing import CliRunner
 
 from massspring import LITERATURE, METHODS
-from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.cli import app as cli
 from studies.cli import commands, outline
@@ -23,13 +22,6 @@ def test_the_outline_is_what_the_modules_say():
     assert outline.studies() == [(s.name, s.question.strip().split("\n")[0]) for s in shown]
     assert outline.methods() == [(m.name, (m.__doc__ or "").strip().split("\n")[0]) for m in (*METHODS, *LITERATURE)]
     assert outline.metrics() == [(m.name, m.description) for m in METRICS]
-
-
-def test_a_registry_of_another_form_is_one_sentence():
-    with pytest.raises(StudyError, match="there is no tuple METHODS"):
-        list(outline._registered("massspring.errors", "METHODS"))
-    with pytest.raises(StudyError, match="no tuple of imported names"):
-        list(outline._registered("studies.metrics.metrics", "METRICS"))
 
 
 @pytest.mark.parametrize("name", COMMANDS)
