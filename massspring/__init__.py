@@ -1,6 +1,6 @@
 """Mass-spring bodies that keep their volume: Jung, Hong, Choi (2005). Knows no file, no plot, no scene.
 
-The public names are those of the stub, `__init__.pyi`; a name loads its module when it is first used.
+The public names are those of the stub, `__init__.pyi`, and the methods; a name loads its module when it is first used.
 """
 
 from importlib import import_module
@@ -8,9 +8,15 @@ from typing import Any
 
 import lazy_loader
 
-_public, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_public, __dir__, _listed = lazy_loader.attach_stub(__name__, __file__)
 
 
 def __getattr__(name: str) -> Any:
-    """A public name, or the version of the installed distribution. Raises AttributeError for any other."""
-    return import_module("importlib.metadata").version("organbench") if name == "__version__" else _public(name)
+    """A public name, `__all__`, or the version of the installed distribution. Raises AttributeError for any other."""
+    if name == "__version__":
+        return import_module("importlib.metadata").version("organbench")
+    if name in _listed or (name.startswith("_") and name != "__all__"):
+        return _public(name)
+    methods = import_module("massspring.methods")
+    others = {method.__name__: method for method in (*methods.METHODS, *methods.LITERATURE)}
+    return sorted({*_listed, *others}) if name == "__all__" else others.get(name) or _public(name)

@@ -94,11 +94,20 @@ def _followed(source: Source) -> Iterator[str]:
             yield _origin(module, name)
 
 
+def _stub(module: str) -> Path:
+    """The file in which a package lists its public names, if it has one."""
+    return (own_file(module) or ROOT).with_suffix(".pyi")
+
+
 def _origin(module: str, name: str) -> str:
     if name and own_file(f"{module}.{name}") is not None:
         return f"{module}.{name}"
     exports = _source(module).exports
     passed_on = exports.get(name, exports.get("*") if name else None)
+    if name and passed_on is None and (stub := _stub(module)).is_file():
+        raise MassSpringError(
+            f"{module} has no public name {name!r}: add it to {stub.name}, or import it from its module"
+        )
     return module if passed_on is None or own_file(passed_on) is None else _origin(passed_on, name)
 
 
@@ -122,7 +131,7 @@ class _Memory:
             self.known = stored if isinstance(stored, dict) and len(stored) < MOST else {}
 
     def get(self, module: str, file: Path) -> Source:
-        content, stub = file.read_bytes(), file.with_suffix(".pyi")
+        content, stub = file.read_bytes(), _stub(module)
         public = stub.read_bytes() if stub.is_file() else b""
         key = hashlib.sha256(f"{VERSION} {module} {file.name}\0".encode() + content + public).hexdigest()
         if key not in self.known:

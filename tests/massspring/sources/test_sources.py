@@ -96,6 +96,15 @@ def statements(tree: ast.Module) -> list[ast.stmt]:
     return found
 
 
+def test_a_name_that_no_stub_lists_is_an_error(checkout):
+    """Else the code behind it would be left out."""
+    (checkout / "studies/__init__.pyi").write_text("from .ask import ask as ask\n")
+    assert fresh("studies.user")
+    (checkout / "studies/user.py").write_text("from studies import asked\n")
+    with pytest.raises(MassSpringError, match="studies has no public name 'asked': add it to"):
+        fresh("studies.user")
+
+
 def faces() -> list[Path]:
     return [file for package in sources.OWN for file in (ROOT / package).rglob("__init__.py")]
 
