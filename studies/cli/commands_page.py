@@ -11,7 +11,7 @@ from studies.cli.terminal import PROGRAM
 
 PAGE = Path(__file__).parents[2] / "docs/commands.md"
 WIDTH, SEVERAL = 120, 3
-"""Columns of the page, and commands that share an option before it is listed once for all of them."""
+"""Columns of the page, and commands that share an option before it is listed once."""
 HEAD = f"""# Commands
 
 `organbench COMMAND --help` prints the same. `python -m studies.cli.commands_page` writes this page. A FILE.py may stand
@@ -23,7 +23,7 @@ def commands_page() -> str:
     commands = {name: loaded(name) for name in COMMANDS}
     described = {name: [_described(one) for one in command.params] for name, command in commands.items()}
     counts = Counter(line for lines in described.values() for line in lines)
-    shared = [line for line, count in counts.items() if count >= SEVERAL and line.startswith("- `-")]
+    shared = [line for line, count in counts.items() if count >= SEVERAL]
     parts, panel = [HEAD], ""
     for name, command in commands.items():
         if COMMANDS[name].panel != panel:
@@ -34,7 +34,7 @@ def commands_page() -> str:
         more = f" Also {', '.join(also)}." if also else ""
         parts.append(_wrapped(f"**`{usage}`** {command.help}{more}"))
         parts.append("\n".join(_wrapped(line) for line in described[name] if line not in shared))
-    parts += ["## Options of several commands", "\n".join(map(_wrapped, shared))]
+    parts += ["## Arguments and options of several commands", "\n".join(map(_wrapped, shared))]
     return "\n\n".join(filter(None, parts)) + "\n"
 
 

@@ -49,6 +49,7 @@ COMMANDS = {
     "judge": Entry(SHARE, "Judge the results of another program as our own.", "scenes"),
     "archive": Entry(SHARE, "Pack records, tables, charts and code into a zip file.", "studies"),
     "publish": Entry(SHARE, "Copy tables and charts to results/published.", "studies"),
+    "restamp": Entry(MAINTAIN, "Keep results after a change of code that moves no number.", "studies"),
     "doctor": Entry(MAINTAIN, "Check this installation, its caches and its results."),
     "prune": Entry(MAINTAIN, "List and remove stored files that nothing needs.", "studies"),
 }
