@@ -27,7 +27,7 @@ meshio.write_points_cells("scan.ply", 1e3 * points, [("triangle", faces.astype(n
 # The doctor names each fault and the option that mends it. Its exit code is 1 where it found something.
 
 # %% language="bash"
-# organbench check scan.ply --unit mm || echo exit code $?
+# organbench mesh-check scan.ply --unit mm || echo exit code $?
 
 # %% [markdown]
 # ## A body of 150 surface nodes

@@ -13,7 +13,6 @@ from rocrate.rocrate import ROCrate
 
 from massspring.sources import ROOT
 from studies.base.errors import StudyError
-from studies.base.face import DISTRIBUTION
 from studies.catalog.study import Study, command_line
 from studies.store.paths import study_folder
 
@@ -92,7 +91,7 @@ def citation_file() -> Path:
     """
     places = [ROOT / CITATION, ROOT.parent / CITATION]
     with suppress(PackageNotFoundError):  # the code of an archive
-        places += [Path(str(file.locate())) for file in distribution(DISTRIBUTION).files or [] if file.name == CITATION]
+        places += [Path(str(file.locate())) for file in distribution("organbench").files or [] if file.name == CITATION]
     for place in places:
         if place.is_file():
             return place

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 class Choices:
     """A trial; the default of each choice is its gentlest value, to which a failure is reduced."""
 
-    COMMAND: ClassVar[str] = "organbench stress"
+    COMMAND: ClassVar[str] = "organbench fuzz"
     seed: int
     number: int
     """Which one of its seed."""

@@ -35,7 +35,7 @@ MOVING_ELEMENTS = "P2/P1", "P2/P0"
 class ReferenceTrial(Choices):
     """A body, an element, a material, a load and how hard to try."""
 
-    COMMAND: ClassVar[str] = "organbench stress --reference"
+    COMMAND: ClassVar[str] = "organbench fuzz --reference"
 
     shape: str = "octant"
     flaw: str = "none"

@@ -7,7 +7,7 @@ import pytest
 
 from massspring import sources
 from massspring.errors import MassSpringError
-from massspring.sources import ROOT, read_source
+from massspring.sources import ROOT, read_source, source_fingerprint
 from tests.massspring.sources.conftest import fresh
 
 EDITS = {
@@ -94,6 +94,22 @@ def statements(tree: ast.Module) -> list[ast.stmt]:
         apart = isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "not TYPE_CHECKING")
         found += node.body if apart else [node]
     return found
+
+
+def test_a_stub_leads_to_the_code_behind_a_name(checkout):
+    (checkout / "studies/__init__.pyi").write_text("from .table import FIVE as FIVE\n")
+    (checkout / "studies/table.py").write_text("FIVE = 5\n")
+    (checkout / "studies/user.py").write_text("from studies import FIVE\n")
+    before = fresh("studies.user")
+    (checkout / "studies/table.py").write_text("FIVE = 6\n")
+    assert fresh("studies.user") != before
+    (checkout / "studies/user.py").write_text("from studies import SIX\n")
+    with pytest.raises(MassSpringError, match="studies has no public name 'SIX': add it to"):
+        fresh("studies.user")
+
+
+def test_the_state_of_all_code_is_known():
+    assert len(source_fingerprint(*sources.own_modules())) == 64
 
 
 def faces() -> list[Path]:
