@@ -22,7 +22,7 @@ ONE = "from tests.studies.tiny import tiny_case, tiny_study\nSTUDY = tiny_study(
 SBATCH = """#!/bin/bash
 for last; do :; done
 cp "$last" {folder}/script
-setsid bash "$last" > {folder}/worker.log 2>&1 &
+setsid bash {folder}/script > {folder}/worker.log 2>&1 &
 echo $! > {folder}/process
 echo "4711;cluster"
 """
