@@ -43,7 +43,9 @@ PROGRAM = """
 import sys
 import studies
 from studies.__main__ import main
+from studies.archive.crate import citation_file
 print(studies.__file__)
+print(citation_file())
 sys.argv = ["organbench", "list"]
 main()
 """
@@ -53,7 +55,7 @@ main()
 def wheel(tmp_path_factory) -> Path:
     """The wheel, built from a copy of the sources without a network."""
     source, target = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+    for name in ("pyproject.toml", "README.md", "LICENSE", "CITATION.cff"):
         shutil.copy(ROOT / name, source)
     for package in PACKAGES:
         name = package.__name__
@@ -89,8 +91,9 @@ def test_the_wheel_runs_from_another_folder(wheel, tmp_path):
     command = [str(home / "bin" / "python"), "-c", PROGRAM]
     done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    where, *lines = done.stdout.splitlines()
+    where, cited, *lines = done.stdout.splitlines()
     assert where == str(place / "studies" / "__init__.py")
+    assert Path(cited).is_relative_to(place) and Path(cited).read_bytes() == (ROOT / "CITATION.cff").read_bytes()
     assert any("volume_loss" in line for line in lines) and any("implicit_volume" in line for line in lines)
 
 

@@ -6,7 +6,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from massspring import METHODS
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.family import true_volume
 from studies.plots.campaigns.recovery import RETURNED
@@ -118,11 +117,6 @@ def test_meshes_and_settings_of_every_reference():
     rows = pd.read_csv(ROOT / PUBLISHED / "reference" / "uncertainty.csv")
     assert {len(levels.split()) for levels in rows["levels"].astype(str)} == {3} and meshes == WORDS[3]
     assert settings == WORDS[len(VARIANTS)]
-
-
-def test_the_number_of_methods():
-    (count,) = said(r"(\w+) methods, from springs alone to XPBD and implicit springs")
-    assert count.lower() == WORDS[len(METHODS)]
 
 
 def test_what_other_programs_reach_on_the_liver():

@@ -3,15 +3,22 @@
 import hashlib
 import json
 from collections.abc import Sequence
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
-from studies.archive.citation import ABSTRACT, AUTHORS, LICENSE
+from rocrate.model import ContextEntity, Entity, File
+from rocrate.rocrate import ROCrate
+
+from massspring.sources import ROOT
+from studies.base.errors import StudyError
+from studies.base.face import DISTRIBUTION
 from studies.catalog.study import Study, command_line
-from studies.store.archived import CRATE
 from studies.store.paths import study_folder
 
-CONTEXT = "https://w3id.org/ro/crate/1.1"
+CRATE_VERSION = "1.1"
+CITATION = "CITATION.cff"
 CODE = "code"
 """Folder with the sources; it is described as a whole."""
 FORMATS = {
@@ -27,26 +34,69 @@ FORMATS = {
     ".txt": "text/plain",
 }
 WORDS = {
-    "CITATION.cff": "How to cite organbench and the paper that it measures",
+    CITATION: "How to cite organbench and the paper that it measures",
     "README.md": "How to look at the archive and to draw its charts again",
     "constraints.txt": "Versions of all packages that the results were made with",
     "kept_volume.csv": "How well each run kept its volumes",
     "machine.json": "Processor, system and versions of the machine that measured",
     "report.html": "The results on one page, without a network",
 }
-Entity = dict[str, Any]
 
 
 def write_crate(folder: Path, studies: Sequence[Study], version: str, day: str) -> None:
-    """Describes all files below a folder; day: of the archive, YYYY-MM-DD."""
+    """Describes all files below a folder; day: of the archive, YYYY-MM-DD. Raises StudyError without CITATION.cff."""
+    about = citation()
+    crate = ROCrate(version=CRATE_VERSION)
+    authors = _add(crate, "#authors", "Organization", name=about["authors"][0]["name"])
+    program = _add(crate, "#organbench", "SoftwareApplication", name=about["title"], softwareVersion=version)
+    page = f"https://spdx.org/licenses/{about['license']}"
+    licence = _add(crate, page, "CreativeWork", name=about["license"], identifier=about["license"])
     files = sorted(path for path in folder.rglob("*") if path.is_file())
-    plain = [path for path in files if path.relative_to(folder).parts[0] != CODE]
-    entities = [_file(folder, path) for path in plain]
-    parts = [*entities, _code(version)]
-    graph = [_descriptor(), _root(studies, day, parts), *parts, _software(version), _authors(), _licence()]
-    graph += [_action(folder, study, entities) for study in studies]
-    text = json.dumps({"@context": f"{CONTEXT}/context", "@graph": graph}, indent=1, ensure_ascii=False)
-    (folder / CRATE).write_text(text + "\n", encoding="utf-8")
+    names = [path.relative_to(folder) for path in files]
+    parts = {name: _file(crate, folder, name) for name in names if name.parts[0] != CODE}
+    crate.add(*parts.values())
+    description = "The three packages that made the results: PYTHONPATH=code python -m studies"
+    crate.add_dataset(
+        dest_path=CODE, properties={"name": f"Sources of organbench {version}", "description": description}
+    )
+    for study in studies:
+        home = study_folder(folder, study.name).relative_to(folder)
+        action = _add(
+            crate,
+            f"#run-{study.name}",
+            "CreateAction",
+            name=command_line("run", [study], elsewhere=True),
+            description=study.question,
+            instrument=program,
+            result=[part for name, part in parts.items() if name.is_relative_to(home)],
+        )
+        crate.root_dataset.append_to("mentions", action)
+    crate.name = f"organbench results: {', '.join(study.name for study in studies)}"
+    crate.description = " ".join([about["abstract"], *(study.question for study in studies)])
+    crate.datePublished, crate.license = day, licence
+    crate.root_dataset["author"] = authors
+    crate.metadata.write(folder)
+
+
+def citation() -> dict[str, Any]:
+    """What CITATION.cff says. Raises StudyError where it is missing."""
+    lines = citation_file().read_text(encoding="utf-8").splitlines()
+    # Each line is "name: JSON", which is YAML.
+    return {name: json.loads(value) for name, _, value in (line.partition(": ") for line in lines)}
+
+
+def citation_file() -> Path:
+    """CITATION.cff of the checkout, of the archive whose code runs, or of the installed package.
+
+    Raises StudyError where it is in none of them.
+    """
+    places = [ROOT / CITATION, ROOT.parent / CITATION]
+    with suppress(PackageNotFoundError):  # the code of an archive
+        places += [Path(str(file.locate())) for file in distribution(DISTRIBUTION).files or [] if file.name == CITATION]
+    for place in places:
+        if place.is_file():
+            return place
+    raise StudyError(f"{CITATION} is missing: install organbench again")
 
 
 def digest(path: Path) -> str:
@@ -55,80 +105,18 @@ def digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _descriptor() -> Entity:
-    return {
-        "@id": CRATE,
-        "@type": "CreativeWork",
-        "conformsTo": {"@id": CONTEXT},
-        "about": {"@id": "./"},
-    }
+def _add(crate: ROCrate, number: str, kind: str, **properties: Any) -> Entity:
+    entity = ContextEntity(crate, number, {"@type": kind, **properties})
+    crate.add(entity)
+    return entity
 
 
-def _root(studies: Sequence[Study], day: str, parts: Sequence[Entity]) -> Entity:
-    names = ", ".join(study.name for study in studies)
-    return {
-        "@id": "./",
-        "@type": "Dataset",
-        "name": f"organbench results: {names}",
-        "description": " ".join([ABSTRACT, *(study.question for study in studies)]),
-        "datePublished": day,
-        "license": {"@id": f"https://spdx.org/licenses/{LICENSE}"},
-        "author": {"@id": "#authors"},
-        "hasPart": [{"@id": part["@id"]} for part in parts],
-        "mentions": [{"@id": _action_id(study)} for study in studies],
-    }
-
-
-def _file(folder: Path, path: Path) -> Entity:
-    name = path.relative_to(folder).as_posix()
-    return {
-        "@id": name,
-        "@type": "File",
-        "name": WORDS.get(name, path.stem),
-        "encodingFormat": FORMATS.get(path.suffix, "application/octet-stream"),
+def _file(crate: ROCrate, folder: Path, name: Path) -> File:
+    path = folder / name
+    properties = {
+        "name": WORDS.get(name.as_posix(), name.stem),
+        "encodingFormat": FORMATS.get(name.suffix, "application/octet-stream"),
         "contentSize": str(path.stat().st_size),
         "sha256": digest(path),
     }
-
-
-def _code(version: str) -> Entity:
-    return {
-        "@id": f"{CODE}/",
-        "@type": "Dataset",
-        "name": f"Sources of organbench {version}",
-        "description": "The three packages that made the results: PYTHONPATH=code python -m studies",
-    }
-
-
-def _software(version: str) -> Entity:
-    return {"@id": "#organbench", "@type": "SoftwareApplication", "name": "organbench", "softwareVersion": version}
-
-
-def _authors() -> Entity:
-    return {"@id": "#authors", "@type": "Organization", "name": AUTHORS}
-
-
-def _licence() -> Entity:
-    return {
-        "@id": f"https://spdx.org/licenses/{LICENSE}",
-        "@type": "CreativeWork",
-        "name": "BSD 3-Clause Licence",
-        "identifier": LICENSE,
-    }
-
-
-def _action_id(study: Study) -> str:
-    return f"#run-{study.name}"
-
-
-def _action(folder: Path, study: Study, files: Sequence[Entity]) -> Entity:
-    """Which files a study's run gave."""
-    home = study_folder(folder, study.name).relative_to(folder).as_posix() + "/"
-    return {
-        "@id": _action_id(study),
-        "@type": "CreateAction",
-        "name": command_line("run", [study], elsewhere=True),
-        "description": study.question,
-        "instrument": {"@id": "#organbench"},
-        "result": [{"@id": file["@id"]} for file in files if file["@id"].startswith(home)],
-    }
+    return File(crate, path, name.as_posix(), properties=properties)

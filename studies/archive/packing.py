@@ -10,8 +10,7 @@ from tempfile import TemporaryDirectory
 
 import studies as package
 from massspring.sources import OWN, ROOT
-from studies.archive.citation import citation
-from studies.archive.crate import CODE, digest, write_crate
+from studies.archive.crate import CITATION, CODE, citation_file, digest, write_crate
 from studies.archive.versions import pins
 from studies.base.atomic import is_there, part_beside
 from studies.base.errors import StudyError
@@ -130,7 +129,7 @@ def describe(stage: Path, studies: Sequence[Study], day: str, extra: Iterable[Pa
         version=version, names=", ".join(names), first=Path(studies[0].word).name or names[0], manifest=MANIFEST
     )
     (stage / "README.md").write_text(page, encoding="utf-8")
-    (stage / "CITATION.cff").write_text(citation(version), encoding="utf-8")
+    bring(citation_file(), stage / CITATION)
     (stage / "constraints.txt").write_text(pins(), encoding="utf-8")
     write_crate(stage, studies, version, day)
     files = sorted(path for path in stage.rglob("*") if path.is_file())

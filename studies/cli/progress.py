@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 
 from rich.console import Console
+from rich.filesize import decimal
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from studies.base.counting import amounts
@@ -154,15 +155,7 @@ def disk(planned: list[Planned], root: Path) -> str:
     more = f" (without {unknown} reference solutions of unknown size)" if unknown else ""
     if stored > free:
         return (
-            f"about {amount(stored)}{more}, more than the {amount(free)} that are free: make room (`organbench prune` "
-            "lists what is not needed), or choose another disk with --results"
+            f"about {decimal(stored)}{more}, more than the {decimal(free)} that are free: make room (`organbench "
+            "prune` lists what is not needed), or choose another disk with --results"
         )
-    return f"about {amount(stored)}{more} will be stored, {amount(free)} are free"
-
-
-def amount(size: float) -> str:
-    """Bytes as people say them: "8.0 MB"."""
-    for unit, limit in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
-        if size >= limit:
-            return f"{size / limit:.1f} {unit}"
-    return f"{size / 1e3:.0f} kB"
+    return f"about {decimal(stored)}{more} will be stored, {decimal(free)} are free"

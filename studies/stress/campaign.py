@@ -7,7 +7,8 @@ from functools import partial
 import pandas as pd
 
 from studies.base.processes import run_each
-from studies.stress.outcome import UNEXPLAINED, Attempt, Drawn, Outcome, tried
+from studies.stress.choices import Choices
+from studies.stress.outcome import UNEXPLAINED, Attempt, Outcome, tried
 from studies.sweep.local import environment
 
 CHUNK = 25
@@ -15,7 +16,7 @@ CHUNK = 25
 
 
 def run_trials(
-    trials: Iterable[Drawn], jobs: int, done: Callable[[Outcome], object], attempt: Attempt = tried
+    trials: Iterable[Choices], jobs: int, done: Callable[[Outcome], object], attempt: Attempt = tried
 ) -> list[Outcome]:
     """What `attempt` made of every trial, in their order; `done` hears of each."""
     trials = list(trials)
@@ -27,7 +28,7 @@ def run_trials(
     return [found[trial.number] for trial in trials]
 
 
-def _each(chunks: list[list[Drawn]], jobs: int, attempt: Attempt) -> Iterator[Outcome]:
+def _each(chunks: list[list[Choices]], jobs: int, attempt: Attempt) -> Iterator[Outcome]:
     """A chunk that ends its process is tried again trial by trial."""
     with closing(run_each(chunks, jobs, partial(try_all, attempt), environment=environment())) as ended:
         for chunk, outcomes, cause in ended:
@@ -39,7 +40,7 @@ def _each(chunks: list[list[Drawn]], jobs: int, attempt: Attempt) -> Iterator[Ou
                 yield from _each([[trial] for trial in chunk], jobs, attempt)
 
 
-def try_all(attempt: Attempt, trials: list[Drawn]) -> list[Outcome]:
+def try_all(attempt: Attempt, trials: list[Choices]) -> list[Outcome]:
     """In a process: what came of each."""
     return [attempt(trial) for trial in trials]
 

@@ -3,14 +3,15 @@
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
-from typing import Any, ClassVar, Protocol
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from massspring import MassSpringError, simulate
 from studies.base.errors import StudyError
+from studies.stress.choices import Choices
 from studies.stress.surroundings import setup_of
-from studies.stress.trial import PLAIN, Trial
+from studies.stress.trial import Trial
 from studies.stress.truths import broken, named, other_bits
 
 UNEXPLAINED = "unexplained"
@@ -18,32 +19,11 @@ SECONDS = 20.0
 """After which a trial is given up."""
 
 
-class Drawn(Protocol):
-    """A trial of any campaign: a dataclass of its choices."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    @property
-    def number(self) -> int:
-        """Which one of its seed."""
-        ...
-
-    @property
-    def line(self) -> str:
-        """The command that repeats it."""
-        ...
-
-    @property
-    def changed(self) -> dict[str, Any]:
-        """The choices that are not the gentlest."""
-        ...
-
-
 @dataclass(frozen=True)
 class Outcome:
     """Of a trial."""
 
-    trial: Drawn
+    trial: Choices
     status: str
     """ "ok", "refused", "diverged", "blocked", "inverted", "drifted", "penetrated", "timed-out", or UNEXPLAINED; of the
     reference "not-converged" too."""
@@ -63,15 +43,19 @@ Attempt = Callable[[Any], Outcome]
 def tried(trial: Trial) -> Outcome:
     """What comes of a trial. Never raises: an error that is not ours is the finding."""
     begun = time.perf_counter()
+    return Outcome(trial, *end_of(lambda: _run(trial), MassSpringError, StudyError), time.perf_counter() - begun)
+
+
+def end_of(run: Callable[[], tuple[str, str]], *refusals: type[Exception]) -> tuple[str, str]:
+    """Status and message of a run; an error that is none of `refusals` is UNEXPLAINED."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            status, message = _run(trial)
-        except (MassSpringError, StudyError) as refused:
-            status, message = "refused", str(refused)
+            return run()
+        except refusals as refused:
+            return "refused", str(refused)
         except Exception as error:  # whatever it is, it has no name
-            status, message = UNEXPLAINED, f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
-    return Outcome(trial, status, message, time.perf_counter() - begun)
+            return UNEXPLAINED, f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
 
 
 def _run(trial: Trial) -> tuple[str, str]:
@@ -83,25 +67,15 @@ def _run(trial: Trial) -> tuple[str, str]:
     return (UNEXPLAINED, wrong) if wrong else named(setup, history)
 
 
-def simplest(outcome: Outcome, most: int = 200, attempt: Attempt = tried, plain: Mapping[str, Any] = PLAIN) -> Outcome:
-    """A trial with as few choices off the gentlest, `plain`, as still ends in that status, tried choice by choice."""
-    found, waiting = outcome, deque(_gentler(outcome.trial, plain))
+def simplest(outcome: Outcome, most: int = 200, attempt: Attempt = tried) -> Outcome:
+    """A trial with as few choices off the gentlest as still ends in that status, tried choice by choice."""
+    found, waiting = outcome, deque(outcome.trial.gentler())
     while waiting and most > 0:
         most -= 1
         simpler = attempt(waiting.popleft())
         if simpler.status == outcome.status and _kind(simpler) == _kind(outcome):
-            found, waiting = simpler, deque(_gentler(simpler.trial, plain))
+            found, waiting = simpler, deque(simpler.trial.gentler())
     return found
-
-
-def _gentler(trial: Drawn, plain: Mapping[str, Any]) -> Iterable[Drawn]:
-    """The trial with one choice more at its gentlest, or half-way there."""
-    for name in trial.changed:
-        yield replace(trial, **{name: plain[name]})
-    for name in ("nodes", "steps"):
-        value = getattr(trial, name)
-        if value > 2 * plain[name]:
-            yield replace(trial, **{name: int(value // 2 // plain["steps"] * plain["steps"] or value // 2)})
 
 
 def _kind(outcome: Outcome) -> str:

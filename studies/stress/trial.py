@@ -1,11 +1,12 @@
 """One trial of the stress campaign: every choice that makes it, drawn from a seed and a number."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from massspring import METHODS, Method
+from studies.stress.choices import Choices
 
 ORGANS = "liver", "kidney"
 LINEAR, QUADRATIC, SURFACE = "tetrahedral", "quadratic", "surface"
@@ -25,30 +26,6 @@ CHOICES: dict[str, tuple[Any, ...]] = {
 """What is drawn evenly; a choice that stands there twice is drawn twice as often."""
 WITHOUT_LENGTH = ("cotangent", "edge_smoothed")
 WITH_LENGTH = tuple(law for law in CHOICES["law"] if law not in WITHOUT_LENGTH)
-PLAIN: dict[str, Any] = {
-    "shape": "cloud",
-    "kind": LINEAR,
-    "law": "van_gelder",
-    "volumes": "whole",
-    "nodes": 12,
-    "steps": 12,
-    "dt_fraction": 0.5,
-    "modulus": 2e3,
-    "heaviest": 1.0,
-    "start": "rest",
-    "target": 1.0,
-    "load": "none",
-    "depth": 0.1,
-    "speed": 0.1,
-    "friction": 0.0,
-    "held": False,
-    "far": 0.0,
-    "gravity": 0.0,
-    "damping": 0.0,
-    "precision": "float64",
-    "threads": 1,
-}
-"""The gentlest value of each choice, to which a failure is reduced."""
 FRAMES = 12
 FEW = 24
 """Steps at most of a method that is stable at any length of them."""
@@ -62,55 +39,43 @@ UNFIT = 0.1
 
 
 @dataclass(frozen=True)
-class Trial:
+class Trial(Choices):
     """A body, a method, a step and a world."""
 
-    seed: int
-    number: int
-    shape: str
-    kind: str
-    law: str
-    volumes: str
-    method: str
-    nodes: int
+    shape: str = "cloud"
+    kind: str = LINEAR
+    law: str = "van_gelder"
+    volumes: str = "whole"
+    method: str = field(kw_only=True)
+    nodes: int = 12
     """About; of a cell four, of an organ on its surface."""
-    steps: int
+    steps: int = 12
     """Of the whole run, in FRAMES frames."""
-    dt_fraction: float
+    dt_fraction: float = 0.5
     """Step over the stability limit of the damped springs."""
-    modulus: float
+    modulus: float = 2e3
     """[Pa]."""
-    heaviest: float
+    heaviest: float = 1.0
     """Largest mass over the smallest, over what the mesh gives."""
-    start: str
-    target: float
+    start: str = "rest"
+    target: float = 1.0
     """Of the volume, over that at rest; it jumps there."""
-    load: str
-    depth: float
+    load: str = "none"
+    depth: float = 0.1
     """Over the body's smallest extent."""
-    speed: float
+    speed: float = 0.1
     """Of the obstacle [m/s]."""
-    friction: float | str
-    held: bool
+    friction: float | str = 0.0
+    held: bool = False
     """The lowest quarter of the body."""
-    far: float
+    far: float = 0.0
     """From the origin [m]."""
-    gravity: float
+    gravity: float = 0.0
     """[m/s²]."""
-    damping: float
+    damping: float = 0.0
     """Over the largest frequency of the springs."""
-    precision: str
-    threads: int
-
-    @property
-    def line(self) -> str:
-        """The command that repeats it."""
-        return f"organbench stress --seed {self.seed} --trial {self.number}"
-
-    @property
-    def changed(self) -> dict[str, Any]:
-        """The choices that are not the gentlest."""
-        return {name: value for name, value in asdict(self).items() if name in PLAIN and value != PLAIN[name]}
+    precision: str = "float64"
+    threads: int = 1
 
 
 def draw(seed: int, number: int) -> Trial:

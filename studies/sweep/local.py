@@ -8,7 +8,7 @@ from pathlib import Path
 
 from numba.core import event
 
-from studies.base.compile_watch import CompileWatch
+from studies.base.compile_watch import EVENT, CompileWatch
 from studies.base.errors import StudyError
 from studies.base.portable import environment as portable_environment
 from studies.base.processes import Tell, run_each
@@ -45,7 +45,7 @@ def do(task: Task) -> Path:
 def begin(files: tuple[Given, ...], tell: Tell) -> None:
     """What every process does first: it loads the user's `files`, and tells what it compiles."""
     load_given(files)
-    event.register("numba:compile", CompileWatch(tell))
+    event.register(EVENT, CompileWatch(tell))
 
 
 def files_for(tasks: Sequence[Task]) -> tuple[Given, ...]:

@@ -1,9 +1,9 @@
 """What frame times say, and what they cannot say: percentiles, missed deadlines, ratios with their spread."""
 
 from dataclasses import dataclass
-from math import comb
 
 import numpy as np
+from scipy.special import bdtr
 
 from studies.base.errors import StudyError
 
@@ -75,11 +75,7 @@ def ratio_with_spread(a: np.ndarray, b: np.ndarray) -> Ratio:
 def _sign_test_rank(n: int) -> tuple[int, float]:
     """The largest k for which (k-th smallest, k-th largest) of n holds the median with CONFIDENCE, else 1; and its
     confidence 1 - 2 P(Binomial(n, 1/2) < k)."""
-    best = (1, 1.0 - 2.0 * 0.5**n)
-    below = 0.5**n
-    for k in range(2, n // 2 + 1):
-        below += comb(n, k - 1) * 0.5**n
-        if 1.0 - 2.0 * below < CONFIDENCE:
-            break
-        best = (k, 1.0 - 2.0 * below)
-    return best
+    ranks = np.arange(1, max(n // 2, 1) + 1)
+    confidence = 1.0 - 2.0 * bdtr(ranks - 1, n, 0.5)
+    rank = max(1, int(np.sum(confidence >= CONFIDENCE)))
+    return rank, float(confidence[rank - 1])

@@ -86,7 +86,7 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
     assert "tiny: 3 cases, 3 timings would run" in out
     assert re.search(r"  3 cases \(missing\): about \d+ s of computing\n", out)
     assert re.search(r"about \d+ s with 2 processes, from the rate of another machine for 3 cases, 3 timings;", out)
-    assert re.search(r"  about \d+ kB will be stored, [\d.]+ [GT]B are free\n", out)
+    assert re.search(r"  about [\d.]+ kB will be stored, [\d.]+ [GT]B are free\n", out)
     stale(results, tiny_case(timed=True))
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--results", results)
     assert re.search(r"  1 case \(the code has changed since\): about \d+ s of computing\n", out)
@@ -96,9 +96,9 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
 
 
 def test_a_disk_without_room_is_told_beforehand(organbench, tiny_file, tmp_path, monkeypatch):
-    monkeypatch.setattr(progress, "free_bytes", lambda folder: 1000.0)
+    monkeypatch.setattr(progress, "free_bytes", lambda folder: 1000)
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--results", tmp_path / "empty")
-    assert code == 0 and re.search(r"about \d+ kB, more than the 1 kB that are free: make room", out)
+    assert code == 0 and re.search(r"about [\d.]+ kB, more than the 1\.0 kB that are free: make room", out)
 
 
 def test_the_room_is_that_of_the_disk_on_which_the_folder_will_lie(tmp_path):
@@ -166,7 +166,7 @@ def test_numba_is_heard_once_for_each_function_that_is_called():
     with watching(heard.append) as watch:
         assert outer(1) == 4
         assert outer(2) == 6
-    assert (heard, watch.names, watch.depth) == (["outer"], ["outer"], 0)
+    assert heard == ["outer"] and len(watch.compiled) == 2
     assert watch.seconds > 0
     outer(1.0)
     assert heard == ["outer"]

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
+from scipy.optimize import isotonic_regression
 
 from studies.metrics.cells import UNRESOLVED_MARK
 from studies.metrics.metric import Metric
@@ -180,16 +181,9 @@ def log_axis(axis: Axis) -> None:
 
 
 def spread_out(heights: np.ndarray, gap: float) -> np.ndarray:
-    """The heights nearest to `heights` (n,), in the same order, at least `gap` apart (as isotonic regression)."""
+    """The heights nearest to `heights` (n,), in the same order, at least `gap` apart."""
     order = np.argsort(heights, kind="stable")
     ladder = gap * np.arange(len(heights))
-    blocks: list[tuple[float, int]] = []
-    for height in heights[order] - ladder:
-        mean, count = float(height), 1
-        while blocks and blocks[-1][0] > mean:
-            before, size = blocks.pop()
-            mean, count = (before * size + mean * count) / (size + count), size + count
-        blocks.append((mean, count))
     placed = np.empty(len(heights))
-    placed[order] = np.repeat([mean for mean, _ in blocks], [count for _, count in blocks]) + ladder
+    placed[order] = isotonic_regression(heights[order] - ladder).x + ladder
     return placed

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from html import escape
 from typing import Any
 
 from studies.advice.words import wish_words
@@ -86,26 +85,16 @@ def _timed(row: Best, speeds: Mapping[str, list[float]]) -> Best:
     return row | {"speed": row["speed"] or speeds.get(row["case"])}
 
 
-def best_html(best: Sequence[Best]) -> str:
-    """Three lines in words, and a row for each scene."""
+def answers(best: Sequence[Best]) -> dict[str, str]:
+    """Three questions and their answers; nothing where no body is judged."""
     if not best:
-        return (
-            "<p>No body can be named yet: that takes a case by implicit_volume and the reference of its scene, which "
-            "<code>organbench run</code> computes.</p>"
-        )
+        return {}
     papers = [row["paper"] for row in best if row["paper"]]
-    lines = {
+    return {
         "Which body?": _which(best),
         "How wrong?": f"{_capital(_errors(best))}.{_beside(_errors(papers))}",
         "How fast?": f"{_capital(_speed(best) or 'no time is measured')}.{_beside(_speed(papers))}",
     }
-    items = "".join(f"<li><strong>{head}</strong> {escape(text)}</li>" for head, text in lines.items())
-    heads = "".join(f'<th scope="col">{head}</th>' for head in HEADS)
-    rows = "".join(_scene_rows(row) for row in best)
-    return (
-        f'<ul class="answer">{items}</ul><div class="scroll" role="region" aria-label="The best body of each scene" '
-        f'tabindex="0"><table class="best"><thead><tr>{heads}</tr></thead>{rows}</table></div>'
-    )
 
 
 def _which(best: Sequence[Best]) -> str:
@@ -162,15 +151,15 @@ def _span(rows: Sequence[Best], name: str) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _scene_rows(row: Best) -> str:
-    """The name of a scene, its body, and the paper's."""
-    mark = "" if row["meets"] else ' <span class="entry">misses the target</span>'
-    scene = f'<tr><th scope="rowgroup" colspan="{len(HEADS)}">{escape(readable(row["scene"]))}</th></tr>'
-    paper = f'<tr class="soft">{_cells(row["paper"], " (the paper’s)")}</tr>' if row["paper"] else ""
-    return f"<tbody>{scene}<tr>{_cells(row, mark)}</tr>{paper}</tbody>"
+def scene_rows(best: Sequence[Best]) -> list[dict[str, Any]]:
+    """Of each scene its name, its body, and the paper's."""
+    return [
+        {"scene": readable(row["scene"]), "meets": row["meets"], "best": _cells(row)}
+        | {"paper": _cells(row["paper"]) if row["paper"] else None}
+        for row in best
+    ]
 
 
-def _cells(row: Best, mark: str) -> str:
+def _cells(row: Best) -> dict[str, Any]:
     numbers = [value_cell(*row[name], signed=name == "force") if row[name] else MISSING for name in NUMBERS]
-    link = f'<a href="#case={escape(row["case"])}">{escape(row["body"])}</a>{mark}'
-    return f"<td>{link}</td>" + "".join(f'<td class="number">{number}</td>' for number in numbers)
+    return {"case": row["case"], "body": row["body"], "numbers": numbers}

@@ -9,19 +9,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from string import Template
 from typing import Any
 
 import pandas as pd
+from markupsafe import Markup
 
 from studies.base.atomic import write_whole
 from studies.base.counting import counted
 from studies.base.errors import StudyError
-from studies.catalog.study import Study
-from studies.report.page.best import best_html, joined_best
+from studies.catalog.study import Study, command_line
+from studies.report.page.best import HEADS, answers, joined_best, scene_rows
 from studies.report.page.case_data import merged
 from studies.report.page.findings import findings
-from studies.report.page.markup import again_html, charts_html, findings_html, script_json, table_html
+from studies.report.page.markup import ASSETS, TEMPLATES, machine_words, script_json, table, tabs
 from studies.report.page.part import Part, other_studies, part_path, read_part
 
 Parts = list[tuple[Study, Part]]
@@ -31,7 +31,6 @@ LIMIT = 3_000_000
 """Bytes of the page; its folder may hold as many cases as there are."""
 DETAILS = ("histories", "reference", "replay", "why")
 """What a case keeps in a file of its own where the page has no room for it."""
-ASSETS = Path(__file__).parent / "assets"
 SCRIPTS = (
     "data.js",
     "table.js",
@@ -165,22 +164,30 @@ def page(parts: Parts, given: Mapping[str, Any], machine: dict[str, Any]) -> byt
     tables = {study.name: part["rows"] for study, part in parts}
     names = [study.name for study, _ in parts]
     script = "\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)
-    text = Template((ASSETS / "page.html").read_text(encoding="utf-8")).substitute(
-        style=(ASSETS / "page.css").read_text(encoding="utf-8"),
+    studies = [study for study, _ in parts]
+    best = joined_best([part["best"] for _, part in parts], shown)
+    text = TEMPLATES.get_template("page.html").render(
+        style=Markup((ASSETS / "page.css").read_text(encoding="utf-8")),
         summary=f"{_counted(shown)} of {counted(len(parts), 'study', 'studies')}: {', '.join(names)}. "
         "Volume-preserving mass-spring organs against nearly incompressible finite elements.",
-        best=best_html(joined_best([part["best"] for _, part in parts], shown)),
-        findings=findings_html(findings(tables)),
-        charts=charts_html(
+        answers=answers(best),
+        best_heads=HEADS,
+        best_rows=scene_rows(best),
+        findings=findings(tables),
+        tabs=tabs(
             {study.name: part["charts"] for study, part in parts},
-            {study.name: " ".join(study.question.split()) for study, _ in parts},
+            {study.name: " ".join(study.question.split()) for study in studies},
         ),
-        table=table_html(shown, given["cases"]),
+        cases=table(shown, given["cases"]),
         count=counted(len(shown), "case"),
         csv=base64.b64encode(csv_of(rows).encode()).decode("ascii"),
-        again=again_html([study for study, _ in parts], machine),
-        data=script_json(given),
-        script=script,
+        commands=[
+            command_line("run", studies, elsewhere=True),
+            command_line("report", [study for study in studies if study.word], elsewhere=True),
+        ],
+        machine=machine_words(machine),
+        data=Markup(script_json(given)),
+        script=Markup(script),
         digest=base64.b64encode(sha256(script.encode()).digest()).decode("ascii"),
     )
     return text.encode()

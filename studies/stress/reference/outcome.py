@@ -1,7 +1,6 @@
 """How a trial of the reference ends: ok, or a failure with a name; everything else is unexplained."""
 
 import time
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -11,7 +10,7 @@ from reference_fem.dynamics.motion_path import check_element, motion_path
 from reference_fem.system.saddle_point import System
 from reference_fem.system.state import State
 from studies.base.errors import StudyError
-from studies.stress.outcome import UNEXPLAINED, Outcome
+from studies.stress.outcome import UNEXPLAINED, Outcome, end_of
 from studies.stress.reference.surroundings import Task, task_of
 from studies.stress.reference.trial import ReferenceTrial
 from studies.stress.reference.truths import broken, corner_ratio
@@ -57,12 +56,7 @@ class ReferenceOutcome(Outcome):
 def tried(trial: ReferenceTrial, seconds: float = SECONDS) -> ReferenceOutcome:
     """What comes of a trial. Never raises: an error that is not ours is the finding."""
     begun, reached = time.process_time(), Reached()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            status, message = _run(trial, _clock(begun + seconds), reached)
-        except Exception as error:  # whatever it is, it has no name
-            status, message = UNEXPLAINED, f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+    status, message = end_of(lambda: _run(trial, _clock(begun + seconds), reached))
     return ReferenceOutcome(trial, status, message, time.process_time() - begun, reached)
 
 

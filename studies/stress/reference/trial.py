@@ -1,11 +1,12 @@
 """One trial of the reference: every choice that makes it, drawn from a seed and a number."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from reference_fem import ELEMENTS
+from studies.stress.choices import Choices
 from studies.stress.trial import ORGANS, UNFIT
 
 OBSTACLES = "plane", "sphere", "capsule"
@@ -25,81 +26,47 @@ CHOICES: dict[str, tuple[Any, ...]] = {
 }
 """What is drawn evenly; a choice that stands there twice is drawn twice as often."""
 FLAWS = "inside_out", "open", "unused", "not_finite", "flat", "loose"
-PLAIN: dict[str, Any] = {
-    "shape": "octant",
-    "flaw": "none",
-    "bend": 0.0,
-    "nodes": 8,
-    "element": "P2/P1",
-    "law": "neo_hookean",
-    "mu": 2e3,
-    "bulk": 1e3,
-    "load": "none",
-    "slip": "frictionless",
-    "depth": 0.1,
-    "gravity": 0.0,
-    "steps": 1,
-    "force_tol": 1e-6,
-    "volume_tol": 1e-8,
-    "penetration_tol": 3e-4,
-    "penalty": 1500.0,
-    "iterations": 25,
-    "smallest_step": 1.0 / 64.0,
-    "solver": "scipy",
-    "speed": 0.0,
-}
-"""The gentlest value of each choice, to which a failure is reduced."""
 FLAWED, ONE_ORGAN_IN, MOVING = 0.08, 40, 0.12
 MOVING_ELEMENTS = "P2/P1", "P2/P0"
 """Those that motions have; others are left in few trials, and refused."""
 
 
 @dataclass(frozen=True)
-class ReferenceTrial:
+class ReferenceTrial(Choices):
     """A body, an element, a material, a load and how hard to try."""
 
-    seed: int
-    number: int
-    shape: str
-    flaw: str
+    COMMAND: ClassVar[str] = "organbench stress --reference"
+
+    shape: str = "octant"
+    flaw: str = "none"
     """What is wrong with the mesh; of "loose", with what holds it."""
-    bend: float
+    bend: float = 0.0
     """How far mid-side nodes of the surface are moved, over the length of their edge; 0: straight as drawn."""
-    nodes: int
+    nodes: int = 8
     """Vertices, about; of an organ on its surface."""
-    element: str
-    law: str
-    mu: float
+    element: str = "P2/P1"
+    law: str = "neo_hookean"
+    mu: float = 2e3
     """[Pa]."""
-    bulk: float
+    bulk: float = 1e3
     """kappa / mu."""
-    load: str
-    slip: str
-    depth: float
+    load: str = "none"
+    slip: str = "frictionless"
+    depth: float = 0.1
     """Over the body's height; of a lumen, how far it is filled: 0.9 is three times its volume, or a pressure of mu."""
-    gravity: float
+    gravity: float = 0.0
     """[m/s²]."""
-    steps: int
+    steps: int = 1
     """Wanted times."""
-    force_tol: float
-    volume_tol: float
-    penetration_tol: float
-    penalty: float
-    iterations: int
-    smallest_step: float
-    solver: str
-    speed: float
+    force_tol: float = 1e-6
+    volume_tol: float = 1e-8
+    penetration_tol: float = 3e-4
+    penalty: float = 1500.0
+    iterations: int = 25
+    smallest_step: float = 1.0 / 64.0
+    solver: str = "scipy"
+    speed: float = 0.0
     """Size of the body over the time that the load takes, over the speed of shear waves; 0: a path of rest."""
-
-    @property
-    def line(self) -> str:
-        """The command that repeats it."""
-        return f"organbench stress --reference --seed {self.seed} --trial {self.number}"
-
-    @property
-    def changed(self) -> dict[str, Any]:
-        """The choices that are not the gentlest."""
-        return {name: value for name, value in asdict(self).items() if name in PLAIN and value != PLAIN[name]}
 
 
 def draw(seed: int, number: int) -> ReferenceTrial:

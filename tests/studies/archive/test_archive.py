@@ -11,11 +11,13 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pandas as pd
+import pytest
 
+from studies.archive import crate
 from studies.archive.checking import check
-from studies.archive.citation import citation
 from studies.archive.packing import chosen, pack
 from studies.archive.versions import pins
+from studies.base.errors import StudyError
 from studies.exchange.entry import ENTRY, entry_path, outside
 from studies.report.results import draw_charts, refresh
 from studies.runs.current import case_path
@@ -146,8 +148,27 @@ def test_the_versions_are_those_installed():
     assert not any(line.startswith("pytest==") for line in lines)
 
 
-def test_the_repository_is_cited_as_its_archives():
-    assert (ROOT / "CITATION.cff").read_text(encoding="utf-8") == citation(version("organbench"))
+def test_an_archive_is_cited_as_the_repository(unpacked):
+    file = ROOT / "CITATION.cff"
+    assert (unpacked / "CITATION.cff").read_bytes() == file.read_bytes()
+    cited, entities = crate.citation(), json.loads((unpacked / archived.CRATE).read_text())["@graph"]
+    assert cited["version"] == version("organbench")
+    (root,) = (entity for entity in entities if entity["@id"] == "./")
+    assert root["description"].startswith(cited["abstract"])
+    assert root["license"] == {"@id": f"https://spdx.org/licenses/{cited['license']}"}
+
+
+def test_the_citation_is_found_next_to_the_code_of_an_archive(tmp_path, monkeypatch):
+    monkeypatch.setattr(crate, "ROOT", tmp_path / "code")
+    (tmp_path / "CITATION.cff").write_text("")
+    assert crate.citation_file() == tmp_path / "CITATION.cff"
+
+
+def test_a_missing_citation_is_one_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr(crate, "ROOT", tmp_path / "code")
+    monkeypatch.setattr(crate, "DISTRIBUTION", "not-installed")
+    with pytest.raises(StudyError, match=r"CITATION\.cff is missing: install organbench again"):
+        crate.citation()
 
 
 def test_charts_are_drawn_into_the_folder_that_is_named(packed, tmp_path):

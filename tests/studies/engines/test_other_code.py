@@ -39,7 +39,7 @@ def file(tmp_path_factory):
 
 
 @contextmanager
-def running(words, folder, path=ROOT):
+def running(words, folder, path: "Path | str" = ROOT):
     """A program, with the packages below `path`, until the end."""
     environment = {**os.environ, "PYTHONPATH": str(path)}
     with open(folder / "log", "ab") as log:

@@ -218,6 +218,20 @@ def test_what_has_no_room_in_the_page_lies_beside_it(kept, page, tmp_path, monke
     assert inside["pieces"] | loaded == whole["pieces"] and not set(inside["pieces"]) & set(loaded)
 
 
+def test_a_page_says_what_it_lacks_and_which_body_misses_the_target(kept):
+    parts = [(study, read_part(kept[0], study)) for study in kept[1]]
+    given = {"cases": {}}
+    bare = module.page([(study, part | {"best": [], "charts": [], "rows": []}) for study, part in parts], given, {})
+    for sentence in ("No body can be named yet", "None yet: nothing that a finding", "No charts yet."):
+        assert sentence in bare.decode()
+    number = [1.0, 0.1]
+    row = {"scene": NASTY, "target": "any", "meets": False, "order": [0.0], "body": "ball, 9, 1", "case": "0"}
+    row |= {"force": number, "displacement": number, "shape": None, "speed": None, "paper": None}
+    missed = module.page([(study, part | {"best": [row]}) for study, part in parts], given, {}).decode()
+    assert "misses the target</span>" in missed and NASTY not in missed and Parsed(missed).wrong == []
+    assert "misses the target</span>" not in bare.decode()
+
+
 def test_without_results_there_is_no_page(tmp_path):
     assert write_page(tmp_path, [tiny_study()]) == (None, []) and not (tmp_path / "report.html").exists()
 
@@ -269,9 +283,7 @@ def test_commands_name_the_file_of_an_own_study(kept, tmp_path):
     path, _ = write_page(root, [own, kept[1][1]])
     assert path is not None
     text = path.read_text(encoding="utf-8")
-    assert (
-        "organbench run &#x27;my rod.py&#x27; frame_rate" in text and "organbench report &#x27;my rod.py&#x27;" in text
-    )
+    assert "organbench run &#39;my rod.py&#39; frame_rate" in text and "organbench report &#39;my rod.py&#39;" in text
     runs = [case["run"] for case in data_of(text)["cases"].values() if "entry" not in case]
     assert len(runs) == len(losses()) and all(run.startswith("organbench run 'my rod.py' --case ") for run in runs)
 

@@ -15,10 +15,10 @@ from studies.stress.reference import outcome as module
 from studies.stress.reference.outcome import Reached, tried
 from studies.stress.reference.surroundings import task_of
 from studies.stress.reference.table import counts_by_choice, last_states
-from studies.stress.reference.trial import CHOICES, FLAWS, PLAIN, ReferenceTrial, draw
+from studies.stress.reference.trial import CHOICES, FLAWS, ReferenceTrial, draw
 from studies.stress.reference.truths import at_rest, broken, corner_ratio
 
-CALM = ReferenceTrial(seed=0, number=0, **{**PLAIN, "nodes": 7})
+CALM = ReferenceTrial(seed=0, number=0, nodes=7)
 PRESSED = replace(CALM, load="plane", depth=0.1, gravity=9.81, steps=2)
 
 
@@ -141,7 +141,7 @@ def test_corners_turned_inside_out_are_seen(pressed):
 
 def test_a_failure_is_reduced_to_the_choices_that_matter():
     noisy = replace(CALM, flaw="unused", law="mooney_rivlin", bulk=3e4, steps=4, load="plane", gravity=9.81)
-    assert set(simplest(tried(noisy), attempt=tried, plain=PLAIN).trial.changed) <= {"flaw", "nodes"}
+    assert set(simplest(tried(noisy), attempt=tried).trial.changed) <= {"flaw", "nodes"}
 
 
 def test_counts_and_last_states_are_stored():

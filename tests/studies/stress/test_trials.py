@@ -13,10 +13,10 @@ from studies.stress import outcome as module
 from studies.stress.bodies import body_of, mesh_of
 from studies.stress.outcome import UNEXPLAINED, simplest, tried
 from studies.stress.surroundings import setup_of
-from studies.stress.trial import CHOICES, PLAIN, Trial, draw
+from studies.stress.trial import CHOICES, Trial, draw
 from studies.stress.truths import broken, named, other_bits
 
-CALM = Trial(seed=0, number=0, method="implicit_volume", **PLAIN)
+CALM = Trial(seed=0, number=0, method="implicit_volume")
 
 
 def test_a_trial_is_its_seed_and_number():
@@ -128,6 +128,11 @@ def test_a_failure_is_reduced_to_the_choices_that_matter():
         "nodes",
     }
     assert "dt_fraction" in found.trial.changed
+
+
+def test_a_trial_is_made_gentler_choice_by_choice_and_by_halves():
+    trials = replace(CALM, nodes=80, gravity=9.81).gentler()
+    assert [(trial.nodes, trial.gravity) for trial in trials] == [(12, 9.81), (80, 0.0), (36, 9.81)]
 
 
 def test_a_method_that_forgets_the_volume_is_found(monkeypatch):

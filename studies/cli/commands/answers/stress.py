@@ -18,17 +18,16 @@ from studies.stress.campaign import counts, run_trials, table_of
 from studies.stress.outcome import UNEXPLAINED, Attempt, Outcome, simplest, tried
 from studies.stress.reference.outcome import tried as try_reference
 from studies.stress.reference.table import counts_by_choice, last_states
-from studies.stress.reference.trial import PLAIN as GENTLE
 from studies.stress.reference.trial import draw as draw_reference
-from studies.stress.trial import PLAIN, draw
+from studies.stress.trial import draw
 
 FOLDER, REFERENCE, TRIALS, LAST = "breaking", "breaking_reference", "trials.csv.gz", "last.npz"
 WHAT = "trials"
-CAMPAIGNS: Mapping[bool, tuple[Callable[[int, int], Any], Attempt, Mapping[str, Any]]] = {
-    False: (draw, tried, PLAIN),
-    True: (draw_reference, try_reference, GENTLE),
+CAMPAIGNS: Mapping[bool, tuple[Callable[[int, int], Any], Attempt]] = {
+    False: (draw, tried),
+    True: (draw_reference, try_reference),
 }
-"""Whether the reference is tried: how a trial is drawn and tried, and its gentlest choices."""
+"""Whether the reference is tried: how a trial is drawn and tried."""
 
 
 def stress(
@@ -40,11 +39,11 @@ def stress(
     results: Results = Path("results"),
 ) -> None:
     """Tries to break every method with random bodies and surroundings (exit code 1: an end without a name)."""
-    make, attempt, plain = CAMPAIGNS[reference]
+    make, attempt = CAMPAIGNS[reference]
     if trial is not None:
         found = [attempt(make(seed, trial))]
         tell(found[0])
-        say(f"simplest: {simplest(found[0], attempt=attempt, plain=plain).trial.changed}")
+        say(f"simplest: {simplest(found[0], attempt=attempt).trial.changed}")
     else:
         with TerminalProgress(errors) as progress:
             progress.begin(WHAT, cases)
