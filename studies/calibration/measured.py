@@ -1,7 +1,6 @@
 """The runs that a calibration rests on: made once, stored with the others, read back where they are current."""
 
 from collections.abc import Iterable
-from contextlib import nullcontext
 from pathlib import Path
 
 from studies.base.errors import StudyError
@@ -15,8 +14,9 @@ from studies.runs.current import case_path, why_case_is_stale
 from studies.runs.run import run_case
 from studies.scene.scene import Scene
 from studies.store.record import read_record
-from studies.sweep.engine import Progress, Told
-from studies.sweep.pool import perform, told_by_workers
+from studies.sweep.executor import Progress, Told, perform
+from studies.sweep.failures import store_failure
+from studies.sweep.local import Local
 from studies.sweep.run_studies import check_writable
 from studies.sweep.tasks import Task
 
@@ -28,11 +28,10 @@ def pending(root: Path, scenes: Iterable[Scene], start: BodyRecipe) -> list[Task
     return sorted((task for task in tasks if not task.is_current()), key=lambda task: -task.weight)
 
 
-def bring_up_to_date(tasks: list[Task], root: Path, jobs: int, progress: Progress, on_compile: Told | None) -> None:
+def bring_up_to_date(tasks: list[Task], root: Path, jobs: int, progress: Progress, on_compile: Told) -> None:
     """Does them in `jobs` processes. Raises StudyError when results cannot be written."""
     check_writable(root)
-    with told_by_workers(on_compile) if on_compile is not None else nullcontext() as writer:
-        perform(tasks, jobs, progress, writer=writer)
+    perform(Local(jobs), tasks, progress, on_compile, store_failure)
 
 
 class Measurements:

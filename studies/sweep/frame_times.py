@@ -8,7 +8,7 @@ from studies.catalog.study import Study
 from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.store.archived import check_no_archive
-from studies.sweep.engine import Progress, Told
+from studies.sweep.executor import Progress, Told
 from studies.sweep.stored.known import Known
 from studies.timing.alone import alone
 from studies.timing.cases import time_cases

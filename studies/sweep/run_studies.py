@@ -7,9 +7,9 @@ from pathlib import Path
 from studies.base.atomic import write_whole
 from studies.catalog.study import Study
 from studies.store.archived import check_no_archive
-from studies.sweep.engine import Engine, Progress, Told
+from studies.sweep.executor import Executor, Progress, Told, perform
 from studies.sweep.failures import Failures
-from studies.sweep.pool import Pool
+from studies.sweep.local import Local
 from studies.sweep.stored.known import Known
 from studies.sweep.tasks import Task, tasks_of
 
@@ -17,7 +17,7 @@ from studies.sweep.tasks import Task, tasks_of
 def run_studies(
     root: Path,
     studies: list[Study],
-    jobs: int | Engine,
+    jobs: int | Executor,
     progress: Progress,
     wanted: Callable[[Task], bool] | None = None,
     on_compile: Told = lambda name: None,
@@ -25,26 +25,27 @@ def run_studies(
 ) -> int:
     """Brings the studies up to date below `root`; the number of pieces that had to run.
 
-    `jobs`: so many processes of this machine, or an engine. `wanted` replaces the rule "what is not current".
+    `jobs`: so many processes of this machine, or an executor. `wanted` replaces the rule "what is not current".
     `on_compile` hears what is being compiled, from any thread. `failures` hears of pieces whose process died, which are
     stored as failed, and of those that do not run because a folder lies in the place of their file. Another command may
     work on the same folder. Raises StudyError when results cannot be written, and for a root that is an archive.
     """
     check_no_archive(root)
     root = root.absolute()
-    engine, known = Pool(jobs) if isinstance(jobs, int) else jobs, Known(root)
+    executor, known = Local(jobs) if isinstance(jobs, int) else jobs, Known(root)
 
     def stale(task: Task) -> bool:
-        return known.why_stale(task) is not None or (engine.portable and not known.is_portable(task))
+        return known.why_stale(task) is not None or (executor.portable and not known.is_portable(task))
 
     rule = wanted or stale
     todo = [replace(task, seen=task.state()) for task in tasks_of(root, studies) if rule(task)]
     failures = failures or Failures()
     if todo:
         check_writable(root)
-        engine.perform([task for task in todo if failures.can_store(task)], progress, on_compile, failures.add)
+        storable = [task for task in todo if failures.can_store(task)]
+        perform(executor, storable, progress, on_compile, failures.add)
     among = None if wanted is None else {task.path() for task in todo}
-    measured = sum(engine.measure(root, study, progress, on_compile, among) for study in studies)
+    measured = sum(executor.measure(root, study, progress, on_compile, among) for study in studies)
     return len(todo) + measured
 
 

@@ -5,12 +5,14 @@ import os
 import shutil
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from studies.base.errors import StudyError
+from studies.sweep.find_study import find_study
 from studies.sweep.run_studies import run_studies
 from tests.studies.engines.conftest import address_in, engine_at
 from tests.studies.tiny import Silent, tiny_study
@@ -37,7 +39,7 @@ def file(tmp_path_factory):
 
 
 @contextmanager
-def running(words, folder, path=ROOT):
+def running(words, folder, path: "Path | str" = ROOT):
     """A program, with the packages below `path`, until the end."""
     environment = {**os.environ, "PYTHONPATH": str(path)}
     with open(folder / "log", "ab") as log:
@@ -57,21 +59,83 @@ def refusal(file, folder):
     return str(stop.value)
 
 
-@pytest.mark.slow
-def test_a_worker_with_other_code_is_refused_by_name(file, tmp_path):
+@pytest.fixture
+def other_code(tmp_path):
+    """A folder with the packages, one of which is edited."""
     for package in PACKAGES:
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
     with open(tmp_path / "massspring" / "run" / "simulation.py", "a") as source:
-        source.write("\nMENDED = True\n")
-    words = ["--scheduler-file", str(file), "--name", "another"]
-    with running([sys.executable, "-m", "studies", "worker", *words], tmp_path, tmp_path):
-        said = refusal(file, tmp_path)
-    assert said.startswith("worker another has other code of organbench; install the same version there")
+        source.write("\nEDITED = True\n")
+    return tmp_path
 
 
-@pytest.mark.slow
+def worker(file, name):
+    return [sys.executable, "-m", "studies", "worker", "--scheduler-file", str(file), "--name", name]
+
+
+@pytest.mark.campaign
+def test_a_worker_with_other_code_is_refused_by_name(file, other_code):
+    with running(worker(file, "another"), other_code, other_code):
+        said = refusal(file, other_code)
+    assert said.startswith("worker another differs in the code of organbench; put the same version there")
+
+
+WAITS = """
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from massspring import Free
+from tests.studies.tiny import tiny_case, tiny_study
+
+
+@dataclass(frozen=True)
+class Waits(Free):
+    name: ClassVar[str] = "waits"
+    file: str = ""
+
+    def advance(self, state, boundary):
+        until = time.monotonic() + 120
+        while not Path(self.file).exists() and time.monotonic() < until:
+            time.sleep(0.05)
+        return super().advance(state, boundary)
+
+
+FILES = ("", *2 * [str(Path(__file__).with_name("go-on"))])
+STUDY = tiny_study(cases=tuple(tiny_case(method=Waits(file=f), dt_fraction=0.4 + k / 20) for k, f in enumerate(FILES)))
+"""
+"""A study whose cases but the first, which is the longest, wait for a file."""
+
+
+@pytest.mark.campaign
+def test_a_worker_that_joins_later_with_other_code_gets_nothing(file, other_code, tmp_path_factory, monkeypatch):
+    here, said = tmp_path_factory.mktemp("here"), []
+    (here / "waits.py").write_text(WAITS)
+    study = find_study(str(here / "waits.py"))
+
+    def heard(text, stacklevel):
+        said.append(text)
+        (here / "go-on").touch()
+
+    class Follower(Silent):
+        def advance(self, what, note):
+            super().advance(what, note)
+            if len(self.done) == 1:
+                later.enter_context(running(worker(file, "late"), other_code, f"{other_code}:{ROOT}"))
+
+    monkeypatch.setattr("studies.engines.cluster.warnings", SimpleNamespace(warn=heard))
+    address = json.loads(file.read_text())["address"]
+    with running(worker(file, "good"), here), engine_at(address, 60.0) as one, ExitStack() as later:
+        run_studies(here / "results", [study], one, Follower())
+    fault = "differs in the code of organbench; put the same version there, and start the worker again"
+    assert said == [f"worker late {fault}; it gets no job"]
+    assert len(list((here / "results" / "tiny").iterdir())) == 3
+
+
+@pytest.mark.campaign
 def test_a_worker_without_organbench_is_refused_by_name(file, tmp_path):
     words = ["--scheduler-file", str(file), "--name", "bare", "--no-dashboard", "--no-nanny"]
     with running([sys.executable, "-c", WITHOUT, *words], tmp_path):
         said = refusal(file, tmp_path)
-    assert said.startswith("worker bare has no organbench that can be loaded (")
+    assert said.startswith("worker bare has no organbench that can be loaded;")
