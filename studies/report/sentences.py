@@ -178,7 +178,7 @@ def laws(published: Path) -> str:
     nodal = rows[(rows["body"] == NODAL) & (rows["law"] == "cotangent")].sort_values("nodes").iloc[-1]
     return (
         f"**Which stiffness law, how many volumes** (`make study-laws`, [chart](../results/published/laws/laws.png)): "
-        f"with one volume the force of a filled ball is {_range(short)} % too small under every law. A volume per node "
+        f"with one volume the force of a filled ball is {_range(short)} % too small under any law. One volume per node "
         f"with cotangent springs brings it within {nodal['force_error [%]']:.1f} % at {nodal['nodes']} surface nodes."
     )
 
