@@ -112,7 +112,9 @@ FOREIGN = ("anew", "of before", "mend", "mends", "mended", "beside", "told", "un
 """Words that a reader of today stumbles over, and one-word-per-thing: "next to", "repair", "inverted", "target"."""
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if p.name not in (HISTORY, QUOTED)] + NOTEBOOKS, ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page", [p for p in PAGES if p.name not in (HISTORY, QUOTED)] + NOTEBOOKS, ids=lambda page: page.name
+)
 def test_words_are_plain(page):
     text = " ".join(
         re.sub(r"<!-- (\w+): begin -->.*?<!-- \1: end -->|`[^`]*`", "", read(page), flags=re.DOTALL).split()

@@ -2,8 +2,8 @@
 # # First steps
 #
 # A ball of 5 cm is squeezed between two plates by 30 % of its diameter: once with springs alone, once with its volume
-# kept by one Lagrange multiplier. A *scene* is what happens to an organ, a *body* is particles, springs and volumes, and
-# a *method* advances them in time. The three together are a *case*; `measure` runs it.
+# kept by one Lagrange multiplier. A *scene* is what happens to an organ, a *body* is particles, springs and volumes,
+# and a *method* advances them in time. The three together are a *case*; `measure` runs it.
 
 # %%
 import matplotlib.pyplot as plt

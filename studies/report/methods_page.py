@@ -40,8 +40,8 @@ OTHERS = """
 ## Others of the literature
 
 `LITERATURE`: alternatives to the methods above, which do not make the same claims
-([theory](theory.md#14-others-of-the-literature)). *Keeps* and *stable* as above. They run in the same scenes against the
-same reference. The study `literature` runs them in every scene; a case that a method cannot do is skipped with the
+([theory](theory.md#14-others-of-the-literature)). *Keeps* and *stable* as above. They run in the same scenes against
+the same reference. The study `literature` runs them in every scene; a case that a method cannot do is skipped with the
 reason.
 """
 AROUND: Mapping[str, Surroundings] = {

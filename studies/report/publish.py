@@ -54,7 +54,7 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
     copies = _copy(sources, root, target)
     kept = {*absent, *APART} - {study.name for study in studies}
     _remove([file for file in _files(target) if file.relative_to(target).parts[0] not in kept], copies)
-    show_sentences(home)
+    show_sentences(studies, home)
     return copies, absent
 
 
@@ -79,7 +79,7 @@ def publish_some(root: Path, studies: Sequence[Study], home: Path) -> list[Path]
             write_machine(target / study.name / "machine.json")
             copies.append(target / study.name / "machine.json")
     _remove([file for study in studies for file in _files(target / study.name)], copies)
-    show_sentences(home)
+    show_sentences(studies, home)
     return copies
 
 
@@ -110,12 +110,13 @@ def show_summaries(root: Path, studies: Sequence[Study], home: Path) -> None:
         write_whole(page, text.encode())
 
 
-def show_sentences(home: Path) -> None:
-    """Puts the findings in words, read off the published tables, between their marks in the pages below `home`.
+def show_sentences(studies: Sequence[Study], home: Path) -> None:
+    """Puts the findings that concern these studies between their marks in the pages below `home`.
 
-    Raises StudyError where a table, a page or its marks are missing.
+    They read the published tables. Raises StudyError where a table, a page or its marks are missing.
     """
-    for sentences in SENTENCES:
+    names = {study.name for study in studies}
+    for sentences in (each for each in SENTENCES if names & set(each.studies)):
         page = home / sentences.page
         text = between(_read(page), sentences.marks, sentences.written(home / PUBLISHED), page)
         write_whole(page, text.encode())

@@ -1,9 +1,11 @@
 """Findings in words: every number is read off the tables in results/published, and publishing writes them again."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import mean
 from textwrap import fill
+from typing import Any
 
 import pandas as pd
 
@@ -17,6 +19,10 @@ from studies.plots.campaigns.recovery import RETURNED
 
 WIDTH = 120
 """Columns of a page."""
+Row = dict[str, Any]
+"""Name of a column -> its value."""
+FORCE, VOLUME, STEP, SPEED = "force_end [%]", "volume_worst [%]", "step_time [µs]", "real_time [s/s]"
+OURS = "implicit_volume"
 NODAL = "tetrahedral, nodal volumes"
 SECOND_LOOK = 0.25
 """Steps over the stability limit up to here are for a second look, not for the comparison [1]."""
@@ -37,6 +43,8 @@ class Sentences:
     """Below the folder of README.md."""
     name: str
     """In the marks."""
+    studies: tuple[str, ...]
+    """Whose tables it reads."""
     text: Callable[[Path], list[str]]
     """Folder of the published tables -> one paragraph per finding."""
 
@@ -51,12 +59,17 @@ class Sentences:
         return "\n".join(fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False) for text in points)
 
 
-def table(published: Path, study: str) -> pd.DataFrame:
-    """The published table of a study. Raises StudyError where it is missing."""
+def table(published: Path, study: str) -> list[Row]:
+    """The rows of the published table of a study. Raises StudyError where it is missing."""
     path = published / study / f"{study}.csv"
     if not path.is_file():
         raise StudyError(f"there is no table {path} to read the findings from; `organbench publish {study}` writes it")
-    return pd.read_csv(path)
+    return [{str(name): value for name, value in row.items()} for row in pd.read_csv(path).to_dict("records")]
+
+
+def column(rows: Iterable[Row], name: str) -> list[float]:
+    """The known values of a column."""
+    return [float(row[name]) for row in rows if row[name] == row[name]]
 
 
 def headline(published: Path) -> list[str]:
@@ -77,28 +90,29 @@ def answers(published: Path) -> list[str]:
 
 def constraint(published: Path) -> str:
     """What the constraint keeps, and what it costs."""
-    rows = table(published, "volume_loss")
-    rows = rows[rows["dt/dt_c"] > SECOND_LOOK]
-    lost = rows.groupby("method")["volume_worst [%]"].max()
-    times = table(published, "frame_rate").pivot(
-        index=["scene", "body", "nodes"], columns="method", values="step_time [µs]"
-    )
-    more = 100 * (times["implicit_volume"] / times["free"] - 1)
+    rows = [row for row in table(published, "volume_loss") if row["dt/dt_c"] > SECOND_LOOK]
+    lost = {name: max(column((row for row in rows if row["method"] == name), VOLUME)) for name in (OURS, "free")}
+    times = {
+        (row["scene"], row["body"], row["nodes"], row["method"]): row[STEP] for row in table(published, "frame_rate")
+    }
+    more = [100 * (time / times[*key, "free"] - 1) for (*key, method), time in times.items() if method == OURS]
     return (
         f"**The constraint keeps the volume and costs little.** With it the volume is never more than "
-        f"{lost['implicit_volume']:.6f} % off; springs alone lose up to {lost['free']:.0f} %. A step takes "
-        f"{more.min():.0f} to {more.max():.0f} % longer ([frame times](results/published/frame_rate/cost_ratio.png))."
+        f"{lost[OURS]:.6f} % off; springs alone lose up to {lost['free']:.0f} %. A step takes "
+        f"{_range(more)} % longer ([frame times](results/published/frame_rate/cost_ratio.png))."
     )
 
 
 def one_volume(published: Path) -> str:
     """How far one kept volume is from the force."""
-    rows = table(published, "volume_loss")
-    rows = rows[(rows["dt/dt_c"] > SECOND_LOOK) & (rows["method"] == "implicit_volume")]
-    short = {body: -rows.loc[rows["body"] == body, "force_end [%]"] for body in ("tetrahedral", "surface")}
+    rows = [row for row in table(published, "volume_loss") if row["dt/dt_c"] > SECOND_LOOK and row["method"] == OURS]
+    filled, surface = (
+        [-force for force in column((row for row in rows if row["body"] == body), FORCE)]
+        for body in ("tetrahedral", "surface")
+    )
     return (
         f"**The volume alone does not make the force right.** With one kept volume, the force of the filled bodies is "
-        f"{_range(short['tetrahedral'])} % too small, that of the paper's surface bodies {_range(short['surface'])} % "
+        f"{_range(filled)} % too small, that of the paper's surface bodies {_range(surface)} % "
         f"([forces](results/published/volume_loss/force.png))."
     )
 
@@ -141,41 +155,48 @@ def _why_not(one: Judged, wish: Wish) -> str:
 
 def other_programs(published: Path, up: str = "") -> str:
     """What MuJoCo, FElupe, Newton and PyBullet reach on the pressed liver; up: from the page to README's folder."""
-    rows = table(published, "peers")
-    rows = rows[(rows["scene"] == "liver_press") & ~rows["method"].str.contains("half_step")]
-    method, off = rows["method"], rows["force_end [%]"].abs()
-    felupe, ours = method.eq("felupe"), method.eq("implicit_volume") & rows["body"].eq("quadratic")
-    linear = method.isin(["mujoco", "newton", "bullet"])
-    speed = [rows.loc[which].sort_values("nodes")["real_time [s/s]"].to_numpy() for which in (ours, felupe)]
+    rows = [row for row in table(published, "peers") if row["scene"] == "liver_press"]
+    ours = [row for row in rows if row["method"] == OURS and row["body"] == "quadratic"]
+    felupe = [row for row in rows if row["method"] == "felupe"]
+    linear = [row for row in rows if row["method"] in ("mujoco", "newton", "bullet")]
+    speeds = {name: {row["nodes"]: row[SPEED] for row in of} for name, of in (("ours", ours), ("theirs", felupe))}
+    off, off_felupe, off_linear = ([abs(force) for force in column(of, FORCE)] for of in (ours, felupe, linear))
+    faster = mean(speed / speeds["theirs"][nodes] for nodes, speed in speeds["ours"].items())
     return (
         f"**Implicit elements are more accurate and slower.** On the pressed liver FElupe's quadratic elements are "
-        f"{_range(off[felupe], 1)} % off in force. Our uniform quadratic bodies are {_range(off[ours])} % off and "
-        f"{(speed[0] / speed[1]).mean():.0f} times as fast. MuJoCo, Newton and PyBullet, on linear tetrahedra, are "
-        f"{_range(off[linear])} % off ([other programs]({up}results/published/peers/peers.png))."
+        f"{_range(off_felupe, 1)} % off in force. Our uniform quadratic bodies are {_range(off)} % off and "
+        f"{faster:.0f} times as fast. MuJoCo, Newton and PyBullet, on linear tetrahedra, are "
+        f"{_range(off_linear)} % off ([other programs]({up}results/published/peers/peers.png))."
     )
 
 
 def ways(published: Path) -> str:
     """How alike the methods are that keep one volume, and how stiff one volume per tetrahedron is."""
-    rows = table(published, "methods")
-    rows = rows[(rows["body"] == "tetrahedral") & (rows["dt [ms]"] < LONGEST_STEP)]
-    one, apart = (rows[rows["method"].isin(names)] for names in (TOGETHER, APART))
-    spread = one.groupby("scene")["force_end [%]"].agg(lambda errors: errors.max() - errors.min()).max()
-    step, volume = one["step_time [µs]"], one["volume_worst [%]"]
+    rows = [
+        row for row in table(published, "methods") if row["body"] == "tetrahedral" and row["dt [ms]"] < LONGEST_STEP
+    ]
+    together = [row for row in rows if row["method"] in TOGETHER]
+    apart = column((row for row in rows if row["method"] in APART), FORCE)
+    forces = [column((row for row in together if row["scene"] == name), FORCE) for name in {r["scene"] for r in rows}]
+    spread = max(max(force) - min(force) for force in forces)
+    count = len({row["method"] for row in together})
+    step, volume = column(together, STEP), column(together, VOLUME)
     return (
         f"**Which way to keep a volume** (`make study-methods`, [chart](../results/published/methods/methods.png)): "
-        f"all {one['method'].nunique()} methods that keep *one* volume give the same force within {spread:.1f} %. They "
-        f"differ in cost, {plain(step.min())} to {plain(step.max())} µs a step, and in the volume error, "
-        f"{volume.min():.0e} to {volume.max():.1f} %. One volume per tetrahedron locks: the force is "
-        f"{_range(apart['force_end [%]'])} % too large."
+        f"all {count} methods that keep *one* volume give the same force within {spread:.1f} %. They "
+        f"differ in cost, {plain(min(step))} to {plain(max(step))} µs a step, and in the volume error, "
+        f"{min(volume):.0e} to {max(volume):.1f} %. One volume per tetrahedron locks: the force is "
+        f"{_range(apart)} % too large."
     )
 
 
 def laws(published: Path) -> str:
     """What stiffness laws and nodal volumes are worth."""
     rows = table(published, "laws")
-    short = -rows.loc[rows["body"] == "tetrahedral", "force_end [%]"]
-    nodal = rows[(rows["body"] == NODAL) & (rows["law"] == "cotangent")].sort_values("nodes").iloc[-1]
+    short = [-force for force in column((row for row in rows if row["body"] == "tetrahedral"), FORCE)]
+    nodal = max(
+        (row for row in rows if (row["body"], row["law"]) == (NODAL, "cotangent")), key=lambda row: row["nodes"]
+    )
     return (
         f"**Which stiffness law, how many volumes** (`make study-laws`, [chart](../results/published/laws/laws.png)): "
         f"with one volume the force of a filled ball is {_range(short)} % too small under any law. One volume per node "
@@ -186,44 +207,52 @@ def laws(published: Path) -> str:
 def literature(published: Path) -> str:
     """How fast and how far off the methods are that keep no volume by a constraint."""
     rows = table(published, "literature")
-    response = rows[rows["method"] == "elastic_response"]
-    linear = rows[rows["method"].isin(["elastic_response", "linear_modes"]) & (rows["scene"] != "ball_clamped")]
-    held = response[response["scene"] == "ball_clamped"].iloc[0]
+    (held,) = (row for row in rows if (row["method"], row["scene"]) == ("elastic_response", "ball_clamped"))
+    linear = [row for row in rows if row["method"] in ("elastic_response", "linear_modes")]
+    turning = column((row for row in linear if row["scene"] != "ball_clamped"), FORCE)
     return (
         f"**What else the literature offers** (`make study-literature`, "
         f"[chart](../results/published/literature/literature.png)): angular springs, chain mail, linear modes and a "
         f"precomputed elastic response. Where the organ hardly turns, the precomputed response is the best value: on "
         f"ball_clamped its force is {held['force_end [%]']:.0f} % off at {held['real_time [s/s]']:.0f} times real "
-        f"time. Where the organ turns, both linear methods miss the force by {_range(linear['force_end [%]'])} %."
+        f"time. Where the organ turns, both linear methods miss the force by {_range(turning)} %."
     )
 
 
 def starts(published: Path) -> str:
     """From which distorted starts a ball recovers its rest shape."""
     rows = table(published, "stress")
-    count = rows["scene"].nunique()
-    recovers = rows["method"].str.contains("recovers")
-    back = rows["rest_distance [%]"] < RETURNED
-    one = rows["body"].eq("tetrahedral")
+    scenes = {row["scene"]: row["scene"].removeprefix("stress_") for row in rows}
 
-    def recovered(which: pd.Series) -> int:
-        """Starts from which every body and law of these rows comes back."""
-        return int(back[which].groupby(rows["scene"]).all().sum())
+    def lost(body: str, chosen: Callable[[str], bool]) -> list[str]:
+        """Starts from which a body does not come back by these methods, under one law or another."""
+        return sorted(
+            {
+                scenes[row["scene"]]
+                for row in rows
+                if row["body"] == body and chosen(row["method"]) and not row["rest_distance [%]"] < RETURNED
+            }
+        )
 
-    keeps = one & rows["method"].eq("implicit_volume")
-    lost = ", ".join(name.removeprefix("stress_") for name in rows.loc[keeps & ~back, "scene"])
+    one, none = lost("tetrahedral", OURS.__eq__), lost("tetrahedral", "free".__eq__)
+    nodal, helped = lost(NODAL, OURS.__eq__), lost(NODAL, lambda method: "recovers" in method)
+    count = len(scenes)
     return (
         f"**From which distorted starts a ball recovers** (`make study-stress`, "
-        f"[chart](../results/published/stress/recovery.png)): with one volume from {recovered(keeps)} of {count} (not "
-        f"from: {lost}), with springs alone from {recovered(one & rows['method'].eq('free'))}, with nodal volumes from "
-        f"{recovered(rows['body'].eq(NODAL) & ~recovers)}, and from {recovered(rows['body'].eq(NODAL) & recovers)} "
-        f"with `ImplicitVolume(recovers=True)` ([theory](theory.md), section 8)."
+        f"[chart](../results/published/stress/recovery.png)): with one volume from {count - len(one)} of {count} (not "
+        f"from: {', '.join(one)}), with springs alone from {count - len(none)}, with nodal volumes from "
+        f"{count - len(nodal)}, and from {count - len(helped)} with `ImplicitVolume(recovers=True)` "
+        f"([theory](theory.md), section 8)."
     )
 
 
-def _range(values: pd.Series, digits: int = 0) -> str:
-    """Smallest and largest known value in words."""
-    return f"{values.min():.{digits}f} to {values.max():.{digits}f}".replace("-", MINUS)
+def _range(values: Iterable[float], digits: int = 0) -> str:
+    """Smallest and largest value in words."""
+    known = list(values)
+    return f"{min(known):.{digits}f} to {max(known):.{digits}f}".replace("-", MINUS)
 
 
-SENTENCES = (Sentences("README.md", "findings", headline), Sentences("docs/findings.md", "answers", answers))
+SENTENCES = (
+    Sentences("README.md", "findings", ("volume_loss", "frame_rate", "accuracy", "peers"), headline),
+    Sentences("docs/findings.md", "answers", ("methods", "laws", "literature", "peers", "stress"), answers),
+)
