@@ -108,6 +108,22 @@ def test_the_ball_the_liver_and_the_step_of_the_first_table():
     assert round(1e3 * true_volume(make_shape("liver", {})), 1) == float(volume)
 
 
+def test_numbers_that_the_list_of_limits_quotes():
+    text = " ".join((ROOT / "docs/limits.md").read_text(encoding="utf-8").split())
+    population = (TABLES / "population" / "population.md").read_text(encoding="utf-8")
+    bounds = re.findall(r"^\| (\w+) \| graded quadratic.*?\| [^|]+ \| [^|]+ \| ([\d.]+) \(", population, re.M)
+    quoted = re.findall(r"within (\d+) % for livers, (\d+) % for kidneys and (\d+) % for stomachs", text)[0]
+    assert [f"{float(bound):.0f}" for _, bound in bounds] == list(quoted)
+    rows = pd.read_csv(TABLES / "accuracy" / "accuracy.csv").set_index(["scene", "body", "nodes"]).sort_index()
+    stiff = 1 + rows.loc[("stomach_press", "surface", 550), "force_end [%]"].item() / 100
+    assert f"has {stiff:.1f} times the force" in text
+    bodies = rows.loc[("liver_probe", "graded quadratic, masses by stiffness")]
+    first = bodies.groupby("nodes", sort=True)["mean_error [%]"].first()
+    sizes = "is {:.2f} % at 794 nodes, {:.2f} % at 994 and {:.2f} % at 1,194".format(*first[[794, 994, 1194]])
+    assert sizes in text
+    assert sizes.removeprefix("is ") in " ".join((ROOT / "docs/findings.md").read_text(encoding="utf-8").split())
+
+
 def test_every_reference_has_three_meshes_and_three_refined_settings():
     rows = pd.read_csv(TABLES / "reference" / "uncertainty.csv")
     assert {len(levels.split()) for levels in rows["levels"].astype(str)} == {3}

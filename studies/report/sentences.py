@@ -14,8 +14,9 @@ from studies.base.errors import StudyError
 from studies.catalog.accuracy import ACCURACY
 from studies.metrics.cells import MINUS, plain
 from studies.metrics.judged import Judged, cheapest, nearest
-from studies.metrics.wish import Wish, usual_wish
+from studies.metrics.wish import SHAPE, Wish, usual_wish
 from studies.plots.campaigns.recovery import RETURNED
+from studies.store.record import Status
 
 WIDTH = 120
 """Columns of a page."""
@@ -55,7 +56,9 @@ class Sentences:
 
     def written(self, published: Path) -> str:
         """The list in Markdown, at most WIDTH columns wide. Raises StudyError where a table is missing."""
-        points = (f"- {text}" for text in self.text(published))
+        points = [f"- {text}" for text in self.text(published)]
+        if self.page.startswith("docs/"):  # links are written as from README
+            points = [point.replace("](results/", "](../results/").replace("](docs/", "](") for point in points]
         return "\n".join(fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False) for text in points)
 
 
@@ -83,9 +86,14 @@ def answers(published: Path) -> list[str]:
         ways(published),
         laws(published),
         literature(published),
-        other_programs(published, "../"),
+        other_programs(published),
         starts(published),
     ]
+
+
+def limits(published: Path) -> list[str]:
+    """What docs/limits.md says of accuracy."""
+    return [one_volume(published), exceptions(published), shapes(published), inverted(published)]
 
 
 def constraint(published: Path) -> str:
@@ -119,23 +127,58 @@ def one_volume(published: Path) -> str:
 
 def recommended(published: Path) -> str:
     """In how many scenes a body is accurate enough, how fast these are, and where none is."""
-    speeds, misses, count = list[float](), list[str](), 0
+    speeds, missed = _chosen(published)
+    return (
+        f"**Quadratic bodies with many volumes are accurate without fitting.** The recommended bodies are [accurate "
+        f"enough](docs/accuracy.md#accurate-enough) in {len(speeds) - len(missed)} of {len(speeds)} scenes, "
+        f"{_range(speeds, 1)} times as fast as real time on one core. The exceptions: {'; '.join(missed) or 'none'}."
+    )
+
+
+def exceptions(published: Path) -> str:
+    """The scenes in which no body is accurate enough."""
+    speeds, missed = _chosen(published)
+    return (
+        f"**{len(missed)} of {len(speeds)} scenes have no body that is [accurate "
+        f"enough](docs/accuracy.md#accurate-enough) beyond doubt.** {'; '.join(missed) or 'None'}."
+    )
+
+
+def shapes(published: Path) -> str:
+    """The bodies that do not keep the shape of their organ."""
+    rows = [row for row in table(published, ACCURACY.name) if row["method"] == OURS]
+    flat = [-change for change in column((row for row in rows if "quadratic" not in row["body"]), "shape_volume [%]")]
+    off = {
+        f"{row['scene']} with {row['nodes']} nodes ({row['shape_error [%]']:.1f} % of the size)": None
+        for row in rows
+        if "quadratic" in row["body"] and row["shape_error [%]"] > SHAPE
+    }
+    return (
+        f"**Some bodies do not keep the shape of their organ** and are never recommended. Bodies with flat sides lack "
+        f"{_range(flat, 1)} % of the volume. Graded quadratic bodies farther than {SHAPE:g} % from the true surface: "
+        f"{', '.join(off) or 'none'}."
+    )
+
+
+def inverted(published: Path) -> str:
+    """The runs of the study `accuracy` that did not end well."""
+    rows = [row for row in table(published, ACCURACY.name) if row["status"] != Status.OK]
+    bodies = "; ".join(f"{row['scene']}, {row['body']}, {row['nodes']} nodes ({row['status']})" for row in rows)
+    return f"**Some runs of the study `accuracy` fail**: {bodies or 'none'}."
+
+
+def _chosen(published: Path) -> tuple[list[float], list[str]]:
+    """Speed of the recommended or closest body of each scene [s/s]; the scenes without an accurate one, with why."""
+    speeds, missed = list[float](), list[str]()
     for scene in ACCURACY.scenes:
         rows = [one for one in published_rows(published, scene) if one.compared]
         wish = usual_wish(scene)
         best = cheapest(rows, wish)
         chosen = best or nearest(rows, wish)
-        if chosen is None:
-            continue
-        count += 1
-        speeds.append(1.0 / chosen.cost.value)
-        if best is None:
-            misses.append(f"{scene.name} {_why_not(chosen, wish)}")
-    return (
-        f"**Quadratic bodies with many volumes are accurate without fitting.** The recommended bodies are [accurate "
-        f"enough](docs/accuracy.md#accurate-enough) in {count - len(misses)} of {count} scenes, {min(speeds):.1f} to "
-        f"{max(speeds):.1f} times as fast as real time on one core. The exceptions: {'; '.join(misses) or 'none'}."
-    )
+        if chosen is not None:
+            speeds.append(1.0 / chosen.cost.value)
+            missed += [] if best else [f"{scene.name} {_why_not(chosen, wish)}"]
+    return speeds, missed
 
 
 def _why_not(one: Judged, wish: Wish) -> str:
@@ -153,8 +196,8 @@ def _why_not(one: Judged, wish: Wish) -> str:
     return " and ".join(missed) or "does not keep the shape of the organ at rest"
 
 
-def other_programs(published: Path, up: str = "") -> str:
-    """What MuJoCo, FElupe, Newton and PyBullet reach on the pressed liver; up: from the page to README's folder."""
+def other_programs(published: Path) -> str:
+    """What MuJoCo, FElupe, Newton and PyBullet reach on the pressed liver."""
     rows = [row for row in table(published, "peers") if row["scene"] == "liver_press"]
     ours = [row for row in rows if row["method"] == OURS and row["body"] == "quadratic"]
     felupe = [row for row in rows if row["method"] == "felupe"]
@@ -166,7 +209,7 @@ def other_programs(published: Path, up: str = "") -> str:
         f"**Implicit elements are more accurate and slower.** On the pressed liver FElupe's quadratic elements are "
         f"{_range(off_felupe, 1)} % off in force. Our uniform quadratic bodies are {_range(off)} % off and "
         f"{faster:.0f} times as fast. MuJoCo, Newton and PyBullet, on linear tetrahedra, are "
-        f"{_range(off_linear)} % off ([other programs]({up}results/published/peers/peers.png))."
+        f"{_range(off_linear)} % off ([other programs](results/published/peers/peers.png))."
     )
 
 
@@ -182,7 +225,7 @@ def ways(published: Path) -> str:
     count = len({row["method"] for row in together})
     step, volume = column(together, STEP), column(together, VOLUME)
     return (
-        f"**Which way to keep a volume** (`make study-methods`, [chart](../results/published/methods/methods.png)): "
+        f"**Which way to keep a volume** (`make study-methods`, [chart](results/published/methods/methods.png)): "
         f"all {count} methods that keep *one* volume give the same force within {spread:.1f} %. They "
         f"differ in cost, {plain(min(step))} to {plain(max(step))} µs a step, and in the volume error, "
         f"{min(volume):.0e} to {max(volume):.1f} %. One volume per tetrahedron locks: the force is "
@@ -198,7 +241,7 @@ def laws(published: Path) -> str:
         (row for row in rows if (row["body"], row["law"]) == (NODAL, "cotangent")), key=lambda row: row["nodes"]
     )
     return (
-        f"**Which stiffness law, how many volumes** (`make study-laws`, [chart](../results/published/laws/laws.png)): "
+        f"**Which stiffness law, how many volumes** (`make study-laws`, [chart](results/published/laws/laws.png)): "
         f"with one volume the force of a filled ball is {_range(short)} % too small under any law. One volume per node "
         f"with cotangent springs brings it within {nodal['force_error [%]']:.1f} % at {nodal['nodes']} surface nodes."
     )
@@ -212,7 +255,7 @@ def literature(published: Path) -> str:
     turning = column((row for row in linear if row["scene"] != "ball_clamped"), FORCE)
     return (
         f"**What else the literature offers** (`make study-literature`, "
-        f"[chart](../results/published/literature/literature.png)): angular springs, chain mail, linear modes and a "
+        f"[chart](results/published/literature/literature.png)): angular springs, chain mail, linear modes and a "
         f"precomputed elastic response. Where the organ hardly turns, the precomputed response is the best value: on "
         f"ball_clamped its force is {held['force_end [%]']:.0f} % off at {held['real_time [s/s]']:.0f} times real "
         f"time. Where the organ turns, both linear methods miss the force by {_range(turning)} %."
@@ -239,10 +282,10 @@ def starts(published: Path) -> str:
     count = len(scenes)
     return (
         f"**From which distorted starts a ball recovers** (`make study-stress`, "
-        f"[chart](../results/published/stress/recovery.png)): with one volume from {count - len(one)} of {count} (not "
+        f"[chart](results/published/stress/recovery.png)): with one volume from {count - len(one)} of {count} (not "
         f"from: {', '.join(one)}), with springs alone from {count - len(none)}, with nodal volumes from "
         f"{count - len(nodal)}, and from {count - len(helped)} with `ImplicitVolume(recovers=True)` "
-        f"([theory](theory.md), section 8)."
+        f"([theory](docs/theory.md#8-several-volumes))."
     )
 
 
@@ -255,4 +298,5 @@ def _range(values: Iterable[float], digits: int = 0) -> str:
 SENTENCES = (
     Sentences("README.md", "findings", ("volume_loss", "frame_rate", "accuracy", "peers"), headline),
     Sentences("docs/findings.md", "answers", ("methods", "laws", "literature", "peers", "stress"), answers),
+    Sentences("docs/limits.md", "limits", ("volume_loss", "accuracy"), limits),
 )
