@@ -66,14 +66,14 @@ def test_a_scene_whose_reference_decides_nothing_is_not_called_missed(published)
 
     text = changed(published, "accuracy", spoil)
     assert "in 6 of 9 scenes" in text
-    assert "ball_clamped cannot be decided, as its reference is only known to ±2 % in displacement" in text
+    assert "ball_clamped is undecided, because its reference is only known to ±2 % in displacement" in text
 
 
 def test_a_scene_without_an_accurate_body_says_by_how_much_it_misses(published):
     def spoil(rows):
         rows.loc[rows["scene"] == "kidney_probe", "force_end [%]"] = 3.5
 
-    assert "kidney_probe misses 3 % in force by 0.5 %" in changed(published, "accuracy", spoil)
+    assert "kidney_probe misses the target of 3 % for force by 0.5 %" in changed(published, "accuracy", spoil)
 
 
 def test_a_missing_table_is_one_sentence(published):

@@ -187,9 +187,9 @@ def _why_not(one: Judged, wish: Wish) -> str:
     bounds = {name: (error, bound) for name, (error, bound) in errors.items() if bound and error.known}
     for name, (error, bound) in bounds.items():
         if error.uncertainty > bound:
-            return f"cannot be decided, as its reference is only known to ±{error.uncertainty:.2g} % in {name}"
+            return f"is undecided, because its reference is only known to ±{error.uncertainty:.2g} % in {name}"
     missed = [
-        f"misses {bound:g} % in {name} by {abs(error.value) - bound:.1g} %"
+        f"misses the target of {bound:g} % for {name} by {abs(error.value) - bound:.1g} %"
         for name, (error, bound) in bounds.items()
         if abs(error.value) > bound
     ]
