@@ -8,8 +8,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from numba.core import event
 
-from studies.compiling.log import Compiled, log_from_now_on, summary
+from studies.base.compile_watch import EVENT, Compiled, CompileWatch
+from studies.compiling.log import summary
 
 PATIENCE = 900.0
 """Seconds that a process waits for what another one makes; the longest takes a minute on a busy machine."""
@@ -74,7 +76,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Listens where that is asked for."""
-    config.stash[COMPILED] = [] if config.getoption("--compiled") is None else log_from_now_on()
+    watch = CompileWatch()
+    config.stash[COMPILED] = watch.compiled
+    if config.getoption("--compiled") is not None:
+        event.register(EVENT, watch)
 
 
 @pytest.hookimpl(optionalhook=True)

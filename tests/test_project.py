@@ -110,32 +110,3 @@ def test_campaigns_run_in_verify():
     lines = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
     assert any(line.endswith("organbench verify") for line in lines)
     assert any(line.endswith("pytest -q -n 2 --dist loadfile -m campaign") for line in lines)
-
-
-FILES = [
-    file for package in ("massspring", "reference_fem", "studies") for file in sorted((ROOT / package).rglob("*.py"))
-]
-LINES, LENGTH, ARGUMENTS, FOLDER = 250, 40, 7, 16
-"""Most lines of a file and of a function, arguments of one, and modules of a folder."""
-MORE_ARGUMENTS = {
-    "massspring/kernels/jit/row_sums.py": "code for vector registers is given one by one what it loads",
-    "massspring/kernels/points/facet_forces.py": "what is solved for, and what it acts on",
-    "studies/geometry/api/organs.py": "each decides the mesh, and most have a usual value",
-    "reference_fem/system/assembly.py": "loops are unrolled by lengths that are given one by one, a fifth faster",
-}
-"""Files with functions of more arguments, and why; the options of a command are as many as it has."""
-
-
-def test_files_functions_and_folders_stay_small():
-    assert all(file.read_text(encoding="utf-8").count("\n") <= LINES for file in FILES)
-    assert all(len(list(folder.glob("*.py"))) <= FOLDER for folder in {file.parent for file in FILES})
-    longer = set()
-    for file in FILES:
-        name = file.relative_to(ROOT).as_posix()
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.FunctionDef):
-                assert (node.end_lineno or 0) - node.lineno < LENGTH, f"{name}: {node.name}"
-                given = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
-                if len(given) > ARGUMENTS and "cli/commands" not in name:
-                    longer.add(name)
-    assert longer == set(MORE_ARGUMENTS)

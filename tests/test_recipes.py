@@ -4,7 +4,10 @@ import ast
 import importlib.util
 import inspect
 import itertools
+import os
 import re
+import shutil
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +17,7 @@ import pytest
 import massspring
 from massspring import LITERATURE, METHODS, Volumes, tetrahedral_body
 from massspring.body.laws import LAWS
+from massspring.sources import OWN
 from studies.catalog import STUDIES, Chart
 from studies.catalog.methods import contestants
 from studies.cli import outline
@@ -163,6 +167,38 @@ def test_an_added_method_is_found_everywhere(method):
     case = Case(SCENES[0], method=method)
     assert case_from_json(case.key) == case
     test_methods.test_settings_survive_json(method)
+
+
+@pytest.fixture
+def repository(tmp_path) -> Path:
+    """A copy of the packages and of pyproject.toml, to which a user adds."""
+    root = Path(__file__).parents[1]
+    for package in OWN:
+        shutil.copytree(root / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(root / "pyproject.toml", tmp_path)
+    return tmp_path
+
+
+def run_in(repository: Path, *words: str) -> str:
+    """The output of a Python program that takes the packages from there."""
+    environment = {**os.environ, "PYTHONPATH": str(repository)}
+    done = subprocess.run([sys.executable, *words], cwd=repository, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_a_new_method_is_a_file_and_a_line_and_nothing_else(repository):
+    """As a user of the repository adds one: the contracts of the imports hold, and it is listed."""
+    (repository / "massspring/methods/added.py").write_text(code("CONTRIBUTING.md", title("method")), encoding="utf-8")
+    registry = repository / "massspring/methods/__init__.py"
+    text = registry.read_text(encoding="utf-8").replace("    Free,\n", "    Free,\n    Added,\n", 1)
+    imports = "from massspring.methods.added import Added\nfrom massspring.methods.barycentre"
+    registry.write_text(text.replace("from massspring.methods.barycentre", imports, 1), encoding="utf-8")
+    assert "15 kept, 0 broken" in run_in(
+        repository, "-c", "from importlinter.cli import lint_imports_command as c; c()"
+    )
+    assert re.search(r"^ +added +One division", run_in(repository, "-m", "studies", "list", "methods"), re.MULTILINE)
 
 
 @pytest.mark.slow

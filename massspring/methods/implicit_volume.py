@@ -81,7 +81,7 @@ def implicit_volume_frame(frame, lam):
 @njit_inlined
 def limited_multiplier(model, nodes, contacts, error, dt, flow, mobility):
     """lam [Pa] of the sums over all nodes (eq. 3.3), G·W̃·G, and whether only a part of the error is made up for
-    (35)."""
+    (eq. 8.5)."""
     weights, longest = model.inverse_mass, model.correction_limit
     lam, left = multiplier_of_sums(nodes, contacts, weights, error, dt, flow, mobility)
     if not left > 0.0 or surely_short(error, left, model.largest_inverse_mass, longest):

@@ -4,7 +4,6 @@ from pathlib import Path
 
 from massspring.errors import MassSpringError
 from studies.base.errors import StudyError
-from studies.base.old_imports import advice
 from studies.base.own_file import line_of, loaded_from
 
 
@@ -19,10 +18,6 @@ def what_failed(path: Path, error: BaseException) -> str:
     if isinstance(error, SyntaxError) and error.filename == str(path):
         return f"SyntaxError in line {error.lineno}: {error.msg}"
     line = line_of(path, error)
-    if isinstance(error, ImportError) and line:
-        moved = advice(path.read_bytes(), line)
-        if moved:
-            return f"in line {line}, {moved}"
     kind = "" if isinstance(error, StudyError | MassSpringError) else f"{type(error).__name__} "
     message = str(error).split("\n")[0]
     return f"{kind}in line {line or '?'}" + (f": {message}" if message else "")

@@ -21,7 +21,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import run_fingerprint
 from studies.runs.run import measure
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.store.checksums import BLOCK, attribute_digest, sealed
+from studies.store.opening import BLOCK, sealed
 from studies.store.paths import SUFFIX, file_stem, key_digest, study_folder
 from studies.store.record import Record, write_record
 
@@ -62,8 +62,7 @@ def make_up(root: Path, study: Study, like: Record) -> int:
 
 def _texts(case: Case) -> tuple[bytes, ...]:
     """What is a case's own in the file of its record."""
-    digests = (attribute_digest(case.key), attribute_digest(case.name))
-    return tuple(text.encode() for text in (case.key, case.name, *digests))
+    return case.key.encode(), case.name.encode()
 
 
 def many_lines(count: int = COUNT) -> list[BenchLine]:

@@ -25,6 +25,7 @@ COMMANDS = {
         ("plot", "results.plot", "plot", "Draws the charts and the table of a study from what is stored."),
         ("report", "results.report", "report", "All charts and tables, and the summaries; names what it wrote."),
         ("replay", "running.replay", "replay", "Runs exactly that case again, and says whether it is the same."),
+        ("restamp", "running.restamp", "restamp", "Keeps stored results after a change of code that moves no number."),
         ("compare", "results.compare", "compare", "Every number that two results folders share, and which moved."),
         ("view", "results.view", "view", "Writes cases and their reference to one file for ParaView."),
         ("export", "exchange.export", "export", "Writes a scene for another program, with how to hand results in."),

@@ -14,8 +14,8 @@ import llvmlite.binding as llvm
 from massspring.compile_cache import folder
 from massspring.sources import source_fingerprint
 from studies.base.atomic import write_whole
+from studies.base.compile_watch import Compiled, watching
 from studies.compiling import elements, frames
-from studies.compiling.log import Compiled, logged
 
 
 class Done(NamedTuple):
@@ -50,9 +50,9 @@ ESSENTIAL: tuple[str, ...] = (
 def perform(name: str) -> Done:
     """Does one task of `tasks()`, in a process that may have done others."""
     begin = perf_counter()
-    with logged() as compiled:
+    with watching() as watch:
         tasks()[name]()
-    return Done(name, perf_counter() - begin, compiled)
+    return Done(name, perf_counter() - begin, watch.compiled)
 
 
 def stamp(whole: bool) -> Path:

@@ -3,12 +3,10 @@ metrics read the record."""
 
 import hashlib
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from massspring import History
 from massspring.layout.probe_arrays import tip_depth
 from massspring.sources import source_fingerprint
 from massspring.world.obstacles import Obstacle, Probe
@@ -141,9 +139,7 @@ def _sway(fitting: Fitting, values: dict[str, np.ndarray]) -> dict[str, float]:
     """How much the force sways at the end, where it is known."""
     if "force" not in fitting.histories:
         return {}
-    read = {name: values[name] for name in ("t", "contact_force", "held_force")}
-    # What `sway` reads of a history.
-    return {"sway": sway(fitting.mesh.scene, cast(History, SimpleNamespace(good_frames=len(fitting.t), **read)))}
+    return {"sway": sway(fitting.mesh.scene, values["t"], values["contact_force"], values["held_force"])}
 
 
 def _named(path: Path, fitting: Fitting) -> str:

@@ -1,15 +1,13 @@
 """A metric over the members of a population: median, range, worst member, and how sure of each one may be."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from scipy.stats import bootstrap
 
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run
-from studies.metrics.table import metric
 from studies.runs.recipe_text import body_words
 from studies.store.record import Status
 
@@ -127,39 +125,3 @@ def groups(runs: Sequence[Run]) -> list[Group]:
     for run in runs:
         found.setdefault((run.case.scene.organ.shape, body_words(run.case.body)), []).append(run)
     return [Group(organ, body, tuple(members)) for (organ, body), members in found.items()]
-
-
-COLUMNS: dict[str, Callable[[Distribution], object]] = {
-    "members": lambda d: d.count,
-    "lost": lambda d: d.lost,
-    "median": lambda d: d.median,
-    "median, low": lambda d: d.median_interval[0],
-    "median, high": lambda d: d.median_interval[1],
-    "2.5 %": lambda d: d.middle[0],
-    "97.5 %": lambda d: d.middle[1],
-    "95 of 100": lambda d: d.bound,
-    "95 of 100, low": lambda d: d.bound_interval[0],
-    "95 of 100, high": lambda d: d.bound_interval[1],
-    "worst": lambda d: d.worst,
-    "worst member": lambda d: d.worst_member,
-    "confidence of the worst [1]": lambda d: d.confidence,
-    "largest floor": lambda d: d.floor,
-    "floors below a third": lambda d: d.resolved,
-}
-"""Of a table of distributions."""
-
-
-def distribution_table(runs: Sequence[Run], names: Sequence[str]) -> pd.DataFrame:
-    """A row for each organ, body and metric of `names`; numbers in the metric's unit where the column names none."""
-    rows = []
-    for group in groups(runs):
-        for entry in map(metric, names):
-            found = group.of(entry)
-            row: dict[str, object] = {
-                "organ": group.organ,
-                "body": group.body,
-                "metric": entry.name,
-                "unit": entry.unit,
-            }
-            rows.append(row | {name: read(found) for name, read in COLUMNS.items()})
-    return pd.DataFrame(rows)

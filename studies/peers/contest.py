@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studies.base.errors import StudyError
-from studies.exchange.entry import entry_path, outside
+from studies.exchange.entry import HALF_STEP, entry_path, outside
 from studies.exchange.export import export
 from studies.exchange.judge import entry_record, unfinished_record
 from studies.exchange.meshes import given_mesh
 from studies.peers.scene_folder import CANNOT, MISSING
-from studies.plots.campaigns.peers import HALF_STEP
 from studies.runs.case import Case
 from studies.scene.scene import Scene
 from studies.store.record import Record, Status, write_record

@@ -6,12 +6,10 @@ from pathlib import Path
 
 from massspring.sources import source_fingerprint
 from studies.geometry.mesher.jobs import MAKERS
-from studies.reference.checkpoints import kept
 from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
 from studies.store.paths import key_digest, record_path
-from studies.store.record import peek
-from studies.store.staleness import CASE_CHANGED, CODE_CHANGED, MISSING, why_stale
+from studies.store.staleness import why_stale
 
 STUDY = "reference"
 
@@ -72,15 +70,6 @@ class ReferenceSolve:
         """Problem and code in one text."""
         return f"{reference_fingerprint()} {key_digest(self.key)}"
 
-    def state(self, root: Path) -> str:
-        """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""
-        if kept(self.path(root), self.stamp) is not None:
-            return "half-way"
-        why = self.why_stale(root)
-        if why is None:
-            return str(peek(self.path(root)).status)
-        return "missing" if why == MISSING else "stale" if why in (CASE_CHANGED, CODE_CHANGED) else "unreadable"
-
     @property
     def weight(self) -> float:
         """What it costs, roughly: unknowns."""
@@ -121,23 +110,10 @@ class SolveStanding:
 
     reference_solve: ReferenceSolve
     state: str
-    """As `ReferenceSolve.state` says."""
+    """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""
     unknowns: int | None
     """None where nothing is stored."""
     steps: int
     """Checkpoints reached."""
     seconds: float
     """What solving took [s]; NaN where nothing is stored."""
-
-
-def standing_of(root: Path, reference_solve: ReferenceSolve) -> SolveStanding:
-    """Read off the header of the stored solution, or off the load path half-way to it."""
-    state = reference_solve.state(root)
-    if state == "half-way":
-        begun = kept(reference_solve.path(root), reference_solve.stamp)
-        done = len([e for e in begun.path if e.t in reference_solve.scene.checkpoints]) if begun else 0
-        return SolveStanding(reference_solve, state, None, done, float("nan"))
-    if state in ("missing", "unreadable"):
-        return SolveStanding(reference_solve, state, None, 0, float("nan"))
-    known = peek(reference_solve.path(root)).attributes
-    return SolveStanding(reference_solve, state, known["unknowns"], known["steps_done"], float(known["seconds"]))

@@ -93,18 +93,12 @@ class Solution:
     def displacement(self, points: np.ndarray, checkpoint: int = -1) -> np.ndarray:
         """Displacement [m] of the material points `points` (m, 3) [m]; of an octant, mirrored.
 
-        Kept for points asked before: metrics of all runs on one mesh ask for the same.
+        Points are found in the mesh once: metrics of all runs on one mesh ask for the same.
         """
-        key = (points.tobytes(), checkpoint)
-        if key not in self._known:
-            self._known[key] = self._mirrored(self.field("displacement")[[checkpoint]], points)[0]
-        return self._known[key]
+        return self._mirrored(self.field("displacement")[[checkpoint]], points)[0]
 
     def displacements(self, points: np.ndarray) -> np.ndarray:
-        """Displacement [m] of the material points `points` (m, 3) [m] at every checkpoint, (K, m, 3).
-
-        The points are found in the mesh once for all checkpoints.
-        """
+        """Displacement [m] of the material points `points` (m, 3) [m] at every checkpoint, (K, m, 3)."""
         return self._mirrored(self.field("displacement"), points)
 
     def _mirrored(self, nodal: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -115,10 +109,6 @@ class Solution:
         columns = nodal.transpose(1, 0, 2).reshape(nodes, 3 * count)
         found = self._evaluator.displacement(columns, sign * points).reshape(len(points), count, 3)
         return sign * found.transpose(1, 0, 2)
-
-    @cached_property
-    def _known(self) -> dict[tuple[bytes, int], np.ndarray]:
-        return {}
 
     def outside(self, triangles: np.ndarray) -> np.ndarray:
         """Those of the boundary triangles or facets (s, 3 or 6) that do not lie in a plane of symmetry."""

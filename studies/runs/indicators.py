@@ -27,7 +27,7 @@ def indicators(scene: Scene, body: Body, history: History, lumen: int) -> dict[s
     return {
         "unknowns_per_volume": 3.0 * body.node_count / body.kept.count,
         "alternation": float(alternation / scene.tissue.shear_modulus),
-        "sway": sway(scene, history),
+        "sway": sway(scene, history.t[: history.good_frames], history.contact_force, history.held_force),
     }
 
 
@@ -73,15 +73,17 @@ def unlike_neighbours(pressure: np.ndarray, pairs: np.ndarray) -> float:
     return float(np.sqrt(np.mean((pressure[paired] - around[paired] / count[paired]) ** 2)))
 
 
-def sway(scene: Scene, history: History) -> float:
+def sway(scene: Scene, t: np.ndarray, contact_force: np.ndarray, held_force: np.ndarray) -> float:
     """Range of the probed force about its straight trend, over its mean [1], in the last frames of those in which
-    nothing outside moves; NaN where there are fewer than three, or no force to compare."""
-    rests = history.t > still_from(scene)
-    last = np.flatnonzero(rests & (np.arange(len(history.t)) < history.good_frames))[-STILL_FRAMES:]
-    among = history.contact_force if scene.probed.what == "obstacle" else history.held_force
+    nothing outside moves; NaN where there are fewer than three, or no force to compare.
+
+    t: ends of the good frames [s], (f,); contact_force: (F, o, 3) [N], held_force: (F, g, 3) [N], F ≥ f.
+    """
+    last = np.flatnonzero(t > still_from(scene))[-STILL_FRAMES:]
+    among = contact_force if scene.probed.what == "obstacle" else held_force
     if "force" not in scene.quantities or len(last) < 3 or not scene.probed.number < among.shape[1]:
         return float("nan")
-    force = scene.output_force(history.contact_force, history.held_force)[last]
+    force = scene.output_force(contact_force, held_force)[last]
     trend, mean = np.polynomial.Polynomial.fit(last, force, 1), abs(float(force.mean()))
     return float(np.ptp(force - trend(last))) / mean if mean > 0.0 else float("nan")
 

@@ -37,7 +37,7 @@ def run_case(root: Path, study: str, case: Case, on_frame: Callable[[int], objec
     Raises StudyError only when it cannot be stored."""
     path = case_path(root, study, case)
     started = time.perf_counter()
-    with watching(lambda name: None) as watch:
+    with watching() as watch:
         record = measure(case, on_frame)
     seconds = time.perf_counter() - started - watch.seconds
     write_record(path, replace(record, attributes={**record.attributes, "seconds": seconds}))
@@ -180,10 +180,11 @@ def replay(path: Path) -> tuple[Record, Record, str | None]:
     if stored.kind != "run":
         raise StudyError(f"{path} holds a {stored.kind}, only a run can be replayed")
     new = measure(case_from_json(stored.key))
-    return stored, new, _difference(stored, new)
+    return stored, new, difference(stored, new)
 
 
-def _difference(stored: Record, new: Record) -> str | None:
+def difference(stored: Record, new: Record) -> str | None:
+    """The first difference of status or fields, as a sentence; None where all are equal, bit for bit."""
     if stored.status != new.status:
         return f"it was {stored.status}, now it is {new.status}: {new.message}"
     odd = set(stored.fields) ^ set(new.fields)

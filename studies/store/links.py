@@ -8,9 +8,9 @@ from pathlib import Path
 import h5py
 
 from studies.base.atomic import is_there, sweep_parts, write_whole
-from studies.store.checksums import BLOCK, sealed
 from studies.store.index.entry import Entry
 from studies.store.index.folder import FolderIndex
+from studies.store.opening import BLOCK, sealed
 from studies.store.paths import DIGITS, SUFFIX, TIMING, index_path
 from studies.store.record import INDEX_KIND, SCHEMA
 

@@ -126,6 +126,7 @@ class RunAttributes(Timed):
     entry_seconds = optional_value(float, "s/s", "of an entry from outside: computing time for a simulated second")
     own_files = optional_value(str, "", "files of the user with the method and the law: JSON, path to SHA-256")
     portable = optional_value(str, "", "settings of a result that is equal on every x86-64 processor")
+    restamped = optional_value(str, "", "former code, and replays by which the result was kept for this code")
 
 
 class ReferenceFields(Table):
@@ -159,6 +160,7 @@ class ReferenceAttributes(Table):
     steps_done = value(int, "1", "checkpoints that were reached")
     seconds = value(float, "s", "wall time of the solution")
     portable = optional_value(str, "", "settings of a result that is equal on every x86-64 processor")
+    restamped = optional_value(str, "", "former code, and replays by which the result was kept for this code")
 
 
 class TimingFields(Table):
@@ -175,6 +177,7 @@ class TimingAttributes(Timed):
     core = optional_value(int, "1", "core that the process was pinned to; none where it cannot be")
     threads = value(int, "1", "threads that compiled code was allowed")
     repeats = value(int, "1", "repeats", "r")
+    restamped = optional_value(str, "", "former code, and replays by which the result was kept for this code")
 
 
 RUN_FIELDS, RUN_ATTRIBUTES = lines_of(RunFields, FieldSpec), lines_of(RunAttributes, AttributeSpec)

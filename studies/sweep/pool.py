@@ -12,7 +12,7 @@ from threading import Event, Thread
 
 from numba.core import event
 
-from studies.base.compile_watch import CompileWatch
+from studies.base.compile_watch import EVENT, CompileWatch
 from studies.base.errors import StudyError
 from studies.base.interrupts import die_quietly
 from studies.base.portable import environment as portable_environment
@@ -75,7 +75,7 @@ def begin_worker(writer: Connection | None, files: tuple[Given, ...] = ()) -> No
     die_quietly()
     load_given(files)
     if writer is not None:
-        event.register("numba:compile", CompileWatch(writer.send))
+        event.register(EVENT, CompileWatch(writer.send))
 
 
 def perform(

@@ -81,7 +81,7 @@ def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[
     with pinned(threads=1) as core:
         for group in groups.values():
             started = time.perf_counter()
-            with watching(lambda name: None) as watch:
+            with watching() as watch:
                 setups = {case.key: prepare(case).setup for case in group}
                 contestants = {key: (lambda s=setup: simulate(s).frame_ns) for key, setup in setups.items()}
                 measured = interleave(contestants, max(map(repeats_for, setups.values())), warmups=0)

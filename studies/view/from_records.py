@@ -1,7 +1,5 @@
 """Bodies to show, made of the records of a run and of a reference."""
 
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -14,22 +12,6 @@ from studies.view.body import Shown, upright
 
 COMPARED = "surface"
 """Quantity that a scene must allow where displacements are to be compared: a body that may turn or slip has none."""
-
-
-@dataclass(frozen=True, eq=False)
-class Remembering(Solution):
-    """A reference that finds the nodes of a mesh once, though many runs have it."""
-
-    def displacements(self, points: np.ndarray) -> np.ndarray:
-        """As Solution's."""
-        key = points.tobytes()
-        if key not in self._found:
-            self._found[key] = super().displacements(points)
-        return self._found[key]
-
-    @cached_property
-    def _found(self) -> dict[bytes, np.ndarray]:
-        return {}
 
 
 def shown_run(run: Run, solution: Solution | None, name: str) -> Shown:

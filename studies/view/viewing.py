@@ -16,7 +16,7 @@ from studies.scenes import SCENES
 from studies.store.record import Status, read_record
 from studies.sweep.remarks import remarks_of
 from studies.view.body import Shown
-from studies.view.from_records import Remembering, shown_reference, shown_run
+from studies.view.from_records import shown_reference, shown_run
 from studies.view.stored import Stored, chosen_runs, finest_reference, stored_runs
 
 
@@ -50,7 +50,7 @@ class _References:
         try:
             path = finest_reference(root, scene)
             if path is not None and path not in self.read:
-                self.read[path] = Remembering(scene, read_record(path))
+                self.read[path] = Solution(scene, read_record(path))
         except StudyError as problem:
             self.remarks[str(problem)] = None
             return None

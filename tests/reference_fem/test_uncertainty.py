@@ -204,6 +204,6 @@ def test_shares_add_as_independent_ones():
 
 
 def test_the_bar_is_as_wide_as_the_theory_says():
-    """Equation (20) of docs/theory.md: 1.25 times the change left; twice the spread where values go to and fro."""
+    """Eq. 6.3: 1.25 times the change left; twice the spread where values go to and fro."""
     assert mesh_error(SIZES, law(2.0)).uncertainty == pytest.approx(1.25 * 0.3, rel=1e-9)
     assert mesh_error(SIZES, [7.0, 7.2, 6.9]).uncertainty == pytest.approx(2 * 0.3, rel=1e-9)

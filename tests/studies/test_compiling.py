@@ -9,12 +9,13 @@ import pytest
 from massspring import LITERATURE, METHODS, Free, ImplicitVolume
 from massspring.kernels.jit.stage_clock import STAGES
 from massspring.methods import VARIANTS
+from studies.base.compile_watch import Compiled, watching
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.compiling import main, tasks
 from studies.compiling.bodies import EDGE, KINDS, tiny_block, tiny_body
 from studies.compiling.frames import OWN_TYPES, PLAIN, PROBE, THREADS, Variant, advance, setup_of, variants
-from studies.compiling.log import Compiled, listing, logged, summary
+from studies.compiling.log import listing, summary
 
 
 @pytest.fixture
@@ -81,12 +82,12 @@ def test_a_variant_advances_a_body_that_is_pressed(option):
     assert len(setup.probes) == (option == PROBE)
     after = setup.method.advance(setup.start(), setup.boundary(0))
     assert np.abs(after.diagnostics.contact_impulse[0]).max() > 0
-    with logged() as first:
+    with watching() as first:
         advance(variant)
-    assert all(entry.seconds > 0 for entry in first)
-    with logged() as again:
+    assert all(entry.seconds > 0 for entry in first.compiled)
+    with watching() as again:
         advance(variant)
-    assert again == []
+    assert again.compiled == []
 
 
 @pytest.mark.parametrize("method", LITERATURE, ids=lambda method: method.name)
@@ -107,11 +108,11 @@ def test_compiling_is_logged_with_its_own_time_and_loading_is_not():
     def outer(x):
         return inner(x) * 2
 
-    with logged() as found:
+    with watching() as found:
         outer(1.0), outer(2.0)
-    assert [entry.function.rpartition(".")[2] for entry in found] == ["inner", "outer"]
-    assert all(0 < entry.seconds < 60 and "float64" in entry.arguments for entry in found)
-    text = listing(found)
+    assert [entry.function.rpartition(".")[2] for entry in found.compiled] == ["inner", "outer"]
+    assert all(0 < entry.seconds < 60 and "float64" in entry.arguments for entry in found.compiled)
+    text = listing(found.compiled)
     assert text.count("\n") == 3 and ".inner," in text
 
 

@@ -164,7 +164,7 @@ def test_numba_is_heard_once_for_each_function_that_is_called():
     with watching(heard.append) as watch:
         assert outer(1) == 4
         assert outer(2) == 6
-    assert (heard, watch.names, watch.depth) == (["outer"], ["outer"], 0)
+    assert heard == ["outer"] and len(watch.compiled) == 2
     assert watch.seconds > 0
     outer(1.0)
     assert heard == ["outer"]

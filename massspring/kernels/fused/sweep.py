@@ -6,8 +6,7 @@ Each spring is computed at both of its ends: nothing is scattered, and all lanes
 from massspring.kernels.forces.springs import SHORTEST
 from massspring.kernels.fused.chunk import AREA, FORCE, HERE, LANES, RESULT, SHARE, SPEED, SUMS, put, take, total
 from massspring.kernels.fused.long_rows import add_walls, join_pieces
-from massspring.kernels.fused.padded import pad_positions
-from massspring.kernels.jit.decorators import njit_inlined, njit_lean
+from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.thread_team import JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, fork, join
 from massspring.kernels.jit.vectors import at_least, gather, lanes_of, load, root, save, spread
 
@@ -204,13 +203,6 @@ def predict_from_places(model, nodes, work, boundary, keeps, team):
     if walls:
         flow += add_walls(model, nodes, boundary.dt)
     return volume, flow, mobility
-
-
-@njit_lean
-def gather_and_predict(model, nodes, work, boundary, keeps):
-    """The same from `x`; leaves the positions in `padded_positions`, where `advance` looks for them."""
-    pad_positions(nodes, work, 0, nodes.x.shape[0])
-    return predict_from_places(model, nodes, work, boundary, keeps, None)
 
 
 @njit_inlined

@@ -1,6 +1,6 @@
 """What a file holds, whatever its format: points, triangles or tetrahedra, and the parts that the file tells apart."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -49,10 +49,6 @@ class Content:
     def uses_known_points(self) -> bool:
         """Whether no cell names a point that is not there."""
         return bool(self.cells.min(initial=0) >= 0 and self.cells.max(initial=-1) < len(self.points))
-
-    def named_part(self, number: int) -> "Content":
-        """The triangles of one of `names` alone."""
-        return replace(self, triangles=self.triangles[self.part == number], names=(), part=NONE)
 
 
 def check_content(content: Content, name: str) -> Content:

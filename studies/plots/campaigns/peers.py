@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.exchange.entry import is_entry, outside
+from studies.exchange.entry import HALF_STEP, is_entry, outside
 from studies.metrics.judged import FORCE, cost_of
 from studies.metrics.metric import COMPARABLE, Metric
 from studies.metrics.run import Run
@@ -35,8 +35,6 @@ ROWS = {FORCE: "error of the force [%]", VOLUME: "volume off by [%]"}
 LOWEST = {FORCE: 0.1, VOLUME: 1e-5}
 """What is smaller is drawn there [%]."""
 ROOM = 2.0
-HALF_STEP = "-half_step"
-"""End of the name of an entry with steps half as long, which shows whether the answer hangs on the step."""
 SPARE = tuple(zip((ORANGE, GREEN, BLUE, PURPLE, BLACK, MUTED[2], MUTED[1], MUTED[0]), "^sDvX<>h", strict=True))
 """Colours and markers of what has none of its own, in the order of its appearance."""
 NAMED = 2

@@ -1,7 +1,7 @@
 """What the page shows of one case: words, histories, and its surface beside that of the reference."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,6 @@ from massspring import Capsule, Obstacle, Plane
 from studies.metrics.metric import PERCENT
 from studies.metrics.run import Run
 from studies.plots.style.style import readable
-from studies.reference.load import Reference
 from studies.report.page.pack import STEP, pack_frames, pack_indices, pack_series
 from studies.report.page.reference_shape import MOST_NODES, from_rest, reference_id
 from studies.scene.quantities import allowed
@@ -34,21 +33,7 @@ class Surface:
     """Whether the times are the checkpoints alone, between which the page moves all points in straight lines."""
 
 
-@dataclass
-class Truths:
-    """Displacements of references at points of the organ, which are found once for all runs on one mesh."""
-
-    known: dict[tuple[int, bytes], np.ndarray] = field(default_factory=dict)
-
-    def displacements(self, reference: Reference, points: np.ndarray) -> np.ndarray:
-        """Of `points` (n, 3) [m] at every checkpoint [m], (K, n, 3)."""
-        key = id(reference), points.tobytes()
-        if key not in self.known:
-            self.known[key] = reference.displacements(points)
-        return self.known[key]
-
-
-def case_data(run: Run, again: str, truths: Truths) -> dict[str, Any]:
+def case_data(run: Run, again: str) -> dict[str, Any]:
     """JSON-able; `again`: the command that repeats the run."""
     case, record = run.case, run.record
     law = f", law {readable(case.body.law)}" if case.body.law != "van_gelder" else ""
@@ -66,7 +51,7 @@ def case_data(run: Run, again: str, truths: Truths) -> dict[str, Any]:
     if run.reference is not None:
         found["reference"] = reference_points(run)
     surface = recorded_surface(run) or checkpoint_surface(run)
-    return found | ({"why": why_still(run)} if surface is None else {"replay": replay_of(run, surface, truths)})
+    return found | ({"why": why_still(run)} if surface is None else {"replay": replay_of(run, surface)})
 
 
 def recorded_surface(run: Run) -> Surface | None:
@@ -143,7 +128,7 @@ def reference_points(run: Run) -> dict[str, list[float | None]]:
     return {name: [float(f"{v:.5g}") if np.isfinite(v) else None for v in values] for name, values in found.items()}
 
 
-def replay_of(run: Run, surface: Surface, truths: Truths) -> dict[str, Any]:
+def replay_of(run: Run, surface: Surface) -> dict[str, Any]:
     """The surface of a run; where there is a reference, its id, and how far points are from their places in it."""
     nodes, times = surface.nodes, surface.times
     triangles = run.fields.triangles
@@ -162,15 +147,15 @@ def replay_of(run: Run, surface: Surface, truths: Truths) -> dict[str, Any]:
         return found
     comparable = allowed(run.case.scene, COMPARED)
     found |= {"reference": reference_id(run.case.scene), "comparable": comparable}
-    return found | errors_of(run, nodes, truths) if comparable else found
+    return found | errors_of(run, nodes) if comparable else found
 
 
-def errors_of(run: Run, nodes: np.ndarray, truths: Truths) -> dict[str, Any]:
+def errors_of(run: Run, nodes: np.ndarray) -> dict[str, Any]:
     """Distances [m] of `nodes` (v,) from their places in the reference at all checkpoints that the run reached, one row
     after the other, before them those at rest; and the largest."""
     assert run.reference is not None  # the caller checked it
     rest, own = run.fields.rest[nodes], run.fields.snapshots[:, nodes]
-    error = np.linalg.norm(own - rest - truths.displacements(run.reference, rest)[: len(own)], axis=-1)
+    error = np.linalg.norm(own - rest - run.reference.displacements(rest)[: len(own)], axis=-1)
     reached = np.array(run.case.scene.checkpoints[: len(own)], float)
     times, rows = from_rest(run.case.scene, reached, np.zeros(len(nodes)), error)
     return {

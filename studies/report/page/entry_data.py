@@ -6,7 +6,6 @@ from studies.exchange.entry import ENTRY
 from studies.metrics.run import Run
 from studies.plots.style.style import readable
 from studies.report.page.case_data import (
-    Truths,
     checkpoint_surface,
     histories,
     reference_points,
@@ -16,7 +15,7 @@ from studies.report.page.case_data import (
 from studies.store.record import Status
 
 
-def entry_data(run: Run, truths: Truths, scene: str) -> dict[str, Any]:
+def entry_data(run: Run, scene: str) -> dict[str, Any]:
     """JSON-able, as `case_data` has it of a case; `entry` holds the name. The replay is that of the checkpoints, which
     all entries hold on one of the scene's own meshes; one that handed nothing in has none. `scene`: as the command line
     takes it."""
@@ -37,4 +36,4 @@ def entry_data(run: Run, truths: Truths, scene: str) -> dict[str, Any]:
     if run.reference is not None:
         found["reference"] = reference_points(run)
     surface = checkpoint_surface(run)
-    return found | ({"why": why_still(run)} if surface is None else {"replay": replay_of(run, surface, truths)})
+    return found | ({"why": why_still(run)} if surface is None else {"replay": replay_of(run, surface)})

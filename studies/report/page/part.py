@@ -17,7 +17,7 @@ from studies.catalog.study import RESERVED, Study, command_line, word_elsewhere
 from studies.exchange.entry import is_entry
 from studies.metrics.run import Run
 from studies.report.page.best import best_bodies
-from studies.report.page.case_data import Truths, case_data
+from studies.report.page.case_data import case_data
 from studies.report.page.entry_data import entry_data
 from studies.report.page.reference_shape import reference_id, reference_shape
 from studies.runs.current import case_path
@@ -48,9 +48,8 @@ def write_part(root: Path, study: Study, runs: Sequence[Run], table: pd.DataFram
     rows = [{name: _plain(value) for name, value in row.items()} for row in table.to_dict("records")]
     cases: dict[str, Any] = {}
     references: dict[str, Any] = {}
-    truths = Truths()
     for number, run in zip(ids, runs, strict=True):
-        cases.setdefault(number, _data(root, study, run, truths))
+        cases.setdefault(number, _data(root, study, run))
         if run.reference is not None and (name := reference_id(run.case.scene)) not in references:
             references[name] = reference_shape(run.reference)
     files = [chart.file for chart in study.charts]
@@ -110,16 +109,14 @@ def other_studies(root: Path, studies: Sequence[Study]) -> tuple[list[Study], li
     return others, remarks
 
 
-def _data(root: Path, study: Study, run: Run, truths: Truths) -> dict[str, Any]:
+def _data(root: Path, study: Study, run: Run) -> dict[str, Any]:
     if is_entry(run.case):
-        return entry_data(run, truths, _scene_word(study, run.case.scene.name))
+        return entry_data(run, _scene_word(study, run.case.scene.name))
     path = _named(root, case_path(root, study.name, run.case))
     own = files_of(run.case.method, run.case.body.law)
     files = [word for file in own for word in ("--file", file.path.name)]
     again = shlex.join(["organbench", "replay", str(path), *files])
-    return case_data(run, again, truths) | {
-        "run": command_line("run", [study], "--case", run.case.name, elsewhere=True)
-    }
+    return case_data(run, again) | {"run": command_line("run", [study], "--case", run.case.name, elsewhere=True)}
 
 
 def _scene_word(study: Study, scene: str) -> str:

@@ -105,7 +105,7 @@ class Known:
         return _why(self.of_timing(study, case), lambda: case_digest(case), self.code(case))
 
     def standing(self, solve: ReferenceSolve) -> SolveStanding:
-        """How a piece of a reference stands, as `studies.reference.reference_solves.standing_of` tells it."""
+        """How a piece of a reference stands: read off the folder, or off the load path half-way to it."""
         begun = kept(solve.path(self.root), solve.stamp)
         if begun is not None:
             done = len([e for e in begun.path if e.t in solve.scene.checkpoints])

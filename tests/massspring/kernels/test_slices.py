@@ -11,12 +11,12 @@ from massspring.kernels.forces.membrane import add_membrane_forces
 from massspring.kernels.forces.springs import spring_forces_into
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
 from massspring.kernels.fused.chunk import LANES
-from massspring.kernels.fused.sweep import gather_and_predict
 from massspring.kernels.step.attachments import prescribe
 from massspring.layout.allocate import start
 from massspring.layout.sell_chunks import LONGEST, rings, slices_of
 from tests.massspring.active_nodes import list_active
 from tests.massspring.conftest import SOFT, block, icosphere
+from tests.massspring.gathered import gather_and_predict
 from tests.massspring.kernels.test_kernels import DIFFERENCE, STEP, moved
 
 ROUND_OFF = 1e-14  # relative to the largest: sums of at most some hundred doubles in another order

@@ -9,9 +9,9 @@ from numba.core.runtime import rtsys
 
 from massspring import Attachment, Free, ImplicitVolume, MassSpringError, Setup, simulate
 from massspring.kernels.contact.node_contact import round_gap
-from massspring.kernels.fused.sweep import gather_and_predict
 from massspring.layout.allocate import start
 from massspring.run.precision import KEPT_DOUBLE, in_precision
+from tests.massspring.gathered import gather_and_predict
 from tests.massspring.methods.test_methods import clock_for, squeeze
 
 SINGLE = float(np.finfo(np.float32).eps)

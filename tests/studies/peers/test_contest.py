@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from massspring import Free, ImplicitVolume, Plane, Xpbd
-from studies.exchange.entry import entries_beside, outside
+from studies.exchange.entry import HALF_STEP, entries_beside, outside
 from studies.exchange.export import export
 from studies.exchange.judge import unfinished_record
 from studies.metrics.run import Run
 from studies.metrics.table import study_table
 from studies.peers.contest import PEERS, Attempt, Peer, contest, hand_over
 from studies.peers.scene_folder import CannotDo, SceneFolder, moved, turn_to
-from studies.plots.campaigns.peers import HALF_STEP, draw, figure, looks_of
+from studies.plots.campaigns.peers import draw, figure, looks_of
 from studies.plots.style.style import GREY, VERMILLION
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes import BALL_CLAMPED, LIVER_PROBE, STOMACH_PRESS

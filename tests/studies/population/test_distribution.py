@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 
-from studies.metrics.distribution import ENOUGH, distribution, distribution_table, groups
-from studies.scenes.liver_press import LIVER_PRESS
-from studies.store.record import Status
-from tests.plots.made_up import run
+from studies.metrics.distribution import ENOUGH, distribution
 
 NONE: dict[str, float] = {}
 
@@ -69,17 +66,3 @@ def test_the_confidence_of_the_worst_is_wilks_s():
 def test_the_same_members_give_the_same_intervals():
     values = named(np.random.default_rng(3).normal(size=30))
     assert distribution(values, NONE) == distribution(values, NONE)
-
-
-def test_a_table_has_a_row_for_each_organ_body_and_metric():
-    members = [
-        run(LIVER_PRESS, error=0.02),
-        run(LIVER_PRESS, error=0.05),
-        run(LIVER_PRESS, "surface", error=0.3, status=Status.DIVERGED),
-    ]
-    assert [(group.organ, len(group.runs)) for group in groups(members)] == [("liver", 2), ("liver", 1)]
-    table = distribution_table(members, ("force_end", "volume_worst"))
-    assert len(table) == 4
-    row = table.iloc[0]
-    assert (row["organ"], row["metric"], row["unit"], row["members"], row["lost"]) == ("liver", "force_end", "%", 1, 0)
-    assert table.iloc[2]["members"] == 0 and table.iloc[2]["lost"] == 1

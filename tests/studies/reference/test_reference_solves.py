@@ -13,7 +13,7 @@ from studies.base.errors import StudyError
 from studies.reference import reference_solves as known
 from studies.reference import solve as module
 from studies.reference.load import load_reference
-from studies.reference.reference_solves import ReferenceSolve, reference_solves, standing_of
+from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.reference.solve import solve
 from studies.report.references import refresh_uncertainty
 from studies.scene.as_json import scene_from_dict, scene_to_json
@@ -88,7 +88,8 @@ def test_settings_are_varied_only_where_they_matter():
 
 
 def listed(root):
-    return [standing_of(root, reference_solve) for reference_solve in reference_solves(SCENE)]
+    known = Known(root)
+    return [known.standing(reference_solve) for reference_solve in reference_solves(SCENE)]
 
 
 def states(root):
@@ -107,7 +108,7 @@ def test_listing_says_how_every_piece_stands(solved, tmp_path, monkeypatch):
     assert sorted(unknowns := [row.unknowns for row in whole[:3]]) == unknowns
     assert states(root) == ["ok", "missing", "ok", "ok", "ok", "unreadable"]
     assert [row.unknowns for row in listed(root) if row.state in ("missing", "unreadable")] == [None, None]
-    monkeypatch.setattr(known, "reference_fingerprint", lambda: "other")
+    monkeypatch.setattr("studies.sweep.stored.known.reference_fingerprint", lambda: "other")
     assert states(solved) == ["stale"] * 6
 
 

@@ -76,7 +76,7 @@ def test_what_is_new_changed_or_gone_is_seen(many, opened):
     assert found[first.name].status == "diverged" and not found["copy.h5"].at_home and third.name not in found
 
 
-def test_a_date_that_is_put_back_hides_no_change(many, trusted):
+def test_a_date_that_is_put_back_hides_no_change(many):
     """A change that keeps size and date, as tools that copy can make it."""
     path = record_files(many, NAME)[0]
     before = path.stat()
@@ -110,7 +110,7 @@ def lose_silently(root, path):
     shelf.put(ENTRIES, {path.name: shelf.load(ENTRIES)[path.name]._replace(state=state)})
 
 
-def test_a_full_check_finds_what_a_date_does_not_tell(many, trusted):
+def test_a_full_check_finds_what_a_date_does_not_tell(many):
     path = record_files(many, NAME)[0]
     entries(many)
     lose_silently(many, path)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.reference.reference_solves import reference_solves, standing_of
+from studies.reference.reference_solves import reference_solves
 from studies.runs.current import case_path
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
@@ -19,6 +19,7 @@ from studies.sweep.failures import Failures
 from studies.sweep.load import load_runs
 from studies.sweep.pool import do, environment_of_workers
 from studies.sweep.standings import failed
+from studies.sweep.stored.known import Known
 from studies.sweep.tasks import tasks_of
 from studies.timing.alone import alone
 from tests.studies.tiny import tiny_case, tiny_study
@@ -56,7 +57,7 @@ def test_a_piece_that_died_is_stored_as_failed(tmp_path):
     (run,), remarks = load_runs(tmp_path, tiny_study(cases=(case,)))
     assert (run.record.status, run.record.message) == (Status.FAILED, "its process died")
     assert "the reference of 'ball_squeeze' on mesh 0.9 is failed: its process died" in remarks[0]
-    assert [standing_of(tmp_path, solve).state for solve in reference_solves(scene)] == ["failed"] * 6
+    assert [Known(tmp_path).standing(solve).state for solve in reference_solves(scene)] == ["failed"] * 6
     said = failures.sentence("again")
     assert said.startswith(f"failed: {tasks[0].label} (its process died), and 6 more; the rest is done")
 

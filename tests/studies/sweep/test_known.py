@@ -154,7 +154,7 @@ def test_a_reference_that_changed_measures_anew(many, monkeypatch):
     assert len(measured) == 2 * COUNT
 
 
-def test_lost_bits_are_found_by_who_reads_them_and_then_by_all(many, trusted):
+def test_lost_bits_are_found_by_who_reads_them_and_then_by_all(many):
     path = record_files(many, NAME)[0]
     statuses(many)
     lose_silently(many, path)
@@ -164,7 +164,7 @@ def test_lost_bits_are_found_by_who_reads_them_and_then_by_all(many, trusted):
     assert sorted(statuses(many)) == ["ok"] * (COUNT - 1) + ["stale"]
 
 
-def test_status_check_reads_every_byte(organbench, many, trusted):
+def test_status_check_reads_every_byte(organbench, many):
     study = many / "many.py"
     study.write_text(f"from studies.bench.many_cases import many_study\nSTUDY = many_study({COUNT})\n")
     path = record_files(many, NAME)[0]

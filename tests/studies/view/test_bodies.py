@@ -9,7 +9,7 @@ import pytest
 from studies.base.errors import StudyError
 from studies.reference.solution import Solution
 from studies.view.body import QUADRATIC_TETRAHEDRON, TETRAHEDRON, TRIANGLE
-from studies.view.from_records import Remembering, shown_reference, shown_run
+from studies.view.from_records import shown_reference, shown_run
 from studies.view.side_by_side import side_by_side
 from tests.studies.made_up_run import CELLS, EDGE, POINTS, SCENE, TRIANGLES, bend, run
 from tests.studies.octant import SCENE as OCTANT
@@ -31,14 +31,6 @@ def test_a_run_is_what_is_stored_at_the_checkpoints(solution):
     np.testing.assert_allclose(body.volume_ratio, [0.98, 1.03])
     np.testing.assert_array_equal(body.force, [1.0, 2.0])
     assert body.cell_type == TETRAHEDRON and (body.cells == CELLS).all()
-
-
-def test_the_nodes_of_a_mesh_are_found_once(solution):
-    remembering = Remembering(SCENE, solution.record)
-    first = remembering.displacements(POINTS)
-    assert remembering.displacements(POINTS.copy()) is first
-    np.testing.assert_array_equal(first, solution.displacements(POINTS))
-    np.testing.assert_array_equal(remembering.displacements(POINTS[:3]), solution.displacements(POINTS[:3]))
 
 
 def test_nodes_that_are_no_points_of_the_organ_have_no_error(solution):
