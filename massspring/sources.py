@@ -23,8 +23,6 @@ OWN = ("massspring", "reference_fem", "studies")
 APART = ("massspring.compile_cache", "massspring.sources", "studies.base.atomic", "studies.store")
 """Own modules that keep account of code, or files, and change no result: a record has a schema number of its own."""
 ROOT = Path(__file__).parents[1]
-FACE = "_FACE"
-"""A package that loads its names when they are asked for lists them under this name: {name: module}."""
 
 
 class Source(NamedTuple):
@@ -96,11 +94,20 @@ def _followed(source: Source) -> Iterator[str]:
             yield _origin(module, name)
 
 
+def _stub(module: str) -> Path:
+    """The file in which a package lists its public names, if it has one."""
+    return (own_file(module) or ROOT).with_suffix(".pyi")
+
+
 def _origin(module: str, name: str) -> str:
     if name and own_file(f"{module}.{name}") is not None:
         return f"{module}.{name}"
     exports = _source(module).exports
     passed_on = exports.get(name, exports.get("*") if name else None)
+    if name and passed_on is None and (stub := _stub(module)).is_file():
+        raise MassSpringError(
+            f"{module} has no public name {name!r}: add it to {stub.name}, or import it from its module"
+        )
     return module if passed_on is None or own_file(passed_on) is None else _origin(passed_on, name)
 
 
@@ -124,10 +131,11 @@ class _Memory:
             self.known = stored if isinstance(stored, dict) and len(stored) < MOST else {}
 
     def get(self, module: str, file: Path) -> Source:
-        content = file.read_bytes()
-        key = hashlib.sha256(f"{VERSION} {module} {file.name}\0".encode() + content).hexdigest()
+        content, stub = file.read_bytes(), _stub(module)
+        public = stub.read_bytes() if stub.is_file() else b""
+        key = hashlib.sha256(f"{VERSION} {module} {file.name}\0".encode() + content + public).hexdigest()
         if key not in self.known:
-            self.known[key] = list(read_source(content, module, file))
+            self.known[key] = list(read_source(content, module, file, public))
             self.grown = True
         meaning, imports, exports = self.known[key]
         return Source(meaning, [(pair[0], pair[1]) for pair in imports], exports)
@@ -144,7 +152,7 @@ class _Memory:
             os.replace(part.name, self.path)
 
 
-VERSION = 1
+VERSION = 2
 """Of what is remembered."""
 MOST = 20_000
 """Texts that are remembered; then it begins anew, for most are of former versions."""
@@ -160,15 +168,19 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "organbench"
 
 
-def read_source(content: bytes, module: str, file: Path) -> Source:
-    """What the text of `module` says. Raises MassSpringError for a text that is no Python."""
+def read_source(content: bytes, module: str, file: Path, stub: bytes = b"") -> Source:
+    """What the text of `module` says; a package that loads its names lazily lists them in a stub.
+
+    Raises MassSpringError for a text that is no Python.
+    """
     try:
         tree = ast.parse(content)
     except SyntaxError as error:
         raise MassSpringError(f"{file} is no Python ({error.msg}, line {error.lineno}): correct it") from error
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
     imports = sorted(set(_imports(tree, package)))
-    exports = {name: origin for origin, name in imports if name} | _face(tree)
+    public = _imports(ast.parse(stub), package)
+    exports = {name: origin for origin, name in (*imports, *public) if name}
     _drop_docstrings(tree)
     return Source(hashlib.sha256(ast.dump(tree).encode()).hexdigest(), imports, exports)
 
@@ -186,15 +198,6 @@ def _imports(tree: ast.AST, package: str) -> Iterator[tuple[str, str]]:
             yield from ((module, alias.name) for alias in node.names)
         else:
             yield from _imports(node, package)
-
-
-def _face(tree: ast.Module) -> dict[str, str]:
-    for node in tree.body:
-        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
-            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            if any(isinstance(target, ast.Name) and target.id == FACE for target in targets):
-                return ast.literal_eval(node.value)
-    return {}
 
 
 def _drop_docstrings(tree: ast.AST) -> None:

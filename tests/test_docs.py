@@ -86,7 +86,7 @@ NOTEBOOKS = sorted(ROOT.glob("docs/gallery/*.py"))
 def test_commands_of_a_page_exist(page):
     """Each command, with each option that the line names."""
     for line in commands(page):
-        words = [word for word in shlex.split(line) if word not in ("||", "…")]
+        words = [word for word in shlex.split(line) if word not in ("||", "…", "COMMAND")]
         command: Any = typer.main.get_command(app)
         context = command.context_class(command)
         while hasattr(command, "resolve_command") and words and not words[0].startswith("-"):

@@ -63,7 +63,10 @@ def test_what_the_requirements_require_is_pinned_too():
         # llvmlite is numba's own back end and comes with it; the clock inside a compiled loop is written in it.
         ("massspring", {"massspring", "numpy", "scipy", "numba", "llvmlite"}),
         # Of massspring only where compiled code is kept, and that in one file (the import contracts).
-        ("reference_fem", {"reference_fem", "numpy", "scipy", "numba", "skfem", "pypardiso", "massspring"}),
+        (
+            "reference_fem",
+            {"reference_fem", "numpy", "scipy", "numba", "skfem", "pypardiso", "massspring"},
+        ),
     ],
 )
 def test_the_solvers_import_little(package, allowed):
@@ -73,7 +76,7 @@ def test_the_solvers_import_little(package, allowed):
         for node in ast.walk(ast.parse(file.read_text())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module] if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module else []
-            foreign = {name.split(".")[0] for name in names} - allowed - sys.stdlib_module_names
+            foreign = {name.split(".")[0] for name in names} - allowed - {"lazy_loader"} - sys.stdlib_module_names
             assert not foreign, f"{file.relative_to(ROOT)} imports {foreign}"
 
 
@@ -81,6 +84,11 @@ def test_make_alone_lists_the_targets():
     text = subprocess.run(["make", "-s"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for target in ("study", "study-%", "smoke", "test", "check", "docs", "figures", "bench", "clean", "results/%.png"):
         assert re.search(rf"^  {re.escape(target)} +\S", text, re.MULTILINE), target
+
+
+def test_an_old_target_is_refused_with_its_new_name():
+    done = subprocess.run(["make", "-s", "stress"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and done.stderr.startswith("make stress is now make fuzz\n")
 
 
 @pytest.mark.parametrize(("goals", "fast", "all_of_them"), [("check", 1, 0), ("test", 0, 1), ("check test", 0, 1)])

@@ -15,12 +15,11 @@ from pathlib import Path
 import pytest
 
 import massspring
-from massspring import LITERATURE, METHODS, Volumes, tetrahedral_body
+from massspring import METHODS, Volumes, tetrahedral_body
 from massspring.body.laws import LAWS
 from massspring.sources import OWN
 from studies.catalog import STUDIES, Chart
 from studies.catalog.methods import contestants
-from studies.cli import outline
 from studies.geometry.organs import SHAPES
 from studies.geometry.surface.first_surface import first_surface
 from studies.metrics.metrics import METRICS
@@ -269,10 +268,3 @@ def test_an_added_law_keeps_the_contract(recipe, add):
     assert BodyRecipe(law="bars").law == "bars"
     body = tetrahedral_body(*block((2, 2, 2)), SOFT, "bars")
     assert body.law == "bars" and body.keeping(Volumes.nodal(body)).kept.count == body.node_count
-
-
-def test_the_list_of_commands_reads_the_tuples():
-    """Without running them: they must stay tuples that name their things one by one."""
-    assert [name for name, _ in outline.methods()] == [method.name for method in (*METHODS, *LITERATURE)]
-    assert [name for name, _ in outline.metrics()] == [metric.name for metric in METRICS]
-    assert len(outline.studies()) == len(STUDIES) + 1, "and the population"

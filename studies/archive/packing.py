@@ -21,7 +21,7 @@ from studies.reference.reference_solves import reference_solves
 from studies.report.publish import check_studies
 from studies.report.results import make_folder, refresh, report
 from studies.runs.current import case_path
-from studies.runs.own import files_of
+from studies.runs.user_code import files_of
 from studies.store.archived import MANIFEST, check_no_archive
 from studies.store.links import link_study
 from studies.timing.cases import timing_file

@@ -6,13 +6,11 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from studies.base.face import DISTRIBUTION
-
 
 def pins() -> str:
     """A line for each package that organbench requires, directly or not, with the version that is installed."""
     found: dict[str, str] = {}
-    waiting = [Requirement(DISTRIBUTION)]
+    waiting = [Requirement("organbench")]
     while waiting:
         one = waiting.pop()
         name = canonicalize_name(one.name)
@@ -23,6 +21,6 @@ def pins() -> str:
         except PackageNotFoundError:  # of another platform, or replaced by its user
             continue
         waiting += map(Requirement, requires(name) or [])
-    lines = [f"{name}=={found[name]}" for name in sorted(found) if name != DISTRIBUTION]
-    head = f"# {DISTRIBUTION} {found.get(DISTRIBUTION, 'of the folder code')}, Python {platform.python_version()}"
+    lines = [f"{name}=={found[name]}" for name in sorted(found) if name != "organbench"]
+    head = f"# organbench {found.get('organbench', 'of the folder code')}, Python {platform.python_version()}"
     return "\n".join([head, *lines, ""])

@@ -11,9 +11,9 @@ from importlib.metadata import PackageNotFoundError, metadata, requires, version
 
 from packaging.requirements import Requirement
 
-from studies.base.face import DISTRIBUTION
 from studies.checkup.finding import Finding, fault, note, ok
 
+DISTRIBUTION = "organbench"
 GMSH_LIBRARIES = (
     "libglu1-mesa", "libgl1", "libxft2", "libxcursor1", "libxinerama1", "libxrender1", "libxfixes3", "libxext6",
     "libfontconfig1", "libx11-6", "libgomp1",

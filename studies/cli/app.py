@@ -1,6 +1,8 @@
 """The command line: reads words, calls the library, prints. Bad input ends in one sentence and exit code 2."""
 
+import errno
 import io
+import os
 import sys
 import warnings
 from typing import Annotated
@@ -8,44 +10,14 @@ from typing import Annotated
 import typer
 
 import studies
+from massspring.errors import MassSpringError
+from reference_fem.errors import SolveError
 from studies.base import interrupts
-from studies.cli.endings import complain, flushed, message
-from studies.cli.group import Entry, lazy_group
-from studies.cli.terminal import say
+from studies.base.errors import StudyError
+from studies.cli.loading import Commands
+from studies.cli.terminal import errors, say
 
-COMMANDS = {
-    name: Entry(f"studies.cli.commands.{module}", function, line)
-    for name, module, function, line in (
-        ("list", "results.list_names", "list_names", "Studies, scenes, organs, methods and metrics, a line each."),
-        ("run", "running.run", "run", "Runs what is missing or stale, then draws the charts."),
-        ("worker", "running.worker", "worker", "Does pieces of studies for `organbench run --on` elsewhere."),
-        ("status", "running.status", "status", "How many cases are ok, failed, stale or missing, and why."),
-        ("show", "results.show", "show", "What is in a results file: status, numbers, fields with units."),
-        ("table", "results.table", "table", "One row per case, with the metrics of the study."),
-        ("plot", "results.plot", "plot", "Draws the charts and the table of a study from what is stored."),
-        ("report", "results.report", "report", "All charts and tables, and the summaries; names what it wrote."),
-        ("replay", "running.replay", "replay", "Runs exactly that case again, and says whether it is the same."),
-        ("restamp", "running.restamp", "restamp", "Keeps stored results after a change of code that moves no number."),
-        ("compare", "results.compare", "compare", "Every number that two results folders share, and which moved."),
-        ("view", "results.view", "view", "Writes cases and their reference to one file for ParaView."),
-        ("export", "exchange.export", "export", "Writes a scene for another program, with how to hand results in."),
-        ("judge", "exchange.judge", "judge", "Judges what another program computed, as our own runs are."),
-        ("publish", "results.publish", "publish", "Copies tables and charts to results/published, and the summaries."),
-        ("advise", "answers.advise", "advise", "The cheapest recipe that is accurate enough for a scene."),
-        ("calibrate", "answers.calibrate", "calibrate", "Fits few numbers of a body, judged in other scenes."),
-        ("verify", "answers.verify", "verify", "Holds the reference against closed forms and published numbers."),
-        ("stress", "answers.stress", "stress", "Tries to break every method at random; each end has a name."),
-        ("cost", "running.cost", "cost", "Microseconds per stage of a step, and what the scene leaves out."),
-        ("mesh", "meshes.mesh", "mesh", "Makes a mesh: of a synthetic organ, or from a file."),
-        ("check", "meshes.check", "check", "Tells what is wrong with a mesh and what mends it."),
-        ("place", "meshes.place", "place", "Places hold and probe on a scan, and writes a study."),
-        ("archive", "house.archive", "archive", "Packs records, tables, charts and code into one zip file."),
-        ("prune", "house.prune", "prune", "Lists stored files that nothing needs, and removes them."),
-        ("doctor", "house.doctor", "doctor", "What is missing on this machine, and what mends it."),
-        ("safe-dt", "running.safe_dt", "safe_dt", "The stability limit of a scene, predicted and verified by runs."),
-    )
-}
-app = typer.Typer(cls=lazy_group(COMMANDS), no_args_is_help=True, pretty_exceptions_enable=False)
+app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
 
 
 def show_version(asked: bool) -> None:
@@ -94,3 +66,47 @@ def _exit_code() -> str | int | None:
             complain(f"organbench: {message(error)}")
             code = 2
     return interrupts.exit_code() if interrupts.pressed() else code
+
+
+def message(error: Exception) -> str:
+    """The sentence for an error. Raises an unforeseen error again: a fault of this program keeps its traceback."""
+    if isinstance(error, (StudyError, MassSpringError, SolveError)):
+        return str(error)
+    from studies.runs.user_code import AGAIN, fault_of  # half a second, for an error alone
+
+    fault = fault_of(error)
+    if fault is not None:
+        return fault + AGAIN
+    # An error with a file name is not one of the terminal's.
+    if isinstance(error, OSError) and error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF):
+        return unwritten(error)
+    raise error
+
+
+def unwritten(error: OSError) -> str:
+    """The sentence for an output that takes no more."""
+    return f"the output could not be written ({error.strerror}); what was stored before is kept"
+
+
+def complain(sentence: str) -> None:
+    """To standard error, where that can be written to."""
+    try:
+        errors.print(sentence, markup=False, highlight=False)
+    except OSError:
+        return
+
+
+def flushed(code: str | int | None) -> str | int | None:
+    """`code`, or 2 when the last lines of the output cannot be written; later the interpreter would complain."""
+    output = sys.stdout
+    if output is None or output.closed:
+        return code
+    try:
+        output.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), output.fileno())
+        if code or isinstance(error, BrokenPipeError):  # it was printed before, or the reader has closed the pipe
+            return code
+        complain(f"organbench: {unwritten(error)}")
+        return 2
+    return code

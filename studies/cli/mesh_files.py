@@ -21,10 +21,10 @@ from studies.geometry.files.opening import opened
 from studies.geometry.files.units import UNITS, Source, check_unit, length_of, likely_units, unit_question
 from studies.geometry.mesher.progress import BEAT, WAITING
 
-Unit = Annotated[str | None, typer.Option(help="of the file's coordinates: m, cm, mm or in")]
-Scale = Annotated[float, typer.Option(help="the file's coordinates are multiplied by this first")]
-LongestSide = Annotated[str | None, typer.Option(help="of the body, such as 19cm, instead of a unit and a scale")]
-Part = Annotated[str | None, typer.Option(help="of several in a file: its name or number, or a label of a mask")]
+Unit = Annotated[str | None, typer.Option(help="unit of the file's coordinates: m, cm, mm or in")]
+Scale = Annotated[float, typer.Option(help="factor on the file's coordinates")]
+LongestSide = Annotated[str | None, typer.Option(help="longest side of the body, such as 19cm, instead of --unit")]
+Part = Annotated[str | None, typer.Option(help="a body of the file: its name, number or mask label")]
 Yes = Annotated[bool, typer.Option("--yes", "--force", help="read a very large file without asking")]
 
 

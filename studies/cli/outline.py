@@ -1,78 +1,62 @@
-"""Names and first lines as they stand in the sources: `list` has to be quick, and loading numba is not."""
+"""Names and first lines, read from the sources: importing what `organbench list` shows takes longer than a second.
+
+A test holds them equal to what the modules say.
+"""
 
 import ast
-from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
-from studies.base.errors import StudyError
+import studies as package
+
+ROOT = Path(package.__file__).parents[1]
+Rows = list[tuple[str, str]]
 
 
-def studies() -> list[tuple[str, str]]:
+def studies() -> Rows:
     """(name, question) of each of STUDIES, the name of its module and the first line there, and of the population."""
-    homes = _registered("studies.catalog", "STUDIES")
-    catalogue = [(module.rsplit(".", 1)[1], _first_line(_parsed(module))) for _, module in homes]
-    return [*catalogue, ("population", _first_line(_parsed("studies.population.study")))]
+    modules = [module for module, _ in _registered("studies.catalog", "STUDIES")]
+    rows = [(module.rsplit(".", 1)[1], _first_line(_parsed(module))) for module in modules]
+    return [*rows, ("population", _first_line(_parsed("studies.population.study")))]
 
 
-def methods() -> list[tuple[str, str]]:
+def methods() -> Rows:
     """(name, first line) of each of METHODS and of LITERATURE."""
-    found = []
     homes = [home for registry in ("METHODS", "LITERATURE") for home in _registered("massspring.methods", registry)]
-    for name, module in homes:
-        (node,) = [n for n in _parsed(module).body if isinstance(n, ast.ClassDef) and n.name == name]
-        (word,) = [
-            n.value.value
-            for n in node.body
-            if isinstance(n, ast.AnnAssign) and _named(n.target, "name") and isinstance(n.value, ast.Constant)
-        ]
-        found.append((str(word), _first_line(node)))
-    return found
+    classes = [_defined(_parsed(module), name) for module, name in homes]
+    return [(_assigned(one, "name").value, _first_line(one)) for one in classes]
 
 
-def metrics() -> list[tuple[str, str]]:
+def metrics() -> Rows:
     """(name, description) of each of METRICS: calls of a name, a unit, a direction and a function."""
     tree = _parsed("studies.metrics.metrics")
-    functions = {n.name: _first_line(n) for n in tree.body if isinstance(n, ast.FunctionDef)}
-    found = []
-    for item in _tuple(tree, "METRICS"):
-        if not (isinstance(item, ast.Call) and isinstance(item.args[0], ast.Constant)):
-            raise StudyError("METRICS is no tuple of calls; list its metrics one by one")
-        function = item.args[3]
-        found.append((str(item.args[0].value), functions[function.id] if isinstance(function, ast.Name) else ""))
-    return found
+    calls = [item.args for item in _assigned(tree, "METRICS").elts]
+    return [(name.value, _first_line(_defined(tree, function.id))) for name, _, _, function, *_ in calls]
 
 
-def _registered(module: str, registry: str) -> Iterator[tuple[str, str]]:
-    """(name, module it is imported from) of the items of a tuple. Raises StudyError where there is none."""
+def _registered(module: str, registry: str) -> list[tuple[str, str]]:
+    """(module it is imported from, name) of the items of a tuple."""
     tree = _parsed(module)
     homes = {alias.name: node.module for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
-    for item in _tuple(tree, registry):
-        if not (isinstance(item, ast.Name) and item.id in homes):
-            raise StudyError(f"{registry} of {module} is no tuple of imported names; import and list them one by one")
-        yield item.id, str(homes[item.id])
+    return [(str(homes[item.id]), item.id) for item in _assigned(tree, registry).elts]
 
 
-def _tuple(tree: ast.Module, name: str) -> list[ast.expr]:
-    for node in tree.body:
-        if isinstance(node, ast.AnnAssign) and _named(node.target, name) and isinstance(node.value, ast.Tuple):
-            return node.value.elts
-    raise StudyError(f"there is no tuple {name} with its type; write NAME: tuple[...] = (...)")
+def _assigned(node: Any, name: str) -> Any:
+    """The value of NAME: type = value in a module or class."""
+    found = (one for one in node.body if isinstance(one, ast.AnnAssign) and ast.unparse(one.target) == name)
+    return next(found).value
 
 
-def _named(node: ast.expr, name: str) -> bool:
-    return isinstance(node, ast.Name) and node.id == name
+def _defined(tree: ast.Module, name: str) -> Any:
+    """The class or function of this name."""
+    return next(one for one in tree.body if getattr(one, "name", None) == name)
 
 
 def _parsed(module: str) -> ast.Module:
-    """The syntax tree of a module of this project; neither it nor the packages round it are run."""
-    top, *parts = module.split(".")
-    spec = find_spec(top)
-    assert spec is not None and spec.origin is not None  # the packages of the project are installed together
-    path = Path(spec.origin).parent.joinpath(*parts)
-    source = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    return ast.parse(source.read_bytes())
+    """The syntax tree of a module of this project; neither it nor the packages around it are run."""
+    path = ROOT.joinpath(*module.split("."))
+    return ast.parse((path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_bytes())
 
 
-def _first_line(node: ast.Module | ast.ClassDef | ast.FunctionDef) -> str:
+def _first_line(node: Any) -> str:
     return (ast.get_docstring(node) or "").strip().split("\n")[0]

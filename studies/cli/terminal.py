@@ -56,7 +56,7 @@ SceneName = Annotated[
 ]
 SMOKE = "smoke"
 """Folder below the results for small meshes and few frames."""
-Smoke = Annotated[bool, typer.Option("--smoke", help="small meshes, few frames; kept apart in results/smoke")]
+Smoke = Annotated[bool, typer.Option("--smoke", help="small meshes and few frames; stored in results/smoke")]
 
 
 def say(text: object) -> None:

@@ -16,7 +16,7 @@ from multiprocessing import Pipe
 from pathlib import Path
 from threading import Lock
 
-from studies.sweep.own_files import Given, load_given
+from studies.runs.user_code import Given, load_given
 from studies.sweep.workers import PATIENCE, Death, cause_of
 
 PROGRAM = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from studies.engines.child import main; main({})"

@@ -13,7 +13,7 @@ from studies.base.atomic import is_there, write_whole
 from studies.base.errors import StudyError
 from studies.engines.identity import Identity, difference, this_identity
 from studies.engines.requests import Presence
-from studies.sweep.own_files import Given
+from studies.runs.user_code import Given
 from studies.sweep.workers import Death
 
 SIGHT_SECONDS = 60.0

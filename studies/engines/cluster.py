@@ -16,9 +16,9 @@ from studies.engines.fleet import GB, Fleet
 from studies.engines.requests import FrameTimes, Piece
 from studies.runs.case import Case
 from studies.runs.current import case_fingerprint, case_path
+from studies.runs.user_code import Given, given_files
 from studies.store.staleness import is_current
 from studies.sweep.engine import Progress, Told
-from studies.sweep.own_files import Given, given_files
 from studies.sweep.pool import environment
 from studies.sweep.tasks import Task
 from studies.sweep.workers import TRIES, Death

@@ -5,11 +5,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from studies.base.own_file import read_own
 from studies.reference.reference_solves import reference_fingerprint
 from studies.runs.current import run_fingerprint
+from studies.runs.user_code import Given, read_code
 from studies.store.machine import machine_id, this_machine
-from studies.sweep.own_files import Given
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Identity:
 
 def this_identity(files: tuple[Given, ...] = ()) -> Identity:
     """That of this process; `files`: of the user."""
-    known = {path: read_own(Path(path), content).fingerprint for path, content in files}
+    known = {path: read_code(Path(path), content).fingerprint for path, content in files}
     packages = this_machine().packages
     return Identity(
         run_fingerprint(), reference_fingerprint(), platform.python_version(), packages, known, machine_id()

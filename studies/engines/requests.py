@@ -9,9 +9,9 @@ from studies.base.atomic import is_there, part_path, write_whole
 from studies.catalog.study import Study
 from studies.engines.identity import Identity, this_identity
 from studies.runs.case import Case
+from studies.runs.user_code import Given
 from studies.sweep.engine import Silent
 from studies.sweep.frame_times import measure_times
-from studies.sweep.own_files import Given
 from studies.sweep.pool import do
 from studies.sweep.tasks import Task
 

@@ -7,8 +7,6 @@ from typing import Any
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
-from studies.base.own_file import file_of
-from studies.base.study_file import fault_of_study_file
 from studies.catalog.study import Study
 from studies.exchange.entry import entries_beside, entry_files
 from studies.geometry import SHAPES, organ
@@ -26,6 +24,7 @@ from studies.report.references import refresh_uncertainty, state_of
 from studies.report.summary import SUMMARIES
 from studies.runs.digest import case_digest
 from studies.runs.paper import play, slide_case, squeezed_balls
+from studies.runs.user_code import fault_of, file_of
 from studies.store.archived import is_archive, shown_machine
 from studies.store.index.entry import written
 from studies.store.machine import write_machine
@@ -52,7 +51,7 @@ def draw_charts(root: Path, study: Study, runs: Sequence[Run]) -> list[Path]:
         try:
             chart.draw(runs, folder / chart.file)
         except Exception as error:  # a user's own chart may fail in any way
-            own = fault_of_study_file(error)
+            own = fault_of(error)
             if own is None and file_of(chart.draw) is not None:  # it could not even be called
                 own = f"its function fails: {type(error).__name__}: {error}"
             if own is None:

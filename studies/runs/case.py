@@ -12,7 +12,7 @@ from massspring import ImplicitVolume, Method
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.runs.case_checks import check_recipe, check_settings
-from studies.runs.own import law_names, methods_by_name
+from studies.runs.user_code import law_names, methods_by_name
 from studies.scene.as_json import _scene_adapter, scene_from_dict
 from studies.scene.scene import Scene
 
@@ -31,8 +31,8 @@ class BodyRecipe:
     """Nodes on the outer surface; of a quadratic body mid-side nodes too, so that it has a quarter of them as vertices,
     and of a graded one those that grading adds (within 5 %)."""
     law: str = "van_gelder"
-    """Stiffness law: of a tetrahedral body of LAWS, of SMOOTHED or of one's own (`studies.runs.own.own_law`), where
-    springs without length need nodal volumes; of a membrane "delingette" or "lloyd"."""
+    """Stiffness law: of a tetrahedral body of LAWS, of SMOOTHED or of one's own (`studies.own_law`), where springs
+    without length need nodal volumes; of a membrane "delingette" or "lloyd"."""
     stiffness: float = 1.0
     """Factor on every spring; 1 matches the tissue's shear modulus."""
     volumes: Literal["scene", "whole", "regions", "patches", "nodal"] = "scene"

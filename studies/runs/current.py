@@ -6,7 +6,7 @@ from pathlib import Path
 from massspring.sources import source_fingerprint
 from studies.geometry.mesher.jobs import MAKERS
 from studies.runs.case import Case
-from studies.runs.own import files_of
+from studies.runs.user_code import files_of
 from studies.store.paths import record_path
 from studies.store.staleness import why_stale
 

@@ -26,8 +26,8 @@ from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.grading.quadratic_mesh import QuadraticMesh
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.limits import check_size
-from studies.runs.own import own_laws, sprung_by
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
+from studies.runs.user_code import own_laws, sprung_by
 from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scene.scene import Scene
 

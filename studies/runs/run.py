@@ -13,14 +13,13 @@ from massspring import History, MassSpringError, simulate
 from massspring.run.history import EXTRA
 from studies.base.compile_watch import watching
 from studies.base.errors import DoesNotApply, StudyError
-from studies.base.own_file import fault_of_own
 from studies.runs.case import Case, case_from_json
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.indicators import indicators, remarks
 from studies.runs.limits import TIME_LIMIT
-from studies.runs.own import files_of
 from studies.runs.prepare import LUMEN, Prepared, prepare
 from studies.runs.surface_frames import moments, surface_fields
+from studies.runs.user_code import fault_of, files_of
 from studies.store.new_record import new_fields, new_record
 from studies.store.record import Field, Record, Status, read_record, write_record
 from studies.store.schema import RUN_FIELDS
@@ -58,7 +57,7 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
         except (StudyError, MassSpringError) as error:
             return _record(case, Status.FAILED, str(error), {"warnings": _said(caught)}, {})
         except Exception as error:  # code of a user may fail in any way
-            own = fault_of_own(error)
+            own = fault_of(error)
             if own is None:
                 raise
             return _record(case, Status.FAILED, own, {"warnings": _said(caught)}, {})

@@ -105,7 +105,7 @@ class Trial:
     @property
     def line(self) -> str:
         """The command that repeats it."""
-        return f"organbench stress --seed {self.seed} --trial {self.number}"
+        return f"organbench fuzz --seed {self.seed} --trial {self.number}"
 
     @property
     def changed(self) -> dict[str, Any]:

@@ -7,8 +7,8 @@ from pathlib import Path
 from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint
 from studies.runs.case import Case
 from studies.runs.current import case_fingerprint
-from studies.runs.own import files_of
 from studies.runs.run import OWN_FILES
+from studies.runs.user_code import files_of
 from studies.store.new_record import new_record
 from studies.store.record import Record, Status, write_record
 from studies.sweep.tasks import Task

@@ -22,10 +22,10 @@ from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.runs.case import Case
 from studies.runs.run import run_case
+from studies.runs.user_code import Given, given_files, load_given
 from studies.sweep.engine import Progress, Told
 from studies.sweep.failures import store_failure
 from studies.sweep.frame_times import measure_times
-from studies.sweep.own_files import Given, given_files, load_given
 from studies.sweep.tasks import Task
 from studies.sweep.workers import done_or_dead
 

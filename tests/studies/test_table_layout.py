@@ -2,7 +2,7 @@
 
 import pytest
 
-from studies.cli.commands.results import table
+from studies.cli.commands import table
 from studies.metrics.cells import value_cell
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED

@@ -1,1 +1,1 @@
-"""Commands in rooms, one per module; studies.cli.app loads the one that is called."""
+"""Commands, one per module; studies.cli.loading loads the one that is called."""

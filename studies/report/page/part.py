@@ -21,7 +21,7 @@ from studies.report.page.case_data import case_data
 from studies.report.page.entry_data import entry_data
 from studies.report.page.reference_shape import reference_id, reference_shape
 from studies.runs.current import case_path
-from studies.runs.own import files_of
+from studies.runs.user_code import files_of
 from studies.store.paths import key_hash, record_files
 
 Part = dict[str, Any]

@@ -94,7 +94,7 @@ class ReferenceTrial:
     @property
     def line(self) -> str:
         """The command that repeats it."""
-        return f"organbench stress --reference --seed {self.seed} --trial {self.number}"
+        return f"organbench fuzz --reference --seed {self.seed} --trial {self.number}"
 
     @property
     def changed(self) -> dict[str, Any]:

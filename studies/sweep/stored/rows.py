@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from massspring.sources import source_fingerprint
 from studies.base.collection import uncollected
 from studies.base.errors import DamagedFile
-from studies.base.own_file import file_of
 from studies.catalog.study import Study
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run
 from studies.metrics.table import Row, row_of
 from studies.runs.case import Case
+from studies.runs.user_code import file_of
 from studies.store.archived import shown_machine
 from studies.store.index.entry import Entry
 from studies.store.index.room import Room

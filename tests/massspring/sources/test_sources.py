@@ -96,6 +96,18 @@ def statements(tree: ast.Module) -> list[ast.stmt]:
     return found
 
 
+def test_a_stub_leads_to_the_code_behind_a_name(checkout):
+    (checkout / "studies/__init__.pyi").write_text("from .table import FIVE as FIVE\n")
+    (checkout / "studies/table.py").write_text("FIVE = 5\n")
+    (checkout / "studies/user.py").write_text("from studies import FIVE\n")
+    before = fresh("studies.user")
+    (checkout / "studies/table.py").write_text("FIVE = 6\n")
+    assert fresh("studies.user") != before
+    (checkout / "studies/user.py").write_text("from studies import SIX\n")
+    with pytest.raises(MassSpringError, match="studies has no public name 'SIX': add it to"):
+        fresh("studies.user")
+
+
 def faces() -> list[Path]:
     return [file for package in sources.OWN for file in (ROOT / package).rglob("__init__.py")]
 

@@ -9,8 +9,8 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Chart
-from studies.cli.commands.results import publish as command
-from studies.cli.commands.results import report as report_command
+from studies.cli.commands import publish as command
+from studies.cli.commands import report as report_command
 from studies.report import publish as publishing
 from studies.report.publish import EXTRAS, PUBLISHED, between, publish, publish_some
 from studies.report.sentences import Sentences
@@ -134,7 +134,7 @@ def test_the_command_publishes_where_it_stands_or_says_one_sentence(current, hom
     monkeypatch.setattr(command, "STUDIES", (HEADLINE,))
     code, out, err = organbench("publish", "--results", current)
     assert (code, err) == (0, "") and str(PUBLISHED / "volume_loss" / "one.png") in out
-    assert "not made again, stays as published: verify: organbench verify; figures: organbench report" in out
+    assert "kept as published: verify: organbench verify; figures: organbench report" in out
     before = shown(home)
     miss(current, monkeypatch)
     code, out, err = organbench("publish", "--results", current)

@@ -145,7 +145,7 @@ def test_the_command_ends_with_0_here_and_with_1_where_something_is_missing(tmp_
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     good = subprocess.run(command, env=env, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert good.returncode == 0, good.stdout + good.stderr
-    assert good.stdout.endswith("nothing that is needed is missing\n") and "note   no results yet" in good.stdout
+    assert good.stdout.endswith("nothing required is missing\n") and "note   no results yet" in good.stdout
     (tmp_path / "gmsh.py").write_text("raise OSError('libGLU.so.1: cannot open shared object file')\n")
     env["PYTHONPATH"] += os.pathsep + str(tmp_path)
     bad = subprocess.run(command, env=env, cwd="/", capture_output=True, text=True, check=False)

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from massspring import METHODS
 from studies.catalog import STUDIES
 from studies.cli import app as cli
-from studies.cli.commands.running.status import SHOWN
+from studies.cli.commands.status import SHOWN
 from studies.geometry.organs import SHAPES
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import study_table

@@ -1,15 +1,18 @@
 """The list of commands and the list of names say what the code says, without loading it."""
 
+import pkgutil
+from collections import Counter
+
 import pytest
+from typer.testing import CliRunner
 
 from massspring import LITERATURE, METHODS
-from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.cli import app as cli
-from studies.cli import outline
-from studies.cli.commands.results.list_names import KINDS
-from studies.cli.completing import NAMES
-from studies.cli.group import loaded
+from studies.cli import commands, outline
+from studies.cli.commands.list import KINDS
+from studies.cli.commands_page import PAGE, commands_page
+from studies.cli.loading import COMMANDS, NAMES, loaded
 from studies.metrics.metrics import METRICS
 from studies.population import Population, population_study
 
@@ -21,20 +24,34 @@ def test_the_outline_is_what_the_modules_say():
     assert outline.metrics() == [(m.name, m.description) for m in METRICS]
 
 
-def test_a_registry_of_another_form_is_one_sentence():
-    with pytest.raises(StudyError, match="there is no tuple METHODS"):
-        list(outline._registered("massspring.errors", "METHODS"))
-    with pytest.raises(StudyError, match="no tuple of imported names"):
-        list(outline._registered("studies.metrics.metrics", "METRICS"))
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_line_of_a_command_begins_its_help(name):
+    line = COMMANDS[name].line
+    assert (loaded(name).help or "").startswith(line.removesuffix("."))
+    assert len(line) <= 64, "at 80 columns it takes one line"
 
 
-@pytest.mark.parametrize("name", cli.COMMANDS)
-def test_the_line_of_a_command_begins_as_its_help(name):
-    entry = cli.COMMANDS[name]
-    command = loaded(name, entry)
-    first = (command.help or "").split("\n")[0]
-    assert first.split()[:3] == entry.help.split()[:3], (first, entry.help)
-    assert len(entry.help) <= 66, "at 80 columns it takes one line"
+def test_no_group_of_the_list_of_commands_is_long():
+    sizes = Counter(entry.panel for entry in COMMANDS.values())
+    assert max(sizes.values()) <= 7
+    assert [entry.panel for entry in COMMANDS.values()] == list(sizes.elements()), "group by group"
+    shown = CliRunner().invoke(cli.app, ["--help"], env={"COLUMNS": "80"}).output
+    assert [panel for panel in sizes if f"─ {panel} ─" not in shown] == []
+
+
+def test_every_module_of_a_command_is_listed():
+    modules = {name for _, name, _ in pkgutil.iter_modules(commands.__path__)}
+    assert {name.replace("-", "_") for name in COMMANDS} == modules
+
+
+def test_the_page_of_commands_is_up_to_date():
+    assert PAGE.read_text(encoding="utf-8") == commands_page(), "run python -m studies.cli.commands_page"
+
+
+@pytest.mark.parametrize(("old", "new"), [("check", "mesh-check"), ("stress", "fuzz"), ("cost", "profile")])
+def test_an_old_command_is_refused_with_its_new_name(refused, old, new):
+    assert f"the command '{old}' is now '{new}': run `organbench {new}`" in refused(old, "--help")
+    assert old not in COMMANDS and new in COMMANDS
 
 
 def test_a_misspelt_command_is_one_sentence_and_names_the_nearest(refused):

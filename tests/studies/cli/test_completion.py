@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from studies.catalog import STUDIES
-from studies.cli import app as cli
-from studies.cli.completing import KIND, NAMES
+from studies.cli.loading import COMMANDS, NAMES
 from studies.geometry.organs import SHAPES
 from studies.population import POPULATION
 from studies.scenes import SCENES
@@ -44,7 +43,7 @@ def completed(*words: str) -> tuple[list[str], list[str]]:
         (("run", "volume_loss", "vol"), []),
         (("advise", "liver_pre"), ["liver_press"]),
         (("mesh", "kid"), ["kidney"]),
-        (("check", "kid"), []),
+        (("mesh-check", "kid"), []),
         (("table", "--all", "vol"), ["volume_loss"]),
         (("table", "--csv", "vol"), []),
         (("run", "--sm"), ["--smoke"]),
@@ -63,7 +62,7 @@ def test_every_name_is_offered():
     assert NAMES["studies"]() == [*(study.name for study in STUDIES), POPULATION]
     assert NAMES["scenes"]() == [scene.name for scene in SCENES]
     assert NAMES["organs"]() == list(SHAPES)
-    assert KIND.keys() <= cli.COMMANDS.keys() and set(KIND.values()) == NAMES.keys()
+    assert {entry.names for entry in COMMANDS.values()} == {*NAMES, ""}
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

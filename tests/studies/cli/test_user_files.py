@@ -9,7 +9,7 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.catalog.study import Study, command_line
-from studies.runs import own
+from studies.runs import user_code
 from studies.store.paths import record_files
 from studies.sweep.find_scene import find_scene
 from studies.sweep.find_study import find_study
@@ -78,11 +78,11 @@ def test_both_kinds_of_file_are_taken(organbench, write, tmp_path, monkeypatch, 
 def test_the_example_of_contributing_is_a_scene_for_other_programs(organbench, tmp_path):
     """The example of a study has STUDY alone, that of an own file both."""
     for section, name in (("Add a study", "ball_squeeze"), ("Keep it in a file of your own", "ball_on_the_moon")):
-        own.forget()
+        user_code.forget()
         path = tmp_path / "example.py"
         path.write_text(code("CONTRIBUTING.md", section))
         assert find_scene(str(path)).name == name
-    own.forget()
+    user_code.forget()
 
 
 def test_calibrate_takes_no_file(refused, write):

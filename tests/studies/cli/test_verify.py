@@ -33,7 +33,7 @@ def run(monkeypatch, tmp_path):
 def test_numbers_that_agree_are_printed_and_kept(run, tmp_path):
     result = run([oracle("first", 2.01), oracle("second", 1.99, fast=False)])
     assert result.exit_code == 0
-    assert "2 of 2 numbers are where they must be" in result.stdout
+    assert "2 of 2 checks passed" in result.stdout
     table = pd.read_csv(tmp_path / "verify" / "verify.csv")
     assert list(table["oracle"]) == ["first", "second"]
     assert list(table["deviation"]) == pytest.approx([0.005, 0.005])

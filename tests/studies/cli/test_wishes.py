@@ -3,7 +3,7 @@
 import pytest
 
 from studies.base.errors import StudyError
-from studies.cli.wishes import budget, share
+from studies.cli.options import budget, share
 
 
 @pytest.mark.parametrize("text", ["3%", "3 %", " 3% ", "0.03", ".03", "3e-2", "3.0%"])

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from studies.base.errors import StudyError
-from studies.cli.commands.results import compare as compare_command
-from studies.cli.commands.results.compare import rows_of
+from studies.cli.commands import compare as compare_command
+from studies.cli.commands.compare import rows_of
 from studies.compare.folders import compare, equal_records
 from studies.compare.verdict import MEANING, ROUND_OFF, Verdict, verdict_of
 from studies.store.paths import record_files

@@ -72,7 +72,7 @@ def test_no_part_of_a_mesh_is_passed_on(organbench, tmp_path):
     second = write_obj(tmp_path / "two.obj", points + 1.0, triangles + len(points)).read_text().splitlines()
     path = tmp_path / "two.obj"
     path.write_text("\n".join(["o first", *first, f"o {EVIL}", *second]) + "\n", encoding="utf-8")
-    _, out, err = organbench("check", path, "--unit", "m")
+    _, out, err = organbench("mesh-check", path, "--unit", "m")
     assert steers(out + err) == [] and "owned" in out + err
     _, out, err = organbench("mesh", "--from", path, "--unit", "m", "--part", "none", "-o", tmp_path / "a.vtu")
     assert steers(out + err) == [] and "owned" in out + err

@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from studies.base.errors import StudyError
-from studies.cli.commands.results.show import describe
+from studies.cli.commands.show import describe
 from studies.store import links
 from studies.store.links import link_study
 from studies.store.paths import index_path, key_hash, readable, record_files, record_path, timing_path

@@ -48,10 +48,10 @@ def test_the_chart_draws_every_status_and_none(tmp_path):
 
 @pytest.mark.slow
 def test_the_command_tells_and_writes(organbench, tmp_path):
-    code, out, err = organbench("stress", "--cases", 4, "--seed", 11, "--jobs", 1, "--results", tmp_path)
+    code, out, err = organbench("fuzz", "--cases", 4, "--seed", 11, "--jobs", 1, "--results", tmp_path)
     assert code == 0, out + err
     assert len(pd.read_csv(tmp_path / "breaking" / "trials.csv.gz")) == 4
     assert (tmp_path / "breaking" / "breaking.png").is_file() and "all" in out
-    code, again, _ = organbench("stress", "--seed", 11, "--trial", 2, "--results", tmp_path)
+    code, again, _ = organbench("fuzz", "--seed", 11, "--trial", 2, "--results", tmp_path)
     status = pd.read_csv(tmp_path / "breaking" / "trials.csv.gz")["status"][2]
     assert code == 0 and again.startswith(f"{status}: ") and "--seed 11 --trial 2" in again and "simplest: " in again

@@ -159,7 +159,7 @@ def test_counts_and_last_states_are_stored():
 
 @pytest.mark.slow
 def test_the_command_tells_and_writes(organbench, tmp_path):
-    code, out, err = organbench("stress", "--reference", "--cases", 3, "--seed", 1, "--jobs", 1, "--results", tmp_path)
+    code, out, err = organbench("fuzz", "--reference", "--cases", 3, "--seed", 1, "--jobs", 1, "--results", tmp_path)
     assert code == 0, out + err
     assert len(pd.read_csv(tmp_path / "breaking_reference" / "trials.csv.gz")) == 3
     assert (tmp_path / "breaking_reference" / "last.npz").is_file() and "element" in out

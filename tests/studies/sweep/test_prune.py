@@ -110,7 +110,7 @@ def test_the_command_lists_and_removes_only_when_told(organbench, refused, resul
     expected = spoil(results)
     before = content(results / "tiny")
     code, out, err = organbench("prune", tiny_file, "--results", results)
-    assert (code, err) == (0, "") and "nothing is removed yet" in out
+    assert (code, err) == (0, "") and "Repeat with --rule RULE --yes to delete" in out
     assert all(name in out for rule in (Rule.STALE, Rule.FAILED, Rule.ORPHANS) for name in expected[rule])
     assert content(results / "tiny") == before
     assert "name the rules" in refused("prune", tiny_file, "--yes", "--results", results)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from studies.advice.answer import advise
-from studies.cli.commands.meshes.place import SHIPPED, UNKNOWNS, VARIANTS
+from studies.cli.commands.place import SHIPPED, UNKNOWNS, VARIANTS
 from studies.geometry import organ, read_mesh
 from studies.report.page.pack import unpack_frames
 from studies.runs.case import BodyRecipe
@@ -61,7 +61,7 @@ SMALLER = {
 def test_the_page_is_followed(organbench, scan_file, kidney):
     folder = scan_file.parent
     scene_file = folder / "my_scene.py"
-    words = ["check", "mesh", "check", "place", "run", "run", "status", "table", "report"]
+    words = ["mesh-check", "mesh", "mesh-check", "place", "run", "run", "status", "table", "report"]
     assert [line.split()[0] for line in COMMANDS] == words
     for line in COMMANDS:
         if line == "run my_scene.py":

@@ -89,7 +89,7 @@ def test_the_table_counts_the_pairs_that_sleep(mesh_cache):
 
 
 def test_the_command_prints_a_table_or_json(organbench, tmp_path):
-    words = ("cost", "ball_clamped", "--nodes", NODES, "--method", "free")
+    words = ("profile", "ball_clamped", "--nodes", NODES, "--method", "free")
     code, out, _ = organbench(*words, "--csv", tmp_path / "cost.csv")
     assert code == 0 and "springs and prediction" in out and NO_CONTACT in out
     assert (tmp_path / "cost.csv").read_text(encoding="utf-8").startswith("kind,what,")
@@ -98,5 +98,5 @@ def test_the_command_prints_a_table_or_json(organbench, tmp_path):
 
 
 def test_bad_words_are_refused(refused):
-    assert "did you mean 'ball_squeeze'" in refused("cost", "bal_squeeze")
-    assert "unknown body 'solid'" in refused("cost", "ball_squeeze", "--body", "solid")
+    assert "did you mean 'ball_squeeze'" in refused("profile", "bal_squeeze")
+    assert "unknown body 'solid'" in refused("profile", "ball_squeeze", "--body", "solid")

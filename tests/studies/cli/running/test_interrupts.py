@@ -177,17 +177,6 @@ def test_the_entry_point_is_ready_before_anything_large_is_read():
     assert (done.returncode, done.stderr) == (130, "organbench: interrupted before anything was begun\n")
 
 
-def test_nothing_slow_is_read_before_it_listens():
-    """What Python itself loads before a program begins, its site, is beyond us; of our own only three small files."""
-    program = f"import sys; sys.path.insert(0, {str(REPOSITORY)!r}); old = set(sys.modules); import studies; "
-    program += "print(*sorted(set(sys.modules) - old))"
-    command = [sys.executable, "-I", "-S", "-c", program]
-    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.split())
-    assert {"studies", "studies.base", "studies.base.face"} <= loaded
-    assert not loaded & {"typing", "re", "collections", "enum", "functools", "pathlib", "signal"}, loaded
-
-
 def test_without_it_all_stays_as_it_was(organbench, monkeypatch):
     monkeypatch.setattr(cli, "app", broken)
     before = signal.getsignal(signal.SIGINT)

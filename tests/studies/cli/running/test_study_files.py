@@ -46,7 +46,7 @@ OWN = "from studies.catalog import Chart\nfrom massspring import Free\nfrom test
 
 BROKEN |= {
     "sys.exit": ("import sys\nsys.exit(3)\n", "cannot be loaded: SystemExit in line 2: 3"),
-    "BaseException": ("raise BaseException\n", "cannot be loaded: BaseException in line 1; mend it"),
+    "BaseException": ("raise BaseException\n", "cannot be loaded: BaseException in line 1; correct it and run again"),
     "method class": (
         OWN + "STUDY = tiny_study(cases=(tiny_case(method=Free),))\n",
         "in line 4: the method is Free",

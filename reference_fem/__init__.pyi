@@ -1,0 +1,32 @@
+from .dynamics.modes import Modes as Modes
+from .dynamics.modes import natural_frequencies as natural_frequencies
+from .dynamics.motion_path import DynamicsSettings as DynamicsSettings
+from .dynamics.motion_path import Moment as Moment
+from .dynamics.motion_path import motion_path as motion_path
+from .elements.curve import curve as curve
+from .elements.evaluate import Evaluator as Evaluator
+from .elements.shapes import facet_nodes as facet_nodes
+from .elements.shapes import nodes as nodes
+from .elements.shapes import surface_triangles as surface_triangles
+from .elements.table import ELEMENTS as ELEMENTS
+from .elements.table import Element as Element
+from .errors import SlowSolverWarning as SlowSolverWarning
+from .errors import SolveError as SolveError
+from .model.cavity import Cavity as Cavity
+from .model.loads import BodyForce as BodyForce
+from .model.loads import Traction as Traction
+from .model.material import Material as Material
+from .model.material import MooneyRivlin as MooneyRivlin
+from .model.material import NeoHookean as NeoHookean
+from .model.obstacles import RigidCapsule as RigidCapsule
+from .model.obstacles import RigidPlane as RigidPlane
+from .model.obstacles import RigidSphere as RigidSphere
+from .model.problem import PrescribedDisplacement as PrescribedDisplacement
+from .model.problem import Problem as Problem
+from .statics.equilibrium import Checkpoint as Checkpoint
+from .statics.equilibrium import Equilibrium as Equilibrium
+from .statics.equilibrium import equilibrium_path as equilibrium_path
+from .system.state import NewtonSettings as NewtonSettings
+from .system.state import State as State
+
+__version__: str

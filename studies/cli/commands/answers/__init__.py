@@ -1,1 +1,0 @@
-"""Commands that answer a question: which recipe, which parameters, is the reference right."""

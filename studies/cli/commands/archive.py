@@ -1,0 +1,37 @@
+"""`organbench archive`: results that can be handed on."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.archive.checking import check
+from studies.archive.packing import chosen, pack
+from studies.catalog import STUDIES
+from studies.cli.terminal import Results, busy, say, warn
+from studies.sweep.find_study import find_studies
+
+
+def archive(
+    studies: Annotated[
+        list[str] | None, typer.Argument(metavar="STUDY", help="studies to pack; default: all with stored results")
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="the zip file")] = Path("organbench-results.zip"),
+    results: Results = Path("results"),
+    checked: Annotated[
+        Path | None, typer.Option("--check", metavar="FILE", help="only compare this archive with its checksums")
+    ] = None,
+) -> None:
+    """Pack records, tables, charts and code into a zip file. Stale results are refused."""
+    if checked is not None:
+        with busy(f"reading {checked}"):
+            count = check(checked)
+        say(f"{checked}: {count} files, each as it was packed")
+        return
+    found = find_studies(studies) if studies else chosen(results, STUDIES)
+    files = [Path(name) for name in studies or [] if name.endswith(".py")]
+    with busy(f"packing {', '.join(study.name for study in found)}"):
+        packed = pack(results, found, output, datetime.now(UTC).date().isoformat(), files)
+    warn(packed.remarks)
+    say(f"{packed.path}: {packed.files} files, {packed.size / 1e6:.1f} MB")

@@ -1,0 +1,31 @@
+"""`organbench doctor`: what is missing on this machine."""
+
+from pathlib import Path
+
+import typer
+
+from studies.checkup.finding import Finding, Level
+from studies.checkup.machine import machine
+from studies.checkup.results_folder import results_folder
+from studies.checkup.software import software
+from studies.cli import outline
+from studies.cli.terminal import Results, busy, say
+
+
+def doctor(results: Results = Path("results")) -> None:
+    """Check this installation, its caches and its results. Exit code 1: something needed is missing."""
+    with busy("looking at packages, caches and results"):
+        names = [name for name, _ in outline.studies()]
+        found = [*software(), *machine(results), *results_folder(results, names)]
+    for finding in found:
+        show(finding)
+    faults = sum(finding.level is Level.FAULT for finding in found)
+    say(f"{faults} of {len(found)} checks failed" if faults else "nothing required is missing")
+    raise typer.Exit(1 if faults else 0)
+
+
+def show(finding: Finding) -> None:
+    """A line, and below it how to repair it."""
+    say(f"{finding.level:<6} {finding.said}")
+    if finding.mend:
+        say(f"       {finding.mend}")

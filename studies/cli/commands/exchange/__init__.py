@@ -1,1 +1,0 @@
-"""Scenes for other programs, and what these hand in."""

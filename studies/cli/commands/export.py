@@ -1,0 +1,40 @@
+"""`organbench export`: a scene for another program."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.advice.yardsticks import yardsticks
+from studies.base.errors import StudyError
+from studies.cli.terminal import Results, SceneName, busy, say, warn
+from studies.exchange.export import export as exported
+from studies.exchange.meshes import NODES
+from studies.sweep.find_scene import find_scene
+
+
+def export(
+    scene: SceneName,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="folder to write  [default: the name of the scene]")
+    ] = None,
+    nodes: Annotated[int, typer.Option(help="vertices on the outer surface")] = NODES,
+    results: Results = Path("results"),
+) -> None:
+    """Write a scene for another program: meshes, material, loads, output times, and how to hand results in.
+
+    README.md in the folder holds what our own bodies reach.
+    """
+    found = find_scene(scene)
+    folder = output if output is not None else Path(found.name)
+    try:
+        rows = yardsticks(results, found)
+    except StudyError as problem:
+        warn([f"README.md names no measured body: {problem}"])
+        rows = []
+    with busy(f"meshing for {found.name}"):
+        written, why_not = exported(found, folder, nodes, rows)
+    if why_not:
+        warn([f"there is no curved mesh: {why_not}"])
+    for path in written:
+        say(path)

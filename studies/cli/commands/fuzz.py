@@ -1,0 +1,87 @@
+"""`organbench fuzz`: random trials that try to break every method, or the reference, and what came of each."""
+
+import gzip
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import pandas as pd
+import typer
+
+from studies.base.atomic import write_whole
+from studies.cli.progress import TerminalProgress
+from studies.cli.terminal import Results, console, errors, say
+from studies.plots.campaigns.breaking import draw as draw_chart
+from studies.store.stamps import set_stamp
+from studies.store.tables.csv_table import write_table
+from studies.stress.campaign import counts, run_trials, table_of
+from studies.stress.outcome import UNEXPLAINED, Attempt, Outcome, simplest, tried
+from studies.stress.reference.outcome import tried as try_reference
+from studies.stress.reference.table import counts_by_choice, last_states
+from studies.stress.reference.trial import PLAIN as GENTLE
+from studies.stress.reference.trial import draw as draw_reference
+from studies.stress.trial import PLAIN, draw
+
+FOLDER, REFERENCE, TRIALS, LAST = "breaking", "breaking_reference", "trials.csv.gz", "last.npz"
+WHAT = "trials"
+CAMPAIGNS: Mapping[bool, tuple[Callable[[int, int], Any], Attempt, Mapping[str, Any]]] = {
+    False: (draw, tried, PLAIN),
+    True: (draw_reference, try_reference, GENTLE),
+}
+"""Whether the reference is tried: how a trial is drawn and tried, and its gentlest choices."""
+
+
+def fuzz(
+    cases: Annotated[int, typer.Option(min=1, help="number of trials")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the random trials")] = 0,
+    trial: Annotated[int | None, typer.Option(min=0, help="repeat this trial and simplify it")] = None,
+    reference: Annotated[bool, typer.Option("--reference", help="test the finite-element reference instead")] = False,
+    jobs: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    results: Results = Path("results"),
+) -> None:
+    """Try to break every method with random trials of bodies and surroundings. Exit code 1: an unclassified failure."""
+    make, attempt, plain = CAMPAIGNS[reference]
+    if trial is not None:
+        found = [attempt(make(seed, trial))]
+        tell(found[0])
+        say(f"simplest: {simplest(found[0], attempt=attempt, plain=plain).trial.changed}")
+    else:
+        with TerminalProgress(errors) as progress:
+            progress.begin(WHAT, cases)
+            trials = [make(seed, number) for number in range(cases)]
+            found = run_trials(trials, jobs, lambda outcome: progress.advance(WHAT, outcome.status), attempt)
+        (store_reference if reference else store)(results, found)
+        for outcome in found:
+            if outcome.status == UNEXPLAINED:
+                tell(outcome)
+    if any(outcome.status == UNEXPLAINED for outcome in found):
+        raise typer.Exit(1)
+
+
+def store(results: Path, found: Sequence[Outcome]) -> None:
+    """The table, counts and chart of a campaign against the methods."""
+    table = table_of(found)
+    draw_chart(table, results / FOLDER / "breaking.png")
+    write(results, FOLDER, table, counts(table).reset_index())
+
+
+def store_reference(results: Path, found: Sequence[Outcome]) -> None:
+    """The same against the reference, without a chart, and the last states that converged before a failure."""
+    table = table_of(found)
+    write_whole(results / REFERENCE / LAST, last_states(found))
+    write(results, REFERENCE, table, counts_by_choice(table))
+
+
+def write(results: Path, folder: str, table: pd.DataFrame, counted: pd.DataFrame) -> None:
+    """Counts and trials of a campaign, below `results`/`folder`."""
+    say(write_table(results / folder / "counts.csv", counted))
+    write_whole(results / folder / TRIALS, gzip.compress(table.to_csv(index=False).encode(), mtime=0))
+    set_stamp(results, folder)
+    console.print(counted.to_string(index=False), markup=False, highlight=False)
+
+
+def tell(outcome: Outcome) -> None:
+    """How a trial ended, and the line that repeats it."""
+    say(
+        f"{outcome.status}: {outcome.message or 'nothing to object to'} ({outcome.seconds:.2g} s): {outcome.trial.line}"
+    )

@@ -1,1 +1,0 @@
-"""Commands about the installation and about results as a whole."""

@@ -1,0 +1,151 @@
+"""`organbench mesh`: from a name or a file to a mesh."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from studies.base.errors import StudyError
+from studies.base.lookup import lookup
+from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, settled, source_of, working
+from studies.cli.terminal import say
+from studies.geometry import OrganMesh, curved, organ, scan, true_shape_of, vary
+from studies.geometry.files.units import NAMES, check_unit
+from studies.geometry.files.writing import SURFACES, VOLUMES, check_target, holds_tetrahedra, write_mesh
+from studies.geometry.mesh.quality import dihedral_angles
+from studies.geometry.organs import SHAPES
+from studies.metrics.wish import SHAPE
+from studies.scene.scene import Organ
+
+MM = 1e-3
+NODES = 550
+
+
+def mesh(
+    name: Annotated[str, typer.Argument(help="an organ (see `organbench list organs`); leave it out with --from")] = "",
+    source: Annotated[Path | None, typer.Option("--from", help="a file instead: STL, OBJ, VTK, glTF, a mask …")] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help=f"{' '.join(VOLUMES + SURFACES)}")] = Path("mesh.vtu"),
+    nodes: Annotated[int | None, typer.Option(help="outer nodes; without it a file keeps its own")] = None,
+    fill: Annotated[bool | None, typer.Option("--fill/--surface", help="with tetrahedra, or only the surface")] = None,
+    order: Annotated[int, typer.Option(min=1, max=2, help="2: curved elements that follow the true shape")] = 1,
+    wall: Annotated[float | None, typer.Option(help="wall thickness of a hollow body in mm")] = None,
+    seed: Annotated[int | None, typer.Option(help="seed of a random, plausible variation of the organ")] = None,
+    smooth: Annotated[float, typer.Option(help="close folds and level bumps of this size in mm (--from)")] = 0.0,
+    solid: Annotated[float | None, typer.Option(help="fill a shell, close openings up to so many mm (--from)")] = None,
+    close_holes: Annotated[bool, typer.Option("--close-holes", help="close holes with flat lids (--from)")] = False,
+    unit: Unit = None,
+    scale: Scale = 1.0,
+    longest_side: LongestSide = None,
+    part: Part = None,
+    write_unit: Annotated[str, typer.Option(help="unit of the written lengths: m, cm, mm or in")] = "m",
+    yes: Yes = False,
+) -> None:
+    """Mesh a synthetic organ or a surface in a file, which is welded, oriented, remeshed and filled."""
+    check_unit(write_unit)
+    check_target(output, source)
+    filled = check_filling(output, fill, order)
+    check_one(name, source, seed)
+    if source is None:
+        given = {"--smooth": smooth, "--close-holes": close_holes, "--solid": solid, "--unit": unit}
+        refuse_file_options(given | {"--scale": scale != 1.0, "--longest-side": longest_side, "--part": part})
+        with working(f"meshing the {name}"):
+            shape, made = None, synthetic(name, nodes or NODES, seed, wall, filled, exact=order == 1)
+    else:
+        file = settled(source_of(source, unit, scale, longest_side, part), yes)
+        how = {"smooth": smooth * MM, "solid": in_metres(solid), "wall": in_metres(wall), "holes": close_holes}
+        with working(f"meshing {source.name}"):
+            made = scan(file, nodes, fill=filled, on_shape=order == 2, **how)
+            shape = true_shape_of(file, **how) if order == 2 and nodes else None
+    with working("curving" if order == 2 else "writing"):
+        write_mesh(made, output, write_unit, curved(made, shape=shape) if order == 2 else None)
+    near = nearness(made) if made.losses or order == 2 or source is not None else [closeness(made)]
+    for line in (*near, f"{summary(made)}; written to {output} in {NAMES[write_unit]}"):
+        say(line)
+
+
+def check_one(name: str, source: Path | None, seed: int | None) -> None:
+    """Raise StudyError unless an organ or a file is asked for, and no file with a seed."""
+    if bool(name) == (source is not None):
+        raise StudyError("say what to mesh: the name of an organ (see `organbench list`), or --from FILE")
+    if source is not None and seed is not None:
+        raise StudyError("--seed varies synthetic organs; a file comes as it is, leave it out")
+
+
+def check_filling(output: Path, fill: bool | None, order: int) -> bool:
+    """Whether the body gets tetrahedra: as asked, or as its file can hold them. Raises StudyError where it cannot."""
+    filled = holds_tetrahedra(output) if fill is None else fill
+    if filled and not holds_tetrahedra(output):
+        raise StudyError(f"{output.name}: {output.suffix} holds triangles only; use .vtu, or leave --fill out")
+    if order == 2 and not filled:
+        raise StudyError("curved elements (--order 2) fill a body; leave --surface out, and write .vtu, .vtk or .msh")
+    return filled
+
+
+def in_metres(millimetres: float | None) -> float | None:
+    """A length of the command line."""
+    return None if millimetres is None else millimetres * MM
+
+
+def refuse_file_options(given: Mapping[str, object]) -> None:
+    """Raise StudyError for options that only a file can have, by name; None, False and 0 are not given."""
+    wrong = [option for option, value in given.items() if value not in (None, False)]
+    if wrong:
+        raise StudyError(f"{' and '.join(wrong)} are for files (--from); a synthetic organ needs none of it")
+
+
+def synthetic(name: str, nodes: int, seed: int | None, wall: float | None, filled: bool, exact: bool) -> OrganMesh:
+    """An organ of SHAPES, varied by its seed, with a wall [mm] if it can have one; `exact`: with flat sides and yet its
+    true volume."""
+    lookup(name, SHAPES, "organ")
+    parameters: dict[str, float] = {} if seed is None else dict(vary(name, seed))
+    if wall is not None:
+        hollow = [known for known, make in SHAPES.items() if "wall" in make.__code__.co_varnames]
+        if name not in hollow:
+            raise StudyError(f"the {name} is solid; --wall is for {', '.join(hollow)}, or for a file (--from)")
+        # The ball's parameters are in metres, the organs' in millimetres.
+        parameters["wall"] = wall * MM if name == "ball" else wall
+    return organ(name, nodes, fill=filled, parameters=parameters, exact=exact, sides="straight" if exact else "curved")
+
+
+def closeness(made: OrganMesh) -> str:
+    """How far a synthetic organ with flat sides is from its true surface, and where that is too far, about how many
+    nodes are not: the distance falls as the area of a facet does."""
+    # Loaded where it is used: it brings the finite elements.
+    from studies.metrics.rest_surface import rest_surfaces
+    from studies.metrics.true_surface import shape_errors
+
+    sides = rest_surfaces(made.points, made.triangles)
+    organ_of = Organ(made.recipe["organ"], made.recipe["parameters"])
+    far = 100.0 * shape_errors(organ_of, sides, filled=len(made.tetrahedra) > 0).distance
+    enough = 10 * int(np.ceil(0.1 * made.outer_count * far / SHAPE))
+    more = f"; about {enough:,} nodes keep it within {SHAPE:g} %" if far > SHAPE else ""
+    return f"shape: up to {far:.2g} % of the organ's size off its true surface{more}"
+
+
+def nearness(made: OrganMesh) -> list[str]:
+    """How near a mesh is to its file, a line for each direction and one for the volume; none for other meshes."""
+    lost = made.losses
+    if not lost:
+        return []
+    rows = []
+    for key, way in (("file_to_mesh", "file to mesh"), ("mesh_to_file", "mesh to file")):
+        mean, most, far = (1e3 * lost[key][kind] for kind in ("mean", "p95", "max"))
+        where = ", ".join(f"{1e3 * x:.4g}" for x in lost[key]["where"])
+        largest = f"largest {far:.3g} mm ({0.1 * far / lost['diagonal']:.2g} % of the diagonal) at ({where}) mm"
+        rows.append(f"{way}: mean {mean:.2g} mm, 95 % within {most:.2g} mm, {largest}")
+    before, after = lost["volume_file"], lost["volume_mesh"]
+    change = 100 * (after / before - 1)
+    return [*rows, f"volume: file {1e6 * before:.5g} mL, mesh {1e6 * after:.5g} mL ({change:+.3f} %)"]
+
+
+def summary(made: OrganMesh) -> str:
+    """What was made, in a line."""
+    body = f", {len(made.tetrahedra):,} tetrahedra" if len(made.tetrahedra) else ""
+    flattest = (
+        f", flattest angle {float(np.min(dihedral_angles(made.points, made.tetrahedra))):.3g} degrees" if body else ""
+    )
+    lumen = f", lumen {1e6 * made.lumen_volume:.4g} mL" if made.hollow else ""
+    surface = f"{made.outer_count:,} outer nodes, {len(made.outer_triangles):,} outer triangles"
+    return f"{made.name}: {surface}{body}, tissue {1e6 * made.volume:.4g} mL{lumen}{flattest}"

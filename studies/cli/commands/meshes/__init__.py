@@ -1,1 +1,0 @@
-"""Commands about meshes of organs: made, examined, placed."""

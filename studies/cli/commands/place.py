@@ -1,0 +1,146 @@
+"""`organbench place`: from a scan to a scene, by rule."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import studies
+from studies.advice.answer import RESULTS, Advice, advise
+from studies.advice.words import body_in_python
+from studies.base.atomic import write_whole
+from studies.base.errors import StudyError
+from studies.base.lookup import lookup
+from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, settled, source_of, working
+from studies.cli.terminal import say, warn
+from studies.geometry import BallRegion, scan
+from studies.geometry.files.units import Source, stem_of
+from studies.plots.place import draw_placing
+from studies.population.folder import placed_scene
+from studies.scene.chosen_place import RADIUS, SIDES, place_of
+from studies.scene.proposal import Proposal, proposal
+from studies.scene.scene_file import Recommended, organ_options, python_name, scene_text
+from studies.scene.tissues import TISSUES, tissue_named
+
+MM = 1e-3
+NODES = 550
+SHIPPED = Path(studies.__file__).parents[1] / RESULTS
+"""Results with the published table of accuracy, wherever the command is called from."""
+UNKNOWNS = {250: 10_000, 360: 23_000, 550: 46_000}
+"""Of the reference on each mesh of the plan: the mean of a spleen and a liver of 5,000 nodes, which are 5 % apart."""
+VARIANTS = 3
+"""Solves with better settings on the coarsest mesh."""
+SECONDS = 2.5e-3
+"""Per unknown: liver_probe took 2.3 ms and kidney_probe 2.9 ms on 90,000 unknowns, on a core of a busy machine."""
+MESHING = 60.0
+"""Seconds for the meshes of the same spleen and liver: 26 and 51, and those of the bodies."""
+SIDES_HELP = f"{', '.join(SIDES)} (left is -x, front -y, bottom -z)"
+
+
+def place(
+    path: Annotated[Path, typer.Argument(help="a surface: STL, OBJ, PLY, VTK, glTF, a label mask …")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="scene file to write")] = Path("scene.py"),
+    picture: Annotated[Path | None, typer.Option(help="draw hold and probe to this PNG file")] = None,
+    tissue: Annotated[str | None, typer.Option(help=f"{', '.join(TISSUES)}; default: by the file's name")] = None,
+    hold: Annotated[str | None, typer.Option(help=f"{SIDES_HELP}, or x,y,z in mm; default: the blunter end")] = None,
+    probe: Annotated[str | None, typer.Option(help="a side or x,y,z in mm; default: the flattest patch")] = None,
+    nodes: Annotated[int, typer.Option(help="surface nodes of the body with one volume")] = NODES,
+    smooth: Annotated[float, typer.Option(help="close folds and level bumps of this size in mm")] = 0.0,
+    solid: Annotated[float | None, typer.Option(help="fill a shell, close openings up to this size in mm")] = None,
+    close_holes: Annotated[bool, typer.Option("--close-holes", help="close holes with flat lids")] = False,
+    unit: Unit = None,
+    scale: Scale = 1.0,
+    longest_side: LongestSide = None,
+    part: Part = None,
+    yes: Yes = False,
+) -> None:
+    """Place hold and probe on a scan and write a study: two bodies, their reference, charts and replays."""
+    check_names(output, picture)
+    held, probed = (None if text is None else place_of(text) for text in (hold, probe))
+    name = tissue_of(tissue, path, part)
+    source = settled(source_of(path, unit, scale, longest_side, part), yes)
+    how: dict[str, Any] = {"smooth": smooth * MM, "holes": close_holes, "solid": None if solid is None else solid * MM}
+    with working(f"meshing {path.name}"):
+        mesh = scan(source, nodes, fill=False, **how)
+    if source.longest_side is None:
+        source = replace(source, unit=mesh.recipe["unit"])  # a scene says it, also where the file does
+    placing = proposal(mesh, held, probed)
+    if tissue is None:
+        modulus = 1e-3 * TISSUES[name].shear_modulus
+        say(f"tissue: {name} ({modulus:g} kPa), as the file is called; --tissue names another")
+    for line in lines_of(placing):
+        say(line)
+    answer = answer_for(source, placing, name)
+    body = second_body(answer)
+    text = scene_text(placing, organ_options(source, how), name, nodes, body, output.parent)
+    write_whole(output, text.encode())
+    if picture is not None:
+        draw_placing(mesh, placing, RADIUS * placing.sides[0], picture)
+    say(f"written to {output}; next: organbench run {output}, which takes about {minutes(answer):.0f} minutes")
+
+
+def check_names(output: Path, picture: Path | None) -> None:
+    """Raise StudyError unless the files that will be written are called what they are."""
+    if output.suffix != ".py":
+        raise StudyError(f"{output.name}: a scene file is Python; give it a name that ends in .py")
+    if picture is not None and picture.suffix.lower() != ".png":
+        raise StudyError(f"{picture.name}: the picture is a PNG; give it a name that ends in .png")
+
+
+def tissue_of(given: str | None, path: Path, part: str | None) -> str:
+    """A name of TISSUES: as given, or as the file or its part is called. Raises StudyError."""
+    if given is not None:
+        lookup(given, TISSUES, "tissue")
+        return given
+    return tissue_named(" ".join([stem_of(path), *([part] if part else [])]))
+
+
+def answer_for(source: Source, placing: Proposal, tissue: str) -> Advice | None:
+    """What `organbench advise` recommends for the scene by the published table; None, with a warning, where there is no
+    such table."""
+    scene = placed_scene(python_name(stem_of(source.path)), source, placing, TISSUES[tissue])
+    try:
+        return advise(scene, results=SHIPPED, timing=False)
+    except StudyError as error:
+        warn([f"the scene has one body alone, for nothing can be recommended: {error}"])
+        return None
+
+
+def second_body(answer: Advice | None) -> Recommended | None:
+    """The recommended body, which is printed with its errors."""
+    if answer is None or answer.chosen is None:
+        return None
+    case = answer.chosen.case
+    errors = f"force {answer.chosen.force.value:+.2g} %, displacement {answer.chosen.displacement.value:.2g} %"
+    near = "" if answer.meets else ", the nearest to the usual accuracy"
+    alike = answer.alike or (answer.scene.name,)
+    say(f"bodies: tetrahedral of one volume; {case.body.series}, {case.body.nodes} nodes (recommended{near})")
+    say(f"  worst errors of the recommended one in {' and '.join(alike)}: {errors}")
+    return Recommended(body_in_python(case.body), case.dt_fraction, alike)
+
+
+def minutes(answer: Advice | None) -> float:
+    """What the study takes on one core, roughly and without compiling: meshes, references, and the recommended body."""
+    unknowns = sum(UNKNOWNS.values()) + VARIANTS * min(UNKNOWNS.values())
+    body = 0.0
+    if answer is not None and answer.chosen is not None and answer.chosen.cost.known:
+        body = answer.chosen.cost.value * answer.scene.duration
+    return (MESHING + SECONDS * unknowns + body) / 60.0
+
+
+def lines_of(placing: Proposal) -> list[str]:
+    """Where hold and probe are, for a person."""
+
+    def mm(values: tuple[float, ...]) -> str:
+        return ", ".join(f"{1e3 * x:.4g}" for x in values)
+
+    axes = "; ".join(", ".join(f"{x:.2f}" for x in axis) for axis in placing.axes)
+    hold = placing.hold
+    where = f"within {1e3 * hold.radius:.3g} mm of" if isinstance(hold, BallRegion) else "beyond"
+    at = hold.center if isinstance(hold, BallRegion) else hold.point
+    return [
+        f"extents along the principal axes: {mm(placing.sides)} mm (axes {axes}; middle {mm(placing.middle)} mm)",
+        f"hold: {placing.held_where}, {100 * placing.held_share:.0f} % of the surface, {where} ({mm(at)}) mm",
+        f"palpate: ({mm(placing.palpation.point)}) mm, flatness {placing.flatness:.2f} (1 is a plane)",
+    ]

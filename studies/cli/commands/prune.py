@@ -1,0 +1,67 @@
+"""`organbench prune`: stored files that nothing needs any more."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.base.errors import StudyError
+from studies.base.lookup import lookup
+from studies.catalog import STUDIES
+from studies.cli.terminal import Results, say
+from studies.sweep.find_study import find_studies
+from studies.sweep.stored.prune import MEANING, Prunable, Rule, prunable, remove
+
+SHOWN = 8
+"""Files named per rule; `--list` names the rest."""
+
+
+def prune(
+    studies: Annotated[list[str] | None, typer.Argument(metavar="STUDY", help="the studies to examine")] = None,
+    every: Annotated[bool, typer.Option("--all", help="examine all studies")] = False,
+    rules: Annotated[str, typer.Option("--rule", help=f"rules to apply, separated by commas: {', '.join(Rule)}")] = "",
+    older: Annotated[float, typer.Option("--older-than", metavar="DAYS", min=0.0, help="keep younger files")] = 0.0,
+    references: Annotated[bool, typer.Option(help="also examine their references (hours of computing)")] = False,
+    results: Results = Path("results"),
+    listed: Annotated[bool, typer.Option("--list", help="name every file")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="remove the files; without it they are only listed")] = False,
+) -> None:
+    """List and remove stored files that nothing needs. Nothing is removed without --rule and --yes."""
+    if bool(studies) == every:
+        raise StudyError("name the studies whose files are examined, or give --all")
+    if yes and not rules:
+        raise StudyError("--yes removes nothing without --rule: name the rules to apply")
+    known = {str(rule): rule for rule in Rule}
+    chosen = [lookup(word.strip(), known, "rule") for word in rules.split(",")] if rules else list(Rule)
+    found = prunable(results, list(STUDIES) if every else find_studies(studies or []), chosen, older, references)
+    for rule in chosen:
+        show([one for one in found if one.rule == rule], rule, listed)
+    if not found:
+        say("nothing to remove")
+    elif yes:
+        gone = remove(found)
+        say(f"removed {len(gone)} files, {size(gone)}" + _left(found, gone))
+    else:
+        say(f"dry run: {size(found)} could be removed. Repeat with --rule RULE --yes to delete")
+
+
+def show(found: list[Prunable], rule: Rule, listed: bool) -> None:
+    """The files of a rule, with what it means."""
+    if not found:
+        return
+    say(f"{rule}, {MEANING[rule]}: {len(found)} files, {size(found)}")
+    shown = found if listed or len(found) <= SHOWN + 1 else found[:SHOWN]
+    for one in shown:
+        say(f"  {one.path}")
+    if len(shown) < len(found):
+        say(f"  and {len(found) - len(shown)} more (--list names them)")
+
+
+def size(found: list[Prunable]) -> str:
+    """Of all together, in MB."""
+    return f"{sum(one.size for one in found) / 1e6:.1f} MB"
+
+
+def _left(found: list[Prunable], gone: list[Prunable]) -> str:
+    left = len(found) - len(gone)
+    return f"; {left} were rewritten in the meantime and stay" if left else ""

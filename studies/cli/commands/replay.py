@@ -1,0 +1,78 @@
+"""`organbench replay`: does a stored run come out the same?"""
+
+import hashlib
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.base.errors import DamagedFile, StudyError
+from studies.cli.terminal import say, warn
+from studies.exchange.entry import ENTRY
+from studies.runs.run import own_files_of
+from studies.runs.run import replay as replay_run
+from studies.runs.user_code import load_file
+from studies.store.record import Record, peek
+
+
+def replay(
+    path: Annotated[Path, typer.Argument(help="a results file")],
+    file: Annotated[
+        list[Path] | None,
+        typer.Option(help="the FILE.py that made it. It runs as a program: name only a file you trust"),
+    ] = None,
+) -> None:
+    """Run one stored case again and compare the results. Exit code 1: they differ.
+
+    A record is data and starts no program: a case with a method or law of your own needs --file.
+    """
+    load_own_files(path, file or [])
+    stored, new, difference = replay_run(path)
+    if difference is None:
+        say(f"{stored.name}: the same, bit for bit ({new.status})")
+        return
+    say(f"{stored.name}: {difference}")
+    if stored.fingerprint != new.fingerprint:
+        say("the code has changed since it was stored")
+    if stored.machine != new.machine:
+        say("it was stored on another machine")
+    raise typer.Exit(1)
+
+
+def load_own_files(path: Path, given: list[Path]) -> None:
+    """Loads the user's files that the run in `path` was made with: those of `given` with the same names, or the only
+    one of `given` whatever its name. Where the record says that they lie is not looked at: a stranger may have written
+    it, and the SHA-256 with it.
+
+    Warns of a file whose SHA-256 is not the one in the record. Raises StudyError where one is not among `given`.
+    """
+    record = peek(path)
+    if record.attributes.get(ENTRY) is not None:
+        raise StudyError(f"{path} is an entry from outside: only the program that made it can run it again")
+    wanted = _own_files(path, record)
+    by_name = {file.name: file for file in given}
+    if len(wanted) == len(given) == 1:
+        by_name = {Path(name).name: given[0] for name in wanted}
+    missing = [name for name in wanted if Path(name).name not in by_name]
+    if missing:
+        raise StudyError(
+            f"{path} was made with the program {missing[0]}, and programs run only when you name them: add "
+            f"--file {shlex.quote(missing[0])}, or where it is now, if you trust it"
+        )
+    for name, digest in wanted.items():
+        file = by_name[Path(name).name]
+        if file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() != digest:
+            warn([f"{file} is not the file that {path} was made with: its content has changed"])
+        load_file(file)
+
+
+def _own_files(path: Path, record: Record) -> dict[str, str]:
+    """As `own_files_of`. Raises DamagedFile for a text that this program does not write."""
+    try:
+        wanted = own_files_of(record)
+    except ValueError:
+        wanted = None
+    if not isinstance(wanted, dict) or not all(isinstance(digest, str) for digest in wanted.values()):
+        raise DamagedFile(f"{path} does not say which files it was made with: delete it, or run its study again")
+    return wanted

@@ -1,1 +1,0 @@
-"""Commands that read, draw, compare and publish what is stored."""

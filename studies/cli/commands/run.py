@@ -1,0 +1,164 @@
+"""`organbench run`: studies brought up to date."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.base.atomic import sweep_parts
+from studies.base.counting import amounts
+from studies.base.errors import StudyError
+from studies.base.lookup import lookup
+from studies.catalog import STUDIES, Study
+from studies.catalog.checks import check_study
+from studies.cli.options import case_named
+from studies.cli.progress import TerminalProgress, dry_run
+from studies.cli.terminal import PROGRAM, SMOKE, Results, Smoke, console, say, warn
+from studies.engines.choose import WORDS, engine_for
+from studies.geometry.mesher.jobs import cache_folder
+from studies.population import POPULATION
+from studies.reference.reference_solves import STUDY as REFERENCES
+from studies.report.results import refresh
+from studies.store.links import link_study
+from studies.store.paths import study_folder
+from studies.store.staleness import MISSING
+from studies.sweep.engine import Engine
+from studies.sweep.failures import Failures
+from studies.sweep.find_study import ON, find_studies
+from studies.sweep.frame_times import measure_again
+from studies.sweep.plan import TIMING, plan, plan_again
+from studies.sweep.run_studies import run_studies
+from studies.sweep.standings import causes, failed, standings, summary, unexpected, warnings_of
+from studies.sweep.stored.known import Known
+from studies.sweep.tasks import Task, tasks_of
+
+JOBS = 2
+"""Processes, where nothing is said."""
+AGAIN = "timing: measure the stored cases again on this machine; run nothing else"
+MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
+GIVEN = f"studies, or a FILE.py with STUDY or SCENE ({PROGRAM}); default: {MAIN_STUDIES}"
+Wanted = Callable[[Task], bool] | None
+Rule = Callable[[Task, Known], bool]
+
+
+def run(
+    studies: Annotated[list[str] | None, typer.Argument(metavar="STUDY", help=GIVEN)] = None,
+    results: Results = Path("results"),
+    smoke: Smoke = False,
+    case: Annotated[str, typer.Option(help="only the case with this name or part of a name; draws no charts")] = "",
+    only: Annotated[str, typer.Option(help="run only cases that are failed, stale, or both (failed,stale)")] = "",
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="processes for the physics; timings always run alone  [default: 2]")
+    ] = None,
+    on: Annotated[str, typer.Option(help=f"{WORDS} (docs/cluster.md)")] = "",
+    again: Annotated[str, typer.Option(help=AGAIN)] = "",
+    portable: Annotated[bool, typer.Option(help="the same bits on every x86-64 processor; slower")] = False,
+    organs: Annotated[str, typer.Option(help="run on the surfaces of this folder: FOLDER or FOLDER:mm")] = "",
+    dry: Annotated[bool, typer.Option("--dry-run", help="only print what would run, why, and for how long")] = False,
+) -> None:
+    """Run what is missing or stale, then draw the charts. Interrupt it any time: the same command continues it."""
+    if on and jobs is not None:
+        raise StudyError("give either --jobs or --on: --on local:4 stands for --jobs 4")
+    if again:
+        _check_again(again, {"--on": on, "--only": only, "--portable": portable})
+    root, rules, failures = results / SMOKE if smoke else results, _rules(only), Failures()
+    if organs:
+        studies = [f"{name}{ON}{organs}" for name in studies or [POPULATION]]
+    chosen, well = [_chosen(study, smoke, case) for study in find_studies(studies or [])], True
+    for study in [] if again else chosen:
+        if plan(root, study, _wanted(root, study, rules)):
+            warn(check_study(study, drawn=not case))
+    with engine_for(on, jobs or JOBS, portable, root, say) as engine:
+        for study in chosen:
+            if again:
+                _time_again(root, study, dry, not case)
+                continue
+            wanted = _wanted(root, study, rules)
+            if dry:
+                dry_run(console, study.name, plan(root, study, wanted), jobs or JOBS, root)
+            else:
+                well = _bring_up_to_date(root, study, engine, wanted, not case, failures) and well
+    _exit(well, failures, studies or [])
+
+
+def _exit(well: bool, failures: Failures, names: list[str]) -> None:
+    """Ends with exit code 1 where something ended as its study does not expect."""
+    if failures.causes:
+        warn([failures.sentence(f"organbench run {' '.join(names)}".rstrip() + " --only failed")])
+    if failures.causes or not well:
+        raise typer.Exit(1)
+
+
+def _chosen(study: Study, smoke: bool, case: str) -> Study:
+    study = study.smoke() if smoke else study
+    return replace(study, cases=(case_named(study, case),)) if case else study
+
+
+def _bring_up_to_date(
+    root: Path, study: Study, engine: Engine, wanted: Wanted, drawn: bool, failures: Failures
+) -> bool:
+    """Runs what must run, and tells how it ended: whether as the study expects."""
+    planned = plan(root, study, wanted)
+    with TerminalProgress(console, planned, engine.processes if planned else 1) as progress:
+        count = run_studies(root, [study], engine, progress, wanted, progress.compiling, failures)
+    for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
+        sweep_parts(folder)
+    warn(link_study(root, study.name))
+    warnings = warnings_of(root, study) if count else []
+    if warnings:
+        more = f" (and {len(warnings) - 1} more cases warn; `organbench show` prints them)" if len(warnings) > 1 else ""
+        warn([warnings[0] + more])
+    if drawn:
+        warn(refresh(root, study)[1])
+    what = "charts" if drawn else "records"
+    say(f"{study.name}: {amounts(progress.done) or 'nothing'} ran, {what} in {study_folder(root, study.name)}")
+    ended = [standing for standing in standings(root, study) if wanted is None or wanted(standing.task)]
+    odd = unexpected(study, ended)
+    say(f"{study.name}: {summary(ended)}")
+    for sentence in causes(odd):
+        say(f"  {sentence}")
+    return not odd
+
+
+def _check_again(again: str, others: dict[str, object]) -> None:
+    """Raises StudyError for anything but timing, and for options that choose or place what runs."""
+    lookup(again, [TIMING], "thing to do again (--again)")
+    given = [name for name, value in others.items() if value]
+    if given:
+        raise StudyError(f"--again {again} times what is stored on this machine, whatever it is; leave {given[0]} out")
+
+
+def _time_again(root: Path, study: Study, dry: bool, drawn: bool) -> None:
+    """Times the stored cases of a study, or says which; nothing of it runs."""
+    planned = plan_again(root, study)
+    if not planned:
+        say(f"{study.name}: nothing is stored of this code that can be timed; `organbench run` runs it")
+        return
+    if dry:
+        dry_run(console, study.name, planned, 1, root)
+        return
+    with TerminalProgress(console, planned) as progress:
+        count = measure_again(root, study, progress, progress.compiling)
+    if drawn:
+        warn(refresh(root, study)[1])
+    say(f"{study.name}: {count} stored cases were timed again, {'charts' if drawn else 'times'} in "
+        f"{study_folder(root, study.name)}")  # fmt: skip
+
+
+def _rules(only: str) -> list[Rule]:
+    rules: dict[str, Rule] = {
+        "failed": failed,
+        "stale": lambda task, known: known.why_stale(task) not in (None, MISSING),
+    }
+    return [lookup(word.strip(), rules, "filter") for word in only.split(",")] if only else []
+
+
+def _wanted(root: Path, study: Study, rules: list[Rule]) -> Wanted:
+    """What one of the rules lets run; None for none, where all that is not current runs."""
+    if not rules:
+        return None
+    known = Known(root)
+    chosen = {task.path().absolute() for task in tasks_of(root, [study]) if any(rule(task, known) for rule in rules)}
+    return lambda task: task.path().absolute() in chosen

@@ -1,1 +1,0 @@
-"""Commands that run cases, and tell what a run will cost."""

@@ -1,0 +1,45 @@
+"""`organbench view`: stored cases beside their reference in one file for ParaView."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.base.counting import counted
+from studies.cli.terminal import Results, busy, say, warn
+from studies.sweep.find_scene import find_scene, split_word
+from studies.view.listing import listing
+from studies.view.side_by_side import side_by_side
+from studies.view.viewing import view as viewed
+from studies.view.vtkhdf import SUFFIX, check_target, write_grid
+
+
+def view(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="SCENE|CASE", help="a scene or a FILE.py for all its cases, or a results file"),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help=f"{SUFFIX} file  [default: SCENE{SUFFIX}]")
+    ] = None,
+    results: Results = Path("results"),
+) -> None:
+    """Write cases and their reference to a file for ParaView. Without an argument: list the cases."""
+    if not names:
+        lines, remarks = listing(results)
+        warn(remarks)
+        for line in lines:
+            say(line)
+        return
+    if output is not None:
+        check_target(output)
+    own = {name: find_scene(name) for name in names if split_word(name)[0]}
+    with busy(f"reading {' '.join(names)}"):
+        found = viewed(results, [own[name].name if name in own else name for name in names], list(own.values()))
+    warn(found.remarks)
+    path = output if output is not None else Path(found.scene.name + SUFFIX)
+    size = write_grid(path, side_by_side(found.times, found.bodies))
+    times = " ".join(f"{t:g}" for t in found.times)
+    say(f"{path}: {counted(len(found.bodies), 'body', 'bodies')} at {times} s, {size / 1e6:.1f} MB")
+    for number, body in enumerate(found.bodies):
+        say(f"  {number}  {body.name}")
