@@ -104,7 +104,7 @@ def _origin(module: str, name: str) -> str:
         return f"{module}.{name}"
     exports = _source(module).exports
     passed_on = exports.get(name, exports.get("*") if name else None)
-    if name and passed_on is None and (stub := _stub(module)).is_file():
+    if name not in ("", "*") and passed_on is None and (stub := _stub(module)).is_file():
         raise MassSpringError(
             f"{module} has no public name {name!r}: add it to {stub.name}, or import it from its module"
         )

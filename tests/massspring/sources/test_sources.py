@@ -7,7 +7,7 @@ import pytest
 
 from massspring import sources
 from massspring.errors import MassSpringError
-from massspring.sources import ROOT, read_source
+from massspring.sources import ROOT, read_source, source_fingerprint
 from tests.massspring.sources.conftest import fresh
 
 EDITS = {
@@ -106,6 +106,10 @@ def test_a_stub_leads_to_the_code_behind_a_name(checkout):
     (checkout / "studies/user.py").write_text("from studies import SIX\n")
     with pytest.raises(MassSpringError, match="studies has no public name 'SIX': add it to"):
         fresh("studies.user")
+
+
+def test_the_state_of_all_code_is_known():
+    assert len(source_fingerprint(*sources.own_modules())) == 64
 
 
 def faces() -> list[Path]:
