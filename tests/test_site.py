@@ -22,12 +22,22 @@ def build(tmp_path, monkeypatch):
 
 
 def test_every_page_is_in_the_menu_and_what_it_shows_is_copied(build, tmp_path):
-    menu = [file for entry in build.copy_pages() for file in entry.values()]
-    pages = {f"docs/{page.name}" for page in ROOT.glob("docs/*.md")}
-    pages |= {"README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"}
+    first, *parts = build.copy_pages()
+    menu = [file for part in parts for entries in part.values() for entry in entries for file in entry.values()]
+    pages = {f"docs/{page.name}" for page in ROOT.glob("docs/*.md")} | {
+        "CONTRIBUTING.md",
+        "SECURITY.md",
+        "CHANGELOG.md",
+    }
+    assert first == {"organbench": "README.md"}
     assert set(menu) == pages and len(menu) == len(pages)
-    assert menu[:3] == ["README.md", "docs/how-a-run-works.md", "docs/theory.md"]
-    shown = re.findall(r"\]\((results/[^)]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert [part for entry in parts for part in entry] == ["Tutorial", "How-to", "Theory", "Reference"]
+    assert menu[0] == "docs/first-study.md"
+    shown = [
+        file
+        for page in ("README.md", "docs/findings.md")
+        for file in re.findall(r"\]\((?:\.\./)?(results/[^)]+)\)", (ROOT / page).read_text(encoding="utf-8"))
+    ]
     assert len(shown) > 10 and all((tmp_path / file).is_file() for file in shown)
 
 

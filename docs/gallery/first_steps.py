@@ -2,8 +2,8 @@
 # # First steps
 #
 # A ball of 5 cm is squeezed between two plates by 30 % of its diameter: once with springs alone, once with its volume
-# kept by one Lagrange multiplier. A *scene* is what happens, a *body* is particles, springs and volumes, a *method*
-# advances time; the three together are a *case*, which `measure` runs.
+# kept by one Lagrange multiplier. A *scene* is what happens to an organ, a *body* is particles, springs and volumes,
+# and a *method* advances them in time. The three together are a *case*; `measure` runs it.
 
 # %%
 import matplotlib.pyplot as plt
@@ -26,8 +26,8 @@ for name in ("nodes", "springs", "dt", "dt_limit", "steps"):
     print(f"{name:10} {records[0].attributes[name]:.4g}")
 
 # %% [markdown]
-# Springs alone lose volume while the plates close; the constraint keeps it. The force tells them apart as well: a body
-# that cannot lose volume is stiffer.
+# Springs alone lose volume while the plates close; the constraint keeps it. The force differs too: a body that
+# cannot lose volume is stiffer.
 
 # %%
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
@@ -56,8 +56,8 @@ for number, (case, record) in enumerate(zip(cases, records, strict=True), start=
 plt.show()
 
 # %% [markdown]
-# Metrics are numbers read off a run. Those that compare with the finite-element reference need it to be solved, which
-# `organbench run volume_loss` does; without one they are not a number.
+# Metrics are numbers computed from a run. Some compare with the finite-element reference, which `organbench run
+# volume_loss` solves; without it they are not a number (NaN).
 
 # %%
 runs = [Run(case, record) for case, record in zip(cases, records, strict=True)]

@@ -1,9 +1,9 @@
 # %% [markdown]
 # # Your own method
 #
-# A method written in a file of your own runs beside ours, in the same scene, with the same metrics. This one is a
-# shortcut that comes to mind first: springs alone, and after each frame the body is scaled about its middle until it
-# has its volume again. What does that cost?
+# A method in a file of your own runs next to ours, in the same scene, with the same metrics. This one is an obvious
+# shortcut: springs alone, and after each frame the body is scaled about its centre until it has its volume again. What
+# does that cost?
 
 # %%
 # %%writefile shortcut.py
@@ -45,8 +45,8 @@ CHARTS = (Chart("volume.png", "studies.plots.volume_history:draw"), Chart("force
 STUDY = Study("shortcut", "Is scaling as good as a constraint?", CASES, CHARTS, ("volume_worst", "min_j"))
 
 # %% [markdown]
-# The file is a study: it is run, looked at and drawn like those of the catalogue. An edit of its code makes its own
-# cases stale, and no others.
+# The file is a study: you run, tabulate and draw it like those of the catalogue. If you edit its code, its own cases
+# become stale, and no others.
 
 # %% language="bash"
 # organbench run shortcut.py --results results --jobs 1
@@ -60,8 +60,8 @@ from IPython.display import Image
 Image("results/shortcut/volume.png", width=700)
 
 # %% [markdown]
-# Scaling keeps the volume to the last digit. But it moves nodes without a force, into the plates too: the force stays
-# that of springs alone. A constraint is a pressure, which the plates feel.
+# Scaling keeps the volume to the last digit. But it moves nodes without a force, even into the plates, so the force
+# stays that of springs alone. A constraint is a pressure, and the plates feel it.
 
 # %%
 from pathlib import Path

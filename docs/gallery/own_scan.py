@@ -1,8 +1,9 @@
 # %% [markdown]
 # # Your own scan
 #
-# A surface from a scanner has holes, specks and triangles that look inwards. Here such a file is made from a synthetic
-# kidney, looked at, mended, meshed, held, palpated and run. With your own file, begin at the doctor.
+# A surface from a scanner has holes, specks and triangles that point inwards. This notebook makes such a file from a
+# synthetic kidney, checks it, repairs it, makes a mesh, places a clamped region and a probe, and runs it. With your own
+# file, begin at the mesh doctor.
 
 # %%
 import meshio
@@ -13,7 +14,7 @@ from studies.geometry import organ
 
 kidney = organ("kidney", 600, fill=False, exact=True)
 faces = kidney.triangles.copy()
-faces[100:160] = faces[100:160, ::-1]  # some look inwards
+faces[100:160] = faces[100:160, ::-1]  # some point inwards
 lowest = kidney.points[faces].mean(axis=1)[:, 2].argsort()
 faces = np.delete(faces, lowest[:3], axis=0)  # a hole
 speck = np.array([[0.0, 0.0, 0.0], [2e-3, 0.0, 0.0], [0.0, 2e-3, 0.0], [0.0, 0.0, 2e-3]]) + 0.2
@@ -24,7 +25,7 @@ meshio.write_points_cells("scan.ply", 1e3 * points, [("triangle", faces.astype(n
 # %% [markdown]
 # ## What is wrong with it
 #
-# The doctor names each fault and the option that mends it. Its exit code is 1 where it found something.
+# The mesh doctor names each fault and the option that repairs it. Its exit code is 1 if it found a fault.
 
 # %% language="bash"
 # organbench mesh-check scan.ply --unit mm || echo exit code $?
@@ -32,7 +33,7 @@ meshio.write_points_cells("scan.ply", 1e3 * points, [("triangle", faces.astype(n
 # %% [markdown]
 # ## A body of 150 surface nodes
 #
-# The command says what was lost on the way: distances to the file and back, and both volumes.
+# The command prints how far the mesh is from the file, in both directions, and both volumes.
 
 # %% language="bash"
 # organbench mesh --from scan.ply --unit mm --close-holes --nodes 150 -o body.vtu
@@ -42,10 +43,10 @@ body = meshio.read("body.vtu")
 print({block.type: len(block.data) for block in body.cells}, f"{1e6 * kidney.volume:.0f} mL before the damage")
 
 # %% [markdown]
-# ## Where it is held and palpated
+# ## Where it is clamped and probed
 #
-# By rule: the blunter end of the longest axis is held, the flattest patch that can be reached is palpated. `--hold` and
-# `--probe` choose other places. The name of the file does not say which organ it is, so `--tissue` does.
+# By default the blunter end of the longest axis is clamped, and the probe presses on the flattest patch that it can
+# reach. `--hold` and `--probe` choose other places. The file's name does not say which organ it is, so `--tissue` does.
 
 # %% language="bash"
 # organbench place body.vtu --tissue kidney --nodes 150 -o my_scene.py --picture my_scene.png
@@ -56,8 +57,8 @@ Image("my_scene.png", width=700)
 # %% [markdown]
 # ## Run it
 #
-# The scene file is a study like all others: `organbench run my_scene.py` solves the reference too and runs a second
-# body, the recommended one, in minutes to an hour. Here the first body alone runs, for 50 frames.
+# The scene file is a study like all others: `organbench run my_scene.py` also solves the reference and runs a second
+# body, the recommended one. That takes minutes to an hour. Here only the first body runs, for 50 frames.
 
 # %%
 import matplotlib.pyplot as plt

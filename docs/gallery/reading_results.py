@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Reading results
 #
-# Results are tables (CSV, Parquet) and one HDF5 file per case; `organbench view` writes what ParaView plays. Everything
-# here reads them without a screen. First a small study, so that there is something to read.
+# Results are tables (CSV, Parquet) and one HDF5 file per case; `organbench view` writes a file for ParaView. First we
+# run a small study, so that there is something to read.
 
 # %%
 # %%writefile small.py
@@ -23,7 +23,7 @@ STUDY = Study("small", "What is in a results folder?", CASES, (), ("volume_worst
 # %% [markdown]
 # ## Tables
 #
-# A row per case. The unit stands in the name of the column.
+# A table has a row per case. The name of each column contains its unit.
 
 # %%
 import pandas as pd
@@ -37,7 +37,7 @@ table.pivot(index="body", columns="method", values="volume_worst [%]")
 # %% [markdown]
 # ## Records
 #
-# The file named as the study opens like a tree: a link to each case, below which are its arrays.
+# The file with the name of the study opens like a tree: it links to each case and its arrays.
 
 # %%
 import h5py
@@ -47,7 +47,7 @@ with h5py.File("results/small/small.h5") as file:
         print(name, "->", case.attrs["status"], case["volume"].shape, case["volume"].attrs["unit"])
 
 # %% [markdown]
-# `Run.load` compares every byte with its checksum first. Arrays are `fields`, numbers and texts `attributes`.
+# `Run.load` verifies the file's checksum first. Arrays are `fields`, numbers and texts `attributes`.
 
 # %%
 from pathlib import Path
@@ -68,8 +68,7 @@ plt.show()
 # %% [markdown]
 # ## ParaView
 #
-# One file holds all cases side by side, in all steps. ParaView opens it; VTK, which ParaView is made of, reads it in
-# Python.
+# One file contains all cases side by side, in all steps. ParaView opens it; its library VTK reads it in Python.
 
 # %% language="bash"
 # organbench view results/small/ball*tetrahedral*.h5 -o small.vtkhdf
@@ -90,7 +89,7 @@ for step in steps:
     print(f"step {step}: {grid.GetNumberOfPoints()} points, V/V0 of each body: {ratio.round(4)}")
 
 # %% [markdown]
-# The last step, drawn with matplotlib from what VTK has read:
+# The last step, read by VTK and drawn with matplotlib:
 
 # %%
 points = 1e3 * vtk_to_numpy(grid.GetPoints().GetData())

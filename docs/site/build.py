@@ -16,11 +16,17 @@ ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "docs" / "site"
 STAGE = ROOT / "build" / "docs"
 PACKAGES = ("massspring", "reference_fem", "studies")
-FIRST = (
-    *("how-a-run-works", "theory", "notation", "methods", "results"),
-    *("population", "breaking", "cluster", "own-organ", "meshes", "paper"),
-)
-"""Pages of docs/ in the order of the menu; further ones follow."""
+MENU = {
+    "Tutorial": ("first-study",),
+    "How-to": (
+        *("own-organ", "accuracy", "calibration", "submit", "paraview", "archive", "population", "cluster"),
+        *("CONTRIBUTING", "troubleshooting"),
+    ),
+    "Theory": ("theory", "paper", "breaking", "limits"),
+    "Reference": ("findings", "commands", "methods", "results", "report", "meshes", "notation", "how-a-run-works"),
+}
+"""Pages of docs/, and of the root, in the order of the menu; further ones follow in its last part."""
+ROOT_PAGES = ("CONTRIBUTING", "SECURITY", "CHANGELOG")
 LINK = re.compile(r"\]\((?:\.\./)?(results/[^)#\s]+)\)")
 """A link or picture in results/."""
 FOREIGN = re.compile(r"""(?:<(?:script|img|iframe)\b[^>]*\bsrc|<link\b[^>]*\bhref)=["']?((?:https?:)?//[^"'\s>]+)""")
@@ -44,10 +50,13 @@ def copy_pages() -> list:
             if (ROOT / shown).is_file():
                 (STAGE / shown).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(ROOT / shown, STAGE / shown)
-    names = sorted((page.stem for page in STAGE.glob("docs/*.md")), key=lambda name: (*FIRST, name).index(name))
-    pages = [STAGE / "docs" / f"{name}.md" for name in names]
-    pages += [STAGE / f"{name}.md" for name in ("CONTRIBUTING", "SECURITY", "CHANGELOG")]
-    return [{"organbench": "README.md"}] + [{title(page): str(page.relative_to(STAGE))} for page in pages]
+    pages = {page.stem: page for page in sorted(STAGE.glob("docs/*.md"))}
+    pages |= {name: STAGE / f"{name}.md" for name in ROOT_PAGES}
+    further = pages.keys() - {name for names in MENU.values() for name in names}
+    menu = {part: [name for name in names if name in pages] for part, names in MENU.items()}
+    menu["Reference"] += [name for name in pages if name in further]
+    parts = {part: [{title(pages[n]): str(pages[n].relative_to(STAGE))} for n in names] for part, names in menu.items()}
+    return [{"organbench": "README.md"}, *({part: entries} for part, entries in parts.items())]
 
 
 def gallery_pages() -> list:

@@ -44,7 +44,11 @@ def stored(results: Path, scenes: Iterable[Scene]) -> Stored:
     found, origins = dict[str, list[Judged]](), []
     for name, scene in wanted.items():
         own, told = _runs(results, scene)
-        others = [one for one in _published(results, scene) if one.compared and recipe_text(one.case) not in told]
+        others = [
+            one
+            for one in published_rows(results / PUBLISHED, scene)
+            if one.compared and recipe_text(one.case) not in told
+        ]
         if own or others:
             found[name] = [*own, *others]
             origins += [str(results / ACCURACY.name)] * bool(own) + [str(_table(results))] * bool(others)
@@ -73,14 +77,14 @@ def _runs(results: Path, scene: Scene) -> tuple[list[Judged], set[str]]:
     return own, {recipe_text(case) for case in (*(one.case for one in own), *bad)}
 
 
-def _published(results: Path, scene: Scene) -> list[Judged]:
-    """Rows of the published table. Raises StudyError for a table that lacks what makes a recipe again."""
-    path = _table(results)
+def published_rows(published: Path, scene: Scene) -> list[Judged]:
+    """Rows of the table in a folder of published results. Raises StudyError for a table without complete recipes."""
+    path = published / ACCURACY.name / f"{ACCURACY.name}.csv"
     if not path.is_file():
         return []
     try:
         rows = pd.read_csv(path)
-        here = machine_of(results / PUBLISHED, ACCURACY.name) == machine_id()
+        here = machine_of(published, ACCURACY.name) == machine_id()
         chosen = rows.loc[(rows["scene"] == scene.name) & (rows["status"] == Status.OK)]
         return [_judged_row(scene, row, here) for row in chosen.to_dict("records")]
     except (KeyError, ValueError, OSError) as error:

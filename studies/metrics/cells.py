@@ -5,6 +5,7 @@ import math
 MISSING = "–"
 UNRESOLVED_MARK = "†"
 """Of an error that the reference knows less than ten times better than the model."""
+UNRESOLVED_NOTE = f"{UNRESOLVED_MARK} unresolved: the uncertainty of the reference is more than a tenth of this error"
 MINUS = "−"
 
 

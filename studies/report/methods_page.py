@@ -14,13 +14,12 @@ PAGE = Path("docs/methods.md")
 HEAD = """# Methods
 
 What each method claims and supports. `python -m studies.report.methods_page` writes this page from the classes in
-massspring/methods, and a test holds it to them. Equations and sources stand in the docstring of each method and in
-[theory.md](theory.md).
+massspring/methods. Equations and sources are in the docstring of each method and in the [theory](theory.md).
 """
 CLAIMS = """
 ## Claims
 
-The contract test, tests/massspring/methods/test_methods.py, measures every claim. *Order*: the error of a trajectory
+A test, tests/massspring/methods/test_methods.py, measures every claim. *Order*: the error of a trajectory
 falls with this power of the time step. *Volume*: |V/V0 − 1| after a quiet step at half the stability limit. *Angular
 momentum*: conserved to round-off in free flight.
 """
@@ -31,9 +30,8 @@ CAPABILITIES = """
 of the **tetrahedra**; those over the **points** of quadratic elements; or those of the **elements** of an elastic
 solid, linear or quadratic. *Correction* of a wrong volume: **limited**, a volume moves a node by a limited length in
 each step; **full**, the whole error in one step; **penalty**, by a force that the stable step bounds; **unbounded**, by
-a force that nothing bounds. *Stable*: below the stability limit, or at any step. What a method does not support it
-refuses with one sentence. Every method supports planes, spheres and capsules with friction, attachments, gravity and
-damping.
+a force without a bound. *Stable*: below the stability limit, or at any step. A method refuses what it does not support
+with one sentence. Every method supports planes, spheres and capsules with friction, attachments, gravity and damping.
 """
 REASONS = """
 ## Why not
@@ -41,9 +39,10 @@ REASONS = """
 OTHERS = """
 ## Others of the literature
 
-`LITERATURE`: what is put in the place of the methods above, without their contract (docs/theory.md, section 14).
-*Keeps* and *stable* as above. They run in the same scenes and beside the same reference; the study `accuracy` has them
-in every scene, and what they cannot do is a case that is skipped with the reason.
+`LITERATURE`: alternatives to the methods above, which do not make the same claims
+([theory](theory.md#14-others-of-the-literature)). *Keeps* and *stable* as above. They run in the same scenes against
+the same reference. The study `literature` runs them in every scene; a case that a method cannot do is skipped with the
+reason.
 """
 AROUND: Mapping[str, Surroundings] = {
     "nothing held": Surroundings(),

@@ -9,6 +9,7 @@ from studies.catalog import Study
 from studies.catalog.study import command_line
 from studies.population import POPULATION
 from studies.report.results import FIGURES, charts_and_tables, refresh
+from studies.report.sentences import SENTENCES
 from studies.report.summary import SUMMARIES
 from studies.store.machine import machine_id, machine_of, write_machine
 from studies.store.stamps import is_stamped
@@ -53,6 +54,7 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
     copies = _copy(sources, root, target)
     kept = {*absent, *APART} - {study.name for study in studies}
     _remove([file for file in _files(target) if file.relative_to(target).parts[0] not in kept], copies)
+    show_sentences(studies, home)
     return copies, absent
 
 
@@ -77,6 +79,7 @@ def publish_some(root: Path, studies: Sequence[Study], home: Path) -> list[Path]
             write_machine(target / study.name / "machine.json")
             copies.append(target / study.name / "machine.json")
     _remove([file for study in studies for file in _files(target / study.name)], copies)
+    show_sentences(studies, home)
     return copies
 
 
@@ -104,6 +107,18 @@ def show_summaries(root: Path, studies: Sequence[Study], home: Path) -> None:
         text = (root / summary.file).read_text(encoding="utf-8")
         pages[page] = between(pages.get(page) or _read(page), summary.marks, text, page)
     for page, text in pages.items():
+        write_whole(page, text.encode())
+
+
+def show_sentences(studies: Sequence[Study], home: Path) -> None:
+    """Puts the findings that concern these studies between their marks in the pages below `home`.
+
+    They read the published tables. Raises StudyError where a table, a page or its marks are missing.
+    """
+    names = {study.name for study in studies}
+    for sentences in (each for each in SENTENCES if names & set(each.studies)):
+        page = home / sentences.page
+        text = between(_read(page), sentences.marks, sentences.written(home / PUBLISHED), page)
         write_whole(page, text.encode())
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from studies.metrics.cells import MISSING, UNRESOLVED_MARK, value_cell
+from studies.metrics.cells import MISSING, UNRESOLVED_MARK, UNRESOLVED_NOTE, value_cell
 from studies.metrics.distribution import groups
 from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, judged, nearest
 from studies.metrics.run import Run
@@ -20,7 +20,7 @@ LADDER_SCENES = ("ball_clamped", "liver_press")
 """Scenes in which every rung has a force and a displacement."""
 
 
-WHY_NONE = "no body meets the usual wish and keeps the shape, or the reference is too coarse to tell"
+WHY_NONE = "no body meets the target and keeps the shape, or the reference is not accurate enough to decide"
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Summary:
 
 
 def results_of(runs: Sequence[Run]) -> str:
-    """Accuracy of each scene, body and method, beside the floor of the reference."""
+    """Accuracy of each scene, body and method, with the uncertainty of the reference."""
     rows = study_table(runs, SUMMARY_METRICS)
     if rows.empty:
         return "No results yet: run `make study`."
@@ -56,7 +56,10 @@ def results_of(runs: Sequence[Run]) -> str:
         cells = [_cell(row, name) for name in SUMMARY_COLUMNS]
         lines.append(f"| {row['scene']} | {row['body']} | {row['method']} | " + " | ".join(cells) + " |")
     if any(UNRESOLVED_MARK in line for line in lines):
-        lines += ["", f"{UNRESOLVED_MARK} the reference is not ten times better than this error"]
+        lines += [
+            "",
+            UNRESOLVED_NOTE,
+        ]
     return "\n".join(lines)
 
 
@@ -150,8 +153,8 @@ def ladder_of(runs: Sequence[Run]) -> str:
 def population_of(runs: Sequence[Run]) -> str:
     """Every body on the members of every organ: the median, what 95 of 100 stay below, and the worst."""
     lines = [
-        "| organ | body, surface nodes | members, lost | force: median [%] | 95 of 100 [%] | worst [%] "
-        "| mean: median [%] | 95 of 100 [%] | largest floor, force / mean [%] |",
+        "| organ | body, surface nodes | members, failed | force: median [%] | 95 of 100 [%] | worst [%] "
+        "| mean: median [%] | 95 of 100 [%] | largest reference uncertainty, force / mean [%] |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for group in groups(runs):
@@ -179,8 +182,8 @@ def _with_interval(value: float, interval: tuple[float, float], signed: bool = F
 
 
 SUMMARIES = (
-    Summary("volume_loss", "summary.md", "README.md", "results", results_of),
-    Summary("accuracy", "accuracy/recommended.md", "README.md", "recommended", recommended_of),
+    Summary("volume_loss", "summary.md", "docs/findings.md", "results", results_of),
+    Summary("accuracy", "accuracy/recommended.md", "docs/findings.md", "recommended", recommended_of),
     Summary("accuracy", "accuracy/ladder.md", "docs/paper.md", "ladder", ladder_of),
     Summary("population", "population/population.md", "docs/population.md", "population", population_of),
 )

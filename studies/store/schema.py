@@ -37,7 +37,7 @@ class Status(StrEnum):
 STATUSES: dict[Status, str] = {
     Status.OK: "finished, with nothing to object to",
     Status.DIVERGED: "values not finite, or nodes that left",
-    Status.INVERTED: "an element ends inside out",
+    Status.INVERTED: "an element ends inverted",
     Status.DRIFTED: "a kept volume more than 1 % off",
     Status.NOT_CONVERGED: "the reference found no equilibrium at a checkpoint",
     Status.BLOCKED: "a thin probe was driven through tissue that had nowhere to go",

@@ -12,7 +12,7 @@ from studies.exchange.description import judged_metrics
 from studies.exchange.entry import entry_path, run_of_entry
 from studies.exchange.judge import entry_record
 from studies.exchange.meshes import NODES
-from studies.metrics.cells import UNRESOLVED_MARK, plain, value_cell
+from studies.metrics.cells import UNRESOLVED_NOTE, plain, value_cell
 from studies.metrics.judged import FORCE
 from studies.metrics.run import Run
 from studies.reference.load import Reference, load_reference
@@ -85,4 +85,4 @@ def lines_of(run: Run) -> list[str]:
         marked |= unresolved
         shown = value_cell(value, uncertainty, signed=metric.better == "-", unresolved=unresolved)
         lines.append(f"  {metric.name:18} {shown} {metric.unit}".removesuffix(" 1"))
-    return [*lines, f"{UNRESOLVED_MARK} the reference is not ten times better than this error"] if marked else lines
+    return [*lines, UNRESOLVED_NOTE] if marked else lines

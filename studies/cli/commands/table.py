@@ -9,7 +9,7 @@ import typer
 from studies.base.lookup import lookup
 from studies.cli.terminal import Results, StudyName, console, say, warn
 from studies.exchange.entry import entries_beside
-from studies.metrics.cells import MISSING, UNRESOLVED_MARK, plain, value_cell
+from studies.metrics.cells import MISSING, UNRESOLVED_NOTE, plain, value_cell
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED, frame_of, row_of
@@ -69,7 +69,7 @@ def draw(rows: Sequence[Row], metrics: list[Metric], every: bool) -> None:
         if not every:
             break
     if any(row[UNRESOLVED] for row in rows):
-        say(f"{UNRESOLVED_MARK} the reference is not ten times better than this error")
+        say(UNRESOLVED_NOTE)
     if rest:
         say(f"not shown (--all, --csv FILE, --metrics): {', '.join(metric.name for metric in rest)}")
 

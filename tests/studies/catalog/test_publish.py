@@ -11,7 +11,9 @@ from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Chart
 from studies.cli.commands import publish as command
 from studies.cli.commands import report as report_command
+from studies.report import publish as publishing
 from studies.report.publish import EXTRAS, PUBLISHED, between, publish, publish_some
+from studies.report.sentences import Sentences
 from studies.report.summary import SUMMARIES
 from studies.runs import current as runs
 from studies.runs.current import case_path
@@ -22,6 +24,7 @@ from tests.studies.tiny import tiny_case, tiny_study
 
 REPOSITORY = Path(__file__).parents[3]
 BEGIN, END = MARKS = SUMMARIES[0].marks
+PAGE = SUMMARIES[0].page
 HEADLINE = replace(
     tiny_study(charts=(Chart("one.png", lambda runs, path: path.write_bytes(b"a picture")),)), name="volume_loss"
 )
@@ -35,16 +38,17 @@ def current(results):
 
 
 @pytest.fixture
-def home(tmp_path):
-    """A repository's folder with a README."""
-    folder = tmp_path / "home"
-    folder.mkdir()
-    (folder / "README.md").write_text(f"# Title\n{BEGIN}\nold\n{END}\n")
-    return folder
+def home(tmp_path, monkeypatch):
+    """A repository's folder with the page of the headline table, and no page with findings in words."""
+    monkeypatch.setattr(publishing, "SENTENCES", ())
+    page = tmp_path / "home" / PAGE
+    page.parent.mkdir(parents=True)
+    page.write_text(f"# Title\n{BEGIN}\nold\n{END}\n")
+    return tmp_path / "home"
 
 
 def shown(home):
-    """Name and content of all that is published, and README."""
+    """Name and content of all that is published, and of the page."""
     return {path.relative_to(home).as_posix(): path.read_bytes() for path in home.rglob("*") if path.is_file()}
 
 
@@ -56,9 +60,20 @@ def test_tables_charts_and_the_summary_are_copied(current, home):
     assert {copy.read_bytes() == (current / copy.relative_to(home / PUBLISHED)).read_bytes() for copy in copies} == {
         True
     }
-    text = (home / "README.md").read_text()
+    text = (home / PAGE).read_text()
     assert (current / "summary.md").read_text() in text and "old" not in text
     assert not list((home / PUBLISHED).rglob("*.h5"))
+
+
+def test_findings_in_words_follow_the_tables_that_were_published(current, home, monkeypatch):
+    def worst(published: Path) -> list[str]:
+        return [(published / "volume_loss" / "volume_loss.csv").read_text().splitlines()[0].split(",")[0]]
+
+    begin, end = (findings := Sentences("README.md", "findings", ("volume_loss",), worst)).marks
+    monkeypatch.setattr(publishing, "SENTENCES", (findings, replace(findings, page="none.md", studies=("laws",))))
+    (home / "README.md").write_text(f"# Title\n{begin}\nold\n{end}\nthe rest\n")
+    publish(current, [HEADLINE], home)
+    assert (home / "README.md").read_text() == f"# Title\n{begin}\n- scene\n{end}\nthe rest\n"
 
 
 def test_what_nothing_makes_any_more_goes_and_what_was_not_made_again_stays(current, home):
@@ -108,10 +123,10 @@ def test_stale_or_missing_results_are_refused_before_anything_is_written(current
 
 
 def test_a_readme_without_marks_is_refused_before_anything_is_written(current, home):
-    (home / "README.md").write_text("# Title\n")
+    (home / PAGE).write_text("# Title\n")
     with pytest.raises(StudyError, match="has no lines"):
         publish(current, [HEADLINE], home)
-    assert [*shown(home)] == ["README.md"]
+    assert [*shown(home)] == [PAGE]
 
 
 def test_the_command_publishes_where_it_stands_or_says_one_sentence(current, home, organbench, monkeypatch):
@@ -182,7 +197,7 @@ def test_some_studies_are_published_and_all_else_stays(current, home, organbench
         (home / PUBLISHED / name).write_text("old")
     monkeypatch.setattr("studies.sweep.find_study.STUDIES", (HEADLINE,))
     code, out, _ = organbench("publish", "volume_loss", "--results", current)
-    assert code == 0 and "one.png" in out and "old" not in (home / "README.md").read_text()
+    assert code == 0 and "one.png" in out and "old" not in (home / PAGE).read_text()
     left = {path.relative_to(home / PUBLISHED).as_posix() for path in (home / PUBLISHED).rglob("*") if path.is_file()}
     assert left == {
         "other/other.csv",

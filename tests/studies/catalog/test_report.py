@@ -90,7 +90,7 @@ def test_summary_marks_what_the_reference_does_not_know_well_enough(finished_swe
     truth = SimpleNamespace(total_uncertainty=uncertainty, force=np.array([1.0]), displacement=lambda x: 0 * x)
     text = results_of([replace(runs[0], reference=truth)])
     assert f"± 2 {UNRESOLVED_MARK} |" in text.replace("2.0", "2")
-    assert text.endswith("the reference is not ten times better than this error")
+    assert text.endswith("the uncertainty of the reference is more than a tenth of this error")
 
 
 def test_fine_steps_are_no_headline(finished_sweep):

@@ -28,7 +28,7 @@ EQUILIBRIA = {"liver_press": (-1.7, -1.0, 1.2, 1.5, 1.8), "liver_probe": (4.5, -
 def told() -> dict[str, list[float]]:
     """Scene -> the numbers of its row."""
     page = (ROOT / "docs/accuracy.md").read_text(encoding="utf-8")
-    part = page.split("## Force on the way\n")[1].split("\n## ")[0]
+    part = page.split("## Force along the path\n")[1].split("\n## ")[0]
     rows = re.findall(r"^\| (\w+) \| ([-−+\d. |]+) \|$", part, re.M)
     return {name: [float(cell.replace("−", "-")) for cell in cells.split(" | ")] for name, cells in rows}
 

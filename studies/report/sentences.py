@@ -1,0 +1,302 @@
+"""Findings in words: every number is read off the tables in results/published, and publishing writes them again."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import mean
+from textwrap import fill
+from typing import Any
+
+import pandas as pd
+
+from studies.advice.campaign import published_rows
+from studies.base.errors import StudyError
+from studies.catalog.accuracy import ACCURACY
+from studies.metrics.cells import MINUS, plain
+from studies.metrics.judged import Judged, cheapest, nearest
+from studies.metrics.wish import SHAPE, Wish, usual_wish
+from studies.plots.campaigns.recovery import RETURNED
+from studies.store.record import Status
+
+WIDTH = 120
+"""Columns of a page."""
+Row = dict[str, Any]
+"""Name of a column -> its value."""
+FORCE, VOLUME, STEP, SPEED = "force_end [%]", "volume_worst [%]", "step_time [µs]", "real_time [s/s]"
+OURS = "implicit_volume"
+NODAL = "tetrahedral, nodal volumes"
+SECOND_LOOK = 0.25
+"""Steps over the stability limit up to here are for a second look, not for the comparison [1]."""
+TOGETHER = ("baumgarte", "implicit_springs", "implicit_volume", "penalty", "post_stabilization", "pressure",
+            "projection", "pyramid", "shake", "xpbd whole iterations2")  # fmt: skip
+"""Methods that keep the volume of the whole body."""
+APART = ("element bulk_modulus1e+06 hard", "xpbd")
+"""Methods that keep the volume of every tetrahedron."""
+LONGEST_STEP = 100.0
+"""Of the implicit springs: so long that the answer changes [ms]."""
+
+
+@dataclass(frozen=True)
+class Sentences:
+    """A list of findings, and the page that shows it between its marks."""
+
+    page: str
+    """Below the folder of README.md."""
+    name: str
+    """In the marks."""
+    studies: tuple[str, ...]
+    """Whose tables it reads."""
+    text: Callable[[Path], list[str]]
+    """Folder of the published tables -> one paragraph per finding."""
+
+    @property
+    def marks(self) -> tuple[str, str]:
+        """The lines of the page between which the list stands."""
+        return f"<!-- {self.name}: begin -->", f"<!-- {self.name}: end -->"
+
+    def written(self, published: Path) -> str:
+        """The list in Markdown, at most WIDTH columns wide. Raises StudyError where a table is missing."""
+        points = [f"- {text}" for text in self.text(published)]
+        if self.page.startswith("docs/"):  # links are written as from README
+            points = [point.replace("](results/", "](../results/").replace("](docs/", "](") for point in points]
+        return "\n".join(fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False) for text in points)
+
+
+def table(published: Path, study: str) -> list[Row]:
+    """The rows of the published table of a study. Raises StudyError where it is missing."""
+    path = published / study / f"{study}.csv"
+    if not path.is_file():
+        raise StudyError(f"there is no table {path} to read the findings from; `organbench publish {study}` writes it")
+    return [{str(name): value for name, value in row.items()} for row in pd.read_csv(path).to_dict("records")]
+
+
+def column(rows: Iterable[Row], name: str) -> list[float]:
+    """The known values of a column."""
+    return [float(row[name]) for row in rows if row[name] == row[name]]
+
+
+def headline(published: Path) -> list[str]:
+    """What README states."""
+    return [constraint(published), one_volume(published), recommended(published), other_programs(published)]
+
+
+def answers(published: Path) -> list[str]:
+    """What docs/findings.md adds: one answer for each study of methods, laws, literature and starts."""
+    return [
+        ways(published),
+        laws(published),
+        literature(published),
+        other_programs(published),
+        starts(published),
+    ]
+
+
+def limits(published: Path) -> list[str]:
+    """What docs/limits.md says of accuracy."""
+    return [one_volume(published), exceptions(published), shapes(published), inverted(published)]
+
+
+def constraint(published: Path) -> str:
+    """What the constraint keeps, and what it costs."""
+    rows = [row for row in table(published, "volume_loss") if row["dt/dt_c"] > SECOND_LOOK]
+    lost = {name: max(column((row for row in rows if row["method"] == name), VOLUME)) for name in (OURS, "free")}
+    times = {
+        (row["scene"], row["body"], row["nodes"], row["method"]): row[STEP] for row in table(published, "frame_rate")
+    }
+    more = [100 * (time / times[*key, "free"] - 1) for (*key, method), time in times.items() if method == OURS]
+    return (
+        f"**The constraint keeps the volume and costs little.** With it the volume is never more than "
+        f"{lost[OURS]:.6f} % off; springs alone lose up to {lost['free']:.0f} %. A step takes "
+        f"{_range(more)} % longer ([frame times](results/published/frame_rate/cost_ratio.png))."
+    )
+
+
+def one_volume(published: Path) -> str:
+    """How far one kept volume is from the force."""
+    rows = [row for row in table(published, "volume_loss") if row["dt/dt_c"] > SECOND_LOOK and row["method"] == OURS]
+    filled, surface = (
+        [-force for force in column((row for row in rows if row["body"] == body), FORCE)]
+        for body in ("tetrahedral", "surface")
+    )
+    return (
+        f"**The volume alone does not make the force right.** With one kept volume, the force of the filled bodies is "
+        f"{_range(filled)} % too small, that of the paper's surface bodies {_range(surface)} % "
+        f"([forces](results/published/volume_loss/force.png))."
+    )
+
+
+def recommended(published: Path) -> str:
+    """In how many scenes a body is accurate enough, how fast these are, and where none is."""
+    speeds, missed = _chosen(published)
+    return (
+        f"**Quadratic bodies with many volumes are accurate without fitting.** The recommended bodies are [accurate "
+        f"enough](docs/accuracy.md#accurate-enough) in {len(speeds) - len(missed)} of {len(speeds)} scenes, "
+        f"{_range(speeds, 1)} times as fast as real time on one core. The exceptions: {'; '.join(missed) or 'none'}."
+    )
+
+
+def exceptions(published: Path) -> str:
+    """The scenes in which no body is accurate enough."""
+    speeds, missed = _chosen(published)
+    return (
+        f"**{len(missed)} of {len(speeds)} scenes have no body that is [accurate "
+        f"enough](docs/accuracy.md#accurate-enough) beyond doubt.** {'; '.join(missed) or 'None'}."
+    )
+
+
+def shapes(published: Path) -> str:
+    """The bodies that do not keep the shape of their organ."""
+    rows = [row for row in table(published, ACCURACY.name) if row["method"] == OURS]
+    flat = [-change for change in column((row for row in rows if "quadratic" not in row["body"]), "shape_volume [%]")]
+    off = {
+        f"{row['scene']} with {row['nodes']} nodes ({row['shape_error [%]']:.1f} % of the size)": None
+        for row in rows
+        if "quadratic" in row["body"] and row["shape_error [%]"] > SHAPE
+    }
+    return (
+        f"**Some bodies do not keep the shape of their organ** and are never recommended. Bodies with flat sides lack "
+        f"{_range(flat, 1)} % of the volume. Graded quadratic bodies farther than {SHAPE:g} % from the true surface: "
+        f"{', '.join(off) or 'none'}."
+    )
+
+
+def inverted(published: Path) -> str:
+    """The runs of the study `accuracy` that did not end well."""
+    rows = [row for row in table(published, ACCURACY.name) if row["status"] != Status.OK]
+    bodies = "; ".join(f"{row['scene']}, {row['body']}, {row['nodes']} nodes ({row['status']})" for row in rows)
+    return f"**Some runs of the study `accuracy` fail**: {bodies or 'none'}."
+
+
+def _chosen(published: Path) -> tuple[list[float], list[str]]:
+    """Speed of the recommended or closest body of each scene [s/s]; the scenes without an accurate one, with why."""
+    speeds, missed = list[float](), list[str]()
+    for scene in ACCURACY.scenes:
+        rows = [one for one in published_rows(published, scene) if one.compared]
+        wish = usual_wish(scene)
+        best = cheapest(rows, wish)
+        chosen = best or nearest(rows, wish)
+        if chosen is not None:
+            speeds.append(1.0 / chosen.cost.value)
+            missed += [] if best else [f"{scene.name} {_why_not(chosen, wish)}"]
+    return speeds, missed
+
+
+def _why_not(one: Judged, wish: Wish) -> str:
+    """Which error misses its target, or which cannot be decided."""
+    errors = {"force": (one.force, wish.force), "displacement": (one.displacement, wish.displacement)}
+    bounds = {name: (error, bound) for name, (error, bound) in errors.items() if bound and error.known}
+    for name, (error, bound) in bounds.items():
+        if error.uncertainty > bound:
+            return f"is undecided, because its reference is only known to ±{error.uncertainty:.2g} % in {name}"
+    missed = [
+        f"misses the target of {bound:g} % for {name} by {abs(error.value) - bound:.1g} %"
+        for name, (error, bound) in bounds.items()
+        if abs(error.value) > bound
+    ]
+    return " and ".join(missed) or "does not keep the shape of the organ at rest"
+
+
+def other_programs(published: Path) -> str:
+    """What MuJoCo, FElupe, Newton and PyBullet reach on the pressed liver."""
+    rows = [row for row in table(published, "peers") if row["scene"] == "liver_press"]
+    ours = [row for row in rows if row["method"] == OURS and row["body"] == "quadratic"]
+    felupe = [row for row in rows if row["method"] == "felupe"]
+    linear = [row for row in rows if row["method"] in ("mujoco", "newton", "bullet")]
+    speeds = {name: {row["nodes"]: row[SPEED] for row in of} for name, of in (("ours", ours), ("theirs", felupe))}
+    off, off_felupe, off_linear = ([abs(force) for force in column(of, FORCE)] for of in (ours, felupe, linear))
+    faster = mean(speed / speeds["theirs"][nodes] for nodes, speed in speeds["ours"].items())
+    return (
+        f"**Implicit elements are more accurate and slower.** On the pressed liver FElupe's quadratic elements are "
+        f"{_range(off_felupe, 1)} % off in force. Our uniform quadratic bodies are {_range(off)} % off and "
+        f"{faster:.0f} times as fast. MuJoCo, Newton and PyBullet, on linear tetrahedra, are "
+        f"{_range(off_linear)} % off ([other programs](results/published/peers/peers.png))."
+    )
+
+
+def ways(published: Path) -> str:
+    """How alike the methods are that keep one volume, and how stiff one volume per tetrahedron is."""
+    rows = [
+        row for row in table(published, "methods") if row["body"] == "tetrahedral" and row["dt [ms]"] < LONGEST_STEP
+    ]
+    together = [row for row in rows if row["method"] in TOGETHER]
+    apart = column((row for row in rows if row["method"] in APART), FORCE)
+    forces = [column((row for row in together if row["scene"] == name), FORCE) for name in {r["scene"] for r in rows}]
+    spread = max(max(force) - min(force) for force in forces)
+    count = len({row["method"] for row in together})
+    step, volume = column(together, STEP), column(together, VOLUME)
+    return (
+        f"**Which way to keep a volume** (`make study-methods`, [chart](results/published/methods/methods.png)): "
+        f"all {count} methods that keep *one* volume give the same force within {spread:.1f} %. They "
+        f"differ in cost, {plain(min(step))} to {plain(max(step))} µs a step, and in the volume error, "
+        f"{min(volume):.0e} to {max(volume):.1f} %. One volume per tetrahedron locks: the force is "
+        f"{_range(apart)} % too large."
+    )
+
+
+def laws(published: Path) -> str:
+    """What stiffness laws and nodal volumes are worth."""
+    rows = table(published, "laws")
+    short = [-force for force in column((row for row in rows if row["body"] == "tetrahedral"), FORCE)]
+    nodal = max(
+        (row for row in rows if (row["body"], row["law"]) == (NODAL, "cotangent")), key=lambda row: row["nodes"]
+    )
+    return (
+        f"**Which stiffness law, how many volumes** (`make study-laws`, [chart](results/published/laws/laws.png)): "
+        f"with one volume the force of a filled ball is {_range(short)} % too small under any law. One volume per node "
+        f"with cotangent springs brings it within {nodal['force_error [%]']:.1f} % at {nodal['nodes']} surface nodes."
+    )
+
+
+def literature(published: Path) -> str:
+    """How fast and how far off the methods are that keep no volume by a constraint."""
+    rows = table(published, "literature")
+    (held,) = (row for row in rows if (row["method"], row["scene"]) == ("elastic_response", "ball_clamped"))
+    linear = [row for row in rows if row["method"] in ("elastic_response", "linear_modes")]
+    turning = column((row for row in linear if row["scene"] != "ball_clamped"), FORCE)
+    return (
+        f"**What else the literature offers** (`make study-literature`, "
+        f"[chart](results/published/literature/literature.png)): angular springs, chain mail, linear modes and a "
+        f"precomputed elastic response. Where the organ hardly turns, the precomputed response is the best value: on "
+        f"ball_clamped its force is {held['force_end [%]']:.0f} % off at {held['real_time [s/s]']:.0f} times real "
+        f"time. Where the organ turns, both linear methods miss the force by {_range(turning)} %."
+    )
+
+
+def starts(published: Path) -> str:
+    """From which distorted starts a ball recovers its rest shape."""
+    rows = table(published, "stress")
+    scenes = {row["scene"]: row["scene"].removeprefix("stress_") for row in rows}
+
+    def lost(body: str, chosen: Callable[[str], bool]) -> list[str]:
+        """Starts from which a body does not come back by these methods, under one law or another."""
+        return sorted(
+            {
+                scenes[row["scene"]]
+                for row in rows
+                if row["body"] == body and chosen(row["method"]) and not row["rest_distance [%]"] < RETURNED
+            }
+        )
+
+    one, none = lost("tetrahedral", OURS.__eq__), lost("tetrahedral", "free".__eq__)
+    nodal, helped = lost(NODAL, OURS.__eq__), lost(NODAL, lambda method: "recovers" in method)
+    count = len(scenes)
+    return (
+        f"**From which distorted starts a ball recovers** (`make study-stress`, "
+        f"[chart](results/published/stress/recovery.png)): with one volume from {count - len(one)} of {count} (not "
+        f"from: {', '.join(one)}), with springs alone from {count - len(none)}, with nodal volumes from "
+        f"{count - len(nodal)}, and from {count - len(helped)} with `ImplicitVolume(recovers=True)` "
+        f"([theory](docs/theory.md#8-several-volumes))."
+    )
+
+
+def _range(values: Iterable[float], digits: int = 0) -> str:
+    """Smallest and largest value in words."""
+    known = list(values)
+    return f"{min(known):.{digits}f} to {max(known):.{digits}f}".replace("-", MINUS)
+
+
+SENTENCES = (
+    Sentences("README.md", "findings", ("volume_loss", "frame_rate", "accuracy", "peers"), headline),
+    Sentences("docs/findings.md", "answers", ("methods", "laws", "literature", "peers", "stress"), answers),
+    Sentences("docs/limits.md", "limits", ("volume_loss", "accuracy"), limits),
+)

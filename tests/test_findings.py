@@ -1,0 +1,136 @@
+"""The numbers that README and docs state of the studies are those of the published tables."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from massspring import METHODS
+from studies.base.errors import StudyError
+from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.surface.family import true_volume
+from studies.reference.solve import VARIANTS
+from studies.report.publish import PUBLISHED
+from studies.report.sentences import APART, NODAL, SENTENCES, TOGETHER
+from studies.report.summary import SUMMARIES
+from studies.scenes import BALL_SQUEEZE, LIVER_PRESS
+from studies.scenes.ball_squeeze import RADIUS
+
+ROOT = Path(__file__).parent.parent
+TABLES = ROOT / PUBLISHED
+HEADLINE = SENTENCES[0]
+
+
+def between(page: str, marks: tuple[str, str]) -> str:
+    """What a page shows between its marks."""
+    return (ROOT / page).read_text(encoding="utf-8").split(marks[0])[1].split(marks[1])[0].strip()
+
+
+@pytest.fixture
+def published(tmp_path):
+    """A copy of the published tables, to be changed."""
+    return shutil.copytree(TABLES, tmp_path / "published", ignore=shutil.ignore_patterns("*.png"))
+
+
+def changed(published: Path, study: str, change) -> str:
+    """The headline after a change of the table of a study."""
+    path = published / study / f"{study}.csv"
+    rows = pd.read_csv(path)
+    change(rows)
+    rows.to_csv(path, index=False)
+    return " ".join(HEADLINE.written(published).split())
+
+
+@pytest.mark.parametrize("sentences", SENTENCES, ids=lambda sentences: sentences.name)
+def test_findings_in_words_are_read_off_the_published_tables(sentences):
+    assert between(sentences.page, sentences.marks) == sentences.written(TABLES), "run `organbench publish`"
+
+
+@pytest.mark.parametrize("summary", SUMMARIES, ids=lambda summary: summary.name)
+def test_tables_of_the_pages_are_the_published_ones(summary):
+    assert between(summary.page, summary.marks) == (TABLES / summary.file).read_text(encoding="utf-8").strip()
+
+
+def test_a_force_that_changes_changes_the_sentence(published):
+    def shorten(rows):
+        rows.loc[rows["body"] == "surface", "force_end [%]"] = -12.3
+
+    assert "that of the paper's surface bodies 12 to 12 %" in changed(published, "volume_loss", shorten)
+
+
+def test_a_scene_whose_reference_decides_nothing_is_not_called_missed(published):
+    def spoil(rows):
+        rows.loc[rows["scene"] == "ball_clamped", "mean_error floor [%]"] = 2.0
+
+    text = changed(published, "accuracy", spoil)
+    assert "in 6 of 9 scenes" in text
+    assert "ball_clamped is undecided, because its reference is only known to ±2 % in displacement" in text
+
+
+def test_a_scene_without_an_accurate_body_says_by_how_much_it_misses(published):
+    def spoil(rows):
+        rows.loc[rows["scene"] == "kidney_probe", "force_end [%]"] = 3.5
+
+    assert "kidney_probe misses the target of 3 % for force by 0.5 %" in changed(published, "accuracy", spoil)
+
+
+def test_a_missing_table_is_one_sentence(published):
+    (published / "peers" / "peers.csv").unlink()
+    with pytest.raises(StudyError, match=r"there is no table .*peers.csv .*`organbench publish peers` writes it"):
+        HEADLINE.written(published)
+
+
+def test_the_words_of_the_answers_hold():
+    """All methods that keep one volume stand in the table, and those that keep every tetrahedron's lock."""
+    rows = pd.read_csv(TABLES / "methods" / "methods.csv")
+    rows = rows[rows["body"] == "tetrahedral"]
+    assert set(TOGETHER) | set(APART) <= set(rows["method"]) and not set(TOGETHER) & set(APART)
+    assert (rows.loc[rows["method"].isin(APART), "force_end [%]"] > 0).all()
+    laws = pd.read_csv(TABLES / "laws" / "laws.csv")
+    nodal = laws[(laws["body"] == NODAL) & (laws["law"] == "cotangent")].sort_values("nodes")
+    assert nodal["force_error [%]"].is_monotonic_decreasing, "refinement helps"
+
+
+def test_the_ball_the_liver_and_the_step_of_the_first_table():
+    text = " ".join((ROOT / "docs/findings.md").read_text(encoding="utf-8").split())
+    radius, volume, modulus, nodes = re.findall(
+        r"Ball of (\d+) cm radius and liver of ([\d.]+) L, shear modulus ([\d.]+) kPa, (\d+) surface nodes", text
+    )[0]
+    rows = pd.read_csv(TABLES / "volume_loss" / "volume_loss.csv")
+    assert set(rows["nodes"]) == {int(nodes)}
+    shown = rows[rows["dt/dt_c"] > 0.25]
+    assert len(shown) == 16 and (shown["dt/dt_c"] <= 0.5).all()
+    for scene in (BALL_SQUEEZE, LIVER_PRESS):
+        assert scene.tissue.shear_modulus == pytest.approx(1e3 * float(modulus))
+    assert pytest.approx(RADIUS) == 1e-2 * float(radius)
+    assert round(1e3 * true_volume(make_shape("liver", {})), 1) == float(volume)
+
+
+def test_numbers_that_the_list_of_limits_quotes():
+    text = " ".join((ROOT / "docs/limits.md").read_text(encoding="utf-8").split())
+    population = (TABLES / "population" / "population.md").read_text(encoding="utf-8")
+    bounds = re.findall(r"^\| (\w+) \| graded quadratic.*?\| [^|]+ \| [^|]+ \| ([\d.]+) \(", population, re.M)
+    quoted = re.findall(r"within (\d+) % for livers, (\d+) % for kidneys and (\d+) % for stomachs", text)[0]
+    assert [f"{float(bound):.0f}" for _, bound in bounds] == list(quoted)
+    rows = pd.read_csv(TABLES / "accuracy" / "accuracy.csv").set_index(["scene", "body", "nodes"]).sort_index()
+    stiff = 1 + rows.loc[("stomach_press", "surface", 550), "force_end [%]"].item() / 100
+    assert f"has {stiff:.1f} times the force" in text
+    bodies = rows.loc[("liver_probe", "graded quadratic, masses by stiffness")]
+    first = bodies.groupby("nodes", sort=True)["mean_error [%]"].first()
+    sizes = "is {:.2f} % at 794 nodes, {:.2f} % at 994 and {:.2f} % at 1,194".format(*first[[794, 994, 1194]])
+    assert sizes in text
+    assert sizes.removeprefix("is ") in " ".join((ROOT / "docs/findings.md").read_text(encoding="utf-8").split())
+
+
+def test_every_reference_has_three_meshes_and_three_refined_settings():
+    rows = pd.read_csv(TABLES / "reference" / "uncertainty.csv")
+    assert {len(levels.split()) for levels in rows["levels"].astype(str)} == {3}
+    assert len(VARIANTS) == 3
+
+
+def test_methods_of_the_page_are_those_of_the_tuple():
+    page = (ROOT / "docs/methods.md").read_text(encoding="utf-8").split("## Claims")[1].split("## ")[0]
+    named = re.findall(r"^\| (\w+) \|", page, re.M)
+    assert {method.name for method in METHODS} <= set(named)
