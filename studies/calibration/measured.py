@@ -6,26 +6,25 @@ from pathlib import Path
 
 from studies.base.errors import StudyError
 from studies.calibration.stored import STUDY
+from studies.catalog.study import Study
 from studies.metrics.judged import Judged, judged
 from studies.metrics.run import Run
 from studies.reference.load import Reference, load_reference
-from studies.reference.reference_solves import reference_solves
 from studies.runs.case import BodyRecipe, Case
-from studies.runs.current import case_path, why_case_is_stale
-from studies.runs.run import run_case
 from studies.scene.scene import Scene
+from studies.store.ledger import Ledger
 from studies.store.record import read_record
 from studies.sweep.engine import Progress, Told
 from studies.sweep.pool import perform, told_by_workers
 from studies.sweep.run_studies import check_writable
-from studies.sweep.tasks import Task
+from studies.sweep.tasks import CaseTask, Task, tasks_of
 
 
 def pending(root: Path, scenes: Iterable[Scene], start: BodyRecipe) -> list[Task]:
     """Pieces of references and runs of the starting body that are missing or stale, the longest first."""
-    works = [work for scene in scenes for work in (*reference_solves(scene), Case(scene, start))]
-    tasks = [Task(root, STUDY, work) for work in works]
-    return sorted((task for task in tasks if not task.is_current()), key=lambda task: -task.weight)
+    cases = tuple(Case(scene, start) for scene in scenes)
+    ledger, tasks = Ledger(root), tasks_of(root, [Study(STUDY, "", cases, (), ())])
+    return [task for task in tasks if ledger.why(task) is not None]
 
 
 def bring_up_to_date(tasks: list[Task], root: Path, jobs: int, progress: Progress, on_compile: Told | None) -> None:
@@ -39,7 +38,7 @@ class Measurements:
     """Errors of recipes in scenes, from stored runs where there are any."""
 
     def __init__(self, root: Path, scenes: Iterable[Scene]) -> None:
-        self.root = root
+        self.root, self.ledger = root, Ledger(root)
         self.references: dict[str, Reference | None] = {scene.name: load_reference(root, scene) for scene in scenes}
         self.made = 0
         """Runs that were not there."""
@@ -60,8 +59,9 @@ class Measurements:
         return errors
 
     def _run(self, scene: Scene, recipe: BodyRecipe) -> Run:
-        case = Case(scene, recipe)
-        if why_case_is_stale(self.root, STUDY, case) is not None:
-            run_case(self.root, STUDY, case)
+        task = CaseTask(self.root, STUDY, Case(scene, recipe))
+        if self.ledger.why(task) is not None:
+            task.run()
+            self.ledger.look_again()
             self.made += 1
-        return Run(case, read_record(case_path(self.root, STUDY, case)), self.references[scene.name])
+        return Run(task.work, read_record(task.path()), self.references[scene.name])

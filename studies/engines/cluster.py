@@ -14,15 +14,12 @@ from studies.engines.crew import Crew
 from studies.engines.dask import LOST, Answer, Lines, Lost, lines_to
 from studies.engines.fleet import GB, Fleet
 from studies.engines.requests import FrameTimes, Piece
-from studies.runs.case import Case
-from studies.runs.current import case_fingerprint, case_path
-from studies.store.staleness import is_current
+from studies.store.ledger import Ledger
 from studies.sweep.engine import Progress, Told
 from studies.sweep.own_files import Given, given_files
 from studies.sweep.pool import environment
-from studies.sweep.tasks import Task
+from studies.sweep.tasks import CaseTask, Task, case_tasks
 from studies.sweep.workers import TRIES, Death
-from studies.timing.cases import can_be_timed
 
 ANSWER_SECONDS = 0.5
 """That an answer is waited for before the workers are looked at again."""
@@ -74,7 +71,7 @@ class Cluster:
         """As every engine; what workers compile is not told."""
         if not tasks:
             return
-        files = given_files(task.work for task in tasks if isinstance(task.work, Case))
+        files = given_files(task.work for task in tasks if isinstance(task, CaseTask))
         with told(), self._crew(tasks[0].root, tasks, files, self.portable) as crew:
             self._check_memory(crew.fleet)
             progress.begin("physics", len(tasks))
@@ -140,9 +137,9 @@ class Cluster:
 
     def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
         """As every engine: on one worker of each kind of machine, after all pieces, one machine after the other."""
-        cases = tuple(case for case in study.cases if case.timed)
-        chosen = [case for case in cases if among is None or case_path(root, study.name, case) in among]
-        if not chosen or (self.lines is None and all(timed_somewhere(root, study.name, case) for case in chosen)):
+        ledger, timed = Ledger(root), [task for task in case_tasks(root, study) if task.work.timed]
+        cases, chosen = tuple(task.work for task in timed), [t for t in timed if among is None or t.path() in among]
+        if not chosen or (self.lines is None and all(map(ledger.timed_somewhere, chosen))):
             return 0
         request = FrameTimes(root, study.name, cases, None if among is None else frozenset(among))
         with told(), self._crew(root, [], given_files(cases), portable=False) as crew:
@@ -174,15 +171,6 @@ class Cluster:
                 )
             progress.advance("timing", name)
             return count
-
-
-def timed_somewhere(root: Path, study: str, case: Case) -> bool:
-    """Whether any machine has timed a case with this code, or none ever will."""
-    if not can_be_timed(root, study, case):
-        return True
-    path = case_path(root, study, case)
-    found = path.parent.glob(f"{path.stem}.timing.*.h5")
-    return any(is_current(file, case.key, case_fingerprint(case)) for file in found)
 
 
 @contextmanager

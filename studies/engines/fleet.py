@@ -7,7 +7,6 @@ from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from studies.engines.memory import need_of
 from studies.sweep.tasks import Task
 from studies.sweep.workers import TRIES
 
@@ -43,7 +42,7 @@ class Fleet:
 
     def __init__(self, tasks: Sequence[Task]) -> None:
         self.tasks = list(tasks)
-        self.needs = [need_of(task) for task in tasks]
+        self.needs = [task.needs for task in tasks]
         self.waiting = deque(range(len(tasks)))
         self.members: dict[str, Member] = {}
         self.tries = Counter[int]()

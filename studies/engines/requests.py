@@ -12,8 +12,7 @@ from studies.runs.case import Case
 from studies.sweep.engine import Silent
 from studies.sweep.frame_times import measure_times
 from studies.sweep.own_files import Given
-from studies.sweep.pool import do
-from studies.sweep.tasks import Task
+from studies.sweep.tasks import Task, do
 
 
 class Request(Protocol):

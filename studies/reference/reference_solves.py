@@ -1,4 +1,4 @@
-"""What the reference of a scene is made of: its solutions, what each depends on, where it lies, how it stands."""
+"""What the reference of a scene is made of: its solutions, what each depends on, and where it lies."""
 
 import json
 from dataclasses import dataclass, replace
@@ -6,12 +6,9 @@ from pathlib import Path
 
 from massspring.sources import source_fingerprint
 from studies.geometry.mesher.jobs import MAKERS
-from studies.reference.checkpoints import kept
 from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
 from studies.store.paths import key_digest, record_path
-from studies.store.record import peek
-from studies.store.staleness import CASE_CHANGED, CODE_CHANGED, MISSING, why_stale
 
 STUDY = "reference"
 
@@ -59,27 +56,10 @@ class ReferenceSolve:
         """Where it lies."""
         return record_path(root, STUDY, self.name, self.key)
 
-    def is_current(self, root: Path) -> bool:
-        """Whether it is there, from this code, as it was written."""
-        return self.why_stale(root) is None
-
-    def why_stale(self, root: Path) -> str | None:
-        """Why it must be solved (again) (studies.store.staleness); None when it need not."""
-        return why_stale(self.path(root), self.key, reference_fingerprint())
-
     @property
     def stamp(self) -> str:
         """Problem and code in one text."""
         return f"{reference_fingerprint()} {key_digest(self.key)}"
-
-    def state(self, root: Path) -> str:
-        """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""
-        if kept(self.path(root), self.stamp) is not None:
-            return "half-way"
-        why = self.why_stale(root)
-        if why is None:
-            return str(peek(self.path(root)).status)
-        return "missing" if why == MISSING else "stale" if why in (CASE_CHANGED, CODE_CHANGED) else "unreadable"
 
     @property
     def weight(self) -> float:
@@ -113,31 +93,3 @@ def sensitivity_runs(scene: Scene) -> list[str]:
 def reference_fingerprint() -> str:
     """Hash of the code that makes a reference and of all that it imports; what judges references is not among it."""
     return source_fingerprint("studies.reference.solve", *MAKERS)
-
-
-@dataclass(frozen=True)
-class SolveStanding:
-    """How a reference solve stands."""
-
-    reference_solve: ReferenceSolve
-    state: str
-    """As `ReferenceSolve.state` says."""
-    unknowns: int | None
-    """None where nothing is stored."""
-    steps: int
-    """Checkpoints reached."""
-    seconds: float
-    """What solving took [s]; NaN where nothing is stored."""
-
-
-def standing_of(root: Path, reference_solve: ReferenceSolve) -> SolveStanding:
-    """Read off the header of the stored solution, or off the load path half-way to it."""
-    state = reference_solve.state(root)
-    if state == "half-way":
-        begun = kept(reference_solve.path(root), reference_solve.stamp)
-        done = len([e for e in begun.path if e.t in reference_solve.scene.checkpoints]) if begun else 0
-        return SolveStanding(reference_solve, state, None, done, float("nan"))
-    if state in ("missing", "unreadable"):
-        return SolveStanding(reference_solve, state, None, 0, float("nan"))
-    known = peek(reference_solve.path(root)).attributes
-    return SolveStanding(reference_solve, state, known["unknowns"], known["steps_done"], float(known["seconds"]))

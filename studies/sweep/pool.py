@@ -13,20 +13,14 @@ from threading import Event, Thread
 from numba.core import event
 
 from studies.base.compile_watch import CompileWatch
-from studies.base.errors import StudyError
 from studies.base.interrupts import die_quietly
 from studies.base.portable import environment as portable_environment
 from studies.catalog.study import Study
 from studies.geometry.mesher.jobs import cache_folder
-from studies.reference.reference_solves import ReferenceSolve
-from studies.reference.solve import solve
-from studies.runs.case import Case
-from studies.runs.run import run_case
 from studies.sweep.engine import Progress, Told
-from studies.sweep.failures import store_failure
 from studies.sweep.frame_times import measure_times
 from studies.sweep.own_files import Given, given_files, load_given
-from studies.sweep.tasks import Task
+from studies.sweep.tasks import CaseTask, Task, do
 from studies.sweep.workers import done_or_dead
 
 COMPILED = "NUMBA_CACHE_DIR"
@@ -34,18 +28,6 @@ COMPILED = "NUMBA_CACHE_DIR"
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Every process computes on one core: the cores are shared out by cases, not inside them."""
 POLL_SECONDS = 0.2
-
-
-def do(task: Task) -> Path:
-    """Does a piece of work, unless another command has meanwhile; where its record lies."""
-    if task.done_meanwhile():
-        return task.path()
-    if isinstance(task.work, ReferenceSolve):
-        try:
-            return solve(task.root, task.work)
-        except StudyError as error:  # a mesh that cannot be made costs its scene, as it does for a case
-            return store_failure(task, str(error))
-    return run_case(task.root, task.study, task.work)
 
 
 @contextmanager
@@ -85,7 +67,7 @@ def perform(
     do: Callable[[Task], Path] = do,
     writer: Connection | None = None,
     files: tuple[Given, ...] = (),
-    on_death: Callable[[Task, str], object] = store_failure,
+    on_death: Callable[[Task, str], object] = Task.store_failure,
 ) -> None:
     """Runs the tasks in `jobs` processes, which load the user's `files`. Ctrl-C keeps what is stored. A task whose
     process dies is tried twice again, then given to `on_death` with the cause, and the rest goes on."""
@@ -146,7 +128,7 @@ class Pool:
         on_death: Callable[[Task, str], object],
     ) -> None:
         """As every engine."""
-        files = given_files(task.work for task in tasks if isinstance(task.work, Case))
+        files = given_files(task.work for task in tasks if isinstance(task, CaseTask))
         with environment_of_workers(self.portable), told_by_workers(on_compile) as writer:
             perform(list(tasks), self.processes, progress, writer=writer, files=files, on_death=on_death)
 

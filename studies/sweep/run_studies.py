@@ -7,10 +7,10 @@ from pathlib import Path
 from studies.base.atomic import write_whole
 from studies.catalog.study import Study
 from studies.store.archived import check_no_archive
+from studies.store.ledger import Ledger
 from studies.sweep.engine import Engine, Progress, Told
 from studies.sweep.failures import Failures
 from studies.sweep.pool import Pool
-from studies.sweep.stored.known import Known
 from studies.sweep.tasks import Task, tasks_of
 
 
@@ -22,29 +22,35 @@ def run_studies(
     wanted: Callable[[Task], bool] | None = None,
     on_compile: Told = lambda name: None,
     failures: Failures | None = None,
+    ledger: Ledger | None = None,
 ) -> int:
     """Brings the studies up to date below `root`; the number of pieces that had to run.
 
     `jobs`: so many processes of this machine, or an engine. `wanted` replaces the rule "what is not current".
-    `on_compile` hears what is being compiled, from any thread. `failures` hears of pieces whose process died, which are
-    stored as failed, and of those that do not run because a folder lies in the place of their file. Another command may
-    work on the same folder. Raises StudyError when results cannot be written, and for a root that is an archive.
+    `on_compile` hears what is being compiled, from any thread. `failures` hears of jobs whose process died, which are
+    stored as failed, and of those that do not run because a folder lies in the place of their file. `ledger`: of
+    `root`, where the command has one. Another command may work on the same folder. Raises StudyError when results
+    cannot be written, and for a root that is an archive.
     """
     check_no_archive(root)
     root = root.absolute()
-    engine, known = Pool(jobs) if isinstance(jobs, int) else jobs, Known(root)
+    engine, ledger = Pool(jobs) if isinstance(jobs, int) else jobs, ledger or Ledger(root)
 
     def stale(task: Task) -> bool:
-        return known.why_stale(task) is not None or (engine.portable and not known.is_portable(task))
+        entry = ledger.entry(task)
+        return ledger.why(task) is not None or (engine.portable and (entry is None or entry.portable is None))
 
     rule = wanted or stale
-    todo = [replace(task, seen=task.state()) for task in tasks_of(root, studies) if rule(task)]
+    ledger.look_again()
+    stored = [(task, ledger.entry(task)) for task in tasks_of(root, studies) if rule(task)]
+    todo = [replace(task, seen=entry and entry.state) for task, entry in stored]
     failures = failures or Failures()
     if todo:
         check_writable(root)
         engine.perform([task for task in todo if failures.can_store(task)], progress, on_compile, failures.add)
     among = None if wanted is None else {task.path() for task in todo}
     measured = sum(engine.measure(root, study, progress, on_compile, among) for study in studies)
+    ledger.look_again()
     return len(todo) + measured
 
 

@@ -1,80 +1,260 @@
-"""The pieces of work that studies are made of."""
+"""The jobs that studies are made of: cases, and the solutions of their references."""
 
+import json
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
+from typing import Any, ClassVar
 
 from studies.base.atomic import is_there
-from studies.base.collection import uncollected
+from studies.base.errors import StudyError
 from studies.catalog.study import Study
-from studies.reference.reference_solves import ReferenceSolve, reference_solves
+from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint, reference_solves
+from studies.reference.solve import solve
 from studies.runs.case import Case
-from studies.runs.current import case_path, why_case_is_stale
-from studies.runs.digest import case_digest
+from studies.runs.current import case_fingerprint, case_path
+from studies.runs.own import files_of
+from studies.runs.run import OWN_FILES, run_case
+from studies.store.entry import file_state, read_entry, why_entry_is_stale
+from studies.store.new_record import new_record
+from studies.store.paths import key_digest
+from studies.store.record import Record, Status, write_record
+from studies.sweep.estimate import MEMORY, case_bytes, case_seconds, solve_memory, solve_seconds
 
 REFERENCE = "reference "
 """Before the name of a reference solution in its label."""
 
 
 @dataclass(frozen=True)
-class Task:
-    """One piece of work that can run in any process: a piece of a reference, or a case."""
+class Task(ABC):
+    """One job, which can run in any process."""
 
     root: Path
+    """The results folder."""
     study: str
     work: Case | ReferenceSolve
     seen: tuple[int, ...] | None = field(default=None, compare=False)
-    """State of its file when it was found that it must run; None where there was none."""
+    """State of its file when the sweep began; None where there was none."""
+
+    kind: ClassVar[str]
+    """ "case" or "reference"."""
 
     @property
+    @abstractmethod
+    def label(self) -> str:
+        """For progress and messages."""
+
+    @property
+    @abstractmethod
     def weight(self) -> float:
         """Longest first keeps both cores busy to the end: references by mesh, then cases by size over step."""
-        if isinstance(self.work, ReferenceSolve):
-            return 1e9 + self.work.weight
-        return self.work.body.nodes / self.work.dt_fraction
+
+    @property
+    @abstractmethod
+    def needs(self) -> float:
+        """Memory that it may take, rather too much [bytes]."""
+
+    @property
+    @abstractmethod
+    def seconds(self) -> float:
+        """Estimated duration on the machine of results/published [s]."""
+
+    @property
+    @abstractmethod
+    def size(self) -> int | None:
+        """Estimated bytes of its record; None where that is unknown."""
+
+    @property
+    @abstractmethod
+    def fingerprint(self) -> str:
+        """Hash of the code that computes it."""
+
+    @abstractmethod
+    def path(self) -> Path:
+        """Where its record lies."""
+
+    @abstractmethod
+    def run(self) -> Path:
+        """Computes it and stores the result; where the record lies. Raises StudyError when it cannot be stored."""
+
+    @abstractmethod
+    def failure(self, cause: str) -> Record:
+        """The record of a job that could not be done."""
+
+    def store_failure(self, cause: str) -> Path:
+        """Stores it as failed. Raises StudyError when it cannot be stored."""
+        write_record(self.path(), self.failure(cause))
+        return self.path()
+
+    @cached_property
+    def _digest(self) -> str:
+        return key_digest(self.work.key)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 (hex) of what it computes."""
+        return self._digest
+
+    def state(self) -> tuple[int, ...] | None:
+        """Size, times and inode of its file; None where there is none."""
+        return file_state(self.path().stat()) if is_there(self.path()) else None
+
+    def done_meanwhile(self) -> bool:
+        """Whether another command has stored its result since the sweep began."""
+        if self.state() in (None, self.seen):
+            return False
+        return why_entry_is_stale(read_entry(self.path()), self.digest, self.fingerprint) is None
+
+
+@dataclass(frozen=True)
+class CaseTask(Task):
+    """A case of a study."""
+
+    work: Case
+    kind = "case"
 
     @property
     def label(self) -> str:
-        """For progress and messages."""
-        return REFERENCE + self.work.name if isinstance(self.work, ReferenceSolve) else self.work.name
+        """As Task's."""
+        return self.work.name
 
-    def is_current(self) -> bool:
-        """Whether it need not run."""
-        return self.why_stale() is None
+    @property
+    def weight(self) -> float:
+        """As Task's."""
+        return self.work.body.nodes / self.work.dt_fraction
 
-    def why_stale(self) -> str | None:
-        """Why it must run (again) (studies.store.staleness); None when it need not."""
-        if isinstance(self.work, ReferenceSolve):
-            return self.work.why_stale(self.root)
-        return why_case_is_stale(self.root, self.study, self.work)
+    @property
+    def needs(self) -> float:
+        """As Task's."""
+        return MEMORY
 
-    def state(self) -> tuple[int, ...] | None:
-        """What tells its file from any later one; None where there is none."""
-        if not is_there(self.path()):
-            return None
-        found = self.path().stat()
-        return found.st_ino, found.st_size, found.st_mtime_ns
+    @property
+    def seconds(self) -> float:
+        """As Task's."""
+        return case_seconds(self.work)
 
-    def done_meanwhile(self) -> bool:
-        """Whether another command has stored its result since it was found that it must run."""
-        return self.state() != self.seen and self.is_current()
+    @property
+    def size(self) -> int:
+        """As Task's."""
+        return case_bytes(self.work)
+
+    @property
+    def fingerprint(self) -> str:
+        """As Task's."""
+        return case_fingerprint(self.work)
+
+    @cached_property
+    def _path(self) -> Path:
+        return case_path(self.root, self.study, self.work)
 
     def path(self) -> Path:
-        """Where its record lies."""
-        return (
-            self.work.path(self.root)
-            if isinstance(self.work, ReferenceSolve)
-            else case_path(self.root, self.study, self.work)
-        )
+        """As Task's."""
+        return self._path
+
+    def run(self) -> Path:
+        """As Task's."""
+        return run_case(self.root, self.study, self.work)
+
+    def failure(self, cause: str) -> Record:
+        """As Task's."""
+        own = {str(file.path): file.sha256 for file in files_of(self.work.method, self.work.body.law)}
+        return _failed(self, "run", cause, {"warnings": ""} | ({OWN_FILES: json.dumps(own)} if own else {}))
 
 
-@uncollected()
+@dataclass(frozen=True)
+class ReferenceTask(Task):
+    """One solution of the reference of a scene."""
+
+    work: ReferenceSolve
+    kind = "reference"
+
+    @property
+    def label(self) -> str:
+        """As Task's."""
+        return REFERENCE + self.work.name
+
+    @property
+    def weight(self) -> float:
+        """As Task's."""
+        return 1e9 + self.work.weight
+
+    @property
+    def needs(self) -> float:
+        """As Task's."""
+        known = read_entry(self.path()).unknowns if is_there(self.path()) else None
+        return solve_memory(self.work, known)
+
+    @property
+    def seconds(self) -> float:
+        """As Task's."""
+        return solve_seconds(self.work)
+
+    @property
+    def size(self) -> None:
+        """As Task's."""
+        return None
+
+    @property
+    def fingerprint(self) -> str:
+        """As Task's."""
+        return reference_fingerprint()
+
+    @cached_property
+    def _path(self) -> Path:
+        return self.work.path(self.root)
+
+    def path(self) -> Path:
+        """As Task's."""
+        return self._path
+
+    def run(self) -> Path:
+        """As Task's. A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""
+        try:
+            return solve(self.root, self.work)
+        except StudyError as error:
+            return self.store_failure(str(error))
+
+    def failure(self, cause: str) -> Record:
+        """As Task's."""
+        solve = self.work
+        nothing = {"unknowns": 0, "steps_done": 0, "seconds": float("nan")}
+        about = {"scene": solve.scene.name, "level": float(solve.level), "variant": solve.variant}
+        return _failed(self, "reference", cause, about | nothing)
+
+
+def _failed(task: Task, kind: str, cause: str, attributes: dict[str, Any]) -> Record:
+    return new_record(
+        kind=kind,
+        key=task.work.key,
+        name=task.work.name,
+        status=Status.FAILED,
+        message=cause,
+        fingerprint=task.fingerprint,
+        attributes=attributes,
+        fields={},
+    )
+
+
+def do(task: Task) -> Path:
+    """Does a job, unless another command has meanwhile; where its record lies."""
+    return task.path() if task.done_meanwhile() else task.run()
+
+
+def case_tasks(root: Path, study: Study) -> list[CaseTask]:
+    """A job per case, in the order of the study."""
+    return [CaseTask(root, study.name, case) for case in study.cases]
+
+
+def reference_tasks(root: Path, study: Study) -> list[ReferenceTask]:
+    """A job per solution of the references of a study."""
+    return [ReferenceTask(root, study.name, one) for scene in study.scenes for one in reference_solves(scene)]
+
+
 def tasks_of(root: Path, studies: Iterable[Study]) -> list[Task]:
-    """Everything the studies need, each piece once, longest first."""
-    tasks: dict[object, Task] = {}
+    """Everything the studies need, each result once, longest first."""
+    tasks: dict[Path, Task] = {}
     for study in studies:
-        for solve in (solve for scene in study.scenes for solve in reference_solves(scene)):
-            tasks[solve.path(root)] = Task(root, study.name, solve)
-        for case in study.cases:
-            tasks[study.name, case_digest(case)] = Task(root, study.name, case)
+        tasks |= {task.path(): task for task in (*reference_tasks(root, study), *case_tasks(root, study))}
     return sorted(tasks.values(), key=lambda task: -task.weight)

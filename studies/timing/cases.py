@@ -7,7 +7,7 @@ from pathlib import Path
 from massspring import Free, Setup, simulate
 from studies.base.atomic import is_there
 from studies.base.compile_watch import watching
-from studies.base.errors import DamagedFile, OtherVersion, StudyError
+from studies.base.errors import StudyError
 from studies.runs.case import Case
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.prepare import prepare
@@ -15,8 +15,7 @@ from studies.store.archived import is_archive, shown_machine
 from studies.store.machine import machine_id
 from studies.store.new_record import new_record
 from studies.store.paths import timing_path
-from studies.store.record import Status, canonical, peek, read_record, write_record
-from studies.store.staleness import is_current
+from studies.store.record import Status, canonical, read_record, write_record
 from studies.timing.protocol import FrameTiming, interleave, pinned
 from studies.timing.stage_cost import ROWS, stage_times
 
@@ -35,23 +34,6 @@ def timing_file(root: Path, study: str, case: Case) -> Path:
 def shown_timing_file(root: Path, study: str, case: Case) -> Path:
     """Where the frame times lie that tables and charts show: this machine's, in an archive those of its machine."""
     return timing_path(case_path(root, study, case), shown_machine(root))
-
-
-def can_be_timed(root: Path, study: str, case: Case) -> bool:
-    """Whether the case ran to its end: a run that broke off has no comparable frames, and one that cannot be read
-    has none yet."""
-    path = case_path(root, study, case)
-    try:
-        return is_there(path) and peek(path).status in (Status.OK, Status.INVERTED, Status.DRIFTED)
-    except (DamagedFile, OtherVersion):
-        return False
-
-
-def timing_is_current(root: Path, study: str, case: Case) -> bool:
-    """Whether this machine has timed this case with this code, or never will."""
-    if not can_be_timed(root, study, case):
-        return True
-    return is_current(timing_file(root, study, case), case.key, case_fingerprint(case))
 
 
 def read_timing(root: Path, study: str, case: Case) -> FrameTiming | None:

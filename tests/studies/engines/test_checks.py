@@ -12,10 +12,10 @@ from studies.engines.checks import check_for, wait_until_seen
 from studies.engines.crew import Crew
 from studies.engines.fleet import Fleet
 from studies.engines.identity import difference, this_identity
-from studies.engines.memory import BASE, factors, unknowns_of
 from studies.reference.reference_solves import ReferenceSolve
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.sweep.tasks import Task
+from studies.sweep.estimate import MEMORY, factor_memory
+from studies.sweep.tasks import ReferenceTask
 from studies.sweep.workers import Death
 from tests.studies.engines.made_up import MadeUp, worker
 
@@ -78,10 +78,10 @@ def test_files_of_other_machines_are_waited_for(tmp_path):
 
 @pytest.mark.parametrize(("unknowns", "peak"), [(8_191, 0.30e9), (25_423, 0.52e9), (41_851, 0.60e9), (89_598, 1.35e9)])
 def test_no_less_memory_is_declared_than_references_have_taken(unknowns, peak):
-    assert peak < BASE + factors(unknowns) < 1.9 * peak
+    assert peak < MEMORY + factor_memory(unknowns) < 1.9 * peak
 
 
 def test_the_size_of_a_reference_is_declared_before_it_is_known():
     for level, unknowns in ((0.12, 16_482), (0.22, 4_391)):
-        solve = ReferenceSolve(BALL_SQUEEZE, level)
-        assert unknowns <= unknowns_of(Task(Path("nowhere"), "tiny", solve), solve) < 3 * unknowns
+        needs = ReferenceTask(Path("nowhere"), "tiny", ReferenceSolve(BALL_SQUEEZE, level)).needs
+        assert factor_memory(unknowns) <= needs - MEMORY < 3.5 * factor_memory(unknowns)

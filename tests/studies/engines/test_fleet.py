@@ -12,11 +12,11 @@ from studies.engines.checks import check_for
 from studies.engines.cluster import Cluster
 from studies.engines.crew import Crew
 from studies.engines.fleet import Fleet, Member
-from studies.engines.memory import BASE, need_of
 from studies.engines.requests import Piece, Presence
 from studies.reference.reference_solves import ReferenceSolve
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.sweep.tasks import Task
+from studies.sweep.estimate import MEMORY
+from studies.sweep.tasks import CaseTask, ReferenceTask
 from studies.sweep.workers import Death
 from tests.studies.engines.made_up import MadeUp, worker
 from tests.studies.tiny import tiny_case
@@ -26,12 +26,12 @@ SETUP = Setup((), (), ".")
 
 def small(number):
     """A piece of which only the number counts."""
-    return Task(Path("results"), "tiny", tiny_case(dt_fraction=0.5 - 0.01 * number))
+    return CaseTask(Path("results"), "tiny", tiny_case(dt_fraction=0.5 - 0.01 * number))
 
 
 def large():
     """The piece with the most memory of a reference."""
-    return Task(Path("results"), "tiny", ReferenceSolve(BALL_SQUEEZE, 0.1))
+    return ReferenceTask(Path("results"), "tiny", ReferenceSolve(BALL_SQUEEZE, 0.1))
 
 
 @pytest.fixture(autouse=True)
@@ -75,15 +75,15 @@ def test_every_piece_goes_to_one_worker(check):
 
 def test_memory_is_shared_by_what_a_worker_does():
     fleet = Fleet([large(), large(), small(1)])
-    need = need_of(large())
-    fleet.members["a"] = Member("a", "a", "m", 4, need + BASE)
+    need = large().needs
+    fleet.members["a"] = Member("a", "a", "m", 4, need + MEMORY)
     assert [number for _, number in fleet.handed_out()] == [0, 2], "the second reference waits, the case does not"
     fleet.done("a", 0)
     assert [number for _, number in fleet.handed_out()] == [1]
 
 
 def test_a_piece_that_no_worker_has_the_memory_for_is_refused_before_anything_runs(check):
-    lines = MadeUp(as_it_should(check), a=worker("a", memory=2 * BASE), b=worker("b", memory=BASE))
+    lines = MadeUp(as_it_should(check), a=worker("a", memory=2 * MEMORY), b=worker("b", memory=MEMORY))
     crew = crew_of(lines, check, [large(), small(1)])
     with pytest.raises(
         StudyError, match=r"reference ball_squeeze-0\.1 needs about \d+\.\d GB, and the largest worker has 0\.6"

@@ -7,8 +7,10 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.engines import requests
-from studies.engines.cluster import Cluster, timed_somewhere
+from studies.engines.cluster import Cluster
 from studies.engines.requests import FrameTimes, Presence, busy_share
+from studies.store.ledger import Ledger
+from studies.sweep.tasks import case_tasks
 from tests.studies.engines.made_up import MadeUp, worker
 from tests.studies.tiny import Silent, tiny_case, tiny_study
 
@@ -56,13 +58,17 @@ def test_a_worker_that_is_lost_meanwhile_is_a_sentence(tmp_path, monkeypatch):
         measured(tmp_path, lambda address: None)
 
 
+def timed_somewhere(root):
+    return [Ledger(root).timed_somewhere(task) for task in case_tasks(root, tiny_study())]
+
+
 def test_what_any_machine_has_timed_asks_for_no_cluster(results):
     study = tiny_study()
-    assert all(timed_somewhere(results, "tiny", case) for case in study.cases)
+    assert timed_somewhere(results) == [True, True, True]
     assert Cluster(lambda: None, 1.0).measure(results, study, Silent(), print, None) == 0  # type: ignore[arg-type]
     for file in (results / "tiny").glob("*.timing.*.h5"):
         file.unlink()
-    assert [timed_somewhere(results, "tiny", case) for case in study.cases] == [False, False, True], "one diverges"
+    assert timed_somewhere(results) == [False, False, True], "one diverges"
 
 
 def test_the_share_of_a_machine_that_is_busy(tmp_path, monkeypatch):

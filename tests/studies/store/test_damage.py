@@ -7,8 +7,8 @@ import pytest
 from studies.base.errors import DamagedFile, StudyError
 from studies.store import opening
 from studies.store.checksums import Seal, seal_of
+from studies.store.entry import DAMAGED, why_stale
 from studies.store.record import SCHEMA, peek, read_record, write_record
-from studies.store.staleness import DAMAGED, why_stale
 from tests.studies import made_up_run
 from tests.studies.store.test_store import KEY, assert_same, record
 

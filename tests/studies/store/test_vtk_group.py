@@ -11,10 +11,10 @@ from studies.base.errors import DamagedFile
 from studies.runs.current import case_path
 from studies.store import opening
 from studies.store import record as storing
+from studies.store.entry import DAMAGED, why_stale
 from studies.store.layout.vtk_group import GROUP
 from studies.store.record import Record, read_record, write_record
 from studies.store.schema import Status
-from studies.store.staleness import DAMAGED, why_stale
 from tests.studies.made_up_run import SCENE, run
 from tests.studies.store.test_store import assert_same
 from tests.studies.tiny import tiny_case

@@ -10,16 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.reference.reference_solves import reference_solves, standing_of
+from studies.reference.reference_solves import reference_solves
 from studies.runs.current import case_path
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.failures import Failures
 from studies.sweep.load import load_runs
-from studies.sweep.pool import do, environment_of_workers
-from studies.sweep.standings import failed
-from studies.sweep.tasks import tasks_of
+from studies.sweep.pool import environment_of_workers
+from studies.sweep.standings import failed, solve_standing
+from studies.sweep.tasks import do, tasks_of
 from studies.timing.alone import alone
 from tests.studies.tiny import tiny_case, tiny_study
 
@@ -52,11 +53,12 @@ def test_a_piece_that_died_is_stored_as_failed(tmp_path):
     tasks, failures = tasks_of(tmp_path, [tiny_study(cases=(case,))]), Failures()
     for task in tasks:
         failures.add(task, "its process died")
-    assert all(task.is_current() and failed(task) for task in tasks)
+    ledger = Ledger(tmp_path)
+    assert all(ledger.why(task) is None and failed(ledger, task) for task in tasks)
     (run,), remarks = load_runs(tmp_path, tiny_study(cases=(case,)))
     assert (run.record.status, run.record.message) == (Status.FAILED, "its process died")
     assert "the reference of 'ball_squeeze' on mesh 0.9 is failed: its process died" in remarks[0]
-    assert [standing_of(tmp_path, solve).state for solve in reference_solves(scene)] == ["failed"] * 6
+    assert [solve_standing(ledger, solve).state for solve in reference_solves(scene)] == ["failed"] * 6
     said = failures.sentence("again")
     assert said.startswith(f"failed: {tasks[0].label} (its process died), and 6 more; the rest is done")
 

@@ -8,6 +8,7 @@ import typer
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, say, warn
 from studies.report import results as reports
+from studies.store.ledger import Ledger
 from studies.sweep.find_study import find_study
 
 
@@ -18,7 +19,7 @@ def report(
 ) -> None:
     """All charts and tables, the summaries, and report.html; names what it wrote."""
     more = [study for study in map(find_study, studies or []) if study not in STUDIES]
-    written, remarks = reports.report(results, [*STUDIES, *more])
+    written, remarks = reports.report(Ledger(results), [*STUDIES, *more])
     if figures:
         written += reports.draw_figures(results)
     warn(remarks)

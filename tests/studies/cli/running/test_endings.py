@@ -13,9 +13,8 @@ from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.current import case_path
 from studies.scenes import ReferencePlan
 from studies.store.record import Status, read_record, write_record
-from studies.sweep.failures import store_failure
 from studies.sweep.standings import CAUSES, Standing, causes, summary, unexpected
-from studies.sweep.tasks import Task, tasks_of
+from studies.sweep.tasks import CaseTask, ReferenceTask, tasks_of
 from tests.studies.tiny import SQUEEZE, diverging_case, tiny_case, tiny_study
 
 ROOT = Path(__file__).parents[4]
@@ -74,7 +73,7 @@ def test_only_what_is_chosen_decides(organbench, results, file_of):
 def test_a_reference_that_failed_is_exit_code_1(organbench, tmp_path, file_of, losses, code):
     scene = replace(SQUEEZE, reference=ReferencePlan("octant", (0.9, 0.5), variants=()))
     for task in tasks_of(tmp_path / "r", [tiny_study(cases=(tiny_case(scene=scene),))]):
-        store_failure(task, f"no equilibrium at {task.work.level:g} s" if task.label[:3] == "ref" else "no mesh")
+        task.store_failure(f"no equilibrium at {task.work.level:g} s" if task.label[:3] == "ref" else "no mesh")
     ended, out, _ = organbench("run", file_of(WITH_REFERENCE.format(losses)), "--results", tmp_path / "r")
     assert ended == code
     assert "tiny: nothing ran" in out and "tiny: 1 case: 1 failed; 2 reference solutions: 2 failed" in out
@@ -90,7 +89,7 @@ def test_status_and_run_count_alike(organbench, results, file_of):
 
 def standing(status, message, number=0) -> Standing:
     work = tiny_case(frames=number + 1)
-    return Standing(Task(__file__, "tiny", work), status, message)
+    return Standing(CaseTask(Path(__file__), "tiny", work), status, message)
 
 
 def test_causes_that_differ_in_numbers_are_one_sentence():
@@ -107,7 +106,7 @@ def test_a_method_that_does_not_apply_and_what_has_not_ended_are_no_failure():
     fine = [standing(status, "") for status in ("ok", "skipped", "stale", "missing")]
     bad = [standing(status, "") for status in Status if status not in ("ok", "skipped")]
     assert unexpected(study, [*fine, *bad]) == bad
-    reference = Standing(Task(__file__, "tiny", ReferenceSolve(SQUEEZE, 0.5)), "not-converged", "")
+    reference = Standing(ReferenceTask(Path(__file__), "tiny", ReferenceSolve(SQUEEZE, 0.5)), "not-converged", "")
     assert unexpected(replace(study, expects=tuple(Status)), [reference]) == [reference]
 
 
