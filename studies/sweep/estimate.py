@@ -8,10 +8,8 @@ from studies.base.errors import StudyError
 from studies.geometry.organs.make_shape import make_shape
 from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.case import Case
-from studies.scene.checks import surface_of
 from studies.scene.scene import Scene
 from studies.store.schema import SURFACE
-from studies.timing.cases import BUDGET, REPEATS
 
 SECONDS_PER_UNKNOWN = 2e-3
 """Of a load path, [s]: the median of 51 reference solutions of the catalogue with 10,832 to 89,683 unknowns, on two
@@ -95,6 +93,8 @@ def case_seconds(case: Case) -> float:
 
 def timing_seconds(case: Case) -> float:
     """Of measuring the frame times of a case that runs: none of one whose organ cannot be read."""
+    from studies.timing.cases import BUDGET, REPEATS  # with pandas
+
     try:
         once = run_seconds(case)
     except StudyError:
@@ -120,6 +120,8 @@ def organ_size(scene: Scene) -> float:
     """Diagonal of the box around an organ [m]. Raises StudyError."""
     if scene.organ.shape != "file":
         return make_shape(scene.organ.shape, scene.organ.parameters).size
+    from studies.scene.checks import surface_of  # with the readers of meshes
+
     return MARGIN * float(np.linalg.norm(np.ptp(surface_of(scene.organ, scene.name)[0], axis=0)))
 
 
@@ -151,4 +153,6 @@ def case_bytes(case: Case) -> int:
 
 def timing_bytes(case: Case) -> int:
     """Of the frame times of a case."""
+    from studies.timing.cases import REPEATS
+
     return HEAD // 3 + NUMBER * (case.frames or case.scene.frames) * (REPEATS + STAGES)

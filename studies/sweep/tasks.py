@@ -12,11 +12,9 @@ from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint, reference_solves
-from studies.reference.solve import solve
 from studies.runs.case import Case
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.own import files_of
-from studies.runs.run import OWN_FILES, run_case
 from studies.store.entry import file_state, read_entry, why_entry_is_stale
 from studies.store.new_record import new_record
 from studies.store.paths import key_digest
@@ -155,10 +153,14 @@ class CaseTask(Task):
 
     def run(self) -> Path:
         """As Task's."""
+        from studies.runs.run import run_case  # with the solver, which takes most of a second to load
+
         return run_case(self.root, self.study, self.work)
 
     def failure(self, cause: str) -> Record:
         """As Task's."""
+        from studies.runs.run import OWN_FILES
+
         own = {str(file.path): file.sha256 for file in files_of(self.work.method, self.work.body.law)}
         return _failed(self, "run", cause, {"warnings": ""} | ({OWN_FILES: json.dumps(own)} if own else {}))
 
@@ -211,6 +213,8 @@ class ReferenceTask(Task):
 
     def run(self) -> Path:
         """As Task's. A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""
+        from studies.reference.solve import solve
+
         try:
             return solve(self.root, self.work)
         except StudyError as error:
@@ -218,9 +222,9 @@ class ReferenceTask(Task):
 
     def failure(self, cause: str) -> Record:
         """As Task's."""
-        solve = self.work
+        work = self.work
         nothing = {"unknowns": 0, "steps_done": 0, "seconds": float("nan")}
-        about = {"scene": solve.scene.name, "level": float(solve.level), "variant": solve.variant}
+        about = {"scene": work.scene.name, "level": float(work.level), "variant": work.variant}
         return _failed(self, "reference", cause, about | nothing)
 
 
