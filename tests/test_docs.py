@@ -15,7 +15,7 @@ ROOT = Path(__file__).parent.parent
 PACKAGES = ("massspring", "reference_fem", "studies")
 PROSE = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "docs/how-a-run-works.md", "docs/theory.md",
          "docs/notation.md", "docs/equations.md", "docs/meshes.md", "docs/own-organ.md", "docs/paper.md",
-         "docs/breaking.md", "docs/cluster.md", "docs/scale.md", "docs/population.md", "docs/results.md",
+         "docs/breaking.md", "docs/cluster.md", "docs/population.md", "docs/results.md",
          "docs/methods.md", "docs/accuracy.md")  # fmt: skip
 FENCE = re.compile(r"```python\n(.*?)```", re.DOTALL)
 
