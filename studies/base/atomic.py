@@ -1,30 +1,22 @@
 """A file is there whole or not at all, whatever interrupts: full disk, Ctrl-C, kill -9, power cut."""
 
 import errno
-import hashlib
 import os
-import platform
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
-from itertools import count
 from pathlib import Path
+from uuid import uuid4
 
 from studies.base.errors import StudyError
 
 STALE_SECONDS = 3600.0  # a write takes seconds: a .part this old belongs to a process that was killed
-ORPHAN_SECONDS = 60.0
-"""After which that is true of a part whose process, of this host, is gone."""
-BOOT = Path("/proc/sys/kernel/random/boot_id")
-"""Names the start of a Linux system."""
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Writes `content` to `path` through a `.part` file beside it: written, flushed to disk, renamed.
+    """Writes `content` to `path` through a `.part` file next to it: written, flushed to disk, renamed.
 
-    Each writer has its own .part, on every host that shares the folder, so two that write the same file do not mix; the
-    last one wins.
+    Each writer has its own .part, so two that write the same file do not mix; the last one wins.
     What stood at `path` stays untouched until the rename. Raises StudyError when it cannot be written.
     """
     with part_beside(path, len(content)) as part:
@@ -53,18 +45,9 @@ def part_beside(path: Path, size: int | None = None) -> Iterator[Path]:
 
 
 def part_path(path: Path) -> Path:
-    """A new name beside `path` that no other writer has: NAME.HOST-PROCESS-NUMBER.part."""
-    return path.with_name(f"{path.name}.{_host()}-{os.getpid()}-{next(_NUMBERS)}.part")
-
-
-_NUMBERS = count(1)
-
-
-@cache
-def _host() -> str:
-    """8 hex digits that tell this machine, since its start, from others: processes have equal numbers elsewhere."""
-    started = BOOT.read_text() if BOOT.is_file() else ""
-    return hashlib.sha256(f"{platform.node()} {started}".encode()).hexdigest()[:8]
+    """A new name next to `path` that no other writer has, on any host. (`tempfile` would make files that their owner
+    alone may read.)"""
+    return path.with_name(f"{path.name}.{uuid4().hex[:12]}.part")
 
 
 def is_there(path: Path) -> bool:
@@ -93,22 +76,7 @@ def sweep_parts(folder: Path) -> int:
 def old_parts(folder: Path) -> list[Path]:
     """Those files, sorted."""
     now = time.time()
-    return [part for part in sorted(Path(folder).glob("*.part")) if now - _modified(part) > _patience(part)]
-
-
-def _patience(part: Path) -> float:
-    """Seconds that a .part may lie: less where its process was of this host and is gone."""
-    host, _, rest = part.name.split(".")[-2].partition("-")
-    process = rest.split("-")[0]
-    if os.name != "posix" or host != _host() or not process.isdigit():
-        return STALE_SECONDS
-    try:
-        os.kill(int(process), 0)
-    except (ProcessLookupError, OverflowError):
-        return ORPHAN_SECONDS
-    except PermissionError:  # another user's
-        return STALE_SECONDS
-    return STALE_SECONDS
+    return [part for part in sorted(Path(folder).glob("*.part")) if now - _modified(part) > STALE_SECONDS]
 
 
 def _modified(part: Path) -> float:

@@ -12,7 +12,8 @@ from studies.grading.quadratic_mesh import QuadraticMesh
 from studies.grading.shaping import all_facets, linear_mesh, quadratic_mesh
 from studies.grading.true_shape import true_shape
 from studies.scene.kind import load_of
-from studies.scene.meshing import mesh_for, remeshed
+from studies.scene.meshing import mesh_for
+from studies.scene.organ_file import remeshed
 from studies.scene.scene import Scene
 
 SOLID, HOLLOW = (1, 2), (0, 1)

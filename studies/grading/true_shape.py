@@ -13,7 +13,7 @@ from studies.geometry.mesh.jacobian import PAIRS
 from studies.geometry.organs import SHAPES
 from studies.geometry.shape.levelset import Shape, project
 from studies.grading.held_mesh import HeldMesh, rim_sides
-from studies.scene.meshing import remeshed, scanned
+from studies.scene.organ_file import remeshed, scanned
 from studies.scene.scene import Held, Organ
 
 

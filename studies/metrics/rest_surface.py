@@ -1,7 +1,7 @@
 """The surface of a body at rest, with sides as curved as its facets, and the nearest points on it."""
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from skfem.refdom import RefTri
 from massspring.body.quadratic import PARTS_OF_FACET
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.geometry.surface.distance import distance_to_surface
+from studies.geometry.surface.sides import along_facets, lattice, shape_functions
 
 DIVISIONS = 6
 """Parts of a facet's side where it is sampled: 28 points and 36 triangles a facet."""
@@ -56,10 +57,7 @@ class RestSurface:
 
     def lattice(self, divisions: int = DIVISIONS) -> tuple[np.ndarray, np.ndarray]:
         """Points (m, 3) [m] on all facets and the triangles (t, 3) between them, `divisions`² a facet."""
-        local, parts = _lattice(divisions)
-        places = np.einsum("pa,fai->fpi", _shares(local, self.curved), self.points[self.facets])
-        triangles = parts + len(local) * np.arange(len(self.facets))[:, None, None]
-        return places.reshape(-1, 3), triangles.reshape(-1, 3)
+        return along_facets(self.points, self.facets, divisions)
 
     @property
     def areas(self) -> np.ndarray:
@@ -73,7 +71,7 @@ class RestSurface:
         local, weights = get_quadrature(RefTri, VOLUME_ORDER)
         centred = (self.points - self.points[self.facets].mean(axis=(0, 1)))[self.facets]
         barycentric = np.column_stack([1.0 - local.sum(axis=0), *local])
-        x = np.einsum("qa,fai->fqi", _shares(barycentric, self.curved), centred)
+        x = np.einsum("qa,fai->fqi", shape_functions(barycentric, self.curved), centred)
         along = np.einsum("dqa,fai->dfqi", _slopes(barycentric, self.curved), centred)
         return float(np.einsum("fqi,fqi,q->", x, np.cross(*along), weights) / 3.0)
 
@@ -87,12 +85,12 @@ class RestSurface:
         each = [_nearest(queries[block], corners, tree, distance[block]) for block in blocks]
         triangle, inside = (np.concatenate(part) for part in zip(*each, strict=True))
         facet, part = np.divmod(triangle, divisions**2)
-        local, parts = _lattice(divisions)
+        local, parts = lattice(divisions)
         return Nearest(distance, facet, np.einsum("qc,qci->qi", inside, local[parts[part]]))
 
     def interpolated(self, values: np.ndarray, at: Nearest) -> np.ndarray:
         """Nodal values (n, 3) at points of the surface, (q, 3)."""
-        return np.einsum("qa,qai->qi", _shares(at.local, self.curved), values[self.facets[at.facet]])
+        return np.einsum("qa,qai->qi", shape_functions(at.local, self.curved), values[self.facets[at.facet]])
 
 
 def rest_surfaces(points: np.ndarray, facets: np.ndarray) -> dict[str, RestSurface]:
@@ -118,27 +116,6 @@ def six_node_facets(triangles: np.ndarray) -> np.ndarray | None:
     for part, corner in np.ndindex(4, 3):
         facets[:, PARTS_OF_FACET[part, corner]] = parts[:, part, corner]
     return facets if np.array_equal(facets[:, PARTS_OF_FACET], parts) else None
-
-
-@cache
-def _lattice(divisions: int) -> tuple[np.ndarray, np.ndarray]:
-    """Barycentric coordinates (p, 3) of a regular lattice on a triangle, and its triangles (divisions², 3)."""
-    number, local = {}, []
-    for i in range(divisions + 1):
-        for j in range(divisions + 1 - i):
-            number[i, j] = len(local)
-            local.append([divisions - i - j, i, j])
-    upright = [[(i, j), (i + 1, j), (i, j + 1)] for i, j in number if i + j < divisions]
-    turned = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i, j in number if i + j < divisions - 1]
-    triangles = np.array([[number[corner] for corner in corners] for corners in upright + turned])
-    return np.array(local) / divisions, triangles
-
-
-def _shares(local: np.ndarray, curved: bool) -> np.ndarray:
-    """Shape functions at barycentric coordinates (p, 3): (p, 3) linear, or (p, 6) quadratic."""
-    if not curved:
-        return local
-    return np.concatenate([local * (2.0 * local - 1.0), 4.0 * local * np.roll(local, -1, axis=1)], axis=1)
 
 
 def _slopes(local: np.ndarray, curved: bool) -> np.ndarray:

@@ -17,7 +17,7 @@ from studies.geometry.shape.levelset import Shape, at_depth
 from studies.geometry.surface.distance import hausdorff
 from studies.grading.true_shape import true_shape
 from studies.metrics.rest_surface import LUMEN, OUTER, RestSurface, rest_surfaces
-from studies.scene.meshing import scanned
+from studies.scene.organ_file import scanned
 from studies.scene.scene import Organ
 
 ORGANS = 128

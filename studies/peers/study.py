@@ -4,9 +4,7 @@ No study of the catalogue: what others compute needs the extra `peers`. `make st
 """
 
 from massspring import Free, ImplicitVolume, Xpbd
-from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
-from studies.scenes import BALL_SQUEEZE, LIVER_PRESS
+from studies import BALL_SQUEEZE, LIVER_PRESS, BodyRecipe, Case, Chart, Study
 
 SCENES = (BALL_SQUEEZE, LIVER_PRESS)
 NODES = (150, 300)

@@ -26,8 +26,9 @@ from studies.plots.style.page import (
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, remark, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, remark, save, styled
 from studies.runs.case import BodyRecipe
+from studies.store.record import Status
 
 TITLE = "Error against the reference"
 QUANTITIES = {
@@ -40,6 +41,7 @@ ROOM = 1.7
 """Top of the axis over the largest value: so much that its marker is whole."""
 REACH = 0.38
 """Half the width of a group of points; groups are 1 apart."""
+STRUCK_OUT = {"marker": "x", "linestyle": "", "color": BLACK, "markersize": 11, "markeredgewidth": 1.4}
 
 
 @styled
@@ -100,13 +102,22 @@ def _draw_scene(
 def _draw_point(
     axes: Axes, x: float, error: float, uncertainty: float, run: Run, looks: dict[BodyRecipe, BodyLook]
 ) -> float:
-    """A filled marker where the floor is small beside the error, else a hollow one; never below the floor."""
+    """A filled marker where the reference is much better known than the error, else a hollow one; never below the
+    uncertainty of the reference. A run that did not end ok is struck out."""
     height = max(error, uncertainty)
     colour = method_colour(run.case.method.name)
     face = colour if uncertainty <= RESOLVED_SHARE * error else "white"
     marker = looks[run.case.body].marker if error > uncertainty else "_"
     axes.plot(x, height, marker=marker, color=colour, markerfacecolor=face, markersize=7.5, markeredgewidth=1.6)
+    if run.record.status != Status.OK:
+        axes.plot(x, height, **STRUCK_OUT)
     return height
+
+
+def _struck_out(shown: Sequence[Run]) -> list[Line2D]:
+    """The handle of runs that did not end ok, where there are some."""
+    states = sorted({readable(run.record.status) for run in shown if run.record.status != Status.OK})
+    return [Line2D([], [], label=f"struck out: {', '.join(states)}, no sound result", **STRUCK_OUT)] if states else []
 
 
 def _handles(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list:
@@ -114,7 +125,8 @@ def _handles(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list:
     return [
         *body_method_handles(shown, looks, markers=True),
         Line2D([], [], label="hollow: the reference is not ten times better", **hollow),
-        band_handle("reference's own uncertainty"),
+        band_handle("uncertainty of the reference"),
+        *_struck_out(shown),
     ]
 
 

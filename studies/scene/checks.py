@@ -17,7 +17,7 @@ from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.first_surface import first_surface
 from studies.scene.clock import check_clock, is_number
 from studies.scene.kind import has_wall
-from studies.scene.meshing import scanned
+from studies.scene.organ_file import scanned
 from studies.scene.scene import Organ, Scene
 
 Surface = tuple[np.ndarray, np.ndarray]

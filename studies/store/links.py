@@ -7,9 +7,9 @@ from collections.abc import Collection, Sequence
 import h5py
 
 from studies.base.atomic import is_there, sweep_parts, write_whole
-from studies.store.checksums import BLOCK, sealed
 from studies.store.entry import Entry
 from studies.store.ledger import Ledger
+from studies.store.opening import BLOCK, sealed
 from studies.store.paths import DIGITS, SUFFIX, TIMING, index_path
 from studies.store.record import INDEX_KIND, SCHEMA
 

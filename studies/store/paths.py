@@ -68,8 +68,3 @@ def record_files(root: Path, study: str) -> list[Path]:
     """The records of `study`, sorted; no timing files, no index, no unfinished files."""
     index = index_path(root, study)
     return [p for p in sorted(index.parent.glob("*.h5")) if p != index and ".timing." not in p.name]
-
-
-def timing_files(root: Path, study: str) -> list[Path]:
-    """The timing files of `study`, of all machines, sorted."""
-    return sorted(study_folder(root, study).glob("*.timing.*.h5"))

@@ -5,7 +5,7 @@ A failure is a record too, with its status, its message and NaN after the moment
 
 import io
 import json
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,24 +16,22 @@ import numpy as np
 from studies.base.atomic import write_whole
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.base.lookup import lookup
-from studies.store.checksums import BLOCK, attribute_digest, field_digest, manifest, plain, sealed
 from studies.store.faults import fault
-from studies.store.layout.hdf5 import add_attribute, add_dataset
-from studies.store.layout.vtk_group import GROUP, add_vtk_group
-from studies.store.opening import AGAIN, open_results
-from studies.store.schema import Status
-from studies.store.trial_read import read_all
+from studies.store.opening import AGAIN, BLOCK, open_results, sealed
+from studies.store.schema import LAYOUTS, Status
+from studies.store.vtk_group import add_vtk_group
 
 INDEX_KIND = "index"
 """Of the file that holds links to a study's records and none of their parts."""
 SCHEMA = 2
 """Version of the layout (studies.store.schema); raised when a reader of the old one would misread the new one. 1 had no
-checksums."""
+seal."""
 FORMAT = ("v110", "v110")
-"""Of HDF5: the first that can hold the views of studies.store.layout.vtk_group, has checksums of its own for all but
-values, and needs no tree for a dataset of one chunk."""
-CHECKSUMS = "checksums"
-"""Attribute with the digests of all others and of all fields (studies.store.checksums)."""
+"""Of HDF5: the first that can hold the views of studies.store.vtk_group."""
+PART_DIGESTS = "checksums"
+"""Attribute of files written earlier, with digests of their parts, which the seal of the whole file replaces."""
+DIMENSION = "This is a netCDF dimension but not a netCDF variable.%10d"
+"""Name of a dimension scale without values (docs.unidata.ucar.edu/netcdf-c, "NetCDF-4 file format specification")."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +51,7 @@ class Record:
     key: the case as JSON text              name: readable, "/" makes folders in the study's index
     status, message: how it ended and why   fingerprint: of the code (massspring.sources)
     machine: id (studies.store.machine)           attributes: numbers, text, true/false, None or short lists of numbers
-    fields: name -> Field; "/" in a name makes a group
+    fields: name -> Field
     """
 
     schema: int
@@ -68,6 +66,7 @@ class Record:
     fields: dict[str, Field] = field(default_factory=dict)
 
 
+TEXT = h5py.string_dtype()
 HEADER = ("schema", "kind", "key", "name", "status", "message", "fingerprint", "machine")
 
 
@@ -82,29 +81,45 @@ def write_record(path: Path, record: Record) -> None:
     with h5py.File(image, "w", libver=FORMAT, userblock_size=BLOCK) as file:
         attributes = {name: getattr(record, name) for name in HEADER} | record.attributes
         for name, value in attributes.items():
-            add_attribute(file.id, name, value)
-        add_attribute(file.id, CHECKSUMS, manifest(attributes, record.fields))
-        items = {name: add_dataset(file.id, name, np.asarray(field.values)) for name, field in record.fields.items()}
-        for name, item in record.fields.items():
-            add_attribute(items[name], "unit", item.unit)
-            add_attribute(items[name], "description", item.description)
-        add_vtk_group(file.id, record.kind, record.fields, items)
+            plain = str(value) if isinstance(value, str) else value  # an Enum of text is not text to HDF5
+            file.attrs[name] = h5py.Empty("f8") if value is None else plain
+        datasets = {name: _add_field(file, name, item) for name, item in record.fields.items()}
+        _name_dimensions(file, record.kind, datasets)
+        add_vtk_group(file, record.kind, datasets)
     write_whole(Path(path), sealed(image.getvalue()))
 
 
+def _add_field(file: h5py.File, name: str, item: Field) -> h5py.Dataset:
+    values = np.asarray(item.values)
+    dataset = file.create_dataset(name, data=values.astype(TEXT) if values.dtype.kind == "U" else values)
+    dataset.attrs.update({"unit": item.unit, "description": item.description})
+    return dataset
+
+
+def _name_dimensions(file: h5py.File, kind: str, datasets: Mapping[str, h5py.Dataset]) -> None:
+    """Dimension scales called as the letters of studies.store.schema, as netCDF-4 has them: xarray names dims so."""
+    scales: dict[str, h5py.Dataset] = {}
+    for name, dataset in datasets.items() if kind in LAYOUTS else ():
+        for axis, letter in enumerate(LAYOUTS[kind][0][name].shape.split()):
+            if letter not in scales:
+                length = dataset.shape[axis]
+                scales[letter] = file.create_dataset(letter, (length,), "f4")
+                scales[letter].make_scale(DIMENSION % length)
+            dataset.dims[axis].attach_scale(scales[letter])
+
+
 def read_record(path: Path, fields: Iterable[str] | None = None) -> Record:
-    """The record in `path`, with all fields or only the named ones, each held to its checksum; with all of them, the
-    record also to its table (studies.store.schema). The file is opened read-only. Parts that others added are left out.
+    """The record in `path`, with all fields or only the named ones; with all of them, held to its table
+    (studies.store.schema). The file is opened read-only.
 
     Raises StudyError when the file is missing, of another program or lacks a named field, DamagedFile when its content
     is not what was written, OtherVersion for another schema.
     """
-    with open_results(path) as (file, untouched):
-        record, digests = _header(path, file)
-        names = digests if fields is None else [lookup(name, list(digests), "field") for name in fields]
-        record = replace(record, fields={name: _field(path, file, name, digests[name]) for name in names})
-        if fields is None and not untouched and GROUP in file:
-            read_all(file[GROUP], path.stat().st_size)  # held to the checksums of the format
+    with open_results(path) as file:
+        record = _header(path, file)
+        stored = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset) and not item.is_scale}
+        names = stored if fields is None else [lookup(name, list(stored), "field") for name in fields]
+        record = replace(record, fields={name: _field(path, stored[name]) for name in names})
     wrong = None if fields is not None else fault(record.kind, record.status, record.attributes, record.fields)
     if wrong:
         raise DamagedFile(f"{path} {wrong}: {AGAIN}")
@@ -112,19 +127,15 @@ def read_record(path: Path, fields: Iterable[str] | None = None) -> Record:
 
 
 def peek(path: Path) -> Record:
-    """The record in `path` without its fields, but held to all checksums: some milliseconds, and one for every
-    megabyte. Errors as read_record."""
-    with open_results(path) as (file, untouched):
-        record = _header(path, file)[0]
-    return record if untouched else replace(read_record(path), fields={})
+    """The record in `path` without its fields: some milliseconds, and one for every megabyte. Errors as read_record."""
+    with open_results(path) as file:
+        return _header(path, file)
 
 
 def glance(path: Path, attributes: Collection[str]) -> Record:
     """As `peek`, with those of the named attributes that are there alone: a third of the time for a small file."""
-    with open_results(path) as (file, untouched):
-        if untouched:
-            return _header(path, file, (*HEADER, *attributes))[0]
-    return peek(path)
+    with open_results(path) as file:
+        return _header(path, file, (*HEADER, *attributes))
 
 
 def canonical(key: str) -> str:
@@ -148,7 +159,7 @@ def _check(record: Record) -> None:
     lookup(record.status, [str(status) for status in Status], "status")
     for name, value in record.attributes.items():
         simple = value is None or isinstance(value, (str, bool, int, float, np.number, np.bool_))
-        if name in (*HEADER, CHECKSUMS) or not (simple or _is_short_list(value)):
+        if name in (*HEADER, PART_DIGESTS) or not (simple or _is_short_list(value)):
             raise StudyError(
                 f"attribute {name!r} = {str(value)[:60]!r} of record {record.name!r} cannot be stored: "
                 f"its name must not be one of {', '.join(HEADER)} and its value a number, text, None or a short list"
@@ -158,10 +169,10 @@ def _check(record: Record) -> None:
         raise StudyError(f"{name} {getattr(record, name)[:60]!r} of a record holds a zero byte, which no file can keep")
     for name, item in record.fields.items():
         kind = np.asarray(item.values).dtype.kind
-        if kind not in "biufU" or not item.description or (not item.unit and kind != "U"):
+        if "/" in name or kind not in "biufU" or not item.description or (not item.unit and kind != "U"):
             raise StudyError(
-                f"field {name!r} of record {record.name!r} needs numbers or text (not dtype kind {kind!r}), "
-                f"a unit ('1' for none; it has {item.unit!r}) and a description (it has {item.description!r})"
+                f"field {name!r} of record {record.name!r} needs a name without '/', numbers or text (not dtype kind "
+                f"{kind!r}), a unit ('1' for none; it has {item.unit!r}) and a description ({item.description!r})"
             )
     wrong = fault(record.kind, record.status, record.attributes, record.fields)
     if wrong:
@@ -175,9 +186,8 @@ def _is_short_list(value: Any) -> bool:
     return array.dtype.kind in "biuf" and array.nbytes <= 4096
 
 
-def _header(path: Path, file: h5py.File, wanted: Collection[str] | None = None) -> tuple[Record, dict[str, str]]:
-    """The record without fields, and the digest of each field by name. `wanted`: of its attributes these alone, of a
-    file of which every byte is known to be as it was written."""
+def _header(path: Path, file: h5py.File, wanted: Collection[str] | None = None) -> Record:
+    """The record without fields. wanted: the attributes that are read; without, all."""
     attributes = file.attrs  # a new one each time it is asked for, and each opens the file's root
     if "schema" not in attributes:
         raise StudyError(f"{path} is an HDF5 file, but not a results file of organbench: it has no schema version")
@@ -189,43 +199,21 @@ def _header(path: Path, file: h5py.File, wanted: Collection[str] | None = None) 
         )
     if _plain(attributes.get("kind")) == INDEX_KIND:
         raise StudyError(f"{path} is the index of a study, not a case: give one of the files beside it")
-    if CHECKSUMS not in attributes:
-        raise DamagedFile(f"{path} lacks the attribute {CHECKSUMS!r}: {AGAIN}")
-    digests = json.loads(str(attributes[CHECKSUMS]))
-    if wanted is None:
-        values = {name: _checked(path, attributes, name, digest) for name, digest in digests["attributes"].items()}
-    else:
-        values = {name: _plain(attributes[name]) for name in wanted if name in digests["attributes"]}
+    names = [name for name in wanted or attributes if name in attributes and name != PART_DIGESTS]
+    values = {name: _plain(attributes[name]) for name in names}
     header = {name: values.pop(name) for name in HEADER}
     header["status"] = Status(lookup(header["status"], [str(status) for status in Status], f"status in {path}"))
-    return Record(**header, attributes=values), digests["fields"]
-
-
-def _checked(path: Path, attributes: h5py.AttributeManager, name: str, digest: str) -> Any:
-    if name not in attributes:
-        raise DamagedFile(f"{path} lacks the attribute {name!r}: {AGAIN}")
-    value = _plain(attributes[name])
-    if attribute_digest(value) != digest:
-        raise DamagedFile(f"{path}: the attribute {name!r} has changed since it was written: {AGAIN}")
-    return value
+    return Record(**header, attributes=values)
 
 
 def _plain(value: Any) -> Any:
-    return None if isinstance(value, h5py.Empty) else plain(value)
+    """An attribute as it is read: None, text, true/false, a number or a list of numbers."""
+    return None if isinstance(value, h5py.Empty) else value if isinstance(value, str) else np.asarray(value).tolist()
 
 
-def _field(path: Path, file: h5py.File, name: str, digest: str) -> Field:
-    dataset = file.get(name)
-    if not isinstance(dataset, h5py.Dataset):
-        raise DamagedFile(f"{path} lacks {name!r}: {AGAIN}")
-    for part in ("unit", "description"):
-        if part not in dataset.attrs:
-            raise DamagedFile(f"{path}: {name!r} has lost its {part}: {AGAIN}")
+def _field(path: Path, dataset: h5py.Dataset) -> Field:
+    if dataset.nbytes > path.stat().st_size:  # nothing is compressed
+        raise DamagedFile(f"{path}: {dataset.name!r} claims {dataset.nbytes} bytes, more than the file has: {AGAIN}")
     text = h5py.check_string_dtype(dataset.dtype) is not None
-    if not text and dataset.nbytes > path.stat().st_size:  # nothing is compressed
-        raise DamagedFile(f"{path}: {name!r} claims {dataset.nbytes} bytes, more than the file has: {AGAIN}")
-    values = np.asarray(dataset.asstr()[()] if text else dataset[()])
-    found = Field(values.astype(str) if text else values, str(dataset.attrs["unit"]), str(dataset.attrs["description"]))
-    if field_digest(found) != digest:
-        raise DamagedFile(f"{path}: {name!r} has changed since it was written: {AGAIN}")
-    return found
+    values = np.asarray(dataset.asstr()[()]).astype(str) if text else np.asarray(dataset[()])
+    return Field(values, str(dataset.attrs["unit"]), str(dataset.attrs["description"]))

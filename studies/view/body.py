@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.store.layout.vtk_group import TETRAHEDRON, TRIANGLE
+from studies.store.vtk_group import TETRAHEDRON, TRIANGLE
 
 QUADRATIC_TETRAHEDRON = 24
 """As VTK numbers this type of cells (vtkCellType.h)."""

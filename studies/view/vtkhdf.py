@@ -12,7 +12,7 @@ import numpy as np
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
-from studies.store.layout.vtk_group import GRID, GROUP, VERSION
+from studies.store.vtk_group import GRID, GROUP, VERSION
 from studies.view.side_by_side import Data, Grid
 
 SUFFIX = ".vtkhdf"

@@ -67,6 +67,16 @@ def test_force_of_the_reference_holds_when_the_press_stops():
     assert "15 mm in 3 s" in axes.get_title()
 
 
+def test_runs_that_did_not_end_ok_are_struck_out_and_named():
+    sound, inverted = run(BALL_CLAMPED), run(BALL_CLAMPED, status=Status.INVERTED, method=Free())
+    figure = accuracy.figure([sound, inverted])
+    crosses = [line for line in lines(figure.axes[0], BLACK) if line.get_marker() == "x"]
+    heights = [height for _, height, _ in points(figure.axes[0], VERMILLION)]
+    assert [line.get_ydata()[0] for line in crosses] == heights and len(heights) == 4
+    assert "struck out: inverted, no sound result" in words(figure.legends[0])
+    assert "struck out" not in words(accuracy.figure([sound]))
+
+
 @pytest.mark.parametrize("error", [0.0, 1e-4, 0.011, 0.05, 0.3])
 def test_accuracy_never_below_the_floor_and_hollow_where_the_floor_matters(error):
     (axes,) = accuracy.figure([run(BALL_CLAMPED, error=error)]).axes

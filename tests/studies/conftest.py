@@ -87,12 +87,6 @@ def tiny_file(tmp_path):
 def opened(monkeypatch):
     """Names of the results files that are read, as they are."""
     found = []
-    read = opening.seal_of
-    monkeypatch.setattr(opening, "seal_of", lambda path: found.append(path.name) or read(path))
+    check = opening.check_seal
+    monkeypatch.setattr(opening, "check_seal", lambda path: found.append(path.name) or check(path))
     return found
-
-
-@pytest.fixture
-def trusted(monkeypatch):
-    """Of a changed file no other process need try whether the library comes to an end with it."""
-    monkeypatch.setattr(opening, "_comes_to_an_end", lambda path: True)

@@ -85,9 +85,9 @@ class Fit:
     def area_error(self) -> float:
         """Largest deviation of a region's area from that of the region on the true surface, over the latter [1]."""
         errors = [0.0]
+        points, facets = with_middles(self.shape, self.points, self.triangles, self.regions, self.curved)
         for region in self.regions:
             inside = (region_side(region, self.points) <= 0)[self.triangles].all(axis=1)
-            points, facets = with_middles(self.shape, self.points, self.triangles, self.regions, self.curved)
             area = triangle_areas(*along_facets(points, facets[inside])).sum()
             errors.append(abs(float(area) / region_area(region, *self.truth) - 1.0))
         return max(errors)

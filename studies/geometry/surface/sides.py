@@ -11,16 +11,14 @@ from studies.geometry.shape.regions import Region
 
 PARTS = 4
 """Each side of a facet is cut into so many where distances are measured: 15 places a facet."""
+OUTLINE = 1e-9
+"""Distance [m] within which a node is on an outline, far above rounding and far below an edge."""
 
 
 def region_side(region: Region, points: np.ndarray) -> np.ndarray:
     """-1 inside the region, 1 outside, 0 on its outline, (n,), of points (n, 3) [m] of a whole surface or near one."""
     level = region.level(points)
     return np.sign(np.where(np.abs(level) <= OUTLINE, 0.0, level))
-
-
-OUTLINE = 1e-9
-"""Distance [m] within which a node is on an outline, far above rounding and far below an edge."""
 
 
 def region_area(region: Region, points: np.ndarray, triangles: np.ndarray) -> float:
@@ -77,23 +75,27 @@ def with_middles(
     )
 
 
-def along_facets(points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (m, 3) [m] evenly on quadratic facets (t, 6), and the flat pieces (p, 3) between them."""
-    values, pieces = lattice()
-    places = np.einsum("mi,fik->fmk", values, points[facets])
-    first = len(values) * np.arange(len(facets))
-    return places.reshape(-1, 3), (pieces[None] + first[:, None, None]).reshape(-1, 3)
+def along_facets(points: np.ndarray, facets: np.ndarray, parts: int = PARTS) -> tuple[np.ndarray, np.ndarray]:
+    """Places (m, 3) [m] evenly on flat facets (t, 3) or quadratic ones (t, 6), whose sides are cut into `parts`, and
+    the flat triangles (parts² t, 3) between them."""
+    local, pieces = lattice(parts)
+    places = np.einsum("pa,fai->fpi", shape_functions(local, facets.shape[1] == 6), points[facets])
+    first = len(local) * np.arange(len(facets))
+    return places.reshape(-1, 3), (pieces + first[:, None, None]).reshape(-1, 3)
 
 
 @cache
-def lattice() -> tuple[np.ndarray, np.ndarray]:
-    """Values (m, 6) of a quadratic facet's functions at places on it, and triangles (p, 3) between these places."""
-    rows = [(i, j) for i in range(PARTS + 1) for j in range(PARTS + 1 - i)]
+def lattice(parts: int = PARTS) -> tuple[np.ndarray, np.ndarray]:
+    """Barycentric coordinates (p, 3) of a regular lattice on a triangle, and the triangles (parts², 3) between them."""
+    rows = [(i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]
     number = {row: k for k, row in enumerate(rows)}
-    up = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in rows if i + j < PARTS]
-    down = [(number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]) for i, j in rows if i + j < PARTS - 1]
-    second, third = np.array(rows, float).T / PARTS
-    first = 1.0 - second - third
-    corners = [share * (2.0 * share - 1.0) for share in (first, second, third)]
-    middles = [4.0 * one * other for one, other in ((first, second), (second, third), (third, first))]
-    return np.column_stack([*corners, *middles]), np.array(up + down)
+    upright = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in rows if i + j < parts]
+    turned = [(number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]) for i, j in rows if i + j < parts - 1]
+    return np.array([(parts - i - j, i, j) for i, j in rows]) / parts, np.array(upright + turned)
+
+
+def shape_functions(local: np.ndarray, curved: bool) -> np.ndarray:
+    """Of a facet at barycentric coordinates (p, 3): (p, 3) linear, or (p, 6) quadratic, corners first."""
+    if not curved:
+        return local
+    return np.concatenate([local * (2.0 * local - 1.0), 4.0 * local * np.roll(local, -1, axis=1)], axis=1)

@@ -65,7 +65,7 @@ def test_a_scene_is_meshed_from_the_file_that_it_was_made_for(tmp_path):
     assert case_from_json(case_of(path).key) == case_of(path)
     assert mesh_for(scene, 0, filled=False).volume == pytest.approx(1e-3)
     written(path, edge=0.11)
-    with pytest.raises(StudyError, match=r"box\.obj does not hold what it held when the scene was made"):
+    with pytest.raises(StudyError, match=r"box\.obj has changed since the scene was made"):
         mesh_for(scene, 0)
     assert mesh_for(file_scene(path), 0, filled=False).volume == pytest.approx(1.331e-3)
     path.unlink()

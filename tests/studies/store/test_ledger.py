@@ -131,7 +131,7 @@ def test_what_is_new_changed_or_gone_is_seen(many, opened):
         assert sorted(opened) == sorted(["copy.h5", first.name])
 
 
-def test_a_file_changed_behind_its_back_is_seen_though_its_date_is_put_back(many, trusted):
+def test_a_file_changed_behind_its_back_is_seen_though_its_date_is_put_back(many):
     path = record_files(many, NAME)[0]
     assert entries(many)[path.name].fault == ""
     before = path.stat()
@@ -205,7 +205,7 @@ def lose_silently(root, path):
         database.execute("UPDATE files SET mtime = ?, ctime = ? WHERE file = ?", values)
 
 
-def test_status_check_reads_every_byte(organbench, many, trusted):
+def test_status_check_reads_every_byte(organbench, many):
     study = many / "many.py"
     study.write_text("from tests.studies.store.test_ledger import STUDY\n")
     path = record_files(many, NAME)[0]
@@ -217,7 +217,7 @@ def test_status_check_reads_every_byte(organbench, many, trusted):
     assert f"{COUNT - 1} ok, 1 stale" in organbench("status", study, "--results", many)[1]
 
 
-def test_lost_bits_are_found_by_the_first_reader_and_then_known_to_all(many, trusted):
+def test_lost_bits_are_found_by_the_first_reader_and_then_known_to_all(many):
     path = record_files(many, NAME)[0]
     statuses(many)
     lose_silently(many, path)

@@ -10,7 +10,7 @@ from studies.cli.commands.results.show import describe
 from studies.store import links
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
-from studies.store.paths import index_path, key_hash, readable, record_files, record_path, timing_files, timing_path
+from studies.store.paths import index_path, key_hash, readable, record_files, record_path, timing_path
 from studies.store.record import SCHEMA, Field, Record, Status, read_record, write_record
 
 
@@ -60,7 +60,6 @@ def test_timing_files_are_siblings_and_no_records(tmp_path):
     path.with_name(path.name + ".77.part").write_bytes(b"")
     link_study(Ledger(tmp_path), "volume_loss")
     assert record_files(tmp_path, "volume_loss") == [path]
-    assert timing_files(tmp_path, "volume_loss") == [timing]
     with pytest.raises(StudyError, match="cannot be a machine id"):
         timing_path(path, "../x")
 

@@ -4,7 +4,6 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
@@ -52,15 +51,6 @@ def test_the_document_reads_a_run(path, capsys):
 def test_a_field_and_an_attribute_of_one_name_are_two_things(path):
     run = Run.load(path)
     assert run.fields.triangles.shape == (run.attributes.triangles, 3)
-
-
-def test_what_others_added_to_the_file_is_left_alone(path):
-    expected = Run.load(path).fields.volume
-    with h5py.File(path, "r+") as file:
-        file.create_group("notes")["force"] = np.ones(3)
-        file.attrs["checked by"] = "me"
-    run = Run.load(path)
-    assert np.array_equal(run.fields.volume, expected) and "notes" not in run.record.fields
 
 
 def test_a_file_without_what_came_later_opens(path):

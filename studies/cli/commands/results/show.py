@@ -42,7 +42,7 @@ def describe(path: Path, width: int = WIDE, every: bool = True) -> Tree:
 
     Raises StudyError as read_record does."""
     path = Path(path)
-    with open_results(path) as (file, _):
+    with open_results(path) as file:
         links = _links(file) if file.attrs.get("kind") == INDEX_KIND else None
     return _index(path, links, every) if links is not None else _record(path, read_record(path), width, every)
 
