@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +32,8 @@ from studies.store.machine import write_machine
 from studies.store.paths import study_folder
 from studies.store.stamps import set_stamp
 from studies.store.tables.csv_table import write_table
-from studies.sweep.load import References, load_runs, stored_state
-from studies.sweep.tasks import case_tasks
+from studies.sweep.load import References, load_runs
+from studies.sweep.tasks import case_tasks, reference_tasks
 
 FIGURES = "figures"
 FIGURE_NODES = 550
@@ -111,26 +112,50 @@ def refresh(ledger: Ledger, study: Study, references: References | None = None) 
 
     references: those of the ledger, where other studies need them too.
     """
-    root, references = ledger.root, references or References(ledger)
-    folder = study_folder(root, study.name)
-    table = folder / f"{study.name}.csv"
-    summaries = [summary for summary in SUMMARIES if summary.study == study.name]
-    paths = [*(folder / chart.file for chart in study.charts), table, *(root / summary.file for summary in summaries)]
-    stamp, state = root / "cache" / f"{study.name}.drawn.json", state_of_study(ledger, study)
-    before = _stamped(stamp)
-    if before.get("inputs") == state and all(path.exists() for path in paths) and read_part(root, study) is not None:
+    folder, state = study_folder(ledger.root, study.name), state_of_study(ledger, study)
+    paths = [*(folder / chart.file for chart in study.charts), folder / f"{study.name}.csv"]
+    paths += [ledger.root / summary.file for summary in SUMMARIES if summary.study == study.name]
+    before = _stamped(ledger.root / "cache" / f"{study.name}.drawn.json")
+    drawn = before.get("inputs") == state and all(path.exists() for path in paths)
+    if drawn and read_part(ledger.root, study) is not None:
         return paths, before["remarks"]
-    runs, remarks = load_runs(root, study, references)
-    entries, unreadable = entries_beside(root, study.scenes, references.of)
-    rows = study_table([*runs, *entries], study.columns)
-    write_table(table, rows)
-    for summary in summaries:
-        write_whole(root / summary.file, (summary.text(runs) + "\n").encode())
+    return paths, draw(load(ledger, study, references or References(ledger)), state)
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A study with all that its charts and tables show."""
+
+    root: Path
+    study: Study
+    runs: list[Run]
+    submissions: list[Run]
+    """Results of other programs in its scenes."""
+    remarks: list[str]
+    """What is missing, in sentences."""
+
+
+def load(ledger: Ledger, study: Study, references: References) -> Loaded:
+    """Reads all that is stored of a study."""
+    runs, remarks = load_runs(ledger.root, study, references)
+    submissions, unreadable = entries_beside(ledger.root, study.scenes, references.of)
+    return Loaded(ledger.root, study, runs, submissions, [*remarks, *unreadable])
+
+
+def draw(loaded: Loaded, state: str) -> list[str]:
+    """Writes tables, summaries, charts and the part of the page; what is missing, in sentences. state: kept, so that
+    nothing is drawn until it changes."""
+    root, study, runs = loaded.root, loaded.study, [*loaded.runs, *loaded.submissions]
+    rows = study_table(runs, study.columns)
+    write_table(study_folder(root, study.name) / f"{study.name}.csv", rows)
+    for summary in (summary for summary in SUMMARIES if summary.study == study.name):
+        write_whole(root / summary.file, (summary.text(loaded.runs) + "\n").encode())
     with svg_copies() as pictures:
-        draw_charts(root, study, [*runs, *entries])
-    write_part(root, study, [*runs, *entries], rows, pictures)
-    write_whole(stamp, json.dumps({"inputs": state, "remarks": [*remarks, *unreadable]}).encode())
-    return paths, [*remarks, *unreadable]
+        draw_charts(root, study, runs)
+    write_part(root, study, runs, rows, pictures)
+    drawn = {"inputs": state, "remarks": loaded.remarks}
+    write_whole(root / "cache" / f"{study.name}.drawn.json", json.dumps(drawn).encode())
+    return loaded.remarks
 
 
 def _stamped(stamp: Path) -> dict[str, Any]:
@@ -147,13 +172,13 @@ def state_of_study(ledger: Ledger, study: Study) -> str:
     """Hash of all that charts and tables are made from: the lines of the ledger, and the code, that of the user's files
     too."""
     tasks, machine = case_tasks(ledger.root, study), shown_machine(ledger.root)
-    entries = [*map(ledger.entry, tasks), *(ledger.timing(task, machine) for task in tasks if task.work.timed)]
-    files = [entry.written if entry else "-" for entry in (*entries, *ledger.files(SUBMISSIONS).values())]
+    others = [*(ledger.timing(task, machine) for task in tasks), *ledger.files(SUBMISSIONS).values()]
     metrics = [metric(column) for column in study.columns]
     drawn = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
     own = {file.sha256 for file in map(file_of, drawn) if file is not None}
-    names = [task.digest for task in tasks] + [entry.name for entry in metrics]
-    return state_of(stored_state(ledger, study.scenes), *files, *names, *sorted(own), study.word)
+    names = [*(task.digest for task in tasks), *(entry.name for entry in metrics), *sorted(own), study.word]
+    files = ledger.state([*tasks, *reference_tasks(ledger.root, study.scenes)])
+    return state_of(files, *(entry.written if entry else "-" for entry in others), *names)
 
 
 def draw_figures(root: Path) -> list[Path]:

@@ -141,6 +141,11 @@ class Ledger:
             self._write(f"DELETE FROM measured WHERE study = ? AND what NOT IN ({last})", [(study, study, SETS)])
         return found
 
+    def state(self, jobs: Iterable[Result]) -> str:
+        """The files of jobs with sizes and times, as text: a copy of the folder has the same."""
+        entries = ((job, self.entry(job)) for job in jobs)
+        return "\n".join(entry.written if entry else f"{job.path().name} -" for job, entry in entries)
+
     def forget(self, study: str, names: Iterable[str]) -> None:
         """Reads these files again: they turned out to be damaged."""
         self._write("DELETE FROM files WHERE study = ? AND file = ?", [(study, name) for name in names])

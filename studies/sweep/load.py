@@ -1,22 +1,22 @@
 """The stored runs of a study, with their references and frame times."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from studies.base.errors import OtherVersion, StudyError
 from studies.catalog.study import Study
 from studies.metrics.run import Run
 from studies.reference.load import Reference, load_reference
-from studies.reference.reference_solves import STUDY as REFERENCES
-from studies.reference.reference_solves import reference_solves
-from studies.runs.case import Case
 from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
-from studies.store.archived import is_archive
+from studies.store.archived import is_archive, shown_machine
+from studies.store.entry import CODE_CHANGED, why_entry_is_stale
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
-from studies.sweep.tasks import case_tasks
-from studies.timing.cases import read_timing
+from studies.sweep.tasks import CaseTask, case_tasks, reference_tasks
+from studies.timing.cases import timing_of
+from studies.timing.protocol import FrameTiming
 
 
 class References:
@@ -34,8 +34,7 @@ class References:
 
     def problem(self, scene: Scene) -> StudyError | None:
         """Why a scene with a plan has none. Solutions that are there and went well are not read for that."""
-        files = self.ledger.files(REFERENCES)
-        entries = [files.get(solve.path(self.ledger.root).name) for solve in reference_solves(scene)]
+        entries = map(self.ledger.entry, reference_tasks(self.ledger.root, [scene]))
         if scene_to_json(scene) not in self._read and all(entry and entry.status == Status.OK for entry in entries):
             return None
         reference = self._look(scene)
@@ -57,25 +56,49 @@ def load_runs(root: Path, study: Study, references: References | None = None) ->
     references: those of a ledger of `root`, where other studies need them too.
     """
     references = references or References(Ledger(root))
-    reference_of = {scene.name: references.of(scene) for scene in study.scenes}
-    runs, problems = [], reference_problems(references, study)
+    runs, problems = list[Run](), reference_problems(references, study)
     for task in case_tasks(root, study):
-        entry = references.ledger.entry(task)
-        try:
-            if entry is None:
-                raise not_stored(root, task.work)
-            if entry.fault:
-                raise entry.error()
-            record, timing = read_record(task.path()), None
-        except StudyError as error:
-            problems.append(error)
-            continue
-        try:
-            timing = read_timing(root, study.name, task.work) if task.work.timed else None
-        except StudyError as error:
-            problems.append(error)
-        runs.append(Run(task.work, record, reference_of[task.work.scene.name], timing))
+        run, missing = load_run(references, task)
+        runs += [run] if run else []
+        problems += missing
     return runs, sentences(problems)
+
+
+def load_run(references: References, task: CaseTask) -> tuple[Run | None, list[StudyError]]:
+    """The run of a case with its reference and frame times, None where it cannot be read; and what is wrong."""
+    ledger = references.ledger
+    try:
+        entry = ledger.entry(task)
+        if entry is None:
+            raise not_stored(ledger.root, task)
+        if entry.fault:
+            raise entry.error()
+        run = Run(task.work, read_record(task.path()), references.of(task.work.scene))
+    except StudyError as problem:
+        return None, [problem]
+    try:
+        return replace(run, timing=frame_times(ledger, task)), []
+    except StudyError as problem:
+        return run, [problem]
+
+
+def not_stored(root: Path, task: CaseTask) -> StudyError:
+    """The error of a case without a file."""
+    return StudyError(f"case {task.label} {'is missing in the archive' if is_archive(root) else 'has not run'}")
+
+
+def frame_times(ledger: Ledger, task: CaseTask) -> FrameTiming | None:
+    """This machine's frame times of a case; None where it is not timed, or not by this code. An archive shows its own.
+
+    Raises StudyError where they cannot be read.
+    """
+    entry = ledger.timing(task, shown_machine(ledger.root)) if task.work.timed else None
+    if entry is not None and entry.fault:
+        raise entry.error()
+    why = why_entry_is_stale(entry, task.digest, task.fingerprint)
+    if entry is None or (why is not None and not (why == CODE_CHANGED and is_archive(ledger.root))):
+        return None
+    return timing_of(read_record(task.path().with_name(entry.file)))
 
 
 def reference_problems(references: References, study: Study) -> list[StudyError]:
@@ -83,22 +106,9 @@ def reference_problems(references: References, study: Study) -> list[StudyError]
     return [problem for scene in study.scenes if (problem := references.problem(scene)) is not None]
 
 
-def not_stored(root: Path, case: Case) -> StudyError:
-    """The error of a case without a file."""
-    what = "is missing in the archive" if is_archive(root) else "has not run"
-    return StudyError(f"case {case.name} {what}")
-
-
 def sentences(problems: Sequence[StudyError]) -> list[str]:
     """One for each problem, but one for all files of another version: after an update these are all files."""
     others = [str(problem) for problem in problems if isinstance(problem, OtherVersion)]
     more = f" (and {len(others) - 1} more files)" if len(others) > 1 else ""
-    messages = [str(problem) for problem in problems if not isinstance(problem, OtherVersion)]
-    return [*messages, others[0] + more] if others else messages
-
-
-def stored_state(ledger: Ledger, scenes: Iterable[Scene]) -> str:
-    """The files of the references of scenes with their sizes and times, as text."""
-    files = ledger.files(REFERENCES)
-    names = [solve.path(ledger.root).name for scene in scenes for solve in reference_solves(scene)]
-    return " ".join(files[name].written if name in files else f"{name} -" for name in names)
+    messages = dict.fromkeys(str(problem) for problem in problems if not isinstance(problem, OtherVersion))
+    return [*messages, others[0] + more] if others else [*messages]

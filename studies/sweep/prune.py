@@ -117,7 +117,7 @@ def _of_study(ledger: Ledger, study: Study) -> dict[str, Rule]:
 def _of_references(ledger: Ledger, studies: Collection[Study]) -> dict[str, Rule]:
     """The same for the references of the scenes of studies; those of any other scene stay."""
     scenes = {scene.name for study in studies for scene in study.scenes}
-    tasks = {task.path().name: task for study in studies for task in reference_tasks(ledger.root, study)}
+    tasks = {task.path().name: task for study in studies for task in reference_tasks(ledger.root, study.scenes)}
     found: dict[str, Rule] = {}
     for file, entry in ledger.files(REFERENCES).items():
         rule = _rule(ledger, tasks[file]) if file in tasks else None

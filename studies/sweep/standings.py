@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from studies.base.counting import amounts, status_counts
 from studies.catalog.study import Study
 from studies.reference.checkpoints import kept
+from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import ReferenceSolve
 from studies.store.entry import CASE_CHANGED, CODE_CHANGED, MISSING, Entry
 from studies.store.ledger import FAILURES, Ledger
@@ -131,7 +132,7 @@ def solve_standing(ledger: Ledger, solve: ReferenceSolve) -> SolveStanding:
     begun = kept(solve.path(ledger.root), solve.stamp)
     if begun is not None:
         return SolveStanding(solve, "half-way", steps=len([e for e in begun.path if e.t in solve.scene.checkpoints]))
-    task = ReferenceTask(ledger.root, "", solve)
+    task = ReferenceTask(ledger.root, REFERENCES, solve)
     entry, why = ledger.entry(task), ledger.why(task)
     if entry is None or entry.fault:
         return SolveStanding(solve, "missing" if entry is None else "unreadable")

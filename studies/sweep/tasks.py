@@ -11,10 +11,12 @@ from typing import Any, ClassVar
 from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
+from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint, reference_solves
 from studies.runs.case import Case
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.own import files_of
+from studies.scene.scene import Scene
 from studies.store.entry import file_state, read_entry, why_entry_is_stale
 from studies.store.new_record import new_record
 from studies.store.paths import key_digest
@@ -32,6 +34,7 @@ class Task(ABC):
     root: Path
     """The results folder."""
     study: str
+    """Name of the study, or of the folder of references."""
     work: Case | ReferenceSolve
     seen: tuple[int, ...] | None = field(default=None, compare=False)
     """State of its file when the sweep began; None where there was none."""
@@ -251,14 +254,14 @@ def case_tasks(root: Path, study: Study) -> list[CaseTask]:
     return [CaseTask(root, study.name, case) for case in study.cases]
 
 
-def reference_tasks(root: Path, study: Study) -> list[ReferenceTask]:
-    """A job per solution of the references of a study."""
-    return [ReferenceTask(root, study.name, one) for scene in study.scenes for one in reference_solves(scene)]
+def reference_tasks(root: Path, scenes: Iterable[Scene]) -> list[ReferenceTask]:
+    """A job per solution of the references of scenes."""
+    return [ReferenceTask(root, REFERENCES, one) for scene in scenes for one in reference_solves(scene)]
 
 
 def tasks_of(root: Path, studies: Iterable[Study]) -> list[Task]:
     """Everything the studies need, each result once, longest first."""
     tasks: dict[Path, Task] = {}
     for study in studies:
-        tasks |= {task.path(): task for task in (*reference_tasks(root, study), *case_tasks(root, study))}
+        tasks |= {task.path(): task for task in (*reference_tasks(root, study.scenes), *case_tasks(root, study))}
     return sorted(tasks.values(), key=lambda task: -task.weight)

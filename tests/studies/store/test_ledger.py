@@ -353,7 +353,7 @@ def test_rows_are_measured_again_for_other_metrics_and_a_changed_reference(many,
     own = Metric("count", "1", "-", lambda run: measured.append(1) or 1.0)
     assert frame_of(rows(many, [own])).equals(frame_of(rows(many, [own]))) and len(measured) == COUNT
     assert set(rows(many, COLUMNS[:1])[0]) < set(rows(many)[0])
-    monkeypatch.setattr("studies.sweep.rows.stored_state", lambda ledger, scenes: "solved again")
+    monkeypatch.setattr(Ledger, "state", lambda self, jobs: "solved again")
     rows(many, [own])
     assert len(measured) == 2 * COUNT
 

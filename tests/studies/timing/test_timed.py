@@ -16,8 +16,9 @@ from studies.store.entry import CODE_CHANGED, MISSING
 from studies.store.machine import machine_id
 from studies.store.record import Status, read_record, write_record
 from studies.sweep import tasks
+from studies.sweep.load import frame_times
 from studies.timing import cases as module
-from studies.timing.cases import read_timing, time_cases, timing_file, write_timing
+from studies.timing.cases import time_cases, timing_file, write_timing
 from studies.timing.protocol import FrameTiming
 from tests.studies.tiny import FRAMES, diverging_case, tiny_case
 
@@ -51,12 +52,16 @@ def test_timing_again_leaves_the_physics_alone(results):
 
 def test_measured_frames_make_the_time_metrics_numbers(results):
     record = read_record(case_path(results, "tiny", KEPT))
-    run = Run(KEPT, record, None, read_timing(results, "tiny", KEPT))
+    run = Run(KEPT, record, None, read_timing(results, KEPT))
     assert all(metric(name)(run) > 0 for name in ("step_time", "frame_time", "frame_time_p99", "real_time"))
 
 
 def why_untimed(root, case):
     return ledger.Ledger(root).why_untimed(tasks.CaseTask(root, "tiny", case))
+
+
+def read_timing(root, case):
+    return frame_times(ledger.Ledger(root), tasks.CaseTask(root, "tiny", case))
 
 
 def can_be_timed(root, case):
@@ -68,7 +73,7 @@ def test_current_until_the_code_changes_or_on_another_machine(results, monkeypat
     for asked in (module, tasks):
         monkeypatch.setattr(asked, "case_fingerprint", lambda case: "edited")
     assert why_untimed(results, KEPT) == CODE_CHANGED
-    assert read_timing(results, "tiny", KEPT) is None
+    assert read_timing(results, KEPT) is None
     monkeypatch.undo()
     monkeypatch.setattr(ledger, "machine_id", lambda: "00000000")
     assert why_untimed(results, KEPT) == MISSING
