@@ -19,7 +19,7 @@ from studies.runs.current import run_fingerprint
 from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
 from studies.store.machine import this_machine
-from studies.sweep.engine import Progress, Silent, Told
+from studies.sweep.executor import Progress, Silent, Told
 
 NODES = 550
 RESULTS = Path("results")
@@ -62,7 +62,7 @@ def calibrate(
     scenes = _scenes_of(tried)
     tasks = pending(root, scenes, start)
     if tasks:
-        bring_up_to_date(tasks, root, jobs, progress or Silent(), on_compile)
+        bring_up_to_date(tasks, root, jobs, progress or Silent(), on_compile or (lambda name: None))
     with watching(on_compile or (lambda name: None)):
         found = calibration(organ, start, tried, Measurements(root, scenes), progress or Silent())
     write_calibration(root, found)

@@ -1,7 +1,6 @@
 """The runs that a calibration rests on: made once, stored with the others, read back where they are current."""
 
 from collections.abc import Iterable
-from contextlib import nullcontext
 from pathlib import Path
 
 from studies.base.errors import StudyError
@@ -14,8 +13,8 @@ from studies.runs.case import BodyRecipe, Case
 from studies.scene.scene import Scene
 from studies.store.ledger import Ledger
 from studies.store.record import read_record
-from studies.sweep.engine import Progress, Told
-from studies.sweep.pool import perform, told_by_workers
+from studies.sweep.executor import Progress, Told, perform
+from studies.sweep.local import Local
 from studies.sweep.run_studies import check_writable
 from studies.sweep.tasks import CaseTask, Task, tasks_of
 
@@ -27,11 +26,10 @@ def pending(root: Path, scenes: Iterable[Scene], start: BodyRecipe) -> list[Task
     return [task for task in tasks if ledger.why(task) is not None]
 
 
-def bring_up_to_date(tasks: list[Task], root: Path, jobs: int, progress: Progress, on_compile: Told | None) -> None:
+def bring_up_to_date(tasks: list[Task], root: Path, jobs: int, progress: Progress, on_compile: Told) -> None:
     """Does them in `jobs` processes. Raises StudyError when results cannot be written."""
     check_writable(root)
-    with told_by_workers(on_compile) if on_compile is not None else nullcontext() as writer:
-        perform(tasks, jobs, progress, writer=writer)
+    perform(Local(jobs), tasks, progress, on_compile, Task.store_failure)
 
 
 class Measurements:

@@ -1,17 +1,15 @@
 """`python -m studies.compiling.main`: compiles what `make study` and `make test` need; silent when it is there."""
 
 import argparse
-import multiprocessing
 import sys
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from time import perf_counter
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
-from studies.base.interrupts import die_quietly, exit_code, listening
+from studies.base.interrupts import exit_code, listening
+from studies.base.processes import run_each
 from studies.compiling.log import listing, summary
 from studies.compiling.tasks import ESSENTIAL, Done, is_done, perform, set_done, tasks
 
@@ -20,23 +18,21 @@ PROCESSES = 2
 
 def compile_all(names: list[str]) -> Iterator[Done]:
     """Does the tasks in two processes; yields each as it is done. Raises StudyError for one that fails."""
-    pool = ProcessPoolExecutor(PROCESSES, multiprocessing.get_context("spawn"), initializer=die_quietly)
+    for name, done, cause in run_each(names, PROCESSES, compile_one):
+        if cause is not None:
+            raise StudyError(f"{name} could not be compiled: {cause}; run the command again")
+        yield done
+
+
+def compile_one(name: str) -> Done:
+    """In a process: does one task. Raises StudyError where it fails."""
     try:
-        futures = {pool.submit(perform, name): name for name in names}
-        for future in as_completed(futures):
-            try:
-                yield future.result()
-            except BrokenProcessPool as error:
-                raise StudyError(
-                    "a compiling process died (out of memory, or killed); run the command again"
-                ) from error
-            except Exception as error:
-                words = " ".join(str(error).split())
-                raise StudyError(f"{futures[future]} could not be compiled: {type(error).__name__}: {words}") from error
-    finally:
-        for worker in multiprocessing.active_children():
-            worker.terminate()
-        pool.shutdown(wait=False, cancel_futures=True)
+        return perform(name)
+    except MemoryError:
+        raise
+    except Exception as error:  # numba raises errors of many types
+        words = " ".join(str(error).split())
+        raise StudyError(f"{name} could not be compiled: {type(error).__name__}: {words}") from error
 
 
 def show(position: str, done: Done) -> None:

@@ -1,34 +1,138 @@
-"""A sweep on the workers of a cluster (studies.sweep.engine.Engine)."""
+"""A sweep on the workers that a Dask scheduler knows (https://distributed.dask.org)."""
 
+import logging
 import os
+import pickle
+import secrets
+import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+from distributed import Client, Future, KilledWorker, wait
+from distributed.client import FutureCancelledError, FuturesCancelledError
 
 from studies.base.errors import StudyError
+from studies.base.processes import TRIES, Died
 from studies.catalog.study import Study
-from studies.engines.apart import Setup
-from studies.engines.checks import check_for, wait_until_seen
-from studies.engines.crew import Crew
-from studies.engines.dask import LOST, Answer, Lines, Lost, lines_to
-from studies.engines.fleet import GB, Fleet
-from studies.engines.requests import FrameTimes, Piece
+from studies.engines.requests import DoTask, FrameTimes, Preparation, check_for, wait_until_seen
+from studies.engines.worker import MEGABYTES, JobPlugin, do, machine
 from studies.store.ledger import Ledger
-from studies.sweep.engine import Progress, Told
+from studies.sweep.executor import Progress, Told
+from studies.sweep.local import environment, files_for
 from studies.sweep.own_files import Given, given_files
-from studies.sweep.pool import environment
-from studies.sweep.tasks import CaseTask, Task, case_tasks
-from studies.sweep.workers import TRIES, Death
+from studies.sweep.tasks import Task, case_tasks
 
-ANSWER_SECONDS = 0.5
-"""That an answer is waited for before the workers are looked at again."""
+CONNECT_SECONDS = 10.0
+"""After which a scheduler that does not answer is not there."""
+LOOK_SECONDS = 1.0
+"""Between two looks at which workers there are."""
 BUSY = 0.1
-"""Share of a machine's processors that others may use beside frame times, without a warning."""
+"""Share of a machine's processors that others may use during frame times, without a warning."""
+GONE = (
+    "the Dask scheduler is gone, or no longer answers: start it and its workers again; what is finished is stored, the "
+    "same command goes on from there"
+)
+
+
+class Session:
+    """The workers of one sweep: those that are fit."""
+
+    def __init__(self, client: Client, patience: float) -> None:
+        """patience: seconds without a fit worker that are waited."""
+        self.client, self.patience = client, patience
+        self.name = f"organbench-{secrets.token_hex(4)}"
+        self.faults: SimpleQueue[str] = SimpleQueue()
+        self.manned = time.monotonic()
+        self.submitted = 0
+
+    def workers(self) -> dict[str, Any]:
+        """All that the scheduler knows now, by address. Raises StudyError when it is gone."""
+        if self.client.status != "running":
+            raise StudyError(GONE)
+        try:
+            return self.client.scheduler_info()["workers"]
+        except OSError as error:
+            raise StudyError(GONE) from error
+
+    def fit(self) -> dict[str, Any]:
+        """Those that get jobs. Warns of those that joined unfit, and raises StudyError when there has been none for
+        too long."""
+        while not self.faults.empty():
+            warnings.warn(f"{self.faults.get()}; it gets no job", stacklevel=2)
+        found = {place: worker for place, worker in self.workers().items() if worker["resources"].get(self.name)}
+        if found:
+            self.manned = time.monotonic()
+        elif time.monotonic() > self.manned + self.patience:
+            raise StudyError(
+                f"the cluster has had no worker for {self.patience:g} s: start some with `organbench worker`; what is "
+                "finished is stored, the same command goes on from there"
+            )
+        return found
+
+    def begin(self, plugin: JobPlugin) -> None:
+        """Returns when all workers that are there are fit, and there is one. Raises StudyError for one that is not."""
+        while not self.workers():
+            self.fit()
+            time.sleep(LOOK_SECONDS / 5)
+        known = self.workers()
+        found: Any = self.client.run(find_spec, "studies")
+        bare = [place for place, spec in found.items() if spec is None]
+        if bare:
+            name = known[bare[0]]["name"]
+            raise StudyError(f"worker {name} has no organbench that can be loaded; install it there; nothing has run")
+        try:
+            self.client.register_plugin(plugin, name=self.name)
+        except StudyError as error:
+            raise StudyError(f"{error}; nothing has run") from error
+        self.client.subscribe_topic(self.name, lambda event: self.faults.put(event[1]))
+
+    def submit(self, request: Any, megabytes: float = 0.0, **options: Any) -> Future:
+        """Has a request answered by a process of a fit worker."""
+        self.submitted += 1
+        options |= {"key": f"{self.name}-{self.submitted}", "priority": -self.submitted, "pure": False}
+        wanted = {self.name: 1, MEGABYTES: megabytes}
+        return self.client.submit(do, self.name, pickle.dumps(request), resources=wanted, **options)
+
+    def result(self, future: Future) -> Any:
+        """The answer. Raises StudyError when the scheduler is gone, what the request raised, Died, and KilledWorker."""
+        try:
+            return pickle.loads(future.result())
+        except FutureCancelledError as error:
+            raise StudyError(GONE) from error
+
+    def ended(self, futures: Iterable[Future]) -> list[Future]:
+        """Those that have ended; waits a moment for the first. Raises StudyError when the scheduler is gone."""
+        try:
+            with suppress(TimeoutError), self.client.as_current():
+                wait(list(futures), timeout=LOOK_SECONDS, return_when="FIRST_COMPLETED")
+        except FuturesCancelledError as error:
+            raise StudyError(GONE) from error
+        return [future for future in futures if future.done()]
+
+    def check_memory(self, tasks: Sequence[Task], needs: Sequence[float]) -> None:
+        """Raises StudyError when a task needs more memory than any fit worker has."""
+        limits = [worker["resources"][MEGABYTES] for worker in self.fit().values()]
+        if limits and needs and max(needs) > max(limits):
+            task = tasks[needs.index(max(needs))]
+            raise StudyError(
+                f"{task.label} needs about {max(needs) / 1e3:.1f} GB, and the largest worker has "
+                f"{max(limits) / 1e3:.1f} GB: start one with more (`organbench worker --memory`)"
+            )
+
+    def end(self) -> None:
+        """Ends what is being done, and the processes on all workers."""
+        with suppress(Exception):  # the scheduler may be gone
+            self.client.unregister_worker_plugin(self.name)
 
 
 class Cluster:
-    """An engine: workers that a Dask scheduler knows."""
+    """The executor that is a Dask cluster (studies.sweep.executor.Executor)."""
 
     def __init__(
         self,
@@ -37,149 +141,123 @@ class Cluster:
         portable: bool = False,
         to_come: int = 1,
     ) -> None:
-        """scheduler: makes its address; patience: seconds without any worker that are waited; to_come: pieces that
+        """scheduler: makes its address; patience: seconds without any worker that are waited; to_come: jobs that
         workers not yet there will do at a time."""
         self.scheduler, self.patience, self.portable, self.to_come = scheduler, patience, portable, to_come
         self.stack = ExitStack()
-        self.lines: Lines | None = None
+        self.client: Client | None = None
 
     def __enter__(self) -> "Cluster":
         return self
 
     def __exit__(self, *error: object) -> None:
-        self.lines = None
+        self.client = None
         self.stack.close()
 
     @property
     def processes(self) -> int:
         """Threads of all workers that there are now."""
-        with told():
-            return max(self.to_come, sum(worker.threads for worker in self._connected().workers().values()))
+        threads: Any = self._connected().nthreads()
+        return max(self.to_come, sum(threads.values()))
 
-    def _connected(self) -> Lines:
-        if self.lines is None:
-            self.lines = self.stack.enter_context(lines_to(self.stack.enter_context(self.scheduler())))
-        return self.lines
-
-    def perform(
-        self,
-        tasks: Sequence[Task],
-        progress: Progress,
-        on_compile: Told,
-        on_death: Callable[[Task, str], object],
-    ) -> None:
-        """As every engine; what workers compile is not told."""
-        if not tasks:
-            return
-        files = given_files(task.work for task in tasks if isinstance(task, CaseTask))
-        with told(), self._crew(tasks[0].root, tasks, files, self.portable) as crew:
-            self._check_memory(crew.fleet)
-            progress.begin("physics", len(tasks))
-            done = []
-            for task, cause in self._ended(crew):
-                if cause is not None:
-                    on_death(task, cause)
-                else:
-                    done.append(task.path())
-                progress.advance("physics", task.label)
-        wait_until_seen(done)
+    def _connected(self) -> Client:
+        if self.client is None:
+            self.client = self.stack.enter_context(client_of(self.stack.enter_context(self.scheduler())))
+        return self.client
 
     @contextmanager
-    def _crew(self, root: Path, tasks: Sequence[Task], files: tuple[Given, ...], portable: bool) -> Iterator[Crew]:
-        lines = self._connected()
-        setup = Setup(tuple(sorted(environment(portable).items())), files, os.getcwd())
-        with check_for(root, files) as check:
-            crew = Crew(lines, setup, check, Fleet(tasks))
-            crew.assemble(self.patience)
-            yield crew
+    def _session(self, root: Path, files: tuple[Given, ...], portable: bool) -> Iterator[Session]:
+        session = Session(self._connected(), self.patience)
+        preparation = pickle.dumps(Preparation(os.getcwd(), files))
+        try:
+            with check_for(root, files) as check:
+                session.begin(JobPlugin(session.name, environment(portable), preparation, pickle.dumps(check)))
+                yield session
+        finally:
+            session.end()
 
-    def _ended(self, crew: Crew) -> Iterator[tuple[Task, str | None]]:
-        """Each piece as it ends, with None, or with a cause where it cost too many processes."""
-        fleet = crew.fleet
-        while fleet.left:
-            for number in crew.look():
-                yield from self._died(fleet, "", number, LOST)
-            crew.alive(self.patience)
-            for address, number in fleet.handed_out():
-                crew.send(address, Piece(fleet.tasks[number]), number)
-            if not any(member.busy for member in fleet.members.values()):
-                self._check_memory(fleet)
-            answer = crew.lines.next_answer(ANSWER_SECONDS)
-            if answer is not None:
-                yield from self._taken(crew, answer)
-
-    def _taken(self, crew: Crew, answer: Answer) -> Iterator[tuple[Task, str | None]]:
-        if not isinstance(answer.label, int):
-            crew.checked(answer)
-        elif isinstance(answer.value, Death):
-            yield from self._died(crew.fleet, answer.address, answer.label, answer.value.cause)
-        elif isinstance(answer.value, Exception):
-            raise answer.value
-        else:
-            crew.fleet.done(answer.address, answer.label)
-            yield crew.fleet.tasks[answer.label], None
-
-    def _died(self, fleet: Fleet, address: str, number: int, cause: str) -> Iterator[tuple[Task, str | None]]:
-        if fleet.died(address, number):
-            yield fleet.tasks[number], f"its process died {TRIES} times: {cause}"
-
-    def _check_memory(self, fleet: Fleet) -> None:
-        """Raises StudyError when a piece needs more memory than any worker has."""
-        found = fleet.too_large()
-        if found is None or not fleet.members:
+    def map(self, tasks: Sequence[Task], on_compile: Told) -> Generator[tuple[Task, str | None]]:
+        """As every executor; what workers compile is not told. No more jobs are with Dask than can be done at a time:
+        a worker that is lost costs those a try that it had."""
+        if not tasks:
             return
-        task, need = found
-        most = max(member.memory for member in fleet.members.values())
-        raise StudyError(
-            f"{task.label} needs about {need / GB:.1f} GB, and the largest worker has {most / GB:.1f} GB: start one "
-            "with more (`organbench worker --memory`)"
-        )
+        with self._session(tasks[0].root, files_for(tasks), self.portable) as session:
+            needs = [task.needs / 1e6 for task in tasks]
+            session.check_memory(tasks, needs)
+            waiting, running, done = deque(range(len(tasks))), dict[Future, int](), list[Path]()
+            while waiting or running:
+                slots = sum(worker["nthreads"] for worker in session.fit().values())
+                while waiting and len(running) < slots:
+                    number = waiting.popleft()
+                    running[session.submit(DoTask(tasks[number]), needs[number], retries=TRIES - 1)] = number
+                for future in session.ended(running):
+                    task = tasks[running.pop(future)]
+                    cause = _cause(session, future)
+                    done += [task.path()] if cause is None else []
+                    yield task, cause
+        wait_until_seen(done)
 
     def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
-        """As every engine: on one worker of each kind of machine, after all pieces, one machine after the other."""
-        ledger, timed = Ledger(root), [task for task in case_tasks(root, study) if task.work.timed]
+        """As every executor: on one worker of each kind of machine, after all jobs, one machine after the other."""
+        timed = [task for task in case_tasks(root, study) if task.work.timed]
         cases, chosen = tuple(task.work for task in timed), [t for t in timed if among is None or t.path() in among]
-        if not chosen or (self.lines is None and all(map(ledger.timed_somewhere, chosen))):
+        if not chosen or (self.client is None and all(map(Ledger(root).timed_somewhere, chosen))):
             return 0
         request = FrameTimes(root, study.name, cases, None if among is None else frozenset(among))
-        with told(), self._crew(root, [], given_files(cases), portable=False) as crew:
-            machines = list(crew.machines())
-            progress.begin("timing", len(machines))
-            return sum(self._timed(crew, machine[0].address, request, progress) for machine in machines)
+        with self._session(root, given_files(cases), portable=False) as session:
+            names = {place: str(worker["name"]) for place, worker in session.fit().items()}
+            kinds: Any = session.client.run(machine, session.name, workers=list(names))
+            places = {kinds[place]: place for place in sorted(kinds, key=names.__getitem__, reverse=True)}
+            progress.begin("timing", len(places))
+            return sum(_timed(session, places[kind], names[places[kind]], request, progress) for kind in sorted(places))
 
-    def _timed(self, crew: Crew, address: str, request: FrameTimes, progress: Progress) -> int:
-        """On one worker; how many cases that were."""
-        name = crew.fleet.members[address].name
-        crew.send(address, request, 0)
-        while True:
-            if address not in crew.names:
-                raise StudyError(f"worker {name} was lost while it measured frame times; the same command goes on")
-            crew.look()
-            answer = crew.lines.next_answer(ANSWER_SECONDS)
-            if answer is None or answer.label != 0:
-                continue
-            if isinstance(answer.value, Death):
-                raise StudyError(f"worker {name} measured frame times, and its process died: {answer.value.cause}")
-            if isinstance(answer.value, Exception):
-                raise answer.value
-            count, busy = answer.value
-            if count and busy > BUSY:
-                warnings.warn(
-                    f"beside the frame times of {request.study} others used {100 * busy:.0f} % of the processors of "
-                    f"worker {name}: take them with care",
-                    stacklevel=2,
-                )
-            progress.advance("timing", name)
-            return count
+
+def _cause(session: Session, future: Future) -> str | None:
+    """Why a task is not done; raises what it raised."""
+    try:
+        error = session.result(future)
+    except Died as death:
+        return f"its process died {TRIES} times: {death}"
+    except KilledWorker as lost:
+        return f"its worker was lost {lost.allowed_failures + 1} times"
+    if error is not None:
+        raise error
+    return None
+
+
+def _timed(session: Session, place: str, name: str, request: FrameTimes, progress: Progress) -> int:
+    """On one worker; how many cases that were."""
+    future = session.submit(request, workers=[place])
+    while not session.ended([future]):
+        if place not in session.fit():
+            raise StudyError(f"worker {name} was lost while it measured frame times; the same command goes on")
+    try:
+        count, busy = session.result(future)
+    except Died as death:
+        raise StudyError(f"worker {name} measured frame times, and its process died: {death}") from death
+    if count and busy > BUSY:
+        warnings.warn(
+            f"during the frame times of {request.study} others used {100 * busy:.0f} % of the processors of worker "
+            f"{name}: take them with care",
+            stacklevel=2,
+        )
+    progress.advance("timing", name)
+    return count
 
 
 @contextmanager
-def told() -> Iterator[None]:
-    """Inside, a scheduler that is lost is one sentence."""
+def client_of(address: str) -> Iterator[Client]:
+    """A client of the scheduler at `address`. Raises StudyError where there is none."""
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is a sentence here
     try:
-        yield
-    except Lost as error:
+        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False, name="organbench")
+    except (OSError, ValueError, TypeError) as error:
+        first = (str(error).splitlines() or [type(error).__name__])[0]
         raise StudyError(
-            "the Dask scheduler is gone, or no longer answers: start it and its workers again; what is finished is "
-            "stored, the same command goes on from there"
+            f"there is no Dask scheduler at {address} ({first}); start one with `dask scheduler`, or correct the "
+            "address"
         ) from error
+    try:
+        yield client
+    finally:
+        client.close(timeout=1)

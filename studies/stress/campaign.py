@@ -1,18 +1,14 @@
 """Many trials in several processes; a process that dies costs its trial alone."""
 
-import pickle
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from functools import partial
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import pandas as pd
 
-from studies.base.interrupts import die_quietly
+from studies.base.processes import run_each
 from studies.stress.outcome import UNEXPLAINED, Attempt, Drawn, Outcome, tried
-from studies.sweep.pool import environment_of_workers
-from studies.sweep.workers import done_or_dead
+from studies.sweep.local import environment
 
 CHUNK = 25
 """Trials that a process takes at a time."""
@@ -25,32 +21,27 @@ def run_trials(
     trials = list(trials)
     chunks = [trials[first : first + CHUNK] for first in range(0, len(trials), CHUNK)]
     found: dict[int, Outcome] = {}
-    with TemporaryDirectory() as folder, environment_of_workers():
-        for outcome in _each(chunks, jobs, Path(folder), attempt):
-            found[outcome.trial.number] = outcome
-            done(outcome)
+    for outcome in _each(chunks, jobs, attempt):
+        found[outcome.trial.number] = outcome
+        done(outcome)
     return [found[trial.number] for trial in trials]
 
 
-def _each(chunks: list[list[Drawn]], jobs: int, folder: Path, attempt: Attempt) -> Iterator[Outcome]:
+def _each(chunks: list[list[Drawn]], jobs: int, attempt: Attempt) -> Iterator[Outcome]:
     """A chunk that ends its process is tried again trial by trial."""
-    with closing(done_or_dead(chunks, jobs, partial(try_all, folder, attempt), die_quietly)) as ended:
-        for chunk, cause in ended:
+    with closing(run_each(chunks, jobs, partial(try_all, attempt), environment=environment())) as ended:
+        for chunk, outcomes, cause in ended:
             if cause is None:
-                yield from pickle.loads(_file(folder, chunk).read_bytes())
+                yield from outcomes
             elif len(chunk) == 1:
                 yield Outcome(chunk[0], UNEXPLAINED, cause, float("nan"))
             else:
-                yield from _each([[trial] for trial in chunk], jobs, folder, attempt)
+                yield from _each([[trial] for trial in chunk], jobs, attempt)
 
 
-def try_all(folder: Path, attempt: Attempt, trials: list[Drawn]) -> None:
-    """In a process: what came of each, left in `folder`."""
-    _file(folder, trials).write_bytes(pickle.dumps([attempt(trial) for trial in trials]))
-
-
-def _file(folder: Path, trials: list[Drawn]) -> Path:
-    return folder / f"{trials[0].number}-{len(trials)}"
+def try_all(attempt: Attempt, trials: list[Drawn]) -> list[Outcome]:
+    """In a process: what came of each."""
+    return [attempt(trial) for trial in trials]
 
 
 def table_of(outcomes: Iterable[Outcome]) -> pd.DataFrame:

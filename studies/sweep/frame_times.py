@@ -8,7 +8,7 @@ from studies.catalog.study import Study
 from studies.runs.case import Case
 from studies.store.archived import check_no_archive
 from studies.store.ledger import Ledger
-from studies.sweep.engine import Progress, Told
+from studies.sweep.executor import Progress, Told
 from studies.sweep.tasks import CaseTask, case_tasks
 from studies.timing.alone import alone
 from studies.timing.cases import time_cases

@@ -8,16 +8,16 @@ from studies.base.atomic import write_whole
 from studies.catalog.study import Study
 from studies.store.archived import check_no_archive
 from studies.store.ledger import Ledger
-from studies.sweep.engine import Engine, Progress, Told
+from studies.sweep.executor import Executor, Progress, Told, perform
 from studies.sweep.failures import Failures
-from studies.sweep.pool import Pool
+from studies.sweep.local import Local
 from studies.sweep.tasks import Task, tasks_of
 
 
 def run_studies(
     root: Path,
     studies: list[Study],
-    jobs: int | Engine,
+    jobs: int | Executor,
     progress: Progress,
     wanted: Callable[[Task], bool] | None = None,
     on_compile: Told = lambda name: None,
@@ -26,7 +26,7 @@ def run_studies(
 ) -> int:
     """Brings the studies up to date below `root`; the number of pieces that had to run.
 
-    `jobs`: so many processes of this machine, or an engine. `wanted` replaces the rule "what is not current".
+    `jobs`: so many processes of this machine, or an executor. `wanted` replaces the rule "what is not current".
     `on_compile` hears what is being compiled, from any thread. `failures` hears of jobs whose process died, which are
     stored as failed, and of those that do not run because a folder lies in the place of their file. `ledger`: of
     `root`, where the command has one. Another command may work on the same folder. Raises StudyError when results
@@ -34,11 +34,11 @@ def run_studies(
     """
     check_no_archive(root)
     root = root.absolute()
-    engine, ledger = Pool(jobs) if isinstance(jobs, int) else jobs, ledger or Ledger(root)
+    executor, ledger = Local(jobs) if isinstance(jobs, int) else jobs, ledger or Ledger(root)
 
     def stale(task: Task) -> bool:
         entry = ledger.entry(task)
-        return ledger.why(task) is not None or (engine.portable and (entry is None or entry.portable is None))
+        return ledger.why(task) is not None or (executor.portable and (entry is None or entry.portable is None))
 
     rule = wanted or stale
     ledger.look_again()
@@ -47,9 +47,10 @@ def run_studies(
     failures = failures or Failures()
     if todo:
         check_writable(root)
-        engine.perform([task for task in todo if failures.can_store(task)], progress, on_compile, failures.add)
+        storable = [task for task in todo if failures.can_store(task)]
+        perform(executor, storable, progress, on_compile, failures.add)
     among = None if wanted is None else {task.path() for task in todo}
-    measured = sum(engine.measure(root, study, progress, on_compile, among) for study in studies)
+    measured = sum(executor.measure(root, study, progress, on_compile, among) for study in studies)
     ledger.look_again()
     return len(todo) + measured
 

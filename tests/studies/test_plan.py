@@ -11,14 +11,15 @@ import pytest
 from rich.console import Console
 
 from studies.base.compile_watch import watching
+from studies.base.processes import run_each
 from studies.cli import progress
 from studies.cli.progress import QUIET_SECONDS, TerminalProgress, compiling, words
 from studies.runs.current import case_path
 from studies.store.entry import CODE_CHANGED, MISSING
 from studies.store.ledger import Ledger
 from studies.store.record import peek, read_record, write_record
+from studies.sweep.local import begin
 from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, expected_bytes, free_bytes, plan
-from studies.sweep.pool import perform, told_by_workers
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed
 from studies.timing.cases import timing_file
@@ -172,12 +173,6 @@ def test_numba_is_heard_once_for_each_function_that_is_called():
     assert heard == ["outer"]
 
 
-class Compiles:
-    """A task that compiles in its process."""
-
-    label = "compiles"
-
-
 def compile_something(task):
     fresh = numba.njit(lambda x: x + 1)
     assert fresh(1) == 2
@@ -185,6 +180,5 @@ def compile_something(task):
 
 def test_workers_tell_what_they_compile():
     heard = []
-    with told_by_workers(heard.append) as writer:
-        perform([Compiles()], 1, Silent(), do=compile_something, writer=writer)
+    list(run_each(["compiles"], 1, compile_something, partial(begin, ()), tell=heard.append))
     assert heard == ["<lambda>"]

@@ -1,6 +1,5 @@
 """A sweep does what is missing or stale, once; what is finished stays, whatever happens to the rest."""
 
-import os
 from dataclasses import replace
 from functools import partial
 
@@ -15,7 +14,7 @@ from studies.store.entry import OTHER_VERSION
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.load import load_runs
-from studies.sweep.pool import Pool, perform
+from studies.sweep.local import Local
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, standings, warnings_of
 from studies.sweep.tasks import CaseTask, tasks_of
@@ -125,17 +124,9 @@ def test_references_are_shared_and_come_first(tmp_path):
 
 def test_results_that_cannot_be_written_are_told_before_anything_runs(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("no folder")
-    monkeypatch.setattr(Pool, "perform", lambda *_: pytest.fail("nothing may run"))
+    monkeypatch.setattr(Local, "map", lambda *_: pytest.fail("nothing may run"))
     with pytest.raises(StudyError, match="choose a results folder that can be written to"):
         run_studies(tmp_path / "file", [tiny_study()], 1, Silent())
-
-
-def test_the_number_of_threads_is_given_back(monkeypatch, tmp_path):
-    monkeypatch.setenv("OMP_NUM_THREADS", "7")
-    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
-    perform([CaseTask(tmp_path, "tiny", tiny_case(body=replace(tiny_case().body, stiffness=-1.0)))], 1, Silent())
-    assert os.environ["OMP_NUM_THREADS"] == "7"
-    assert "MKL_NUM_THREADS" not in os.environ
 
 
 def test_files_of_the_former_layout_run_again_and_are_told_of_once(results):

@@ -1,5 +1,7 @@
-"""What must be so before a worker gets a piece, and what a piece declares."""
+"""What must be so before a worker gets a job, and what a job declares."""
 
+import os
+import pickle
 from dataclasses import replace
 from pathlib import Path
 from threading import Timer
@@ -7,65 +9,77 @@ from threading import Timer
 import pytest
 
 from studies.base.errors import StudyError
-from studies.engines.apart import Setup
-from studies.engines.checks import check_for, wait_until_seen
-from studies.engines.crew import Crew
-from studies.engines.fleet import Fleet
-from studies.engines.identity import difference, this_identity
+from studies.engines.requests import Check, Preparation, check_for, identity, wait_until_seen
+from studies.engines.worker import JobPlugin
 from studies.reference.reference_solves import ReferenceSolve
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.sweep.estimate import MEMORY, factor_memory
 from studies.sweep.tasks import ReferenceTask
-from studies.sweep.workers import Death
-from tests.studies.engines.made_up import MadeUp, worker
 
 
 @pytest.fixture
 def check(tmp_path):
-    with check_for(tmp_path, ()) as found:
-        yield found
+    with check_for(tmp_path, ()) as made:
+        yield made
+
+
+def test_a_worker_like_this_one_is_fit(check):
+    _, fault = check.answer()
+    assert fault == ""
+    assert [path.name for path in check.token.parent.iterdir()] == [check.token.name], "no trial is left"
 
 
 @pytest.mark.parametrize(
-    ("answer", "told"),
+    ("change", "fault"),
     [
-        (
-            lambda ours, content: (ours, None),
-            r"worker w does not see .*; put the results on a folder that every worker",
-        ),
-        (lambda ours, content: (ours, "older"), "worker w does not see"),
-        (
-            lambda ours, content: ModuleNotFoundError("No module named 'studies'"),
-            r"worker w has no organbench .*'studies'",
-        ),
-        (lambda ours, content: Death("it ended with exit code 1"), "worker w cannot start a process .*exit code 1"),
-        (lambda ours, content: StudyError("the disk is full\nand more"), "worker w cannot begin: the disk is full;"),
-        (lambda ours, content: (replace(ours, packages={"numba": "0.1"}), content), "worker w has numpy not installed"),
-        (lambda ours, content: (replace(ours, references=""), content), "worker w has other code"),
+        ({"content": "older"}, r"does not see .*; put the results on a folder that every worker shares"),
+        ({"token": Path("elsewhere/cache/token")}, "does not see elsewhere; "),
+        ({"numba": "0.1"}, r"has numba [\d.]+, and this machine has 0\.1; install the same version there"),
+        ({"Python": "3.9"}, r"has Python 3\.\d+\.\d+, and this machine has 3\.9"),
+        ({"the code of organbench": "0"}, "differs in the code of organbench; put the same version there"),
     ],
 )
-def test_what_is_wrong_with_a_worker_is_a_sentence(check, answer, told):
-    lines = MadeUp(lambda address, request: answer(check.ours, check.content), w=worker("w"))
-    with pytest.raises(StudyError, match=told):
-        Crew(lines, Setup((), (), "."), check, Fleet([])).assemble(1.0)  # type: ignore[arg-type]
+def test_what_is_wrong_with_a_worker_is_a_sentence(check, change, fault):
+    known = {name: value for name, value in change.items() if name in check.ours}
+    other = {name: value for name, value in change.items() if name not in check.ours}
+    with pytest.raises(StudyError, match=fault):
+        raise StudyError(replace(check, ours=check.ours | known, **other).answer()[1])
 
 
-def test_modules_beside_a_file_of_the_user_are_compared(tmp_path):
+def test_modules_next_to_a_file_of_the_user_are_compared(tmp_path, check):
     (tmp_path / "mine.py").write_text("import helper")
     (tmp_path / "helper.py").write_text("x = 1")
     given = ((str(tmp_path / "mine.py"), b"import helper"),)
-    ours = this_identity(given)
-    assert difference(ours, this_identity(given)) is None
+    ours = replace(check, ours=identity(given), files=given)
+    assert ours.fault() == ""
     (tmp_path / "helper.py").write_text("x = 2")
-    assert "has other modules beside" in str(difference(ours, this_identity(given)))
+    assert ours.fault().startswith(f"differs in the modules next to {tmp_path / 'mine.py'}")
 
 
-def test_a_worker_that_sees_the_folder_answers_with_what_the_file_holds(tmp_path, check):
-    identity, seen = check.request.answer()
-    assert check.fault("w", (identity, seen)) is None
-    elsewhere = replace(check.request, token=tmp_path / "elsewhere" / "cache" / "token")
-    assert elsewhere.answer()[1] is None
-    assert not list(check.token.parent.glob("*.part"))
+class Deadly(Check):
+    """A check that ends its process."""
+
+    def answer(self):
+        os._exit(3)
+
+
+@pytest.mark.parametrize(
+    ("files", "kind", "fault"),
+    [
+        ((), Deadly, "cannot start a process for organbench: it ended with exit code 3"),
+        ((("mine.py", b"import nowhere"),), Check, r"cannot begin: mine\.py cannot be loaded: .*nowhere"),
+    ],
+)
+def test_a_worker_whose_process_fails_is_unfit(check, tmp_path, files, kind, fault):
+    (tmp_path / "mine.py").write_bytes(b"import nowhere")
+    asked = kind(check.token, check.content, check.ours, ())
+    plugin = JobPlugin("session", {}, pickle.dumps(Preparation(str(tmp_path), files)), pickle.dumps(asked))
+    plugin.begin()
+    try:
+        with pytest.raises(StudyError, match=fault):
+            raise StudyError(plugin.fault())
+    finally:
+        plugin.end()
 
 
 def test_files_of_other_machines_are_waited_for(tmp_path):

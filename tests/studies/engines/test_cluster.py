@@ -6,14 +6,14 @@ import pytest
 from distributed import LocalCluster
 
 from studies.base.errors import StudyError
-from studies.engines.requests import Presence
+from studies.engines.requests import Check
 from studies.sweep.run_studies import run_studies
 from tests.studies.engines.conftest import assert_equal_bits, engine_at, physics, swept
 from tests.studies.tiny import Silent, content, tiny_study
 
 
-@pytest.mark.filterwarnings("ignore:beside the frame times")
-def test_a_cluster_leaves_what_the_pool_leaves(scheduler, finished_sweep, tmp_path):
+@pytest.mark.filterwarnings("ignore:during the frame times")
+def test_a_cluster_leaves_what_this_machine_leaves(scheduler, finished_sweep, tmp_path):
     study = tiny_study()
     count, progress = swept(tmp_path, study, scheduler)
     assert count == len(study.cases) + 2, "two are timed, one diverges"
@@ -30,7 +30,7 @@ def test_a_cluster_leaves_what_the_pool_leaves(scheduler, finished_sweep, tmp_pa
 
 
 def test_a_scheduler_that_is_not_there_is_a_sentence(monkeypatch, tmp_path, tiny_file, refused):
-    monkeypatch.setattr("studies.engines.dask.CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr("studies.engines.cluster.CONNECT_SECONDS", 0.5)
     said = refused("run", tiny_file, "--results", tmp_path / "results", "--on", "tcp://127.0.0.1:9")
     assert said.startswith("organbench: there is no Dask scheduler at tcp://127.0.0.1:9 (")
     assert said.endswith("; start one with `dask scheduler`, or correct the address")
@@ -44,9 +44,11 @@ def test_a_scheduler_without_workers_is_a_sentence(tmp_path):
     assert not (tmp_path / "tiny").exists()
 
 
+@pytest.mark.campaign
 def test_a_folder_that_workers_do_not_see_is_a_sentence(scheduler, tmp_path, monkeypatch):
-    monkeypatch.setattr(Presence, "__reduce__", lambda self: (Presence, (tmp_path / "elsewhere" / "token", self.files)))
-    with pytest.raises(StudyError, match=rf"worker [01] does not see {tmp_path}; put the results on a folder"):
+    elsewhere = tmp_path / "elsewhere" / "cache" / "token"
+    monkeypatch.setattr(Check, "__reduce__", lambda self: (Check, (elsewhere, self.content, self.ours, self.files)))
+    with pytest.raises(StudyError, match=rf"worker [01] does not see {tmp_path}/elsewhere; put the results"):
         swept(tmp_path, tiny_study(), scheduler)
     assert not (tmp_path / "tiny").exists()
 

@@ -19,6 +19,7 @@ from tests.studies.engines.conftest import address_in, assert_equal_bits, engine
 from tests.studies.sweep.test_failures import FATAL
 from tests.studies.tiny import FRAMES, Silent
 
+pytestmark = pytest.mark.campaign
 ROOT = Path(__file__).parents[3]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 KILLS = """

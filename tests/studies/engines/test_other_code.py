@@ -5,12 +5,14 @@ import os
 import shutil
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from threading import Timer
 
 import pytest
 
 from studies.base.errors import StudyError
+from studies.sweep.find_study import find_study
 from studies.sweep.run_studies import run_studies
 from tests.studies.engines.conftest import address_in, engine_at
 from tests.studies.tiny import Silent, tiny_study
@@ -57,21 +59,81 @@ def refusal(file, folder):
     return str(stop.value)
 
 
-@pytest.mark.slow
-def test_a_worker_with_other_code_is_refused_by_name(file, tmp_path):
+@pytest.fixture
+def other_code(tmp_path):
+    """A folder with the packages, one of which is edited."""
     for package in PACKAGES:
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
     with open(tmp_path / "massspring" / "run" / "simulation.py", "a") as source:
-        source.write("\nMENDED = True\n")
-    words = ["--scheduler-file", str(file), "--name", "another"]
-    with running([sys.executable, "-m", "studies", "worker", *words], tmp_path, tmp_path):
-        said = refusal(file, tmp_path)
-    assert said.startswith("worker another has other code of organbench; install the same version there")
+        source.write("\nEDITED = True\n")
+    return tmp_path
 
 
-@pytest.mark.slow
+def worker(file, name):
+    return [sys.executable, "-m", "studies", "worker", "--scheduler-file", str(file), "--name", name]
+
+
+@pytest.mark.campaign
+def test_a_worker_with_other_code_is_refused_by_name(file, other_code):
+    with running(worker(file, "another"), other_code, other_code):
+        said = refusal(file, other_code)
+    assert said.startswith("worker another differs in the code of organbench; put the same version there")
+
+
+SLOW = """
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from massspring import Free
+from tests.studies.tiny import tiny_case, tiny_study
+
+
+@dataclass(frozen=True)
+class Waits(Free):
+    name: ClassVar[str] = "waits"
+    file: str = ""
+
+    def advance(self, state, boundary):
+        until = time.monotonic() + 120
+        while not Path(self.file).exists() and time.monotonic() < until:
+            time.sleep(0.05)
+        return super().advance(state, boundary)
+
+
+FILE = str(Path(__file__).with_name("go-on"))
+STUDY = tiny_study(cases=tuple(tiny_case(method=Waits(file=FILE), dt_fraction=f) for f in (0.5, 0.45, 0.4)))
+"""
+"""A study whose cases wait for a file."""
+
+
+@pytest.mark.campaign
+def test_a_worker_that_joins_later_with_other_code_gets_nothing(file, other_code, tmp_path_factory):
+    here = tmp_path_factory.mktemp("here")
+    (here / "waits.py").write_text(SLOW)
+    study = find_study(str(here / "waits.py"))
+    address = json.loads(file.read_text())["address"]
+    with running(worker(file, "good"), here), engine_at(address, 60.0) as one, ExitStack() as later:
+
+        class Follower(Silent):
+            def begin(self, what, total):
+                super().begin(what, total)
+                later.enter_context(running(worker(file, "late"), other_code, other_code))
+
+        with pytest.warns(UserWarning) as warned:
+            Timer(40.0, (here / "go-on").touch).start()
+            run_studies(here / "results", [study], one, Follower())
+    assert [str(one.message) for one in warned if "worker late" in str(one.message)] == [
+        "worker late differs in the code of organbench; put the same version there, and start the worker again; it gets "
+        "no job"
+    ]
+    assert len(list((here / "results" / "tiny").iterdir())) == 3
+
+
+@pytest.mark.campaign
 def test_a_worker_without_organbench_is_refused_by_name(file, tmp_path):
     words = ["--scheduler-file", str(file), "--name", "bare", "--no-dashboard", "--no-nanny"]
     with running([sys.executable, "-c", WITHOUT, *words], tmp_path):
         said = refusal(file, tmp_path)
-    assert said.startswith("worker bare has no organbench that can be loaded (")
+    assert said.startswith("worker bare has no organbench that can be loaded;")

@@ -12,7 +12,7 @@ import pytest
 from studies.base.portable import SETTINGS, environment
 from studies.runs.current import case_path
 from studies.store.record import read_record
-from studies.sweep.pool import Pool
+from studies.sweep.local import Local
 from studies.sweep.run_studies import run_studies
 from tests.studies.tiny import Silent, tiny_case, tiny_study
 
@@ -47,7 +47,7 @@ def test_what_libraries_do_with_the_settings():
 
 def test_records_say_so_and_others_run_again(tmp_path):
     refused = tiny_case(body=replace(tiny_case().body, stiffness=-1.0))  # stored before anything is compiled
-    study, native, portable = tiny_study(cases=(refused,)), Pool(1), Pool(1, portable=True)
+    study, native, portable = tiny_study(cases=(refused,)), Local(1), Local(1, portable=True)
     assert run_studies(tmp_path, [study], native, Silent()) == 1
     path = case_path(tmp_path, study.name, refused)
     assert "portable" not in read_record(path).attributes

@@ -11,8 +11,8 @@ from distributed import Client
 from distributed.security import Security
 
 from studies.base.errors import StudyError
-from studies.engines import jobs, tls
-from studies.engines.settings import Settings
+from studies.engines import tls
+from studies.engines.queue import Settings, scheduler_with_workers
 
 ROOT = Path(__file__).parents[3]
 TRY = """
@@ -27,7 +27,7 @@ client.run_on_scheduler(lambda: open({marker!r}, "w").close())
 def scheduler(tmp_path):
     """Address and folder of a scheduler without workers."""
     settings = Settings("command", workers=1, command="sleep 60 & wait", host="127.0.0.1")
-    with jobs.scheduler_with_jobs(settings, tmp_path, lambda text: None) as address:
+    with scheduler_with_workers(settings, tmp_path, lambda text: None) as address:
         (folder,) = (tmp_path / "cache").iterdir()
         yield address, folder
 
@@ -40,7 +40,7 @@ def attack(address, marker):
 
 def test_the_key_is_for_its_owner_alone_and_goes_with_the_command(tmp_path):
     settings = Settings("command", workers=1, command="sleep 60 & wait", host="127.0.0.1")
-    with jobs.scheduler_with_jobs(settings, tmp_path, lambda text: None):
+    with scheduler_with_workers(settings, tmp_path, lambda text: None):
         (folder,) = (tmp_path / "cache").iterdir()
         modes = {path.name: path.stat().st_mode & 0o777 for path in (folder, folder / tls.KEY)}
         assert modes == {folder.name: 0o700, tls.KEY: 0o600}
@@ -82,7 +82,7 @@ def test_the_holder_of_the_key_is_served_and_no_page_is(scheduler, tmp_path):
 def test_a_worker_holds_the_key_that_lies_beside_its_file(scheduler, monkeypatch):
     address, folder = scheduler
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    command = jobs.worker_command(Settings("command", workers=1, command="x"), folder / "scheduler.json")
+    command = [sys.executable, "-m", "studies", "worker", "--scheduler-file", str(folder / "scheduler.json")]
     worker = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         with Client(address, timeout=10, set_as_default=False) as client:

@@ -7,11 +7,9 @@ ROOT = Path(__file__).parents[3]
 PACKAGES = ("massspring", "reference_fem", "studies")
 ALLOWED = {
     "studies/base/own_file.py": {"exec"},  # a FILE.py, which is a program
-    "studies/engines/apart.py": {"pickle.loads"},  # of the client of its scheduler
-    "studies/engines/child.py": {"pickle.loads"},  # of the process that started it
-    "studies/engines/dask.py": {"pickle.loads"},  # of the workers of its scheduler
-    "studies/stress/campaign.py": {"pickle.loads"},  # of its own processes, in a temporary folder of the user alone
-    "studies/sweep/workers.py": {"pickle.loads"},  # of itself
+    "studies/base/processes.py": {"pickle.loads"},  # of the process that started it, and of those it started
+    "studies/engines/cluster.py": {"pickle.loads"},  # of the workers of its scheduler
+    "studies/engines/worker.py": {"pickle.loads"},  # of the client of its scheduler
 }
 DANGEROUS = {"pickle.loads", "pickle.load", "pickle.Unpickler", "eval", "exec", "pd.read_pickle", "marshal.loads"}
 DANGEROUS |= {"yaml.unsafe_load", "yaml.full_load", "os.system", "shelve.open", "joblib.load"}

@@ -18,7 +18,7 @@ from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.failures import Failures
 from studies.sweep.load import load_runs
-from studies.sweep.pool import environment_of_workers
+from studies.sweep.local import environment
 from studies.sweep.standings import failed, solve_standing
 from studies.sweep.tasks import do, tasks_of
 from studies.timing.alone import alone
@@ -80,11 +80,10 @@ def test_workers_get_caches_that_do_not_depend_on_their_folder(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("ORGANBENCH_CACHE", "meshes")
     monkeypatch.setenv("NUMBA_CACHE_DIR", "compiled")
-    with environment_of_workers():
-        assert os.environ["ORGANBENCH_CACHE"] == str(tmp_path / "meshes")
-        assert os.environ["NUMBA_CACHE_DIR"] == str(tmp_path / "compiled")
-        assert os.environ["OMP_NUM_THREADS"] == "1"
-    assert (os.environ["ORGANBENCH_CACHE"], os.environ["NUMBA_CACHE_DIR"]) == ("meshes", "compiled")
+    wanted = environment()
+    assert wanted["ORGANBENCH_CACHE"] == str(tmp_path / "meshes")
+    assert wanted["NUMBA_CACHE_DIR"] == str(tmp_path / "compiled")
+    assert wanted["OMP_NUM_THREADS"] == "1"
 
 
 def test_one_command_at_a_time_measures(tmp_path):

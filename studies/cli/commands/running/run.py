@@ -16,7 +16,7 @@ from studies.catalog.checks import check_study
 from studies.cli.case_options import case_named
 from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import PROGRAM, SMOKE, Results, Smoke, console, say, warn
-from studies.engines.choose import WORDS, engine_for
+from studies.engines.choose import WORDS, executor_for
 from studies.geometry.mesher.jobs import cache_folder
 from studies.population import POPULATION
 from studies.reference.reference_solves import STUDY as REFERENCES
@@ -25,7 +25,7 @@ from studies.store.entry import MISSING
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
 from studies.store.paths import study_folder
-from studies.sweep.engine import Engine
+from studies.sweep.executor import Executor
 from studies.sweep.failures import Failures
 from studies.sweep.find_study import ON, find_studies
 from studies.sweep.frame_times import measure_again
@@ -71,7 +71,7 @@ def run(
     for study in [] if again else chosen:
         if plan(ledger, study, _wanted(ledger, study, rules)):
             warn(check_study(study, drawn=not case))
-    with engine_for(on, jobs or JOBS, portable, root, say) as engine:
+    with executor_for(on, jobs or JOBS, portable, root, say) as executor:
         for study in chosen:
             if again:
                 _time_again(ledger, study, dry, not case)
@@ -80,7 +80,7 @@ def run(
             if dry:
                 dry_run(console, study.name, plan(ledger, study, wanted), jobs or JOBS, root)
             else:
-                well = _bring_up_to_date(ledger, study, engine, wanted, not case, failures) and well
+                well = _bring_up_to_date(ledger, study, executor, wanted, not case, failures) and well
     _exit(well, failures, studies or [])
 
 
@@ -98,12 +98,12 @@ def _chosen(study: Study, smoke: bool, case: str) -> Study:
 
 
 def _bring_up_to_date(
-    ledger: Ledger, study: Study, engine: Engine, wanted: Wanted, drawn: bool, failures: Failures
+    ledger: Ledger, study: Study, executor: Executor, wanted: Wanted, drawn: bool, failures: Failures
 ) -> bool:
     """Runs what must run, and tells how it ended: whether as the study expects."""
     root, planned = ledger.root, plan(ledger, study, wanted)
-    with TerminalProgress(console, planned, engine.processes if planned else 1) as progress:
-        count = run_studies(root, [study], engine, progress, wanted, progress.compiling, failures, ledger)
+    with TerminalProgress(console, planned, executor.processes if planned else 1) as progress:
+        count = run_studies(root, [study], executor, progress, wanted, progress.compiling, failures, ledger)
     for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
         sweep_parts(folder)
     warn(link_study(ledger, study.name))

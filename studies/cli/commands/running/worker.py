@@ -21,13 +21,13 @@ NO_PAGES = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
 def worker(
     scheduler: Annotated[str, typer.Argument(help="address of the scheduler, as tcp://HOST:8786")] = "",
     file: Annotated[Path | None, typer.Option("--scheduler-file", help="a file that holds it")] = None,
-    processes: Annotated[int, typer.Option(min=1, help="pieces that it does at a time")] = 1,
+    processes: Annotated[int, typer.Option(min=1, help="cases that it does at a time")] = 1,
     memory: Annotated[float, typer.Option(min=0, help="GB for all of them; 0: its share of the machine's")] = 0,
     name: Annotated[str, typer.Option(help="name in messages")] = "",
 ) -> None:
-    """Does pieces of studies for `organbench run --on`, until it is ended or its scheduler is gone.
+    """Does cases and references for `organbench run --on`, until it is ended or its scheduler is gone.
 
-    The same as `dask worker`, with one process for each piece in any case."""
+    The same as `dask worker`, each in a process of its own in any case."""
     if bool(scheduler) == (file is not None):
         raise StudyError("give either the address of a scheduler or a --scheduler-file")
     if find_spec("distributed") is None:

@@ -12,10 +12,9 @@ import pytest
 
 from studies.base import interrupts
 from studies.base.errors import StudyError
+from studies.base.processes import run_each
 from studies.cli import app as cli
 from studies.geometry.mesher import process
-from studies.sweep.pool import perform
-from tests.studies.tiny import Silent
 
 pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="signals and process groups"),
@@ -40,7 +39,7 @@ class PressedInWorker:
 
 def test_a_worker_that_dies_of_it_first_is_an_interruption():
     with pytest.raises(KeyboardInterrupt):
-        perform([PressedInWorker()], 1, Silent(), do=methodcaller("perform"))
+        list(run_each([PressedInWorker()], 1, methodcaller("perform")))
 
 
 def test_held_back_it_waits_and_is_not_lost():

@@ -8,7 +8,7 @@ from studies.runs.current import case_path
 from studies.store.archived import CRATE
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
-from studies.sweep.engine import Silent
+from studies.sweep.executor import Silent
 from studies.sweep.frame_times import measure_again
 from studies.sweep.plan import AGAIN, TIMING, plan_again
 from studies.timing import cases as timed

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from studies.base.errors import StudyError
-from studies.base.interrupts import die_quietly
-from studies.sweep.workers import done_or_dead
+from studies.base.processes import Child, run_each
 
 
 class Piece:
@@ -71,8 +70,8 @@ class Unsendable(Exception):
 
 def swept(tasks, jobs=2):
     """What became of the tasks: number done, and the causes of those that died."""
-    ended = list(done_or_dead(tasks, jobs, methodcaller("perform"), die_quietly))
-    return len(ended), [(task, cause) for task, cause in ended if cause is not None]
+    ended = list(run_each(tasks, jobs, methodcaller("perform")))
+    return len(ended), [(task, cause) for task, _, cause in ended if cause is not None]
 
 
 def test_a_process_that_dies_costs_its_piece_alone():
@@ -101,15 +100,15 @@ def test_what_a_piece_raises_is_raised_here():
 
 def test_a_process_that_cannot_begin_says_why():
     with pytest.raises(StudyError, match=r"mine\.py cannot be loaded"):
-        list(done_or_dead([Piece()], 1, methodcaller("perform"), cannot_begin))
+        list(run_each([Piece()], 1, methodcaller("perform"), cannot_begin))
 
 
-def cannot_begin():
+def cannot_begin(tell):
     raise StudyError("mine.py cannot be loaded")
 
 
 def test_whoever_stops_listening_leaves_no_process():
-    ended = done_or_dead([Piece(), Sleeper()], 2, methodcaller("perform"), die_quietly)
+    ended = run_each([Piece(), Sleeper()], 2, methodcaller("perform"))
     next(ended)
     ended.close()
     assert not multiprocessing.active_children()
@@ -120,3 +119,25 @@ class Sleeper(Piece):
 
     def perform(self):
         time.sleep(600)
+
+
+def environment_of(name):
+    return os.environ.get(name)
+
+
+def test_a_process_has_its_variables_and_this_one_keeps_its_own(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    wanted = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    ended = list(run_each(list(wanted), 2, environment_of, environment=wanted))
+    assert [(one.result, one.cause) for one in ended] == [("1", None)] * 2
+    assert os.environ["OMP_NUM_THREADS"] == "7" and "MKL_NUM_THREADS" not in os.environ
+
+
+def test_a_process_that_is_dead_before_it_gets_a_job_is_no_error_here():
+    child = Child()
+    child.process.kill()
+    child.process.join()
+    child.give(environment_of, "HOME")
+    assert str(child.hear()).startswith("killed by SIGKILL")
+    child.end()

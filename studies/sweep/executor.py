@@ -1,0 +1,84 @@
+"""Who does the jobs of a sweep: processes of this machine (studies.sweep.local) or of a cluster (studies.engines)."""
+
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Protocol
+
+from studies.catalog.study import Study
+from studies.sweep.tasks import Task
+
+Told = Callable[[str], object]
+"""Called with the name of a function that is being compiled, from any thread."""
+
+
+class Progress(Protocol):
+    """Who wants to know how far a sweep is."""
+
+    def begin(self, what: str, total: int) -> None:
+        """A stage of `total` jobs begins."""
+        ...
+
+    def advance(self, what: str, note: str) -> None:
+        """One job is done."""
+        ...
+
+
+class Silent:
+    """Progress that nobody follows."""
+
+    def begin(self, what: str, total: int) -> None:
+        """Nothing is shown."""
+
+    def advance(self, what: str, note: str) -> None:
+        """Nothing is shown."""
+
+
+class Executor(Protocol):
+    """Does jobs, each in a process that may die. A context manager: what it began has ended when it is left."""
+
+    def __enter__(self) -> "Executor":
+        """Begins nothing yet."""
+        ...
+
+    def __exit__(self, *error: object) -> None:
+        """Ends what it began."""
+        ...
+
+    @property
+    def processes(self) -> int:
+        """Jobs that it does at a time, for estimates."""
+        ...
+
+    @property
+    def portable(self) -> bool:
+        """Whether results are to be equal on every x86-64 processor (studies.base.portable)."""
+        ...
+
+    def map(self, tasks: Sequence[Task], on_compile: Told) -> Generator[tuple[Task, str | None]]:
+        """Does the tasks and yields each as it ends: with None, or with the cause where its process died in all tries.
+
+        Raises StudyError before anything runs where a task cannot run, and what a task raises."""
+        ...
+
+    def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
+        """Times alone what is not timed yet of a study, of `among` where given; how many cases that were."""
+        ...
+
+
+def perform(
+    executor: Executor,
+    tasks: Sequence[Task],
+    progress: Progress,
+    on_compile: Told,
+    on_death: Callable[[Task, str], object],
+) -> None:
+    """Does the tasks; `on_death` gets those whose process died, with the cause. Ctrl-C keeps what is stored."""
+    if not tasks:
+        return
+    progress.begin("physics", len(tasks))
+    with closing(executor.map(tasks, on_compile)) as ended:
+        for task, cause in ended:
+            if cause is not None:
+                on_death(task, cause)
+            progress.advance("physics", task.label)

@@ -1,0 +1,68 @@
+"""Jobs of a sweep in processes of this machine."""
+
+import os
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from numba.core import event
+
+from studies.base.compile_watch import CompileWatch
+from studies.base.portable import environment as portable_environment
+from studies.base.processes import Tell, run_each
+from studies.catalog.study import Study
+from studies.geometry.mesher.jobs import cache_folder
+from studies.sweep.executor import Progress, Told
+from studies.sweep.frame_times import measure_times
+from studies.sweep.own_files import Given, given_files, load_given
+from studies.sweep.tasks import CaseTask, Task, do
+
+COMPILED = "NUMBA_CACHE_DIR"
+"""Where the user may want compiled code."""
+ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+"""Every process computes on one core: the cores are shared out by cases, not inside them."""
+
+
+def begin(files: tuple[Given, ...], tell: Tell) -> None:
+    """What every process does first: it loads the user's `files`, and tells what it compiles."""
+    load_given(files)
+    event.register("numba:compile", CompileWatch(tell))
+
+
+def files_for(tasks: Sequence[Task]) -> tuple[Given, ...]:
+    """The user's files that tasks need."""
+    return given_files(task.work for task in tasks if isinstance(task, CaseTask))
+
+
+def environment(portable: bool = False) -> dict[str, str]:
+    """Variables of processes that do jobs: one thread, the caches of this process wherever they work; portable: the
+    settings of studies.base.portable."""
+    wanted = {**dict.fromkeys(ONE_THREAD, "1"), "ORGANBENCH_CACHE": str(cache_folder().absolute())}
+    if os.environ.get(COMPILED):
+        wanted[COMPILED] = str(Path(os.environ[COMPILED]).absolute())
+    return wanted | (portable_environment() if portable else {})
+
+
+@dataclass(frozen=True)
+class Local:
+    """The executor that is this machine (studies.sweep.executor.Executor)."""
+
+    processes: int
+    portable: bool = False
+
+    def __enter__(self) -> "Local":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Its processes end with each sweep."""
+
+    def map(self, tasks: Sequence[Task], on_compile: Told) -> Generator[tuple[Task, str | None]]:
+        """As every executor."""
+        prepare = partial(begin, files_for(tasks))
+        for ended in run_each(tasks, self.processes, do, prepare, environment(self.portable), on_compile):
+            yield ended.job, ended.cause
+
+    def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
+        """As every executor: in this process."""
+        return measure_times(root, study, progress, on_compile, among)
