@@ -9,8 +9,9 @@ from threading import Timer
 import pytest
 
 from studies.base.errors import StudyError
+from studies.engines.cluster import Session
 from studies.engines.requests import Check, Preparation, check_for, identity, wait_until_seen
-from studies.engines.worker import JobPlugin
+from studies.engines.worker import MEGABYTES, JobPlugin
 from studies.reference.reference_solves import ReferenceSolve
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.sweep.estimate import MEMORY, factor_memory
@@ -93,6 +94,23 @@ def test_files_of_other_machines_are_waited_for(tmp_path):
 @pytest.mark.parametrize(("unknowns", "peak"), [(8_191, 0.30e9), (25_423, 0.52e9), (41_851, 0.60e9), (89_598, 1.35e9)])
 def test_no_less_memory_is_declared_than_references_have_taken(unknowns, peak):
     assert peak < MEMORY + factor_memory(unknowns) < 1.9 * peak
+
+
+class Small(Session):
+    """Workers with 500 MB at most."""
+
+    def __init__(self):
+        self.client = None
+
+    def fit(self):
+        return {"a": {"resources": {MEGABYTES: 200.0}}, "b": {"resources": {MEGABYTES: 500.0}}}
+
+
+def test_a_job_that_no_worker_has_the_memory_for_is_refused_before_anything_runs():
+    large = ReferenceTask(Path("results"), "tiny", ReferenceSolve(BALL_SQUEEZE, 0.1))
+    Small().check_memory([large, large], [499.0, 100.0])
+    with pytest.raises(StudyError, match=r"reference ball_squeeze-0\.1 needs about 0\.6 GB, and the largest .* 0\.5"):
+        Small().check_memory([large, large], [499.0, 600.0])
 
 
 def test_the_size_of_a_reference_is_declared_before_it_is_known():

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from threading import Timer
+from types import SimpleNamespace
 
 import pytest
 
@@ -80,7 +80,7 @@ def test_a_worker_with_other_code_is_refused_by_name(file, other_code):
     assert said.startswith("worker another differs in the code of organbench; put the same version there")
 
 
-SLOW = """
+WAITS = """
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,32 +102,34 @@ class Waits(Free):
         return super().advance(state, boundary)
 
 
-FILE = str(Path(__file__).with_name("go-on"))
-STUDY = tiny_study(cases=tuple(tiny_case(method=Waits(file=FILE), dt_fraction=f) for f in (0.5, 0.45, 0.4)))
+FILES = ("", *2 * [str(Path(__file__).with_name("go-on"))])
+STUDY = tiny_study(cases=tuple(tiny_case(method=Waits(file=f), dt_fraction=0.5 - k / 20) for k, f in enumerate(FILES)))
 """
-"""A study whose cases wait for a file."""
+"""A study whose cases but the first wait for a file."""
 
 
 @pytest.mark.campaign
-def test_a_worker_that_joins_later_with_other_code_gets_nothing(file, other_code, tmp_path_factory):
-    here = tmp_path_factory.mktemp("here")
-    (here / "waits.py").write_text(SLOW)
+def test_a_worker_that_joins_later_with_other_code_gets_nothing(file, other_code, tmp_path_factory, monkeypatch):
+    here, said = tmp_path_factory.mktemp("here"), []
+    (here / "waits.py").write_text(WAITS)
     study = find_study(str(here / "waits.py"))
+
+    def heard(text, stacklevel):
+        said.append(text)
+        (here / "go-on").touch()
+
+    class Follower(Silent):
+        def advance(self, what, note):
+            super().advance(what, note)
+            if len(self.done) == 1:
+                later.enter_context(running(worker(file, "late"), other_code, f"{other_code}:{ROOT}"))
+
+    monkeypatch.setattr("studies.engines.cluster.warnings", SimpleNamespace(warn=heard))
     address = json.loads(file.read_text())["address"]
     with running(worker(file, "good"), here), engine_at(address, 60.0) as one, ExitStack() as later:
-
-        class Follower(Silent):
-            def begin(self, what, total):
-                super().begin(what, total)
-                later.enter_context(running(worker(file, "late"), other_code, other_code))
-
-        with pytest.warns(UserWarning) as warned:
-            Timer(40.0, (here / "go-on").touch).start()
-            run_studies(here / "results", [study], one, Follower())
-    assert [str(one.message) for one in warned if "worker late" in str(one.message)] == [
-        "worker late differs in the code of organbench; put the same version there, and start the worker again; it gets "
-        "no job"
-    ]
+        run_studies(here / "results", [study], one, Follower())
+    fault = "differs in the code of organbench; put the same version there, and start the worker again"
+    assert said == [f"worker late {fault}; it gets no job"]
     assert len(list((here / "results" / "tiny").iterdir())) == 3
 
 
