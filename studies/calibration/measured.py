@@ -14,22 +14,22 @@ from studies.scene.scene import Scene
 from studies.store.ledger import Ledger
 from studies.store.record import read_record
 from studies.sweep.executor import Progress, Told, perform
+from studies.sweep.job import CaseJob, Job, jobs_of
 from studies.sweep.local import Local
 from studies.sweep.run_studies import check_writable
-from studies.sweep.tasks import CaseTask, Task, tasks_of
 
 
-def pending(root: Path, scenes: Iterable[Scene], start: BodyRecipe) -> list[Task]:
+def pending(root: Path, scenes: Iterable[Scene], start: BodyRecipe) -> list[Job]:
     """Pieces of references and runs of the starting body that are missing or stale, the longest first."""
     cases = tuple(Case(scene, start) for scene in scenes)
-    ledger, tasks = Ledger(root), tasks_of(root, [Study(STUDY, "", cases, (), ())])
-    return [task for task in tasks if ledger.why(task) is not None]
+    ledger, jobs = Ledger(root), jobs_of(root, [Study(STUDY, "", cases, (), ())])
+    return [job for job in jobs if ledger.why(job) is not None]
 
 
-def bring_up_to_date(tasks: list[Task], root: Path, jobs: int, progress: Progress, on_compile: Told) -> None:
+def bring_up_to_date(todo: list[Job], root: Path, jobs: int, progress: Progress, on_compile: Told) -> None:
     """Does them in `jobs` processes. Raises StudyError when results cannot be written."""
     check_writable(root)
-    perform(Local(jobs), tasks, progress, on_compile, Task.store_failure)
+    perform(Local(jobs), todo, progress, on_compile, Job.store_failure)
 
 
 class Measurements:
@@ -57,9 +57,9 @@ class Measurements:
         return errors
 
     def _run(self, scene: Scene, recipe: BodyRecipe) -> Run:
-        task = CaseTask(self.root, STUDY, Case(scene, recipe))
-        if self.ledger.why(task) is not None:
-            task.run()
+        job = CaseJob(self.root, STUDY, Case(scene, recipe))
+        if self.ledger.why(job) is not None:
+            job.run()
             self.ledger.look_again()
             self.made += 1
-        return Run(task.work, read_record(task.path()), self.references[scene.name])
+        return Run(job.work, read_record(job.path()), self.references[scene.name])

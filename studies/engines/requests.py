@@ -22,8 +22,8 @@ from studies.runs.current import run_fingerprint
 from studies.store.machine import machine_id, this_machine
 from studies.sweep.executor import Silent
 from studies.sweep.frame_times import measure_times
+from studies.sweep.job import Job, do
 from studies.sweep.own_files import Given, load_given
-from studies.sweep.tasks import Task, do
 
 SIGHT_SECONDS = 60.0
 """In which a file that another machine has written must be seen: network folders remember for half a minute what was
@@ -104,16 +104,16 @@ def check_for(root: Path, files: tuple[Given, ...]) -> Iterator[Check]:
 
 
 @dataclass(frozen=True)
-class DoTask:
+class DoJob:
     """A job of a sweep."""
 
-    task: Task
+    job: Job
 
     def answer(self) -> Exception | None:
         """Does it, unless its result is there: a job whose worker was lost may be done. What it raised, which Dask
         would take for a reason to try again."""
         try:
-            do(self.task)
+            do(self.job)
         except MemoryError:
             raise
         except Exception as error:

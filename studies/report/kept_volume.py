@@ -13,7 +13,7 @@ from studies.metrics.metric import COMPARABLE
 from studies.runs.case import Case
 from studies.store.ledger import Ledger
 from studies.store.record import read_record
-from studies.sweep.tasks import CaseTask, case_tasks
+from studies.sweep.job import CaseJob, case_jobs
 
 PROMISED = 1e-4
 """Worst |V_r/V0_r − 1| of any kept volume, after any frame, at the default step [1]."""
@@ -36,24 +36,24 @@ def kept_volumes(ledger: Ledger, studies: Sequence[Study]) -> pd.DataFrame:
     """One row per stored run that the promise covers, the worst first; runs that broke off are left out."""
     rows, code = dict[str, dict[str, object]](), source_fingerprint("studies.report.kept_volume")
     for study in studies:
-        tasks: dict[str, CaseTask] = {}
-        for task in case_tasks(ledger.root, study):
-            entry = ledger.entry(task)
-            if promised(task.work) and entry is not None and entry.status in COMPARABLE:
-                tasks[entry.file] = task
-        found = ledger.measured(study.name, "kept volumes", dict.fromkeys(tasks, code), partial(_row, tasks))
-        rows |= {tasks[file].work.replaced(recorded=()).key: row for file, row in found.items()}
+        jobs: dict[str, CaseJob] = {}
+        for job in case_jobs(ledger.root, study):
+            entry = ledger.entry(job)
+            if promised(job.work) and entry is not None and entry.status in COMPARABLE:
+                jobs[entry.file] = job
+        found = ledger.measured(study.name, "kept volumes", dict.fromkeys(jobs, code), partial(_row, jobs))
+        rows |= {jobs[file].work.replaced(recorded=()).key: row for file, row in found.items()}
     table = pd.DataFrame(list(rows.values()))
     return table if table.empty else table.sort_values(WORST, ascending=False)
 
 
-def _row(tasks: Mapping[str, CaseTask], file: str) -> dict[str, object] | None:
+def _row(jobs: Mapping[str, CaseJob], file: str) -> dict[str, object] | None:
     """None for a file that turns out to be damaged: the table of its study reports it."""
     try:
-        record = read_record(tasks[file].path(), ("volume", "volume_target"))
+        record = read_record(jobs[file].path(), ("volume", "volume_target"))
     except StudyError:
         return None
-    case, worst = tasks[file].work, worst_volume(record.fields["volume"].values, record.fields["volume_target"].values)
+    case, worst = jobs[file].work, worst_volume(record.fields["volume"].values, record.fields["volume_target"].values)
     return {
         "scene": case.scene.name,
         "body": case.body.series,

@@ -13,7 +13,7 @@ from studies.report.summary import SUMMARIES
 from studies.store.ledger import Ledger
 from studies.store.machine import machine_id, machine_of, write_machine
 from studies.store.stamps import is_stamped
-from studies.sweep.frame_times import timed_tasks
+from studies.sweep.frame_times import timed_jobs
 from studies.sweep.standings import standings
 from studies.verify.verification import FOLDER as VERIFY
 
@@ -114,9 +114,9 @@ def check_studies(ledger: Ledger, studies: Sequence[Study], done: str = "publish
     done then."""
     behind = dict[str, list[str]]()
     for study in studies:
-        lacking = [f"{one.task.label} is {one.status}" for one in standings(ledger, study) if not one.ended]
-        untimed = [task for task in timed_tasks(ledger, study) if ledger.why_untimed(task) is not None]
-        lacking += [f"the frame time of {task.label} is missing or stale" for task in untimed]
+        lacking = [f"{one.job.label} is {one.status}" for one in standings(ledger, study) if not one.ended]
+        untimed = [job for job in timed_jobs(ledger, study) if ledger.why_untimed(job) is not None]
+        lacking += [f"the frame time of {job.label} is missing or stale" for job in untimed]
         if lacking:
             behind[study.name] = lacking
     if behind:

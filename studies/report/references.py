@@ -17,8 +17,8 @@ from studies.reference.solve import VARIANTS
 from studies.scene.scene import Scene
 from studies.store.paths import study_folder
 from studies.store.tables.csv_table import write_table
+from studies.sweep.job import reference_jobs
 from studies.sweep.load import References
-from studies.sweep.tasks import reference_tasks
 
 TABLE, CHART = "uncertainty.csv", "uncertainty.png"
 
@@ -72,7 +72,7 @@ def refresh_uncertainty(references: References, scenes: Iterable[Scene]) -> list
     each, root = list({scene.name: scene for scene in scenes}.values()), references.ledger.root
     folder = study_folder(root, STUDY)
     paths = [folder / TABLE, folder / CHART]
-    state = state_of(references.ledger.state(reference_tasks(root, each)))
+    state = state_of(references.ledger.state(reference_jobs(root, each)))
     stamp = root / "cache" / f"{STUDY}.drawn"
     if all(path.exists() for path in (*paths, stamp)) and stamp.read_bytes() == state.encode():
         return paths

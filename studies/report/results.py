@@ -32,8 +32,8 @@ from studies.store.machine import write_machine
 from studies.store.paths import study_folder
 from studies.store.stamps import set_stamp
 from studies.store.tables.csv_table import write_table
+from studies.sweep.job import case_jobs, reference_jobs
 from studies.sweep.load import References, load_runs
-from studies.sweep.tasks import case_tasks, reference_tasks
 
 FIGURES = "figures"
 FIGURE_NODES = 550
@@ -89,7 +89,7 @@ def charts_and_tables(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Pa
     written, remarks, absent, root = [], [], [], ledger.root
     references = References(ledger)
     for study in studies:
-        if not any(map(ledger.entry, case_tasks(root, study))):
+        if not any(map(ledger.entry, case_jobs(root, study))):
             absent.append(study.name)
             continue
         paths, missing = refresh(ledger, study, references)
@@ -171,13 +171,13 @@ def _stamped(stamp: Path) -> dict[str, Any]:
 def state_of_study(ledger: Ledger, study: Study) -> str:
     """Hash of all that charts and tables are made from: the lines of the ledger, and the code, that of the user's files
     too."""
-    tasks, machine = case_tasks(ledger.root, study), shown_machine(ledger.root)
-    others = [*(ledger.timing(task, machine) for task in tasks), *ledger.files(SUBMISSIONS).values()]
+    jobs, machine = case_jobs(ledger.root, study), shown_machine(ledger.root)
+    others = [*(ledger.timing(job, machine) for job in jobs), *ledger.files(SUBMISSIONS).values()]
     metrics = [metric(column) for column in study.columns]
     drawn = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
     own = {file.sha256 for file in map(file_of, drawn) if file is not None}
-    names = [*(task.digest for task in tasks), *(entry.name for entry in metrics), *sorted(own), study.word]
-    files = ledger.state([*tasks, *reference_tasks(ledger.root, study.scenes)])
+    names = [*(job.digest for job in jobs), *(entry.name for entry in metrics), *sorted(own), study.word]
+    files = ledger.state([*jobs, *reference_jobs(ledger.root, study.scenes)])
     return state_of(files, *(entry.written if entry else "-" for entry in others), *names)
 
 

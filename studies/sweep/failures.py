@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from studies.sweep.tasks import Task
+from studies.sweep.job import Job
 
 
 @dataclass
@@ -12,16 +12,16 @@ class Failures:
     causes: dict[str, str] = field(default_factory=dict)
     """Label of a job -> why."""
 
-    def add(self, task: Task, cause: str) -> None:
+    def add(self, job: Job, cause: str) -> None:
         """Notes a job and stores it as failed. Raises StudyError when it cannot be stored."""
-        self.causes[task.label] = cause
-        task.store_failure(cause)
+        self.causes[job.label] = cause
+        job.store_failure(cause)
 
-    def can_store(self, task: Task) -> bool:
+    def can_store(self, job: Job) -> bool:
         """Whether the file of a job can be written; notes a folder in its place as the cause of a failure."""
-        path = task.path()
+        path = job.path()
         if path.is_dir():
-            self.causes[task.label] = f"{path} is a folder in the place of its file: delete it"
+            self.causes[job.label] = f"{path} is a folder in the place of its file: delete it"
         return not path.is_dir()
 
     def sentence(self, again: str) -> str:

@@ -9,7 +9,7 @@ from studies.runs.case import Case
 from studies.store.archived import check_no_archive
 from studies.store.ledger import Ledger
 from studies.sweep.executor import Progress, Told
-from studies.sweep.tasks import CaseTask, case_tasks
+from studies.sweep.job import CaseJob, case_jobs
 from studies.timing.alone import alone
 from studies.timing.cases import time_cases
 
@@ -21,8 +21,8 @@ def measure_times(root: Path, study: Study, progress: Progress, on_compile: Told
 
     def pending() -> list[Case]:
         ledger.look_again()
-        untimed = [task for task in timed_tasks(ledger, study) if ledger.why_untimed(task) is not None]
-        return [task.work for task in untimed if among is None or task.path() in among]
+        untimed = [job for job in timed_jobs(ledger, study) if ledger.why_untimed(job) is not None]
+        return [job.work for job in untimed if among is None or job.path() in among]
 
     return _measured(root, study, progress, on_compile, pending)
 
@@ -34,21 +34,21 @@ def measure_again(ledger: Ledger, study: Study, progress: Progress, on_compile: 
 
     def pending() -> list[Case]:
         ledger.look_again()
-        return [task.work for task in timed_again(ledger, study)]
+        return [job.work for job in timed_again(ledger, study)]
 
     count = _measured(ledger.root, study, progress, on_compile, pending)
     ledger.look_again()
     return count
 
 
-def timed_again(ledger: Ledger, study: Study) -> list[CaseTask]:
+def timed_again(ledger: Ledger, study: Study) -> list[CaseJob]:
     """The cases that `measure_again` times: those of which a run of this code is stored that came to its end."""
-    return [task for task in timed_tasks(ledger, study) if ledger.why(task) is None]
+    return [job for job in timed_jobs(ledger, study) if ledger.why(job) is None]
 
 
-def timed_tasks(ledger: Ledger, study: Study) -> list[CaseTask]:
+def timed_jobs(ledger: Ledger, study: Study) -> list[CaseJob]:
     """The cases of a study that are to be timed, and are stored and came to their end."""
-    return [task for task in case_tasks(ledger.root, study) if task.work.timed and ledger.can_be_timed(task)]
+    return [job for job in case_jobs(ledger.root, study) if job.work.timed and ledger.can_be_timed(job)]
 
 
 def _measured(root: Path, study: Study, progress: Progress, on_compile: Told, pending: Callable[[], list[Case]]) -> int:

@@ -14,7 +14,7 @@ from studies.store.archived import is_archive, shown_machine
 from studies.store.entry import CODE_CHANGED, why_entry_is_stale
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
-from studies.sweep.tasks import CaseTask, case_tasks, reference_tasks
+from studies.sweep.job import CaseJob, case_jobs, reference_jobs
 from studies.timing.cases import timing_of
 from studies.timing.protocol import FrameTiming
 
@@ -34,7 +34,7 @@ class References:
 
     def problem(self, scene: Scene) -> StudyError | None:
         """Why a scene with a plan has none. Solutions that are there and went well are not read for that."""
-        entries = map(self.ledger.entry, reference_tasks(self.ledger.root, [scene]))
+        entries = map(self.ledger.entry, reference_jobs(self.ledger.root, [scene]))
         if scene_to_json(scene) not in self._read and all(entry and entry.status == Status.OK for entry in entries):
             return None
         reference = self._look(scene)
@@ -57,48 +57,48 @@ def load_runs(root: Path, study: Study, references: References | None = None) ->
     """
     references = references or References(Ledger(root))
     runs, problems = list[Run](), reference_problems(references, study)
-    for task in case_tasks(root, study):
-        run, missing = load_run(references, task)
+    for job in case_jobs(root, study):
+        run, missing = load_run(references, job)
         runs += [run] if run else []
         problems += missing
     return runs, sentences(problems)
 
 
-def load_run(references: References, task: CaseTask) -> tuple[Run | None, list[StudyError]]:
+def load_run(references: References, job: CaseJob) -> tuple[Run | None, list[StudyError]]:
     """The run of a case with its reference and frame times, None where it cannot be read; and what is wrong."""
     ledger = references.ledger
     try:
-        entry = ledger.entry(task)
+        entry = ledger.entry(job)
         if entry is None:
-            raise not_stored(ledger.root, task)
+            raise not_stored(ledger.root, job)
         if entry.fault:
             raise entry.error()
-        run = Run(task.work, read_record(task.path()), references.of(task.work.scene))
+        run = Run(job.work, read_record(job.path()), references.of(job.work.scene))
     except StudyError as problem:
         return None, [problem]
     try:
-        return replace(run, timing=frame_times(ledger, task)), []
+        return replace(run, timing=frame_times(ledger, job)), []
     except StudyError as problem:
         return run, [problem]
 
 
-def not_stored(root: Path, task: CaseTask) -> StudyError:
+def not_stored(root: Path, job: CaseJob) -> StudyError:
     """The error of a case without a file."""
-    return StudyError(f"case {task.label} {'is missing in the archive' if is_archive(root) else 'has not run'}")
+    return StudyError(f"case {job.label} {'is missing in the archive' if is_archive(root) else 'has not run'}")
 
 
-def frame_times(ledger: Ledger, task: CaseTask) -> FrameTiming | None:
+def frame_times(ledger: Ledger, job: CaseJob) -> FrameTiming | None:
     """This machine's frame times of a case; None where it is not timed, or not by this code. An archive shows its own.
 
     Raises StudyError where they cannot be read.
     """
-    entry = ledger.timing(task, shown_machine(ledger.root)) if task.work.timed else None
+    entry = ledger.timing(job, shown_machine(ledger.root)) if job.work.timed else None
     if entry is not None and entry.fault:
         raise entry.error()
-    why = why_entry_is_stale(entry, task.digest, task.fingerprint)
+    why = why_entry_is_stale(entry, job.digest, job.fingerprint)
     if entry is None or (why is not None and not (why == CODE_CHANGED and is_archive(ledger.root))):
         return None
-    return timing_of(read_record(task.path().with_name(entry.file)))
+    return timing_of(read_record(job.path().with_name(entry.file)))
 
 
 def reference_problems(references: References, study: Study) -> list[StudyError]:

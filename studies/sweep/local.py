@@ -15,8 +15,8 @@ from studies.catalog.study import Study
 from studies.geometry.mesher.jobs import cache_folder
 from studies.sweep.executor import Progress, Told
 from studies.sweep.frame_times import measure_times
+from studies.sweep.job import CaseJob, Job, do
 from studies.sweep.own_files import Given, given_files, load_given
-from studies.sweep.tasks import CaseTask, Task, do
 
 COMPILED = "NUMBA_CACHE_DIR"
 """Where the user may want compiled code."""
@@ -30,9 +30,9 @@ def begin(files: tuple[Given, ...], tell: Tell) -> None:
     event.register("numba:compile", CompileWatch(tell))
 
 
-def files_for(tasks: Sequence[Task]) -> tuple[Given, ...]:
-    """The user's files that tasks need."""
-    return given_files(task.work for task in tasks if isinstance(task, CaseTask))
+def files_for(jobs: Sequence[Job]) -> tuple[Given, ...]:
+    """The user's files that jobs need."""
+    return given_files(job.work for job in jobs if isinstance(job, CaseJob))
 
 
 def environment(portable: bool = False) -> dict[str, str]:
@@ -57,10 +57,10 @@ class Local:
     def __exit__(self, *error: object) -> None:
         """Its processes end with each sweep."""
 
-    def map(self, tasks: Sequence[Task], on_compile: Told) -> Generator[tuple[Task, str | None]]:
+    def map(self, jobs: Sequence[Job], on_compile: Told) -> Generator[tuple[Job, str | None]]:
         """As every executor."""
-        prepare = partial(begin, files_for(tasks))
-        for ended in run_each(tasks, self.processes, do, prepare, environment(self.portable), on_compile):
+        prepare = partial(begin, files_for(jobs))
+        for ended in run_each(jobs, self.processes, do, prepare, environment(self.portable), on_compile):
             yield ended.job, ended.cause
 
     def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:

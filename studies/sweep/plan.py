@@ -13,7 +13,7 @@ from studies.store.ledger import Ledger
 from studies.store.machine import machine_id
 from studies.sweep.estimate import SECONDS_PER_UNKNOWN, timing_bytes, timing_seconds
 from studies.sweep.frame_times import timed_again
-from studies.sweep.tasks import REFERENCE, CaseTask, Task, case_tasks, tasks_of
+from studies.sweep.job import REFERENCE, CaseJob, Job, case_jobs, jobs_of
 
 PHYSICS, TIMING = "physics", "timing"
 """The stages: the first in several processes, the second alone."""
@@ -41,34 +41,34 @@ class Planned:
     """Whether that rate is one of this machine."""
 
 
-def plan(ledger: Ledger, study: Study, wanted: Callable[[Task], bool] | None = None) -> list[Planned]:
+def plan(ledger: Ledger, study: Study, wanted: Callable[[Job], bool] | None = None) -> list[Planned]:
     """What `run_studies` would run of a study, in its order; `wanted` as there."""
-    tasks = tasks_of(ledger.root, [study])
-    chosen = [task for task in tasks if (ledger.why(task) is not None if wanted is None else wanted(task))]
-    measured = rates(ledger, tasks) if chosen else {}
-    found = [_of_task(ledger, task, measured) for task in chosen]
-    runs = {task.label for task in chosen}
-    for task in case_tasks(ledger.root, study):
-        if not task.work.timed or (wanted is not None and task.label not in runs):
+    jobs = jobs_of(ledger.root, [study])
+    chosen = [job for job in jobs if (ledger.why(job) is not None if wanted is None else wanted(job))]
+    measured = rates(ledger, jobs) if chosen else {}
+    found = [_of_job(ledger, job, measured) for job in chosen]
+    runs = {job.label for job in chosen}
+    for job in case_jobs(ledger.root, study):
+        if not job.work.timed or (wanted is not None and job.label not in runs):
             continue
-        why = ledger.why_untimed(task)
-        if why is not None and (ledger.can_be_timed(task) or task.label in runs):
-            found.append(_of_timing(ledger, task, why, measured))
+        why = ledger.why_untimed(job)
+        if why is not None and (ledger.can_be_timed(job) or job.label in runs):
+            found.append(_of_timing(ledger, job, why, measured))
     return found
 
 
 def plan_again(ledger: Ledger, study: Study) -> list[Planned]:
     """What `measure_again` would time of a study, in its order."""
-    measured = rates(ledger, tasks_of(ledger.root, [study]))
-    return [_of_timing(ledger, task, AGAIN, measured) for task in timed_again(ledger, study)]
+    measured = rates(ledger, jobs_of(ledger.root, [study]))
+    return [_of_timing(ledger, job, AGAIN, measured) for job in timed_again(ledger, study)]
 
 
 def kind_of(stage: str, label: str) -> str:
-    """ "reference", "case" or "timing", by the stage and the label of a task."""
+    """ "reference", "case" or "timing", by the stage and the label of a job."""
     return TIMING if stage == TIMING else "reference" if label.startswith(REFERENCE) else "case"
 
 
-def rates(ledger: Ledger, tasks: Sequence[Task]) -> dict[str, float]:
+def rates(ledger: Ledger, jobs: Sequence[Job]) -> dict[str, float]:
     """Measured over estimated seconds of what this machine has stored: of all references by their unknowns, of the
     given cases; a kind of which nothing is stored is left out."""
     here, sums = machine_id(), {"case": [0.0, 0.0], "reference": [0.0, 0.0]}
@@ -76,25 +76,25 @@ def rates(ledger: Ledger, tasks: Sequence[Task]) -> dict[str, float]:
         if entry.seconds and entry.unknowns and entry.machine == here:
             sums["reference"][0] += entry.seconds
             sums["reference"][1] += SECONDS_PER_UNKNOWN * entry.unknowns
-    for task in tasks:
-        entry = ledger.entry(task)
-        if task.kind == "case" and entry and entry.seconds and entry.machine == here:
+    for job in jobs:
+        entry = ledger.entry(job)
+        if job.kind == "case" and entry and entry.seconds and entry.machine == here:
             sums["case"][0] += entry.seconds
-            sums["case"][1] += task.seconds
+            sums["case"][1] += job.seconds
     return {kind: measured / estimated for kind, (measured, estimated) in sums.items() if measured > 0}
 
 
-def _of_task(ledger: Ledger, task: Task, measured: Mapping[str, float]) -> Planned:
-    why = ledger.why(task) or "its result is a failure"
-    seconds, size = _cost(ledger.entry(task))
-    guess = 0.0 if seconds is not None else task.seconds * measured.get(task.kind, 1.0)
-    return Planned(PHYSICS, task.kind, task.label, why, seconds, size or task.size, guess, task.kind in measured)
+def _of_job(ledger: Ledger, job: Job, measured: Mapping[str, float]) -> Planned:
+    why = ledger.why(job) or "its result is a failure"
+    seconds, size = _cost(ledger.entry(job))
+    guess = 0.0 if seconds is not None else job.seconds * measured.get(job.kind, 1.0)
+    return Planned(PHYSICS, job.kind, job.label, why, seconds, size or job.size, guess, job.kind in measured)
 
 
-def _of_timing(ledger: Ledger, task: CaseTask, why: str, measured: Mapping[str, float]) -> Planned:
-    seconds, size = _cost(ledger.timing(task))
-    guess = 0.0 if seconds is not None else timing_seconds(task.work) * measured.get("case", 1.0)
-    return Planned(TIMING, TIMING, task.label, why, seconds, size or timing_bytes(task.work), guess, "case" in measured)
+def _of_timing(ledger: Ledger, job: CaseJob, why: str, measured: Mapping[str, float]) -> Planned:
+    seconds, size = _cost(ledger.timing(job))
+    guess = 0.0 if seconds is not None else timing_seconds(job.work) * measured.get("case", 1.0)
+    return Planned(TIMING, TIMING, job.label, why, seconds, size or timing_bytes(job.work), guess, "case" in measured)
 
 
 def _cost(entry: Entry | None) -> tuple[float | None, int | None]:

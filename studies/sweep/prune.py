@@ -14,7 +14,7 @@ from studies.store.archived import check_no_archive
 from studies.store.entry import file_state
 from studies.store.ledger import FAILURES, Ledger
 from studies.store.paths import SUFFIX, TIMING, study_folder
-from studies.sweep.tasks import Task, case_tasks, reference_tasks
+from studies.sweep.job import Job, case_jobs, reference_jobs
 
 DAY = 86_400.0
 """Seconds."""
@@ -97,13 +97,13 @@ def _looked_at(path: Path, rule: Rule) -> Prunable | None:
 
 def _of_study(ledger: Ledger, study: Study) -> dict[str, Rule]:
     """By the name of a file in the study's folder: the rule that lets it go. Current results are not among them."""
-    files, tasks = ledger.files(study.name), {task.path().name: task for task in case_tasks(ledger.root, study)}
+    files, jobs = ledger.files(study.name), {job.path().name: job for job in case_jobs(ledger.root, study)}
     found: dict[str, Rule] = {}
     for file in (name for name in files if TIMING not in name):
-        rule = _rule(ledger, tasks[file]) if file in tasks else Rule.SUPERSEDED
+        rule = _rule(ledger, jobs[file]) if file in jobs else Rule.SUPERSEDED
         if rule is not None:
             found[file] = rule
-        elif (timing := ledger.timing(tasks[file])) is not None and ledger.why_untimed(tasks[file]) is not None:
+        elif (timing := ledger.timing(jobs[file])) is not None and ledger.why_untimed(jobs[file]) is not None:
             found[timing.file] = Rule.STALE
     for timing in (name for name in files if TIMING in name):
         record = timing.split(TIMING)[0] + SUFFIX
@@ -117,19 +117,19 @@ def _of_study(ledger: Ledger, study: Study) -> dict[str, Rule]:
 def _of_references(ledger: Ledger, studies: Collection[Study]) -> dict[str, Rule]:
     """The same for the references of the scenes of studies; those of any other scene stay."""
     scenes = {scene.name for study in studies for scene in study.scenes}
-    tasks = {task.path().name: task for study in studies for task in reference_tasks(ledger.root, study.scenes)}
+    jobs = {job.path().name: job for study in studies for job in reference_jobs(ledger.root, study.scenes)}
     found: dict[str, Rule] = {}
     for file, entry in ledger.files(REFERENCES).items():
-        rule = _rule(ledger, tasks[file]) if file in tasks else None
-        if rule is None and file not in tasks and entry.kind == "reference" and entry.scene in scenes:
+        rule = _rule(ledger, jobs[file]) if file in jobs else None
+        if rule is None and file not in jobs and entry.kind == "reference" and entry.scene in scenes:
             rule = Rule.SUPERSEDED
         if rule is not None:
             found[file] = rule
     return found
 
 
-def _rule(ledger: Ledger, task: Task) -> Rule | None:
-    if ledger.why(task) is not None:
+def _rule(ledger: Ledger, job: Job) -> Rule | None:
+    if ledger.why(job) is not None:
         return Rule.STALE
-    entry = ledger.entry(task)
+    entry = ledger.entry(job)
     return Rule.FAILED if entry is not None and entry.status in FAILURES else None

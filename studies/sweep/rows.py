@@ -13,26 +13,26 @@ from studies.metrics.metric import Metric
 from studies.metrics.table import Row, row_of
 from studies.store.archived import shown_machine
 from studies.store.paths import timing_name
+from studies.sweep.job import CaseJob, case_jobs, reference_jobs
 from studies.sweep.load import References, load_run, not_stored, reference_problems, sentences
-from studies.sweep.tasks import CaseTask, case_tasks, reference_tasks
 
 
 def table_rows(references: References, study: Study, metrics: Sequence[Metric]) -> tuple[list[Row], list[str]]:
     """A row per stored case (studies.metrics.table), and what is missing or damaged in sentences."""
     ledger, problems = references.ledger, reference_problems(references, study)
     code = source_fingerprint("studies.metrics.table", "studies.sweep.load")
-    scenes = {scene.name: ledger.state(reference_tasks(ledger.root, [scene])) for scene in study.scenes}
-    tasks, wanted, machine = dict[str, CaseTask](), dict[str, str](), shown_machine(ledger.root)
-    for task in case_tasks(ledger.root, study):
-        entry, timing = ledger.entry(task), ledger.timing(task, machine) if task.work.timed else None
-        problems += [] if entry else [not_stored(ledger.root, task)]
+    scenes = {scene.name: ledger.state(reference_jobs(ledger.root, [scene])) for scene in study.scenes}
+    jobs, wanted, machine = dict[str, CaseJob](), dict[str, str](), shown_machine(ledger.root)
+    for job in case_jobs(ledger.root, study):
+        entry, timing = ledger.entry(job), ledger.timing(job, machine) if job.work.timed else None
+        problems += [] if entry else [not_stored(ledger.root, job)]
         problems += [one.error() for one in (entry, timing) if one and one.fault]
         if entry and not entry.fault:
-            tasks[entry.file] = task
-            wanted[entry.file] = f"{timing and timing.state} {task.fingerprint} {code} {scenes[task.work.scene.name]}"
+            jobs[entry.file] = job
+            wanted[entry.file] = f"{timing and timing.state} {job.fingerprint} {code} {scenes[job.work.scene.name]}"
 
     def measure(file: str) -> Row | None:
-        run, damaged = load_run(references, tasks[file])
+        run, damaged = load_run(references, jobs[file])
         if damaged:  # since the ledger read it
             ledger.forget(study.name, [file, timing_name(file, machine)])
             problems.extend(damaged)

@@ -10,8 +10,8 @@ from studies.store.archived import check_no_archive
 from studies.store.ledger import Ledger
 from studies.sweep.executor import Executor, Progress, Told, perform
 from studies.sweep.failures import Failures
+from studies.sweep.job import Job, jobs_of
 from studies.sweep.local import Local
-from studies.sweep.tasks import Task, tasks_of
 
 
 def run_studies(
@@ -19,7 +19,7 @@ def run_studies(
     studies: list[Study],
     jobs: int | Executor,
     progress: Progress,
-    wanted: Callable[[Task], bool] | None = None,
+    wanted: Callable[[Job], bool] | None = None,
     on_compile: Told = lambda name: None,
     failures: Failures | None = None,
     ledger: Ledger | None = None,
@@ -36,20 +36,20 @@ def run_studies(
     root = root.absolute()
     executor, ledger = Local(jobs) if isinstance(jobs, int) else jobs, ledger or Ledger(root)
 
-    def stale(task: Task) -> bool:
-        entry = ledger.entry(task)
-        return ledger.why(task) is not None or (executor.portable and (entry is None or entry.portable is None))
+    def stale(job: Job) -> bool:
+        entry = ledger.entry(job)
+        return ledger.why(job) is not None or (executor.portable and (entry is None or entry.portable is None))
 
     rule = wanted or stale
     ledger.look_again()
-    stored = [(task, ledger.entry(task)) for task in tasks_of(root, studies) if rule(task)]
-    todo = [replace(task, seen=entry and entry.state) for task, entry in stored]
+    stored = [(job, ledger.entry(job)) for job in jobs_of(root, studies) if rule(job)]
+    todo = [replace(job, seen=entry and entry.state) for job, entry in stored]
     failures = failures or Failures()
     if todo:
         check_writable(root)
-        storable = [task for task in todo if failures.can_store(task)]
+        storable = [job for job in todo if failures.can_store(job)]
         perform(executor, storable, progress, on_compile, failures.add)
-    among = None if wanted is None else {task.path() for task in todo}
+    among = None if wanted is None else {job.path() for job in todo}
     measured = sum(executor.measure(root, study, progress, on_compile, among) for study in studies)
     ledger.look_again()
     return len(todo) + measured

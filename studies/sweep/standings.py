@@ -12,7 +12,7 @@ from studies.reference.reference_solves import ReferenceSolve
 from studies.store.entry import CASE_CHANGED, CODE_CHANGED, MISSING, Entry
 from studies.store.ledger import FAILURES, Ledger
 from studies.store.schema import Status
-from studies.sweep.tasks import ReferenceTask, Task, case_tasks, tasks_of
+from studies.sweep.job import Job, ReferenceJob, case_jobs, jobs_of
 
 CAUSES = 8
 """Of failures that are named one by one."""
@@ -24,7 +24,7 @@ ANY = "any"
 class Standing:
     """How a job stands."""
 
-    task: Task
+    job: Job
     status: str
     """A Status, "stale" or "missing"."""
     message: str
@@ -39,32 +39,32 @@ class Standing:
 
 def standings(ledger: Ledger, study: Study) -> list[Standing]:
     """Every job of a study: ok, failed in some way, stale or missing."""
-    return [standing_of(ledger, task) for task in tasks_of(ledger.root, [study])]
+    return [standing_of(ledger, job) for job in jobs_of(ledger.root, [study])]
 
 
-def standing_of(ledger: Ledger, task: Task) -> Standing:
+def standing_of(ledger: Ledger, job: Job) -> Standing:
     """How a job stands."""
-    entry, why = ledger.entry(task), ledger.why(task)
+    entry, why = ledger.entry(job), ledger.why(job)
     if entry is None or why is not None:
-        return Standing(task, "missing" if why == MISSING else "stale", why or MISSING, entry)
-    return Standing(task, entry.status, entry.message, entry)
+        return Standing(job, "missing" if why == MISSING else "stale", why or MISSING, entry)
+    return Standing(job, entry.status, entry.message, entry)
 
 
-def failed(ledger: Ledger, task: Task) -> bool:
+def failed(ledger: Ledger, job: Job) -> bool:
     """Whether the stored result of a job is no success; a damaged file is stale instead."""
-    entry = ledger.entry(task)
+    entry = ledger.entry(job)
     return entry is not None and entry.status in FAILURES
 
 
 def warnings_of(ledger: Ledger, study: Study) -> list[str]:
     """What the cases of a study warned of when they were prepared, a sentence each."""
-    entries = map(ledger.entry, case_tasks(ledger.root, study))
+    entries = map(ledger.entry, case_jobs(ledger.root, study))
     return [entry.warnings for entry in entries if entry is not None and entry.warnings]
 
 
 def summary(found: Sequence[Standing]) -> str:
     """ "9 cases: 7 ok, 2 failed; 6 reference solutions: 6 ok"."""
-    groups = {kind: [s.status for s in found if s.task.kind == kind] for kind in ("case", "reference")}
+    groups = {kind: [s.status for s in found if s.job.kind == kind] for kind in ("case", "reference")}
     parts = [f"{amounts(Counter({kind: len(each)}))}: {status_counts(each)}" for kind, each in groups.items() if each]
     return "; ".join(parts) or "no cases"
 
@@ -73,12 +73,12 @@ def unexpected(study: Study, found: Sequence[Standing]) -> list[Standing]:
     """What ended in a way that the study does not expect."""
 
     def expected(standing: Standing) -> bool:
-        if standing.task.kind == "reference":
+        if standing.job.kind == "reference":
             return standing.status == Status.OK or study.counts_losses
         return study.accepts(standing.status)
 
     odd = [standing for standing in found if standing.ended and not expected(standing)]
-    return sorted(odd, key=lambda standing: standing.task.kind)
+    return sorted(odd, key=lambda standing: standing.job.kind)
 
 
 def causes(found: Sequence[Standing]) -> list[str]:
@@ -90,7 +90,7 @@ def causes(found: Sequence[Standing]) -> list[str]:
     sentences = []
     for (status, _), each in list(groups.items())[:CAUSES]:
         more = f", and {len(each) - 1} more" if len(each) > 1 else ""
-        sentences.append(f"{status.replace('-', ' ')}: {each[0].message} ({each[0].task.label}{more})")
+        sentences.append(f"{status.replace('-', ' ')}: {each[0].message} ({each[0].job.label}{more})")
     left = len(groups) - CAUSES
     return [*sentences, f"and {left} more causes; `organbench status` names them"] if left > 0 else sentences
 
@@ -132,8 +132,8 @@ def solve_standing(ledger: Ledger, solve: ReferenceSolve) -> SolveStanding:
     begun = kept(solve.path(ledger.root), solve.stamp)
     if begun is not None:
         return SolveStanding(solve, "half-way", steps=len([e for e in begun.path if e.t in solve.scene.checkpoints]))
-    task = ReferenceTask(ledger.root, REFERENCES, solve)
-    entry, why = ledger.entry(task), ledger.why(task)
+    job = ReferenceJob(ledger.root, REFERENCES, solve)
+    entry, why = ledger.entry(job), ledger.why(job)
     if entry is None or entry.fault:
         return SolveStanding(solve, "missing" if entry is None else "unreadable")
     state = "stale" if why in (CASE_CHANGED, CODE_CHANGED) else entry.status

@@ -11,7 +11,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.scenes import Organ, Scene
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.ledger import Ledger
-from studies.sweep.tasks import CaseTask
+from studies.sweep.job import CaseJob
 
 NODES, FRAMES = 60, 5
 SQUEEZE = replace(BALL_SQUEEZE, name="tiny_squeeze", reference=None)
@@ -98,7 +98,7 @@ def file_scene(path, unit: str = "m", **changes) -> Scene:
 
 def why_stale(root, case: Case, study: str = "tiny") -> str | None:
     """What a new ledger of `root` answers for a case."""
-    return Ledger(root).why(CaseTask(root, study, case))
+    return Ledger(root).why(CaseJob(root, study, case))
 
 
 def content(folder) -> dict:

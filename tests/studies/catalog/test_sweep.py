@@ -13,11 +13,11 @@ from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.entry import OTHER_VERSION
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
+from studies.sweep.job import CaseJob, jobs_of
 from studies.sweep.load import load_runs
 from studies.sweep.local import Local
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, standings, warnings_of
-from studies.sweep.tasks import CaseTask, tasks_of
 from studies.timing import cases as timed
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
 
@@ -86,9 +86,9 @@ def test_a_damaged_file_is_stale_and_runs_again(results, number):
     runs, remarks = load_runs(results, study)
     assert len(runs) == 2
     assert len(remarks) == 1
-    assert path.name in remarks[0] and ("'mass' has changed" if number else "cut off") in remarks[0]
+    assert path.name in remarks[0] and "is cut off or damaged" in remarks[0]
     assert warnings_of(Ledger(results), study) == []
-    assert not failed(Ledger(results), CaseTask(results, "tiny", diverging_case()))
+    assert not failed(Ledger(results), CaseJob(results, "tiny", diverging_case()))
     assert run_studies(results, [study], 1, Silent()) == 1
     assert load_runs(results, study)[1] == []
 
@@ -116,10 +116,10 @@ def test_missing_is_told(tmp_path):
 def test_references_are_shared_and_come_first(tmp_path):
     scene = replace(BALL_SQUEEZE, reference=ReferencePlan("octant", (0.9, 0.5, 0.4)))
     one, two = (tiny_study(name=name, cases=(tiny_case(scene=scene),)) for name in ("one", "two"))
-    tasks = tasks_of(tmp_path, [one, two])
-    assert [task.label for task in tasks[:2]] == ["reference ball_squeeze-0.4", "reference ball_squeeze-0.5"]
-    assert len(tasks) == 6 + 2  # three meshes and three variants, shared; a case of each study
-    assert len({task.path() for task in tasks}) == 8
+    jobs = jobs_of(tmp_path, [one, two])
+    assert [job.label for job in jobs[:2]] == ["reference ball_squeeze-0.4", "reference ball_squeeze-0.5"]
+    assert len(jobs) == 6 + 2  # three meshes and three variants, shared; a case of each study
+    assert len({job.path() for job in jobs}) == 8
 
 
 def test_results_that_cannot_be_written_are_told_before_anything_runs(tmp_path, monkeypatch):

@@ -15,7 +15,7 @@ from studies.engines.worker import MEGABYTES, JobPlugin
 from studies.reference.reference_solves import ReferenceSolve
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.sweep.estimate import MEMORY, factor_memory
-from studies.sweep.tasks import ReferenceTask
+from studies.sweep.job import ReferenceJob
 
 
 @pytest.fixture
@@ -107,7 +107,7 @@ class Small(Session):
 
 
 def test_a_job_that_no_worker_has_the_memory_for_is_refused_before_anything_runs():
-    large = ReferenceTask(Path("results"), "tiny", ReferenceSolve(BALL_SQUEEZE, 0.1))
+    large = ReferenceJob(Path("results"), "tiny", ReferenceSolve(BALL_SQUEEZE, 0.1))
     Small().check_memory([large, large], [499.0, 100.0])
     with pytest.raises(StudyError, match=r"reference ball_squeeze-0\.1 needs about 0\.6 GB, and the largest .* 0\.5"):
         Small().check_memory([large, large], [499.0, 600.0])
@@ -115,5 +115,5 @@ def test_a_job_that_no_worker_has_the_memory_for_is_refused_before_anything_runs
 
 def test_the_size_of_a_reference_is_declared_before_it_is_known():
     for level, unknowns in ((0.12, 16_482), (0.22, 4_391)):
-        needs = ReferenceTask(Path("nowhere"), "tiny", ReferenceSolve(BALL_SQUEEZE, level)).needs
+        needs = ReferenceJob(Path("nowhere"), "tiny", ReferenceSolve(BALL_SQUEEZE, level)).needs
         assert factor_memory(unknowns) <= needs - MEMORY < 3.5 * factor_memory(unknowns)

@@ -10,7 +10,7 @@ from studies.base.errors import StudyError
 from studies.engines.cluster import Cluster
 from studies.engines.requests import FrameTimes
 from studies.store.ledger import Ledger
-from studies.sweep.tasks import case_tasks
+from studies.sweep.job import case_jobs
 from tests.studies.tiny import Silent, tiny_case, tiny_study
 
 MACHINES = {"a": "one", "b": "one", "c": "other", "d": "other"}
@@ -75,7 +75,7 @@ def test_a_worker_that_is_lost_meanwhile_is_a_sentence(tmp_path):
 
 
 def timed_somewhere(root):
-    return [Ledger(root).timed_somewhere(task) for task in case_tasks(root, tiny_study())]
+    return [Ledger(root).timed_somewhere(job) for job in case_jobs(root, tiny_study())]
 
 
 def test_what_any_machine_has_timed_asks_for_no_cluster(results):

@@ -20,7 +20,7 @@ from studies.scenes import SCENES, ReferencePlan
 from studies.scenes.ball_clamped import BALL_CLAMPED
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
-from studies.sweep import tasks
+from studies.sweep import job as jobs_module
 from studies.sweep.load import References, load_runs
 from studies.sweep.standings import solve_standing
 from tests.studies.octant import LEVELS, SCENE
@@ -28,7 +28,7 @@ from tests.studies.tiny import tiny_case, tiny_study
 
 
 def is_current(root, reference_solve):
-    return Ledger(root).why(tasks.ReferenceTask(root, "", reference_solve)) is None
+    return Ledger(root).why(jobs_module.ReferenceJob(root, "", reference_solve)) is None
 
 
 def test_current_until_the_load_or_the_code_changes(solved, monkeypatch):
@@ -40,7 +40,7 @@ def test_current_until_the_load_or_the_code_changes(solved, monkeypatch):
     assert ReferenceSolve(replace(SCENE, gravity=(0.0, 0.0, -9.81)), 0.5).key != reference_solve.key
     assert ReferenceSolve(SCENE, 0.5, "kappa").key != reference_solve.key
     assert not is_current(solved, ReferenceSolve(replace(SCENE, checkpoints=(1.0, 3.9)), LEVELS[0]))
-    monkeypatch.setattr(tasks, "reference_fingerprint", lambda: "other")
+    monkeypatch.setattr(jobs_module, "reference_fingerprint", lambda: "other")
     assert not is_current(solved, reference_solve)
 
 
@@ -111,7 +111,7 @@ def test_listing_says_how_every_piece_stands(solved, tmp_path, monkeypatch):
     assert sorted(unknowns := [row.unknowns for row in whole[:3]]) == unknowns
     assert states(root) == ["ok", "missing", "ok", "ok", "ok", "unreadable"]
     assert [row.unknowns for row in listed(root) if row.state in ("missing", "unreadable")] == [None, None]
-    monkeypatch.setattr(tasks, "reference_fingerprint", lambda: "other")
+    monkeypatch.setattr(jobs_module, "reference_fingerprint", lambda: "other")
     assert states(solved) == ["stale"] * 6
 
 

@@ -25,12 +25,12 @@ from studies.store.links import link_study
 from studies.store.paths import record_files
 from studies.store.record import glance, peek, read_record, write_record
 from studies.store.schema import Status
+from studies.sweep.job import case_jobs, jobs_of
 from studies.sweep.load import References, load_runs
 from studies.sweep.plan import plan
 from studies.sweep.rows import table_rows
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import standings, warnings_of
-from studies.sweep.tasks import case_tasks, tasks_of
 from studies.timing.cases import timing_file
 from tests.studies import made_up_run
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
@@ -160,7 +160,7 @@ def test_why_names_each_reason_once(results):
     three.write_bytes(three.read_bytes()[:900])
     old.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(600))
     ledger, reasons = Ledger(results), [CODE_CHANGED, None, DAMAGED, MISSING, CASE_CHANGED, OTHER_VERSION]
-    assert [ledger.why(task) for task in case_tasks(results, study)] == reasons
+    assert [ledger.why(job) for job in case_jobs(results, study)] == reasons
     assert "cut off" in ledger.files("tiny")[three.name].error_message
     assert str(old) in ledger.files("tiny")[old.name].error_message
 
@@ -177,22 +177,22 @@ def test_a_changed_source_makes_all_stale_without_opening_one(many, opened, monk
 def test_a_result_under_another_name_is_not_the_case(results):
     path = case_path(results, "tiny", diverging_case())
     path.rename(path.with_name(f"mine-{path.name[-11:]}"))
-    (task,) = case_tasks(results, tiny_study(cases=(diverging_case(),)))
-    assert Ledger(results).why(task) == MISSING
+    (job,) = case_jobs(results, tiny_study(cases=(diverging_case(),)))
+    assert Ledger(results).why(job) == MISSING
 
 
 def test_a_result_is_wanted_once_in_many_studies(tmp_path):
     twice = replace(STUDY, cases=(*STUDY.cases, *STUDY.cases))
-    assert len(tasks_of(tmp_path, [twice])) == COUNT
-    assert len(tasks_of(tmp_path, [STUDY, replace(STUDY, name="other")])) == 2 * COUNT
+    assert len(jobs_of(tmp_path, [twice])) == COUNT
+    assert len(jobs_of(tmp_path, [STUDY, replace(STUDY, name="other")])) == 2 * COUNT
 
 
 def test_a_timing_is_current_or_not_like_its_case(results):
-    tasks = case_tasks(results, tiny_study())
-    assert [Ledger(results).why_untimed(task) for task in tasks] == [None, None, MISSING]
-    assert [Ledger(results).can_be_timed(task) for task in tasks] == [True, True, False]
-    timing_file(results, "tiny", tasks[0].work).unlink()
-    assert Ledger(results).why_untimed(tasks[0]) == MISSING
+    jobs = case_jobs(results, tiny_study())
+    assert [Ledger(results).why_untimed(job) for job in jobs] == [None, None, MISSING]
+    assert [Ledger(results).can_be_timed(job) for job in jobs] == [True, True, False]
+    timing_file(results, "tiny", jobs[0].work).unlink()
+    assert Ledger(results).why_untimed(jobs[0]) == MISSING
 
 
 def lose_silently(root, path):

@@ -25,8 +25,8 @@ from studies.sweep.estimate import (
     timing_seconds,
     unknowns,
 )
+from studies.sweep.job import jobs_of
 from studies.sweep.plan import plan, rates
-from studies.sweep.tasks import tasks_of
 from tests.studies.tiny import SQUEEZE, tiny_case, tiny_study
 
 PUBLISHED = Path(__file__).parents[3] / "results" / "published"
@@ -78,22 +78,22 @@ def test_a_reference_costs_by_its_unknowns_and_a_motion_by_its_steps():
 
 def test_rates_are_those_of_this_machine(results):
     study = tiny_study()
-    tasks = tasks_of(results, [study])
-    measured = rates(Ledger(results), tasks)["case"]
-    stored = [read_record(task.path()).attributes["seconds"] for task in tasks]
-    assert measured == pytest.approx(sum(stored) / sum(case_seconds(task.work) for task in tasks))
+    jobs = jobs_of(results, [study])
+    measured = rates(Ledger(results), jobs)["case"]
+    stored = [read_record(job.path()).attributes["seconds"] for job in jobs]
+    assert measured == pytest.approx(sum(stored) / sum(case_seconds(job.work) for job in jobs))
     path = case_path(results, "tiny", tiny_case())
     path.unlink()
     (piece, *_) = plan(Ledger(results), study)
     assert piece.here and piece.guess > 0
-    for task in tasks[1:]:
-        write_record(task.path(), replace(read_record(task.path()), machine="0" * len(machine_id())))
-    assert rates(Ledger(results), tasks) == {}, "what another machine stored says nothing of this one"
+    for job in jobs[1:]:
+        write_record(job.path(), replace(read_record(job.path()), machine="0" * len(machine_id())))
+    assert rates(Ledger(results), jobs) == {}, "what another machine stored says nothing of this one"
 
 
 def test_the_rate_of_references_is_that_of_all_that_this_machine_has_solved(tmp_path):
-    task = tasks_of(tmp_path, [tiny_study(cases=(tiny_case(scene=SCENES[0]),))])[0]
-    path = task.store_failure("no mesh")
+    job = jobs_of(tmp_path, [tiny_study(cases=(tiny_case(scene=SCENES[0]),))])[0]
+    path = job.store_failure("no mesh")
     assert rates(Ledger(tmp_path), []) == {}, "what failed at once has no rate"
     solved = read_record(path)
     solved = replace(solved, attributes={**solved.attributes, "unknowns": 1000, "seconds": 4.0})

@@ -7,25 +7,25 @@ from studies.reference.reference_solves import reference_solves
 from studies.scenes import BALL_CLAMPED
 from studies.store.ledger import Ledger
 from studies.store.record import Status, peek
-from studies.sweep import tasks
+from studies.sweep.job import ReferenceJob, do
 
 
 def test_a_mesh_that_cannot_be_made_is_stored_as_failed_with_its_reason(tmp_path, monkeypatch):
     def refuse(root, solve):
         raise StudyError("ball: use more nodes")
 
-    monkeypatch.setattr(tasks, "solve", refuse)
-    task = tasks.ReferenceTask(tmp_path, "made_up", reference_solves(BALL_CLAMPED)[0])
-    stored = peek(tasks.do(task))
+    monkeypatch.setattr("studies.reference.solve.solve", refuse)
+    job = ReferenceJob(tmp_path, "made_up", reference_solves(BALL_CLAMPED)[0])
+    stored = peek(do(job))
     assert (stored.status, stored.message) == (Status.FAILED, "ball: use more nodes")
-    assert Ledger(tmp_path).why(task) is None
+    assert Ledger(tmp_path).why(job) is None
 
 
 def test_a_result_that_cannot_be_stored_ends_the_sweep(tmp_path, monkeypatch):
     def full(*_):
         raise StudyError("no space is left")
 
-    monkeypatch.setattr(tasks, "solve", full)
-    monkeypatch.setattr(tasks, "write_record", full)
+    monkeypatch.setattr("studies.reference.solve.solve", full)
+    monkeypatch.setattr("studies.sweep.job.write_record", full)
     with pytest.raises(StudyError, match="no space is left"):
-        tasks.do(tasks.ReferenceTask(tmp_path, "made_up", reference_solves(BALL_CLAMPED)[0]))
+        do(ReferenceJob(tmp_path, "made_up", reference_solves(BALL_CLAMPED)[0]))

@@ -15,7 +15,7 @@ from studies.store import ledger
 from studies.store.entry import CODE_CHANGED, MISSING
 from studies.store.machine import machine_id
 from studies.store.record import Status, read_record, write_record
-from studies.sweep import tasks
+from studies.sweep import job as jobs_module
 from studies.sweep.load import frame_times
 from studies.timing import cases as module
 from studies.timing.cases import time_cases, timing_file, write_timing
@@ -57,20 +57,20 @@ def test_measured_frames_make_the_time_metrics_numbers(results):
 
 
 def why_untimed(root, case):
-    return ledger.Ledger(root).why_untimed(tasks.CaseTask(root, "tiny", case))
+    return ledger.Ledger(root).why_untimed(jobs_module.CaseJob(root, "tiny", case))
 
 
 def read_timing(root, case):
-    return frame_times(ledger.Ledger(root), tasks.CaseTask(root, "tiny", case))
+    return frame_times(ledger.Ledger(root), jobs_module.CaseJob(root, "tiny", case))
 
 
 def can_be_timed(root, case):
-    return ledger.Ledger(root).can_be_timed(tasks.CaseTask(root, "tiny", case))
+    return ledger.Ledger(root).can_be_timed(jobs_module.CaseJob(root, "tiny", case))
 
 
 def test_current_until_the_code_changes_or_on_another_machine(results, monkeypatch):
     assert why_untimed(results, KEPT) is None
-    for asked in (module, tasks):
+    for asked in (module, jobs_module):
         monkeypatch.setattr(asked, "case_fingerprint", lambda case: "edited")
     assert why_untimed(results, KEPT) == CODE_CHANGED
     assert read_timing(results, KEPT) is None

@@ -29,18 +29,18 @@ from studies.sweep.executor import Executor
 from studies.sweep.failures import Failures
 from studies.sweep.find_study import ON, find_studies
 from studies.sweep.frame_times import measure_again
+from studies.sweep.job import Job, jobs_of
 from studies.sweep.plan import TIMING, plan, plan_again
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import causes, failed, standings, summary, unexpected, warnings_of
-from studies.sweep.tasks import Task, tasks_of
 
 JOBS = 2
 """Processes, where nothing is said."""
 AGAIN = "timing: stored cases are timed again on this machine; nothing else runs"
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 GIVEN = f"studies, or a FILE.py with STUDY or SCENE ({PROGRAM}); without: {MAIN_STUDIES}"
-Wanted = Callable[[Task], bool] | None
-Rule = Callable[[Ledger, Task], bool]
+Wanted = Callable[[Job], bool] | None
+Rule = Callable[[Ledger, Job], bool]
 
 
 def run(
@@ -115,7 +115,7 @@ def _bring_up_to_date(
         warn(refresh(ledger, study)[1])
     what = "charts" if drawn else "records"
     say(f"{study.name}: {amounts(progress.done) or 'nothing'} ran, {what} in {study_folder(root, study.name)}")
-    ended = [standing for standing in standings(ledger, study) if wanted is None or wanted(standing.task)]
+    ended = [standing for standing in standings(ledger, study) if wanted is None or wanted(standing.job)]
     odd = unexpected(study, ended)
     say(f"{study.name}: {summary(ended)}")
     for sentence in causes(odd):
@@ -151,7 +151,7 @@ def _time_again(ledger: Ledger, study: Study, dry: bool, drawn: bool) -> None:
 def _rules(only: str) -> list[Rule]:
     rules: dict[str, Rule] = {
         "failed": failed,
-        "stale": lambda ledger, task: ledger.why(task) not in (None, MISSING),
+        "stale": lambda ledger, job: ledger.why(job) not in (None, MISSING),
     }
     return [lookup(word.strip(), rules, "filter") for word in only.split(",")] if only else []
 
@@ -160,6 +160,6 @@ def _wanted(ledger: Ledger, study: Study, rules: list[Rule]) -> Wanted:
     """What one of the rules lets run; None for none, where all that is not current runs."""
     if not rules:
         return None
-    tasks = tasks_of(ledger.root, [study])
-    chosen = {task.path().absolute() for task in tasks if any(rule(ledger, task) for rule in rules)}
-    return lambda task: task.path().absolute() in chosen
+    jobs = jobs_of(ledger.root, [study])
+    chosen = {job.path().absolute() for job in jobs if any(rule(ledger, job) for rule in rules)}
+    return lambda job: job.path().absolute() in chosen

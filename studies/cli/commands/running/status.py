@@ -57,7 +57,7 @@ def show_reasons(found: list[Standing], every: bool) -> None:
     reasons: dict[tuple[str, str], list[str]] = {}
     for standing in found:
         if standing.status != "ok":
-            reasons.setdefault((standing.status, standing.message), []).append(standing.task.label)
+            reasons.setdefault((standing.status, standing.message), []).append(standing.job.label)
     for (word, message), labels in reasons.items():
         say(f"  {word}: {message}")
         shown = labels if every or len(labels) <= SHOWN + 1 else labels[:SHOWN]

@@ -28,7 +28,7 @@ REFERENCE = "reference "
 
 
 @dataclass(frozen=True)
-class Task(ABC):
+class Job(ABC):
     """One job, which can run in any process."""
 
     root: Path
@@ -110,7 +110,7 @@ class Task(ABC):
 
 
 @dataclass(frozen=True)
-class CaseTask(Task):
+class CaseJob(Job):
     """A case of a study."""
 
     work: Case
@@ -118,32 +118,32 @@ class CaseTask(Task):
 
     @property
     def label(self) -> str:
-        """As Task's."""
+        """As Job's."""
         return self.work.name
 
     @property
     def weight(self) -> float:
-        """As Task's."""
+        """As Job's."""
         return self.work.body.nodes / self.work.dt_fraction
 
     @property
     def needs(self) -> float:
-        """As Task's."""
+        """As Job's."""
         return MEMORY
 
     @property
     def seconds(self) -> float:
-        """As Task's."""
+        """As Job's."""
         return case_seconds(self.work)
 
     @property
     def size(self) -> int:
-        """As Task's."""
+        """As Job's."""
         return case_bytes(self.work)
 
     @property
     def fingerprint(self) -> str:
-        """As Task's."""
+        """As Job's."""
         return case_fingerprint(self.work)
 
     @cached_property
@@ -151,17 +151,17 @@ class CaseTask(Task):
         return case_path(self.root, self.study, self.work)
 
     def path(self) -> Path:
-        """As Task's."""
+        """As Job's."""
         return self._path
 
     def run(self) -> Path:
-        """As Task's."""
+        """As Job's."""
         from studies.runs.run import run_case  # with the solver, which takes most of a second to load
 
         return run_case(self.root, self.study, self.work)
 
     def failure(self, cause: str) -> Record:
-        """As Task's."""
+        """As Job's."""
         from studies.runs.run import OWN_FILES
 
         own = {str(file.path): file.sha256 for file in files_of(self.work.method, self.work.body.law)}
@@ -169,7 +169,7 @@ class CaseTask(Task):
 
 
 @dataclass(frozen=True)
-class ReferenceTask(Task):
+class ReferenceJob(Job):
     """One solution of the reference of a scene."""
 
     work: ReferenceSolve
@@ -177,33 +177,33 @@ class ReferenceTask(Task):
 
     @property
     def label(self) -> str:
-        """As Task's."""
+        """As Job's."""
         return REFERENCE + self.work.name
 
     @property
     def weight(self) -> float:
-        """As Task's."""
+        """As Job's."""
         return 1e9 + self.work.weight
 
     @property
     def needs(self) -> float:
-        """As Task's."""
+        """As Job's."""
         known = read_entry(self.path()).unknowns if is_there(self.path()) else None
         return solve_memory(self.work, known)
 
     @property
     def seconds(self) -> float:
-        """As Task's."""
+        """As Job's."""
         return solve_seconds(self.work)
 
     @property
     def size(self) -> None:
-        """As Task's."""
+        """As Job's."""
         return None
 
     @property
     def fingerprint(self) -> str:
-        """As Task's."""
+        """As Job's."""
         return reference_fingerprint()
 
     @cached_property
@@ -211,11 +211,11 @@ class ReferenceTask(Task):
         return self.work.path(self.root)
 
     def path(self) -> Path:
-        """As Task's."""
+        """As Job's."""
         return self._path
 
     def run(self) -> Path:
-        """As Task's. A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""
+        """As Job's. A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""
         from studies.reference.solve import solve
 
         try:
@@ -224,44 +224,44 @@ class ReferenceTask(Task):
             return self.store_failure(str(error))
 
     def failure(self, cause: str) -> Record:
-        """As Task's."""
+        """As Job's."""
         work = self.work
         nothing = {"unknowns": 0, "steps_done": 0, "seconds": float("nan")}
         about = {"scene": work.scene.name, "level": float(work.level), "variant": work.variant}
         return _failed(self, "reference", cause, about | nothing)
 
 
-def _failed(task: Task, kind: str, cause: str, attributes: dict[str, Any]) -> Record:
+def _failed(job: Job, kind: str, cause: str, attributes: dict[str, Any]) -> Record:
     return new_record(
         kind=kind,
-        key=task.work.key,
-        name=task.work.name,
+        key=job.work.key,
+        name=job.work.name,
         status=Status.FAILED,
         message=cause,
-        fingerprint=task.fingerprint,
+        fingerprint=job.fingerprint,
         attributes=attributes,
         fields={},
     )
 
 
-def do(task: Task) -> Path:
+def do(job: Job) -> Path:
     """Does a job, unless another command has meanwhile; where its record lies."""
-    return task.path() if task.done_meanwhile() else task.run()
+    return job.path() if job.done_meanwhile() else job.run()
 
 
-def case_tasks(root: Path, study: Study) -> list[CaseTask]:
+def case_jobs(root: Path, study: Study) -> list[CaseJob]:
     """A job per case, in the order of the study."""
-    return [CaseTask(root, study.name, case) for case in study.cases]
+    return [CaseJob(root, study.name, case) for case in study.cases]
 
 
-def reference_tasks(root: Path, scenes: Iterable[Scene]) -> list[ReferenceTask]:
+def reference_jobs(root: Path, scenes: Iterable[Scene]) -> list[ReferenceJob]:
     """A job per solution of the references of scenes."""
-    return [ReferenceTask(root, REFERENCES, one) for scene in scenes for one in reference_solves(scene)]
+    return [ReferenceJob(root, REFERENCES, one) for scene in scenes for one in reference_solves(scene)]
 
 
-def tasks_of(root: Path, studies: Iterable[Study]) -> list[Task]:
+def jobs_of(root: Path, studies: Iterable[Study]) -> list[Job]:
     """Everything the studies need, each result once, longest first."""
-    tasks: dict[Path, Task] = {}
+    jobs: dict[Path, Job] = {}
     for study in studies:
-        tasks |= {task.path(): task for task in (*reference_tasks(root, study.scenes), *case_tasks(root, study))}
-    return sorted(tasks.values(), key=lambda task: -task.weight)
+        jobs |= {job.path(): job for job in (*reference_jobs(root, study.scenes), *case_jobs(root, study))}
+    return sorted(jobs.values(), key=lambda job: -job.weight)
