@@ -216,8 +216,6 @@ class Ledger:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             database = self._database = sqlite3.connect(self.path, timeout=PATIENCE, check_same_thread=False)
             weakref.finalize(self, database.close)
-            if database.execute("PRAGMA quick_check(1)").fetchone() != ("ok",):
-                raise sqlite3.DatabaseError("it is damaged")
             if database.execute("PRAGMA user_version").fetchone() != (LAYOUT,):
                 with database:
                     database.execute("BEGIN IMMEDIATE")
