@@ -94,12 +94,14 @@ def test_each_command_opens_a_file_once_or_not_at_all(many, opened):
     assert opened == []
 
 
-def test_a_deleted_ledger_is_made_again_with_the_same_answers(many, opened):
+def test_a_deleted_ledger_is_made_again_with_the_same_answers(many, opened, monkeypatch, recwarn):
+    monkeypatch.setattr(module, "MANY", 0)
     expected = entries(many)
     Ledger(many).path.unlink()
     opened.clear()
     assert entries(many) == expected and len(opened) == COUNT
     assert entries(many) == expected and len(opened) == COUNT
+    assert not recwarn.list
 
 
 def test_an_index_of_the_version_before_is_ignored(many, opened):
