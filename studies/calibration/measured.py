@@ -5,7 +5,6 @@ from pathlib import Path
 
 from studies.base.errors import StudyError
 from studies.calibration.stored import STUDY
-from studies.catalog.study import Study
 from studies.metrics.judged import Judged, judged
 from studies.metrics.run import Run
 from studies.reference.load import Reference, load_reference
@@ -14,16 +13,16 @@ from studies.scene.scene import Scene
 from studies.store.ledger import Ledger
 from studies.store.record import read_record
 from studies.sweep.executor import Progress, Told, perform
-from studies.sweep.job import CaseJob, Job, jobs_of
+from studies.sweep.job import CaseJob, Job, reference_jobs
 from studies.sweep.local import Local
 from studies.sweep.run_studies import check_writable
 
 
 def pending(root: Path, scenes: Iterable[Scene], start: BodyRecipe) -> list[Job]:
     """Pieces of references and runs of the starting body that are missing or stale, the longest first."""
-    cases = tuple(Case(scene, start) for scene in scenes)
-    ledger, jobs = Ledger(root), jobs_of(root, [Study(STUDY, "", cases, (), ())])
-    return [job for job in jobs if ledger.why(job) is not None]
+    ledger, scenes = Ledger(root), list(scenes)
+    jobs = [*reference_jobs(root, scenes), *(CaseJob(root, STUDY, Case(scene, start)) for scene in scenes)]
+    return sorted((job for job in jobs if ledger.why(job) is not None), key=lambda job: -job.weight)
 
 
 def bring_up_to_date(todo: list[Job], root: Path, jobs: int, progress: Progress, on_compile: Told) -> None:
