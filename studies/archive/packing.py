@@ -22,6 +22,7 @@ from studies.report.results import make_folder, refresh, report
 from studies.runs.current import case_path
 from studies.runs.user_code import files_of
 from studies.store.archived import MANIFEST, check_no_archive
+from studies.store.ledger import Ledger
 from studies.store.links import link_study
 from studies.timing.cases import timing_file
 
@@ -71,7 +72,7 @@ def pack(root: Path, studies: Sequence[Study], target: Path, day: str, extra: It
     if target.suffix != SUFFIX:
         raise StudyError(f"an archive ends in {SUFFIX}, not '{target.name}'; give -o FILE{SUFFIX}")
     check_no_archive(root)
-    check_studies(root, studies, "archived")
+    check_studies(Ledger(root), studies, "archived")
     make_folder(target.parent)
     with TemporaryDirectory(dir=target.parent, prefix=f"{target.stem}-") as place:
         stage = Path(place) / "results"  # as commands in report.html name it
@@ -97,11 +98,12 @@ def gather(root: Path, studies: Sequence[Study], stage: Path) -> list[str]:
         found += [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
         for path in [*found, *entry_files(root)]:
             bring(path, stage / path.relative_to(root))
-        link_study(stage, study.name)
-        missing = refresh(stage, study)[1]
+        ledger = Ledger(stage)
+        link_study(ledger, study.name)
+        missing = refresh(ledger, study)[1]
         if missing:
             raise StudyError(f"not archived, something is missing: {study.name}: {missing[0]}")
-    remarks = report(stage, studies)[1]
+    remarks = report(Ledger(stage), studies)[1]
     shutil.rmtree(stage / "cache")
     return remarks
 

@@ -18,13 +18,14 @@ from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.population.folder import DURATION, NODES, PLAN, placed_scene
 from studies.reference.load import Reference, load_reference
-from studies.reference.reference_solves import reference_solves
+from studies.reference.reference_solves import reference_fingerprint, reference_solves
 from studies.reference.solve import solve
 from studies.scene.chosen_place import vector
 from studies.scene.placing import scaled
 from studies.scene.proposal import HELD, Proposal, proposal
 from studies.scene.scene import ForceOutput, Held, Scene
 from studies.scene.scene_file import python_name
+from studies.store.entry import why_stale
 
 PRESSED_IN, LIFTED = 0.1, 0.15
 """How far a plane goes in, of the depth along its way, and the free end goes up, of the organ's length."""
@@ -82,7 +83,7 @@ def lifted(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
 def solved(root: Path, scene: Scene) -> Reference:
     """The scene's reference, of which is solved what is not in `root` yet. Raises StudyError where a solve fails."""
     for one in reference_solves(scene):
-        if not one.is_current(root):
+        if why_stale(one.path(root), one.key, reference_fingerprint()) is not None:
             solve(root, one)
     reference = load_reference(root, scene)
     assert reference is not None  # all of these scenes have a plan

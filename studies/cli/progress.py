@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from studies.base.counting import amounts
 from studies.base.interrupts import stop_if_pressed
-from studies.store.staleness import MISSING
+from studies.store.entry import MISSING
 from studies.sweep.plan import Planned, expected, expected_bytes, free_bytes, kind_of
 
 QUIET_SECONDS = 10.0

@@ -20,17 +20,13 @@ from distributed.client import FutureCancelledError, FuturesCancelledError
 from studies.base.errors import StudyError
 from studies.base.processes import TRIES, Died
 from studies.catalog.study import Study
-from studies.engines.memory import need_of
-from studies.engines.requests import DoTask, FrameTimes, Preparation, check_for, wait_until_seen
+from studies.engines.requests import DoJob, FrameTimes, Preparation, check_for, wait_until_seen
 from studies.engines.worker import MEGABYTES, JobPlugin, do, machine
-from studies.runs.case import Case
-from studies.runs.current import case_fingerprint, case_path
 from studies.runs.user_code import Given, given_files
-from studies.store.staleness import is_current
+from studies.store.ledger import Ledger
 from studies.sweep.executor import Progress, Told
+from studies.sweep.job import Job, case_jobs
 from studies.sweep.local import environment, files_for
-from studies.sweep.tasks import Task
-from studies.timing.cases import can_be_timed
 
 CONNECT_SECONDS = 10.0
 """After which a scheduler that does not answer is not there."""
@@ -119,13 +115,13 @@ class Session:
             raise StudyError(GONE) from error
         return [future for future in futures if future.done()]
 
-    def check_memory(self, tasks: Sequence[Task], needs: Sequence[float]) -> None:
-        """Raises StudyError when a task needs more memory than any fit worker has."""
+    def check_memory(self, jobs: Sequence[Job], needs: Sequence[float]) -> None:
+        """Raises StudyError when a job needs more memory than any fit worker has."""
         limits = [worker["resources"][MEGABYTES] for worker in self.fit().values()]
         if limits and needs and max(needs) > max(limits):
-            task = tasks[needs.index(max(needs))]
+            job = jobs[needs.index(max(needs))]
             raise StudyError(
-                f"{task.label} needs about {max(needs) / 1e3:.1f} GB, and the largest worker has "
+                f"{job.label} needs about {max(needs) / 1e3:.1f} GB, and the largest worker has "
                 f"{max(limits) / 1e3:.1f} GB: start one with more (`organbench worker --memory`)"
             )
 
@@ -180,32 +176,32 @@ class Cluster:
         finally:
             session.end()
 
-    def map(self, tasks: Sequence[Task], on_compile: Told) -> Generator[tuple[Task, str | None]]:
+    def map(self, jobs: Sequence[Job], on_compile: Told) -> Generator[tuple[Job, str | None]]:
         """As every executor; what workers compile is not told. No more jobs are with Dask than can be done at a time:
         a worker that is lost costs those a try that it had."""
-        if not tasks:
+        if not jobs:
             return
-        with self._session(tasks[0].root, files_for(tasks), self.portable) as session:
-            needs = [need_of(task) / 1e6 for task in tasks]
-            session.check_memory(tasks, needs)
-            waiting, running, done = deque(range(len(tasks))), dict[Future, int](), list[Path]()
+        with self._session(jobs[0].root, files_for(jobs), self.portable) as session:
+            needs = [job.needs / 1e6 for job in jobs]
+            session.check_memory(jobs, needs)
+            waiting, running, done = deque(range(len(jobs))), dict[Future, int](), list[Path]()
             while waiting or running:
                 slots = sum(worker["nthreads"] for worker in session.fit().values())
                 while waiting and len(running) < slots:
                     number = waiting.popleft()
-                    running[session.submit(DoTask(tasks[number]), needs[number], retries=TRIES - 1)] = number
+                    running[session.submit(DoJob(jobs[number]), needs[number], retries=TRIES - 1)] = number
                 for future in session.ended(running):
-                    task = tasks[running.pop(future)]
+                    job = jobs[running.pop(future)]
                     cause = _cause(session, future)
-                    done += [task.path()] if cause is None else []
-                    yield task, cause
+                    done += [job.path()] if cause is None else []
+                    yield job, cause
         wait_until_seen(done)
 
     def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
         """As every executor: on one worker of each kind of machine, after all jobs, one machine after the other."""
-        cases = tuple(case for case in study.cases if case.timed)
-        chosen = [case for case in cases if among is None or case_path(root, study.name, case) in among]
-        if not chosen or (self.client is None and all(timed_somewhere(root, study.name, case) for case in chosen)):
+        timed = [job for job in case_jobs(root, study) if job.work.timed]
+        cases, chosen = tuple(job.work for job in timed), [t for t in timed if among is None or t.path() in among]
+        if not chosen or (self.client is None and all(map(Ledger(root).timed_somewhere, chosen))):
             return 0
         request = FrameTimes(root, study.name, cases, None if among is None else frozenset(among))
         with self._session(root, given_files(cases), portable=False) as session:
@@ -217,7 +213,7 @@ class Cluster:
 
 
 def _cause(session: Session, future: Future) -> str | None:
-    """Why a task is not done; raises what it raised."""
+    """Why a job is not done; raises what it raised."""
     try:
         error = session.result(future)
     except Died as death:
@@ -247,15 +243,6 @@ def _timed(session: Session, place: str, name: str, request: FrameTimes, progres
         )
     progress.advance("timing", name)
     return count
-
-
-def timed_somewhere(root: Path, study: str, case: Case) -> bool:
-    """Whether any machine has timed a case with this code, or none ever will."""
-    if not can_be_timed(root, study, case):
-        return True
-    path = case_path(root, study, case)
-    found = path.parent.glob(f"{path.stem}.timing.*.h5")
-    return any(is_current(file, case.key, case_fingerprint(case)) for file in found)
 
 
 @contextmanager

@@ -22,8 +22,7 @@ from studies.runs.user_code import Given, load_given, read_code
 from studies.store.machine import machine_id, this_machine
 from studies.sweep.executor import Silent
 from studies.sweep.frame_times import measure_times
-from studies.sweep.local import do
-from studies.sweep.tasks import Task
+from studies.sweep.job import Job, do
 
 SIGHT_SECONDS = 60.0
 """In which a file that another machine has written must be seen: network folders remember for half a minute what was
@@ -104,16 +103,16 @@ def check_for(root: Path, files: tuple[Given, ...]) -> Iterator[Check]:
 
 
 @dataclass(frozen=True)
-class DoTask:
+class DoJob:
     """A job of a sweep."""
 
-    task: Task
+    job: Job
 
     def answer(self) -> Exception | None:
         """Does it, unless its result is there: a job whose worker was lost may be done. What it raised, which Dask
         would take for a reason to try again."""
         try:
-            do(self.task)
+            do(self.job)
         except MemoryError:
             raise
         except Exception as error:

@@ -24,7 +24,7 @@ UNLIMITED = 1e12
 
 
 def do(session: str, request: bytes) -> bytes:
-    """In a Dask task: has a pickled request (studies.engines.requests) done; its pickled answer. Raises Died.
+    """In a Dask job: has a pickled request (studies.engines.requests) done; its pickled answer. Raises Died.
 
     All stays pickled here: this process may lack the types."""
     return get_worker().plugins[session].do(request)  # pyright: ignore[reportAttributeAccessIssue]

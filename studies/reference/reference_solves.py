@@ -1,4 +1,4 @@
-"""What the reference of a scene is made of: its solutions, what each depends on, where it lies, how it stands."""
+"""What the reference of a scene is made of: its solutions, what each depends on, and where it lies."""
 
 import json
 from dataclasses import dataclass, replace
@@ -9,7 +9,6 @@ from studies.geometry.mesher.jobs import MAKERS
 from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
 from studies.store.paths import key_digest, record_path
-from studies.store.staleness import why_stale
 
 STUDY = "reference"
 
@@ -57,14 +56,6 @@ class ReferenceSolve:
         """Where it lies."""
         return record_path(root, STUDY, self.name, self.key)
 
-    def is_current(self, root: Path) -> bool:
-        """Whether it is there, from this code, as it was written."""
-        return self.why_stale(root) is None
-
-    def why_stale(self, root: Path) -> str | None:
-        """Why it must be solved (again) (studies.store.staleness); None when it need not."""
-        return why_stale(self.path(root), self.key, reference_fingerprint())
-
     @property
     def stamp(self) -> str:
         """Problem and code in one text."""
@@ -102,18 +93,3 @@ def sensitivity_runs(scene: Scene) -> list[str]:
 def reference_fingerprint() -> str:
     """Hash of the code that makes a reference and of all that it imports; what judges references is not among it."""
     return source_fingerprint("studies.reference.solve", *MAKERS)
-
-
-@dataclass(frozen=True)
-class SolveStanding:
-    """How a reference solve stands."""
-
-    reference_solve: ReferenceSolve
-    state: str
-    """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""
-    unknowns: int | None
-    """None where nothing is stored."""
-    steps: int
-    """Checkpoints reached."""
-    seconds: float
-    """What solving took [s]; NaN where nothing is stored."""

@@ -1,8 +1,7 @@
 """How well every stored run kept its volumes: one table over all studies, written by `organbench report`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -12,16 +11,14 @@ from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.metrics.metric import COMPARABLE
 from studies.runs.case import Case
-from studies.runs.digest import case_digest
-from studies.store.index.room import Room
+from studies.store.ledger import Ledger
 from studies.store.record import read_record
-from studies.sweep.stored.known import Known
+from studies.sweep.job import CaseJob, case_jobs
 
 PROMISED = 1e-4
 """Worst |V_r/V0_r − 1| of any kept volume, after any frame, at the default step [1]."""
 DEFAULT_FRACTION = 0.5
 WORST = "worst |V/V0 - 1| [1]"
-ROOM = "kept volumes"
 
 
 def promised(case: Case) -> bool:
@@ -35,31 +32,28 @@ def worst_volume(volume: np.ndarray, target: np.ndarray) -> float:
     return float(np.max(np.abs(volume / target - 1)))
 
 
-def kept_volumes(root: Path, studies: Sequence[Study]) -> pd.DataFrame:
+def kept_volumes(ledger: Ledger, studies: Sequence[Study]) -> pd.DataFrame:
     """One row per stored run that the promise covers, the worst first; runs that broke off are left out."""
-    known, rows = Known(root), dict[str, dict[str, object]]()
-    code = source_fingerprint("studies.report.kept_volume")
+    rows, code = dict[str, dict[str, object]](), source_fingerprint("studies.report.kept_volume")
     for study in studies:
-        folder = known.folder(study.name)
-        room = Room(folder, ROOM)
-        for case in filter(promised, study.cases):
-            entry = known.of_case(study.name, case)
-            if entry is None or entry.status not in COMPARABLE:
-                continue
-            try:
-                row = room.get(entry.file, code, partial(_row, case, folder.folder / entry.file))
-            except StudyError:  # since the index read it: the table of the study tells of it
-                folder.forget([entry.file])
-                continue
-            rows[case_digest(case.replaced(recorded=()))] = row
-        room.keep()
+        jobs: dict[str, CaseJob] = {}
+        for job in case_jobs(ledger.root, study):
+            entry = ledger.entry(job)
+            if promised(job.work) and entry is not None and entry.status in COMPARABLE:
+                jobs[entry.file] = job
+        found = ledger.measured(study.name, "kept volumes", dict.fromkeys(jobs, code), partial(_row, jobs))
+        rows |= {jobs[file].work.replaced(recorded=()).key: row for file, row in found.items()}
     table = pd.DataFrame(list(rows.values()))
     return table if table.empty else table.sort_values(WORST, ascending=False)
 
 
-def _row(case: Case, path: Path) -> dict[str, object]:
-    record = read_record(path, ("volume", "volume_target"))
-    worst = worst_volume(record.fields["volume"].values, record.fields["volume_target"].values)
+def _row(jobs: Mapping[str, CaseJob], file: str) -> dict[str, object] | None:
+    """None for a file that turns out to be damaged: the table of its study reports it."""
+    try:
+        record = read_record(jobs[file].path(), ("volume", "volume_target"))
+    except StudyError:
+        return None
+    case, worst = jobs[file].work, worst_volume(record.fields["volume"].values, record.fields["volume_target"].values)
     return {
         "scene": case.scene.name,
         "body": case.body.series,

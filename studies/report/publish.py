@@ -11,10 +11,11 @@ from studies.population import POPULATION
 from studies.report.results import FIGURES, charts_and_tables, refresh
 from studies.report.sentences import SENTENCES
 from studies.report.summary import SUMMARIES
+from studies.store.ledger import Ledger
 from studies.store.machine import machine_id, machine_of, write_machine
 from studies.store.stamps import is_stamped
+from studies.sweep.frame_times import timed_jobs
 from studies.sweep.standings import standings
-from studies.timing.cases import timing_is_current
 from studies.verify.verification import FOLDER as VERIFY
 
 PUBLISHED = Path("results") / "published"
@@ -41,10 +42,11 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
     is written to `home`, unless every piece of every study, and every one of EXTRAS that is there, is of the present
     code.
     """
-    check_studies(root, studies)
+    ledger = Ledger(root)
+    check_studies(ledger, studies)
     absent = [name for name in EXTRAS if not (root / name).exists()]
     check_extras(root, [name for name in EXTRAS if name not in absent])
-    written, remarks = charts_and_tables(root, studies)
+    written, remarks = charts_and_tables(ledger, studies)
     if remarks:
         raise StudyError(f"not published, something is missing: {remarks[0]}")
     sources = [*written, root / "machine.json"]
@@ -64,10 +66,10 @@ def publish_some(root: Path, studies: Sequence[Study], home: Path) -> list[Path]
 
     Raises StudyError as `publish` does.
     """
-    check_studies(root, studies)
-    sources = []
+    ledger, sources = Ledger(root), []
+    check_studies(ledger, studies)
     for study in studies:
-        written, missing = refresh(root, study)
+        written, missing = refresh(ledger, study)
         if missing and not study.counts_losses:
             raise StudyError(f"not published, something is missing: {study.name}: {missing[0]}")
         sources += written
@@ -122,18 +124,14 @@ def show_sentences(studies: Sequence[Study], home: Path) -> None:
         write_whole(page, text.encode())
 
 
-def check_studies(root: Path, studies: Sequence[Study], done: str = "published") -> None:
+def check_studies(ledger: Ledger, studies: Sequence[Study], done: str = "published") -> None:
     """Raises StudyError when a piece of a study is missing or stale, a timing of this machine too; done: what is not
     done then."""
     behind = dict[str, list[str]]()
     for study in studies:
-        pieces = [s for s in standings(root, study) if s.status in ("missing", "stale")]
-        lacking = [f"{piece.task.label} is {piece.status}" for piece in pieces]
-        lacking += [
-            f"the frame time of {case.name} is missing or stale"
-            for case in study.cases
-            if case.timed and not timing_is_current(root, study.name, case)
-        ]
+        lacking = [f"{one.job.label} is {one.status}" for one in standings(ledger, study) if not one.ended]
+        untimed = [job for job in timed_jobs(ledger, study) if ledger.why_untimed(job) is not None]
+        lacking += [f"the frame time of {job.label} is missing or stale" for job in untimed]
         if lacking:
             behind[study.name] = lacking
     if behind:

@@ -7,17 +7,18 @@ from pathlib import Path
 import pandas as pd
 
 from massspring.sources import own_modules, source_fingerprint
-from studies.base.atomic import is_there, write_whole
+from studies.base.atomic import write_whole
 from studies.metrics.rest_surface import rest_surfaces
 from studies.metrics.true_surface import ShapeErrors, shape_errors
 from studies.plots.uncertainty import draw
 from studies.reference.load import Reference
-from studies.reference.reference_solves import STUDY, reference_solves
+from studies.reference.reference_solves import STUDY
 from studies.reference.solve import VARIANTS
 from studies.scene.scene import Scene
 from studies.store.paths import study_folder
 from studies.store.tables.csv_table import write_table
-from studies.sweep.stored.references import References
+from studies.sweep.job import reference_jobs
+from studies.sweep.load import References
 
 TABLE, CHART = "uncertainty.csv", "uncertainty.png"
 
@@ -60,27 +61,19 @@ def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def state_of(files: Iterable[Path], others: Iterable[str] = ()) -> str:
-    """Hash of all that charts and tables are made from: result files with their sizes and times, `others` that were
-    looked at before, and the code."""
-    digest = hashlib.sha256(source_fingerprint(*own_modules()).encode())
-    for other in others:
-        digest.update(f"{other}\n".encode())
-    for file in files:
-        state = file.stat() if is_there(file) else None
-        digest.update(f"{file.name} {state and (state.st_mtime_ns, state.st_size)}\n".encode())
-    return digest.hexdigest()
+def state_of(*sources: str) -> str:
+    """Hash of all that charts and tables are made from: `sources`, which name files with sizes and times, and the
+    code."""
+    return hashlib.sha256("\n".join([source_fingerprint(*own_modules()), *sources]).encode()).hexdigest()
 
 
 def refresh_uncertainty(references: References, scenes: Iterable[Scene]) -> list[Path]:
     """Writes table and chart of the error bars, unless they show what is stored; none where no reference is known."""
-    each, root = list({scene.name: scene for scene in scenes}.values()), references.known.root
+    each, root = list({scene.name: scene for scene in scenes}.values()), references.ledger.root
     folder = study_folder(root, STUDY)
     paths = [folder / TABLE, folder / CHART]
-    stamp, state = (
-        root / "cache" / f"{STUDY}.drawn",
-        state_of(p.path(root) for scene in each for p in reference_solves(scene)),
-    )
+    state = state_of(references.ledger.state(reference_jobs(root, each)))
+    stamp = root / "cache" / f"{STUDY}.drawn"
     if all(path.exists() for path in (*paths, stamp)) and stamp.read_bytes() == state.encode():
         return paths
     solved = known_references(references, each)

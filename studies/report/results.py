@@ -2,13 +2,15 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
-from studies.exchange.entry import entries_beside, entry_files
+from studies.exchange.entry import FOLDER as SUBMISSIONS
+from studies.exchange.entry import entries_beside
 from studies.geometry import SHAPES, organ
 from studies.metrics.run import Run
 from studies.metrics.table import metric, study_table
@@ -16,24 +18,21 @@ from studies.plots.figures import paper_ball, paper_slide
 from studies.plots.figures.organ_springs import draw_organ_springs
 from studies.plots.figures.organs import draw_organs
 from studies.plots.style.style import svg_copies
-from studies.reference.reference_solves import reference_solves
 from studies.report.kept_volume import kept_volumes
 from studies.report.page.part import read_part, write_part
 from studies.report.page.write import write_page
 from studies.report.references import refresh_uncertainty, state_of
 from studies.report.summary import SUMMARIES
-from studies.runs.digest import case_digest
 from studies.runs.paper import play, slide_case, squeezed_balls
 from studies.runs.user_code import fault_of, file_of
 from studies.store.archived import is_archive, shown_machine
-from studies.store.index.entry import written
+from studies.store.ledger import Ledger
 from studies.store.machine import write_machine
-from studies.store.paths import study_folder, timing_name
+from studies.store.paths import study_folder
 from studies.store.stamps import set_stamp
 from studies.store.tables.csv_table import write_table
-from studies.sweep.load import load_runs
-from studies.sweep.stored.known import Known
-from studies.sweep.stored.references import References
+from studies.sweep.job import case_jobs, reference_jobs
+from studies.sweep.load import References, load_runs
 
 FIGURES = "figures"
 FIGURE_NODES = 550
@@ -72,31 +71,31 @@ def make_folder(folder: Path) -> None:
         ) from error
 
 
-def report(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
+def report(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
     """Charts and tables of all studies, the summaries, machine.json, and report.html, which shows all of it in one
     page; paths, and what is missing in sentences.
     """
-    written, remarks = charts_and_tables(root, studies)
-    page, left_out = write_page(root, studies)
+    written, remarks = charts_and_tables(ledger, studies)
+    page, left_out = write_page(ledger.root, studies)
     return [*written, *([page] if page else [])], [*remarks, *left_out]
 
 
-def charts_and_tables(root: Path, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
+def charts_and_tables(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
     """The same without the page.
 
     A study of which nothing is stored keeps the charts that are there.
     """
-    written, remarks, absent, known = [], [], [], Known(root)
-    references = References(known)
+    written, remarks, absent, root = [], [], [], ledger.root
+    references = References(ledger)
     for study in studies:
-        if not any(known.of_case(study.name, case) for case in study.cases):
+        if not any(map(ledger.entry, case_jobs(root, study))):
             absent.append(study.name)
             continue
-        paths, missing = refresh(root, study, references)
+        paths, missing = refresh(ledger, study, references)
         written += paths
         remarks += [f"{study.name}: {sentence}" for sentence in missing]
     written += refresh_uncertainty(references, [scene for study in studies for scene in study.scenes])
-    kept = kept_volumes(root, studies)
+    kept = kept_volumes(ledger, studies)
     if len(kept):
         written.append(write_table(root / "kept_volume.csv", kept))
     if not is_archive(root):
@@ -106,36 +105,56 @@ def charts_and_tables(root: Path, studies: Sequence[Study]) -> tuple[list[Path],
     return written, remarks
 
 
-def refresh(root: Path, study: Study, known: References | None = None) -> tuple[list[Path], list[str]]:
-    """Draws the charts and writes the tables of a study, unless they show what is stored already. known: references
-    that other studies need too.
+def refresh(ledger: Ledger, study: Study, references: References | None = None) -> tuple[list[Path], list[str]]:
+    """Draws the charts and writes the tables of a study, unless they show what is stored already; their paths, and what
+    is missing in sentences.
 
-    Their paths, and what is missing in sentences.
+    references: those of the ledger, where other studies need them too.
     """
-    folder = study_folder(root, study.name)
-    table = folder / f"{study.name}.csv"
-    paths = [*(folder / chart.file for chart in study.charts), table]
-    told = [summary for summary in SUMMARIES if summary.study == study.name]
-    paths += [root / summary.file for summary in told]
-    stamp = root / "cache" / f"{study.name}.drawn.json"
-    shown = {"inputs": inputs_of(root, study), "remarks": []}
-    before = _stamped(stamp)
-    current = before.get("inputs") == shown["inputs"] and all(path.exists() for path in paths)
-    if current and read_part(root, study) is not None:
+    folder, state = study_folder(ledger.root, study.name), state_of_study(ledger, study)
+    paths = [*(folder / chart.file for chart in study.charts), folder / f"{study.name}.csv"]
+    paths += [ledger.root / summary.file for summary in SUMMARIES if summary.study == study.name]
+    before = _stamped(ledger.root / "cache" / f"{study.name}.drawn.json")
+    drawn = before.get("inputs") == state and all(path.exists() for path in paths)
+    if drawn and read_part(ledger.root, study) is not None:
         return paths, before["remarks"]
-    runs, shown["remarks"] = load_runs(root, study, known)
-    references = {run.case.scene.name: run.reference for run in runs}
-    entries, unreadable = entries_beside(root, study.scenes, lambda scene: references.get(scene.name))
-    shown["remarks"] += unreadable
-    rows = study_table([*runs, *entries], study.columns)
-    write_table(table, rows)
-    for summary in told:
-        write_whole(root / summary.file, (summary.text(runs) + "\n").encode())
+    return paths, draw(load(ledger, study, references or References(ledger)), state)
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A study with all that its charts and tables show."""
+
+    root: Path
+    study: Study
+    runs: list[Run]
+    submissions: list[Run]
+    """Results of other programs in its scenes."""
+    remarks: list[str]
+    """What is missing, in sentences."""
+
+
+def load(ledger: Ledger, study: Study, references: References) -> Loaded:
+    """Reads all that is stored of a study."""
+    runs, remarks = load_runs(ledger.root, study, references)
+    submissions, unreadable = entries_beside(ledger.root, study.scenes, references.of)
+    return Loaded(ledger.root, study, runs, submissions, [*remarks, *unreadable])
+
+
+def draw(loaded: Loaded, state: str) -> list[str]:
+    """Writes tables, summaries, charts and the part of the page; what is missing, in sentences. state: kept, so that
+    nothing is drawn until it changes."""
+    root, study, runs = loaded.root, loaded.study, [*loaded.runs, *loaded.submissions]
+    rows = study_table(runs, study.columns)
+    write_table(study_folder(root, study.name) / f"{study.name}.csv", rows)
+    for summary in (summary for summary in SUMMARIES if summary.study == study.name):
+        write_whole(root / summary.file, (summary.text(loaded.runs) + "\n").encode())
     with svg_copies() as pictures:
-        draw_charts(root, study, [*runs, *entries])
-    write_part(root, study, [*runs, *entries], rows, pictures)
-    write_whole(stamp, json.dumps(shown).encode())
-    return paths, shown["remarks"]
+        draw_charts(root, study, runs)
+    write_part(root, study, runs, rows, pictures)
+    drawn = {"inputs": state, "remarks": loaded.remarks}
+    write_whole(root / "cache" / f"{study.name}.drawn.json", json.dumps(drawn).encode())
+    return loaded.remarks
 
 
 def _stamped(stamp: Path) -> dict[str, Any]:
@@ -148,21 +167,17 @@ def _stamped(stamp: Path) -> dict[str, Any]:
     return before if known and isinstance(before.get("remarks"), list) else {}
 
 
-def inputs_of(root: Path, study: Study) -> str:
-    """Hash of all that charts and tables are made from: result files with their sizes and times, and the code, that of
-    the user's files too."""
-    known, machine = Known(root), shown_machine(root)
-    entries = [(case, known.of_case(study.name, case)) for case in study.cases]
-    names = [entry.file if entry else case_digest(case) for case, entry in entries]
-    names += [timing_name(entry.file, machine) for case, entry in entries if entry and case.timed]
-    states = known.folder(study.name).states
-    files = [f"{name} {written(states.get(name))}" for name in names]
-    references = [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
+def state_of_study(ledger: Ledger, study: Study) -> str:
+    """Hash of all that charts and tables are made from: the lines of the ledger, and the code, that of the user's files
+    too."""
+    jobs, machine = case_jobs(ledger.root, study), shown_machine(ledger.root)
+    others = [*(ledger.timing(job, machine) for job in jobs), *ledger.files(SUBMISSIONS).values()]
     metrics = [metric(column) for column in study.columns]
-    shown = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
-    own = {file.sha256[:16] for file in map(file_of, shown) if file is not None}
-    state = state_of([*entry_files(root), *references], files)
-    return "-".join([state, *(entry.name for entry in metrics), *sorted(own), study.word])
+    drawn = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
+    own = {file.sha256 for file in map(file_of, drawn) if file is not None}
+    names = [*(job.digest for job in jobs), *(entry.name for entry in metrics), *sorted(own), study.word]
+    files = ledger.state([*jobs, *reference_jobs(ledger.root, study.scenes)])
+    return state_of(files, *(entry.written if entry else "-" for entry in others), *names)
 
 
 def draw_figures(root: Path) -> list[Path]:

@@ -1,4 +1,4 @@
-"""Where the record of a case lies, and whether it is there from this code."""
+"""Where the record of a case lies, and the number of the code that makes it."""
 
 import hashlib
 from pathlib import Path
@@ -8,7 +8,6 @@ from studies.geometry.mesher.jobs import MAKERS
 from studies.runs.case import Case
 from studies.runs.user_code import files_of
 from studies.store.paths import record_path
-from studies.store.staleness import why_stale
 
 
 def run_fingerprint() -> str:
@@ -27,8 +26,3 @@ def case_fingerprint(case: Case) -> str:
 def case_path(root: Path, study: str, case: Case) -> Path:
     """Where the record of a case lies."""
     return record_path(root, study, case.name, case.key)
-
-
-def why_case_is_stale(root: Path, study: str, case: Case) -> str | None:
-    """Why it must run (again) (studies.store.staleness); None when it need not."""
-    return why_stale(case_path(root, study, case), case.key, case_fingerprint(case))

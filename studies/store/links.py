@@ -3,19 +3,18 @@
 import io
 from collections import Counter
 from collections.abc import Collection, Sequence
-from pathlib import Path
 
 import h5py
 
 from studies.base.atomic import is_there, sweep_parts, write_whole
-from studies.store.index.entry import Entry
-from studies.store.index.folder import FolderIndex
+from studies.store.entry import Entry
+from studies.store.ledger import Ledger
 from studies.store.opening import BLOCK, sealed
 from studies.store.paths import DIGITS, SUFFIX, TIMING, index_path
 from studies.store.record import INDEX_KIND, SCHEMA
 
 
-def link_study(root: Path, study: str) -> list[str]:
+def link_study(ledger: Ledger, study: str) -> list[str]:
     """Writes results/STUDY/STUDY.h5: an external link (relative file name, so that the folder can be moved) to every
     record by its name, and below "timing/MACHINE" to every timing file. Also removes what killed writers left.
 
@@ -23,10 +22,10 @@ def link_study(root: Path, study: str) -> list[str]:
     the index's place.
     Raises StudyError when the index cannot be written.
     """
-    index = index_path(root, study)
+    index = index_path(ledger.root, study)
     sweep_parts(index.parent)
-    entries = sorted(FolderIndex(root, study).entries.values())
-    unreadable = [entry.told for entry in entries if entry.fault]
+    entries = ledger.files(study).values()
+    unreadable = [entry.error_message for entry in entries if entry.fault]
     records, timings = (
         [entry for entry in entries if not entry.fault and (TIMING in entry.file) == timed] for timed in (False, True)
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from studies.catalog.study import Study
-from studies.sweep.tasks import Task
+from studies.sweep.job import Job
 
 Told = Callable[[str], object]
 """Called with the name of a function that is being compiled, from any thread."""
@@ -55,10 +55,10 @@ class Executor(Protocol):
         """Whether results are to be equal on every x86-64 processor (studies.base.portable)."""
         ...
 
-    def map(self, tasks: Sequence[Task], on_compile: Told) -> Generator[tuple[Task, str | None]]:
-        """Does the tasks and yields each as it ends: with None, or with the cause where its process died in all tries.
+    def map(self, jobs: Sequence[Job], on_compile: Told) -> Generator[tuple[Job, str | None]]:
+        """Does the jobs and yields each as it ends: with None, or with the cause where its process died in all tries.
 
-        Raises StudyError before anything runs where a task cannot run, and what a task raises."""
+        Raises StudyError before anything runs where a job cannot run, and what a job raises."""
         ...
 
     def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
@@ -68,17 +68,17 @@ class Executor(Protocol):
 
 def perform(
     executor: Executor,
-    tasks: Sequence[Task],
+    jobs: Sequence[Job],
     progress: Progress,
     on_compile: Told,
-    on_death: Callable[[Task, str], object],
+    on_death: Callable[[Job, str], object],
 ) -> None:
-    """Does the tasks; `on_death` gets those whose process died, with the cause. Ctrl-C keeps what is stored."""
-    if not tasks:
+    """Does the jobs; `on_death` gets those whose process died, with the cause. Ctrl-C keeps what is stored."""
+    if not jobs:
         return
-    progress.begin("physics", len(tasks))
-    with closing(executor.map(tasks, on_compile)) as ended:
-        for task, cause in ended:
+    progress.begin("physics", len(jobs))
+    with closing(executor.map(jobs, on_compile)) as ended:
+        for job, cause in ended:
             if cause is not None:
-                on_death(task, cause)
-            progress.advance("physics", task.label)
+                on_death(job, cause)
+            progress.advance("physics", job.label)

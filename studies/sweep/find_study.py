@@ -6,13 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from studies.base.collection import uncollected
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
 from studies.population import POPULATION, population_study, study_on
 from studies.runs.case import Case, case_from_json, case_to_dict
-from studies.runs.digest import parts_of
 from studies.scene.clock import check_clock
 from studies.sweep.find_scene import SUFFIX, read_user_file
 
@@ -24,7 +22,6 @@ MAIN = "main"
 """Stands for the main studies of the catalogue; no study has this name."""
 
 
-@uncollected()
 def find_study(name: str) -> Study:
     """A study of the catalogue, or that of a Python file (STUDY, else one of SCENE); either on a folder of surfaces,
     where ON and one follow.
@@ -38,14 +35,10 @@ def find_study(name: str) -> Study:
     study = replace(read_user_file(name).as_study, word=name)
     for scene in study.scenes:
         check_clock(scene, f"{Path(name).name}: ")
-    seen: set[object] = set()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Pydantic serializer warnings")  # the sentence for an odd setting is ours
         for case in study.cases:
-            parts, numbers = parts_of(case), _types(case)
-            if parts is None or numbers not in seen or not seen.issuperset(parts):
-                _check_stored(name, case)
-                seen.update((*(parts or ()), numbers))
+            _check_stored(name, case)
     return study
 
 
@@ -72,12 +65,6 @@ def find_studies(names: Sequence[str]) -> list[Study]:
     """The studies of so many names; the main ones of the catalogue for none, and for the name "main"."""
     found = [[s for s in STUDIES if s.main] if name == MAIN else [find_study(name)] for name in names or [MAIN]]
     return [study for group in found for study in group]
-
-
-def _types(case: Case) -> tuple[object, ...]:
-    """Of the numbers of a case, whose values can all be stored; with its parts it decides whether a case can be."""
-    numbers = (case.dt, case.dt_fraction, case.frames, case.beyond_limit)
-    return (*map(type, numbers), case.precision, case.recorded)
 
 
 def _check_stored(name: str, case: Case) -> None:

@@ -6,10 +6,10 @@ from pathlib import Path
 from studies.base.compile_watch import watching
 from studies.catalog.study import Study
 from studies.runs.case import Case
-from studies.runs.current import case_path
 from studies.store.archived import check_no_archive
+from studies.store.ledger import Ledger
 from studies.sweep.executor import Progress, Told
-from studies.sweep.stored.known import Known
+from studies.sweep.job import CaseJob, case_jobs
 from studies.timing.alone import alone
 from studies.timing.cases import time_cases
 
@@ -17,29 +17,38 @@ from studies.timing.cases import time_cases
 def measure_times(root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
     """Times what is not timed yet, of `among` where given, when no other command does; how many that were."""
 
+    ledger = Ledger(root)
+
     def pending() -> list[Case]:
-        known = Known(root)
-        return [
-            case
-            for case in study.cases
-            if case.timed and known.can_be_timed(study.name, case) and known.why_untimed(study.name, case) is not None
-            if among is None or case_path(root, study.name, case) in among
-        ]
+        ledger.look_again()
+        untimed = [job for job in timed_jobs(ledger, study) if ledger.why_untimed(job) is not None]
+        return [job.work for job in untimed if among is None or job.path() in among]
 
     return _measured(root, study, progress, on_compile, pending)
 
 
-def measure_again(root: Path, study: Study, progress: Progress, on_compile: Told) -> int:
+def measure_again(ledger: Ledger, study: Study, progress: Progress, on_compile: Told) -> int:
     """Times again on this machine all that is stored and current, and runs none of it; how many that were. Older times
     of a case stay until the newer ones are whole. Raises StudyError for a root that is an archive."""
-    check_no_archive(root)
-    return _measured(root, study, progress, on_compile, lambda: timed_again(Known(root), study))
+    check_no_archive(ledger.root)
+
+    def pending() -> list[Case]:
+        ledger.look_again()
+        return [job.work for job in timed_again(ledger, study)]
+
+    count = _measured(ledger.root, study, progress, on_compile, pending)
+    ledger.look_again()
+    return count
 
 
-def timed_again(known: Known, study: Study) -> list[Case]:
+def timed_again(ledger: Ledger, study: Study) -> list[CaseJob]:
     """The cases that `measure_again` times: those of which a run of this code is stored that came to its end."""
-    timed = [case for case in study.cases if case.timed and known.can_be_timed(study.name, case)]
-    return [case for case in timed if known.why_case_is_stale(study.name, case) is None]
+    return [job for job in timed_jobs(ledger, study) if ledger.why(job) is None]
+
+
+def timed_jobs(ledger: Ledger, study: Study) -> list[CaseJob]:
+    """The cases of a study that are to be timed, and are stored and came to their end."""
+    return [job for job in case_jobs(ledger.root, study) if job.work.timed and ledger.can_be_timed(job)]
 
 
 def _measured(root: Path, study: Study, progress: Progress, on_compile: Told, pending: Callable[[], list[Case]]) -> int:

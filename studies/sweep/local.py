@@ -9,37 +9,19 @@ from pathlib import Path
 from numba.core import event
 
 from studies.base.compile_watch import EVENT, CompileWatch
-from studies.base.errors import StudyError
 from studies.base.portable import environment as portable_environment
 from studies.base.processes import Tell, run_each
 from studies.catalog.study import Study
 from studies.geometry.mesher.jobs import cache_folder
-from studies.reference.reference_solves import ReferenceSolve
-from studies.reference.solve import solve
-from studies.runs.case import Case
-from studies.runs.run import run_case
 from studies.runs.user_code import Given, given_files, load_given
 from studies.sweep.executor import Progress, Told
-from studies.sweep.failures import store_failure
 from studies.sweep.frame_times import measure_times
-from studies.sweep.tasks import Task
+from studies.sweep.job import CaseJob, Job, do
 
 COMPILED = "NUMBA_CACHE_DIR"
 """Where the user may want compiled code."""
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Every process computes on one core: the cores are shared out by cases, not inside them."""
-
-
-def do(task: Task) -> Path:
-    """Does a task, unless another command has meanwhile; where its record lies."""
-    if task.done_meanwhile():
-        return task.path()
-    if isinstance(task.work, ReferenceSolve):
-        try:
-            return solve(task.root, task.work)
-        except StudyError as error:  # a mesh that cannot be made costs its scene, as it does for a case
-            return store_failure(task, str(error))
-    return run_case(task.root, task.study, task.work)
 
 
 def begin(files: tuple[Given, ...], tell: Tell) -> None:
@@ -48,9 +30,9 @@ def begin(files: tuple[Given, ...], tell: Tell) -> None:
     event.register(EVENT, CompileWatch(tell))
 
 
-def files_for(tasks: Sequence[Task]) -> tuple[Given, ...]:
-    """The user's files that tasks need."""
-    return given_files(task.work for task in tasks if isinstance(task.work, Case))
+def files_for(jobs: Sequence[Job]) -> tuple[Given, ...]:
+    """The user's files that jobs need."""
+    return given_files(job.work for job in jobs if isinstance(job, CaseJob))
 
 
 def environment(portable: bool = False) -> dict[str, str]:
@@ -75,10 +57,10 @@ class Local:
     def __exit__(self, *error: object) -> None:
         """Its processes end with each sweep."""
 
-    def map(self, tasks: Sequence[Task], on_compile: Told) -> Generator[tuple[Task, str | None]]:
+    def map(self, jobs: Sequence[Job], on_compile: Told) -> Generator[tuple[Job, str | None]]:
         """As every executor."""
-        prepare = partial(begin, files_for(tasks))
-        for ended in run_each(tasks, self.processes, do, prepare, environment(self.portable), on_compile):
+        prepare = partial(begin, files_for(jobs))
+        for ended in run_each(jobs, self.processes, do, prepare, environment(self.portable), on_compile):
             yield ended.job, ended.cause
 
     def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:

@@ -7,19 +7,16 @@ from pathlib import Path
 
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
-from studies.reference.reference_solves import ReferenceSolve
-from studies.runs.case import Case
-from studies.runs.size import record_bytes, timing_bytes
-from studies.store.index.entry import Entry
+from studies.reference.reference_solves import STUDY as REFERENCES
+from studies.store.entry import Entry
+from studies.store.ledger import Ledger
+from studies.store.machine import machine_id
+from studies.sweep.estimate import SECONDS_PER_UNKNOWN, timing_bytes, timing_seconds
 from studies.sweep.frame_times import timed_again
-from studies.sweep.stored.estimate import predicted, rates, timing_seconds
-from studies.sweep.stored.known import Known
-from studies.sweep.tasks import REFERENCE, Task, tasks_of
+from studies.sweep.job import REFERENCE, CaseJob, Job, case_jobs, jobs_of
 
 PHYSICS, TIMING = "physics", "timing"
 """The stages: the first in several processes, the second alone."""
-
-
 AGAIN = "asked for again"
 """Why stored cases are timed though their times are current."""
 
@@ -39,59 +36,65 @@ class Planned:
     size: int | None = None
     """Bytes that it will store: as then, else from what a case records; None of a reference that is not stored."""
     guess: float = 0.0
-    """Seconds by its size and a rate (studies.sweep.stored.estimate), which count where it has not run."""
+    """Seconds by its size and a rate (studies.sweep.estimate), which count where it has not run."""
     here: bool = False
     """Whether that rate is one of this machine."""
 
 
-def plan(
-    root: Path, study: Study, wanted: Callable[[Task], bool] | None = None, known: Known | None = None
-) -> list[Planned]:
+def plan(ledger: Ledger, study: Study, wanted: Callable[[Job], bool] | None = None) -> list[Planned]:
     """What `run_studies` would run of a study, in its order; `wanted` as there."""
-    known, tasks = known or Known(root), tasks_of(root, [study])
-    chosen = [task for task in tasks if _runs(task, wanted, known)]
-    measured = rates(known, tasks) if chosen else {}
-    found = [_of_task(task, known, measured) for task in chosen]
-    runs = {piece.label for piece in found}
-    for case in study.cases:
-        if not case.timed or (wanted is not None and case.name not in runs):
+    jobs = jobs_of(ledger.root, [study])
+    chosen = [job for job in jobs if (ledger.why(job) is not None if wanted is None else wanted(job))]
+    measured = rates(ledger, jobs) if chosen else {}
+    found = [_of_job(ledger, job, measured) for job in chosen]
+    runs = {job.label for job in chosen}
+    for job in case_jobs(ledger.root, study):
+        if not job.work.timed or (wanted is not None and job.label not in runs):
             continue
-        why = known.why_untimed(study.name, case)
-        if why is not None and (known.can_be_timed(study.name, case) or case.name in runs):
-            found.append(_of_timing(study, case, why, known, measured))
+        why = ledger.why_untimed(job)
+        if why is not None and (ledger.can_be_timed(job) or job.label in runs):
+            found.append(_of_timing(ledger, job, why, measured))
     return found
 
 
-def plan_again(root: Path, study: Study) -> list[Planned]:
+def plan_again(ledger: Ledger, study: Study) -> list[Planned]:
     """What `measure_again` would time of a study, in its order."""
-    known = Known(root)
-    measured = rates(known, tasks_of(root, [study]))
-    return [_of_timing(study, case, AGAIN, known, measured) for case in timed_again(known, study)]
+    measured = rates(ledger, jobs_of(ledger.root, [study]))
+    return [_of_timing(ledger, job, AGAIN, measured) for job in timed_again(ledger, study)]
 
 
 def kind_of(stage: str, label: str) -> str:
-    """ "reference", "case" or "timing", by the stage and the label of a task."""
+    """ "reference", "case" or "timing", by the stage and the label of a job."""
     return TIMING if stage == TIMING else "reference" if label.startswith(REFERENCE) else "case"
 
 
-def _runs(task: Task, wanted: Callable[[Task], bool] | None, known: Known) -> bool:
-    return known.why_stale(task) is not None if wanted is None else wanted(task)
+def rates(ledger: Ledger, jobs: Sequence[Job]) -> dict[str, float]:
+    """Measured over estimated seconds of what this machine has stored: of all references by their unknowns, of the
+    given cases; a kind of which nothing is stored is left out."""
+    here, sums = machine_id(), {"case": [0.0, 0.0], "reference": [0.0, 0.0]}
+    for entry in ledger.files(REFERENCES).values():
+        if entry.seconds and entry.unknowns and entry.machine == here:
+            sums["reference"][0] += entry.seconds
+            sums["reference"][1] += SECONDS_PER_UNKNOWN * entry.unknowns
+    for job in jobs:
+        entry = ledger.entry(job)
+        if job.kind == "case" and entry and entry.seconds and entry.machine == here:
+            sums["case"][0] += entry.seconds
+            sums["case"][1] += job.seconds
+    return {kind: measured / estimated for kind, (measured, estimated) in sums.items() if measured > 0}
 
 
-def _of_task(task: Task, known: Known, measured: Mapping[str, float]) -> Planned:
-    why = known.why_stale(task) or "its result is a failure"
-    seconds, size = _cost(known.entry(task))
-    kind = "reference" if isinstance(task.work, ReferenceSolve) else "case"
-    guess = 0.0 if seconds is not None else predicted(task) * measured.get(kind, 1.0)
-    if not isinstance(task.work, ReferenceSolve):
-        size = size or record_bytes(task.work)
-    return Planned(PHYSICS, kind, task.label, why, seconds, size, guess, kind in measured)
+def _of_job(ledger: Ledger, job: Job, measured: Mapping[str, float]) -> Planned:
+    why = ledger.why(job) or "its result is a failure"
+    seconds, size = _cost(ledger.entry(job))
+    guess = 0.0 if seconds is not None else job.seconds * measured.get(job.kind, 1.0)
+    return Planned(PHYSICS, job.kind, job.label, why, seconds, size or job.size, guess, job.kind in measured)
 
 
-def _of_timing(study: Study, case: Case, why: str, known: Known, measured: Mapping[str, float]) -> Planned:
-    seconds, size = _cost(known.of_timing(study.name, case))
-    guess = 0.0 if seconds is not None else timing_seconds(case) * measured.get("case", 1.0)
-    return Planned(TIMING, TIMING, case.name, why, seconds, size or timing_bytes(case), guess, "case" in measured)
+def _of_timing(ledger: Ledger, job: CaseJob, why: str, measured: Mapping[str, float]) -> Planned:
+    seconds, size = _cost(ledger.timing(job))
+    guess = 0.0 if seconds is not None else timing_seconds(job.work) * measured.get("case", 1.0)
+    return Planned(TIMING, TIMING, job.label, why, seconds, size or timing_bytes(job.work), guess, "case" in measured)
 
 
 def _cost(entry: Entry | None) -> tuple[float | None, int | None]:

@@ -18,9 +18,9 @@ from studies.reference.reference_solves import ReferenceSolve, reference_fingerp
 from studies.reference.solve import solve
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.run import difference, measure
+from studies.store.entry import CODE_CHANGED, why_stale
 from studies.store.paths import SUFFIX, TIMING
 from studies.store.record import Record, Status, peek, read_record, write_record
-from studies.store.staleness import CODE_CHANGED, why_stale
 
 AT_RANDOM = 3
 """Replays of a kind beyond the quickest of each variety."""

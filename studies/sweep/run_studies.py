@@ -7,11 +7,11 @@ from pathlib import Path
 from studies.base.atomic import write_whole
 from studies.catalog.study import Study
 from studies.store.archived import check_no_archive
+from studies.store.ledger import Ledger
 from studies.sweep.executor import Executor, Progress, Told, perform
 from studies.sweep.failures import Failures
+from studies.sweep.job import Job, jobs_of
 from studies.sweep.local import Local
-from studies.sweep.stored.known import Known
-from studies.sweep.tasks import Task, tasks_of
 
 
 def run_studies(
@@ -19,33 +19,39 @@ def run_studies(
     studies: list[Study],
     jobs: int | Executor,
     progress: Progress,
-    wanted: Callable[[Task], bool] | None = None,
+    wanted: Callable[[Job], bool] | None = None,
     on_compile: Told = lambda name: None,
     failures: Failures | None = None,
+    ledger: Ledger | None = None,
 ) -> int:
     """Brings the studies up to date below `root`; the number of pieces that had to run.
 
     `jobs`: so many processes of this machine, or an executor. `wanted` replaces the rule "what is not current".
-    `on_compile` hears what is being compiled, from any thread. `failures` hears of pieces whose process died, which are
-    stored as failed, and of those that do not run because a folder lies in the place of their file. Another command may
-    work on the same folder. Raises StudyError when results cannot be written, and for a root that is an archive.
+    `on_compile` hears what is being compiled, from any thread. `failures` hears of jobs whose process died, which are
+    stored as failed, and of those that do not run because a folder lies in the place of their file. `ledger`: of
+    `root`, where the command has one. Another command may work on the same folder. Raises StudyError when results
+    cannot be written, and for a root that is an archive.
     """
     check_no_archive(root)
     root = root.absolute()
-    executor, known = Local(jobs) if isinstance(jobs, int) else jobs, Known(root)
+    executor, ledger = Local(jobs) if isinstance(jobs, int) else jobs, ledger or Ledger(root)
 
-    def stale(task: Task) -> bool:
-        return known.why_stale(task) is not None or (executor.portable and not known.is_portable(task))
+    def stale(job: Job) -> bool:
+        entry = ledger.entry(job)
+        return ledger.why(job) is not None or (executor.portable and (entry is None or entry.portable is None))
 
     rule = wanted or stale
-    todo = [replace(task, seen=task.state()) for task in tasks_of(root, studies) if rule(task)]
+    ledger.look_again()
+    stored = [(job, ledger.entry(job)) for job in jobs_of(root, studies) if rule(job)]
+    todo = [replace(job, seen=entry and entry.state) for job, entry in stored]
     failures = failures or Failures()
     if todo:
         check_writable(root)
-        storable = [task for task in todo if failures.can_store(task)]
+        storable = [job for job in todo if failures.can_store(job)]
         perform(executor, storable, progress, on_compile, failures.add)
-    among = None if wanted is None else {task.path() for task in todo}
+    among = None if wanted is None else {job.path() for job in todo}
     measured = sum(executor.measure(root, study, progress, on_compile, among) for study in studies)
+    ledger.look_again()
     return len(todo) + measured
 
 

@@ -1,80 +1,84 @@
-"""How every piece of a study stands, by the index of what is stored."""
+"""How every job of a study stands, by the ledger of what is stored."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from studies.base.collection import uncollected
 from studies.base.counting import amounts, status_counts
 from studies.catalog.study import Study
+from studies.reference.checkpoints import kept
+from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import ReferenceSolve
+from studies.store.entry import CASE_CHANGED, CODE_CHANGED, MISSING, Entry
+from studies.store.ledger import FAILURES, Ledger
 from studies.store.schema import Status
-from studies.store.staleness import MISSING
-from studies.sweep.stored.known import FAILURES, Known
-from studies.sweep.tasks import Task, tasks_of
+from studies.sweep.job import Job, ReferenceJob, case_jobs, jobs_of
 
 CAUSES = 8
 """Of failures that are named one by one."""
-
-
-def warnings_of(root: Path, study: Study) -> list[str]:
-    """What the cases of a study warned of when they were prepared, a sentence each."""
-    known = Known(root)
-    entries = [known.of_case(study.name, case) for case in study.cases]
-    return [entry.warnings for entry in entries if entry is not None and entry.warnings]
+ANY = "any"
+"""Stands for the machine of a portable result, which is equal on every one (studies.base.portable)."""
 
 
 @dataclass(frozen=True)
 class Standing:
-    """How a piece of work stands."""
+    """How a job stands."""
 
-    task: Task
+    job: Job
     status: str
     """A Status, "stale" or "missing"."""
     message: str
+    entry: Entry | None = None
+    """Its file; None where there is none."""
 
     @property
-    def of_reference(self) -> bool:
-        """Whether it is a reference solution, and no case."""
-        return isinstance(self.task.work, ReferenceSolve)
+    def ended(self) -> bool:
+        """Whether a current result is stored."""
+        return self.status not in ("stale", "missing")
 
 
-@uncollected()
-def standings(root: Path, study: Study, known: Known | None = None) -> list[Standing]:
-    """Every piece of a study: ok, failed in some way, stale or missing."""
-    known = known or Known(root)
-    return [standing_of(task, known) for task in tasks_of(root, [study])]
+def standings(ledger: Ledger, study: Study) -> list[Standing]:
+    """Every job of a study: ok, failed in some way, stale or missing."""
+    return [standing_of(ledger, job) for job in jobs_of(ledger.root, [study])]
 
 
-def standing_of(task: Task, known: Known) -> Standing:
-    """How a piece stands."""
-    entry, why = known.look(task)
+def standing_of(ledger: Ledger, job: Job) -> Standing:
+    """How a job stands."""
+    entry, why = ledger.entry(job), ledger.why(job)
     if entry is None or why is not None:
-        return Standing(task, "missing" if why == MISSING else "stale", why or MISSING)
-    return Standing(task, entry.status, entry.message)
+        return Standing(job, "missing" if why == MISSING else "stale", why or MISSING, entry)
+    return Standing(job, entry.status, entry.message, entry)
 
 
-def failed(task: Task, known: Known | None = None) -> bool:
-    """Whether the stored result of a task is no success; a damaged file is stale instead."""
-    entry = (known or Known(task.root)).entry(task)
+def failed(ledger: Ledger, job: Job) -> bool:
+    """Whether the stored result of a job is no success; a damaged file is stale instead."""
+    entry = ledger.entry(job)
     return entry is not None and entry.status in FAILURES
+
+
+def warnings_of(ledger: Ledger, study: Study) -> list[str]:
+    """What the cases of a study warned of when they were prepared, a sentence each."""
+    entries = map(ledger.entry, case_jobs(ledger.root, study))
+    return [entry.warnings for entry in entries if entry is not None and entry.warnings]
 
 
 def summary(found: Sequence[Standing]) -> str:
     """ "9 cases: 7 ok, 2 failed; 6 reference solutions: 6 ok"."""
-    groups = {"case": [], "reference": []}
-    for standing in found:
-        groups["reference" if standing.of_reference else "case"].append(standing.status)
+    groups = {kind: [s.status for s in found if s.job.kind == kind] for kind in ("case", "reference")}
     parts = [f"{amounts(Counter({kind: len(each)}))}: {status_counts(each)}" for kind, each in groups.items() if each]
     return "; ".join(parts) or "no cases"
 
 
 def unexpected(study: Study, found: Sequence[Standing]) -> list[Standing]:
-    """What ended in a way that the study does not expect; what is stale or missing has not ended."""
-    ended = [standing for standing in found if standing.status not in ("stale", "missing")]
-    references = [s for s in ended if s.of_reference and s.status != Status.OK and not study.counts_losses]
-    return [s for s in ended if not s.of_reference and not study.accepts(s.status)] + references
+    """What ended in a way that the study does not expect."""
+
+    def expected(standing: Standing) -> bool:
+        if standing.job.kind == "reference":
+            return standing.status == Status.OK or study.counts_losses
+        return study.accepts(standing.status)
+
+    odd = [standing for standing in found if standing.ended and not expected(standing)]
+    return sorted(odd, key=lambda standing: standing.job.kind)
 
 
 def causes(found: Sequence[Standing]) -> list[str]:
@@ -86,6 +90,52 @@ def causes(found: Sequence[Standing]) -> list[str]:
     sentences = []
     for (status, _), each in list(groups.items())[:CAUSES]:
         more = f", and {len(each) - 1} more" if len(each) > 1 else ""
-        sentences.append(f"{status.replace('-', ' ')}: {each[0].message} ({each[0].task.label}{more})")
+        sentences.append(f"{status.replace('-', ' ')}: {each[0].message} ({each[0].job.label}{more})")
     left = len(groups) - CAUSES
     return [*sentences, f"and {left} more causes; `organbench status` names them"] if left > 0 else sentences
+
+
+def machines_of(found: Iterable[Standing]) -> Counter[str]:
+    """Results of each kind of machine, by its id, the most first; stale and missing ones left out."""
+    ended = (standing.entry for standing in found if standing.ended and standing.entry is not None)
+    counts = Counter(entry.machine if entry.portable is None else ANY for entry in ended)
+    return Counter(dict(counts.most_common()))
+
+
+def mixture(counts: Counter[str]) -> str | None:
+    """A sentence for results that differ by rounding; None where all are of one kind."""
+    if len(counts) < 2:
+        return None
+    parts = [
+        f"{count} {'portable' if machine == ANY else f'of machine {machine}'}" for machine, count in counts.items()
+    ]
+    return f"made on {len(counts)} kinds of processors, whose results differ by rounding: {', '.join(parts)}"
+
+
+@dataclass(frozen=True)
+class SolveStanding:
+    """How a solution of a reference stands."""
+
+    reference_solve: ReferenceSolve
+    state: str
+    """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""
+    unknowns: int | None = None
+    """None where nothing is stored."""
+    steps: int = 0
+    """Checkpoints reached."""
+    seconds: float = float("nan")
+    """What solving took [s]; NaN where nothing is stored."""
+
+
+def solve_standing(ledger: Ledger, solve: ReferenceSolve) -> SolveStanding:
+    """How a solution stands, or the load path half-way to it."""
+    begun = kept(solve.path(ledger.root), solve.stamp)
+    if begun is not None:
+        return SolveStanding(solve, "half-way", steps=len([e for e in begun.path if e.t in solve.scene.checkpoints]))
+    job = ReferenceJob(ledger.root, REFERENCES, solve)
+    entry, why = ledger.entry(job), ledger.why(job)
+    if entry is None or entry.fault:
+        return SolveStanding(solve, "missing" if entry is None else "unreadable")
+    state = "stale" if why in (CASE_CHANGED, CODE_CHANGED) else entry.status
+    seconds = float("nan") if entry.seconds is None else entry.seconds
+    return SolveStanding(solve, state, entry.unknowns, entry.steps_done or 0, seconds)

@@ -5,18 +5,15 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from massspring import Free, Setup, simulate
-from studies.base.atomic import is_there
 from studies.base.compile_watch import watching
-from studies.base.errors import DamagedFile, OtherVersion, StudyError
+from studies.base.errors import StudyError
 from studies.runs.case import Case
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.prepare import prepare
-from studies.store.archived import is_archive, shown_machine
 from studies.store.machine import machine_id
 from studies.store.new_record import new_record
 from studies.store.paths import timing_path
-from studies.store.record import Status, canonical, peek, read_record, write_record
-from studies.store.staleness import is_current
+from studies.store.record import Record, Status, write_record
 from studies.timing.protocol import FrameTiming, interleave, pinned
 from studies.timing.stage_cost import ROWS, stage_times
 
@@ -32,42 +29,9 @@ def timing_file(root: Path, study: str, case: Case) -> Path:
     return timing_path(case_path(root, study, case), machine_id())
 
 
-def shown_timing_file(root: Path, study: str, case: Case) -> Path:
-    """Where the frame times lie that tables and charts show: this machine's, in an archive those of its machine."""
-    return timing_path(case_path(root, study, case), shown_machine(root))
-
-
-def can_be_timed(root: Path, study: str, case: Case) -> bool:
-    """Whether the case ran to its end: a run that broke off has no comparable frames, and one that cannot be read
-    has none yet."""
-    path = case_path(root, study, case)
-    try:
-        return is_there(path) and peek(path).status in (Status.OK, Status.INVERTED, Status.DRIFTED)
-    except (DamagedFile, OtherVersion):
-        return False
-
-
-def timing_is_current(root: Path, study: str, case: Case) -> bool:
-    """Whether this machine has timed this case with this code, or never will."""
-    if not can_be_timed(root, study, case):
-        return True
-    return is_current(timing_file(root, study, case), case.key, case_fingerprint(case))
-
-
-def read_timing(root: Path, study: str, case: Case) -> FrameTiming | None:
-    """This machine's frame times of a case; None where it has none from this code. An archive shows its own.
-
-    Raises StudyError when they cannot be read.
-    """
-    path = shown_timing_file(root, study, case)
-    if not is_there(path):
-        return None
-    record = read_record(path)
-    stale = record.fingerprint != case_fingerprint(case) and not is_archive(root)
-    if stale or canonical(record.key) != canonical(case.key):
-        return None
-    attributes = record.attributes
-    return FrameTiming(record.fields["frame_ns"].values, attributes["core"], attributes["threads"])
+def timing_of(record: Record) -> FrameTiming:
+    """The frame times in the record of a timing file."""
+    return FrameTiming(record.fields["frame_ns"].values, record.attributes["core"], record.attributes["threads"])
 
 
 def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[[str], None]) -> None:

@@ -18,12 +18,13 @@ from reference_fem.crosscheck.meridian import Ball, MeridianMesh, MeridianSoluti
 from reference_fem.crosscheck.solid import SolidSolution, solve_solid
 from reference_fem.oracles import Check, Oracle, Outcome
 from studies.reference.load import Reference, load_reference
-from studies.reference.reference_solves import reference_solves
+from studies.reference.reference_solves import reference_fingerprint, reference_solves
 from studies.reference.solve import solve
 from studies.reference.uncertainty import SamplePoints
 from studies.scene.scene import Scene
 from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS
 from studies.scenes.ball_clamped import CAP
+from studies.store.entry import why_stale
 from studies.verify.judge_mesh import JudgeMesh, judged_problem
 
 
@@ -126,7 +127,7 @@ def second_judges(root: Path) -> tuple[Oracle, ...]:
 def reference_of(root: Path, scene: Scene) -> Reference:
     """The stored reference, after solving what is missing or stale. Raises StudyError where a path broke off."""
     for reference_solve in reference_solves(scene):
-        if not reference_solve.is_current(root):
+        if why_stale(reference_solve.path(root), reference_solve.key, reference_fingerprint()) is not None:
             solve(root, reference_solve)
     found = load_reference(root, scene)
     assert found is not None  # the scene has a plan

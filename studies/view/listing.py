@@ -8,7 +8,7 @@ from studies.base.errors import StudyError
 from studies.scene.as_json import scene_of_key
 from studies.scenes import SCENES
 from studies.store.record import Status
-from studies.sweep.remarks import remarks_of
+from studies.sweep.load import sentences
 from studies.view.stored import Stored, finest_reference, stored_runs
 
 
@@ -28,7 +28,7 @@ def listing(root: Path) -> tuple[list[str], list[str]]:
             lines += [f"  {_line(case)}" for case in cases]
     if not lines:
         raise StudyError(f"nothing to view is stored in {root}: `organbench run` does that")
-    return lines, remarks_of(problems)
+    return lines, sentences(problems)
 
 
 def _reference(root: Path, name: str, cases: list[Stored]) -> tuple[str, list[StudyError]]:

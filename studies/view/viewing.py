@@ -14,7 +14,7 @@ from studies.scene.as_json import scene_of_key
 from studies.scene.scene import Scene
 from studies.scenes import SCENES
 from studies.store.record import Status, read_record
-from studies.sweep.remarks import remarks_of
+from studies.sweep.load import sentences
 from studies.view.body import Shown
 from studies.view.from_records import shown_reference, shown_run
 from studies.view.stored import Stored, chosen_runs, finest_reference, stored_runs
@@ -78,7 +78,7 @@ def view(root: Path, words: Sequence[str], own: Sequence[Scene] = ()) -> View:
             loaded.append((stored, _run(stored)))
         except StudyError as problem:
             problems.append(problem)
-    remarks = remarks_of(problems)
+    remarks = sentences(problems)
     scene = _one_scene(root, [scenes[word] for word in words if word in scenes], [run for _, run in loaded], remarks)
     cases = [_shown(stored, run, references) for stored, run in loaded]
     if not loaded:

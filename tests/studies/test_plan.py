@@ -15,8 +15,9 @@ from studies.base.processes import run_each
 from studies.cli import progress
 from studies.cli.progress import QUIET_SECONDS, TerminalProgress, compiling, words
 from studies.runs.current import case_path
+from studies.store.entry import CODE_CHANGED, MISSING
+from studies.store.ledger import Ledger
 from studies.store.record import peek, read_record, write_record
-from studies.store.staleness import CODE_CHANGED, MISSING
 from studies.sweep.local import begin
 from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, expected_bytes, free_bytes, plan
 from studies.sweep.run_studies import run_studies
@@ -32,7 +33,7 @@ def stale(root, case):
 
 
 def test_from_nothing_everything_is_planned_with_an_estimate_by_its_size(tmp_path):
-    found = plan(tmp_path, tiny_study())
+    found = plan(Ledger(tmp_path), tiny_study())
     assert sorted(p.kind for p in found) == ["case"] * 3 + ["timing"] * 3
     assert {p.seconds for p in found} == {None}
     assert {p.why for p in found} == {MISSING}
@@ -42,7 +43,7 @@ def test_from_nothing_everything_is_planned_with_an_estimate_by_its_size(tmp_pat
 def test_what_is_planned_is_what_runs(results):
     path = stale(results, tiny_case(timed=True))
     timing_file(results, "tiny", tiny_study().cases[1]).unlink()
-    found = plan(results, tiny_study())
+    found = plan(Ledger(results), tiny_study())
     assert [(p.stage, p.label, p.why) for p in found] == [
         (PHYSICS, tiny_case().name, CODE_CHANGED),
         (TIMING, tiny_study().cases[1].name, MISSING),
@@ -52,13 +53,13 @@ def test_what_is_planned_is_what_runs(results):
     watched = Silent()
     assert run_studies(results, [tiny_study()], 1, watched) == 2
     assert watched.done == [(p.stage, p.label) for p in found]
-    assert plan(results, tiny_study()) == []
+    assert plan(Ledger(results), tiny_study()) == []
 
 
 def test_a_filter_plans_what_it_lets_run(results):
     stale(results, tiny_case(timed=True))
-    assert plan(results, tiny_study(), failed) == []
-    (piece, *_) = plan(results, tiny_study(), lambda task: task.label == diverging_case().name)
+    assert plan(Ledger(results), tiny_study(), partial(failed, Ledger(results))) == []
+    (piece, *_) = plan(Ledger(results), tiny_study(), lambda task: task.label == diverging_case().name)
     assert (piece.label, piece.why) == (diverging_case().name, "its result is a failure")
 
 
@@ -107,10 +108,10 @@ def test_the_room_is_that_of_the_disk_on_which_the_folder_will_lie(tmp_path):
 
 def test_bytes_are_those_of_the_last_time_or_of_what_is_recorded(results):
     path = stale(results, tiny_case(timed=True))
-    (known, *_) = plan(results, tiny_study())
+    (known, *_) = plan(Ledger(results), tiny_study())
     assert known.size == path.stat().st_size
     path.unlink()
-    (guessed,) = [p for p in plan(results, tiny_study()) if p.label == known.label and p.stage == PHYSICS]
+    (guessed,) = [p for p in plan(Ledger(results), tiny_study()) if p.label == known.label and p.stage == PHYSICS]
     assert guessed.size is not None and 0.5 < guessed.size / known.size < 2.0
 
 

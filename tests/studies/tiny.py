@@ -10,6 +10,8 @@ from studies.geometry.mesh.organ_mesh import boundary_triangles
 from studies.runs.case import BodyRecipe, Case
 from studies.scenes import Organ, Scene
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.store.ledger import Ledger
+from studies.sweep.job import CaseJob
 
 NODES, FRAMES = 60, 5
 SQUEEZE = replace(BALL_SQUEEZE, name="tiny_squeeze", reference=None)
@@ -92,6 +94,11 @@ def file_scene(path, unit: str = "m", **changes) -> Scene:
         damping=0.0,
     )
     return replace(scene, **changes)
+
+
+def why_stale(root, case: Case, study: str = "tiny") -> str | None:
+    """What a new ledger of `root` answers for a case."""
+    return Ledger(root).why(CaseJob(root, study, case))
 
 
 def content(folder) -> dict:

@@ -9,8 +9,9 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, say
+from studies.store.ledger import Ledger
 from studies.sweep.find_study import find_studies
-from studies.sweep.stored.prune import MEANING, Prunable, Rule, prunable, remove
+from studies.sweep.prune import MEANING, Prunable, Rule, prunable, remove
 
 SHOWN = 8
 """Files named per rule; `--list` names the rest."""
@@ -33,7 +34,8 @@ def prune(
         raise StudyError("--yes removes nothing without --rule: name the rules to apply")
     known = {str(rule): rule for rule in Rule}
     chosen = [lookup(word.strip(), known, "rule") for word in rules.split(",")] if rules else list(Rule)
-    found = prunable(results, list(STUDIES) if every else find_studies(studies or []), chosen, older, references)
+    chosen_studies = list(STUDIES) if every else find_studies(studies or [])
+    found = prunable(Ledger(results), chosen_studies, chosen, older, references)
     for rule in chosen:
         show([one for one in found if one.rule == rule], rule, listed)
     if not found:

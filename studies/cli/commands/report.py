@@ -8,6 +8,7 @@ import typer
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, say, warn
 from studies.report import results as reports
+from studies.store.ledger import Ledger
 from studies.sweep.find_study import find_study
 
 
@@ -20,7 +21,7 @@ def report(
 ) -> None:
     """Draw all charts and tables and write report.html. The files are named."""
     more = [study for study in map(find_study, studies or []) if study not in STUDIES]
-    written, remarks = reports.report(results, [*STUDIES, *more])
+    written, remarks = reports.report(Ledger(results), [*STUDIES, *more])
     if figures:
         written += reports.draw_figures(results)
     warn(remarks)

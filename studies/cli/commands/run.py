@@ -21,26 +21,26 @@ from studies.geometry.mesher.jobs import cache_folder
 from studies.population import POPULATION
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.report.results import refresh
+from studies.store.entry import MISSING
+from studies.store.ledger import Ledger
 from studies.store.links import link_study
 from studies.store.paths import study_folder
-from studies.store.staleness import MISSING
 from studies.sweep.executor import Executor
 from studies.sweep.failures import Failures
 from studies.sweep.find_study import ON, find_studies
 from studies.sweep.frame_times import measure_again
+from studies.sweep.job import Job, jobs_of
 from studies.sweep.plan import TIMING, plan, plan_again
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import causes, failed, standings, summary, unexpected, warnings_of
-from studies.sweep.stored.known import Known
-from studies.sweep.tasks import Task, tasks_of
 
 JOBS = 2
 """Processes, where nothing is said."""
 AGAIN = "timing: measure the stored cases again on this machine; run nothing else"
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 GIVEN = f"studies, or a FILE.py with STUDY or SCENE ({PROGRAM}); default: {MAIN_STUDIES}"
-Wanted = Callable[[Task], bool] | None
-Rule = Callable[[Task, Known], bool]
+Wanted = Callable[[Job], bool] | None
+Rule = Callable[[Ledger, Job], bool]
 
 
 def run(
@@ -64,22 +64,23 @@ def run(
     if again:
         _check_again(again, {"--on": on, "--only": only, "--portable": portable})
     root, rules, failures = results / SMOKE if smoke else results, _rules(only), Failures()
+    ledger = Ledger(root)
     if organs:
         studies = [f"{name}{ON}{organs}" for name in studies or [POPULATION]]
     chosen, well = [_chosen(study, smoke, case) for study in find_studies(studies or [])], True
     for study in [] if again else chosen:
-        if plan(root, study, _wanted(root, study, rules)):
+        if plan(ledger, study, _wanted(ledger, study, rules)):
             warn(check_study(study, drawn=not case))
     with executor_for(on, jobs or JOBS, portable, root, say) as executor:
         for study in chosen:
             if again:
-                _time_again(root, study, dry, not case)
+                _time_again(ledger, study, dry, not case)
                 continue
-            wanted = _wanted(root, study, rules)
+            wanted = _wanted(ledger, study, rules)
             if dry:
-                dry_run(console, study.name, plan(root, study, wanted), jobs or JOBS, root)
+                dry_run(console, study.name, plan(ledger, study, wanted), jobs or JOBS, root)
             else:
-                well = _bring_up_to_date(root, study, executor, wanted, not case, failures) and well
+                well = _bring_up_to_date(ledger, study, executor, wanted, not case, failures) and well
     _exit(well, failures, studies or [])
 
 
@@ -97,24 +98,24 @@ def _chosen(study: Study, smoke: bool, case: str) -> Study:
 
 
 def _bring_up_to_date(
-    root: Path, study: Study, executor: Executor, wanted: Wanted, drawn: bool, failures: Failures
+    ledger: Ledger, study: Study, executor: Executor, wanted: Wanted, drawn: bool, failures: Failures
 ) -> bool:
     """Runs what must run, and tells how it ended: whether as the study expects."""
-    planned = plan(root, study, wanted)
+    root, planned = ledger.root, plan(ledger, study, wanted)
     with TerminalProgress(console, planned, executor.processes if planned else 1) as progress:
-        count = run_studies(root, [study], executor, progress, wanted, progress.compiling, failures)
+        count = run_studies(root, [study], executor, progress, wanted, progress.compiling, failures, ledger)
     for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
         sweep_parts(folder)
-    warn(link_study(root, study.name))
-    warnings = warnings_of(root, study) if count else []
+    warn(link_study(ledger, study.name))
+    warnings = warnings_of(ledger, study) if count else []
     if warnings:
         more = f" (and {len(warnings) - 1} more cases warn; `organbench show` prints them)" if len(warnings) > 1 else ""
         warn([warnings[0] + more])
     if drawn:
-        warn(refresh(root, study)[1])
+        warn(refresh(ledger, study)[1])
     what = "charts" if drawn else "records"
     say(f"{study.name}: {amounts(progress.done) or 'nothing'} ran, {what} in {study_folder(root, study.name)}")
-    ended = [standing for standing in standings(root, study) if wanted is None or wanted(standing.task)]
+    ended = [standing for standing in standings(ledger, study) if wanted is None or wanted(standing.job)]
     odd = unexpected(study, ended)
     say(f"{study.name}: {summary(ended)}")
     for sentence in causes(odd):
@@ -130,35 +131,35 @@ def _check_again(again: str, others: dict[str, object]) -> None:
         raise StudyError(f"--again {again} times what is stored on this machine, whatever it is; leave {given[0]} out")
 
 
-def _time_again(root: Path, study: Study, dry: bool, drawn: bool) -> None:
+def _time_again(ledger: Ledger, study: Study, dry: bool, drawn: bool) -> None:
     """Times the stored cases of a study, or says which; nothing of it runs."""
-    planned = plan_again(root, study)
+    planned = plan_again(ledger, study)
     if not planned:
         say(f"{study.name}: nothing is stored of this code that can be timed; `organbench run` runs it")
         return
     if dry:
-        dry_run(console, study.name, planned, 1, root)
+        dry_run(console, study.name, planned, 1, ledger.root)
         return
     with TerminalProgress(console, planned) as progress:
-        count = measure_again(root, study, progress, progress.compiling)
+        count = measure_again(ledger, study, progress, progress.compiling)
     if drawn:
-        warn(refresh(root, study)[1])
+        warn(refresh(ledger, study)[1])
     say(f"{study.name}: {count} stored cases were timed again, {'charts' if drawn else 'times'} in "
-        f"{study_folder(root, study.name)}")  # fmt: skip
+        f"{study_folder(ledger.root, study.name)}")  # fmt: skip
 
 
 def _rules(only: str) -> list[Rule]:
     rules: dict[str, Rule] = {
         "failed": failed,
-        "stale": lambda task, known: known.why_stale(task) not in (None, MISSING),
+        "stale": lambda ledger, job: ledger.why(job) not in (None, MISSING),
     }
     return [lookup(word.strip(), rules, "filter") for word in only.split(",")] if only else []
 
 
-def _wanted(root: Path, study: Study, rules: list[Rule]) -> Wanted:
+def _wanted(ledger: Ledger, study: Study, rules: list[Rule]) -> Wanted:
     """What one of the rules lets run; None for none, where all that is not current runs."""
     if not rules:
         return None
-    known = Known(root)
-    chosen = {task.path().absolute() for task in tasks_of(root, [study]) if any(rule(task, known) for rule in rules)}
-    return lambda task: task.path().absolute() in chosen
+    jobs = jobs_of(ledger.root, [study])
+    chosen = {job.path().absolute() for job in jobs if any(rule(ledger, job) for rule in rules)}
+    return lambda job: job.path().absolute() in chosen

@@ -14,8 +14,8 @@ from rich.tree import Tree
 
 from studies.base.counting import amounts
 from studies.cli.terminal import console
-from studies.store.index.entry import Entry, read_entry
-from studies.store.index.folder import FolderIndex
+from studies.store.entry import Entry, read_entry
+from studies.store.ledger import Ledger
 from studies.store.opening import open_results
 from studies.store.paths import TIMING
 from studies.store.record import INDEX_KIND, Field, Record, Status, read_record
@@ -145,8 +145,8 @@ def _index(path: Path, links: dict[str, str], every: bool) -> Tree:
 def _entries(path: Path) -> dict[str, Entry]:
     """What is known of the files beside a study's index; nothing where it does not lie in a results folder."""
     folder = path.absolute().parent
-    return FolderIndex(folder.parent, folder.name).entries if folder.name == path.stem else {}
+    return Ledger(folder.parent).files(folder.name) if folder.name == path.stem else {}
 
 
 def _brief(entry: Entry) -> Text:
-    return Text(entry.told, style="red") if entry.fault else _verdict(entry.status, entry.message)
+    return Text(entry.error_message, style="red") if entry.fault else _verdict(entry.status, entry.message)

@@ -10,12 +10,19 @@ from rich.table import Table
 from studies.base.counting import status_counts
 from studies.catalog import STUDIES
 from studies.cli.terminal import SMOKE, Results, Smoke, busy, console, say
-from studies.reference.reference_solves import SolveStanding, reference_solves
+from studies.reference.reference_solves import reference_solves
 from studies.scene.scene import Scene
+from studies.store.ledger import Ledger
 from studies.sweep.find_study import find_study
-from studies.sweep.machines import machines_of, mixture
-from studies.sweep.standings import Standing, standings, summary
-from studies.sweep.stored.known import Known
+from studies.sweep.standings import (
+    SolveStanding,
+    Standing,
+    machines_of,
+    mixture,
+    solve_standing,
+    standings,
+    summary,
+)
 
 SHOWN = 8
 """Cases and reference solutions named per reason; `--all` names the rest."""
@@ -32,17 +39,17 @@ def status(
     chosen = [find_study(study)] if study else list(STUDIES)
     if smoke:
         chosen, results = [entry.smoke() for entry in chosen], results / SMOKE
-    known = Known(results, check)
+    ledger = Ledger(results, check)
     for entry in chosen:
         with busy(f"looking at {entry.name}"):
-            found = standings(results, entry, known)
+            found = standings(ledger, entry)
         say(f"{entry.name}: {summary(found)}")
         if study:
             show_reasons(found, every)
-            mixed = mixture(machines_of(found, known))
+            mixed = mixture(machines_of(found))
             if mixed:
                 say(f"  {mixed}")
-    show_references(known, {scene.name: scene for entry in chosen for scene in entry.scenes}.values(), every)
+    show_references(ledger, {scene.name: scene for entry in chosen for scene in entry.scenes}.values(), every)
 
 
 def show_reasons(found: list[Standing], every: bool) -> None:
@@ -50,7 +57,7 @@ def show_reasons(found: list[Standing], every: bool) -> None:
     reasons: dict[tuple[str, str], list[str]] = {}
     for standing in found:
         if standing.status != "ok":
-            reasons.setdefault((standing.status, standing.message), []).append(standing.task.label)
+            reasons.setdefault((standing.status, standing.message), []).append(standing.job.label)
     for (word, message), labels in reasons.items():
         say(f"  {word}: {message}")
         shown = labels if every or len(labels) <= SHOWN + 1 else labels[:SHOWN]
@@ -60,9 +67,9 @@ def show_reasons(found: list[Standing], every: bool) -> None:
             say(f"    and {len(labels) - len(shown)} more (--all names them)")
 
 
-def show_references(known: Known, scenes: Iterable[Scene], every: bool) -> None:
+def show_references(ledger: Ledger, scenes: Iterable[Scene], every: bool) -> None:
     """How the references stand: a line per scene, or one per mesh and setting."""
-    found = {scene.name: [known.standing(solve) for solve in reference_solves(scene)] for scene in scenes}
+    found = {scene.name: [solve_standing(ledger, solve) for solve in reference_solves(scene)] for scene in scenes}
     found = {name: rows for name, rows in found.items() if rows}
     if not found:
         return

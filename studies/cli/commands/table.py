@@ -15,11 +15,12 @@ from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED, frame_of, row_of
 from studies.metrics.table import metric as metric_of
 from studies.scene.quantities import ALWAYS
+from studies.store.ledger import Ledger
 from studies.store.tables.csv_table import write_table
 from studies.store.tables.parquet_table import write_parquet
 from studies.sweep.find_study import find_study
-from studies.sweep.stored.known import Known
-from studies.sweep.stored.rows import table_rows
+from studies.sweep.load import References
+from studies.sweep.rows import table_rows
 
 Row = Mapping[Any, Any]
 SETTINGS = {"law": "law {}", "nodes": "{} nodes", "stiffness": "stiffness {}", "dt/dt_c": "dt = {} dt_c"}
@@ -39,7 +40,8 @@ def table(
     own = [metric_of(column) for column in entry.columns]
     known = {m.name: m for m in (*METRICS, *own)}
     chosen = [lookup(name.strip(), known, "metric") for name in metrics.split(",")] if metrics else own
-    rows, remarks, references = table_rows(Known(results), entry, chosen)
+    references = References(Ledger(results))
+    rows, remarks = table_rows(references, entry, chosen)
     entries, unreadable = entries_beside(results, entry.scenes, references.of)
     rows += [row_of(run, chosen) for run in entries]
     warn([*remarks, *unreadable])

@@ -22,6 +22,7 @@ from studies.exchange.entry import ENTRY, entry_path, outside
 from studies.report.results import draw_charts, refresh
 from studies.runs.current import case_path
 from studies.store import archived, machine
+from studies.store.ledger import Ledger
 from studies.store.record import read_record, write_record
 from studies.timing import cases as timed
 from tests.studies.archive.conftest import DAY, STUDY
@@ -50,7 +51,7 @@ def test_charts_and_tables_are_drawn_again_on_another_machine_by_other_code(unpa
     for module in (machine, archived, timed):
         monkeypatch.setattr(module, "machine_id", lambda: "00000000")
     monkeypatch.setattr(timed, "case_fingerprint", lambda case: "of other code")
-    assert refresh(unpacked, STUDY)[1] == []
+    assert refresh(Ledger(unpacked), STUDY)[1] == []
     assert (table.read_bytes(), chart.read_bytes()) == before
 
 

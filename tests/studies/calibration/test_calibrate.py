@@ -96,7 +96,7 @@ def test_an_interrupted_calibration_goes_on(made, tmp_path, monkeypatch):
     def refuse(*_):
         raise AssertionError("a stored case was run again")
 
-    monkeypatch.setattr("studies.calibration.measured.run_case", refuse)
+    monkeypatch.setattr("studies.sweep.job.CaseJob.run", refuse)
     assert calibrate("ball", BODY, again, folds=FOLDS) == found
 
 

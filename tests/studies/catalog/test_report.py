@@ -16,11 +16,12 @@ from studies.metrics.cells import UNRESOLVED_MARK
 from studies.report.results import draw_charts, refresh, report
 from studies.report.summary import results_of
 from studies.runs.current import case_path
+from studies.store.ledger import Ledger
 from studies.store.machine import machine_id
 from studies.store.record import Status
 from studies.store.tables.csv_table import write_table
+from studies.sweep import load as sweep_load
 from studies.sweep.load import load_runs
-from studies.sweep.stored import references
 from tests.studies.tiny import tiny_case, tiny_study
 
 
@@ -53,18 +54,20 @@ def test_a_table_is_read_back_as_it_was(tmp_path):
 def test_report_writes_everything_and_names_what_is_missing(results):
     more = tiny_case(dt_fraction=0.4)
     study = tiny_study(cases=(*tiny_study().cases, more))
-    written, remarks = report(results, [study])
+    written, remarks = report(Ledger(results), [study])
     assert written == [results / name for name in ("tiny/tiny.csv", "kept_volume.csv", "report.html")]
     assert remarks == [f"tiny: case {more.name} has not run"]
     assert len(pd.read_csv(results / "tiny" / "tiny.csv")) == 3
     assert json.loads((results / "machine.json").read_text())["id"] == machine_id()
     before = {path: path.read_bytes() for path in results.rglob("*.*")}
-    report(results, [study])
+    report(Ledger(results), [study])
     assert {path: path.read_bytes() for path in results.rglob("*.*")} == before
 
 
 def test_studies_that_were_not_run_are_named_in_one_line(results):
-    _, remarks = report(results, [tiny_study(), *(replace(tiny_study(), name=name) for name in ("other", "third"))])
+    _, remarks = report(
+        Ledger(results), [tiny_study(), *(replace(tiny_study(), name=name) for name in ("other", "third"))]
+    )
     assert [remark for remark in remarks if "not run" in remark] == [
         "not run here, what is drawn of them stays: other, third; make study-NAME runs one"
     ]
@@ -115,20 +118,20 @@ def test_what_is_shown_already_is_not_drawn_again(results):
         path.write_bytes(b"picture")
 
     study = tiny_study(charts=(Chart("one.png", draw),))
-    paths, _ = refresh(results, study)
+    paths, _ = refresh(Ledger(results), study)
     assert [path.name for path in paths] == ["one.png", f"{study.name}.csv"] and len(drawn) == 1
     before = [path.read_bytes() for path in paths]
-    assert refresh(results, study)[0] == paths and len(drawn) == 1
+    assert refresh(Ledger(results), study)[0] == paths and len(drawn) == 1
     paths[0].unlink()
-    refresh(results, study)
+    refresh(Ledger(results), study)
     assert len(drawn) == 2 and [path.read_bytes() for path in paths] == before
     os.utime(case_path(results, study.name, study.cases[0]), ns=(1, 1))
-    refresh(results, study)
+    refresh(Ledger(results), study)
     assert len(drawn) == 3
 
 
 def test_the_headline_study_writes_the_summary_too(results):
-    paths, remarks = refresh(results, replace(tiny_study(), name="volume_loss"))
+    paths, remarks = refresh(Ledger(results), replace(tiny_study(), name="volume_loss"))
     assert paths[-1] == results / "summary.md" and paths[-1].is_file()
     assert len(remarks) == 3, "none of its cases has run under this name"
 
@@ -136,20 +139,20 @@ def test_the_headline_study_writes_the_summary_too(results):
 @pytest.mark.parametrize("text", ['{"inp', "[]", "{}", '{"inputs": 1, "remarks": []}', "\udcff"])
 def test_a_stamp_that_is_damaged_is_drawn_again(results, text):
     study = tiny_study(charts=(Chart("one.png", lambda runs, path: path.write_bytes(b"picture")),))
-    refresh(results, study)
+    refresh(Ledger(results), study)
     stamp = results / "cache" / f"{study.name}.drawn.json"
     whole = stamp.read_bytes()
     stamp.write_bytes(text.encode(errors="surrogateescape"))
-    refresh(results, study)
+    refresh(Ledger(results), study)
     assert stamp.read_bytes() == whole
 
 
 def test_studies_of_one_scene_share_its_reference(results, monkeypatch):
-    loaded, load = [], references.load_reference
+    loaded, load = [], sweep_load.load_reference
     monkeypatch.setattr(
-        references, "load_reference", lambda root, scene: loaded.append(scene.name) or load(root, scene)
+        sweep_load, "load_reference", lambda root, scene: loaded.append(scene.name) or load(root, scene)
     )
     shutil.copytree(results / "tiny", results / "twin")
-    written, _ = report(results, [tiny_study(), tiny_study(name="twin")])
+    written, _ = report(Ledger(results), [tiny_study(), tiny_study(name="twin")])
     assert {results / "tiny" / "tiny.csv", results / "twin" / "twin.csv"} <= set(written)
     assert loaded == [scene.name for scene in tiny_study().scenes]

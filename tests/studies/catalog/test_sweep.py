@@ -1,6 +1,7 @@
 """A sweep does what is missing or stale, once; what is finished stays, whatever happens to the rest."""
 
 from dataclasses import replace
+from functools import partial
 
 import h5py
 import pytest
@@ -9,13 +10,14 @@ from studies.base.errors import StudyError
 from studies.runs.current import case_path
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.store.entry import OTHER_VERSION
+from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
-from studies.store.staleness import OTHER_VERSION
+from studies.sweep.job import CaseJob, jobs_of
 from studies.sweep.load import load_runs
 from studies.sweep.local import Local
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, standings, warnings_of
-from studies.sweep.tasks import Task, tasks_of
 from studies.timing import cases as timed
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
 
@@ -25,7 +27,7 @@ def content(folder):
 
 
 def counts(root, study):
-    found = [standing.status for standing in standings(root, study)]
+    found = [standing.status for standing in standings(Ledger(root), study)]
     return {status: found.count(status) for status in found}
 
 
@@ -80,13 +82,13 @@ def test_a_damaged_file_is_stale_and_runs_again(results, number):
             file["mass"][0] *= 1.5
     else:
         path.write_bytes(path.read_bytes()[:1000])
-    assert [s.message for s in standings(results, study) if s.status == "stale"] == ["its file is damaged"]
+    assert [s.message for s in standings(Ledger(results), study) if s.status == "stale"] == ["its file is damaged"]
     runs, remarks = load_runs(results, study)
     assert len(runs) == 2
     assert len(remarks) == 1
-    assert path.name in remarks[0] and ("'mass' has changed" if number else "cut off") in remarks[0]
-    assert warnings_of(results, study) == []
-    assert not failed(Task(results, "tiny", diverging_case()))
+    assert path.name in remarks[0] and "is cut off or damaged" in remarks[0]
+    assert warnings_of(Ledger(results), study) == []
+    assert not failed(Ledger(results), CaseJob(results, "tiny", diverging_case()))
     assert run_studies(results, [study], 1, Silent()) == 1
     assert load_runs(results, study)[1] == []
 
@@ -98,7 +100,7 @@ def test_only_what_is_asked_for(results):
     write_record(path, replace(read_record(path), status=Status.TIMED_OUT))
     timed.timing_file(results, "tiny", tiny_case(timed=True)).unlink()
     watched = Silent()
-    assert run_studies(results, [study], 1, watched, wanted=failed) == 1
+    assert run_studies(results, [study], 1, watched, wanted=partial(failed, Ledger(results))) == 1
     assert watched.done == [("physics", diverging_case().name)]
     assert counts(results, study) == {"ok": 1, "stale": 1, "diverged": 1}
 
@@ -114,10 +116,10 @@ def test_missing_is_told(tmp_path):
 def test_references_are_shared_and_come_first(tmp_path):
     scene = replace(BALL_SQUEEZE, reference=ReferencePlan("octant", (0.9, 0.5, 0.4)))
     one, two = (tiny_study(name=name, cases=(tiny_case(scene=scene),)) for name in ("one", "two"))
-    tasks = tasks_of(tmp_path, [one, two])
-    assert [task.label for task in tasks[:2]] == ["reference ball_squeeze-0.4", "reference ball_squeeze-0.5"]
-    assert len(tasks) == 6 + 2  # three meshes and three variants, shared; a case of each study
-    assert len({task.path() for task in tasks}) == 8
+    jobs = jobs_of(tmp_path, [one, two])
+    assert [job.label for job in jobs[:2]] == ["reference ball_squeeze-0.4", "reference ball_squeeze-0.5"]
+    assert len(jobs) == 6 + 2  # three meshes and three variants, shared; a case of each study
+    assert len({job.path() for job in jobs}) == 8
 
 
 def test_results_that_cannot_be_written_are_told_before_anything_runs(tmp_path, monkeypatch):
@@ -135,5 +137,4 @@ def test_files_of_the_former_layout_run_again_and_are_told_of_once(results):
     runs, remarks = load_runs(results, study)
     assert (runs, len(remarks)) == ([], 1)
     assert "of an earlier version of organbench" in remarks[0] and remarks[0].endswith("(and 2 more files)")
-    assert {s.message for s in standings(results, study)} == {OTHER_VERSION}
-    assert all(task.why_stale() == OTHER_VERSION for task in tasks_of(results, [study]))
+    assert {s.message for s in standings(Ledger(results), study)} == {OTHER_VERSION}

@@ -10,12 +10,12 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.engines.cluster import Session
-from studies.engines.memory import BASE, factors, unknowns_of
 from studies.engines.requests import Check, Preparation, check_for, identity, wait_until_seen
 from studies.engines.worker import MEGABYTES, JobPlugin
 from studies.reference.reference_solves import ReferenceSolve
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.sweep.tasks import Task
+from studies.sweep.estimate import MEMORY, factor_memory
+from studies.sweep.job import ReferenceJob
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_files_of_other_machines_are_waited_for(tmp_path):
 
 @pytest.mark.parametrize(("unknowns", "peak"), [(8_191, 0.30e9), (25_423, 0.52e9), (41_851, 0.60e9), (89_598, 1.35e9)])
 def test_no_less_memory_is_declared_than_references_have_taken(unknowns, peak):
-    assert peak < BASE + factors(unknowns) < 1.9 * peak
+    assert peak < MEMORY + factor_memory(unknowns) < 1.9 * peak
 
 
 class Small(Session):
@@ -107,7 +107,7 @@ class Small(Session):
 
 
 def test_a_job_that_no_worker_has_the_memory_for_is_refused_before_anything_runs():
-    large = Task(Path("results"), "tiny", ReferenceSolve(BALL_SQUEEZE, 0.1))
+    large = ReferenceJob(Path("results"), "tiny", ReferenceSolve(BALL_SQUEEZE, 0.1))
     Small().check_memory([large, large], [499.0, 100.0])
     with pytest.raises(StudyError, match=r"reference ball_squeeze-0\.1 needs about 0\.6 GB, and the largest .* 0\.5"):
         Small().check_memory([large, large], [499.0, 600.0])
@@ -115,5 +115,5 @@ def test_a_job_that_no_worker_has_the_memory_for_is_refused_before_anything_runs
 
 def test_the_size_of_a_reference_is_declared_before_it_is_known():
     for level, unknowns in ((0.12, 16_482), (0.22, 4_391)):
-        solve = ReferenceSolve(BALL_SQUEEZE, level)
-        assert unknowns <= unknowns_of(Task(Path("nowhere"), "tiny", solve), solve) < 3 * unknowns
+        needs = ReferenceJob(Path("nowhere"), "tiny", ReferenceSolve(BALL_SQUEEZE, level)).needs
+        assert factor_memory(unknowns) <= needs - MEMORY < 3.5 * factor_memory(unknowns)

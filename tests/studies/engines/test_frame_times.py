@@ -7,8 +7,10 @@ import psutil
 import pytest
 
 from studies.base.errors import StudyError
-from studies.engines.cluster import Cluster, timed_somewhere
+from studies.engines.cluster import Cluster
 from studies.engines.requests import FrameTimes
+from studies.store.ledger import Ledger
+from studies.sweep.job import case_jobs
 from tests.studies.tiny import Silent, tiny_case, tiny_study
 
 MACHINES = {"a": "one", "b": "one", "c": "other", "d": "other"}
@@ -72,13 +74,17 @@ def test_a_worker_that_is_lost_meanwhile_is_a_sentence(tmp_path):
         measured(tmp_path, lambda place: None)
 
 
+def timed_somewhere(root):
+    return [Ledger(root).timed_somewhere(job) for job in case_jobs(root, tiny_study())]
+
+
 def test_what_any_machine_has_timed_asks_for_no_cluster(results):
     study = tiny_study()
-    assert all(timed_somewhere(results, "tiny", case) for case in study.cases)
+    assert timed_somewhere(results) == [True, True, True]
     assert Cluster(lambda: None, 1.0).measure(results, study, Silent(), print, None) == 0  # type: ignore[arg-type]
     for file in (results / "tiny").glob("*.timing.*.h5"):
         file.unlink()
-    assert [timed_somewhere(results, "tiny", case) for case in study.cases] == [False, False, True], "one diverges"
+    assert timed_somewhere(results) == [False, False, True], "one diverges"
 
 
 def test_the_request_times_what_is_not_timed(results, monkeypatch):

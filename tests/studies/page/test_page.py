@@ -22,6 +22,7 @@ from studies.report.page.part import part_path, read_part, write_part
 from studies.report.page.svg import inline
 from studies.report.page.write import ASSETS, SCRIPTS, write_page
 from studies.report.results import draw_charts, report
+from studies.store.ledger import Ledger
 from tests.plots.made_up import POINTS, STRETCH
 from tests.studies.page.made_up_page import COLUMNS, HELD, MOMENTS, NASTY, losses, made_up_parts, rates, theirs
 from tests.studies.tiny import tiny_study
@@ -237,21 +238,21 @@ def test_without_results_there_is_no_page(tmp_path):
 
 
 def test_report_writes_it_the_same_again(results):
-    written, _ = report(results, [tiny_study()])
+    written, _ = report(Ledger(results), [tiny_study()])
     assert written[-1] == results / "report.html" and part_path(results, tiny_study()).is_file()
     before = written[-1].read_bytes()
-    assert report(results, [tiny_study()])[0][-1].read_bytes() == before
+    assert report(Ledger(results), [tiny_study()])[0][-1].read_bytes() == before
     part_path(results, tiny_study()).unlink()
-    assert report(results, [tiny_study()])[0][-1].read_bytes() == before
+    assert report(Ledger(results), [tiny_study()])[0][-1].read_bytes() == before
 
 
 @pytest.mark.parametrize("text", ['{"rows"', "[]", "{}", "", "null", "of this {}"])
 def test_a_damaged_part_is_gathered_again(results, text):
-    before = report(results, [tiny_study()])[0][-1].read_bytes()
+    before = report(Ledger(results), [tiny_study()])[0][-1].read_bytes()
     path = part_path(results, tiny_study())
     whole = path.read_bytes()
     path.write_text(text.replace("of this", whole.decode().splitlines()[0] + "\n"))
-    assert report(results, [tiny_study()])[0][-1].read_bytes() == before and path.read_bytes() == whole
+    assert report(Ledger(results), [tiny_study()])[0][-1].read_bytes() == before and path.read_bytes() == whole
 
 
 def test_a_damaged_part_of_a_study_without_results_is_left_out_and_named(kept, tmp_path):
@@ -290,7 +291,7 @@ def test_commands_name_the_file_of_an_own_study(kept, tmp_path):
 
 def test_a_chart_that_keeps_no_svg_is_left_out_and_said(results):
     study = tiny_study(charts=(Chart("own.png", lambda runs, path: path.write_bytes(b"own")),))
-    assert any("chart own.png is left out" in remark for remark in report(results, [study])[1])
+    assert any("chart own.png is left out" in remark for remark in report(Ledger(results), [study])[1])
 
 
 def test_charts_are_the_same_again_small_and_without_what_a_page_has_no_use_for(kept, tmp_path):

@@ -16,7 +16,8 @@ from studies.reference import solve as module
 from studies.reference.checkpoints import IGNORED
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
-from studies.sweep.stored.known import Known
+from studies.store.ledger import Ledger
+from studies.sweep.standings import solve_standing
 from tests.reference_fem.statics.test_resume import TIMES, pressed_and_filled
 from tests.studies.octant import LEVELS, SCENE
 
@@ -68,7 +69,7 @@ def test_a_pickle_is_never_loaded(tmp_path):
     file.parent.mkdir(parents=True)
     file.write_bytes(with_digest(pickle.dumps((reference_solve.stamp, Evil(marker)))))
     with pytest.warns(UserWarning, match=IGNORED):
-        assert Known(tmp_path).standing(reference_solve).state == "missing"
+        assert solve_standing(Ledger(tmp_path), reference_solve).state == "missing"
     assert not marker.exists()
 
 

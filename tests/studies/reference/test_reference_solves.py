@@ -10,7 +10,6 @@ import pytest
 
 from reference_fem import SolveError
 from studies.base.errors import StudyError
-from studies.reference import reference_solves as known
 from studies.reference import solve as module
 from studies.reference.load import load_reference
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
@@ -19,25 +18,30 @@ from studies.report.references import refresh_uncertainty
 from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scenes import SCENES, ReferencePlan
 from studies.scenes.ball_clamped import BALL_CLAMPED
+from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
-from studies.sweep.load import load_runs
-from studies.sweep.stored.known import Known
-from studies.sweep.stored.references import References
+from studies.sweep import job as jobs_module
+from studies.sweep.load import References, load_runs
+from studies.sweep.standings import solve_standing
 from tests.studies.octant import LEVELS, SCENE
 from tests.studies.tiny import tiny_case, tiny_study
 
 
+def is_current(root, reference_solve):
+    return Ledger(root).why(jobs_module.ReferenceJob(root, "", reference_solve)) is None
+
+
 def test_current_until_the_load_or_the_code_changes(solved, monkeypatch):
     reference_solve = ReferenceSolve(SCENE, LEVELS[0])
-    assert reference_solve.is_current(solved)
+    assert is_current(solved, reference_solve)
     renamed_metric = replace(SCENE, damping=1.0, frames=7, title="another", quantities=("volume",))
     other_family = replace(renamed_metric, reference=ReferencePlan("octant", (0.5, 0.1), variants=()))
-    assert ReferenceSolve(other_family, LEVELS[0]).is_current(solved)
+    assert is_current(solved, ReferenceSolve(other_family, LEVELS[0]))
     assert ReferenceSolve(replace(SCENE, gravity=(0.0, 0.0, -9.81)), 0.5).key != reference_solve.key
     assert ReferenceSolve(SCENE, 0.5, "kappa").key != reference_solve.key
-    assert not ReferenceSolve(replace(SCENE, checkpoints=(1.0, 3.9)), LEVELS[0]).is_current(solved)
-    monkeypatch.setattr(known, "reference_fingerprint", lambda: "other")
-    assert not reference_solve.is_current(solved)
+    assert not is_current(solved, ReferenceSolve(replace(SCENE, checkpoints=(1.0, 3.9)), LEVELS[0]))
+    monkeypatch.setattr(jobs_module, "reference_fingerprint", lambda: "other")
+    assert not is_current(solved, reference_solve)
 
 
 def test_a_mesh_is_the_same_in_every_plan_that_halves_it_as_often():
@@ -88,8 +92,7 @@ def test_settings_are_varied_only_where_they_matter():
 
 
 def listed(root):
-    known = Known(root)
-    return [known.standing(reference_solve) for reference_solve in reference_solves(SCENE)]
+    return [solve_standing(Ledger(root), reference_solve) for reference_solve in reference_solves(SCENE)]
 
 
 def states(root):
@@ -108,14 +111,14 @@ def test_listing_says_how_every_piece_stands(solved, tmp_path, monkeypatch):
     assert sorted(unknowns := [row.unknowns for row in whole[:3]]) == unknowns
     assert states(root) == ["ok", "missing", "ok", "ok", "ok", "unreadable"]
     assert [row.unknowns for row in listed(root) if row.state in ("missing", "unreadable")] == [None, None]
-    monkeypatch.setattr("studies.sweep.stored.known.reference_fingerprint", lambda: "other")
+    monkeypatch.setattr(jobs_module, "reference_fingerprint", lambda: "other")
     assert states(solved) == ["stale"] * 6
 
 
 def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, tmp_path, found):
     root = shutil.copytree(solved, tmp_path / "results")
     table, chart = refresh_uncertainty(
-        References(Known(root)), [SCENE, SCENE, replace(SCENE, name="bare", reference=None)]
+        References(Ledger(root)), [SCENE, SCENE, replace(SCENE, name="bare", reference=None)]
     )
     rows = pd.read_csv(table)
     assert rows["quantity"].tolist() == list(found.total_uncertainty)
@@ -124,12 +127,12 @@ def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, 
     assert rows["uncertainty [%]"][0] == pytest.approx(100 * found.total_uncertainty["force"], rel=1e-5)
     assert chart.read_bytes()[:4] == b"\x89PNG"
     chart.write_bytes(b"old")
-    refresh_uncertainty(References(Known(root)), [SCENE])
+    refresh_uncertainty(References(Ledger(root)), [SCENE])
     assert chart.read_bytes() == b"old"
     solve(root, ReferenceSolve(SCENE, LEVELS[0]))
-    refresh_uncertainty(References(Known(root)), [SCENE])
+    refresh_uncertainty(References(Ledger(root)), [SCENE])
     assert chart.read_bytes()[:4] == b"\x89PNG"
-    assert refresh_uncertainty(References(Known(tmp_path / "empty")), [SCENE]) == []
+    assert refresh_uncertainty(References(Ledger(tmp_path / "empty")), [SCENE]) == []
 
 
 class Killed(BaseException):

@@ -11,6 +11,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import case_path
 from studies.runs.run import measure
 from studies.scenes import BALL_CLAMPED, JUDGED
+from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from tests.studies.tiny import NODES, SQUEEZE, diverging_case, tiny_case, tiny_study
 
@@ -88,7 +89,7 @@ def test_the_promise_covers_the_default_step_from_rest_alone():
 def test_the_table_is_read_off_the_stored_runs(results):
 
     study = tiny_study()
-    table = kept_volumes(results, [study])
+    table = kept_volumes(Ledger(results), [study])
     (row,) = table.to_dict("records")
     path = case_path(results, "tiny", tiny_case(timed=True))
     record = read_record(path)
@@ -98,6 +99,6 @@ def test_the_table_is_read_off_the_stored_runs(results):
     spoiled[2] *= 1.0002
     fields = record.fields | {"volume": replace(record.fields["volume"], values=spoiled)}
     write_record(path, replace(record, fields=fields))
-    assert kept_volumes(results, [study])["at most 1e-4"].tolist() == ["NO"]
-    assert kept_volumes(results / "nowhere", [study]).empty
-    assert kept_volumes(results, [tiny_study(cases=(diverging_case(),))]).empty
+    assert kept_volumes(Ledger(results), [study])["at most 1e-4"].tolist() == ["NO"]
+    assert kept_volumes(Ledger(results / "nowhere"), [study]).empty
+    assert kept_volumes(Ledger(results), [tiny_study(cases=(diverging_case(),))]).empty

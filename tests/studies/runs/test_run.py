@@ -11,12 +11,12 @@ from studies.base.errors import StudyError
 from studies.runs import current
 from studies.runs import run as module
 from studies.runs.case import BodyRecipe, Case
-from studies.runs.current import case_path, why_case_is_stale
+from studies.runs.current import case_path
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames, judge, measure, replay, run_case
 from studies.scenes.stress import STRESS_SCENES
 from studies.store.record import Field, Status, read_record, write_record
-from tests.studies.tiny import FRAMES, NODES, diverging_case, tiny_case
+from tests.studies.tiny import FRAMES, NODES, diverging_case, tiny_case, why_stale
 
 SERIES = ("volume", "pressure", "contact_force", "penetration", "min_j")
 
@@ -111,10 +111,10 @@ def test_newton_s_third_law_between_the_planes(ran):
 def test_it_is_current_until_case_or_code_change(ran, monkeypatch):
     root, path = ran
     assert path == case_path(root, "tiny", tiny_case())
-    assert why_case_is_stale(root, "tiny", tiny_case()) is None
-    assert why_case_is_stale(root, "tiny", tiny_case(dt_fraction=0.4))
+    assert why_stale(root, tiny_case()) is None
+    assert why_stale(root, tiny_case(dt_fraction=0.4))
     monkeypatch.setattr(current, "run_fingerprint", lambda: "edited")
-    assert why_case_is_stale(root, "tiny", tiny_case())
+    assert why_stale(root, tiny_case())
 
 
 def test_progress_is_told_frame_by_frame():

@@ -9,12 +9,11 @@ import pytest
 from massspring import Capsule, Sphere, Trajectory
 from studies.geometry import HalfSpace
 from studies.runs.case import BodyRecipe
-from studies.runs.current import why_case_is_stale
 from studies.runs.run import measure, run_case
 from studies.scene.meshing import mesh_for
 from studies.scenes import Held, Organ
 from studies.store.record import Status, read_record
-from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
+from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, why_stale, write_obj
 
 
 def failure(case) -> str:
@@ -153,4 +152,4 @@ def test_failures_are_stored_like_successes(tmp_path):
     case = tiny_case(body=BodyRecipe(nodes=NODES, stiffness=-1.0))
     record = read_record(run_case(tmp_path, "tiny", case))
     assert record.status == Status.FAILED
-    assert why_case_is_stale(tmp_path, "tiny", case) is None
+    assert why_stale(tmp_path, case) is None

@@ -15,6 +15,7 @@ from studies.runs.run import checkpoint_frames, measure, replay, run_case
 from studies.runs.surface_frames import MOMENTS, moments
 from studies.scenes import STOMACH_PRESS
 from studies.scenes.stress import STRESS_SCENES
+from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
 from studies.store.schema import SURFACE
 from studies.timing.cases import time_cases
@@ -127,4 +128,4 @@ def test_the_same_run_with_and_without_its_surface_is_seen_once(stored, tmp_path
     runs, problems = stored_runs(tmp_path)
     assert problems == [] and len(runs) == 1
     studies = [Study(study, "Once?", (case,), (), ()) for study, case in kinds.items()]
-    assert len(kept_volumes(tmp_path, studies)) == 1
+    assert len(kept_volumes(Ledger(tmp_path), studies)) == 1

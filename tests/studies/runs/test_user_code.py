@@ -10,6 +10,7 @@ from studies.runs import user_code
 from studies.runs.current import case_path
 from studies.runs.run import measure
 from studies.runs.user_code import files_of, given_files, load_given
+from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
 from studies.sweep.find_study import find_study
 from tests.studies.tiny import tiny_case
@@ -113,7 +114,7 @@ def test_a_new_chart_or_metric_is_drawn_without_running(organbench, mine, ran):
 def test_lines_of_the_page_name_the_file(mine, ran):
     """Both run the case again: from the study, and bit for bit from its record, with the file that its method is in."""
     study = find_study(str(mine))
-    refresh(ran, study)
+    refresh(Ledger(ran), study)
     part = read_part(ran, study)
     assert part is not None
     for case, name in zip(part["cases"].values(), (case.name for case in study.cases), strict=True):

@@ -10,15 +10,14 @@ from studies.catalog import Study
 from studies.metrics.run import Run
 from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.case import BodyRecipe, Case, case_from_json
-from studies.runs.current import case_path, why_case_is_stale
-from studies.runs.digest import case_digest
+from studies.runs.current import case_path
 from studies.scene.meshing import mesh_for
 from studies.scene.scene import Organ
 from studies.scenes import BALL_SQUEEZE
+from studies.store.entry import MISSING
 from studies.store.paths import key_digest
-from studies.store.staleness import MISSING
 from studies.sweep.run_studies import run_studies
-from tests.studies.tiny import Silent, cube, file_scene, write_obj
+from tests.studies.tiny import Silent, cube, file_scene, why_stale, write_obj
 
 
 def case_of(path):
@@ -37,16 +36,16 @@ def test_a_moved_file_keeps_its_results_and_an_edited_one_does_not(tmp_path):
     root, path = tmp_path / "results", written(tmp_path / "here" / "box.obj")
     case = case_of(path)
     run_studies(root, [Study("own", "Does it fall?", (case,), (), ())], 1, Silent())
-    assert why_case_is_stale(root, "own", case) is None
+    assert why_stale(root, case, "own") is None
     moved = path.rename(tmp_path / "moved.obj")
     same = case_of(moved)
-    assert why_case_is_stale(root, "own", same) is None and case_digest(same) == key_digest(same.key)
+    assert why_stale(root, same, "own") is None
     # The record itself is read without the file, and still names where it was.
     run = Run.load(case_path(root, "own", same))
     assert run.case.scene.organ.parameters["path"] == str(path) and len(run.fields.t) == 2
     written(moved, edge=0.11)
     other = case_of(moved)
-    assert why_case_is_stale(root, "own", other) == MISSING and case_digest(other) != case_digest(same)
+    assert why_stale(root, other, "own") == MISSING and key_digest(other.key) != key_digest(same.key)
 
 
 def test_references_are_known_by_content_too(tmp_path):

@@ -5,9 +5,9 @@ import pytest
 
 from studies.base.errors import DamagedFile, StudyError
 from studies.store import opening
+from studies.store.entry import DAMAGED, why_stale
 from studies.store.opening import sealed
 from studies.store.record import SCHEMA, peek, read_record, write_record
-from studies.store.staleness import DAMAGED, why_stale
 from tests.studies import made_up_run
 from tests.studies.store.test_store import KEY, record
 

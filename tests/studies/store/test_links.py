@@ -8,6 +8,7 @@ from rich.console import Console
 from studies.base.errors import StudyError
 from studies.cli.commands.show import describe
 from studies.store import links
+from studies.store.ledger import Ledger
 from studies.store.links import link_study
 from studies.store.paths import index_path, key_hash, readable, record_files, record_path, timing_path
 from studies.store.record import SCHEMA, Field, Record, Status, read_record, write_record
@@ -57,7 +58,7 @@ def test_timing_files_are_siblings_and_no_records(tmp_path):
     assert timing.name == path.name.replace(".h5", ".timing.89abcdef.h5")
     shutil.copy(path, timing)
     path.with_name(path.name + ".77.part").write_bytes(b"")
-    link_study(tmp_path, "volume_loss")
+    link_study(Ledger(tmp_path), "volume_loss")
     assert record_files(tmp_path, "volume_loss") == [path]
     with pytest.raises(StudyError, match="cannot be a machine id"):
         timing_path(path, "../x")
@@ -65,7 +66,7 @@ def test_timing_files_are_siblings_and_no_records(tmp_path):
 
 def test_a_record_that_is_open_by_its_link_can_be_read(tmp_path):
     path = store(tmp_path, "ball", "{}")
-    link_study(tmp_path, "volume_loss")
+    link_study(Ledger(tmp_path), "volume_loss")
     with h5py.File(index_path(tmp_path, "volume_loss")) as file:
         case = file["ball"]
         assert read_record(path).attributes == {"worst": 1.25e-4} and case["volume"].shape == (3,)
@@ -74,7 +75,7 @@ def test_a_record_that_is_open_by_its_link_can_be_read(tmp_path):
 def test_the_index_opens_every_case_by_its_name_and_can_be_moved(tmp_path):
     one, two = store(tmp_path, "ball/free", '{"a": 1}'), store(tmp_path, "ball/implicit", '{"a": 2}')
     shutil.copy(one, timing_path(one, "01234567"))
-    assert link_study(tmp_path, "volume_loss") == []
+    assert link_study(Ledger(tmp_path), "volume_loss") == []
     (tmp_path / "volume_loss").rename(tmp_path / "moved")
     with h5py.File(tmp_path / "moved" / "volume_loss.h5") as file:
         assert sorted(file["ball"]) == ["free", "implicit"]
@@ -87,7 +88,7 @@ def test_the_index_opens_every_case_by_its_name_and_can_be_moved(tmp_path):
 def test_names_that_clash_get_their_hash(tmp_path):
     names = ["ball", "ball", "ball/free", "timing", "/", "../x"]
     paths = [store(tmp_path, name, f'{{"a": {i}}}') for i, name in enumerate(names)]
-    assert link_study(tmp_path, "volume_loss") == []
+    assert link_study(Ledger(tmp_path), "volume_loss") == []
     with h5py.File(index_path(tmp_path, "volume_loss")) as file:
         hashes = [key_hash(f'{{"a": {i}}}') for i in range(6)]
         assert {*file} == {
@@ -100,7 +101,7 @@ def test_an_unreadable_case_is_reported_and_left_out(tmp_path):
     store(tmp_path, "ball/free", '{"a": 1}')
     bad = store(tmp_path, "ball/implicit", '{"a": 2}')
     bad.write_bytes(bad.read_bytes()[:900])
-    problems = link_study(tmp_path, "volume_loss")
+    problems = link_study(Ledger(tmp_path), "volume_loss")
     assert len(problems) == 1
     assert bad.name in problems[0]
     with h5py.File(index_path(tmp_path, "volume_loss")) as file:
@@ -125,7 +126,7 @@ def test_show_tells_status_units_and_numbers(tmp_path):
 def test_show_an_index(tmp_path):
     store(tmp_path, "ball/free", '{"a": 1}')
     gone = store(tmp_path, "ball/implicit", '{"a": 2}', Status.TIMED_OUT, "after 60 s")
-    link_study(tmp_path, "volume_loss")
+    link_study(Ledger(tmp_path), "volume_loss")
     text = shown(describe(index_path(tmp_path, "volume_loss")))
     assert "index of 2 cases" in text
     assert "free  status ok" in text
@@ -136,7 +137,7 @@ def test_show_an_index(tmp_path):
 
 def test_an_index_is_no_record(tmp_path):
     store(tmp_path, "ball/free", '{"a": 1}')
-    link_study(tmp_path, "volume_loss")
+    link_study(Ledger(tmp_path), "volume_loss")
     with pytest.raises(StudyError, match="is the index of a study"):
         read_record(index_path(tmp_path, "volume_loss"))
 
@@ -144,8 +145,8 @@ def test_an_index_is_no_record(tmp_path):
 def test_an_index_that_says_the_same_is_left_as_it_is(tmp_path, monkeypatch):
     """So that results which may only be looked at can be looked at by `run` too."""
     store(tmp_path, "ball/free", '{"a": 1}')
-    link_study(tmp_path, "volume_loss")
+    link_study(Ledger(tmp_path), "volume_loss")
     before = index_path(tmp_path, "volume_loss").stat().st_mtime_ns
     monkeypatch.setattr(links, "write_whole", lambda *_: pytest.fail("nothing has changed"))
-    link_study(tmp_path, "volume_loss")
+    link_study(Ledger(tmp_path), "volume_loss")
     assert index_path(tmp_path, "volume_loss").stat().st_mtime_ns == before

@@ -58,7 +58,13 @@ def test_what_a_run_writes_is_what_its_tables_list(finished_sweep):
     record = read_record(case_path(finished_sweep, "tiny", tiny_case()))
     optional = {name for name, spec in RUN_FIELDS.items() if spec.optional}
     assert set(record.fields) == set(RUN_FIELDS) - optional
-    assert set(record.attributes) == set(LAYOUTS["run"][1]) - {OWN_FILES, ENTRY, SECONDS, "portable", "restamped"}  # where asked for
+    assert set(record.attributes) == set(LAYOUTS["run"][1]) - {
+        OWN_FILES,
+        ENTRY,
+        SECONDS,
+        "portable",
+        "restamped",
+    }  # where asked for
     timing = read_record(timing_file(finished_sweep, "tiny", tiny_case(timed=True)))
     assert set(timing.fields) == set(LAYOUTS["timing"][0])
     assert set(timing.attributes) == set(LAYOUTS["timing"][1])

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from studies.base.errors import OtherVersion, StudyError
+from studies.store.entry import CASE_CHANGED, CODE_CHANGED, MISSING, OTHER_VERSION, why_stale
 from studies.store.new_record import new_fields, new_record
 from studies.store.opening import open_results, sealed
 from studies.store.record import SCHEMA, Field, Record, Status, peek, read_record, write_record
 from studies.store.schema import LAYOUTS, TIMING_FIELDS
-from studies.store.staleness import CASE_CHANGED, CODE_CHANGED, MISSING, OTHER_VERSION, is_current, why_stale
 from tests.studies import made_up_run
 from tests.studies.view.made import reference_record
 
@@ -207,7 +207,7 @@ def test_current_means_same_case_and_same_code(tmp_path):
     path = tmp_path / "a.h5"
     assert why_stale(path, KEY, "f" * 64) == MISSING
     write_record(path, record(status=Status.FAILED))
-    assert is_current(path, KEY, "f" * 64)
-    assert is_current(path, json.dumps(json.loads(KEY), sort_keys=False, indent=2), "f" * 64)
+    assert why_stale(path, KEY, "f" * 64) is None
+    assert why_stale(path, json.dumps(json.loads(KEY), sort_keys=False, indent=2), "f" * 64) is None
     assert why_stale(path, KEY.replace("0.001", "0.002"), "f" * 64) == CASE_CHANGED
     assert why_stale(path, KEY, "e" * 64) == CODE_CHANGED

@@ -13,22 +13,20 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import case_path
 from studies.runs.user_code import methods_by_name
 from studies.scenes import JUDGED, SCENES, Organ
+from studies.store.ledger import Ledger
 from studies.store.machine import machine_id
 from studies.store.record import read_record, write_record
-from studies.sweep.failures import store_failure
-from studies.sweep.plan import plan
-from studies.sweep.stored.estimate import (
+from studies.sweep.estimate import (
     MESH,
     SECONDS_PER_UNKNOWN,
     case_seconds,
-    rates,
     run_seconds,
     solve_seconds,
     timing_seconds,
     unknowns,
 )
-from studies.sweep.stored.known import Known
-from studies.sweep.tasks import tasks_of
+from studies.sweep.job import jobs_of
+from studies.sweep.plan import plan, rates
 from tests.studies.tiny import SQUEEZE, tiny_case, tiny_study
 
 PUBLISHED = Path(__file__).parents[3] / "results" / "published"
@@ -80,29 +78,29 @@ def test_a_reference_costs_by_its_unknowns_and_a_motion_by_its_steps():
 
 def test_rates_are_those_of_this_machine(results):
     study = tiny_study()
-    tasks = tasks_of(results, [study])
-    measured = rates(Known(results), tasks)["case"]
-    stored = [read_record(task.path()).attributes["seconds"] for task in tasks]
-    assert measured == pytest.approx(sum(stored) / sum(case_seconds(task.work) for task in tasks))
+    jobs = jobs_of(results, [study])
+    measured = rates(Ledger(results), jobs)["case"]
+    stored = [read_record(job.path()).attributes["seconds"] for job in jobs]
+    assert measured == pytest.approx(sum(stored) / sum(case_seconds(job.work) for job in jobs))
     path = case_path(results, "tiny", tiny_case())
     path.unlink()
-    (piece, *_) = plan(results, study)
+    (piece, *_) = plan(Ledger(results), study)
     assert piece.here and piece.guess > 0
-    for task in tasks[1:]:
-        write_record(task.path(), replace(read_record(task.path()), machine="0" * len(machine_id())))
-    assert rates(Known(results), tasks) == {}, "what another machine stored says nothing of this one"
+    for job in jobs[1:]:
+        write_record(job.path(), replace(read_record(job.path()), machine="0" * len(machine_id())))
+    assert rates(Ledger(results), jobs) == {}, "what another machine stored says nothing of this one"
 
 
 def test_the_rate_of_references_is_that_of_all_that_this_machine_has_solved(tmp_path):
-    task = tasks_of(tmp_path, [tiny_study(cases=(tiny_case(scene=SCENES[0]),))])[0]
-    path = store_failure(task, "no mesh")
-    assert rates(Known(tmp_path), []) == {}, "what failed at once has no rate"
+    job = jobs_of(tmp_path, [tiny_study(cases=(tiny_case(scene=SCENES[0]),))])[0]
+    path = job.store_failure("no mesh")
+    assert rates(Ledger(tmp_path), []) == {}, "what failed at once has no rate"
     solved = read_record(path)
     solved = replace(solved, attributes={**solved.attributes, "unknowns": 1000, "seconds": 4.0})
     write_record(path, solved)
-    assert rates(Known(tmp_path), []) == {"reference": pytest.approx(4.0 / (1000 * SECONDS_PER_UNKNOWN))}
+    assert rates(Ledger(tmp_path), []) == {"reference": pytest.approx(4.0 / (1000 * SECONDS_PER_UNKNOWN))}
     write_record(path, replace(solved, machine="0" * len(machine_id())))
-    assert rates(Known(tmp_path), []) == {}, "another machine solved it"
+    assert rates(Ledger(tmp_path), []) == {}, "another machine solved it"
 
 
 def test_an_organ_that_cannot_be_read_fails_at_once():

@@ -14,13 +14,13 @@ from studies.reference.reference_solves import reference_solves
 from studies.runs.current import case_path
 from studies.scenes import ReferencePlan
 from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.failures import Failures
+from studies.sweep.job import do, jobs_of
 from studies.sweep.load import load_runs
-from studies.sweep.local import do, environment
-from studies.sweep.standings import failed
-from studies.sweep.stored.known import Known
-from studies.sweep.tasks import tasks_of
+from studies.sweep.local import environment
+from studies.sweep.standings import failed, solve_standing
 from studies.timing.alone import alone
 from tests.studies.tiny import tiny_case, tiny_study
 
@@ -50,23 +50,24 @@ STUDY = tiny_study(cases=(tiny_case(method=Fatal()), tiny_case(method=Free())))
 def test_a_piece_that_died_is_stored_as_failed(tmp_path):
     scene = replace(BALL_SQUEEZE, reference=ReferencePlan("octant", (0.9, 0.5, 0.4)))
     case = tiny_case(scene=scene)
-    tasks, failures = tasks_of(tmp_path, [tiny_study(cases=(case,))]), Failures()
-    for task in tasks:
-        failures.add(task, "its process died")
-    assert all(task.is_current() and failed(task) for task in tasks)
+    jobs, failures = jobs_of(tmp_path, [tiny_study(cases=(case,))]), Failures()
+    for job in jobs:
+        failures.add(job, "its process died")
+    ledger = Ledger(tmp_path)
+    assert all(ledger.why(job) is None and failed(ledger, job) for job in jobs)
     (run,), remarks = load_runs(tmp_path, tiny_study(cases=(case,)))
     assert (run.record.status, run.record.message) == (Status.FAILED, "its process died")
     assert "the reference of 'ball_squeeze' on mesh 0.9 is failed: its process died" in remarks[0]
-    assert [Known(tmp_path).standing(solve).state for solve in reference_solves(scene)] == ["failed"] * 6
+    assert [solve_standing(ledger, solve).state for solve in reference_solves(scene)] == ["failed"] * 6
     said = failures.sentence("again")
-    assert said.startswith(f"failed: {tasks[0].label} (its process died), and 6 more; the rest is done")
+    assert said.startswith(f"failed: {jobs[0].label} (its process died), and 6 more; the rest is done")
 
 
 def test_what_another_command_has_done_meanwhile_is_not_done_again(results):
-    (task,) = (task for task in tasks_of(results, [tiny_study()]) if task.work == tiny_case(timed=True))
-    planned = replace(task, seen=task.state())
+    (job,) = (job for job in jobs_of(results, [tiny_study()]) if job.work == tiny_case(timed=True))
+    planned = replace(job, seen=job.state())
     assert not planned.done_meanwhile(), "it is asked for as it is"
-    path = task.path()
+    path = job.path()
     write_record(path, read_record(path))
     before = path.read_bytes(), path.stat().st_mtime_ns
     assert planned.done_meanwhile() and do(planned) == path

@@ -4,10 +4,9 @@ from collections import Counter
 from dataclasses import replace
 
 from studies.runs.current import case_path
+from studies.store.ledger import Ledger
 from studies.store.record import read_record, write_record
-from studies.sweep.machines import machines_of, mixture
-from studies.sweep.standings import standings
-from studies.sweep.stored.known import Known
+from studies.sweep.standings import machines_of, mixture, standings
 from tests.studies.tiny import tiny_study
 
 
@@ -21,9 +20,9 @@ def stored_by(results, case, **changes):
 
 def test_status_says_how_many_kinds_of_machines_a_study_mixes(results, tiny_file, organbench):
     study = tiny_study()
-    assert mixture(machines_of(standings(results, study), Known(results))) is None, "all are of this one"
+    assert mixture(machines_of(standings(Ledger(results), study))) is None, "all are of this one"
     here = stored_by(results, study.cases[0], machine="00000000")
-    assert machines_of(standings(results, study), Known(results)) == {here: 2, "00000000": 1}
+    assert machines_of(standings(Ledger(results), study)) == {here: 2, "00000000": 1}
     shown = organbench("status", tiny_file, "--results", results)[1]
     told = (
         f"made on 2 kinds of processors, whose results differ by rounding: 2 of machine {here}, 1 of machine 00000000"
@@ -36,11 +35,11 @@ def test_portable_results_are_equal_on_every_machine(results):
     for case, machine in zip(study.cases, ("1", "2", "3"), strict=True):
         record = read_record(case_path(results, "tiny", case))
         stored_by(results, case, machine=machine, attributes={**record.attributes, "portable": "yes"})
-    assert mixture(machines_of(standings(results, study), Known(results))) is None
+    assert mixture(machines_of(standings(Ledger(results), study))) is None
     assert str(mixture(Counter({"a": 2, "any": 1}))).endswith("differ by rounding: 2 of machine a, 1 portable")
 
 
 def test_stale_results_do_not_count(results):
     study = tiny_study()
     stored_by(results, study.cases[0], machine="00000000", fingerprint="0")
-    assert mixture(machines_of(standings(results, study), Known(results))) is None
+    assert mixture(machines_of(standings(Ledger(results), study))) is None

@@ -8,10 +8,11 @@ from dataclasses import replace
 import pytest
 
 from studies.runs.current import case_path
+from studies.store.ledger import Ledger
 from studies.store.links import link_study
 from studies.store.record import Status, read_record, write_record
+from studies.sweep.prune import DAY, Rule, prunable, remove
 from studies.sweep.standings import standings
-from studies.sweep.stored.prune import DAY, Rule, prunable, remove
 from studies.timing.cases import timing_file
 from tests.studies.octant import SCENE
 from tests.studies.tiny import content, diverging_case, tiny_case, tiny_study
@@ -21,7 +22,7 @@ TIMED = tiny_case(timed=True)
 
 def found(root, study=None, rules=tuple(Rule), **options):
     """Name of a file -> the rule that lets it go."""
-    return {one.path.name: one.rule for one in prunable(root, [study or tiny_study()], rules, **options)}
+    return {one.path.name: one.rule for one in prunable(Ledger(root), [study or tiny_study()], rules, **options)}
 
 
 def spoil(root):
@@ -45,7 +46,7 @@ def spoil(root):
 
 def test_of_a_finished_study_nothing_may_go(results):
     """Also what diverged: that is a result."""
-    link_study(results, "tiny")
+    link_study(Ledger(results), "tiny")
     assert found(results, references=True) == {}
 
 
@@ -55,7 +56,7 @@ def test_a_rule_names_its_files_and_no_others(results, rule):
     study = tiny_study(cases=tiny_study().cases[:2])
     assert found(results, study) == {name: rule for rule, names in expected.items() for name in names}
     before, kept = content(results / "tiny"), expected[rule]
-    gone = remove(prunable(results, [study], [rule]))
+    gone = remove(prunable(Ledger(results), [study], [rule]))
     assert {one.path.name for one in gone} == kept
     after = content(results / "tiny")
     assert {path.name for path in set(before) - set(after)} == kept and after.items() <= before.items()
@@ -85,10 +86,10 @@ def test_what_is_written_anew_meanwhile_stays(results):
     stale = case_path(results, "tiny", diverging_case())
     record = read_record(stale)
     write_record(stale, replace(record, fingerprint="0" * 64))
-    listed = prunable(results, [tiny_study()], [Rule.STALE])
+    listed = prunable(Ledger(results), [tiny_study()], [Rule.STALE])
     write_record(stale, record)
     assert remove(listed) == [] and stale.is_file()
-    assert {standing.status for standing in standings(results, tiny_study())} == {"ok", "diverged"}
+    assert {standing.status for standing in standings(Ledger(results), tiny_study())} == {"ok", "diverged"}
 
 
 def test_references_stay_unless_they_are_asked_for(solved, tmp_path):

@@ -11,10 +11,14 @@ from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.runs.current import case_path
 from studies.runs.prepare import prepare
+from studies.store import ledger
+from studies.store.entry import CODE_CHANGED, MISSING
 from studies.store.machine import machine_id
 from studies.store.record import Status, read_record, write_record
+from studies.sweep import job as jobs_module
+from studies.sweep.load import frame_times
 from studies.timing import cases as module
-from studies.timing.cases import can_be_timed, read_timing, time_cases, timing_file, timing_is_current, write_timing
+from studies.timing.cases import time_cases, timing_file, write_timing
 from studies.timing.protocol import FrameTiming
 from tests.studies.tiny import FRAMES, diverging_case, tiny_case
 
@@ -48,29 +52,41 @@ def test_timing_again_leaves_the_physics_alone(results):
 
 def test_measured_frames_make_the_time_metrics_numbers(results):
     record = read_record(case_path(results, "tiny", KEPT))
-    run = Run(KEPT, record, None, read_timing(results, "tiny", KEPT))
+    run = Run(KEPT, record, None, read_timing(results, KEPT))
     assert all(metric(name)(run) > 0 for name in ("step_time", "frame_time", "frame_time_p99", "real_time"))
 
 
+def why_untimed(root, case):
+    return ledger.Ledger(root).why_untimed(jobs_module.CaseJob(root, "tiny", case))
+
+
+def read_timing(root, case):
+    return frame_times(ledger.Ledger(root), jobs_module.CaseJob(root, "tiny", case))
+
+
+def can_be_timed(root, case):
+    return ledger.Ledger(root).can_be_timed(jobs_module.CaseJob(root, "tiny", case))
+
+
 def test_current_until_the_code_changes_or_on_another_machine(results, monkeypatch):
-    assert timing_is_current(results, "tiny", KEPT)
-    monkeypatch.setattr(module, "case_fingerprint", lambda case: "edited")
-    assert not timing_is_current(results, "tiny", KEPT)
-    assert read_timing(results, "tiny", KEPT) is None
+    assert why_untimed(results, KEPT) is None
+    for asked in (module, jobs_module):
+        monkeypatch.setattr(asked, "case_fingerprint", lambda case: "edited")
+    assert why_untimed(results, KEPT) == CODE_CHANGED
+    assert read_timing(results, KEPT) is None
     monkeypatch.undo()
-    monkeypatch.setattr(module, "machine_id", lambda: "00000000")
-    assert not timing_is_current(results, "tiny", KEPT)
+    monkeypatch.setattr(ledger, "machine_id", lambda: "00000000")
+    assert why_untimed(results, KEPT) == MISSING
 
 
 def test_what_diverged_or_never_ran_is_not_timed(results):
     assert not timing_file(results, "tiny", diverging_case()).exists()
-    assert not can_be_timed(results, "tiny", diverging_case())
-    assert timing_is_current(results, "tiny", diverging_case())
-    assert not can_be_timed(results, "tiny", tiny_case(dt_fraction=0.3))
+    assert not can_be_timed(results, diverging_case())
+    assert not can_be_timed(results, tiny_case(dt_fraction=0.3))
     for status in (Status.INVERTED, Status.DRIFTED, Status.TIMED_OUT, Status.FAILED):
         path = case_path(results, "tiny", KEPT)
         write_record(path, replace(read_record(path), status=status))
-        assert can_be_timed(results, "tiny", KEPT) == (status in (Status.INVERTED, Status.DRIFTED))
+        assert can_be_timed(results, KEPT) == (status in (Status.INVERTED, Status.DRIFTED))
 
 
 def test_methods_of_one_body_take_turns(results, monkeypatch):

@@ -13,9 +13,8 @@ from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.current import case_path
 from studies.scenes import ReferencePlan
 from studies.store.record import Status, read_record, write_record
-from studies.sweep.failures import store_failure
+from studies.sweep.job import CaseJob, ReferenceJob, jobs_of
 from studies.sweep.standings import CAUSES, Standing, causes, summary, unexpected
-from studies.sweep.tasks import Task, tasks_of
 from tests.studies.tiny import SQUEEZE, diverging_case, tiny_case, tiny_study
 
 ROOT = Path(__file__).parents[4]
@@ -73,8 +72,8 @@ def test_only_what_is_chosen_decides(organbench, results, file_of):
 @pytest.mark.parametrize(("losses", "code"), [("", 1), (", counts_losses=True", 0)])
 def test_a_reference_that_failed_is_exit_code_1(organbench, tmp_path, file_of, losses, code):
     scene = replace(SQUEEZE, reference=ReferencePlan("octant", (0.9, 0.5), variants=()))
-    for task in tasks_of(tmp_path / "r", [tiny_study(cases=(tiny_case(scene=scene),))]):
-        store_failure(task, f"no equilibrium at {task.work.level:g} s" if task.label[:3] == "ref" else "no mesh")
+    for job in jobs_of(tmp_path / "r", [tiny_study(cases=(tiny_case(scene=scene),))]):
+        job.store_failure(f"no equilibrium at {job.work.level:g} s" if job.label[:3] == "ref" else "no mesh")
     ended, out, _ = organbench("run", file_of(WITH_REFERENCE.format(losses)), "--results", tmp_path / "r")
     assert ended == code
     assert "tiny: nothing ran" in out and "tiny: 1 case: 1 failed; 2 reference solutions: 2 failed" in out
@@ -90,13 +89,13 @@ def test_status_and_run_count_alike(organbench, results, file_of):
 
 def standing(status, message, number=0) -> Standing:
     work = tiny_case(frames=number + 1)
-    return Standing(Task(__file__, "tiny", work), status, message)
+    return Standing(CaseJob(Path(__file__), "tiny", work), status, message)
 
 
 def test_causes_that_differ_in_numbers_are_one_sentence():
     same = [standing("failed", f"obstacle 0 starts {k}.5e-3 m inside the body", k) for k in range(3)]
     (sentence,) = causes(same)
-    assert sentence == f"failed: obstacle 0 starts 0.5e-3 m inside the body ({same[0].task.label}, and 2 more)"
+    assert sentence == f"failed: obstacle 0 starts 0.5e-3 m inside the body ({same[0].job.label}, and 2 more)"
     many = [standing("failed", "abcdefghijkl"[k]) for k in range(CAUSES + 2)]
     assert len(causes(many)) == CAUSES + 1 and causes(many)[-1].startswith("and 2 more causes")
     assert summary([*same, standing("not-converged", "")]) == "4 cases: 3 failed, 1 not converged"
@@ -107,7 +106,7 @@ def test_a_method_that_does_not_apply_and_what_has_not_ended_are_no_failure():
     fine = [standing(status, "") for status in ("ok", "skipped", "stale", "missing")]
     bad = [standing(status, "") for status in Status if status not in ("ok", "skipped")]
     assert unexpected(study, [*fine, *bad]) == bad
-    reference = Standing(Task(__file__, "tiny", ReferenceSolve(SQUEEZE, 0.5)), "not-converged", "")
+    reference = Standing(ReferenceJob(Path(__file__), "tiny", ReferenceSolve(SQUEEZE, 0.5)), "not-converged", "")
     assert unexpected(replace(study, expects=tuple(Status)), [reference]) == [reference]
 
 

@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from studies.store.ledger import Ledger
 from studies.store.paths import record_files
 from studies.store.record import Status, peek
 from studies.sweep.run_studies import run_studies
@@ -71,7 +72,7 @@ def finish(tmp_path):
     study = tiny_study(name="slow", cases=tuple(tiny_case(dt_fraction=0.004 + 1e-5 * k) for k in range(3)))
     assert run_studies(tmp_path / "results", [study], 1, Silent()) == total - len(kept)
     assert kept.items() <= {path.name: path.read_bytes() for path in folder.iterdir()}.items()
-    assert [standing.status for standing in standings(tmp_path / "results", study)] == ["ok"] * total
+    assert [standing.status for standing in standings(Ledger(tmp_path / "results"), study)] == ["ok"] * total
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import pytest
 
 from studies.runs.current import case_path
 from studies.store.archived import CRATE
+from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.executor import Silent
 from studies.sweep.frame_times import measure_again
@@ -43,7 +44,7 @@ def test_a_dry_run_says_what_and_how_long_and_times_nothing(organbench, tiny_fil
     code, out, _ = organbench("run", tiny_file, "--results", results, "--again", "timing", "--dry-run")
     assert code == 0 and "tiny: 2 timings would run" in out and f"2 timings ({AGAIN}): about" in out
     assert content(results / "tiny") == before
-    assert [(piece.stage, piece.label) for piece in plan_again(results, tiny_study())] == [
+    assert [(piece.stage, piece.label) for piece in plan_again(Ledger(results), tiny_study())] == [
         (TIMING, case.name) for case in tiny_study().cases[:2]
     ]
 
@@ -59,10 +60,10 @@ def test_what_is_stale_broke_off_or_is_missing_is_not_timed(organbench, tiny_fil
     path = case_path(results, "tiny", KEPT)
     write_record(path, replace(read_record(path), fingerprint="0"))
     other = tiny_study().cases[1]
-    assert [piece.label for piece in plan_again(results, tiny_study())] == [other.name]
+    assert [piece.label for piece in plan_again(Ledger(results), tiny_study())] == [other.name]
     path = case_path(results, "tiny", other)
     write_record(path, replace(read_record(path), status=Status.DIVERGED))
-    assert plan_again(results, tiny_study()) == [] and diverging_case() in tiny_study().cases
+    assert plan_again(Ledger(results), tiny_study()) == [] and diverging_case() in tiny_study().cases
     before = content(results / "tiny")
     code, out, _ = organbench("run", tiny_file, "--results", results, "--again", "timing")
     assert code == 0 and "nothing is stored of this code that can be timed" in out
@@ -83,7 +84,7 @@ def test_old_times_stay_where_the_new_ones_are_not_whole(results, monkeypatch):
 
     monkeypatch.setattr(timed, "write_timing", second_fails)
     with pytest.raises(KeyboardInterrupt):
-        measure_again(results, tiny_study(), Silent(), lambda name: None)
+        measure_again(Ledger(results), tiny_study(), Silent(), lambda name: None)
     assert changed(before, content(results / "tiny")) == set(written) and len(written) == 1
 
 

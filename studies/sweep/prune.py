@@ -10,11 +10,11 @@ from studies.base.atomic import is_there, old_parts
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.reference.reference_solves import STUDY as REFERENCES
-from studies.reference.reference_solves import reference_solves
 from studies.store.archived import check_no_archive
-from studies.store.index.entry import Entry, state_of
+from studies.store.entry import file_state
+from studies.store.ledger import FAILURES, Ledger
 from studies.store.paths import SUFFIX, TIMING, study_folder
-from studies.sweep.stored.known import FAILURES, Known
+from studies.sweep.job import Job, case_jobs, reference_jobs
 
 DAY = 86_400.0
 """Seconds."""
@@ -47,25 +47,23 @@ class Prunable:
     """Bytes."""
     modified: float
     """When it was written [s since 1970]."""
-    state: str
-    """What tells it from any later file of its name."""
+    state: tuple[int, ...]
+    """Its size, times and inode (studies.store.entry)."""
 
 
 def prunable(
-    root: Path, studies: Collection[Study], rules: Collection[Rule], older: float = 0.0, references: bool = False
+    ledger: Ledger, studies: Collection[Study], rules: Collection[Rule], older: float = 0.0, references: bool = False
 ) -> list[Prunable]:
-    """What the rules let go of `studies` below `root`, of what is older than so many days; `references`: also of the
-    references of their scenes. Raises StudyError for an archive."""
-    check_no_archive(root)
-    known = Known(root)
-    named: dict[Path, Rule] = {}
-    for study in studies:
-        folder = study_folder(root, study.name)
-        named |= {folder / file: rule for file, rule in _of_study(known, study).items()}
-        named |= {part: Rule.ORPHANS for part in old_parts(folder)}
+    """What the rules let go of `studies`, of what is older than so many days; `references`: also of the references of
+    their scenes. Raises StudyError for an archive."""
+    check_no_archive(ledger.root)
+    folders = {study.name: _of_study(ledger, study) for study in studies}
     if references:
-        folder = study_folder(root, REFERENCES)
-        named |= {folder / file: rule for file, rule in _of_references(known, studies).items()}
+        folders[REFERENCES] = _of_references(ledger, studies)
+    named: dict[Path, Rule] = {}
+    for name, files in folders.items():
+        folder = study_folder(ledger.root, name)
+        named |= {folder / file: rule for file, rule in files.items()}
         named |= {part: Rule.ORPHANS for part in old_parts(folder)}
     found = [_looked_at(path, rule) for path, rule in sorted(named.items()) if rule in rules]
     return [one for one in found if one is not None and time.time() - one.modified >= older * DAY]
@@ -78,7 +76,7 @@ def remove(found: Collection[Prunable]) -> list[Prunable]:
     gone = []
     for one in found:
         try:
-            if is_there(one.path) and state_of(one.path.lstat()) == one.state:
+            if is_there(one.path) and file_state(one.path.lstat()) == one.state:
                 one.path.unlink()
                 gone.append(one)
         except OSError as problem:
@@ -94,51 +92,44 @@ def _looked_at(path: Path, rule: Rule) -> Prunable | None:
         found = path.lstat()
     except FileNotFoundError:
         return None
-    return Prunable(path, rule, found.st_size, found.st_mtime, state_of(found))
+    return Prunable(path, rule, found.st_size, found.st_mtime, file_state(found))
 
 
-def _of_study(known: Known, study: Study) -> dict[str, Rule]:
+def _of_study(ledger: Ledger, study: Study) -> dict[str, Rule]:
     """By the name of a file in the study's folder: the rule that lets it go. Current results are not among them."""
-    folder = known.folder(study.name)
+    files, jobs = ledger.files(study.name), {job.path().name: job for job in case_jobs(ledger.root, study)}
     found: dict[str, Rule] = {}
-    used: set[str] = set()
-    for case in study.cases:
-        entry = known.of_case(study.name, case)
-        if entry is None:
-            continue
-        used.add(entry.file)
-        rule = _rule(entry, known.why_case_is_stale(study.name, case))
+    for file in (name for name in files if TIMING not in name):
+        rule = _rule(ledger, jobs[file]) if file in jobs else Rule.SUPERSEDED
         if rule is not None:
-            found[entry.file] = rule
-        timing = known.of_timing(study.name, case)
-        if timing is not None and rule is None and known.why_untimed(study.name, case) is not None:
+            found[file] = rule
+        elif (timing := ledger.timing(jobs[file])) is not None and ledger.why_untimed(jobs[file]) is not None:
             found[timing.file] = Rule.STALE
-    found |= {file: Rule.SUPERSEDED for file in folder.entries if TIMING not in file and file not in used}
-    for timing in folder.timings():
-        record = timing.file.split(TIMING)[0] + SUFFIX
-        if record not in folder.entries:
-            found[timing.file] = Rule.ORPHANS
+    for timing in (name for name in files if TIMING in name):
+        record = timing.split(TIMING)[0] + SUFFIX
+        if record not in files:
+            found[timing] = Rule.ORPHANS
         elif record in found:  # frame times go with their run
-            found[timing.file] = found[record]
+            found[timing] = found[record]
     return found
 
 
-def _of_references(known: Known, studies: Collection[Study]) -> dict[str, Rule]:
+def _of_references(ledger: Ledger, studies: Collection[Study]) -> dict[str, Rule]:
     """The same for the references of the scenes of studies; those of any other scene stay."""
-    scenes = {scene.name: scene for study in studies for scene in study.scenes}
+    scenes = {scene.name for study in studies for scene in study.scenes}
+    jobs = {job.path().name: job for study in studies for job in reference_jobs(ledger.root, study.scenes)}
     found: dict[str, Rule] = {}
-    solves = {solve.path(known.root).name: solve for scene in scenes.values() for solve in reference_solves(scene)}
-    for file, entry in known.folder(REFERENCES).entries.items():
-        if file in solves:
-            rule = _rule(entry, known.why_solve_is_stale(solves[file]))
-            if rule is not None:
-                found[file] = rule
-        elif entry.kind == "reference" and entry.scene in scenes:
-            found[file] = Rule.SUPERSEDED
+    for file, entry in ledger.files(REFERENCES).items():
+        rule = _rule(ledger, jobs[file]) if file in jobs else None
+        if rule is None and file not in jobs and entry.kind == "reference" and entry.scene in scenes:
+            rule = Rule.SUPERSEDED
+        if rule is not None:
+            found[file] = rule
     return found
 
 
-def _rule(entry: Entry, why: str | None) -> Rule | None:
-    if why is not None:
+def _rule(ledger: Ledger, job: Job) -> Rule | None:
+    if ledger.why(job) is not None:
         return Rule.STALE
-    return Rule.FAILED if entry.status in FAILURES else None
+    entry = ledger.entry(job)
+    return Rule.FAILED if entry is not None and entry.status in FAILURES else None

@@ -1,0 +1,267 @@
+"""The jobs that studies are made of: cases, and the solutions of their references."""
+
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+from studies.base.atomic import is_there
+from studies.base.errors import StudyError
+from studies.catalog.study import Study
+from studies.reference.reference_solves import STUDY as REFERENCES
+from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint, reference_solves
+from studies.runs.case import Case
+from studies.runs.current import case_fingerprint, case_path
+from studies.runs.user_code import files_of
+from studies.scene.scene import Scene
+from studies.store.entry import file_state, read_entry, why_entry_is_stale
+from studies.store.new_record import new_record
+from studies.store.paths import key_digest
+from studies.store.record import Record, Status, write_record
+from studies.sweep.estimate import MEMORY, case_bytes, case_seconds, solve_memory, solve_seconds
+
+REFERENCE = "reference "
+"""Before the name of a reference solution in its label."""
+
+
+@dataclass(frozen=True)
+class Job(ABC):
+    """One job, which can run in any process."""
+
+    root: Path
+    """The results folder."""
+    study: str
+    """Name of the study, or of the folder of references."""
+    work: Case | ReferenceSolve
+    seen: tuple[int, ...] | None = field(default=None, compare=False)
+    """State of its file when the sweep began; None where there was none."""
+
+    kind: ClassVar[str]
+    """ "case" or "reference"."""
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """For progress and messages."""
+
+    @property
+    @abstractmethod
+    def weight(self) -> float:
+        """Longest first keeps both cores busy to the end: references by mesh, then cases by size over step."""
+
+    @property
+    @abstractmethod
+    def needs(self) -> float:
+        """Memory that it may take, rather too much [bytes]."""
+
+    @property
+    @abstractmethod
+    def seconds(self) -> float:
+        """Estimated duration on the machine of results/published [s]."""
+
+    @property
+    @abstractmethod
+    def size(self) -> int | None:
+        """Estimated bytes of its record; None where that is unknown."""
+
+    @property
+    @abstractmethod
+    def fingerprint(self) -> str:
+        """Hash of the code that computes it."""
+
+    @abstractmethod
+    def path(self) -> Path:
+        """Where its record lies."""
+
+    @abstractmethod
+    def run(self) -> Path:
+        """Computes it and stores the result; where the record lies. Raises StudyError when it cannot be stored."""
+
+    @abstractmethod
+    def failure(self, cause: str) -> Record:
+        """The record of a job that could not be done."""
+
+    def store_failure(self, cause: str) -> Path:
+        """Stores it as failed. Raises StudyError when it cannot be stored."""
+        write_record(self.path(), self.failure(cause))
+        return self.path()
+
+    @cached_property
+    def _digest(self) -> str:
+        return key_digest(self.work.key)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 (hex) of what it computes."""
+        return self._digest
+
+    def state(self) -> tuple[int, ...] | None:
+        """Size, times and inode of its file; None where there is none."""
+        return file_state(self.path().stat()) if is_there(self.path()) else None
+
+    def done_meanwhile(self) -> bool:
+        """Whether another command has stored its result since the sweep began."""
+        if self.state() in (None, self.seen):
+            return False
+        return why_entry_is_stale(read_entry(self.path()), self.digest, self.fingerprint) is None
+
+
+@dataclass(frozen=True)
+class CaseJob(Job):
+    """A case of a study."""
+
+    work: Case
+    kind = "case"
+
+    @property
+    def label(self) -> str:
+        """As Job's."""
+        return self.work.name
+
+    @property
+    def weight(self) -> float:
+        """As Job's."""
+        return self.work.body.nodes / self.work.dt_fraction
+
+    @property
+    def needs(self) -> float:
+        """As Job's."""
+        return MEMORY
+
+    @property
+    def seconds(self) -> float:
+        """As Job's."""
+        return case_seconds(self.work)
+
+    @property
+    def size(self) -> int:
+        """As Job's."""
+        return case_bytes(self.work)
+
+    @property
+    def fingerprint(self) -> str:
+        """As Job's."""
+        return case_fingerprint(self.work)
+
+    @cached_property
+    def _path(self) -> Path:
+        return case_path(self.root, self.study, self.work)
+
+    def path(self) -> Path:
+        """As Job's."""
+        return self._path
+
+    def run(self) -> Path:
+        """As Job's."""
+        from studies.runs.run import run_case  # with the solver, which takes most of a second to load
+
+        return run_case(self.root, self.study, self.work)
+
+    def failure(self, cause: str) -> Record:
+        """As Job's."""
+        from studies.runs.run import OWN_FILES
+
+        own = {str(file.path): file.sha256 for file in files_of(self.work.method, self.work.body.law)}
+        return _failed(self, "run", cause, {"warnings": ""} | ({OWN_FILES: json.dumps(own)} if own else {}))
+
+
+@dataclass(frozen=True)
+class ReferenceJob(Job):
+    """One solution of the reference of a scene."""
+
+    work: ReferenceSolve
+    kind = "reference"
+
+    @property
+    def label(self) -> str:
+        """As Job's."""
+        return REFERENCE + self.work.name
+
+    @property
+    def weight(self) -> float:
+        """As Job's."""
+        return 1e9 + self.work.weight
+
+    @property
+    def needs(self) -> float:
+        """As Job's."""
+        known = read_entry(self.path()).unknowns if is_there(self.path()) else None
+        return solve_memory(self.work, known)
+
+    @property
+    def seconds(self) -> float:
+        """As Job's."""
+        return solve_seconds(self.work)
+
+    @property
+    def size(self) -> None:
+        """As Job's."""
+        return None
+
+    @property
+    def fingerprint(self) -> str:
+        """As Job's."""
+        return reference_fingerprint()
+
+    @cached_property
+    def _path(self) -> Path:
+        return self.work.path(self.root)
+
+    def path(self) -> Path:
+        """As Job's."""
+        return self._path
+
+    def run(self) -> Path:
+        """As Job's. A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""
+        from studies.reference.solve import solve
+
+        try:
+            return solve(self.root, self.work)
+        except StudyError as error:
+            return self.store_failure(str(error))
+
+    def failure(self, cause: str) -> Record:
+        """As Job's."""
+        work = self.work
+        nothing = {"unknowns": 0, "steps_done": 0, "seconds": float("nan")}
+        about = {"scene": work.scene.name, "level": float(work.level), "variant": work.variant}
+        return _failed(self, "reference", cause, about | nothing)
+
+
+def _failed(job: Job, kind: str, cause: str, attributes: dict[str, Any]) -> Record:
+    return new_record(
+        kind=kind,
+        key=job.work.key,
+        name=job.work.name,
+        status=Status.FAILED,
+        message=cause,
+        fingerprint=job.fingerprint,
+        attributes=attributes,
+        fields={},
+    )
+
+
+def do(job: Job) -> Path:
+    """Does a job, unless another command has meanwhile; where its record lies."""
+    return job.path() if job.done_meanwhile() else job.run()
+
+
+def case_jobs(root: Path, study: Study) -> list[CaseJob]:
+    """A job per case, in the order of the study."""
+    return [CaseJob(root, study.name, case) for case in study.cases]
+
+
+def reference_jobs(root: Path, scenes: Iterable[Scene]) -> list[ReferenceJob]:
+    """A job per solution of the references of scenes."""
+    return [ReferenceJob(root, REFERENCES, one) for scene in scenes for one in reference_solves(scene)]
+
+
+def jobs_of(root: Path, studies: Iterable[Study]) -> list[Job]:
+    """Everything the studies need, each result once, longest first."""
+    jobs: dict[Path, Job] = {}
+    for study in studies:
+        jobs |= {job.path(): job for job in (*reference_jobs(root, study.scenes), *case_jobs(root, study))}
+    return sorted(jobs.values(), key=lambda job: -job.weight)

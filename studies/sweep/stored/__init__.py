@@ -1,1 +1,0 @@
-"""What is stored of studies, looked up by the index of their folders."""
