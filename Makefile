@@ -5,9 +5,9 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study study-peers report verify smoke test check lint docs figures stress bench clean distclean compiled \
+.PHONY: help study study-peers report verify smoke test check lint docs links figures stress bench clean distclean compiled \
 	compiled-essential setup-run \
-	setup-test setup-dev FORCE
+	setup-test setup-verify setup-dev FORCE
 
 help: ## this list
 	@echo "make TARGET"
@@ -31,7 +31,7 @@ study-peers: setup-run ## other programs beside ours on the same ball and liver:
 	$(BIN)/python -m studies.peers.main
 	$(BIN)/organbench plot studies/peers/study.py
 
-verify: setup-test ## the reference against closed forms, published numbers and other codes; test campaigns (minutes)
+verify: setup-verify docs ## before a release: oracles, campaigns, browsers, clusters, wheels, notebooks (half an hour)
 	$(BIN)/organbench verify
 	$(PYTEST) -m campaign
 
@@ -42,7 +42,7 @@ test: setup-test compiled ## every test but the campaigns, which `make verify` r
 	$(PYTEST) -m "not campaign"
 
 # Asked for both, `make check test` leaves the fast tests to `test`.
-check: lint docs setup-dev ## lint, types, import contracts, links of the docs and the fast tests
+check: lint links setup-dev ## lint, types, import contracts, links of the docs and the fast tests
 	$(if $(filter test,$(MAKECMDGOALS)),,$(PYTEST) -m "not slow and not campaign")
 
 lint: setup-dev ## ruff, pyright and the import contracts alone
@@ -53,6 +53,9 @@ lint: setup-dev ## ruff, pyright and the import contracts alone
 
 docs: setup-dev compiled-essential ## the documentation as a site: open site/index.html; a broken link is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python docs/site/build.py
+
+links: setup-dev ## the same site in a minute, without running the notebooks
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python docs/site/build.py --links
 
 stress: setup-run ## ten thousand random trials that try to break every method (minutes)
 	$(BIN)/organbench stress --cases 10000
@@ -90,7 +93,7 @@ compiled: setup-run
 compiled-essential: setup-run
 	@$(BIN)/python -m studies.compiling.main --essential
 
-setup-run setup-test setup-dev: setup-%:
+setup-run setup-test setup-verify setup-dev: setup-%:
 	@.ci/setup $*
 
 FORCE:

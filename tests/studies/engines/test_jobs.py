@@ -39,7 +39,7 @@ def slurm(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_job_array_does_a_study_and_is_ended(slurm, organbench):
     study, file, results = slurm / "one.py", slurm / "slurm.yaml", slurm / "results"
     study.write_text(ONE)
@@ -87,6 +87,7 @@ def test_a_job_that_is_refused_is_a_sentence(slurm, refused):
     assert "was refused (no such partition): correct the settings" in said
 
 
+@pytest.mark.campaign
 def test_a_program_that_starts_workers_is_started_for_each_and_ended(tmp_path):
     told, command = [], f"echo $$ {{processes}} {{memory}} ${{EXTRA}} >> {tmp_path}/started; sleep 600 & wait"
     settings = Settings(

@@ -57,7 +57,7 @@ def refusal(file, folder):
     return str(stop.value)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_worker_with_other_code_is_refused_by_name(file, tmp_path):
     for package in PACKAGES:
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
@@ -69,7 +69,7 @@ def test_a_worker_with_other_code_is_refused_by_name(file, tmp_path):
     assert said.startswith("worker another has other code of organbench; install the same version there")
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_worker_without_organbench_is_refused_by_name(file, tmp_path):
     words = ["--scheduler-file", str(file), "--name", "bare", "--no-dashboard", "--no-nanny"]
     with running([sys.executable, "-c", WITHOUT, *words], tmp_path):
