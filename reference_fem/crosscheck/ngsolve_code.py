@@ -124,6 +124,7 @@ class NgsolveModel:
         return place[held.nodes] + count * np.array(held.components)[:, None]
 
     def vector(self):
+        """All unknowns, as NGSolve numbers them."""
         return self.state.vec.FV().NumPy()
 
     def fields(self, vector: Any):

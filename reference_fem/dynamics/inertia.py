@@ -84,9 +84,11 @@ class Instant:
     motion: Motion
 
     def at(self, _: np.ndarray):
+        """(v, a, memory): given, whatever the displacement."""
         return self.motion.v, self.motion.a, self.motion.memory
 
     def slopes(self):
+        """dv/du and da/du: none."""
         return 0.0, 0.0
 
 

@@ -44,6 +44,7 @@ class Account:
         self.now = self.powers(motion)
 
     def powers(self, motion: Motion) -> Powers:
+        """Forces, pressures and dissipation of a motion."""
         system, state = self.system, motion.state
         loads = system.loads_of(state)
         found = system.evaluate(state.x, loads, tangent=False)
@@ -126,6 +127,7 @@ class March:
         self.iterations, self.substeps = self.iterations + state.iterations, self.substeps + 1
 
     def stuck(self, t: float, failure: Exception, path: Sequence[Equilibrium]):
+        """The error of a march that no shorter step carries on."""
         return SolveError(
             f"no motion found between t = {self.motion.state.t:g} s (the last that converged) and t = {t:g} s: "
             f"{failure}; refine the mesh where it folds, or ask for less",

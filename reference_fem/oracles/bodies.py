@@ -105,6 +105,7 @@ def round_off(points: np.ndarray, elements: np.ndarray, radii: Sequence[float]):
 
 
 def on_radius(radius: float):
+    """Whether points (3, N) lie on a sphere about the origin: a function of theirs."""
     return lambda x: np.abs(np.linalg.norm(x, axis=0) - radius) < 1e-9
 
 

@@ -57,10 +57,12 @@ class Equilibrium:
 
     @property
     def min_J(self):
+        """Smallest J of all quadrature points."""
         return float(self.J.min())
 
     @property
     def max_J(self):
+        """Largest J of all quadrature points."""
         return float(self.J.max())
 
 

@@ -72,6 +72,7 @@ class PardisoFactors:
         self.upper = sp.csr_matrix((1, 1))
 
     def call(self, phase: int, b: np.ndarray):
+        """One phase of Pardiso on the matrix and a right-hand side."""
         self.solver.set_phase(phase)
         return self.solver._call_pardiso(self.upper, b)
 
@@ -93,6 +94,7 @@ class PardisoFactors:
         self.call(22, nothing)
 
     def solve(self, b: np.ndarray):
+        """x of K x = b."""
         return self.call(33, np.asfortranarray(b))
 
     def release(self):
@@ -119,9 +121,11 @@ class ScipyFactors:
         self.solve_with = lu.solve
 
     def solve(self, b: np.ndarray):
+        """x of K x = b."""
         return self.solve_with(b)
 
     def release(self):
+        """Forget the factors."""
         self.solve_with = np.asarray
 
 
@@ -139,10 +143,12 @@ class SymmetricSolver:
         self.upper = sp.csr_matrix((1, 1))
 
     def factor(self, upper: sp.csr_matrix):
+        """Take K, by its upper triangle; raises SingularTangent."""
         self.upper = upper
         self.try_factor(afresh=False)
 
     def try_factor(self, afresh: bool):
+        """Factorise; raises SingularTangent."""
         try:
             self.factors.factor(self.upper, afresh)
         except self.factors.failure as problem:
@@ -170,6 +176,7 @@ class SymmetricSolver:
         return x
 
     def misfit(self, x: np.ndarray, b: np.ndarray):
+        """Largest entry of K x − b over the largest of b."""
         Kx = self.upper @ x + self.upper.T @ x - (self.upper.diagonal() * x.T).T
         size = np.abs(b).max()
         with np.errstate(invalid="ignore"):
@@ -177,4 +184,5 @@ class SymmetricSolver:
         return gap / size if size > 0.0 else gap
 
     def release(self):
+        """Give the memory of the factors back."""
         self.factors.release()

@@ -29,6 +29,7 @@ class Pattern:
 
     @property
     def size(self):
+        """Entries of a `values` array."""
         return len(self.indices) + len(self.lift_indices) + 1
 
     def upper(self, values: np.ndarray):

@@ -38,6 +38,7 @@ class Evaluation:
 
     @property
     def usable(self):
+        """Whether no element is inside out and both errors are finite."""
         return self.smallest_J > 0.0 and np.isfinite(self.errors).all()
 
 
@@ -77,6 +78,7 @@ class System:
         checks.check_held(self.nodes, held_dofs)
 
     def build_surface(self, facets: Facets):
+        """Tables of the boundary, as contact reads them."""
         dofs = np.hstack([3 * facets.nodes + c for c in range(3)])
         penalty = self.settings.penalty * self.problem.material.mu / np.sqrt(facets.weights.sum(axis=1))
         positions = self.pattern.positions(dofs)
@@ -98,12 +100,14 @@ class System:
         return force
 
     def rest(self) -> State:
+        """The state that every path starts from."""
         shape = (len(self.rows), *self.surface.weights.shape)
         x, start = np.zeros(self.total), self.settings.start
         grip = contact.first_grip(self.obstacles_at(start), self.sticks, self.surface, x, TOUCHING * np.ptp(self.nodes))
         return State(start, 0.0, x, np.zeros(shape), np.zeros(shape), grip=grip, hold=grip)
 
     def obstacles_at(self, t: float):
+        """Rows of the obstacles at time t, (no, 8)."""
         return obstacles.place(self.rows, self.problem.obstacles, t)
 
     def filling_at(self, t: float, load: float):
