@@ -5,7 +5,7 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study study-peers report verify smoke test check lint docs links figures stress bench clean distclean compiled \
+.PHONY: help study study-peers report verify smoke test check lint docs links figures stress bench speeds coverage clean distclean compiled \
 	compiled-essential setup-run \
 	setup-test setup-verify setup-dev FORCE
 
@@ -66,6 +66,23 @@ figures: setup-run ## draw the charts again from the stored results
 
 bench: setup-run ## measure the numbers that the README promises (quiet machine, please)
 	OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m studies.bench.main
+
+# asv takes the benchmarks of this commit and the code of either: OLD=v0.1 make speeds compares with a release.
+OLD ?= HEAD~1
+BENCH ?=
+ASV = OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/asv --config studies/bench/asv.conf.json
+speeds: setup-run ## the promised speeds of the last commit beside those of OLD, by asv (quiet machine, please)
+	$(BIN)/python -m pip install -q -c constraints.txt --no-build-isolation -e ".[bench]"
+	$(ASV) machine --yes
+	rm -rf build/asv/old && mkdir -p build/asv/old && git archive $(OLD) | tar -x -C build/asv/old
+	export ASV_PYTHONPATH=$$PWD/build/asv/old; $(ASV) run --python=same --set-commit-hash $$(git rev-parse $(OLD)) $(BENCH)
+	export ASV_PYTHONPATH=$$PWD; $(ASV) run --python=same --set-commit-hash $$(git rev-parse HEAD) $(BENCH)
+	$(ASV) compare $$(git rev-parse $(OLD)) $$(git rev-parse HEAD)
+
+coverage: setup-dev ## lines of the kernels that their tests run, with the compiler off
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run --source massspring/kernels -m pytest -q -m "not slow and not campaign" \
+		tests/massspring/kernels
+	$(BIN)/python -m coverage report --skip-covered --show-missing
 
 # A chart or table by its file name: results/STUDY/NAME.png, results/STUDY/NAME.csv
 results/%.png: setup-run FORCE ## one chart by its file name: make results/volume_loss/volume.png
