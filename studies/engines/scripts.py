@@ -25,7 +25,7 @@ class Queue:
 
 
 def slurm(settings: Settings, folder: Path) -> list[str]:
-    """https://slurm.schedmd.com/sbatch.html"""
+    """See https://slurm.schedmd.com/sbatch.html."""
     asked = [
         f"--array=1-{settings.workers}",
         "--nodes=1",

@@ -27,6 +27,7 @@ class Remembered(Generic[T, V]):
         self.known: dict[int, tuple[weakref.ref[T], V]] = {}
 
     def __call__(self, thing: T) -> V:
+        """What the function gives for `thing`."""
         found = self.known.get(id(thing))
         return self.set(thing, self.of(thing)) if found is None else found[1]
 

@@ -96,8 +96,10 @@ def representatives(cases):
 def check_prepared(case):
     try:
         prepared = prepare(case)
-    except DoesNotApply as reason:  # the literature's methods are asked for in every scene
-        assert type(case.method) in LITERATURE and len(str(reason)) > 40
+    except DoesNotApply as error:  # the literature's methods are asked for in every scene
+        reason, prepared = str(error), None
+    if prepared is None:
+        assert type(case.method) in LITERATURE and len(reason) > 40
         return
     assert prepared.setup.clock.frames == case.frames
     assert prepared.setup.clock.duration == pytest.approx(case.scene.duration, rel=1e-12)
