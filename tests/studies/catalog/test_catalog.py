@@ -112,7 +112,12 @@ def test_representatives_leave_no_kind_and_no_scene_out(study):
     assert {case.scene.name for case in chosen} == {case.scene.name for case in cases}
 
 
+QUICK = [study for study in STUDIES if study.name != "organs"]
+"""The organs take most of a minute to mesh: the campaign below prepares them."""
+
+
 @pytest.mark.slow
+@pytest.mark.parametrize("study", QUICK, ids=lambda study: study.name)
 def test_every_kind_of_case_can_be_prepared(study):
     for case in representatives(study.smoke().cases):
         check_prepared(case)
