@@ -5,9 +5,10 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study study-peers report verify smoke test check lint docs figures fuzz stress bench clean distclean compiled \
+.PHONY: help study study-peers report verify smoke test check lint docs links figures fuzz stress bench speeds \
+	coverage clean distclean compiled \
 	compiled-essential setup-run \
-	setup-test setup-dev FORCE
+	setup-test setup-verify setup-dev FORCE
 
 help: ## this list
 	@echo "make TARGET"
@@ -31,7 +32,7 @@ study-peers: setup-run ## other programs beside ours on the same ball and liver:
 	$(BIN)/python -m studies.peers.main
 	$(BIN)/organbench plot studies/peers/study.py
 
-verify: setup-test ## the reference against closed forms, published numbers and other codes; test campaigns (minutes)
+verify: setup-verify docs ## before a release: oracles, campaigns, browsers, clusters, wheels, notebooks (half an hour)
 	$(BIN)/organbench verify
 	$(PYTEST) -m campaign
 
@@ -42,7 +43,7 @@ test: setup-test compiled ## every test but the campaigns, which `make verify` r
 	$(PYTEST) -m "not campaign"
 
 # Asked for both, `make check test` leaves the fast tests to `test`.
-check: lint docs setup-dev ## lint, types, import contracts, links of the docs and the fast tests
+check: lint links setup-dev ## lint, types, import contracts, links of the docs and the fast tests
 	$(if $(filter test,$(MAKECMDGOALS)),,$(PYTEST) -m "not slow and not campaign")
 
 lint: setup-dev ## ruff, pyright and the import contracts alone
@@ -53,6 +54,9 @@ lint: setup-dev ## ruff, pyright and the import contracts alone
 
 docs: setup-dev compiled-essential ## the documentation as a site: open site/index.html; a broken link is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python docs/site/build.py
+
+links: setup-dev ## the same site in a minute, without running the notebooks
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python docs/site/build.py --links
 
 fuzz: setup-run ## ten thousand random trials that try to break every method (minutes)
 	$(BIN)/organbench fuzz --cases 10000
@@ -66,6 +70,23 @@ figures: setup-run ## draw the charts again from the stored results
 
 bench: setup-run ## measure the numbers that the README promises (quiet machine, please)
 	OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m studies.bench.main
+
+# asv takes the benchmarks of this commit and the code of either: OLD=v0.1 make speeds compares with a release.
+OLD ?= HEAD~1
+BENCH ?=
+ASV = OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/asv --config studies/bench/asv.conf.json
+speeds: setup-run ## the promised speeds of the last commit beside those of OLD, by asv (quiet machine, please)
+	$(BIN)/python -m pip install -q -c constraints.txt --no-build-isolation -e ".[bench]"
+	$(ASV) machine --yes
+	rm -rf build/asv/old && mkdir -p build/asv/old && git archive $(OLD) | tar -x -C build/asv/old
+	export ASV_PYTHONPATH=$$PWD/build/asv/old; $(ASV) run --python=same --set-commit-hash $$(git rev-parse $(OLD)) $(BENCH)
+	export ASV_PYTHONPATH=$$PWD; $(ASV) run --python=same --set-commit-hash $$(git rev-parse HEAD) $(BENCH)
+	$(ASV) compare $$(git rev-parse $(OLD)) $$(git rev-parse HEAD)
+
+coverage: setup-dev ## lines of the kernels that their tests run, with the compiler off
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run --source massspring/kernels -m pytest -q -m "not slow and not campaign" \
+		tests/massspring/kernels
+	$(BIN)/python -m coverage report --skip-covered --show-missing
 
 # A chart or table by its file name: results/STUDY/NAME.png, results/STUDY/NAME.csv
 results/%.png: setup-run FORCE ## one chart by its file name: make results/volume_loss/volume.png
@@ -93,7 +114,7 @@ compiled: setup-run
 compiled-essential: setup-run
 	@$(BIN)/python -m studies.compiling.main --essential
 
-setup-run setup-test setup-dev: setup-%:
+setup-run setup-test setup-verify setup-dev: setup-%:
 	@.ci/setup $*
 
 FORCE:

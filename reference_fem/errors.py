@@ -1,5 +1,8 @@
 """The exceptions of this package, and the one warning."""
 
+from collections.abc import Sequence
+from typing import Any
+
 
 class SolveError(ValueError):
     """A reference problem that cannot be set up or solved; the message is one sentence for the user.
@@ -7,7 +10,7 @@ class SolveError(ValueError):
     `converged` holds the equilibria reached before a loading path stopped (empty for a bad set-up).
     """
 
-    def __init__(self, message, converged=()):
+    def __init__(self, message: str, converged: Sequence[Any] = ()):
         super().__init__(message)
         self.converged = list(converged)
 

@@ -1,5 +1,8 @@
 """Closed forms and converged tables that the solver is held against (docs/theory.md, oracles). SI units throughout."""
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
 import numpy as np
 from scipy.optimize import root_scalar
 from scipy.special import spherical_jn
@@ -17,12 +20,12 @@ BALL_BETWEEN_PLANES = {
 over 2R -> (force / (mu R²), equator radius / R); two meshes agree to 1e-4."""
 
 
-def uniaxial_force(mu, area, stretch):
+def uniaxial_force(mu: float, area: float, stretch: float):
     """Force [N] on an incompressible block of rest cross-section `area` [m²]: mu A (s - s^-2)."""
     return mu * area * (stretch - stretch**-2)
 
 
-def principal_stress(material, stretches, axis):
+def principal_stress(material: Any, stretches: Sequence[float], axis: int):
     """Nominal stress [Pa] along `axis` of a body stretched by three principal stretches, p = kappa (J - 1).
 
     P_i = m1 J^-2/3 (s_i - I1 / 3 s_i) + m2 J^-4/3 (s_i (I1 - s_i²) - 2 I2 / 3 s_i) + kappa (J - 1) J / s_i.
@@ -35,13 +38,13 @@ def principal_stress(material, stretches, axis):
     return first + second + kappa * (J - 1.0) * J / s
 
 
-def uniaxial_lateral_stretch(material, stretch):
+def uniaxial_lateral_stretch(material: Any, stretch: float):
     """Lateral stretch of the nearly incompressible block with free sides: root of the lateral stress near s^-1/2."""
     near, tight = (0.7 * stretch**-0.5, 1.3 * stretch**-0.5), {"xtol": 1e-15, "rtol": 1e-15}
     return root_scalar(lambda b: float(principal_stress(material, (b, b, stretch), 0)), bracket=near, **tight).root
 
 
-def uniaxial_stress(material, stretch):
+def uniaxial_stress(material: Any, stretch: float):
     """Nominal axial stress [Pa] of the nearly incompressible block with free sides."""
     b = uniaxial_lateral_stretch(material, stretch)
     return principal_stress(material, (b, b, stretch), 2)
@@ -56,43 +59,43 @@ COOK = {"corner u_x": -5.821, "corner u_y": 6.923, "mid-edge u_y": 6.951}
 100 N of shear on each mm of thickness: upper right corner, and middle of the loaded edge."""
 
 
-def thick_cylinder_displacement(ratio, inner=3.0, outer=9.0, young=1000.0):
+def thick_cylinder_displacement(ratio: float, inner: float = 3.0, outer: float = 9.0, young: float = 1000.0):
     """Displacement [m] of the inner radius under unit pressure in plane strain (Lamé):
     (1 + nu) a ((1 - 2 nu) a² + b²) / (E (b² - a²))."""
     squares = (1.0 - 2.0 * ratio) * inner**2 + outer**2
     return (1.0 + ratio) * inner * squares / (young * (outer**2 - inner**2))
 
 
-def thick_sphere_pressure(mu, inner, outer, inner_stretch):
+def thick_sphere_pressure(mu: float, inner: float, outer: float, inner_stretch: float):
     """Pressure [Pa] inside an incompressible thick sphere of rest radii inner, outer [m], inner radius stretched."""
     outer_stretch = np.cbrt(1.0 + (inner / outer) ** 3 * (inner_stretch**3 - 1.0))
 
-    def branch(s):
+    def branch(s: float):
         return 4.0 / s + s**-4.0
 
     return 0.5 * mu * (branch(outer_stretch) - branch(inner_stretch))
 
 
-def hertz_plane_force(mu, radius, share):
+def hertz_plane_force(mu: float, radius: float, share: float):
     """Small-approach force [N] of an incompressible ball between two planes, share = approach / 2R: 4/3 E* R² d^1.5,
     E* = 4 mu."""
     return 16.0 / 3.0 * mu * radius**2 * share**1.5
 
 
-def ball_torsional(n=2):
+def ball_torsional(n: int = 2):
     """Lowest omega R / sqrt(mu/rho) of a free ball that twists about its centre, any Poisson ratio:
     (n - 1) j_n(y) = y j_{n+1}(y) (Lamb 1882, vibrations of the first class)."""
     return first_root(lambda y: (n - 1) * spherical_jn(n, y) - y * spherical_jn(n + 1, y))
 
 
-def ball_spheroidal(poisson, n=2):
+def ball_spheroidal(poisson: float, n: int = 2):
     """Lowest omega R / sqrt(mu/rho) of a free ball that changes its shape, n >= 2; poisson = 0.5 is incompressible.
 
     Traction-free surface of shear (y) and compression (x) waves (Lamb 1882, vibrations of the second class).
     """
     slowness = np.sqrt((1.0 - 2.0 * poisson) / (2.0 * (1.0 - poisson)))
 
-    def traction(y):
+    def traction(y: float):
         x = slowness * y
         # j_{n+1}(x) x / j_n(x), which vanishes where nothing can be compressed
         ratio = x * spherical_jn(n + 1, x) / spherical_jn(n, x) if x > 0.0 else 0.0
@@ -103,7 +106,7 @@ def ball_spheroidal(poisson, n=2):
     return first_root(traction)
 
 
-def first_root(function, low=0.5, high=10.0):
+def first_root(function: Callable[[float], float], low: float = 0.5, high: float = 10.0):
     """Least root in low..high; the frequencies of a ball are more than the 0.05 of this scan apart."""
     grid = np.arange(low, high, 0.05)
     signs = np.sign([function(y) for y in grid])

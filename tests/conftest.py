@@ -15,6 +15,8 @@ from studies.compiling.log import summary
 
 PATIENCE = 900.0
 """Seconds that a process waits for what another one makes; the longest takes a minute on a busy machine."""
+COSTLY = {"browser", "scheduler", "wheel", "written"}
+"""Fixtures that start a browser or a Dask cluster, build a wheel, run a notebook: what asks for one is a campaign."""
 COMPILED = pytest.StashKey[list[Compiled]]()
 
 
@@ -67,6 +69,14 @@ def mesh_cache(run_folder: Path) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ORGANBENCH_CACHE", str(folder))
         yield folder
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks campaigns by the costly fixtures that they use."""
+    for item in items:
+        if COSTLY & set(getattr(item, "fixturenames", ())):
+            item.add_marker("campaign")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -53,7 +53,6 @@ def written(gallery, tmp_path):
     return write
 
 
-@pytest.mark.slow
 def test_a_notebook_becomes_a_page_with_its_pictures(written):
     folder = written(GOOD)
     page = (folder / "made.md").read_text(encoding="utf-8")
@@ -65,7 +64,6 @@ def test_a_notebook_becomes_a_page_with_its_pictures(written):
     assert json.loads((folder / "made.ipynb").read_text())["cells"][1]["outputs"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -66,7 +66,6 @@ def wheel(tmp_path_factory) -> Path:
     return path
 
 
-@pytest.mark.slow
 def test_the_wheel_holds_the_three_packages_whole(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     inside = {name for name in names if ".dist-info/" not in name}
@@ -78,7 +77,6 @@ def test_the_wheel_holds_the_three_packages_whole(wheel):
     assert top == {"massspring", "reference_fem", "studies"}
 
 
-@pytest.mark.slow
 def test_the_wheel_runs_from_another_folder(wheel, tmp_path):
     """In an environment of its own; what it requires comes from that of the tests."""
     home = tmp_path / "environment"
@@ -97,7 +95,6 @@ def test_the_wheel_runs_from_another_folder(wheel, tmp_path):
     assert any("volume_loss" in line for line in lines) and any("implicit_volume" in line for line in lines)
 
 
-@pytest.mark.campaign
 def test_the_wheel_installs_by_itself(wheel, tmp_path):
     """With pip and everything it requires, as a user does it."""
     home = tmp_path / "environment"

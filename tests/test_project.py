@@ -82,7 +82,19 @@ def test_the_solvers_import_little(package, allowed):
 
 def test_make_alone_lists_the_targets():
     text = subprocess.run(["make", "-s"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    for target in ("study", "study-%", "smoke", "test", "check", "docs", "figures", "bench", "clean", "results/%.png"):
+    for target in (
+        "study",
+        "study-%",
+        "smoke",
+        "test",
+        "check",
+        "docs",
+        "links",
+        "figures",
+        "bench",
+        "clean",
+        "results/%.png",
+    ):
         assert re.search(rf"^  {re.escape(target)} +\S", text, re.MULTILINE), target
 
 
@@ -101,7 +113,7 @@ def test_tests_run_once_also_where_check_and_test_are_asked_for(goals, fast, all
         all_of_them,
     ]
     assert any("ruff check" in line for line in lines) == ("check" in goals)
-    assert any("docs/site/build.py" in line for line in lines) == ("check" in goals)
+    assert any("docs/site/build.py --links" in line for line in lines) == ("check" in goals)
     assert all("not campaign" in line for line in runs)
 
 

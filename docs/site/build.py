@@ -1,5 +1,7 @@
 """Builds the documentation site: `python docs/site/build.py`, then open site/index.html (no network needed).
 
+With --links the notebooks are shown as they are written, not run: that takes a minute and checks every link.
+
 Pages: README, CONTRIBUTING, SECURITY, CHANGELOG and docs/*.md as they stand, the notebooks of docs/gallery with what
 they show, and one for every folder of the three packages with the docstrings of its modules, which are read from the
 sources, not imported. A broken link ends with exit code 1, and so does a notebook that fails.
@@ -59,11 +61,11 @@ def copy_pages() -> list:
     return [{"organbench": "README.md"}, *({part: entries} for part, entries in parts.items())]
 
 
-def gallery_pages() -> list:
-    """Runs the notebooks and writes their pages; their part of the menu. Raises BrokenNotebook."""
+def gallery_pages(run: bool) -> list:
+    """Runs the notebooks, if wanted, and writes their pages; their part of the menu. Raises BrokenNotebook."""
     from gallery import gallery  # its libraries are needed for this alone
 
-    return [{title(page): str(page.relative_to(STAGE))} for page in gallery(STAGE / "docs" / "gallery")]
+    return [{title(page): str(page.relative_to(STAGE))} for page in gallery(STAGE / "docs" / "gallery", run)]
 
 
 def section(module: str, **options: bool) -> str:
@@ -102,13 +104,13 @@ def foreign(site: Path) -> list[str]:
     return [f"{page.relative_to(site)} loads {address}" for page, found in pages.items() for address in found]
 
 
-def main() -> int:
+def main(links_alone: bool) -> int:
     """Copies, writes, builds and checks; the exit code."""
     config = {
         "INHERIT": str(SITE / "config.yml"),
         "docs_dir": str(STAGE),
         "site_dir": str(ROOT / "site"),
-        "nav": [*copy_pages(), {"Gallery": gallery_pages()}, {"API": api_pages()}],
+        "nav": [*copy_pages(), {"Gallery": gallery_pages(run=not links_alone)}, {"API": api_pages()}],
         "plugins": {"mkdocstrings": {"custom_templates": str(SITE / "templates")}},
     }
     file = ROOT / "build" / "mkdocs.yml"
@@ -121,4 +123,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main("--links" in sys.argv[1:]))

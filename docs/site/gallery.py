@@ -32,18 +32,18 @@ class BrokenNotebook(Exception):
     """A notebook that fails, or shows no picture."""
 
 
-def gallery(target: Path) -> list[Path]:
-    """Runs all notebooks and writes their pages below `target`, in the order of the menu. Raises BrokenNotebook."""
+def gallery(target: Path, run: bool = True) -> list[Path]:
+    """Writes the pages of all notebooks below `target`, in the order of the menu. Raises BrokenNotebook."""
     names = {path.stem: path for path in SOURCES.glob("*.py")}
     ordered = [name for name in ORDER if name in names] + sorted(names.keys() - set(ORDER))
     target.mkdir(parents=True, exist_ok=True)
     with ThreadPoolExecutor(TOGETHER) as pool:
-        return list(pool.map(lambda name: write_page(names[name], target), ordered))
+        return list(pool.map(lambda name: write_page(names[name], target, run), ordered))
 
 
-def write_page(source: Path, target: Path) -> Path:
-    """Runs a notebook; writes its page, its pictures and the notebook with its results. Raises BrokenNotebook."""
-    notebook = executed(source)
+def write_page(source: Path, target: Path, run: bool = True) -> Path:
+    """Writes the page of a notebook (run, or as it is), its pictures and the notebook. Raises BrokenNotebook."""
+    notebook = executed(source) if run else jupytext.read(source)
     body, resources = MarkdownExporter(config=EXPORTED).from_notebook_node(
         notebook, {"output_files_dir": ".", "unique_key": source.stem}
     )

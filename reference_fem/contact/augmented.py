@@ -57,14 +57,21 @@ class Touch(NamedTuple):
     """Resultant on the body, overwritten, (no, 3) [N]."""
 
 
-def touch(rows, shift, multiplier, penalty, grip=NO_GRIP, guess=NO_GUESS) -> Touch:
+def touch(
+    rows: np.ndarray,
+    shift: np.ndarray,
+    multiplier: np.ndarray,
+    penalty: np.ndarray,
+    grip: Grip = NO_GRIP,
+    guess: np.ndarray = NO_GUESS,
+) -> Touch:
     """A Touch with room for its results."""
     zeros = np.zeros_like(multiplier), np.zeros_like(grip.traction), np.zeros((len(rows), 3))
     return Touch(rows, shift, multiplier, penalty, grip, guess, *zeros)
 
 
 @compiled()
-def add_contact(x, surface, touch, values, residual, tangent):
+def add_contact(x: np.ndarray, surface: Surface, touch: Touch, values: np.ndarray, residual: np.ndarray, tangent: bool):
     """residual -= w (t n + T) N and, if tangent, values += w d²(potential) N N; fills touch (eq. 6.2, 6.4).
 
     Normal part: eps n⊗n - t curvature (1 - n⊗n - a⊗a); part of a stuck point: eps (1 - n0⊗n0), n0 at its anchor.
@@ -106,7 +113,7 @@ def add_contact(x, surface, touch, values, residual, tangent):
 
 
 @compiled()
-def counted(touch, o, f):
+def counted(touch: Touch, o: int, f: int):
     """Whether a point of a facet has a multiplier, or a pressure that the tangent counts with."""
     for q in range(touch.multiplier.shape[2]):
         if touch.multiplier[o, f, q] > 0.0 or (len(touch.guess) and touch.guess[o, f, q] > 0.0):
@@ -115,7 +122,7 @@ def counted(touch, o, f):
 
 
 @compiled()
-def out_of_reach(row, nodes):
+def out_of_reach(row: np.ndarray, nodes: np.ndarray):
     """Whether no point of a facet without multipliers can feel an obstacle: farther than the facet extends.
 
     The functions of a six-node triangle sum to 5/3 at most in absolute value, so its points stay within twice the
@@ -134,7 +141,7 @@ def out_of_reach(row, nodes):
 
 
 @compiled()
-def press_point(touch, o, f, q, y, push, k):
+def press_point(touch: Touch, o: int, f: int, q: int, y: np.ndarray, push: np.ndarray, k: np.ndarray):
     """push = t n + T (3,) and k = -d push/dy (3, 3) at the point y; False when both are zero.
 
     With a guess s of the pressure, k and T are those of a point pressed by s, whether or not it touches.
@@ -160,7 +167,7 @@ def press_point(touch, o, f, q, y, push, k):
 
 
 @compiled()
-def hold_point(touch, o, f, q, y, push, k):
+def hold_point(touch: Touch, o: int, f: int, q: int, y: np.ndarray, push: np.ndarray, k: np.ndarray):
     """push += T (3,) and k -= dT/dy (3, 3) of a stuck point y."""
     row, grip, eps = touch.rows[o], touch.grip, touch.penalty[f]
     n, along, z, sunk = np.empty(3), np.empty(3), np.empty(3), 0.0
@@ -178,7 +185,7 @@ def hold_point(touch, o, f, q, y, push, k):
         k[i, i] += eps
 
 
-def first_grip(rows, sticks, surface: Surface, x, near) -> Grip:
+def first_grip(rows: np.ndarray, sticks: np.ndarray, surface: Surface, x: np.ndarray, near: float) -> Grip:
     """The grip at the start: of sticking obstacles, the points not farther than `near` [m]."""
     if not sticks.any():
         return NO_GRIP
@@ -188,7 +195,7 @@ def first_grip(rows, sticks, surface: Surface, x, near) -> Grip:
     return Grip(stuck, y - rows[:, None, None, 1:4], np.zeros((*shape, 3)))
 
 
-def renewed_grip(found: Touch, sticks, surface: Surface, x) -> Grip:
+def renewed_grip(found: Touch, sticks: np.ndarray, surface: Surface, x: np.ndarray) -> Grip:
     """The grip after a load step: what is pressed stays stuck where it was, or sticks where it is now."""
     old = found.grip
     if not sticks.any():
@@ -199,7 +206,7 @@ def renewed_grip(found: Touch, sticks, surface: Surface, x) -> Grip:
     return Grip(stuck, np.where(kept, old.anchor, here), np.where(kept, found.traction, 0.0))
 
 
-def potential(x, surface: Surface, touch: Touch):
+def potential(x: np.ndarray, surface: Surface, touch: Touch):
     """sum w (t² - m² + T² - m_T²) / (2 eps) [J] in plain NumPy, apart from the kernel, to check it."""
     y, total, eps = point_positions(x, surface), 0.0, touch.penalty[:, None]
     for o, (row, m) in enumerate(zip(touch.rows, touch.multiplier, strict=True)):

@@ -20,7 +20,7 @@ FIRST = 0.02
 """Time of the state that both iterate at: deformed a little, as within a loading path."""
 
 
-def iteration_ratio(n=7, repeats=3) -> dict:
+def iteration_ratio(n: int = 7, repeats: int = 3) -> dict:
     """Seconds of an iteration (tangent, residual, factors, solution), of reference_fem over the faster of NGSolve's.
 
     By turns, least of the repeats after one that warms up. Keys: unknowns, own_s, ngsolve_s, ratio, inverse.
@@ -55,7 +55,7 @@ def own_iteration(problem: Problem) -> Callable[[], float]:
     return action
 
 
-def ngsolve_iteration(problem: Problem, inverse) -> Callable[[], float]:
+def ngsolve_iteration(problem: Problem, inverse: str) -> Callable[[], float]:
     """The same in NGSolve's own Newton: two of its iterations, halved."""
     model = NgsolveModel(problem)
     model.advance(FIRST, inverse)

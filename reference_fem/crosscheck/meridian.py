@@ -141,6 +141,7 @@ class Quarter:
         return field.vec.FV().NumPy().copy()
 
     def solution(self, radius: float, forces: list[float]) -> MeridianSolution:
+        """What is kept of the state that it has come to."""
         u = load("ngsolve").CF((self.state.components[0], self.state.components[1]))
         return MeridianSolution(radius, np.array(forces), self.space.ndof, self.mesh, u)
 

@@ -6,6 +6,7 @@ of this project it gets the mesh, the held values and the quadrature points, not
 
 import importlib
 import importlib.util
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
@@ -123,9 +124,10 @@ class NgsolveModel:
         return place[held.nodes] + count * np.array(held.components)[:, None]
 
     def vector(self):
+        """All unknowns, as NGSolve numbers them."""
         return self.state.vec.FV().NumPy()
 
-    def fields(self, vector):
+    def fields(self, vector: Any):
         """(u (N2, 3), p (N1,)) in this project's numbers."""
         mesh = self.problem.mesh
         parts = vector[: 3 * len(nodes(mesh))].reshape(3, -1)
@@ -134,7 +136,7 @@ class NgsolveModel:
         middles = ends[:, mesh.edges].mean(axis=1) + bulge
         return np.hstack((ends, middles)).T, vector[3 * len(nodes(mesh)) :].copy()
 
-    def wanted(self, t):
+    def wanted(self, t: float):
         """Increments of the held unknowns that lead to time t, as NGSolve's coefficients, zero elsewhere."""
         mesh = self.problem.mesh
         u, _ = self.fields(self.vector())
@@ -151,7 +153,7 @@ class NgsolveModel:
         step[np.array(self.free)] = 0.0
         return step
 
-    def advance(self, t, inverse="sparsecholesky", tolerance=1e-9) -> int:
+    def advance(self, t: float, inverse: str = "sparsecholesky", tolerance: float = 1e-9) -> int:
         """To time t in one step: the prescribed increment through the tangent, then Newton; returns its iterations."""
         form, vec = self.form, self.state.vec
         step = vec.CreateVector()
@@ -161,14 +163,14 @@ class NgsolveModel:
         vec.data += step - form.mat.Inverse(self.free, inverse=inverse) * pulled
         return self.newton(inverse, tolerance)
 
-    def newton(self, inverse, tolerance, most=20) -> int:
+    def newton(self, inverse: str, tolerance: float, most: int = 20) -> int:
         """NGSolve's own Newton from here; its iterations. Raises SolveError when it does not converge."""
         status, iterations = self.iterate(inverse, tolerance, most)
         if status != 0:
             raise SolveError(f"NGSolve's Newton did not converge in {most} iterations: take shorter steps")
         return iterations
 
-    def iterate(self, inverse, tolerance, most):
+    def iterate(self, inverse: str, tolerance: float, most: int):
         """(status, iterations) of NGSolve's own Newton; what it prints is dropped: the status holds it."""
         newton = load("ngsolve.solvers").Newton
         with redirect_stdout(StringIO()):
@@ -194,7 +196,7 @@ class NgsolveModel:
         return forces
 
 
-def solve(problem: Problem, times) -> NgsolveSolution:
+def solve(problem: Problem, times: Sequence[float]) -> NgsolveSolution:
     """The state at the last of the times, reached step by step; raises SolveError."""
     model = NgsolveModel(problem)
     iterations = sum(model.advance(t) for t in times)

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_fem.dynamics.mass import build_mass
+from reference_fem.model.problem import Problem
 from reference_fem.system.checks import check_inertia
 from reference_fem.system.saddle_point import Evaluation, System
-from reference_fem.system.state import Loads, State
+from reference_fem.system.state import Loads, NewtonSettings, State
 
 
 class Scheme(NamedTuple):
@@ -27,7 +28,7 @@ class Scheme(NamedTuple):
     gamma: float
 
 
-def scheme(rho_inf) -> Scheme:
+def scheme(rho_inf: float) -> Scheme:
     """Optimal parameters for a spectral radius rho_inf at infinite frequency (Chung and Hulbert 1993, eqs 17-25)."""
     alpha_m, alpha_f = (2.0 * rho_inf - 1.0) / (rho_inf + 1.0), rho_inf / (rho_inf + 1.0)
     lead = alpha_f - alpha_m
@@ -59,7 +60,7 @@ class TimeStep:
     held_v: np.ndarray
     held_a: np.ndarray
 
-    def at(self, u):
+    def at(self, u: np.ndarray):
         """(v, a, memory) for u (3 N2,): Newmark's formulas and (1 - am) m1 + am m0 = (1 - af) a1 + af a0 (eq. 6.10)."""
         alpha_m, alpha_f, beta, gamma = self.scheme
         old, dt = self.old, self.dt
@@ -82,10 +83,12 @@ class Instant:
 
     motion: Motion
 
-    def at(self, _):
+    def at(self, _: np.ndarray):
+        """(v, a, memory): given, whatever the displacement."""
         return self.motion.v, self.motion.a, self.motion.memory
 
     def slopes(self):
+        """dv/du and da/du: none."""
         return 0.0, 0.0
 
 
@@ -96,17 +99,17 @@ class MovingSystem(System):
     Raises SolveError for a body without mass.
     """
 
-    def __init__(self, problem, settings, damping=0.0):
+    def __init__(self, problem: Problem, settings: NewtonSettings, damping: float = 0.0):
         check_inertia(problem)
         super().__init__(problem, settings)
         self.mass = build_mass(self)
         self.damping = damping
         self.clock: TimeStep | Instant | None = None
 
-    def check_freedom(self, held_dofs):
+    def check_freedom(self, held_dofs: np.ndarray):
         """Nothing to refuse: inertia balances what no holder does."""
 
-    def evaluate(self, x, loads: Loads, tangent=True) -> Evaluation:
+    def evaluate(self, x: np.ndarray, loads: Loads, tangent: bool = True) -> Evaluation:
         """As at rest, with inertia, once there is a clock."""
         found = super().evaluate(x, loads, tangent)
         if self.clock is None:
@@ -122,11 +125,11 @@ class MovingSystem(System):
         found.errors[0] = self.force_error(found, inertia, v, loads.force)
         return found
 
-    def inertia(self, field):
+    def inertia(self, field: np.ndarray):
         """Mass times a nodal field, interleaved (3 N2,)."""
         return self.mass.times(field.reshape(-1, 3)).ravel()
 
-    def force_error(self, found: Evaluation, inertia, v, force):
+    def force_error(self, found: Evaluation, inertia: np.ndarray, v: np.ndarray, force: np.ndarray | float):
         """Unbalanced force over the forces at work.
 
         Where nothing acts, as in free flight, the scale is the force of elasticity that would stop the motion.

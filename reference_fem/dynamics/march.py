@@ -3,6 +3,7 @@
 docs/theory.md, eq. 6.12.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from reference_fem.dynamics.inertia import Instant, Motion, MovingSystem, Scheme, TimeStep
 from reference_fem.dynamics.release import held_motion, released
 from reference_fem.errors import SolveError
-from reference_fem.statics.equilibrium import EASY
+from reference_fem.statics.equilibrium import EASY, Equilibrium
 from reference_fem.statics.newton import StepFailed, solve_step
 from reference_fem.system import assembly
 from reference_fem.system.state import State
@@ -43,6 +44,7 @@ class Account:
         self.now = self.powers(motion)
 
     def powers(self, motion: Motion) -> Powers:
+        """Forces, pressures and dissipation of a motion."""
         system, state = self.system, motion.state
         loads = system.loads_of(state)
         found = system.evaluate(state.x, loads, tangent=False)
@@ -78,11 +80,11 @@ def strain(system: MovingSystem, state: State):
 class March:
     """A motion under way."""
 
-    def __init__(self, system: MovingSystem, scheme: Scheme, dt=None):
+    def __init__(self, system: MovingSystem, scheme: Scheme, dt: float | None = None):
         self.system, self.scheme, self.dt = system, scheme, dt
         self.iterations = self.substeps = 0
 
-    def begin(self, state: State, v, interval):
+    def begin(self, state: State, v: np.ndarray, interval: float):
         """Let go of a body in `state` with velocities v; interval [s]: to the first wanted time."""
         system = self.system
         self.motion = released(system, state, v, interval / self.count(interval))
@@ -91,11 +93,11 @@ class March:
         # with the pressure as given: the multiplier that starts the motion stores no energy
         self.energy0 = kinetic(system, self.motion) + strain(system, state)
 
-    def count(self, interval):
+    def count(self, interval: float):
         """Equal steps that an interval takes; 1e-9 is round-off in an interval that is a multiple of dt."""
         return 1 if self.dt is None else max(1, int(np.ceil(interval / self.dt * (1.0 - 1e-9))))
 
-    def advance(self, t, path):
+    def advance(self, t: float, path: Sequence[Equilibrium]):
         """To time t, in as many steps as it takes; `path` goes into the exception when they fail."""
         t0, reached = self.motion.state.t, 0.0
         share = full = 1.0 / self.count(t - t0)
@@ -113,7 +115,7 @@ class March:
             if self.motion.state.iterations <= EASY:
                 share = min(full, 2.0 * share)
 
-    def step(self, t):
+    def step(self, t: float):
         """One step, to time t; a StepFailed leaves the motion as it was."""
         system, old = self.system, self.motion
         dt = t - old.state.t
@@ -124,7 +126,8 @@ class March:
         self.account.book(old, self.motion)
         self.iterations, self.substeps = self.iterations + state.iterations, self.substeps + 1
 
-    def stuck(self, t, failure, path):
+    def stuck(self, t: float, failure: Exception, path: Sequence[Equilibrium]):
+        """The error of a march that no shorter step carries on."""
         return SolveError(
             f"no motion found between t = {self.motion.state.t:g} s (the last that converged) and t = {t:g} s: "
             f"{failure}; refine the mesh where it folds, or ask for less",

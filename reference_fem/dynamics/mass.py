@@ -7,7 +7,8 @@ import scipy.sparse as sp
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
 
-from reference_fem.elements.shapes import basis_table
+from reference_fem.elements.shapes import Elements, basis_table
+from reference_fem.elements.table import Element
 from reference_fem.system.saddle_point import System
 
 
@@ -19,12 +20,12 @@ class Mass(NamedTuple):
     values: np.ndarray
     """All components in the slots of the tangent's pattern, (pattern.size,) [kg]."""
 
-    def times(self, field):
+    def times(self, field: np.ndarray):
         """Mass times a nodal field (N2, 3)."""
         return self.matrix @ field
 
 
-def element_masses(element, elements, density, order):
+def element_masses(element: Element, elements: Elements, density: float, order: int):
     """rho integral N_a N_b of every element, (ne, nu, nu) [kg]; for P2 exact at order 4 on straight elements."""
     values, _ = basis_table(element.displacement, get_quadrature(RefTet, order)[0])
     return density * np.einsum("eq,qa,qb->eab", elements.weights, values, values)
@@ -41,7 +42,7 @@ def build_mass(system: System) -> Mass:
     return Mass(matrix, packed(local, system.positions, system.pattern.size, elements.dofs.shape[1]))
 
 
-def packed(local, positions, size, width):
+def packed(local: np.ndarray, positions: np.ndarray, size: int, width: int):
     """Element masses (ne, nu, nu), once for each component, added into the slots of packed upper triangles."""
     values, count = np.zeros(size), local.shape[1]
     a, b = np.triu_indices(count)

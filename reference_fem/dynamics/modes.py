@@ -36,7 +36,7 @@ class Modes:
         return self.elastic / (2.0 * np.pi)
 
 
-def natural_frequencies(problem: Problem, count: int, solver="auto") -> Modes:
+def natural_frequencies(problem: Problem, count: int, solver: str = "auto") -> Modes:
     """The `count` lowest elastic modes of the undeformed, stress-free body, and the rigid motions left free.
 
     K z = omega² diag(M, 0) z with the tangent K of P2/P1 at rest and the consistent mass M; the pressure has no
@@ -61,7 +61,7 @@ def natural_frequencies(problem: Problem, count: int, solver="auto") -> Modes:
     return Modes(np.sqrt(np.maximum(values, 0.0)), np.array(fields), rigid)
 
 
-def lowest(system: MovingSystem, free, count):
+def lowest(system: MovingSystem, free: np.ndarray, count: int):
     """The count smallest omega² (ascending) and their modes (len(free), count) on the free displacements."""
     problem, mass = system.problem, system.mass
     rest = system.rest()
@@ -71,7 +71,7 @@ def lowest(system: MovingSystem, free, count):
     system.solver.factor(system.pattern.upper(tangent - shift * mass.values))
     unknowns, displacements = len(system.pattern.free), len(free)
 
-    def inverse(force):
+    def inverse(force: np.ndarray):
         """Displacement under a force at the shifted stiffness: the pressures follow and are dropped."""
         right = np.zeros(unknowns)
         right[:displacements] = force

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 from skfem import ElementTetP2
 
 from reference_fem.dynamics.inertia import MovingSystem, scheme
@@ -60,9 +61,9 @@ class Moment(Equilibrium):
 
 def motion_path(
     problem: Problem,
-    times,
+    times: ArrayLike,
     settings: DynamicsSettings | None = None,
-    velocity0=None,
+    velocity0: ArrayLike | None = None,
     start: Equilibrium | None = None,
     on_step: Callable[[Moment], None] | None = None,
 ) -> list[Moment]:
@@ -99,7 +100,7 @@ def check_element(problem: Problem):
         raise SolveError(f"a motion with the element {problem.element!r} is asked for: use 'P2/P1' or 'P2/P0'")
 
 
-def given_start(system: MovingSystem, velocity0, start):
+def given_start(system: MovingSystem, velocity0: ArrayLike | None, start: Equilibrium | None):
     """(State, velocities (3 N2,)) that a motion begins with."""
     shape, state = system.nodes.shape, system.rest()
     if start is not None:

@@ -9,7 +9,7 @@ from reference_fem.statics.tangent import Tangent
 from reference_fem.system.state import State
 
 
-def held_motion(system: MovingSystem, t, dt):
+def held_motion(system: MovingSystem, t: float, dt: float):
     """Velocity and acceleration of the prescribed unknowns at time t, by differences of the second order.
 
     Central; forward while t - dt lies before the start, where a motion need not be defined.
@@ -21,7 +21,7 @@ def held_motion(system: MovingSystem, t, dt):
     return (after - before) / (2.0 * dt), (after - 2.0 * now + before) / dt**2
 
 
-def released(system: MovingSystem, state: State, v, dt) -> Motion:
+def released(system: MovingSystem, state: State, v: np.ndarray, dt: float) -> Motion:
     """The motion that starts from the displacement in `state` with velocities v (3 N2,).
 
     M a + B p = load - f(u, 0) - c M v and B·a - 2 C p / dt² = -(g(u + dt v) + g(u - dt v)) / dt², with the tangent's
@@ -55,7 +55,7 @@ def released(system: MovingSystem, state: State, v, dt) -> Motion:
     )
 
 
-def put_mass(system, values, dt):
+def put_mass(system: MovingSystem, values: np.ndarray, dt: float):
     """Tangent values with the mass in place of the stiffness, and the compressibility over dt²/2, in place."""
     pattern, n = system.pattern, system.displacement_count
     count, displaced = len(pattern.indices), pattern.free < n

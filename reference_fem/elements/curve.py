@@ -1,5 +1,6 @@
 """Curved second-order meshes."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,9 @@ from skfem import MeshTet, MeshTet2
 from reference_fem.elements.shapes import facet_nodes, nodes
 
 
-def curve(mesh: MeshTet, project, on_surface) -> MeshTet2:
+def curve(
+    mesh: MeshTet, project: Callable[[np.ndarray], np.ndarray], on_surface: Callable[[np.ndarray], np.ndarray]
+) -> MeshTet2:
     """A second-order mesh whose mid-side nodes on a surface lie on that surface.
 
     project: (3, N) points -> (3, N) points on the true surface [m].

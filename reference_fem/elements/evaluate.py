@@ -19,7 +19,7 @@ class Evaluator:
     Raises SolveError for a point farther out than max_outside [m] (default: 5 % of the diagonal of the box).
     """
 
-    def __init__(self, mesh: MeshTet, max_outside=None):
+    def __init__(self, mesh: MeshTet, max_outside: float | None = None):
         self.x, self.table = nodes(mesh), element_nodes(mesh)
         self.corners = self.x[self.table[:, :4]]
         self.tree = KDTree(self.corners.mean(axis=1))
@@ -27,13 +27,13 @@ class Evaluator:
         self.max_outside = 0.05 * size if max_outside is None else max_outside
         self.outside = np.zeros(0)
 
-    def displacement(self, u, points):
+    def displacement(self, u: np.ndarray, points: np.ndarray):
         """u: (N2, 3) nodal field; points: (M, 3) rest positions [m]; returns (M, 3)."""
         element, local = self.locate(points)
         values, _ = basis_table(ElementTetP2(), local.T)
         return np.einsum("ma,mai->mi", values, np.asarray(u)[self.table[element]])
 
-    def locate(self, points):
+    def locate(self, points: np.ndarray):
         """(element (M,), reference coordinates (M, 3)); fills `outside`."""
         points = np.atleast_2d(np.asarray(points, dtype=float))
         if points.shape[1:] != (3,) or not np.isfinite(points).all():
@@ -53,7 +53,7 @@ class Evaluator:
             )
         return element, local
 
-    def improve(self, points, open_, count, found):
+    def improve(self, points: np.ndarray, open_: np.ndarray, count: int, found: tuple[np.ndarray, np.ndarray]):
         """Try the `count` elements with the nearest centroids for the open points, keep the closest of each."""
         element, local = found
         count = min(count, len(self.table))
@@ -65,7 +65,7 @@ class Evaluator:
             where = open_[better]
             element[where], local[where], self.outside[where] = candidate[better], reference[better], distance[better]
 
-    def invert(self, element, points):
+    def invert(self, element: np.ndarray, points: np.ndarray):
         """Reference coordinates of points in the (curved) elements, by Newton from the straight map.
 
         Points farther than one element's size keep the straight map's: their element is not the nearest.
@@ -86,7 +86,7 @@ class Evaluator:
         local[near] = reach
         return local
 
-    def distances(self, points, element, local):
+    def distances(self, points: np.ndarray, element: np.ndarray, local: np.ndarray):
         """Distance from each point to where its clipped reference coordinates lead [m]; zero inside."""
         inside = np.minimum(local.min(axis=1), 1.0 - local.sum(axis=1)) >= INSIDE
         clipped = np.clip(local, 0.0, 1.0)

@@ -3,7 +3,7 @@
 Whatever the element, the mesh gives ten nodes to a tetrahedron and results are reported at them (`nodes`).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from skfem import ElementTetMini, ElementTetP2, ElementTriP2, MeshTet
@@ -60,7 +60,7 @@ class Facets(NamedTuple):
     """Rest area of each quadrature point, (nf, nq) [m²]."""
 
 
-def basis_table(element, points):
+def basis_table(element: Any, points: np.ndarray):
     """Values (nq, nb) and gradients (nq, dim, nb) of a scikit-fem element at points (dim, nq)."""
     count = element.doflocs.shape[0]
     pairs = [element.lbasis(points, i) for i in range(count)]
@@ -69,7 +69,7 @@ def basis_table(element, points):
     return values, gradients
 
 
-def element_nodes(mesh):
+def element_nodes(mesh: MeshTet):
     """P2 nodes of every tetrahedron, (ne, 10): four vertices, then six mid-side nodes."""
     return Dofs(mesh, ElementTetP2()).element_dofs.T
 
@@ -97,7 +97,7 @@ def displacement_points(mesh: MeshTet, element: Element) -> np.ndarray:
     return points
 
 
-def at_nodes(mesh: MeshTet, element: Element, values) -> np.ndarray:
+def at_nodes(mesh: MeshTet, element: Element, values: np.ndarray) -> np.ndarray:
     """A displacement field (n, 3) at the P2 nodes, (N2, 3); mid-side nodes of a linear field lie between two vertices,
     and a bubble is zero there."""
     if isinstance(element.displacement, ElementTetP2):
@@ -106,7 +106,7 @@ def at_nodes(mesh: MeshTet, element: Element, values) -> np.ndarray:
     return np.vstack((corners, corners[mesh.edges].mean(axis=0)))
 
 
-def forces_at_nodes(mesh: MeshTet, element: Element, forces):
+def forces_at_nodes(mesh: MeshTet, element: Element, forces: np.ndarray):
     """Forces on the displacement functions (n, 3) as forces on the P2 nodes, (N2, 3) [N]; bubbles carry none."""
     if isinstance(element.displacement, ElementTetP2):
         return forces
@@ -142,7 +142,7 @@ def build_elements(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAUL
     )
 
 
-def check_shapes(det):
+def check_shapes(det: np.ndarray):
     """Refuse elements whose map folds: the sign of det (ne, nq) must not change inside one element."""
     largest = np.abs(det).max(axis=1)
     folded = det.min(axis=1) * det.max(axis=1) <= 0.0
@@ -160,7 +160,7 @@ OUTWARD = np.array([-1, 1, -1, 1])
 """Whether the faces of an upright tetrahedron, as RefTet lists their vertices, turn counterclockwise from outside."""
 
 
-def check_neighbours(mesh):
+def check_neighbours(mesh: MeshTet):
     """Refuse a folded element, and an inside-out one: two tetrahedra turn round the face between them in opposite ways.
 
     The map of an element says how it turns, not its corners: those of a part of a curved element that was halved may
@@ -173,7 +173,7 @@ def check_neighbours(mesh):
     a, b, c = np.asarray(mesh.t[:4], np.int64)[np.array(RefTet.facets)].transpose(1, 0, 2)
     turns = np.sign((b - a) * (c - a) * (c - b)) * OUTWARD[:, None] * sign
     round_face = np.zeros(mesh.nfacets)
-    np.add.at(round_face, mesh.t2f, turns)
+    np.add.at(round_face, np.asarray(mesh.t2f), turns)
     bad = np.flatnonzero((mesh.f2t[1] >= 0) & (round_face != 0.0))
     if bad.size:
         pair = mesh.f2t[:, bad[0]]
@@ -196,10 +196,11 @@ def facet_nodes(mesh: MeshTet) -> np.ndarray:
     return np.column_stack((corners, *middles))
 
 
-def edge_index(mesh, pairs):
+def edge_index(mesh: MeshTet, pairs: np.ndarray):
     """Rows of mesh.edges that join the vertex pairs (n, 2)."""
     count = mesh.nvertices
-    keys = np.min(mesh.edges, axis=0) * np.int64(count) + np.max(mesh.edges, axis=0)
+    edges = np.asarray(mesh.edges)
+    keys = np.min(edges, axis=0) * np.int64(count) + np.max(edges, axis=0)
     order = np.argsort(keys)
     wanted = np.min(pairs, axis=1) * np.int64(count) + np.max(pairs, axis=1)
     return order[np.searchsorted(keys, wanted, sorter=order)]

@@ -24,14 +24,14 @@ class Surface(NamedTuple):
     """Basic eps of each facet, (nf,) [Pa/m]."""
 
 
-def point_positions(x, surface: Surface):
+def point_positions(x: np.ndarray, surface: Surface):
     """Where the contact points are, (nf, nq, 3) [m]."""
     moved = (surface.rest + x[: len(surface.rest)])[surface.dofs].reshape(len(surface.dofs), 3, -1)
     return np.einsum("qa,fia->fqi", surface.values, moved)
 
 
 @compiled()
-def point_into(N, nodes, y):
+def point_into(N: np.ndarray, nodes: np.ndarray, y: np.ndarray):
     """y = sum N_a x_a (3,), the point of a facet with nodes x (·, 3) where its functions are N [m]."""
     for i in range(3):
         y[i] = 0.0
@@ -40,7 +40,7 @@ def point_into(N, nodes, y):
 
 
 @compiled()
-def add_point_stiffness(N, k, K):
+def add_point_stiffness(N: np.ndarray, k: np.ndarray, K: np.ndarray):
     """K[ia, jb] += k_ij N_a N_b."""
     count = len(N)
     for i in range(3):
@@ -51,7 +51,7 @@ def add_point_stiffness(N, k, K):
 
 
 @compiled()
-def scatter(K, positions, values):
+def scatter(K: np.ndarray, positions: np.ndarray, values: np.ndarray):
     """values[positions] += packed upper triangle of K."""
     slot = 0
     for a in range(K.shape[0]):

@@ -6,9 +6,9 @@ structures under large deformations, ZAMM 64, 1984). docs/theory.md, eq. 6.6.
 """
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from skfem.quadrature import get_quadrature
@@ -34,7 +34,7 @@ class Cavity:
     volume: Callable | None = None
     pressure: Callable | None = None
 
-    def target(self, t, number):
+    def target(self, t: float, number: int):
         """Wanted filling V/V0, or wanted pressure [Pa], at time t."""
         given = self.volume if self.pressure is None else self.pressure
         value = float(1.0 if given is None else given(t))
@@ -76,16 +76,16 @@ class Lumen:
         """Whether the pressure is prescribed, not the volume."""
         return self.cavity.pressure is not None
 
-    def target(self, t, load):
+    def target(self, t: float, load: float):
         """Wanted volume [m³] or pressure [Pa] at time t, when a share `load` of the start values acts."""
         value = self.cavity.target(t, self.number)
         return load * value if self.by_pressure else (1.0 + load * (value - 1.0)) * self.volume0
 
-    def add(self, x, pressure, gradient, values, tangent):
+    def add(self, x: np.ndarray, pressure: float, gradient: np.ndarray, values: np.ndarray, tangent: bool):
         """Adds dV/dx to gradient, -pressure d²V/dx² to values if tangent; returns V [m³]."""
         return add_wall(x, self.wall, pressure, gradient, values, tangent)
 
-    def beyond_pressure(self, x):
+    def beyond_pressure(self, x: np.ndarray):
         """What dV/dx has on held unknowns beside the wall's area times its normal, of the shape of x [m²].
 
         The volume is that of a cone. Where its wall ends on a symmetry plane, the cone grows with the edge when that
@@ -102,14 +102,14 @@ class Lumen:
         return beyond - np.bincount(dofs.ravel(), area.ravel(), minlength=len(x))
 
 
-def facet_normals(element):
+def facet_normals(element: Any):
     """N_abc of a facet: integral of phi_a (phi_b,r phi_c,s), (nn, nn, nn)."""
     points, w = get_quadrature(RefTri, 4)  # degree 2 + 1 + 1
     N, dN = basis_table(element, points)
     return np.einsum("q,qa,qb,qc->abc", w, N, dN[:, 0], dN[:, 1])
 
 
-def facet_shares(element):
+def facet_shares(element: Any):
     """Triples and their shares C_abc of the cone over one facet: integral of y·(y_r × y_s) / 3, antisymmetrised."""
     T = facet_normals(element) / 3.0
     triples = np.array(list(itertools.combinations(range(len(T)), 3)))
@@ -119,7 +119,7 @@ def facet_shares(element):
 
 
 @compiled()
-def add_wall(x, wall, pressure, gradient, values, tangent):
+def add_wall(x: np.ndarray, wall: Wall, pressure: float, gradient: np.ndarray, values: np.ndarray, tangent: bool):
     """gradient += dV/dx [m²] and, if tangent, values -= pressure d²V/dx²; returns the enclosed V [m³] (eq. 6.6).
 
     det(a, b, c) = a·(b × c): d/da = b × c, and d²/da_i db_j = e_ijk c_k.
@@ -153,7 +153,7 @@ def add_wall(x, wall, pressure, gradient, values, tangent):
     return V
 
 
-def find_lumens(problem, pattern, element, table, held) -> list[Lumen]:
+def find_lumens(problem: Any, pattern: Any, element: Any, table: np.ndarray, held: Sequence[Any]) -> list[Lumen]:
     """The cavities of a problem on its mesh; table: facet nodes of the element (nf, nn), held: HeldNodes.
 
     Raises SolveError for a wall that finds no facet, shares one, is open, or encloses a negative volume.
@@ -174,7 +174,7 @@ def find_lumens(problem, pattern, element, table, held) -> list[Lumen]:
     return lumens
 
 
-def find_walls(cavities, centroids):
+def find_walls(cavities: Sequence[Cavity], centroids: np.ndarray):
     """Numbers of the facets of each cavity; centroids: (3, nf) rest positions [m] of all boundary facets."""
     owners, walls = np.full(centroids.shape[1], -1), []
     for number, cavity in enumerate(cavities):
@@ -195,7 +195,7 @@ def find_walls(cavities, centroids):
     return walls
 
 
-def build_wall(problem, pattern, element, table, origin) -> Wall:
+def build_wall(problem: Any, pattern: Any, element: Any, table: np.ndarray, origin: np.ndarray) -> Wall:
     """Tables of the facets in `table` (nf, nn), outward of the tissue and so into the lumen: hence the sign."""
     triples, shares = facet_shares(element)
     dofs = np.hstack([3 * table + c for c in range(3)])
@@ -203,7 +203,7 @@ def build_wall(problem, pattern, element, table, origin) -> Wall:
     return Wall(dofs.astype(np.uint32), pattern.positions(dofs), rest, triples, -shares)
 
 
-def wall_origin(number, corners, x, held):
+def wall_origin(number: int, corners: np.ndarray, x: np.ndarray, held: Sequence[Any]):
     """A point that all symmetry planes which close the wall go through, (3,) [m], the centre where none does; and
     whether any does."""
     edges = np.sort(np.concatenate((corners[:, :2], corners[:, 1:], corners[:, ::2])), axis=1)

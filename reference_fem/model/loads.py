@@ -78,7 +78,7 @@ def find_points(load: Traction | BodyForce, mesh: MeshTet, element: Element, ord
     return LoadedPoints(load.value, where, weights, functions, table, count)
 
 
-def nodal_force(points: LoadedPoints, t):
+def nodal_force(points: LoadedPoints, t: float):
     """Force on every displacement unknown at time t, (3 count,) [N]; refuses values that are not finite."""
     value = np.asarray(points.value(t, points.positions), dtype=float)
     if value.shape != points.positions.shape or not np.isfinite(value).all():

@@ -13,7 +13,7 @@ from reference_fem.compiled import compiled
 from reference_fem.errors import SolveError
 
 
-def check_modulus(name, value):
+def check_modulus(name: str, value: float):
     """Refuse a modulus that is not a positive finite number."""
     if not (np.isfinite(value) and value > 0.0):
         raise SolveError(
@@ -35,7 +35,7 @@ class TwoTermLaw(ABC):
     def parameters(self) -> np.ndarray:
         """What the compiled law reads: (2 c1, 2 c2, kappa) [Pa]."""
 
-    def energy_density(self, F, p):
+    def energy_density(self, F: np.ndarray, p: np.ndarray):
         """W [J/m³] for F (..., 3, 3) and p (...) [Pa]; written apart from the kernel, to check it."""
         m1, m2, kappa = self.parameters
         J, C = np.linalg.det(F), np.swapaxes(F, -1, -2) @ F
@@ -44,7 +44,7 @@ class TwoTermLaw(ABC):
         isochoric = m1 * (I1 * J ** (-2.0 / 3.0) - 3.0) + m2 * (I2 * J ** (-4.0 / 3.0) - 3.0)
         return 0.5 * isochoric + p * (J - 1.0) - 0.5 * p**2 / kappa
 
-    def stress(self, F, p):
+    def stress(self, F: np.ndarray, p: np.ndarray):
         """First Piola-Kirchhoff stress P (..., 3, 3) [Pa], P Fᵀ = dev(m1 b + m2 (I1 b - b²)) + J p.
 
         m1, m2 = 2 c1 J^-2/3, 2 c2 J^-4/3, b = F Fᵀ; written apart from the kernel, to check it.
@@ -114,7 +114,7 @@ Material = NeoHookean | MooneyRivlin
 
 
 @compiled()
-def cofactor_into(F, cof):
+def cofactor_into(F: np.ndarray, cof: np.ndarray):
     """cof = dJ/dF (3, 3) and J = det F."""
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -125,7 +125,9 @@ def cofactor_into(F, cof):
 
 
 @compiled()
-def response_into(F, p, parameters, H, P, A, scratch):
+def response_into(
+    F: np.ndarray, p: float, parameters: np.ndarray, H: np.ndarray, P: np.ndarray, A: np.ndarray, scratch: np.ndarray
+):
     """P = dW/dF (3, 3) [Pa], A = dP/dF (9, 9) [Pa], H = F^-T; returns J, and J <= 0 leaves the rest unset.
 
     With m = 2 c1 J^-2/3: P = m (F - I1/3 H) + p J H and, row iJ, column kL,
@@ -159,7 +161,9 @@ def response_into(F, p, parameters, H, P, A, scratch):
 
 
 @compiled()
-def add_second_invariant(F, H, I1, m, P, A, scratch):
+def add_second_invariant(
+    F: np.ndarray, H: np.ndarray, I1: float, m: float, P: np.ndarray, A: np.ndarray, scratch: np.ndarray
+):
     """P += m (D - 2/3 I2 H), A += its derivative, m = 2 c2 J^-4/3; I2 = (I1² - |C|²)/2, D = I1 F - F C.
 
     A: m (dD - 4/3 (D⊗H + H⊗D) + 2/3 I2 (4/3 H⊗H + H_iL H_kJ)), and with b = F Fᵀ

@@ -1,9 +1,10 @@
 """Rigid obstacles: planes, spheres and capsules that move by a prescribed path, and their gap to a point."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from reference_fem.compiled import compiled
 from reference_fem.errors import SolveError
@@ -12,7 +13,7 @@ PLANE, SPHERE, CAPSULE = 0, 1, 2
 SLIP = ("frictionless", "no_slip")
 
 
-def finite_vector(value, name):
+def finite_vector(value: ArrayLike, name: str):
     """Three finite numbers as an array; raises SolveError naming them."""
     vector = np.asarray(value, dtype=float)
     if vector.shape != (3,) or not np.isfinite(vector).all():
@@ -20,7 +21,7 @@ def finite_vector(value, name):
     return vector
 
 
-def positive_radius(value, name):
+def positive_radius(value: float, name: str):
     """A radius [m]; raises SolveError unless it is positive and finite."""
     if not (np.isfinite(value) and value > 0.0):
         raise SolveError(f"{name} radius is {value} m: it must be positive and finite")
@@ -84,7 +85,7 @@ class RigidCapsule:
 Obstacle = RigidPlane | RigidSphere | RigidCapsule
 
 
-def sticky(obstacles):
+def sticky(obstacles: Sequence[Obstacle]):
     """Which obstacles hold what touches them, (no,) bool; raises SolveError for an unknown slip."""
     for k, obstacle in enumerate(obstacles):
         if obstacle.slip not in SLIP:
@@ -92,7 +93,7 @@ def sticky(obstacles):
     return np.array([obstacle.slip == "no_slip" for obstacle in obstacles], dtype=bool)
 
 
-def place(rows, obstacles, t):
+def place(rows: np.ndarray, obstacles: Sequence[Obstacle], t: float):
     """Rows of the obstacles moved to time t; raises SolveError when a motion is not finite."""
     moved = rows.copy()
     for k, obstacle in enumerate(obstacles):
@@ -102,7 +103,7 @@ def place(rows, obstacles, t):
 
 
 @compiled()
-def gap_into(row, y, n, along):
+def gap_into(row: np.ndarray, y: np.ndarray, n: np.ndarray, along: np.ndarray):
     """Gap g [m] between point y and an obstacle; unit normal n towards the body, curvature of g [1/m].
 
     d²g/dy² = curvature (1 - n⊗n - along⊗along): along (3,) is the axis of a capsule beside its straight part, else 0.
@@ -132,7 +133,7 @@ def gap_into(row, y, n, along):
     return r - row[7], 1.0 / r
 
 
-def gaps(row, y):
+def gaps(row: np.ndarray, y: np.ndarray):
     """Gap of points y (..., 3) [m] in plain NumPy, apart from the kernel, to check it."""
     apart = y - row[1:4]
     if row[0] == PLANE:

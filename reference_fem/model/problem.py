@@ -70,7 +70,7 @@ class HeldNodes:
     """(k, len(nodes))."""
     motion: Callable | None = field(default=None)
 
-    def displacement(self, t):
+    def displacement(self, t: float):
         """Prescribed displacement of `dofs` at time t [m]."""
         if self.motion is None:
             return np.zeros_like(self.factors)

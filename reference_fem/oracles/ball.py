@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from skfem import MeshTet
 
 from reference_fem import exact
 from reference_fem.elements.shapes import nodes
@@ -23,7 +24,7 @@ GRADE, RADIAL = 0.35, 0.5
 """Finer at the pole and towards the surface: see ball_octant."""
 
 
-def squeeze(mesh, shares: Sequence[float], kappa=KAPPA) -> tuple[Problem, list[Equilibrium]]:
+def squeeze(mesh: MeshTet, shares: Sequence[float], kappa: float = KAPPA) -> tuple[Problem, list[Equilibrium]]:
     """(problem, equilibria) of an octant of unit radius and modulus, at approaches over the diameter."""
     plane = RigidPlane((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), lambda t: (0.0, 0.0, -t))
     problem = Problem(mesh, NeoHookean(1.0, kappa), symmetry(), [plane])

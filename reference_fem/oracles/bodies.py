@@ -1,6 +1,7 @@
 """Meshes of the oracles: a block, an eighth of a ball, an eighth of a thick shell (side or radius 1 m)."""
 
 import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from reference_fem.elements.shapes import nodes
 from reference_fem.model.problem import PrescribedDisplacement
 
 
-def block(cells=(2, 2, 2), skew=0.0):
+def block(cells: Sequence[int] = (2, 2, 2), skew: float = 0.0):
     """Unit cube; skew moves its inner vertices, so that no element is like another."""
     mesh = MeshTet.init_tensor(*[np.linspace(0.0, 1.0, n + 1) for n in cells])
     inner = np.all((mesh.p > 1e-9) & (mesh.p < 1 - 1e-9), axis=0)
@@ -24,7 +25,7 @@ def symmetry():
     return [PrescribedDisplacement(lambda x, c=c: np.abs(x[c]) < 1e-9, (c,)) for c in range(3)]
 
 
-def kuhn_simplex(n):
+def kuhn_simplex(n: int):
     """n³ equal tetrahedra in 1 >= a >= b >= c >= 0: points (k, 3), elements (n³, 4)."""
     cells = np.array(list(itertools.product(range(n), repeat=3)))
     corners = []
@@ -40,7 +41,7 @@ def kuhn_simplex(n):
     return points / n, elements.reshape(-1, 4)
 
 
-def towards_pole(direction, grade):
+def towards_pole(direction: np.ndarray, grade: float):
     """Unit vectors moved towards +z: the polar angle's slope there is `grade`."""
     share = np.arccos(np.clip(direction[:, 2], -1.0, 1.0)) / (np.pi / 2)
     angle = np.pi / 2 * (grade * share + (1.0 - grade) * share**2)
@@ -51,7 +52,7 @@ def towards_pole(direction, grade):
     )
 
 
-def ball_octant(n, grade=0.5, radial=0.3):
+def ball_octant(n: int, grade: float = 0.5, radial: float = 0.3):
     """x, y, z >= 0 part of the unit ball, n³ curved elements, finer at the pole +z."""
     simplex, elements = kuhn_simplex(n)
     radius = simplex[:, 0]
@@ -64,7 +65,7 @@ def ball_octant(n, grade=0.5, radial=0.3):
     return round_off(points, elements, (1.0,))
 
 
-def whole_ball(n):
+def whole_ball(n: int):
     """The unit ball, 8 n³ curved elements: eight octants, joined where they meet."""
     octant = ball_octant(n, grade=1.0, radial=0.0)
     signs = list(itertools.product((1.0, -1.0), repeat=3))
@@ -76,7 +77,7 @@ def whole_ball(n):
     return round_off(points[first], merged[elements], (1.0,))
 
 
-def shell_octant(inner, n, layers):
+def shell_octant(inner: float, n: int, layers: int):
     """inner <= r <= 1, x, y, z >= 0: n² columns of prisms, each cut in three by ascending vertex number."""
     index = {pair: k for k, pair in enumerate((i, j) for i in range(n + 1) for j in range(n + 1 - i))}
     flat = np.array([(i, j, n - i - j) for i, j in index], dtype=float)
@@ -95,7 +96,7 @@ def shell_octant(inner, n, layers):
     return round_off(points, np.array(elements), (inner, 1.0))
 
 
-def round_off(points, elements, radii):
+def round_off(points: np.ndarray, elements: np.ndarray, radii: Sequence[float]):
     """Mesh whose faces on the given radii are curved."""
     mesh = MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(elements.T))
     for radius in radii:
@@ -103,21 +104,22 @@ def round_off(points, elements, radii):
     return mesh
 
 
-def on_radius(radius):
+def on_radius(radius: float):
+    """Whether points (3, N) lie on a sphere about the origin: a function of theirs."""
     return lambda x: np.abs(np.linalg.norm(x, axis=0) - radius) < 1e-9
 
 
-def mapped(cells, place):
+def mapped(cells: Sequence[int], place: Callable[[np.ndarray], np.ndarray]):
     """A second-order mesh of the unit cube, cells along each edge, its nodes moved by place: (3, N) -> (3, N) [m]."""
     mesh = MeshTet.init_tensor(*[np.linspace(0.0, 1.0, n + 1) for n in cells])
     return replace(MeshTet2.from_mesh(mesh), doflocs=place(nodes(mesh).T))
 
 
-def straight(mesh):
+def straight(mesh: MeshTet):
     """The same mesh without mid-side nodes of its own."""
     return MeshTet(np.ascontiguousarray(mesh.doflocs[:, : mesh.nvertices]), mesh.t)
 
 
-def between(bottom, top):
+def between(bottom: float, top: float):
     """A slab one element thick in plane strain: z is held on both faces [m]."""
     return PrescribedDisplacement(lambda x: (x[2] < bottom + 1e-9) | (x[2] > top - 1e-9), (2,))

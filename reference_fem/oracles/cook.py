@@ -22,11 +22,11 @@ TOWARDS_WALL, TOWARDS_CORNERS = 1.6, 0.8
 """Grading: the stress is singular at both ends of the held edge, where even cells converge with order one."""
 
 
-def membrane(cells):
+def membrane(cells: int):
     """(mesh, thickness [mm]) of the membrane, one element thick."""
     thickness = LEFT / cells
 
-    def place(s):
+    def place(s: np.ndarray):
         across = s[0] ** TOWARDS_WALL
         up = s[1] + TOWARDS_CORNERS * (s[1] ** 2 * (3.0 - 2.0 * s[1]) - s[1])
         height = LEFT - (LEFT + LOWER - UPPER) * across
@@ -35,12 +35,12 @@ def membrane(cells):
     return mapped((cells, cells, 1), place), thickness
 
 
-def bend(cells):
+def bend(cells: int):
     """(problem, {quantity: displacement [mm]}) under the whole force."""
     mesh, thickness = membrane(cells)
     shear = FORCE / (UPPER - LOWER)
 
-    def push(t, x):
+    def push(t: float, x: np.ndarray):
         return np.array([np.zeros_like(x[0]), np.full_like(x[0], shear * t), np.zeros_like(x[0])])
 
     held = [PrescribedDisplacement(lambda x: x[0] < 1e-9), between(0.0, thickness)]
@@ -48,7 +48,7 @@ def bend(cells):
     problem = Problem(mesh, NeoHookean(MU, KAPPA * MU), held, loads=[load])
     state, x = equilibrium_path(problem, (0.25, 0.5, 0.75, 1.0))[-1], nodes(mesh)
 
-    def mean(height, axis):
+    def mean(height: float, axis: int):
         there = (np.abs(x[:, 0] - RIGHT) < 1e-6) & (np.abs(x[:, 1] - height) < 1e-6)
         return float(state.u[there, axis].mean())
 

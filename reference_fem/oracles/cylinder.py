@@ -23,10 +23,10 @@ FAMILY = ((1, 2), (2, 3), (3, 4))
 """Of the default element, for the error over mesh size."""
 
 
-def quarter(cells, element):
+def quarter(cells: tuple[int, int], element: str):
     """A quarter of the ring, one element thick; straight-sided for a linear element that has no pressure of its own."""
 
-    def place(s):
+    def place(s: np.ndarray):
         radius, angle = INNER * (OUTER / INNER) ** s[0], 0.5 * np.pi * s[1]
         x = np.array([radius * np.cos(angle), radius * np.sin(angle), THICKNESS * s[2]])
         x[np.abs(x) < 1e-12] = 0.0
@@ -36,11 +36,11 @@ def quarter(cells, element):
     return straight(mesh) if ELEMENTS[element].locks else mesh
 
 
-def press(element, ratio, cells):
+def press(element: str, ratio: float, cells: tuple[int, int]):
     """(problem, u_x at (INNER, 0) [m] under unit pressure) for one element and Poisson's ratio."""
     material = NeoHookean(0.5 * YOUNG / (1.0 + ratio), YOUNG / 3.0 / (1.0 - 2.0 * ratio))
 
-    def push(t, x):
+    def push(t: float, x: np.ndarray):
         return SCALE * t * np.array([x[0], x[1], np.zeros_like(x[0])]) / np.hypot(x[0], x[1])
 
     # the centres of the inner facets lie on chords, inside the circle; all others lie outside it

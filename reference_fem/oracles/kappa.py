@@ -18,7 +18,7 @@ SHELL, BALL = (5, 3), 5
 """Meshes: the same for every ratio, so that their own error drops out of the comparison."""
 
 
-def sphere_pressure(ratio) -> tuple[Problem, float]:
+def sphere_pressure(ratio: float) -> tuple[Problem, float]:
     """Lumen pressure [mu] of the thick sphere at STRETCH."""
     lumen = Cavity(lambda x: np.linalg.norm(x, axis=0) < 0.75, volume=lambda t: t**3)
     problem = Problem(shell_octant(0.5, *SHELL), NeoHookean(1.0, ratio), symmetry(), cavities=[lumen])

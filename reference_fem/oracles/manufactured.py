@@ -4,7 +4,7 @@ Three shears and a stretch, phi = S∘C∘B∘A: A adds a sin(pi Y / 2) to x, B 
 to z, all of unit determinant, and S multiplies z by 1 + q(x, y) / kappa. So J = 1 + q / kappa, and the pressure is q.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from skfem import ElementTetP2
@@ -30,7 +30,7 @@ CELLS = {"P2/P1": (4, 6, 8), "MINI": (4, 6, 8), "P2/P0": (4, 6, 8), "P1": (4, 6,
 """Cells along each edge of the cube; six tetrahedra to a cell."""
 
 
-def motion(X, kappa):
+def motion(X: np.ndarray, kappa: float):
     """Positions (3, …), deformation gradient (…, 3, 3) and pressure (…) of the motion at rest positions X (3, …)."""
     a, b, c = SHEARS
     half = np.pi / 2.0
@@ -49,15 +49,15 @@ def motion(X, kappa):
     return np.stack((x, y, z * (1.0 + q / kappa))), F, q
 
 
-def body_force(material) -> Callable:
+def body_force(material: Material) -> Callable:
     """-Div P of the motion, times t: central differences of fourth order, whose error here is about 1e-11."""
     step = 1e-3
 
-    def stress(X):
+    def stress(X: np.ndarray):
         _, F, q = motion(X, material.kappa)
         return material.stress(F, q)
 
-    def value(t, X):
+    def value(t: float, X: np.ndarray):
         force = np.zeros_like(X)
         for axis, e in enumerate(step * np.eye(3)[:, :, None]):
             slope = 8.0 * (stress(X + e) - stress(X - e)) - (stress(X + 2.0 * e) - stress(X - 2.0 * e))
@@ -70,7 +70,7 @@ def body_force(material) -> Callable:
 def build(name: str, cells: int, material: Material = MATERIAL) -> Problem:
     """The cube under the body force, its whole boundary moved as the motion wants."""
 
-    def displacement(x):
+    def displacement(x: np.ndarray):
         return motion(x, material.kappa)[0] - x
 
     held = PrescribedDisplacement(lambda x: np.ones(x.shape[1], bool), (0, 1, 2), lambda t: (t, t, t), displacement)
@@ -102,7 +102,7 @@ def relative_errors(problem: Problem):
     return l2(u - (moved - X), w) / l2(moved - X, w), l2(p - q, w) / l2(q, w)
 
 
-def l2(field, weights):
+def l2(field: np.ndarray, weights: np.ndarray):
     """Root of the integral of |field|²."""
     return float(np.sqrt(np.sum(weights * np.square(field))))
 
@@ -118,7 +118,7 @@ def curves(name: str) -> tuple[Curve, Curve]:
     return u, p
 
 
-def orders(names) -> Outcome:
+def orders(names: Iterable[str]) -> Outcome:
     """Orders of some elements between their two finest meshes."""
     checks, found = [], []
     for name in names:

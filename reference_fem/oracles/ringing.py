@@ -15,7 +15,7 @@ FAMILY = (2, 3)
 """Elements to a quarter circle."""
 
 
-def ring(cells, kappa):
+def ring(cells: int, kappa: float):
     """(problem, omega R / sqrt(mu/rho) of the ten lowest modes) of a ball of unit radius, modulus and density."""
     problem = Problem(whole_ball(cells), NeoHookean(1.0, kappa), (), density=1.0)
     return problem, natural_frequencies(problem, 10).elastic

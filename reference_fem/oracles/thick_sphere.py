@@ -1,6 +1,7 @@
 """A thick sphere inflated by its content: the pressure of the lumen, over the stretch of its inner radius."""
 
 import numpy as np
+from skfem import MeshTet
 
 from reference_fem import exact
 from reference_fem.model.cavity import Cavity
@@ -18,7 +19,7 @@ KAPPA = 5000.0
 """Over mu; the closed form is incompressible, which moves the pressure by about mu/kappa."""
 
 
-def inflate(inner, mesh):
+def inflate(inner: float, mesh: MeshTet):
     """(problem, lumen pressures [mu] at STRETCHES): the octant, its content grown to the cube of the stretch."""
     middle = 0.5 * (inner + 1.0)
     lumen = Cavity(lambda x: np.linalg.norm(x, axis=0) < middle, volume=lambda t: t**3)

@@ -1,7 +1,9 @@
 """A block pulled and squeezed along one axis, its sides free: the state is homogeneous, so any mesh is exact."""
 
+from skfem import MeshTet
+
 from reference_fem import exact
-from reference_fem.model.material import MooneyRivlin, NeoHookean
+from reference_fem.model.material import Material, MooneyRivlin, NeoHookean
 from reference_fem.model.problem import PrescribedDisplacement, Problem
 from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import block, symmetry
@@ -14,7 +16,7 @@ TIGHT = NewtonSettings(force_tol=1e-11, volume_tol=1e-12)
 """Newton converges quadratically: one more iteration, and round-off alone is left."""
 
 
-def pull(material, stretch, mesh, element="P2/P1"):
+def pull(material: Material, stretch: float, mesh: MeshTet, element: str = "P2/P1"):
     """(problem, equilibrium) of the block at one stretch; the pulled end is the last held region."""
     end = PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (2,), lambda t: (0.0, 0.0, (stretch - 1.0) * t))
     problem = Problem(mesh, material, [*symmetry(), end], element=element)

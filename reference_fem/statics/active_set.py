@@ -51,7 +51,7 @@ class Points(NamedTuple):
 
 
 @compiled()
-def look_at(rows, y, gap, normal):
+def look_at(rows: np.ndarray, y: np.ndarray, gap: np.ndarray, normal: np.ndarray):
     """Gaps (no, nf, nq) [m] and normals (no, nf, nq, 3) of the points y (nf, nq, 3) [m]."""
     along = np.empty(3)
     for o in range(gap.shape[0]):
@@ -60,7 +60,7 @@ def look_at(rows, y, gap, normal):
                 gap[o, f, q] = gap_into(rows[o], y[f, q], normal[o, f, q], along)[0]
 
 
-def points_near(system: System, touch: Touch, x, change) -> Points:
+def points_near(system: System, touch: Touch, x: np.ndarray, change: np.ndarray) -> Points:
     """The points on facets that are, or after the change will be, no farther from an obstacle than their size.
 
     Of a stuck point only the normal part takes part: its traction stays as the tangent has it.
@@ -93,7 +93,7 @@ class Influence:
         self.pushes = points.directions[:, system.pattern.free]
         self.known: dict[int, np.ndarray] = {}
 
-    def of(self, chosen):
+    def of(self, chosen: np.ndarray):
         """Movement of all points off their obstacles per force [m/N], (np, len(chosen))."""
         new = [k for k in chosen if k not in self.known]
         for first in range(0, len(new), BATCH):
@@ -102,12 +102,12 @@ class Influence:
             self.known |= dict(zip(batch, moves.T, strict=True))
         return np.array([self.known[k] for k in chosen]).reshape(len(chosen), len(self.points.gap)).T
 
-    def forces(self, push):
+    def forces(self, push: np.ndarray):
         """Forces on the free unknowns of pushes (np,) [N] at the points."""
         return self.pushes.T @ push
 
 
-def settled(system: System, tangent: Tangent, x, change):
+def settled(system: System, tangent: Tangent, x: np.ndarray, change: np.ndarray):
     """Newton's change (total,) of x with the contact of the linearised problem settled, and its pressures (no, nf, nq).
 
     The next tangent counts with those: they tell better than the gaps which points are going to touch.
@@ -135,17 +135,17 @@ def settled(system: System, tangent: Tangent, x, change):
     return (change + tangent.respond(influence.forces(push)) if push.any() else change), guess
 
 
-def pressures(points: Points, gap):
+def pressures(points: Points, gap: np.ndarray):
     """t = max(0, m - eps g) [Pa]."""
     return np.maximum(0.0, points.multiplier - points.penalty * gap)
 
 
-def changed(points: Points, gap):
+def changed(points: Points, gap: np.ndarray):
     """Numbers of the points that touch although the tangent does not count them, or the other way round."""
     return np.flatnonzero((pressures(points, gap) > 0.0) != points.touching)
 
 
-def pushes(points: Points, chosen, moves, gap):
+def pushes(points: Points, chosen: np.ndarray, moves: np.ndarray, gap: np.ndarray):
     """Forces [N] at the points that change, (k,): +w t of those that touch, -w t of those that the tangent holds.
 
     From t = m - eps (gap + moves·push) (eq. 6.5); moves (k, k): among themselves.
@@ -156,13 +156,13 @@ def pushes(points: Points, chosen, moves, gap):
     return np.linalg.solve(matrix, points.multiplier[chosen] - eps * gap[chosen])
 
 
-def share_of(points: Points, push, more, gap, moved):
+def share_of(points: Points, push: np.ndarray, more: np.ndarray, gap: np.ndarray, moved: np.ndarray):
     """The share of a change of pushes and gaps, up to 1, that lowers the potential most: without it sets may cycle.
 
     Its slope, sum moved (push - w (t - t the tangent counts)), grows with the share: bisected to a thousandth.
     """
 
-    def slope(share):
+    def slope(share: float):
         there = gap + share * moved
         counted = np.where(points.touching, points.multiplier - points.penalty * there, 0.0)
         return moved @ (push + share * more - points.area * (pressures(points, there) - counted))

@@ -1,9 +1,10 @@
 """Loading paths: equilibria at wanted times, with sub-steps that shrink on failure and grow again."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from reference_fem.contact import augmented as contact
 from reference_fem.elements.shapes import at_nodes, forces_at_nodes
@@ -56,10 +57,12 @@ class Equilibrium:
 
     @property
     def min_J(self):
+        """Smallest J of all quadrature points."""
         return float(self.J.min())
 
     @property
     def max_J(self):
+        """Largest J of all quadrature points."""
         return float(self.J.max())
 
 
@@ -76,7 +79,7 @@ class Checkpoint:
 
 def equilibrium_path(
     problem: Problem,
-    times,
+    times: ArrayLike,
     settings: NewtonSettings | None = None,
     on_step: Callable[[Equilibrium], None] | None = None,
     on_checkpoint: Callable[[Checkpoint], None] | None = None,
@@ -114,7 +117,7 @@ def equilibrium_path(
     return path
 
 
-def advance(system: System, state: State, t, load, path):
+def advance(system: System, state: State, t: float, load: float, path: Sequence[Equilibrium]):
     """(state at time t and gravity share load, iterations, sub-steps), in as many sub-steps as it takes."""
     t0, load0, reached, share = state.t, state.load, 0.0, 1.0
     iterations = substeps = 0
@@ -134,7 +137,7 @@ def advance(system: System, state: State, t, load, path):
     return state, iterations, substeps
 
 
-def stuck(state: State, t, failure, path):
+def stuck(state: State, t: float, failure: Exception, path: Sequence[Equilibrium]):
     """The exception for a path that cannot go on."""
     gravity = f" under {100 * state.load:.3g} % of what acts at the start" if state.load < 1.0 else ""
     return SolveError(
@@ -144,7 +147,7 @@ def stuck(state: State, t, failure, path):
     )
 
 
-def describe(system: System, state: State, iterations, substeps) -> Equilibrium:
+def describe(system: System, state: State, iterations: int, substeps: int) -> Equilibrium:
     """Everything worth knowing about a converged state."""
     n, elements = system.displacement_count, system.elements
     found = system.evaluate(state.x, system.loads_of(state), tangent=False)
@@ -175,7 +178,7 @@ def describe(system: System, state: State, iterations, substeps) -> Equilibrium:
     )
 
 
-def held_forces(system: System, reaction):
+def held_forces(system: System, reaction: np.ndarray):
     """Sum of the reactions of each held region, (nh, 3) [N]."""
     left, forces = reaction.copy(), np.zeros((len(system.held), 3))
     for k, held in enumerate(system.held):

@@ -9,8 +9,8 @@ from reference_fem.contact.augmented import NO_GUESS
 from reference_fem.errors import SingularTangent
 from reference_fem.statics import active_set
 from reference_fem.statics.tangent import Tangent
-from reference_fem.system.saddle_point import System
-from reference_fem.system.state import Loads, State
+from reference_fem.system.saddle_point import Evaluation, System
+from reference_fem.system.state import Loads, NewtonSettings, State
 
 PENALTY_GROWTH = 2.0
 """Factor on the contact penalty at each multiplier update inside a step: plain updates gain little where a facet is
@@ -32,7 +32,7 @@ class StepFailed(Exception):
     """A load step did not converge; the path tries a smaller one."""
 
 
-def solve_step(system: System, state: State, t, load) -> State:
+def solve_step(system: System, state: State, t: float, load: float) -> State:
     """The equilibrium at time t from the one in `state`; raises StepFailed.
 
     Multipliers are updated, and the penalty raised, only while some point is deeper than allowed, or is pushed from as
@@ -63,19 +63,19 @@ def solve_step(system: System, state: State, t, load) -> State:
     )
 
 
-def first_guess(system, state, loads: Loads):
+def first_guess(system: System, state: State, loads: Loads):
     """The evaluation that the first direction is taken from: where the body is, with the move of the obstacles
     linearised."""
     old = system.obstacles_at(state.t)
     return system.evaluate(state.x, loads._replace(rows=old, shift=loads.rows[:, 1:4] - old[:, 1:4]))
 
 
-def let_go(grip: contact.Grip, guess):
+def let_go(grip: contact.Grip, guess: np.ndarray):
     """The grip without the points that nothing will press."""
     return grip._replace(stuck=grip.stuck & (guess > 0.0)) if grip.stuck.size else grip
 
 
-def direction(system: System, found, x, target):
+def direction(system: System, found: Evaluation, x: np.ndarray, target: np.ndarray):
     """Newton's change at x, which also takes the held unknowns to their target; and the contact pressures to expect.
 
     Raises StepFailed where the tangent is singular: a shorter step may pass by.
@@ -88,21 +88,21 @@ def direction(system: System, found, x, target):
         raise StepFailed(str(singular)) from singular
 
 
-def settled(found, settings, slack):
+def settled(found: Evaluation, settings: NewtonSettings, slack: float):
     """Whether both relative errors are below their tolerances times slack, and what holds a point also presses it."""
     if contact.mistaken(found.touch):
         return False
     return found.errors[0] <= slack * settings.force_tol and found.errors[1] <= slack * settings.volume_tol
 
 
-def misplaced(system, x, found):
+def misplaced(system: System, x: np.ndarray, found: Evaluation):
     """Whether contact acts farther from an obstacle's surface, or from where it stuck, than its share of the largest
     displacement."""
     allowed = system.settings.penetration_tol * np.abs(x[: system.displacement_count]).max()
     return max(contact.misplacement(found.touch), contact.slippage(found.touch)) > allowed
 
 
-def search(system, x, direction, loads, before):
+def search(system: System, x: np.ndarray, direction: np.ndarray, loads: Loads, before: Evaluation | None):
     """First of a few halved trial steps that keeps every element upright and does not throw the error far up."""
     share = 1.0
     while share > 1e-2:

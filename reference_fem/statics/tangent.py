@@ -22,7 +22,7 @@ class Tangent:
                 if lumen.by_pressure:
                     self.matrix[k] = np.eye(len(system.lumens))[k]
 
-    def respond(self, forces, misfits: np.ndarray | float = 0.0, lifted: np.ndarray | float = 0.0):
+    def respond(self, forces: np.ndarray, misfits: np.ndarray | float = 0.0, lifted: np.ndarray | float = 0.0):
         """Change of all unknowns (total, ...) that balances forces on the free ones (n, ...) and closes the misfits.
 
         misfits (nc, ...): of the cavities. lifted (m, ...): change of the held unknowns, its forces among `forces`.
@@ -40,7 +40,7 @@ class Tangent:
             change[system.pattern.free] += self.columns @ change[m:]
         return change
 
-    def newton(self, lift):
+    def newton(self, lift: np.ndarray):
         """Newton's change of all unknowns (total,), by `lift` (m,) at the held ones."""
         system, found = self.system, self.found
         forces = -found.residual[system.pattern.free] - system.pattern.lifting(found.values) @ lift

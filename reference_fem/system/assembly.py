@@ -1,17 +1,26 @@
 """Residual and tangent of all elements, added into a prebuilt pattern."""
 
 import numpy as np
+from skfem import MeshTet
 
 from reference_fem.compiled import compiled
 from reference_fem.elements.shapes import Elements
-from reference_fem.model.material import cofactor_into, response_into
+from reference_fem.model.material import Material, cofactor_into, response_into
 
 CONTRACT = {"contract"}
 """Fused multiply-add only: no reordering, so two runs agree bitwise."""
 
 
 @compiled(fastmath=CONTRACT)
-def add_elements(x, elements, parameters, positions, values, residual, tangent):
+def add_elements(
+    x: np.ndarray,
+    elements: Elements,
+    parameters: np.ndarray,
+    positions: np.ndarray,
+    values: np.ndarray,
+    residual: np.ndarray,
+    tangent: bool,
+):
     """residual += dPi/dx, values += d²Pi/dx² (if tangent); returns the smallest J, and stops at J <= 0.
 
     x: u at the displacement functions [m], interleaved, then p [Pa], (total,). positions: slots of the packed upper
@@ -49,7 +58,7 @@ def add_elements(x, elements, parameters, positions, values, residual, tangent):
 
 
 @compiled(fastmath=CONTRACT, inline="always")
-def deformation_into(ue, G, functions, F):
+def deformation_into(ue: np.ndarray, G: np.ndarray, functions: tuple, F: np.ndarray):
     """F = 1 + sum u_a grad N_a (3, 3)."""
     count = len(functions)
     for i in range(3):
@@ -61,7 +70,7 @@ def deformation_into(ue, G, functions, F):
 
 
 @compiled()
-def mean_pressure(ue, gradients, weights, functions, parameters):
+def mean_pressure(ue: np.ndarray, gradients: np.ndarray, weights: np.ndarray, functions: tuple, parameters: np.ndarray):
     """kappa (sum w J / sum w - 1): the pressure [Pa] that solves an element's own volume equation (eq. 6.14)."""
     F, cof, change, volume = np.empty((3, 3)), np.empty((3, 3)), 0.0, 0.0
     for q in range(weights.shape[0]):
@@ -72,7 +81,7 @@ def mean_pressure(ue, gradients, weights, functions, parameters):
 
 
 @compiled()
-def condense(K, n):
+def condense(K: np.ndarray, n: int):
     """K[:n, :n] -= K[:n, n] K[:n, n]ᵀ / K[n, n], upper triangle: the last unknown eliminated."""
     for a in range(n):
         share = K[a, n] / K[n, n]
@@ -81,7 +90,18 @@ def condense(K, n):
 
 
 @compiled(fastmath=CONTRACT)
-def integrate_element(ue, gradients, pressures, weights, functions, constraints, parameters, re, K, tangent):
+def integrate_element(
+    ue: np.ndarray,
+    gradients: np.ndarray,
+    pressures: np.ndarray,
+    weights: np.ndarray,
+    functions: tuple,
+    constraints: tuple,
+    parameters: np.ndarray,
+    re: np.ndarray,
+    K: np.ndarray,
+    tangent: bool,
+):
     """Adds one element's residual re and upper tangent K; returns its smallest J."""
     F, H, P = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     A, T, scratch = np.empty((9, 9)), np.empty((9, 3 * len(functions))), np.empty((3, 3, 3))
@@ -108,7 +128,7 @@ def integrate_element(ue, gradients, pressures, weights, functions, constraints,
 
 
 @compiled(fastmath=CONTRACT)
-def add_displacement_block(G, A, w, functions, T, K):
+def add_displacement_block(G: np.ndarray, A: np.ndarray, w: float, functions: tuple, T: np.ndarray, K: np.ndarray):
     """K[ia, kb] += w G_Ja A_iJkL G_Lb, blocks k >= i, through T = A·G (9, 3 nu)."""
     count = len(functions)
     for row in range(9):
@@ -124,7 +144,16 @@ def add_displacement_block(G, A, w, functions, T, K):
 
 
 @compiled(fastmath=CONTRACT)
-def add_pressure_blocks(G, H, M, wJ, w_kappa, functions, constraints, K):
+def add_pressure_blocks(
+    G: np.ndarray,
+    H: np.ndarray,
+    M: np.ndarray,
+    wJ: float,
+    w_kappa: float,
+    functions: tuple,
+    constraints: tuple,
+    K: np.ndarray,
+):
     """K[ia, q] += w J H_iJ G_Ja M_q and K[q, r] -= w M_q M_r / kappa."""
     count = len(functions)
     for i in range(3):
@@ -137,7 +166,7 @@ def add_pressure_blocks(G, H, M, wJ, w_kappa, functions, constraints, K):
             K[3 * count + q, 3 * count + r] -= w_kappa * M[q] * M[r]
 
 
-def deformation(x, elements: Elements, kappa):
+def deformation(x: np.ndarray, elements: Elements, kappa: float):
     """F (ne, nq, 3, 3) and p (ne, nq) [Pa] at the quadrature points, in plain NumPy; kappa [Pa] of the material."""
     known, count = elements.dofs.shape[1], 3 * len(elements.sizes.functions)
     local = x[elements.dofs]
@@ -150,13 +179,13 @@ def deformation(x, elements: Elements, kappa):
     return F, np.broadcast_to(kappa * mean[:, None], change.shape)
 
 
-def energy(x, elements: Elements, material):
+def energy(x: np.ndarray, elements: Elements, material: Material):
     """Potential Pi(x) = sum w W(F, p) [J]; written apart from the kernel, to check it."""
     F, p = deformation(x, elements, material.kappa)
     return float(np.sum(elements.weights * material.energy_density(F, p)))
 
 
-def vertex_pressure(x, elements: Elements, mesh, kappa):
+def vertex_pressure(x: np.ndarray, elements: Elements, mesh: MeshTet, kappa: float):
     """Pressure at the vertices [Pa], (N1,): the unknowns themselves, or the mean of the elements around each."""
     known, count = elements.dofs.shape[1], 3 * len(elements.sizes.functions)
     if known > count:

@@ -1,18 +1,21 @@
 """Refusing what cannot be solved, with one sentence each."""
 
 import numpy as np
-from skfem import MeshTet2
+from numpy.typing import ArrayLike
+from skfem import MeshTet, MeshTet2
 
 from reference_fem.elements.shapes import check_neighbours, facet_nodes, nodes
-from reference_fem.elements.surface import point_positions
+from reference_fem.elements.surface import Surface, point_positions
 from reference_fem.errors import SolveError
 from reference_fem.model.obstacles import gaps
+from reference_fem.model.problem import Problem
+from reference_fem.system.state import State
 
 START_DEPTH = 1e-3
 """Depth at the start that is taken as touching, over the size of the body: the sag of a coarse facet."""
 
 
-def check_mesh(mesh):
+def check_mesh(mesh: MeshTet):
     """Refuse non-finite points, vertices that no element uses, and elements turned inside out."""
     x = mesh.doflocs.T
     bad = np.flatnonzero(~np.isfinite(x).all(axis=1))
@@ -28,7 +31,7 @@ def check_mesh(mesh):
     check_neighbours(mesh)
 
 
-def check_loads(problem):
+def check_loads(problem: Problem):
     """Refuse non-finite gravity, negative or missing density."""
     gravity = np.asarray(problem.gravity, dtype=float)
     if gravity.shape != (3,) or not np.isfinite(gravity).all():
@@ -43,13 +46,13 @@ def check_loads(problem):
             raise SolveError(f"the quadrature {name} is {given}: 4 is the least that integrates p J exactly")
 
 
-def check_inertia(problem):
+def check_inertia(problem: Problem):
     """Refuse a body without mass where motion is asked for."""
     if problem.density == 0.0:
         raise SolveError("the density is 0 kg/m³: a body that moves needs its mass, give the density")
 
 
-def rigid_motions(x):
+def rigid_motions(x: np.ndarray):
     """Six rigid velocities of nodes x (n, 3) about their centre, scaled to unit size: (n, 3, 6)."""
     arm = x - x.mean(axis=0)
     arm = arm / np.linalg.norm(arm, axis=1).max()
@@ -57,24 +60,24 @@ def rigid_motions(x):
     return np.concatenate((np.broadcast_to(np.eye(3), (len(x), 3, 3)), turns), axis=2)
 
 
-def null_space(matrix):
+def null_space(matrix: np.ndarray):
     """Orthonormal columns that the matrix sends to zero (relative singular value below 1e-6)."""
     _, s, vt = np.linalg.svd(matrix, full_matrices=True)
     rank = int(np.sum(s > 1e-6 * np.sqrt(len(matrix))))
     return vt[rank:].T
 
 
-def rigid_freedoms(x, held_dofs):
+def rigid_freedoms(x: np.ndarray, held_dofs: np.ndarray):
     """Rigid motions that the held unknowns leave free, in the columns of rigid_motions, (6, 0 to 6)."""
     return null_space(held_rigid_motions(x, held_dofs))
 
 
-def held_rigid_motions(x, held_dofs):
+def held_rigid_motions(x: np.ndarray, held_dofs: np.ndarray):
     """What the held unknowns see of the six rigid motions, padded with zeros to six rows at least."""
     return np.vstack((rigid_motions(x).reshape(-1, 6)[held_dofs], np.zeros((6, 6))))
 
 
-def check_held(x, held_dofs):
+def check_held(x: np.ndarray, held_dofs: np.ndarray):
     """Refuse a body that can still move rigidly, naming the motion. x: (N2, 3); held_dofs: unknown numbers."""
     seen = held_rigid_motions(x, held_dofs)
     slides = null_space(seen[:, :3])
@@ -88,14 +91,14 @@ def check_held(x, held_dofs):
         )
 
 
-def direction(v):
+def direction(v: np.ndarray):
     """A unit vector in print, leading sign positive."""
     v = v / np.linalg.norm(v)
     v = v * np.sign(v[np.argmax(np.abs(v))])
     return "(" + ", ".join(f"{c + 0.0:.2g}" if abs(c) > 1e-6 else "0" for c in v) + ")"
 
 
-def check_start(surface, rows, size):
+def check_start(surface: Surface, rows: np.ndarray, size: float):
     """Refuse an obstacle that starts deeper than START_DEPTH of the body's size in the undeformed body."""
     y = point_positions(np.zeros(len(surface.rest)), surface)
     for k, row in enumerate(rows):
@@ -107,7 +110,7 @@ def check_start(surface, rows, size):
             )
 
 
-def check_times(times, start):
+def check_times(times: ArrayLike, start: float):
     """Times as an array; refuse an empty, non-finite or non-increasing list, and times before the start."""
     times = np.atleast_1d(np.asarray(times, dtype=float))
     if times.size == 0 or not np.isfinite(times).all():
@@ -117,7 +120,7 @@ def check_times(times, start):
     return times
 
 
-def check_resumed(rest, state):
+def check_resumed(rest: State, state: State):
     """Refuse a stored state that does not fit the problem, whose state at rest is `rest`: compiled loops do not look at
     the length of an array."""
     wanted, given = rest.to_arrays(), state.to_arrays()
@@ -131,7 +134,7 @@ def check_resumed(rest, state):
             )
 
 
-def boundary_size(mesh):
+def boundary_size(mesh: MeshTet):
     """Diagonal of the box around the body [m]."""
     x = nodes(mesh)[np.unique(facet_nodes(mesh))]
     return float(np.linalg.norm(np.ptp(x, axis=0)))

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import scipy.sparse as sp
@@ -32,7 +33,7 @@ def free_bytes():
     return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
 
 
-def check_memory(needed, free, unknowns):
+def check_memory(needed: float, free: float, unknowns: int):
     """Refuse factors that do not fit, before the machine swaps; both in bytes."""
     if needed > free:
         raise SolveError(
@@ -62,7 +63,7 @@ def load_pardiso():
 class PardisoFactors:
     """LDLᵀ of an upper triangle (CSR, sorted, full diagonal); the analysis is done once per pattern."""
 
-    def __init__(self, pypardiso):
+    def __init__(self, pypardiso: ModuleType):
         self.solver = pypardiso.PyPardisoSolver(mtype=-2)
         self.failure = sys.modules[pypardiso.PyPardisoSolver.__module__].PyPardisoError
         for index, value in PARDISO_CONTROL.items():
@@ -70,7 +71,8 @@ class PardisoFactors:
         self.analysed = False
         self.upper = sp.csr_matrix((1, 1))
 
-    def call(self, phase, b):
+    def call(self, phase: int, b: np.ndarray):
+        """One phase of Pardiso on the matrix and a right-hand side."""
         self.solver.set_phase(phase)
         return self.solver._call_pardiso(self.upper, b)
 
@@ -79,7 +81,7 @@ class PardisoFactors:
         while_analysing, kept, factors = (int(self.solver.iparm[index]) for index in (14, 15, 16))
         return 1024 * max(while_analysing, kept + factors)
 
-    def factor(self, upper, afresh=False):
+    def factor(self, upper: sp.csr_matrix, afresh: bool = False):
         """Factorise; the matching and ordering of the first matrix serve its successors unless afresh."""
         self.upper = upper
         nothing = np.zeros(len(upper.indptr) - 1)
@@ -91,7 +93,8 @@ class PardisoFactors:
             check_memory(self.needed_bytes(), free_bytes(), len(nothing))
         self.call(22, nothing)
 
-    def solve(self, b):
+    def solve(self, b: np.ndarray):
+        """x of K x = b."""
         return self.call(33, np.asfortranarray(b))
 
     def release(self):
@@ -109,7 +112,7 @@ class ScipyFactors:
     def __init__(self):
         self.solve_with: Callable = np.asarray
 
-    def factor(self, upper, afresh=False):
+    def factor(self, upper: sp.csr_matrix, afresh: bool = False):
         """Factorise; afresh asks for full partial pivoting."""
         whole = (upper + sp.triu(upper, 1).T).tocsc()
         threshold = 1.0 if afresh else 0.01
@@ -117,10 +120,12 @@ class ScipyFactors:
         lu = splu(whole, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=threshold, options=options)
         self.solve_with = lu.solve
 
-    def solve(self, b):
+    def solve(self, b: np.ndarray):
+        """x of K x = b."""
         return self.solve_with(b)
 
     def release(self):
+        """Forget the factors."""
         self.solve_with = np.asarray
 
 
@@ -130,18 +135,20 @@ class SymmetricSolver:
     Raises SolveError when K is singular to working precision.
     """
 
-    def __init__(self, backend="auto"):
+    def __init__(self, backend: str = "auto"):
         pypardiso = load_pardiso() if backend in ("auto", "pardiso") else None
         if backend == "pardiso" and pypardiso is None:
             raise SolveError("the solver 'pardiso' was asked for but pypardiso is not installed: use 'auto'")
         self.factors = PardisoFactors(pypardiso) if pypardiso else ScipyFactors()
         self.upper = sp.csr_matrix((1, 1))
 
-    def factor(self, upper):
+    def factor(self, upper: sp.csr_matrix):
+        """Take K, by its upper triangle; raises SingularTangent."""
         self.upper = upper
         self.try_factor(afresh=False)
 
-    def try_factor(self, afresh):
+    def try_factor(self, afresh: bool):
+        """Factorise; raises SingularTangent."""
         try:
             self.factors.factor(self.upper, afresh)
         except self.factors.failure as problem:
@@ -150,7 +157,7 @@ class SymmetricSolver:
                 f"part of the body may be free to move, hold it"
             ) from problem
 
-    def solve(self, b):
+    def solve(self, b: np.ndarray):
         """x with |K x - b| <= RESIDUAL_LIMIT |b|, of the shape of b, (n,) or (n, k) for k right-hand sides at once.
 
         One fresh analysis is tried before giving up.
@@ -168,7 +175,8 @@ class SymmetricSolver:
             )
         return x
 
-    def misfit(self, x, b):
+    def misfit(self, x: np.ndarray, b: np.ndarray):
+        """Largest entry of K x − b over the largest of b."""
         Kx = self.upper @ x + self.upper.T @ x - (self.upper.diagonal() * x.T).T
         size = np.abs(b).max()
         with np.errstate(invalid="ignore"):
@@ -176,4 +184,5 @@ class SymmetricSolver:
         return gap / size if size > 0.0 else gap
 
     def release(self):
+        """Give the memory of the factors back."""
         self.factors.release()

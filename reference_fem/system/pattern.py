@@ -29,26 +29,27 @@ class Pattern:
 
     @property
     def size(self):
+        """Entries of a `values` array."""
         return len(self.indices) + len(self.lift_indices) + 1
 
-    def upper(self, values):
+    def upper(self, values: np.ndarray):
         """Upper triangle of the tangent, CSR (n, n), sharing memory with values."""
         n, count = len(self.free), len(self.indices)
         return sp.csr_matrix((values[:count], self.indices, self.indptr), shape=(n, n), copy=False)
 
-    def lifting(self, values):
+    def lifting(self, values: np.ndarray):
         """Coupling of free rows with held columns, CSR (n, m)."""
         first, shape = len(self.indices), (len(self.free), len(self.held))
         return sp.csr_matrix((values[first:-1], self.lift_indices, self.lift_indptr), shape=shape, copy=False)
 
-    def positions(self, dofs):
+    def positions(self, dofs: np.ndarray):
         """Slots of the packed upper triangles (row by row) of the local matrices on dofs (k, l): (k, l(l+1)/2)."""
         keys = pair_keys(self.rank, len(self.free), len(self.held), dofs)
         slots = np.searchsorted(self.keys, keys)
         return np.minimum(slots, self.size - 1).astype(np.uint32)
 
 
-def pair_keys(rank, n, m, dofs):
+def pair_keys(rank: np.ndarray, n: int, m: int, dofs: np.ndarray):
     """One sortable number per local pair: free-free pairs first, row by row, then free-held, then the rest."""
     rows, cols = np.triu_indices(dofs.shape[1])
     a, b = rank[dofs[:, rows]], rank[dofs[:, cols]]
@@ -60,7 +61,7 @@ def pair_keys(rank, n, m, dofs):
     return keys
 
 
-def build_pattern(dofs, held_mask) -> Pattern:
+def build_pattern(dofs: np.ndarray, held_mask: np.ndarray) -> Pattern:
     """Pattern of all element matrices on dofs (ne, l); held_mask (total,) marks prescribed unknowns."""
     free, held = np.flatnonzero(~held_mask), np.flatnonzero(held_mask)
     n, m = len(free), len(held)
@@ -78,6 +79,6 @@ def build_pattern(dofs, held_mask) -> Pattern:
     )  # fmt: skip
 
 
-def row_starts(rows, n):
+def row_starts(rows: np.ndarray, n: int):
     """CSR indptr from sorted row numbers."""
     return np.searchsorted(rows, np.arange(n + 1)).astype(np.int32)

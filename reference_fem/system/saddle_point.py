@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reference_fem.contact import augmented as contact
-from reference_fem.elements.shapes import build_elements, build_facets, displacement_points
+from reference_fem.elements.shapes import Facets, build_elements, build_facets, displacement_points
 from reference_fem.elements.surface import Surface
 from reference_fem.elements.table import find_element
 from reference_fem.errors import SolveError
@@ -38,6 +38,7 @@ class Evaluation:
 
     @property
     def usable(self):
+        """Whether no element is inside out and both errors are finite."""
         return self.smallest_J > 0.0 and np.isfinite(self.errors).all()
 
 
@@ -72,11 +73,12 @@ class System:
         checks.check_start(self.surface, start, checks.boundary_size(mesh))
         self.solver = SymmetricSolver(settings.solver)
 
-    def check_freedom(self, held_dofs):
+    def check_freedom(self, held_dofs: np.ndarray):
         """At rest nothing else balances a load than the holders: every rigid motion must be held."""
         checks.check_held(self.nodes, held_dofs)
 
-    def build_surface(self, facets):
+    def build_surface(self, facets: Facets):
+        """Tables of the boundary, as contact reads them."""
         dofs = np.hstack([3 * facets.nodes + c for c in range(3)])
         penalty = self.settings.penalty * self.problem.material.mu / np.sqrt(facets.weights.sum(axis=1))
         positions = self.pattern.positions(dofs)
@@ -90,7 +92,7 @@ class System:
             loads.append(BodyForce(lambda t, x: np.repeat(pull[:, None], x.shape[1], axis=1)))
         return [find_points(load, self.problem.mesh, self.element, self.problem.degree) for load in loads]
 
-    def force_at(self, t, share=1.0):
+    def force_at(self, t: float, share: float = 1.0):
         """Share of all dead forces at time t, (field_count,) [N]."""
         force = np.zeros(self.field_count)
         for points in self.loaded:
@@ -98,15 +100,17 @@ class System:
         return force
 
     def rest(self) -> State:
+        """The state that every path starts from."""
         shape = (len(self.rows), *self.surface.weights.shape)
         x, start = np.zeros(self.total), self.settings.start
         grip = contact.first_grip(self.obstacles_at(start), self.sticks, self.surface, x, TOUCHING * np.ptp(self.nodes))
         return State(start, 0.0, x, np.zeros(shape), np.zeros(shape), grip=grip, hold=grip)
 
-    def obstacles_at(self, t):
+    def obstacles_at(self, t: float):
+        """Rows of the obstacles at time t, (no, 8)."""
         return obstacles.place(self.rows, self.problem.obstacles, t)
 
-    def filling_at(self, t, load):
+    def filling_at(self, t: float, load: float):
         """What the cavities are wanted to hold at time t, see Loads."""
         return np.array([lumen.target(t, load) for lumen in self.lumens])
 
@@ -121,7 +125,7 @@ class System:
         force = self.force_at(state.t, state.load)
         return Loads(force, rows, state.multiplier, filling, state.stiffness, grip=state.grip)
 
-    def held_at(self, t):
+    def held_at(self, t: float):
         """Prescribed values of the held unknowns at time t; refuses regions that contradict each other."""
         wanted = np.full(self.field_count, np.nan)
         for k, held in enumerate(self.held):
@@ -135,7 +139,7 @@ class System:
             wanted[held.dofs] = value
         return wanted[self.pattern.held]
 
-    def evaluate(self, x, loads: Loads, tangent=True) -> Evaluation:
+    def evaluate(self, x: np.ndarray, loads: Loads, tangent: bool = True) -> Evaluation:
         """Residual and, if wanted, tangent at x under the loads."""
         residual = np.zeros(self.total)
         residual[: self.field_count] -= loads.force
@@ -157,7 +161,14 @@ class System:
         errors = self.relative_errors(x, residual, touch, loads.force, gradients)
         return Evaluation(residual, values, J, touch, errors, volumes, gradients)
 
-    def relative_errors(self, x, residual, touch, force, gradients):
+    def relative_errors(
+        self,
+        x: np.ndarray,
+        residual: np.ndarray,
+        touch: contact.Touch,
+        force: np.ndarray | float,
+        gradients: np.ndarray,
+    ):
         """(unbalanced force over the forces at work, misfit of tissue volume or filling over the whole)."""
         n, m, mu = self.displacement_count, self.field_count, self.problem.material.mu
         free = np.zeros(m)

@@ -1,9 +1,11 @@
 """What a load step starts from, what acts during it, and how hard to try."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from reference_fem.contact.augmented import NO_GRIP, NO_GUESS, Grip
 from reference_fem.errors import SolveError
@@ -62,7 +64,7 @@ class State:
         return arrays
 
     @classmethod
-    def from_arrays(cls, arrays) -> "State":
+    def from_arrays(cls, arrays: Mapping[str, ArrayLike]) -> "State":
         """The state that to_arrays stored; raises SolveError when a part is missing."""
         parts = (*PLAIN, *(f"{name}_{part}" for name in ("grip", "hold") for part in Grip._fields))
         missing = [name for name in parts if name not in arrays]

@@ -1,4 +1,4 @@
-"""How much volume does each model lose, and how far is it from the reference? (The paper's Figure 3.)"""
+"""How much volume does each model lose, and how far is it from the reference? The paper's Figure 3."""
 
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study

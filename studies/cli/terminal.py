@@ -16,7 +16,7 @@ KEPT = "\n\t"
 
 
 def visible(text: str) -> str:
-    """The text with every character that would steer the terminal as its number: ESC is \\x1b."""
+    r"""The text with every character that would steer the terminal as its number: ESC is \x1b."""
     if text.isascii() and text.isprintable():
         return text
     return "".join(_number(c) if unicodedata.category(c) in STEERING and c not in KEPT else c for c in text)

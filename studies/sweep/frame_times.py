@@ -16,7 +16,6 @@ from studies.timing.cases import time_cases
 
 def measure_times(root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
     """Times what is not timed yet, of `among` where given, when no other command does; how many that were."""
-
     ledger = Ledger(root)
 
     def pending() -> list[Case]:

@@ -29,23 +29,23 @@ def test_oracles_have_names_of_their_own_and_a_source():
     assert all(oracle.source and oracle.title for oracle in ORACLES)
 
 
-@pytest.mark.parametrize("got, met", [(1.009, True), (0.991, True), (1.011, False), (np.nan, False)])
+@pytest.mark.parametrize(("got", "met"), [(1.009, True), (0.991, True), (1.011, False), (np.nan, False)])
 def test_a_check_judges_by_the_relative_deviation(got, met):
     assert Check("force", "N", 1.0, got, 0.01, "mesh", 3).met is met
     assert Check("force", "N", -100.0, -100.0 * got, 0.01, "mesh", 3).met is met
 
 
-@pytest.mark.parametrize("got, met", [(3.1, True), (2.8, False), (np.nan, False)])
+@pytest.mark.parametrize(("got", "met"), [(3.1, True), (2.8, False), (np.nan, False)])
 def test_a_check_in_units_of_its_quantity(got, met):
     assert Check("order", "1", 3.0, got, 0.15, "mesh", 3, absolute=True).met is met
 
 
-@pytest.mark.parametrize("got, met", [(1.9, True), (2.6, True), (1.8, False), (np.nan, False)])
+@pytest.mark.parametrize(("got", "met"), [(1.9, True), (2.6, True), (1.8, False), (np.nan, False)])
 def test_a_check_from_below(got, met):
     assert Check("order", "1", 2.0, got, 0.15, "mesh", 3, absolute=True, kind="at least").met is met
 
 
-@pytest.mark.parametrize("got, met", [(0.4, True), (0.9, False), (np.nan, False)])
+@pytest.mark.parametrize(("got", "met"), [(0.4, True), (0.9, False), (np.nan, False)])
 def test_a_control_must_miss(got, met):
     assert Check("displacement", "m", 1.0, got, 0.5, "mesh", 3, kind="misses").met is met
 

@@ -85,21 +85,25 @@ def pulled_without_length(force, padded, slices, rows, lane, here):
 
 @njit_inlined
 def minus(a, b):
+    """a − b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @njit_inlined
 def plus(a, b):
+    """a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @njit_inlined
 def dot(a, b):
+    """a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit_inlined
 def cross(a, b):
+    """a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 

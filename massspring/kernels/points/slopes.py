@@ -41,6 +41,7 @@ def load_three(table, row, lane):
 
 @njit_inlined
 def times(vector, factor):
+    """The components times a factor."""
     return vector[0] * factor, vector[1] * factor, vector[2] * factor
 
 

@@ -134,6 +134,6 @@ def cut(sizes: np.ndarray, corners: np.ndarray, strips: bool) -> Triangles:
         if not strips:
             found.append(fans(rows))
             continue
-        for k in range(int(size) - 2):
-            found.append(rows[:, [k, k + 1, k + 2]] if k % 2 == 0 else rows[:, [k + 1, k, k + 2]])
+        turned = ([k, k + 1, k + 2] if k % 2 == 0 else [k + 1, k, k + 2] for k in range(int(size) - 2))
+        found.extend(rows[:, corner] for corner in turned)
     return np.concatenate(found)

@@ -18,9 +18,8 @@ def crossing_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     proper = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     numbers = np.flatnonzero(proper)
     corners = points[triangles[proper]]
-    found = [np.empty((0, 2), np.int64)]
-    for pairs in overlapping_boxes(corners.min(axis=1), corners.max(axis=1)):
-        found.append(crossing(points, triangles[proper], pairs))
+    boxes = overlapping_boxes(corners.min(axis=1), corners.max(axis=1))
+    found = [np.empty((0, 2), np.int64), *(crossing(points, triangles[proper], pairs) for pairs in boxes)]
     pairs = numbers[np.concatenate(found)]
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 

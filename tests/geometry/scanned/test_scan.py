@@ -102,11 +102,10 @@ def test_every_change_to_a_surface_is_said(block, tmp_path):
     _, points, faces = block
     speck = box((90, 90, 90), (95, 95, 95))
     both = together((points, faces[:, ::-1]), speck)
-    with pytest.warns(UserWarning) as told:
+    with pytest.warns(UserWarning, match="inside out") as told:
         mesh = scan(write(tmp_path / "odd.stl", *both), 200, unit="mm", fill=False)
     said = [str(warning.message) for warning in told]
     assert any("odd.stl: 1 of 2 separate parts are left out (1" in text for text in said)
-    assert any("inside out" in text for text in said)
     assert mesh.volume == pytest.approx(volume_of(block), rel=0.04)
 
 

@@ -127,9 +127,9 @@ def test_bad_bodies_are_refused_in_one_sentence(ball_body, name):
 
 
 def test_a_negative_tetrahedron_is_refused(block_body):
+    cells = block_body.tetrahedra.copy()
+    cells[4] = cells[4, [1, 0, 2, 3]]
     with pytest.raises(MassSpringError, match="tetrahedron 4 has volume -"):
-        cells = block_body.tetrahedra.copy()
-        cells[4] = cells[4, [1, 0, 2, 3]]
         changed(block_body, tetrahedra=cells)
 
 

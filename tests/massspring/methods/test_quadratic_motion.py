@@ -63,7 +63,7 @@ def test_the_contract_of_methods_holds(promise, block):
     promise(block, ImplicitVolume())
 
 
-@pytest.mark.parametrize("promise", (CONTRACT[1], CONTRACT[7]), ids=("spin", "volume"))
+@pytest.mark.parametrize("promise", [CONTRACT[1], CONTRACT[7]], ids=("spin", "volume"))
 def test_the_contract_holds_with_a_lumen(promise, hollow):
     promise(hollow, ImplicitVolume())
 

@@ -24,12 +24,9 @@ MARK = re.compile(rf"^ *@({'|'.join(DECORATORS)})\b", re.MULTILINE)
 
 def compiled_modules() -> list[str]:
     """Modules whose functions carry one of the decorators of compiled code."""
-    found = []
-    for package in sources.OWN:
-        for file in sorted((ROOT / package).rglob("*.py")):
-            if MARK.search(file.read_text()):
-                found.append(".".join(file.relative_to(ROOT).with_suffix("").parts))
-    return found
+    files = [file for package in sources.OWN for file in sorted((ROOT / package).rglob("*.py"))]
+    marked = [file for file in files if MARK.search(file.read_text())]
+    return [".".join(file.relative_to(ROOT).with_suffix("").parts) for file in marked]
 
 
 def decorated(node: ast.AST) -> bool:

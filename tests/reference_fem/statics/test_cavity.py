@@ -206,7 +206,7 @@ def test_a_moved_scene_has_the_same_pressure():
 
 
 @pytest.mark.parametrize(
-    "cavity, words",
+    ("cavity", "words"),
     [
         (Cavity(lambda x: x[0] > 7.0), "contains none of the"),
         (Cavity(lambda x: ~in_the_middle(x)), "encloses -1 m³"),

@@ -34,7 +34,7 @@ def refused(problem, times=(1.0,), settings=None):
     return message, caught.value
 
 
-@pytest.mark.parametrize("mu, kappa", [(0.0, 1.0), (1.0, -5.0), (np.nan, 1.0), (1.0, np.inf)])
+@pytest.mark.parametrize(("mu", "kappa"), [(0.0, 1.0), (1.0, -5.0), (np.nan, 1.0), (1.0, np.inf)])
 def test_material_out_of_range(mu, kappa):
     with pytest.raises(SolveError, match="must be positive and finite"):
         NeoHookean(mu, kappa)
@@ -122,7 +122,7 @@ def test_a_folded_curved_element():
 
 
 @pytest.mark.parametrize(
-    "held, words",
+    ("held", "words"),
     [
         ([], ["slide along (1, 0, 0)", "slide along (0, 1, 0)", "slide along (0, 0, 1)", "turn about"]),
         (
@@ -143,7 +143,7 @@ def test_three_symmetry_planes_hold_a_body():
 
 
 @pytest.mark.parametrize(
-    "held, words",
+    ("held", "words"),
     [
         (PrescribedDisplacement(lambda x: x[0] > 7.0), "contains no boundary node"),
         (PrescribedDisplacement(lambda x: x[2] < 1e-9, (3,)), "components"),
@@ -160,7 +160,7 @@ def test_contradictory_held_regions():
 
 
 @pytest.mark.parametrize(
-    "obstacle, words",
+    ("obstacle", "words"),
     [
         (RigidPlane((0.0, 0.0, 0.9), (0.0, 0.0, -1.0)), "obstacle 0 starts 0.1 m inside the body (limit 0.00173 m)"),
         (RigidSphere((0.5, 0.5, 1.2), 0.5), "inside the body"),

@@ -103,7 +103,7 @@ def test_tangent_is_the_gradient_of_the_residual(system, state):
 
 
 @pytest.mark.parametrize(
-    "system, rows, columns",
+    ("system", "rows", "columns"),
     [(s, *block) for s in SYSTEMS for block in (BLOCKS if ELEMENTS[s[0]].pressure is not None else BLOCKS[2:])],
     indirect=["system"],
 )

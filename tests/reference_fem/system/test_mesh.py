@@ -99,7 +99,7 @@ def test_evaluator_extrapolates_near_the_surface_and_says_how_far():
 
 
 @pytest.mark.parametrize(
-    "points, words", [([[3.0, 0, 0]], "outside the mesh"), ([[np.nan, 0, 0]], "finite"), ([[1, 2]], "shape")]
+    ("points", "words"), [([[3.0, 0, 0]], "outside the mesh"), ([[np.nan, 0, 0]], "finite"), ([[1, 2]], "shape")]
 )
 def test_evaluator_refuses_points_it_cannot_serve(points, words):
     with pytest.raises(SolveError, match=words):

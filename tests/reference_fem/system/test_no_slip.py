@@ -149,7 +149,7 @@ def test_what_is_let_go_is_free_again():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kappa, ratio", [(2.0 / 3.0, np.log(3.0)), (1000.0, 1.0)])
+@pytest.mark.parametrize(("kappa", "ratio"), [(2.0 / 3.0, np.log(3.0)), (1000.0, 1.0)])
 def test_what_no_slip_adds_to_hertz(kappa, ratio):
     """Spence, Proc. R. Soc. A 305, 1968: (1 - nu) log(3 - 4 nu) / (1 - 2 nu), 1.0986 at nu = 0 and 1 at nu = 1/2.
 
@@ -166,12 +166,13 @@ def test_what_no_slip_adds_to_hertz(kappa, ratio):
 
 def test_the_end_of_a_capsule_is_a_sphere():
     held = [PrescribedDisplacement(lambda x: np.abs(x[2]) < 1e-9), *symmetry()[:2]]
-    forces = []
-    for probe in (
+    probes = (
         RigidSphere((0.0, 0.0, 1.5), 0.5, lambda t: (0.0, 0.0, -t)),
         RigidCapsule((0.0, 0.0, 1.5), (0.0, 0.0, 9.0), 0.5, lambda t: (0.0, 0.0, -t)),
-    ):
-        forces.append(equilibrium_path(Problem(ball_octant(4), TISSUE, held, [probe]), (0.1,))[0].obstacle_force)
+    )
+    forces = [
+        equilibrium_path(Problem(ball_octant(4), TISSUE, held, [probe]), (0.1,))[0].obstacle_force for probe in probes
+    ]
     np.testing.assert_allclose(forces[1], forces[0], rtol=1e-5)  # to the Newton tolerance
 
 
@@ -193,7 +194,7 @@ def test_facets_out_of_reach_change_nothing(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "obstacle, words",
+    ("obstacle", "words"),
     [
         (RigidCapsule((0.0, 0.0, 2.0), (0.0, 0.0, 2.0), 0.1), "starts and ends at"),
         (RigidCapsule((0.0, 0.0, 2.0), (0.0, 1.0, 2.0), 0.0), "capsule's radius is 0.0 m"),

@@ -36,6 +36,7 @@ def test_a_scheduler_that_is_not_there_is_a_sentence(monkeypatch, tmp_path, tiny
     assert said.endswith("; start one with `dask scheduler`, or correct the address")
 
 
+@pytest.mark.campaign
 def test_a_scheduler_without_workers_is_a_sentence(tmp_path):
     options = {"n_workers": 0, "processes": False, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
     alone = pytest.raises(StudyError, match=r"has had no worker for 0\.3 s: start some with `organbench worker`")

@@ -87,6 +87,7 @@ def written(folder, text):
     return find_study(str(path))
 
 
+@pytest.mark.campaign
 def test_a_worker_that_is_killed_costs_no_case(tmp_path):
     study = written(tmp_path / "study", KILLS)
     options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
@@ -128,6 +129,7 @@ class Killer(Silent):
         self.process.kill()
 
 
+@pytest.mark.campaign
 def test_a_scheduler_that_dies_half_way_is_one_sentence_and_what_is_finished_stays(tmp_path):
     study, file = written(tmp_path / "study", SLOW), tmp_path / "scheduler.json"
     words = ["--port", "0", "--no-dashboard", "--scheduler-file", str(file), "--host", "127.0.0.1"]

@@ -45,10 +45,12 @@ def damaged():
     }
 
 
-QUICK = "open, turned, two parts"
+QUICK = ("open, turned, two parts", "crossing itself")
 
 
-@pytest.mark.parametrize("fault", [QUICK, *(pytest.param(f, marks=pytest.mark.slow) for f in damaged() if f != QUICK)])
+@pytest.mark.parametrize(
+    "fault", [*QUICK, *(pytest.param(name, marks=pytest.mark.campaign) for name in damaged() if name not in QUICK)]
+)
 def test_the_command_that_is_printed_works(organbench, tmp_path, monkeypatch, fault):
     points, faces, options = damaged()[fault]
     monkeypatch.chdir(tmp_path)

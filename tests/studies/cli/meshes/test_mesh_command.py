@@ -31,6 +31,7 @@ def stored(path, points, faces):
     return path
 
 
+@pytest.mark.slow
 def test_an_organ_that_few_nodes_cannot_hold_names_the_number_that_does(organbench, tmp_path):
     _, out, _ = organbench("mesh", "liver", "--nodes", 100, "-o", tmp_path / "liver.stl")
     enough = int(re.search(r"about ([\d,]+) nodes keep it within 1 %", out)[1].replace(",", ""))
@@ -39,6 +40,7 @@ def test_an_organ_that_few_nodes_cannot_hold_names_the_number_that_does(organben
     assert "nodes keep it" not in out
 
 
+@pytest.mark.slow
 def test_an_organ_is_meshed_and_found_clean(organbench, tmp_path):
     target = tmp_path / "kidney.vtu"
     code, out, err = organbench("mesh", "kidney", "--nodes", 200, "--seed", 3, "-o", target)

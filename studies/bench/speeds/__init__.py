@@ -1,0 +1,1 @@
+"""The promised speeds over commits, for asv: `make bench-commits`."""
