@@ -48,7 +48,7 @@ def thick_sphere(n: int = 6, layers: int = 4) -> Problem:
     return Problem(mesh, NeoHookean(1.0, 5000.0), [blow, *symmetry()])
 
 
-def pulled_organ(mesh: MeshTet, attached: np.ndarray, grip: np.ndarray, move: Sequence[float]) -> Problem:
+def pulled_organ(mesh: MeshTet, attached: np.ndarray, grip: np.ndarray, move: np.ndarray | Sequence[float]) -> Problem:
     """An organ of mu = 1.8 kPa, attached at some vertices and gripped at others (numbers); move: (3,) [m]."""
     if len(np.intersect1d(attached, grip)):
         raise SolveError("the attached and the gripped patch share vertices: take patches that lie apart")

@@ -45,8 +45,10 @@ def part_beside(path: Path, size: int | None = None) -> Iterator[Path]:
 
 
 def part_path(path: Path) -> Path:
-    """A new name next to `path` that no other writer has, on any host. (`tempfile` would make files that their owner
-    alone may read.)."""
+    """A new name next to `path` that no other writer has, on any host.
+
+    `tempfile` would make files that only their owner may read.
+    """
     return path.with_name(f"{path.name}.{uuid4().hex[:12]}.part")
 
 
