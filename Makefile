@@ -28,9 +28,9 @@ report: setup-run ## charts, tables and report.html, one page that opens anywher
 
 study-peers: setup-run ## other programs beside ours on the same ball and liver: the extra `peers` (minutes)
 	$(BIN)/python -m pip install -q -c constraints.txt --no-build-isolation -e ".[peers]"
-	$(BIN)/organbench run studies/peers/study.py
-	$(BIN)/python -m studies.peers.main
-	$(BIN)/organbench plot studies/peers/study.py
+	$(BIN)/organbench run studies/exchange/peers/study.py
+	$(BIN)/python -m studies.exchange.peers.main
+	$(BIN)/organbench plot studies/exchange/peers/study.py
 
 verify: setup-verify docs ## before a release: oracles, campaigns, browsers, clusters, wheels, notebooks (half an hour)
 	$(BIN)/organbench verify
@@ -109,10 +109,10 @@ distclean: clean ## clean, and remove .venv and the raw results too (charts and 
 
 # Two processes that share what they compile, before two that would both compile it; says nothing when it is there.
 compiled: setup-run
-	@$(BIN)/python -m studies.compiling.main
+	@$(BIN)/python -m studies.sweep.compiling.main
 
 compiled-essential: setup-run
-	@$(BIN)/python -m studies.compiling.main --essential
+	@$(BIN)/python -m studies.sweep.compiling.main --essential
 
 setup-run setup-test setup-verify setup-dev: setup-%:
 	@.ci/setup $*

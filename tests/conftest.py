@@ -11,7 +11,7 @@ import pytest
 from numba.core import event
 
 from studies.base.compile_watch import EVENT, Compiled, CompileWatch
-from studies.compiling.log import summary
+from studies.sweep.compiling.log import summary
 
 PATIENCE = 900.0
 """Seconds that a process waits for what another one makes; the longest takes a minute on a busy machine."""

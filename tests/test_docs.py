@@ -12,7 +12,7 @@ import typer
 
 from studies.catalog import STUDIES
 from studies.cli.app import app
-from studies.peers.study import STUDY as PEERS
+from studies.exchange.peers.study import STUDY as PEERS
 from studies.report.publish import EXTRAS
 
 ROOT = Path(__file__).parent.parent

@@ -15,8 +15,8 @@ from studies.reference.solve import VARIANTS
 from studies.report.publish import PUBLISHED
 from studies.report.sentences import APART, NODAL, SENTENCES, TOGETHER
 from studies.report.summary import SUMMARIES
-from studies.scenes import BALL_SQUEEZE, LIVER_PRESS
-from studies.scenes.ball_squeeze import RADIUS
+from studies.scene.library import BALL_SQUEEZE, LIVER_PRESS
+from studies.scene.library.ball_squeeze import RADIUS
 
 ROOT = Path(__file__).parent.parent
 TABLES = ROOT / PUBLISHED

@@ -43,7 +43,7 @@ PROGRAM = """
 import sys
 import studies
 from studies.__main__ import main
-from studies.archive.crate import citation_file
+from studies.report.archive.crate import citation_file
 print(studies.__file__)
 print(citation_file())
 sys.argv = ["organbench", "list"]

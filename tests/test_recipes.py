@@ -26,7 +26,7 @@ from studies.metrics.metrics import METRICS
 from studies.report.methods_page import methods_page
 from studies.runs.case import BodyRecipe, Case, case_from_json
 from studies.runs.run import measure
-from studies.scenes import JUDGED, SCENES
+from studies.scene.library import JUDGED, SCENES
 from studies.store.record import Status
 from studies.sweep.find_study import find_studies
 from studies.sweep.load import load_runs

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 from massspring import Clock, ImplicitElements, ImplicitVolume, Method, Setup, simulate
 from studies.bench.line import BenchLine
+from studies.metrics.timing.protocol import interleave, pinned
+from studies.metrics.timing.statistics import kernel_ns, ratio_with_spread
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
-from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.timing.protocol import interleave, pinned
-from studies.timing.statistics import kernel_ns, ratio_with_spread
+from studies.scene.library.ball_clamped import BALL_CLAMPED
 
 UPDATE = 0.001
 """Simulated time between two states that a program asks for [s], one step of any of them."""

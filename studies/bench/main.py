@@ -23,13 +23,13 @@ from studies.bench.plain import plain_lines
 from studies.bench.plain_points import plain_points_lines
 from studies.bench.slide import slide_lines
 from studies.bench.solver import growth_lines, large_lines, step_lines, threads_lines, volumes_lines
+from studies.metrics.timing.protocol import pinned
 from studies.reference.problem import reference_problem, whole_forces
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
-from studies.scenes.ball_squeeze import BALL_SQUEEZE, PRESS_END, RADIUS
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE, PRESS_END, RADIUS
 from studies.store.stamps import set_stamp
 from studies.store.tables.csv_table import write_table
-from studies.timing.protocol import pinned
 
 APPROACHES = (0.10, 0.20, 0.30)
 """Of the planes over the diameter, at which the reference is held against the converged solution."""

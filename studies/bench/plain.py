@@ -18,8 +18,8 @@ import numpy as np
 from massspring import ImplicitVolume, Setup, simulate
 from studies.bench.line import BenchLine
 from studies.bench.solver import FRAMES, LARGE, LARGE_FRAMES, LARGE_REPEATS, REPEATS, squeezed_setup
-from studies.timing.protocol import interleave, pinned
-from studies.timing.statistics import kernel_ns, ratio_with_spread
+from studies.metrics.timing.protocol import interleave, pinned
+from studies.metrics.timing.statistics import kernel_ns, ratio_with_spread
 
 SETTINGS: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}}
 TARGETS = {"float64": 2.0, "float32": 3.0}

@@ -19,7 +19,7 @@ from studies.bench.line import BenchLine
 from studies.bench.plain import SETTINGS, against_plain, clamp
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 
 SURFACE_NODES = (594, 794, 1194)
 FRAMES, ROUNDS, MOST = 40, 5, 200

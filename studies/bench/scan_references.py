@@ -13,10 +13,10 @@ import numpy as np
 
 from massspring import Plane, Trajectory
 from studies.base.errors import StudyError
+from studies.catalog.population.folder import DURATION, NODES, PLAN, placed_scene
 from studies.geometry import HalfSpace, OrganMesh, scan
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import triangle_areas
-from studies.population.folder import DURATION, NODES, PLAN, placed_scene
 from studies.reference.load import Reference, load_reference
 from studies.reference.reference_solves import reference_fingerprint, reference_solves
 from studies.reference.solve import solve

@@ -12,11 +12,11 @@ import numpy as np
 from massspring import Clock, MassSpringError, Setup
 from massspring.run.simulation import check_state
 from studies.bench.line import BenchLine
+from studies.metrics.timing.protocol import interleave, pinned
+from studies.metrics.timing.statistics import kernel_ns, percentiles
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
-from studies.scenes.stomach_slide import NODES, STOMACH_SLIDE
-from studies.timing.protocol import interleave, pinned
-from studies.timing.statistics import kernel_ns, percentiles
+from studies.scene.library.stomach_slide import NODES, STOMACH_SLIDE
 
 UPDATE = 2e-3
 """Simulated and wall time between two forces on the hand [s]."""

@@ -29,9 +29,9 @@ from massspring import (
 from massspring.layout.threads import cores
 from studies.bench.line import BenchLine
 from studies.geometry import ball
-from studies.scenes.ball_squeeze import RADIUS
-from studies.timing.protocol import interleave, pinned
-from studies.timing.statistics import kernel_ns, percentiles, ratio_with_spread
+from studies.metrics.timing.protocol import interleave, pinned
+from studies.metrics.timing.statistics import kernel_ns, percentiles, ratio_with_spread
+from studies.scene.library.ball_squeeze import RADIUS
 
 FRAMES, STEPS, REPEATS = 200, 20, 15
 LARGE_FRAMES, LARGE_STEPS, LARGE_REPEATS = 12, 20, 5

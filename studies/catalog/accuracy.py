@@ -8,8 +8,8 @@ from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.inertia import why_inertia_matters
 from studies.scene.kind import has_wall, load_of
+from studies.scene.library import JUDGED
 from studies.scene.scene import Scene
-from studies.scenes import JUDGED
 from studies.store.schema import Status
 
 VERTICES = (150, 200, 250, 300)

@@ -3,8 +3,8 @@
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.liver_probe import LIVER_PROBE
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.liver_probe import LIVER_PROBE
 
 BODIES = (
     (BALL_SQUEEZE, BodyRecipe("surface", 550)),

@@ -4,7 +4,7 @@ from massspring import ImplicitVolume
 from massspring.body.laws import LAWS
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 
 NODES = (150, 300, 550)
 

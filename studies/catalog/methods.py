@@ -5,8 +5,8 @@ from dataclasses import replace
 from massspring import METHODS, Element, ImplicitSprings, Method, Xpbd
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.liver_press import LIVER_PRESS
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.liver_press import LIVER_PRESS
 
 NODES = 200
 """So coarse that the dearest, a volume for every tetrahedron, is done in seconds; the same for all."""

@@ -3,7 +3,7 @@
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes import BLADDER_FILL, KIDNEY_PROBE, SPLEEN_SAG, STOMACH_PRESS, STOMACH_PROBE, Scene
+from studies.scene.library import BLADDER_FILL, KIDNEY_PROBE, SPLEEN_SAG, STOMACH_PRESS, STOMACH_PROBE, Scene
 from studies.store.schema import Status
 
 SOLID, HOLLOW = (KIDNEY_PROBE, SPLEEN_SAG), (STOMACH_PRESS, STOMACH_PROBE, BLADDER_FILL)

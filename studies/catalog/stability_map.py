@@ -3,7 +3,7 @@
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.store.schema import Status
 
 FRAMES = 100

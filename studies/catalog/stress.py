@@ -3,7 +3,7 @@
 from massspring import Free, ImplicitVolume, Shake
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes.stress import STRESS_SCENES
+from studies.scene.library.stress import STRESS_SCENES
 from studies.store.schema import Status
 
 NODES = 230

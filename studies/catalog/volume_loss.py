@@ -3,7 +3,7 @@
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE
+from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE
 
 TETRAHEDRAL, SURFACE = BodyRecipe("tetrahedral"), BodyRecipe("surface")
 REPLAYED = (BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE)

@@ -4,9 +4,9 @@ from massspring import ImplicitVolume
 from studies.catalog.accuracy import BUDGETS, LONG, SHORT, headline_case, linear_bodies
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.liver_press import LIVER_PRESS
 from studies.scene.scene import Scene
-from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.scenes.liver_press import LIVER_PRESS
 
 
 def cases(scene: Scene) -> tuple[Case, ...]:

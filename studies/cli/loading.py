@@ -60,7 +60,7 @@ RENAMED = {"check": "mesh-check", "stress": "fuzz", "cost": "profile"}
 
 def scenes() -> list[str]:
     """Names of the scenes."""
-    from studies.scenes import SCENES
+    from studies.scene.library import SCENES
 
     return [scene.name for scene in SCENES]
 

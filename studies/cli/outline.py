@@ -17,7 +17,7 @@ def studies() -> Rows:
     """(name, question) of each of STUDIES, the name of its module and the first line there, and of the population."""
     modules = [module for module, _ in _registered("studies.catalog", "STUDIES")]
     rows = [(module.rsplit(".", 1)[1], _first_line(_parsed(module))) for module in modules]
-    return [*rows, ("population", _first_line(_parsed("studies.population.study")))]
+    return [*rows, ("population", _first_line(_parsed("studies.catalog.population.study")))]
 
 
 def methods() -> Rows:

@@ -15,13 +15,13 @@ from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
 from studies.base.errors import StudyError
 from studies.metrics.run import Run
+from studies.metrics.timing.protocol import FrameTiming
 from studies.reference.load import Reference
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.as_json import scene_of_key, scene_to_json
 from studies.scene.scene import Scene
 from studies.store.paths import readable, record_files, record_path
 from studies.store.record import Record, read_record
-from studies.timing.protocol import FrameTiming
 
 FOLDER = "entries"
 """Of the results."""

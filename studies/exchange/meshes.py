@@ -9,11 +9,11 @@ from massspring import Body
 from massspring.body.volumes import Volumes
 from studies.base.errors import StudyError
 from studies.geometry import OrganMesh
-from studies.grading.graded_mesh import mesh_at
-from studies.grading.quadratic_mesh import QuadraticMesh
+from studies.meshing.graded_mesh import mesh_at
+from studies.meshing.quadratic_mesh import QuadraticMesh
+from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import BodyRecipe
 from studies.runs.prepare import LUMEN, body_for
-from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scene.scene import Scene
 
 STRAIGHT, CURVED = "straight", "curved"

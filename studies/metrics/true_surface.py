@@ -15,7 +15,7 @@ from studies.geometry import read_mesh
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.shape.levelset import Shape, at_depth
 from studies.geometry.surface.distance import hausdorff
-from studies.grading.true_shape import true_shape
+from studies.meshing.true_shape import true_shape
 from studies.metrics.rest_surface import LUMEN, OUTER, RestSurface, rest_surfaces
 from studies.scene.organ_file import scanned
 from studies.scene.scene import Organ

@@ -32,7 +32,7 @@ from studies.plots.style.page import (
 )
 from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, save, styled
 from studies.runs.case import BodyRecipe
-from studies.scenes import Scene
+from studies.scene.library import Scene
 
 TITLE = "Force of the press against the reference"
 FORCES = [metric for metric in METRICS if metric.name == "force_end"]

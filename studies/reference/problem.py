@@ -16,7 +16,7 @@ from reference_fem import (
     nodes,
 )
 from studies.base.errors import StudyError
-from studies.reference.mesh import reference_mesh
+from studies.meshing.reference_mesh import reference_mesh
 from studies.scene.scene import Scene
 
 SAME_POINT = 1e-9

@@ -9,8 +9,8 @@ from reference_fem import facet_nodes, nodes
 from reference_fem.model.problem import HeldNodes
 from studies.geometry.mesh.organ_mesh import tetrahedron_facets
 from studies.geometry.mesh.wall_layers import mean_edge
-from studies.grading.held_mesh import rim_sides
-from studies.scene.meshing import mesh_for
+from studies.meshing.held_mesh import rim_sides
+from studies.meshing.scene_mesh import mesh_for
 from studies.scene.scene import Scene
 
 

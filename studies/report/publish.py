@@ -6,8 +6,8 @@ from pathlib import Path
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.catalog import Study
+from studies.catalog.population import POPULATION
 from studies.catalog.study import command_line
-from studies.population import POPULATION
 from studies.report.results import FIGURES, charts_and_tables, refresh
 from studies.report.sentences import SENTENCES
 from studies.report.summary import SUMMARIES
@@ -16,7 +16,7 @@ from studies.store.machine import machine_id, machine_of, write_machine
 from studies.store.stamps import is_stamped
 from studies.sweep.frame_times import timed_jobs
 from studies.sweep.standings import standings
-from studies.verify.verification import FOLDER as VERIFY
+from studies.tools.verify.verification import FOLDER as VERIFY
 
 PUBLISHED = Path("results") / "published"
 """Below the folder of README.md; the only part of results/ that git keeps."""

@@ -9,7 +9,6 @@ from typing import Any
 
 import pandas as pd
 
-from studies.advice.campaign import published_rows
 from studies.base.errors import StudyError
 from studies.catalog.accuracy import ACCURACY
 from studies.metrics.cells import MINUS, plain
@@ -17,6 +16,7 @@ from studies.metrics.judged import Judged, cheapest, nearest
 from studies.metrics.wish import SHAPE, Wish, usual_wish
 from studies.plots.campaigns.recovery import RETURNED
 from studies.store.record import Status
+from studies.tools.advise.campaign import published_rows
 
 WIDTH = 120
 """Columns of a page."""

@@ -46,7 +46,7 @@ class BodyRecipe:
     weights: tuple[float, float, float, float] | None = None
     """Of a surface body: relative stiffness of structural, bending, inner and axial springs; None for 1, ½, ½, 1."""
     graded: bool = False
-    """Whether elements are halved where the scene holds and touches the body (studies.grading.graded_mesh), once at
+    """Whether elements are halved where the scene holds and touches the body (studies.meshing.graded_mesh), once at
     outlines and twice at contacts, of a hollow organ once at contacts. Quadratic ones are shaped for outlines too."""
     mass: Literal["lumped", "stiffness"] = "lumped"
     """What resists the motion of a quadratic body: its mass, or the same in all, shared in proportion to the stiffness

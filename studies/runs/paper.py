@@ -8,8 +8,8 @@ from massspring import Free, History, ImplicitVolume, Method, Probe, simulate
 from studies.base.errors import StudyError
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import Prepared, prepare
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.stomach_slide import NODES, PRESS_END, SLIDE_END, STOMACH_SLIDE
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.stomach_slide import NODES, PRESS_END, SLIDE_END, STOMACH_SLIDE
 
 BALL_NODES = 550
 

@@ -23,12 +23,12 @@ from massspring.world.surroundings import Surroundings
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
-from studies.grading.quadratic_mesh import QuadraticMesh
+from studies.meshing.quadratic_mesh import QuadraticMesh
+from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
-from studies.scene.meshing import mesh_for, patch_nodes
 from studies.scene.scene import Scene
 
 LUMEN, WHOLE = "lumen", "whole"
@@ -48,7 +48,7 @@ def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
     quadratic = recipe.kind == "quadratic"
     if recipe.graded or quadratic:
         # Loaded where it is asked for: it brings the finite elements.
-        from studies.grading.graded_mesh import graded_mesh, usual_grading
+        from studies.meshing.graded_mesh import graded_mesh, usual_grading
 
         return graded_mesh(scene, recipe.nodes, *(usual_grading(scene) if recipe.graded else (0, 0)), quadratic)
     # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.

@@ -3,7 +3,7 @@
 from massspring import Body, Material, quadratic_body
 from studies.base.errors import DoesNotApply
 from studies.geometry import OrganMesh
-from studies.grading.quadratic_mesh import QuadraticMesh
+from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.runs.case import BodyRecipe
 from studies.scene.inertia import why_inertia_matters
 from studies.scene.scene import Scene

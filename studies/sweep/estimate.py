@@ -93,7 +93,7 @@ def case_seconds(case: Case) -> float:
 
 def timing_seconds(case: Case) -> float:
     """Of measuring the frame times of a case that runs: none of one whose organ cannot be read."""
-    from studies.timing.cases import BUDGET, REPEATS  # with pandas
+    from studies.metrics.timing.cases import BUDGET, REPEATS  # with pandas
 
     try:
         once = run_seconds(case)
@@ -153,6 +153,6 @@ def case_bytes(case: Case) -> int:
 
 def timing_bytes(case: Case) -> int:
     """Of the frame times of a case."""
-    from studies.timing.cases import REPEATS
+    from studies.metrics.timing.cases import REPEATS
 
     return HEAD // 3 + NUMBER * (case.frames or case.scene.frames) * (REPEATS + STAGES)

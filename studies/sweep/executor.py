@@ -1,4 +1,4 @@
-"""Who does the jobs of a sweep: processes of this machine (studies.sweep.local) or of a cluster (studies.engines)."""
+"""Who runs the jobs of a sweep: processes here (studies.sweep.local) or on a cluster (studies.sweep.engines)."""
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing

@@ -9,8 +9,8 @@ from studies.base.lookup import lookup
 from studies.catalog.of_scene import study_of
 from studies.catalog.study import Study
 from studies.runs.user_code import load_file
+from studies.scene.library import SCENES
 from studies.scene.scene import Scene
-from studies.scenes import SCENES
 
 SUFFIX = ".py"
 BETWEEN = ":"

@@ -9,7 +9,7 @@ from typing import Any
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
-from studies.population import POPULATION, population_study, study_on
+from studies.catalog.population import POPULATION, population_study, study_on
 from studies.runs.case import Case, case_from_json, case_to_dict
 from studies.scene.clock import check_clock
 from studies.sweep.find_scene import SUFFIX, read_user_file

@@ -5,13 +5,13 @@ from pathlib import Path
 
 from studies.base.compile_watch import watching
 from studies.catalog.study import Study
+from studies.metrics.timing.alone import alone
+from studies.metrics.timing.cases import time_cases
 from studies.runs.case import Case
 from studies.store.archived import check_no_archive
 from studies.store.ledger import Ledger
 from studies.sweep.executor import Progress, Told
 from studies.sweep.job import CaseJob, case_jobs
-from studies.timing.alone import alone
-from studies.timing.cases import time_cases
 
 
 def measure_times(root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:

@@ -7,6 +7,8 @@ from pathlib import Path
 from studies.base.errors import OtherVersion, StudyError
 from studies.catalog.study import Study
 from studies.metrics.run import Run
+from studies.metrics.timing.cases import timing_of
+from studies.metrics.timing.protocol import FrameTiming
 from studies.reference.load import Reference, load_reference
 from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
@@ -15,8 +17,6 @@ from studies.store.entry import CODE_CHANGED, why_entry_is_stale
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
 from studies.sweep.job import CaseJob, case_jobs, reference_jobs
-from studies.timing.cases import timing_of
-from studies.timing.protocol import FrameTiming
 
 
 class References:

@@ -8,14 +8,14 @@ import numpy as np
 from massspring import Free, ImplicitVolume
 from massspring.body.quadratic import boundary_facets, parts_of_facets
 from studies.metrics.run import Run
+from studies.metrics.timing.protocol import FrameTiming
 from studies.reference.solution import Boundary
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.liver_press import LIVER_PRESS
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.liver_press import LIVER_PRESS
 from studies.store.new_record import new_record
 from studies.store.record import Field, Status
-from studies.timing.protocol import FrameTiming
 from tests.massspring.quadratic import second_order
 
 FRAMES = 40

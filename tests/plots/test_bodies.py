@@ -12,7 +12,7 @@ from studies.plots import force_path, laws, methods, volume_history
 from studies.plots.campaigns import recovery, stability
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, styled
-from studies.scenes.stomach_press import STOMACH_PRESS
+from studies.scene.library.stomach_press import STOMACH_PRESS
 from tests.plots.made_up import run
 from tests.plots.reading import words
 

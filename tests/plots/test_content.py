@@ -9,8 +9,8 @@ from studies.plots import work_precision as work
 from studies.plots.style.page import UNRESOLVED_MARK
 from studies.plots.style.style import BLACK, BLUE, ORANGE, VERMILLION
 from studies.reference.uncertainty import Uncertainty
-from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status
 from tests.plots.made_up import FRAMES, UNCERTAINTY, run
 from tests.plots.reading import lines, points, words

@@ -10,8 +10,8 @@ from studies.base.counting import counted
 from studies.plots.force_path import figure
 from studies.plots.style.style import method_label
 from studies.runs.case import Case
-from studies.scenes import BALL_CLAMPED, LIVER_PRESS, LIVER_PROBE
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library import BALL_CLAMPED, LIVER_PRESS, LIVER_PROBE
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from tests.plots.made_up import run
 
 

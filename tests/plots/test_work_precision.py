@@ -11,10 +11,10 @@ from studies.metrics.true_surface import ShapeErrors
 from studies.plots import work_precision as work
 from studies.plots.style.families import CONTESTANTS, FAMILIES, PAPER, family_of
 from studies.plots.style.style import BLACK, BLUE, GREY, VERMILLION
-from studies.scenes import JUDGED
-from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.liver_press import LIVER_PRESS
+from studies.scene.library import JUDGED
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.liver_press import LIVER_PRESS
 from studies.store.record import Status
 from tests.plots.made_up import FRAMES, UNCERTAINTY, run
 from tests.plots.reading import words

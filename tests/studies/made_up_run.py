@@ -10,7 +10,7 @@ from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.reference.solution import Boundary
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes.ball_clamped import BALL_CLAMPED
+from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.store.new_record import new_fields, new_record
 from studies.store.record import Status
 from studies.store.schema import RUN_FIELDS

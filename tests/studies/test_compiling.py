@@ -12,10 +12,10 @@ from massspring.methods import VARIANTS
 from studies.base.compile_watch import Compiled, watching
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
-from studies.compiling import main, tasks
-from studies.compiling.bodies import EDGE, KINDS, tiny_block, tiny_body
-from studies.compiling.frames import OWN_TYPES, PLAIN, PROBE, THREADS, Variant, advance, setup_of, variants
-from studies.compiling.log import listing, summary
+from studies.sweep.compiling import main, tasks
+from studies.sweep.compiling.bodies import EDGE, KINDS, tiny_block, tiny_body
+from studies.sweep.compiling.frames import OWN_TYPES, PLAIN, PROBE, THREADS, Variant, advance, setup_of, variants
+from studies.sweep.compiling.log import listing, summary
 
 
 @pytest.fixture

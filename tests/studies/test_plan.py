@@ -14,6 +14,7 @@ from studies.base.compile_watch import watching
 from studies.base.processes import run_each
 from studies.cli import progress
 from studies.cli.progress import QUIET_SECONDS, TerminalProgress, compiling, words
+from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
 from studies.store.entry import CODE_CHANGED, MISSING
 from studies.store.ledger import Ledger
@@ -22,7 +23,6 @@ from studies.sweep.local import begin
 from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, expected_bytes, free_bytes, plan
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed
-from studies.timing.cases import timing_file
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
 
 

@@ -8,8 +8,8 @@ from massspring import Free, ImplicitVolume
 from studies.catalog import Study
 from studies.geometry.mesh.organ_mesh import boundary_triangles
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes import Organ, Scene
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library import Organ, Scene
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.store.ledger import Ledger
 from studies.sweep.job import CaseJob
 

@@ -1,7 +1,7 @@
 """The promised speeds of the reference: assembly, a Newton iteration, a path with contact."""
 
 from reference_fem.bench import contact_path, iteration_costs
-from studies.timing.protocol import pinned
+from studies.metrics.timing.protocol import pinned
 
 
 class Iteration:

@@ -5,14 +5,14 @@ from typing import Annotated
 
 import typer
 
-from studies.advice.answer import advise as answered
-from studies.advice.words import lines_of
 from studies.base.compile_watch import watching
 from studies.cli.options import budget as in_time
 from studies.cli.options import share
 from studies.cli.progress import compiling
 from studies.cli.terminal import Results, SceneName, errors, say
 from studies.sweep.find_scene import find_scene
+from studies.tools.advise.answer import advise as answered
+from studies.tools.advise.words import lines_of
 
 
 def advise(

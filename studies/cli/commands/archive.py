@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-from studies.archive.checking import check
-from studies.archive.packing import chosen, pack
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, busy, say, warn
+from studies.report.archive.checking import check
+from studies.report.archive.packing import chosen, pack
 from studies.sweep.find_study import find_studies
 
 

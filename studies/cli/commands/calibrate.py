@@ -7,16 +7,16 @@ import typer
 
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.calibration.calibrate import calibrate as calibrated_on
-from studies.calibration.calibrate import starting_recipe
-from studies.calibration.folds import folds_of
-from studies.calibration.parameters import KINDS
-from studies.calibration.stored import Calibration, calibration_path, read_calibration
-from studies.calibration.words import lines_of
 from studies.cli.progress import TerminalProgress
 from studies.cli.terminal import Results, console, say
 from studies.runs.case import BodyRecipe
 from studies.sweep.find_scene import SUFFIX
+from studies.tools.calibrate.calibrate import calibrate as calibrated_on
+from studies.tools.calibrate.calibrate import starting_recipe
+from studies.tools.calibrate.folds import folds_of
+from studies.tools.calibrate.parameters import KINDS
+from studies.tools.calibrate.stored import Calibration, calibration_path, read_calibration
+from studies.tools.calibrate.words import lines_of
 
 BOTH = "both"
 

@@ -8,11 +8,11 @@ import typer
 from rich.table import Table
 
 from studies.cli.terminal import console, say
-from studies.compare.folders import Change, Comparison
-from studies.compare.folders import compare as compared
-from studies.compare.labels import labels_of
-from studies.compare.verdict import Verdict
 from studies.metrics.cells import MISSING, plain
+from studies.metrics.compare.folders import Change, Comparison
+from studies.metrics.compare.folders import compare as compared
+from studies.metrics.compare.labels import labels_of
+from studies.metrics.compare.verdict import Verdict
 from studies.store.tables.csv_table import write_table
 
 SHOWN = 40

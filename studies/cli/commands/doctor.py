@@ -4,12 +4,12 @@ from pathlib import Path
 
 import typer
 
-from studies.checkup.finding import Finding, Level
-from studies.checkup.machine import machine
-from studies.checkup.results_folder import results_folder
-from studies.checkup.software import software
 from studies.cli import outline
 from studies.cli.terminal import Results, busy, say
+from studies.tools.doctor.finding import Finding, Level
+from studies.tools.doctor.machine import machine
+from studies.tools.doctor.results_folder import results_folder
+from studies.tools.doctor.software import software
 
 
 def doctor(results: Results = Path("results")) -> None:

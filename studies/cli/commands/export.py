@@ -5,12 +5,12 @@ from typing import Annotated
 
 import typer
 
-from studies.advice.yardsticks import yardsticks
 from studies.base.errors import StudyError
 from studies.cli.terminal import Results, SceneName, busy, say, warn
 from studies.exchange.export import export as exported
 from studies.exchange.meshes import NODES
 from studies.sweep.find_scene import find_scene
+from studies.tools.advise.yardsticks import yardsticks
 
 
 def export(

@@ -14,12 +14,12 @@ from studies.cli.terminal import Results, console, errors, say
 from studies.plots.campaigns.breaking import draw as draw_chart
 from studies.store.stamps import set_stamp
 from studies.store.tables.csv_table import write_table
-from studies.stress.campaign import counts, run_trials, table_of
-from studies.stress.outcome import UNEXPLAINED, Attempt, Outcome, simplest, tried
-from studies.stress.reference.outcome import tried as try_reference
-from studies.stress.reference.table import counts_by_choice, last_states
-from studies.stress.reference.trial import draw as draw_reference
-from studies.stress.trial import draw
+from studies.tools.fuzz.campaign import counts, run_trials, table_of
+from studies.tools.fuzz.outcome import UNEXPLAINED, Attempt, Outcome, simplest, tried
+from studies.tools.fuzz.reference.outcome import tried as try_reference
+from studies.tools.fuzz.reference.table import counts_by_choice, last_states
+from studies.tools.fuzz.reference.trial import draw as draw_reference
+from studies.tools.fuzz.trial import draw
 
 FOLDER, REFERENCE, TRIALS, LAST = "breaking", "breaking_reference", "trials.csv.gz", "last.npz"
 WHAT = "trials"

@@ -11,7 +11,7 @@ from studies.base.lookup import lookup
 from studies.cli import outline
 from studies.cli.terminal import console
 from studies.geometry.organs import SHAPES
-from studies.scenes import SCENES
+from studies.scene.library import SCENES
 
 KINDS: dict[str, Callable[[], Sequence[tuple[str, str]]]] = {
     "studies": outline.studies,

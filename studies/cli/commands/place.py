@@ -7,21 +7,21 @@ from typing import Annotated, Any
 import typer
 
 import studies
-from studies.advice.answer import RESULTS, Advice, advise
-from studies.advice.words import body_in_python
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
+from studies.catalog.population.folder import placed_scene
 from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, settled, source_of, working
 from studies.cli.terminal import say, warn
 from studies.geometry import BallRegion, scan
 from studies.geometry.files.units import Source, stem_of
 from studies.plots.place import draw_placing
-from studies.population.folder import placed_scene
 from studies.scene.chosen_place import RADIUS, SIDES, place_of
 from studies.scene.proposal import Proposal, proposal
 from studies.scene.scene_file import Recommended, organ_options, python_name, scene_text
 from studies.scene.tissues import TISSUES, tissue_named
+from studies.tools.advise.answer import RESULTS, Advice, advise
+from studies.tools.advise.words import body_in_python
 
 MM = 1e-3
 NODES = 550

@@ -13,18 +13,18 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
 from studies.catalog.checks import check_study
+from studies.catalog.population import POPULATION
 from studies.cli.options import case_named
 from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import PROGRAM, SMOKE, Results, Smoke, console, say, warn
-from studies.engines.choose import WORDS, executor_for
 from studies.geometry.mesher.jobs import cache_folder
-from studies.population import POPULATION
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.report.results import refresh
 from studies.store.entry import MISSING
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
 from studies.store.paths import study_folder
+from studies.sweep.engines.choose import WORDS, executor_for
 from studies.sweep.executor import Executor
 from studies.sweep.failures import Failures
 from studies.sweep.find_study import ON, find_studies

@@ -9,7 +9,7 @@ import typer
 from reference_fem import crosscheck
 from studies.cli.terminal import Results, console
 from studies.store.stamps import set_stamp
-from studies.verify.verification import FOLDER, Verdict, run_pack, tolerance, write_kappa, write_verdicts
+from studies.tools.verify.verification import FOLDER, Verdict, run_pack, tolerance, write_kappa, write_verdicts
 
 FAST = "smoke"
 """The fast half is kept apart: a part of the pack must not stand where the whole of it stood."""

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from studies.base.errors import StudyError
-from studies.engines.choose import NEEDED
-from studies.engines.tls import words_of
+from studies.sweep.engines.choose import NEEDED
+from studies.sweep.engines.tls import words_of
 
 LONELY_SECONDS = 120
 """Without a scheduler, after which a worker ends."""

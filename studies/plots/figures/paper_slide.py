@@ -13,7 +13,7 @@ from studies.plots.style.page import finish, page, panels
 from studies.plots.style.render import Camera, draw_faces, frame, scale_bar, smooth_normals, uniform
 from studies.plots.style.style import GREY, NORMAL, SMALL, heading, save, styled
 from studies.runs.paper import Played, moments, tip_of
-from studies.scenes.stomach_slide import PROBE
+from studies.scene.library.stomach_slide import PROBE
 
 TITLE = "A thin probe touches the refined stomach, presses deep, and slides"
 CAMERA = Camera(azimuth=-50.0, elevation=28.0)

@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from studies.advice.words import wish_words
 from studies.base.counting import counted
 from studies.metrics.cells import MISSING, value_cell
 from studies.metrics.judged import Judged, Measured, by_cost, cheapest, judged, nearest
@@ -14,6 +13,7 @@ from studies.plots.style.page import by_scene
 from studies.plots.style.style import readable
 from studies.report.summary import PAPER
 from studies.runs.recipe_text import body_words
+from studies.tools.advise.words import wish_words
 
 Best = dict[str, Any]
 """Of a scene, JSON-able: the target in words, whether the body meets it, the body with its step over the limit, the id

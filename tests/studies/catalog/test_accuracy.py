@@ -8,12 +8,12 @@ from massspring import ImplicitVolume
 from studies.catalog import STUDIES
 from studies.catalog.accuracy import ACCURACY, COARSE_STEP, LONG, can_be_graded, headline, judged_at_rest
 from studies.catalog.work_precision import WORK_PRECISION
-from studies.grading.graded_mesh import usual_grading
+from studies.meshing.graded_mesh import usual_grading
 from studies.metrics.metrics import METRICS
 from studies.runs.quadratic import check_masses
 from studies.scene.inertia import why_inertia_matters
+from studies.scene.library import JUDGED
 from studies.scene.quantities import allowed
-from studies.scenes import JUDGED
 from studies.store.paths import readable
 
 

@@ -8,9 +8,9 @@ import pytest
 from massspring import Capsule, Plane, Ramp, Trajectory
 from reference_fem.model.problem import find_held
 from studies.base.errors import StudyError
+from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.reference.problem import anchor, kept_obstacles, reference_problem
-from studies.scene.meshing import mesh_for, patch_nodes
-from studies.scenes import JUDGED, SCENES
+from studies.scene.library import JUDGED, SCENES
 from tests.studies.catalog.test_scenes import coarsest_problem, small_setup
 
 

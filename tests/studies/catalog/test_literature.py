@@ -15,7 +15,7 @@ from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
 from studies.runs.case import BodyRecipe, Case, case_from_json
 from studies.runs.run import measure, replay, run_case
-from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, SPLEEN_SAG
+from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, SPLEEN_SAG
 from studies.store.record import Status, read_record
 
 NODAL = BodyRecipe(nodes=150, law="cotangent", volumes="nodal")

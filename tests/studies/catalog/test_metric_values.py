@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.timing.protocol import FrameTiming
+from studies.metrics.timing.protocol import FrameTiming
 from tests.studies.made_up_run import CELLS, EDGE, POINTS, SHIFT, TRIANGLES, bend, of, reference, run
 
 

@@ -9,11 +9,11 @@ from studies.catalog import STUDIES
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED, metric, study_table
+from studies.metrics.timing.protocol import FrameTiming
+from studies.scene.library import JUDGED
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.quantities import ALWAYS, GAUGE_FREE
-from studies.scenes import JUDGED
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status
-from studies.timing.protocol import FrameTiming
 from tests.studies.made_up_run import SCENE, of, run
 
 

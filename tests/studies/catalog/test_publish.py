@@ -11,6 +11,7 @@ from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Chart
 from studies.cli.commands import publish as command
 from studies.cli.commands import report as report_command
+from studies.metrics.timing.cases import timing_file
 from studies.report import publish as publishing
 from studies.report.publish import EXTRAS, PUBLISHED, between, publish, publish_some
 from studies.report.sentences import Sentences
@@ -19,7 +20,6 @@ from studies.runs import current as runs
 from studies.runs.current import case_path
 from studies.store.machine import machine_id, machine_of
 from studies.store.stamps import is_stamped, set_stamp
-from studies.timing.cases import timing_file
 from tests.studies.tiny import tiny_case, tiny_study
 
 REPOSITORY = Path(__file__).parents[3]

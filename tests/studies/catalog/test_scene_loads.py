@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, BLADDER_FILL, SCENES, STOMACH_SLIDE
-from studies.scenes.ball_squeeze import RADIUS
+from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, BLADDER_FILL, SCENES, STOMACH_SLIDE
+from studies.scene.library.ball_squeeze import RADIUS
 
 ROOT = Path(__file__).parents[3]
 

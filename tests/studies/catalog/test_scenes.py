@@ -16,8 +16,8 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames
 from studies.scene.as_json import scene_from_dict, scene_to_json
-from studies.scenes import JUDGED, SCENES, InitialConditions
-from studies.scenes.stress import STRESS_SCENES
+from studies.scene.library import JUDGED, SCENES, InitialConditions
+from studies.scene.library.stress import STRESS_SCENES
 
 SMALL, THIN = 150, 400
 """Surface nodes of a small solid organ, and of a small hollow one: its wall folds on coarser meshes."""

@@ -2,7 +2,7 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.base.lookup import ALL, lookup
-from studies.scenes import SCENES as ALL_SCENES
+from studies.scene.library import SCENES as ALL_SCENES
 
 SCENES = {"ball_squeeze": 1, "ball_clamped": 2, "liver_press": 3}
 

@@ -10,7 +10,7 @@ from massspring.body.quadratic import boundary_facets, parts_of_facets
 from studies.metrics.true_surface import ShapeErrors
 from studies.report.summary import ladder_of, recommended_of
 from studies.runs.case import BodyRecipe
-from studies.scenes.spleen_sag import SPLEEN_SAG
+from studies.scene.library.spleen_sag import SPLEEN_SAG
 from studies.store.record import Status
 from tests.massspring.quadratic import second_order
 from tests.studies import made_up_run

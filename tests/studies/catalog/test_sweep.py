@@ -7,9 +7,10 @@ import h5py
 import pytest
 
 from studies.base.errors import StudyError
+from studies.metrics.timing import cases as timed
 from studies.runs.current import case_path
-from studies.scenes import ReferencePlan
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library import ReferencePlan
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.store.entry import OTHER_VERSION
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
@@ -18,7 +19,6 @@ from studies.sweep.load import load_runs
 from studies.sweep.local import Local
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, standings, warnings_of
-from studies.timing import cases as timed
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
 
 

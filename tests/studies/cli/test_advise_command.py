@@ -4,8 +4,8 @@ import pytest
 
 from studies.catalog.accuracy import ACCURACY
 from studies.runs.case import BodyRecipe, Case
-from studies.scenes import KIDNEY_PROBE, LIVER_PRESS, LIVER_PROBE
-from tests.studies.advice.made_up_campaign import GRADED, LADDER, publish, row, rows_of
+from studies.scene.library import KIDNEY_PROBE, LIVER_PRESS, LIVER_PROBE
+from tests.studies.tools.advise.made_up_campaign import GRADED, LADDER, publish, row, rows_of
 
 STUDY = """
 from dataclasses import replace

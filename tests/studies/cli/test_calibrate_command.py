@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from studies.calibration.stored import write_calibration
-from studies.calibration.verdict import Verdict
-from studies.calibration.words import lines_of
-from tests.studies.calibration.made_up_errors import made_up
+from studies.tools.calibrate.stored import write_calibration
+from studies.tools.calibrate.verdict import Verdict
+from studies.tools.calibrate.words import lines_of
+from tests.studies.tools.calibrate.made_up_errors import made_up
 
 
 def test_a_stored_calibration_is_told_again(organbench, tmp_path):
@@ -58,7 +58,7 @@ def test_bad_input_is_one_sentence(refused, tmp_path, words, said):
 
 
 def test_an_organ_without_a_reference_is_one_sentence(refused, tmp_path, monkeypatch):
-    monkeypatch.setattr("studies.calibration.folds.judged_at_rest", lambda: ())
+    monkeypatch.setattr("studies.tools.calibrate.folds.judged_at_rest", lambda: ())
     assert "organ 'kidney' has no scene with a reference" in refused("calibrate", "kidney", "--results", tmp_path)
 
 

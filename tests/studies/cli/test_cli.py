@@ -19,7 +19,7 @@ from studies.metrics.metrics import METRICS
 from studies.metrics.table import study_table
 from studies.reference.reference_solves import reference_solves
 from studies.runs.current import case_path
-from studies.scenes import SCENES
+from studies.scene.library import SCENES
 from studies.store.paths import index_path
 from studies.store.record import Field, read_record, write_record
 from studies.sweep.load import load_runs

@@ -8,13 +8,13 @@ from typer.testing import CliRunner
 
 from massspring import LITERATURE, METHODS
 from studies.catalog import STUDIES
+from studies.catalog.population import Population, population_study
 from studies.cli import app as cli
 from studies.cli import commands, outline
 from studies.cli.commands.list import KINDS
 from studies.cli.commands_page import PAGE, commands_page
 from studies.cli.loading import COMMANDS, NAMES, loaded
 from studies.metrics.metrics import METRICS
-from studies.population import Population, population_study
 
 
 def test_the_outline_is_what_the_modules_say():

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from studies.catalog import STUDIES
+from studies.catalog.population import POPULATION
 from studies.cli.loading import COMMANDS, NAMES
 from studies.geometry.organs import SHAPES
-from studies.population import POPULATION
-from studies.scenes import SCENES
+from studies.scene.library import SCENES
 
 ROOT = Path(__file__).parents[3]
 PROGRAM = """

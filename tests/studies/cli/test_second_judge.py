@@ -9,10 +9,10 @@ import pytest
 from reference_fem import crosscheck, facet_nodes, nodes
 from reference_fem.crosscheck.meridian import MeridianMesh
 from studies.geometry.organs.liver import LIVER
-from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS
-from studies.verify import second_judge
-from studies.verify.judge_mesh import JudgeMesh, judged_problem
-from studies.verify.second_judge import (
+from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS
+from studies.tools.verify import second_judge
+from studies.tools.verify.judge_mesh import JudgeMesh, judged_problem
+from studies.tools.verify.second_judge import (
     JUDGES,
     Judge,
     OrganSolution,

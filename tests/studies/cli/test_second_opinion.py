@@ -5,7 +5,7 @@ import pytest
 
 from reference_fem import crosscheck
 from reference_fem.model.problem import find_held
-from studies.verify.second_opinion import PULL, pulled_liver, second_opinions
+from studies.tools.verify.second_opinion import PULL, pulled_liver, second_opinions
 
 
 def test_without_the_other_code_there_is_no_second_opinion(monkeypatch):

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from reference_fem import SolveError
 from reference_fem.oracles import Check, Curve, Oracle, Outcome, kappa
 from studies.cli import app as cli
-from studies.verify import verification
+from studies.tools.verify import verification
 
 
 def oracle(name, got, fast=True, **options):

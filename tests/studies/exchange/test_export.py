@@ -13,14 +13,14 @@ import pandas as pd
 import pytest
 
 from massspring import Capsule, Probe
-from studies.advice.answer import advise
 from studies.exchange.description import description, judged_metrics
 from studies.exchange.export import DIGITS, paths_table, rounded
 from studies.exchange.words import obstacle_words
 from studies.runs.recipe_text import body_words
-from studies.scenes import SCENES
-from studies.scenes.ball_clamped import BALL_CLAMPED, CAP, PUSH, RADIUS
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library import SCENES
+from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, PUSH, RADIUS
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.tools.advise.answer import advise
 
 NODES = 150
 TABLE = Path(__file__).parents[3] / "results" / "published" / "accuracy" / "accuracy.csv"

@@ -8,9 +8,9 @@ from massspring import Body
 from studies.metrics.run import Run
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.liver_press import LIVER_PRESS
 from studies.scene.scene import Organ, Scene
-from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.scenes.liver_press import LIVER_PRESS
 from tests.studies import made_up_run
 
 LIVER = BodyRecipe("quadratic", 794, graded=True, mass="stiffness")

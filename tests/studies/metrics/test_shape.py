@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from massspring import quadratic_body, surface_body, tetrahedral_body
-from studies.advice.answer import advise
-from studies.advice.words import lines_of
 from studies.geometry import organ
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.family import true_volume
@@ -16,13 +14,15 @@ from studies.metrics.table import metric, study_table
 from studies.metrics.true_surface import shape_errors, true_surface
 from studies.metrics.wish import SHAPE, SHAPE_VOLUME
 from studies.runs.case import BodyRecipe
+from studies.scene.library import LIVER_PRESS
 from studies.scene.scene import Organ
-from studies.scenes import LIVER_PRESS
+from studies.tools.advise.answer import advise
+from studies.tools.advise.words import lines_of
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.quadratic import RADIUS, ball_mesh
-from tests.studies.advice.made_up_campaign import LADDER, publish, row
 from tests.studies.metrics.bodies import LIVER, ball_run, liver_runs
 from tests.studies.tiny import cube, file_scene, write_obj
+from tests.studies.tools.advise.made_up_campaign import LADDER, publish, row
 
 DIAGONAL = 2.0 * RADIUS * 3.0**0.5
 SHAPES = ("shape_error", "shape_volume")

@@ -10,7 +10,7 @@ from studies.metrics.rest_surface import OUTER, RestSurface, rest_surfaces
 from studies.metrics.table import metric
 from studies.metrics.wish import SHAPE
 from studies.reference.solution import Boundary, Solution
-from studies.scenes.ball_squeeze import RADIUS as BALL
+from studies.scene.library.ball_squeeze import RADIUS as BALL
 from studies.store.record import Field
 from tests.massspring.conftest import SOFT
 from tests.massspring.quadratic import ball_mesh
@@ -111,7 +111,7 @@ def test_a_record_whose_facets_cannot_be_told_has_no_mean_error():
 def test_of_an_octant_the_whole_ball_is_compared():
     """Closed, with every mirror image in its place, and a displacement that is mirrored with it."""
     from reference_fem import nodes
-    from studies.reference.mesh import reference_mesh
+    from studies.meshing.reference_mesh import reference_mesh
 
     mesh, _, _ = reference_mesh(OCTANT, 0.5)
     points = nodes(mesh)

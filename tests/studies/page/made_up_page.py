@@ -16,7 +16,7 @@ from studies.report.page.part import write_part
 from studies.report.page.write import write_page
 from studies.report.results import draw_charts
 from studies.runs.case import Case
-from studies.scenes import BALL_CLAMPED, BALL_SQUEEZE
+from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE
 from studies.store.machine import write_machine
 from studies.store.record import Field, Status
 from tests.plots.made_up import FRAMES, POINTS, run

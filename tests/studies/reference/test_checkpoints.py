@@ -74,7 +74,7 @@ def test_a_pickle_is_never_loaded(tmp_path):
 
 
 def test_status_of_a_strangers_folder_runs_nothing_and_warns(organbench, tmp_path):
-    from studies.scenes import BALL_SQUEEZE
+    from studies.scene.library import BALL_SQUEEZE
 
     marker = tmp_path / "marker"
     reference_solve = ReferenceSolve(BALL_SQUEEZE, BALL_SQUEEZE.reference.levels[0])

@@ -6,7 +6,7 @@ import pytest
 from reference_fem import Evaluator
 from studies.reference.solution import Solution
 from tests.studies.made_up_run import POINTS, SCENE, bend
-from tests.studies.view.made import reference_record
+from tests.studies.report.view.made import reference_record
 
 
 @pytest.fixture

@@ -11,14 +11,14 @@ from skfem.refdom import RefTet
 from reference_fem import SolveError, facet_nodes, nodes
 from reference_fem.elements.shapes import build_elements, check_neighbours, element_nodes
 from studies.base.errors import StudyError
+from studies.catalog.population import member
 from studies.geometry import curved
 from studies.geometry.mesh.jacobian import curved_volume
-from studies.grading.held_mesh import held_mesh
-from studies.grading.shaping import upright_cells
-from studies.grading.true_shape import as_curved, on_true_shape, true_shape
-from studies.population import member
-from studies.reference.mesh import on_true_sides, reference_mesh
-from studies.scene.meshing import mesh_for
+from studies.meshing.held_mesh import held_mesh
+from studies.meshing.reference_mesh import on_true_sides, reference_mesh
+from studies.meshing.scene_mesh import mesh_for
+from studies.meshing.shaping import upright_cells
+from studies.meshing.true_shape import as_curved, on_true_shape, true_shape
 
 STRICT = member("kidney", 0, 6)
 """The mesher's bound refuses one element of its mesh of 370 surface nodes."""

@@ -16,8 +16,8 @@ from studies.reference.reference_solves import reference_solves
 from studies.reference.solve import solve
 from studies.reference.uncertainty import QUANTITIES
 from studies.report.references import uncertainty_table
-from studies.scenes import ReferencePlan
-from studies.scenes.ball_clamped import BALL_CLAMPED
+from studies.scene.library import ReferencePlan
+from studies.scene.library.ball_clamped import BALL_CLAMPED
 from tests.studies.octant import SCENE
 
 RADIUS, SHEAR = 0.05, SCENE.tissue.shear_modulus

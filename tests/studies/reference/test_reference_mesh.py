@@ -14,14 +14,14 @@ from reference_fem.model.problem import find_held
 from reference_fem.system.saddle_point import System
 from studies.base.errors import StudyError
 from studies.geometry.mesh.jacobian import smallest_jacobian
-from studies.grading.held_mesh import rim_sides, with_patches
-from studies.reference.mesh import reference_mesh
-from studies.reference.outlines import LEAST, SHARE, drawn_to_outlines
+from studies.meshing.held_mesh import rim_sides, with_patches
+from studies.meshing.reference_mesh import reference_mesh
+from studies.meshing.reference_outlines import LEAST, SHARE, drawn_to_outlines
 from studies.reference.problem import reference_problem
 from studies.reference.size import element_size, outline_size
-from studies.scenes.ball_clamped import BALL_CLAMPED, CAP, RADIUS
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.liver_probe import LIVER_PROBE
+from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.liver_probe import LIVER_PROBE
 from tests.studies.tiny import cube
 
 LEVEL, LIVER_LEVEL = 150, 200

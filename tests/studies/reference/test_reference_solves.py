@@ -16,8 +16,8 @@ from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.reference.solve import solve
 from studies.report.references import refresh_uncertainty
 from studies.scene.as_json import scene_from_dict, scene_to_json
-from studies.scenes import SCENES, ReferencePlan
-from studies.scenes.ball_clamped import BALL_CLAMPED
+from studies.scene.library import SCENES, ReferencePlan
+from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
 from studies.sweep import job as jobs_module

@@ -8,10 +8,10 @@ import pytest
 from massspring import Body, Clock, ImplicitVolume, Setup, step_limit
 from massspring.analysis.modes import natural_frequencies
 from reference_fem import exact
+from studies.meshing.scene_mesh import mesh_for
 from studies.runs.case import BodyRecipe
 from studies.runs.prepare import body_for
-from studies.scene.meshing import mesh_for
-from studies.scenes.ball_squeeze import BALL_SQUEEZE, RADIUS
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE, RADIUS
 
 TISSUE = BALL_SQUEEZE.tissue
 UNIT = np.sqrt(TISSUE.shear_modulus / TISSUE.density) / RADIUS

@@ -9,16 +9,16 @@ import pytest
 from reference_fem import facet_nodes, nodes
 from studies.geometry.mesh.jacobian import curved_volume
 from studies.geometry.shape.levelset import project
-from studies.grading.graded_mesh import mesh_at
-from studies.grading.true_shape import true_shape
-from studies.reference.mesh import reference_mesh
+from studies.meshing.graded_mesh import mesh_at
+from studies.meshing.reference_mesh import reference_mesh
+from studies.meshing.scene_mesh import mesh_for
+from studies.meshing.true_shape import true_shape
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.size import element_size
 from studies.reference.solution import Solution
 from studies.reference.solve import solve
-from studies.scene.meshing import mesh_for
+from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scene.scene import Organ
-from studies.scenes.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.store.record import read_record
 from tests.geometry.boxes import box, split
 from tests.studies.tiny import write_obj

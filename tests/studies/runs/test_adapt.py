@@ -8,12 +8,12 @@ import pytest
 from massspring import MassSpringError, Trajectory
 from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
+from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import BodyRecipe
 from studies.runs.prepare import attachments_for, body_for, prepare
-from studies.scene.meshing import mesh_for, patch_nodes
-from studies.scenes import Held
-from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.scenes.stomach_press import STOMACH_PRESS
+from studies.scene.library import Held
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.stomach_press import STOMACH_PRESS
 from tests.geometry.boxes import box, split
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
 

@@ -9,7 +9,7 @@ from massspring import METHODS, Element, Free, ImplicitVolume, Penalty, Xpbd
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.runs.case import BodyRecipe, Case, case_from_json, case_to_dict
-from studies.scenes import SCENES
+from studies.scene.library import SCENES
 from tests.studies.tiny import tiny_case
 
 CHANGES = {

@@ -10,7 +10,7 @@ from studies.report.kept_volume import PROMISED, kept_volumes, promised, worst_v
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import case_path
 from studies.runs.run import measure
-from studies.scenes import BALL_CLAMPED, JUDGED
+from studies.scene.library import BALL_CLAMPED, JUDGED
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from tests.studies.tiny import NODES, SQUEEZE, diverging_case, tiny_case, tiny_study

@@ -10,12 +10,12 @@ from massspring.body.laws import LAWS
 from massspring.body.membranes import MEMBRANE_LAWS
 from reference_fem import exact
 from studies.base.errors import StudyError
+from studies.meshing.scene_mesh import mesh_for
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import body_for, prepare
 from studies.runs.run import measure
-from studies.scene.meshing import mesh_for
-from studies.scenes import BALL_SQUEEZE, BLADDER_FILL
-from studies.scenes.ball_squeeze import DEPTH, PRESS_END, RADIUS
+from studies.scene.library import BALL_SQUEEZE, BLADDER_FILL
+from studies.scene.library.ball_squeeze import DEPTH, PRESS_END, RADIUS
 from studies.store.record import Status
 
 

@@ -21,11 +21,11 @@ from studies.reference.uncertainty import Sample, SamplePoints
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.runs.run import measure
+from studies.scene.library import Lumen, ReferencePlan
+from studies.scene.library.ball_ringing import BALL_RINGING, RADIUS
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.quantities import allowed
 from studies.scene.start import InitialConditions
-from studies.scenes import Lumen, ReferencePlan
-from studies.scenes.ball_ringing import BALL_RINGING, RADIUS
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status
 
 LAMB = 2.6656

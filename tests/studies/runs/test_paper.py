@@ -11,8 +11,8 @@ from studies.plots.figures import paper_ball, paper_slide
 from studies.runs.case import case_from_json
 from studies.runs.paper import ball_case, moments, play, slide_case, tip_of
 from studies.scene.as_json import scene_from_dict, scene_to_json
-from studies.scenes import JUDGED, SCENES, STOMACH_SLIDE
-from studies.scenes.stomach_slide import NODES
+from studies.scene.library import JUDGED, SCENES, STOMACH_SLIDE
+from studies.scene.library.stomach_slide import NODES
 
 SMALL = 400
 

@@ -6,7 +6,7 @@ import pytest
 from reference_fem import exact
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
-from studies.scenes.ball_squeeze import BALL_SQUEEZE, DEPTH, PRESS_END, RADIUS
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE, DEPTH, PRESS_END, RADIUS
 from studies.store.record import Status
 
 SHARES = (0.05, 0.10, 0.15, 0.20, 0.25, 0.30)

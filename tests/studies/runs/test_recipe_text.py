@@ -7,7 +7,7 @@ from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.recipe_text import case_of_recipe, recipe_text
-from studies.scenes.liver_press import LIVER_PRESS
+from studies.scene.library.liver_press import LIVER_PRESS
 
 
 @pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)

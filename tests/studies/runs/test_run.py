@@ -14,7 +14,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import case_path
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames, judge, measure, replay, run_case
-from studies.scenes.stress import STRESS_SCENES
+from studies.scene.library.stress import STRESS_SCENES
 from studies.store.record import Field, Status, read_record, write_record
 from tests.studies.tiny import FRAMES, NODES, diverging_case, tiny_case, why_stale
 

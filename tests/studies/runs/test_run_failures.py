@@ -8,10 +8,10 @@ import pytest
 
 from massspring import Capsule, Sphere, Trajectory
 from studies.geometry import HalfSpace
+from studies.meshing.scene_mesh import mesh_for
 from studies.runs.case import BodyRecipe
 from studies.runs.run import measure, run_case
-from studies.scene.meshing import mesh_for
-from studies.scenes import Held, Organ
+from studies.scene.library import Held, Organ
 from studies.store.record import Status, read_record
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, why_stale, write_obj
 

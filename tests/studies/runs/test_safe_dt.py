@@ -10,7 +10,7 @@ from studies.runs import safe_dt as module
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.runs.safe_dt import ABOVE, BELOW, SafeStep, safe_step
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status
 from tests.studies.tiny import tiny_case
 

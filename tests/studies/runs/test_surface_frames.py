@@ -7,19 +7,19 @@ import pytest
 
 from massspring import simulate
 from studies.catalog import STUDIES, Study
+from studies.metrics.timing.cases import time_cases
 from studies.report.kept_volume import kept_volumes
+from studies.report.view.stored import stored_runs
 from studies.runs import surface_frames
 from studies.runs.case import BodyRecipe, Case, case_from_json
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames, measure, replay, run_case
 from studies.runs.surface_frames import MOMENTS, moments
-from studies.scenes import STOMACH_PRESS
-from studies.scenes.stress import STRESS_SCENES
+from studies.scene.library import STOMACH_PRESS
+from studies.scene.library.stress import STRESS_SCENES
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
 from studies.store.schema import SURFACE
-from studies.timing.cases import time_cases
-from studies.view.stored import stored_runs
 from tests.studies.tiny import NODES, diverging_case, tiny_case
 
 FRAMES = 130
@@ -81,8 +81,8 @@ def test_timed_runs_keep_no_surface(tmp_path, monkeypatch):
         asked.append(tuple(snapshots))
         return simulate(setup, snapshots, **options)
 
-    monkeypatch.setattr("studies.timing.cases.simulate", watched)
-    monkeypatch.setattr("studies.timing.cases.BUDGET", 0.0)
+    monkeypatch.setattr("studies.metrics.timing.cases.simulate", watched)
+    monkeypatch.setattr("studies.metrics.timing.cases.BUDGET", 0.0)
     time_cases(tmp_path, "tiny", [tiny_case(recorded=("surface",), timed=True)], lambda name: None)
     assert len(asked) >= 2 and set(asked) == {()}
 

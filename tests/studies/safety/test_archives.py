@@ -7,7 +7,7 @@ import zipfile
 
 import pytest
 
-from studies.archive import checking
+from studies.report.archive import checking
 from studies.store.archived import MANIFEST
 
 EMPTY = hashlib.sha256(b"").hexdigest()

@@ -11,8 +11,8 @@ from distributed import Client
 from distributed.security import Security
 
 from studies.base.errors import StudyError
-from studies.engines import tls
-from studies.engines.queue import Settings, scheduler_with_workers
+from studies.sweep.engines import tls
+from studies.sweep.engines.queue import Settings, scheduler_with_workers
 
 ROOT = Path(__file__).parents[3]
 TRY = """

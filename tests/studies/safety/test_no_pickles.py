@@ -8,8 +8,8 @@ PACKAGES = ("massspring", "reference_fem", "studies")
 ALLOWED = {
     "studies/runs/user_code.py": {"exec"},  # a FILE.py, which is a program
     "studies/base/processes.py": {"pickle.loads"},  # of the process that started it, and of those it started
-    "studies/engines/cluster.py": {"pickle.loads"},  # of the workers of its scheduler
-    "studies/engines/worker.py": {"pickle.loads"},  # of the client of its scheduler
+    "studies/sweep/engines/cluster.py": {"pickle.loads"},  # of the workers of its scheduler
+    "studies/sweep/engines/worker.py": {"pickle.loads"},  # of the client of its scheduler
 }
 DANGEROUS = {"pickle.loads", "pickle.load", "pickle.Unpickler", "eval", "exec", "pd.read_pickle", "marshal.loads"}
 DANGEROUS |= {"yaml.unsafe_load", "yaml.full_load", "os.system", "shelve.open", "joblib.load"}

@@ -7,13 +7,13 @@ import pytest
 from massspring import ImplicitVolume
 from studies.base.errors import StudyError
 from studies.catalog import Study
+from studies.meshing.scene_mesh import mesh_for
 from studies.metrics.run import Run
 from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.case import BodyRecipe, Case, case_from_json
 from studies.runs.current import case_path
-from studies.scene.meshing import mesh_for
+from studies.scene.library import BALL_SQUEEZE
 from studies.scene.scene import Organ
-from studies.scenes import BALL_SQUEEZE
 from studies.store.entry import MISSING
 from studies.store.paths import key_digest
 from studies.sweep.run_studies import run_studies

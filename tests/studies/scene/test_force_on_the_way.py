@@ -13,7 +13,7 @@ from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
-from studies.scenes import LIVER_PRESS, LIVER_PROBE, STOMACH_PRESS, STOMACH_PROBE, Scene
+from studies.scene.library import LIVER_PRESS, LIVER_PROBE, STOMACH_PRESS, STOMACH_PROBE, Scene
 from studies.store.record import Record, read_record
 
 ROOT = Path(__file__).parents[3]

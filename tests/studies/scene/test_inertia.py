@@ -6,14 +6,14 @@ import pytest
 
 from massspring import Plane, Trajectory
 from studies.scene.inertia import why_inertia_matters
-from studies.scenes import SCENES
-from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.scenes.ball_ringing import BALL_RINGING
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.liver_press import LIVER_PRESS
-from studies.scenes.spleen_sag import SPLEEN_SAG
-from studies.scenes.stomach_slide import STOMACH_SLIDE
-from studies.scenes.stress import STRESS_SCENES
+from studies.scene.library import SCENES
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.ball_ringing import BALL_RINGING
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.liver_press import LIVER_PRESS
+from studies.scene.library.spleen_sag import SPLEEN_SAG
+from studies.scene.library.stomach_slide import STOMACH_SLIDE
+from studies.scene.library.stress import STRESS_SCENES
 
 STATIC = [s for s in SCENES if s.reference is not None and s.reference.dt is None]
 FALLING = replace(SPLEEN_SAG, held=())

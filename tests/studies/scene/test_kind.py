@@ -6,14 +6,14 @@ import pytest
 
 from massspring import Capsule, Plane, Ramp, Trajectory
 from studies.scene.kind import kind_of
+from studies.scene.library import SCENES
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.kidney_probe import KIDNEY_PROBE
+from studies.scene.library.liver_press import LIVER_PRESS
+from studies.scene.library.spleen_sag import SPLEEN_SAG
+from studies.scene.library.stomach_press import STOMACH_PRESS
 from studies.scene.scene import Lumen, Organ
-from studies.scenes import SCENES
-from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
-from studies.scenes.kidney_probe import KIDNEY_PROBE
-from studies.scenes.liver_press import LIVER_PRESS
-from studies.scenes.spleen_sag import SPLEEN_SAG
-from studies.scenes.stomach_press import STOMACH_PRESS
 
 KINDS = {
     "ball_squeeze": "solid, squeeze",

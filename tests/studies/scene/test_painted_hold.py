@@ -8,11 +8,11 @@ import pytest
 from massspring import ImplicitVolume
 from reference_fem import nodes
 from studies.geometry import painted
-from studies.reference.mesh import reference_mesh
+from studies.meshing.reference_mesh import reference_mesh
+from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import BodyRecipe, Case, case_from_json
-from studies.scene.meshing import mesh_for, patch_nodes
+from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scene.scene import Held, Organ
-from studies.scenes.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from tests.geometry.boxes import box, split
 from tests.geometry.files import writers
 

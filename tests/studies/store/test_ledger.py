@@ -14,6 +14,7 @@ import pytest
 
 from studies.metrics.metric import Metric
 from studies.metrics.table import frame_of, metric, study_table
+from studies.metrics.timing.cases import timing_file
 from studies.report.kept_volume import kept_volumes
 from studies.report.results import refresh
 from studies.runs import current
@@ -31,7 +32,6 @@ from studies.sweep.plan import plan
 from studies.sweep.rows import table_rows
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import standings, warnings_of
-from studies.timing.cases import timing_file
 from tests.studies import made_up_run
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
 

@@ -7,13 +7,13 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.exchange.entry import ENTRY, SECONDS
+from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
 from studies.runs.run import OWN_FILES
 from studies.store.faults import fault
 from studies.store.new_record import new_fields
 from studies.store.record import read_record
 from studies.store.schema import LAYOUTS, LENGTHS, REFERENCE_FIELDS, RUN_FIELDS, STATUSES, Status, tables
-from studies.timing.cases import timing_file
 from tests.studies import made_up_run
 from tests.studies.tiny import tiny_case
 

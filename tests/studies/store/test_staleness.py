@@ -15,17 +15,17 @@ BOTH = {
     "studies.geometry.organs.liver",
     "studies.geometry.mesher.gmsh_calls",
     "massspring.world.trajectories",
-    "studies.grading.held_mesh",
-    "studies.grading.true_shape",
+    "studies.meshing.held_mesh",
+    "studies.meshing.true_shape",
 }
 RUNS = BOTH | {
     "studies.runs.prepare",
-    "studies.grading.graded_mesh",
+    "studies.meshing.graded_mesh",
     "massspring.body.laws",
     "massspring.kernels.fused.sweep",
     "massspring.run.history",
 }
-REFERENCES = BOTH | {"studies.reference.mesh", "studies.reference.problem", "reference_fem.contact.augmented"}
+REFERENCES = BOTH | {"studies.meshing.reference_mesh", "studies.reference.problem", "reference_fem.contact.augmented"}
 SHOWN = {"studies.metrics.metrics", "studies.plots.laws", "studies.cli.app", "studies.report.results"}
 
 

@@ -16,7 +16,7 @@ from studies.store.opening import open_results, sealed
 from studies.store.record import SCHEMA, Field, Record, Status, peek, read_record, write_record
 from studies.store.schema import LAYOUTS, TIMING_FIELDS
 from tests.studies import made_up_run
-from tests.studies.view.made import reference_record
+from tests.studies.report.view.made import reference_record
 
 KEY = '{"dt": 0.001, "scene": "ball_squeeze"}'
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from studies import Run, StudyError
+from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
 from studies.store.record import read_record, write_record
 from studies.store.schema import RUN_ATTRIBUTES, RUN_FIELDS, RunAttributes, RunFields, Status
-from studies.timing.cases import timing_file
 from tests.studies.tiny import tiny_case
 
 TYPES = {"number": (float, np.floating, int), "whole number": (int, np.integer), "text": (str,)}

@@ -11,8 +11,8 @@ from studies.store.record import Record, write_record
 from studies.store.schema import Status
 from studies.store.vtk_group import GROUP
 from tests.studies.made_up_run import SCENE, run
-from tests.studies.view.made import reference_record
-from tests.studies.view.test_vtkhdf import exact
+from tests.studies.report.view.made import reference_record
+from tests.studies.report.view.test_vtkhdf import exact
 
 NO_CELLS = {"tetrahedra": np.empty((0, 4), np.uint32)}
 NO_STEP = {"snapshots": np.empty((0, 27, 3)), "snapshot_frame": np.empty(0, int)}

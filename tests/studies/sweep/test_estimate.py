@@ -12,7 +12,7 @@ from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import case_path
 from studies.runs.user_code import methods_by_name
-from studies.scenes import JUDGED, SCENES, Organ
+from studies.scene.library import JUDGED, SCENES, Organ
 from studies.store.ledger import Ledger
 from studies.store.machine import machine_id
 from studies.store.record import read_record, write_record

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studies.metrics.timing.alone import alone
 from studies.reference.reference_solves import reference_solves
 from studies.runs.current import case_path
-from studies.scenes import ReferencePlan
-from studies.scenes.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library import ReferencePlan
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.failures import Failures
@@ -21,7 +22,6 @@ from studies.sweep.job import do, jobs_of
 from studies.sweep.load import load_runs
 from studies.sweep.local import environment
 from studies.sweep.standings import failed, solve_standing
-from studies.timing.alone import alone
 from tests.studies.tiny import tiny_case, tiny_study
 
 ROOT = Path(__file__).parents[3]
@@ -88,7 +88,7 @@ def test_workers_get_caches_that_do_not_depend_on_their_folder(tmp_path, monkeyp
 
 def test_one_command_at_a_time_measures(tmp_path):
     told = []
-    program = "import sys; from pathlib import Path; from studies.timing.alone import alone\n"
+    program = "import sys; from pathlib import Path; from studies.metrics.timing.alone import alone\n"
     program += "with alone(Path(sys.argv[1]), lambda: print('waits', flush=True)): print('inside', flush=True)"
     command = [sys.executable, "-c", program, str(tmp_path)]
     env = {**os.environ, "PYTHONPATH": str(ROOT)}

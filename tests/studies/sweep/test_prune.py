@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 
+from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.prune import DAY, Rule, prunable, remove
 from studies.sweep.standings import standings
-from studies.timing.cases import timing_file
 from tests.studies.octant import SCENE
 from tests.studies.tiny import content, diverging_case, tiny_case, tiny_study
 

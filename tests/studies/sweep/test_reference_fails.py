@@ -4,7 +4,7 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.reference.reference_solves import reference_solves
-from studies.scenes import BALL_CLAMPED
+from studies.scene.library import BALL_CLAMPED
 from studies.store.ledger import Ledger
 from studies.store.record import Status, peek
 from studies.sweep.job import ReferenceJob, do

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
+from studies.metrics.timing.cases import timing_file, timing_is_current
 from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.current import case_fingerprint, case_path, why_case_is_stale
 from studies.store.entry import CODE_CHANGED
 from studies.store.record import Status, peek, read_record, write_record
 from studies.sweep import restamp as module
 from studies.sweep.restamp import AT_RANDOM, outdated, restamp, sample
-from studies.timing.cases import timing_file, timing_is_current
 from tests.studies.octant import LEVELS, SCENE
 from tests.studies.tiny import tiny_case, tiny_study
 

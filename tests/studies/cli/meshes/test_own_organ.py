@@ -10,14 +10,14 @@ import meshio
 import numpy as np
 import pytest
 
-from studies.advice.answer import advise
 from studies.cli.commands.place import SHIPPED, UNKNOWNS, VARIANTS
 from studies.geometry import organ, read_mesh
+from studies.meshing.scene_mesh import mesh_for
 from studies.report.page.pack import unpack_frames
 from studies.runs.case import BodyRecipe
 from studies.scene.chosen_place import DEPTH
-from studies.scene.meshing import mesh_for
 from studies.scene.tissues import SPLEEN
+from studies.tools.advise.answer import advise
 from tests.geometry.boxes import box, together
 
 PAGE = Path(__file__).parents[4] / "docs" / "own-organ.md"

@@ -8,9 +8,9 @@ import pytest
 from massspring import Capsule, Plane, Sphere, Trajectory
 from studies.geometry.organs.make_shape import make_shape
 from studies.scene.checks import check_scene, depth_at_start, surface_of
+from studies.scene.library import SCENES
+from studies.scene.library.stress import STRESS_SCENES
 from studies.scene.scene import Organ
-from studies.scenes import SCENES
-from studies.scenes.stress import STRESS_SCENES
 from studies.sweep import pool
 from tests.studies.tiny import SQUEEZE, tiny_case
 
@@ -18,7 +18,7 @@ STUDY = """from dataclasses import replace
 from massspring import Capsule, Plane, Probe, Sphere, Trajectory
 from studies.catalog import Chart
 from studies.geometry import BallRegion, HalfSpace
-from studies.scenes import ForceOutput, Held, Organ, ReferencePlan
+from studies.scene.library import ForceOutput, Held, Organ, ReferencePlan
 from tests.studies.tiny import SQUEEZE, tiny_case, tiny_study
 
 PLAN = ReferencePlan("octant", (0.9, 0.5))

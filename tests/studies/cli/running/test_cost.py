@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from massspring import Free, ImplicitVolume
+from studies.metrics.timing.skips import SKIPS
+from studies.metrics.timing.stage_cost import ENERGIES, FRAME, ROWS, SKIPPED, STAGE, cost_table, run_frames
 from studies.runs.case import BodyRecipe
 from studies.runs.prepare import prepare
-from studies.scenes.ball_clamped import BALL_CLAMPED
-from studies.scenes.stomach_slide import STOMACH_SLIDE
-from studies.timing.skips import SKIPS
-from studies.timing.stage_cost import ENERGIES, FRAME, ROWS, SKIPPED, STAGE, cost_table, run_frames
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.stomach_slide import STOMACH_SLIDE
 from tests.studies.tiny import NODES, tiny_case
 
 NO_CONTACT = "contact of nodes: no plane, sphere or capsule"

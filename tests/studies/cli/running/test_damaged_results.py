@@ -7,8 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
+from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
-from studies.timing.cases import timing_file
 from tests.studies.tiny import tiny_case
 
 

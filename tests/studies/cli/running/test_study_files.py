@@ -9,7 +9,7 @@ BROKEN = {
     "import": ("\nimport massspringg\n", "ModuleNotFoundError in line 2: No module named 'massspringg'"),
     "name": ("def f():\n    return nothing\nf()\n", "NameError in line 2: name 'nothing' is not defined"),
     "misspelt setting": (
-        "from studies.runs.case import Case\nfrom studies.scenes import SCENES\nSTUDY = Case(SCENES[0], dtt=1)\n",
+        "from studies import SCENES\nfrom studies.runs.case import Case\nSTUDY = Case(SCENES[0], dtt=1)\n",
         "TypeError in line 3",
     ),
     "dt zero": (

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from studies.metrics.timing import cases as timed
+from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
 from studies.store.archived import CRATE
 from studies.store.ledger import Ledger
@@ -11,8 +13,6 @@ from studies.store.record import Status, read_record, write_record
 from studies.sweep.executor import Silent
 from studies.sweep.frame_times import measure_again
 from studies.sweep.plan import AGAIN, TIMING, plan_again
-from studies.timing import cases as timed
-from studies.timing.cases import timing_file
 from tests.studies.tiny import content, diverging_case, tiny_case, tiny_study
 
 KEPT = tiny_case(timed=True)

@@ -1,0 +1,168 @@
+"""A member of a population: an organ of its own, palpated at a place of its own by a probe of its own."""
+
+import zlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from massspring import Plane, Sphere, Trajectory
+from studies.base.errors import StudyError
+from studies.base.lookup import lookup
+from studies.catalog.population.ranges import RANGES, Ranges
+from studies.geometry import SHAPES, vary
+from studies.geometry.organs.millimetres import probe_near
+from studies.geometry.shape.levelset import PalpationPoint, Shape, normals
+from studies.scene.placing import Vector, along, press_times, probe_of, scaled
+from studies.scene.scene import Organ, Scene
+
+NAME = "{organ}_{seed}_{number:03d}"
+"""Of a member's scene."""
+GAP = 0.0005
+"""Between probe and surface at the start [m]."""
+PRESSED = 0.6
+"""Share of the duration in which the probe moves; then all comes to rest."""
+CHECKPOINTS = 2
+"""At half the depth and at rest: a member has a quarter of the time that a scene of the catalogue has."""
+FRAMES = 80
+TRIES = 100
+FLAT = 0.9
+"""Least length of the mean normal round the patch that a probe touches: 1 is a plane, 0.9 a cone of 26 degrees."""
+BEHIND = 0.0009
+"""Between a filled organ and the wall behind it [m], as in the scenes of the catalogue."""
+COLUMNS = 24
+"""Of the grid that finds how far an organ reaches back, along each side."""
+
+
+@dataclass(frozen=True)
+class Population:
+    """So many members of an organ; a larger population of the same seed begins with the smaller one."""
+
+    organ: str
+    count: int
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        lookup(self.organ, RANGES, "organ of a population")
+        for name, value, least in (("count", self.count, 1), ("seed", self.seed, 0)):
+            if isinstance(value, bool) or not isinstance(value, int) or value < least:
+                raise StudyError(
+                    f"population of {self.organ}: {name} is {value!r}; give a whole number from {least} on"
+                )
+
+    def scenes(self) -> tuple[Scene, ...]:
+        """The scenes of all members. Raises StudyError for a member that cannot be palpated anywhere."""
+        return tuple(member(self.organ, self.seed, number) for number in range(self.count))
+
+
+def member(organ: str, seed: int, number: int) -> Scene:
+    """The scene of member `number` of a population: the same for the same three, however many members are drawn.
+
+    Raises StudyError for an organ without ranges, and for a member on which no place for the probe is found.
+    """
+    ranges = lookup(organ, RANGES, "organ of a population")
+    rng = np.random.default_rng([seed, number, zlib.crc32(organ.encode())])
+    parameters = vary(organ, int(rng.integers(2**32)), ranges.spread)
+    if ranges.wall is not None:
+        parameters["wall"] = 1e3 * float(rng.uniform(*ranges.wall))  # shapes take millimetres
+    modulus, radius, depth = (float(rng.uniform(*ends)) for ends in (ranges.shear_modulus, ranges.radius, ranges.depth))
+    shape = SHAPES[organ](**parameters)
+    name = NAME.format(organ=organ, seed=seed, number=number)
+    point = _palpated(shape, ranges, rng, radius, depth)
+    if point is None:
+        raise StudyError(f"member {name}: no place for a probe of {1e3 * radius:.1f} mm in {TRIES} tries")
+    inward = scaled(point.normal, -1.0)
+    base, end = ranges.scene, PRESSED * ranges.scene.duration
+    path = Trajectory((0.0, end), ((0.0, 0.0, 0.0), scaled(inward, depth + GAP)))
+    probe = Sphere(along(point.point, point.normal, radius + GAP), radius, path)
+    return replace(
+        base,
+        name=name,
+        title=f"A {organ} of a population, a probe of {1e3 * radius:.1f} mm radius pushed in by {1e3 * depth:.1f} mm",
+        organ=Organ(organ, parameters),
+        tissue=replace(base.tissue, shear_modulus=modulus, source=ranges.sources[-1]),
+        frames=FRAMES,
+        checkpoints=press_times(0.0, end, CHECKPOINTS, base.duration),
+        obstacles=(probe, *(_wall_behind(shape) for obstacle in base.obstacles if isinstance(obstacle, Plane))),
+        held=tuple(replace(held, region=shape.regions[held.name]) for held in base.held),
+        probed=replace(base.probed, direction=inward),
+        reference=ranges.plan,
+    )
+
+
+def organ_of(name: str) -> str | None:
+    """The organ of a member by its name; None where it is none."""
+    organ, *numbers = name.rsplit("_", 2)
+    return organ if organ in RANGES and len(numbers) == 2 and all(map(str.isdigit, numbers)) else None
+
+
+def _palpated(
+    shape: Shape, ranges: Ranges, rng: np.random.Generator, radius: float, depth: float
+) -> PalpationPoint | None:
+    """A place within `shift` of the default one that is flat under the probe, freely reachable, and not held."""
+    middle = probe_of(shape)
+    across = np.linalg.svd(np.asarray(middle.normal)[None])[2][1:]
+    for _ in range(TRIES):
+        angle, far = rng.uniform(0.0, 2.0 * np.pi), ranges.shift * np.sqrt(rng.uniform())
+        beside = np.asarray(middle.point) + far * (np.cos(angle) * across[0] + np.sin(angle) * across[1])
+        try:
+            point = probe_near(shape, (float(beside[0]), float(beside[1]), float(beside[2])))
+        except StudyError:  # too far from the surface to be brought onto it
+            continue
+        if _able(shape, point, radius, depth):
+            return PalpationPoint(_rounded(point.point), _rounded(point.normal))
+    return None
+
+
+def _rounded(vector: Vector) -> Vector:
+    """To a nanometre: the last bits of Newton's method are another on another machine, and a scene is its numbers."""
+    x, y, z = (round(value, 9) for value in vector)
+    return (x, y, z)
+
+
+def _able(shape: Shape, point: PalpationPoint, radius: float, depth: float) -> bool:
+    """Whether a probe of `radius` can be pushed in by `depth` there: it starts clear of the organ, touches a patch
+    that is nearly flat, far from what is held, with three times the depth of organ behind it."""
+    at, outward = np.asarray(point.point), np.asarray(point.normal)
+    ball = at + (radius + GAP) * outward + radius * _directions()
+    if (shape.level(ball) <= 0.0).any():
+        return False
+    if shape.level((at - 3.0 * depth * outward)[None])[0] >= 0.0:
+        return False
+    across = np.linalg.svd(outward[None])[2][1:]
+    turns = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    circle = np.cos(turns)[:, None] * across[0] + np.sin(turns)[:, None] * across[1]
+    if any((region.level(at + radius * circle) <= 0.0).any() for region in shape.regions.values()):
+        return False
+    touched = np.sqrt(radius * depth)  # on a soft half space (Hertz)
+    return float(np.linalg.norm(normals(shape, at + touched * circle).mean(axis=0))) > FLAT
+
+
+def _directions(count: int = 400) -> np.ndarray:
+    """Unit vectors spread over the sphere, (count, 3) (Fibonacci lattice)."""
+    heights = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    turns = np.pi * (1.0 + 5.0**0.5) * np.arange(count)
+    widths = np.sqrt(1.0 - heights**2)
+    return np.stack([widths * np.cos(turns), widths * np.sin(turns), heights], axis=1)
+
+
+def _wall_behind(shape: Shape) -> Plane:
+    """The plane behind a filled organ, clear of it by BEHIND; towards the back is y."""
+    return Plane((0.0, round(_back_of(shape) + BEHIND, 5), 0.0), (0.0, -1.0, 0.0))
+
+
+def _back_of(shape: Shape) -> float:
+    """The largest y of the organ [m], to a hundredth of a millimetre."""
+    (x0, y0, z0), (x1, y1, z1) = shape.low, shape.high
+    low, high = np.array([x0, z0]), np.array([x1, z1])
+    back = y0
+    while (high - low).max() > 1e-4:
+        x, z = (np.linspace(low[axis], high[axis], COLUMNS) for axis in (0, 1))
+        y = np.linspace(max(back, y0), y1, COLUMNS)
+        points = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)
+        inside = shape.level(points.reshape(-1, 3)).reshape(points.shape[:3]) <= 0.0
+        farthest = np.where(inside.any(axis=1), y[COLUMNS - 1 - inside[:, ::-1].argmax(axis=1)], -np.inf)
+        best = np.unravel_index(int(farthest.argmax()), farthest.shape)
+        back = float(farthest[best])
+        around, cell = np.array([x[best[0]], z[best[1]]]), (high - low) / (COLUMNS - 1)
+        low, high = around - 3.0 * cell, around + 3.0 * cell
+    return back

@@ -1,0 +1,116 @@
+"""A folder of surfaces as a population: each one meshed, held and palpated by rule, or refused with a reason."""
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import studies.geometry as geometry
+from massspring import Sphere, Trajectory
+from studies.base.errors import StudyError
+from studies.catalog.population.draw import CHECKPOINTS, FRAMES, GAP, PRESSED
+from studies.catalog.study import Study
+from studies.geometry.files.units import Source, check_unit, stem_of
+from studies.scene.chosen_place import DEPTH, RADIUS
+from studies.scene.kind import has_wall
+from studies.scene.placing import along, press_times, scaled
+from studies.scene.proposal import Proposal, proposal
+from studies.scene.scene import ForceOutput, Held, Organ, ReferencePlan, Scene
+from studies.scene.scene_file import python_name
+from studies.scene.tissues import LIVER, Tissue
+from studies.store.paths import readable
+
+SURFACES = (
+    *(".stl", ".ply", ".obj", ".off", ".vtk", ".vtp", ".vtu", ".msh"),
+    *(".glb", ".gltf", ".nii", ".nii.gz", ".nrrd"),
+)
+"""Names of files that are tried end so."""
+NODES = 550
+"""Of the mesh on which hold and probe are placed."""
+DURATION, DAMPING = 8.0, 8.0
+"""[s], [1/s]: as in the scenes of the liver."""
+PLAN = ReferencePlan("solid", (250, 360, 550), variants=(), at_outlines=(1, 2, 3), at_contact=(3, 4, 5))
+
+
+@dataclass(frozen=True)
+class Placed:
+    """What became of a file."""
+
+    path: Path
+    scene: Scene | None
+    """None where it was refused."""
+    words: tuple[str, ...]
+    """What was mended, or the reason."""
+
+
+def placed_organs(folder: Path, unit: str | None = None) -> Iterator[Placed]:
+    """Every surface in a folder, by name, as soon as it is placed.
+
+    unit: of files that do not say theirs. Raises StudyError for a folder that is none, or holds no surface.
+    """
+    if not folder.is_dir():
+        raise StudyError(f"there is no folder {folder}; give one with surfaces ({', '.join(SURFACES)})")
+    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name.lower().endswith(SURFACES))
+    if not files:
+        raise StudyError(f"{folder} holds no surface; known are {', '.join(SURFACES)}")
+    names = dict[str, int]()
+    for path in files:
+        name = python_name(stem_of(path))
+        names[name] = names.get(name, 0) + 1
+        yield _placed(path, unit, name if names[name] == 1 else f"{name}_{names[name]}")
+
+
+def _placed(path: Path, unit: str | None, name: str) -> Placed:
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        try:
+            source = Source(path.absolute(), unit)
+            mesh = geometry.scan(source, NODES, fill=False)
+            scene = placed_scene(name, replace(source, unit=mesh.recipe["unit"]), proposal(mesh))
+        except StudyError as error:
+            return Placed(path, None, (str(error),))
+    return Placed(path, scene, tuple(str(warning.message) for warning in told))
+
+
+def placed_scene(name: str, source: Source, found: Proposal, tissue: Tissue = LIVER) -> Scene:
+    """The scene of a body from a file: held at an end, palpated as proposed by a probe in proportion to its size."""
+    radius, depth = (round(share * found.sides[0], 4) for share in (RADIUS, DEPTH))
+    point, outward, end = found.palpation.point, found.palpation.normal, PRESSED * DURATION
+    inward = scaled(outward, -1.0)
+    path = Trajectory((0.0, end), ((0.0, 0.0, 0.0), scaled(inward, depth + GAP)))
+    pressed = f"a probe of {1e3 * radius:.3g} mm radius pushed in by {1e3 * depth:.3g} mm"
+    return Scene(
+        name=name,
+        title=f"{name}: held at {found.held_where}, {pressed}",
+        organ=Organ("file", {"path": str(source.path), "unit": source.unit, "remesh": True}),
+        tissue=tissue,
+        duration=DURATION,
+        frames=FRAMES,
+        checkpoints=press_times(0.0, end, CHECKPOINTS, DURATION),
+        obstacles=(Sphere(along(point, outward, radius + GAP), radius, path),),
+        held=(Held("end", found.hold),),
+        probed=ForceOutput("obstacle", 0, inward),
+        damping=DAMPING,
+        reference=PLAN,
+    )
+
+
+def study_on(study: Study, folder: Path, unit: str | None = None) -> tuple[Study, list[Placed]]:
+    """What a study asks of solid organs, asked of those in a folder instead; and what became of each file.
+
+    Raises StudyError for a unit or folder that is none, one whose every file is refused, and a study without a solid
+    organ.
+    """
+    if unit is not None:
+        check_unit(unit)
+    solid = [case for case in study.cases if not has_wall(case.scene)]
+    if not solid:
+        raise StudyError(f"study '{study.name}' is about hollow organs alone; a surface from a file is a solid one")
+    placed = list(placed_organs(folder, unit))
+    scenes = [one.scene for one in placed if one.scene is not None]
+    if not scenes:
+        raise StudyError(f"every file in {folder} is refused; the first: {placed[0].words[0]}")
+    recipes = {case.replaced(scene=scenes[0], frames=None).key: case for case in solid}
+    cases = tuple(case.replaced(scene=scene, frames=None) for scene in scenes for case in recipes.values())
+    name = readable(f"{study.name}-{folder.resolve().name}")
+    return replace(study, name=name, cases=cases, main=False), placed

@@ -1,0 +1,59 @@
+"""How accurate is each body on organs nobody has seen: the median, and the worst of twenty?"""
+
+from collections.abc import Sequence
+
+from massspring import ImplicitVolume
+from studies.catalog.accuracy import LONG, SHORT, headline
+from studies.catalog.population.draw import Population
+from studies.catalog.study import Chart, Study
+from studies.runs.case import BodyRecipe, Case
+from studies.scene.kind import has_wall
+from studies.scene.scene import Scene
+
+POPULATION = "population"
+"""The study that `organbench run population` brings up to date."""
+MEMBERS = (Population("liver", 40), Population("kidney", 40), Population("stomach", 20))
+NODES = 550
+"""Surface nodes of the linear bodies, of a hollow organ as many again on its lumen."""
+
+
+def recipes_for(scene: Scene) -> tuple[tuple[BodyRecipe, float], ...]:
+    """The bodies that every member gets, and their step over the limit: the paper's; one volume; one volume per node;
+    quadratic and graded, of the size that the accuracy study takes first."""
+    axis = "centre_line" if has_wall(scene) else "straight"
+    return (
+        (BodyRecipe("surface", NODES, axis=axis), SHORT),
+        (BodyRecipe(nodes=NODES), SHORT),
+        (BodyRecipe(nodes=NODES, law="cotangent", volumes="nodal"), SHORT),
+        (headline(scene), LONG),
+    )
+
+
+def population_study(populations: Sequence[Population] = MEMBERS, name: str = POPULATION) -> Study:
+    """Every recipe on every member; members of different organs take turns, so that a study cut short knows them all.
+
+    Raises StudyError for a member that cannot be drawn.
+    """
+    drawn = [population.scenes() for population in populations]
+    turns = [scenes[at] for at in range(max(map(len, drawn), default=0)) for scenes in drawn if at < len(scenes)]
+    return Study(
+        name=name,
+        question=__doc__ or "",
+        cases=tuple(
+            Case(scene, body, ImplicitVolume(), dt_fraction=fraction)
+            for scene in turns
+            for body, fraction in recipes_for(scene)
+        ),
+        charts=(Chart("distributions.png", "studies.plots.campaigns.population:draw"),),
+        counts_losses=True,
+        columns=(
+            "force_end",
+            "mean_error",
+            "shape_error",
+            "shape_volume",
+            "interior_error",
+            "volume_worst",
+            "min_j",
+            "sway",
+        ),
+    )

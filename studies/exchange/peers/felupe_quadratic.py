@@ -1,0 +1,87 @@
+"""FElupe: quadratic tetrahedra with one pressure each (mean dilatation), neo-Hookean, a path of equilibria by Newton.
+
+The volume is kept by the scene's own bulk modulus. Planes touch nodes by a penalty, scaled to the stiffness of the
+body. Inertia and damping are left out, as the scene allows: the loads are slow. A body that nothing holds is held at
+three nodes so that it cannot turn or drift, which takes no force.
+"""
+
+import time
+from pathlib import Path
+from typing import Any
+
+import felupe  # pyright: ignore[reportMissingImports]
+import numpy as np
+from pypardiso import spsolve
+
+from studies.exchange.peers.scene_folder import CannotDo, SceneFolder, hand_in, moved
+
+INCREMENTS = 4
+"""Load steps between two checkpoints."""
+PENALTY = 10.0
+"""Of the stiffness of the body: depths of 1 % of what the planes move."""
+
+
+def run(scene: SceneFolder, out: Path, shorter: float = 1.0) -> None:
+    """Runs the scene with INCREMENTS / shorter load steps to a checkpoint and hands it in."""
+    scene.check_simple()
+    if np.any(scene.data["gravity"]):
+        raise CannotDo("its adapter knows no weight")
+    started = time.process_time()
+    count, planes = len(scene.points), scene.planes
+    mesh = felupe.Mesh(np.vstack([scene.points, *([p["point"]] for p in planes)]), scene.cells, "tetra10")
+    mesh.points_without_cells = np.empty(0, np.int64)  # the planes' own points are moved by hand
+    displacement = felupe.Field(felupe.RegionQuadraticTetra(mesh), dim=3)
+    field = felupe.FieldContainer([displacement])
+    bulk = scene.data["material"]["bulk_modulus"]
+    body = felupe.SolidBodyNearlyIncompressible(felupe.NeoHooke(mu=scene.mu), field, bulk=bulk)
+    contacts = [_contact(scene, field, body, k) for k in range(len(planes))]
+    tied = _tied(scene, displacement)
+    driven = {(k, axis): _fixed(displacement, [count + k], axis) for k in range(len(planes)) for axis in range(3)}
+    boundaries = tied | {f"plane{k}{axis}": boundary for (k, axis), boundary in driven.items()}
+    positions, forces, increments = [scene.points], [0.0], round(INCREMENTS / shorter)
+    for before, now in zip(scene.times[:-1], scene.times[1:], strict=True):
+        ways = [np.linspace(moved(p["path"], before), moved(p["path"], now), increments + 1)[1:] for p in planes]
+        ramp = {boundary: ways[k][:, axis] for (k, axis), boundary in driven.items()}
+        step = felupe.Step(items=[body, *contacts], ramp=ramp, boundaries=boundaries)
+        for _ in step.generate(x0=field, verbose=0, solver=spsolve):
+            pass
+        positions.append(scene.points + displacement.values[:count])
+        forces.append(_force(scene, contacts, count))
+    spent = time.process_time() - started
+    hand_in(out, scene.times, np.array(positions), np.array(forces), spent / scene.data["duration"])
+
+
+def _contact(scene: SceneFolder, field: Any, body: Any, number: int) -> Any:
+    normal = np.array(scene.planes[number]["normal"])
+    point = len(scene.points) + number
+    options = {"centerpoint": point, "normal": normal, "items": [body], "multiplier": PENALTY}
+    return felupe.ContactRigidPlane(field, points=scene.outer, **options)
+
+
+def _force(scene: SceneFolder, contacts: list[Any], count: int) -> float:
+    """The probed force [N]: what the plane's own point feels, turned round."""
+    number = scene.data["force"]["number"]
+    of_points = np.asarray(contacts[number].results.force.todense()).ravel()[: 3 * (count + len(contacts))]
+    return float(of_points.reshape(-1, 3)[count + number] @ scene.data["force"]["direction"])
+
+
+def _fixed(displacement: Any, nodes: Any, *axes: int) -> Any:
+    mask = np.zeros(displacement.region.mesh.npoints, bool)
+    mask[nodes] = True
+    return felupe.Boundary(displacement, mask=mask, skip=tuple(int(axis not in axes) for axis in range(3)))
+
+
+def _tied(scene: SceneFolder, displacement: Any) -> dict[str, Any]:
+    """What does not move: held nodes, or of a free body a node, a direction from it, and a plane through both."""
+    if len(scene.held):
+        return {"held": _fixed(displacement, scene.held, 0, 1, 2)}
+    x = scene.points - scene.points.mean(axis=0)
+    reach = np.abs(x).max()
+    middle, one, other = (
+        int(np.linalg.norm(x - place, axis=1).argmin()) for place in reach * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    )
+    return {
+        "middle": _fixed(displacement, [middle], 0, 1, 2),
+        "direction": _fixed(displacement, [one], 1, 2),
+        "plane": _fixed(displacement, [other], 2),
+    }

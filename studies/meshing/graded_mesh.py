@@ -1,0 +1,157 @@
+"""The mesh of a body that is finer where its scene holds and touches it, with a wanted number of surface nodes."""
+
+from itertools import count
+
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.geometry import OrganMesh
+from studies.geometry.surface.node_count import FEWEST, MOST
+from studies.meshing.held_mesh import HeldMesh, held_mesh
+from studies.meshing.quadratic_mesh import QuadraticMesh
+from studies.meshing.scene_mesh import mesh_for
+from studies.meshing.shaping import all_facets, linear_mesh, quadratic_mesh
+from studies.meshing.true_shape import true_shape
+from studies.scene.kind import load_of
+from studies.scene.organ_file import remeshed
+from studies.scene.scene import Scene
+
+SOLID, HOLLOW = (1, 2), (0, 1)
+"""Times that elements are halved at outlines and at contacts (measured: docs/accuracy.md). The wall of a stomach is
+thin everywhere and gains from contacts alone."""
+MIDDLE, DRAWN, HUNG = 0.5, 0.4, 0.45
+"""Where the middle of a side stands that leaves an outline, as a share of its length from there: near it displacement
+goes as √r where strains are small. What hangs by its outline is strained so much there that sides drawn to 0.4 turn
+elements inside out (docs/accuracy.md). Three sides drawn leave (4 share − 1)³ of the Jacobian at the outline, 0.22 and
+0.51; below a share of 0.37 that is less than studies.meshing.retreat allows."""
+CLOSE, TOLERANCE = 0.03, 0.05
+"""Deviation from the wanted number of nodes at which the search stops, and beyond which it has failed."""
+TRIES, MOST_TRIES = 10, 20
+"""After so many the search ends with what is within TOLERANCE, and goes on to the second number where nothing is."""
+
+
+def usual_grading(scene: Scene) -> tuple[int, int]:
+    """Times that elements are halved at outlines and at contacts of a scene's organ."""
+    return HOLLOW if is_hollow(scene) else SOLID
+
+
+def graded_mesh(
+    scene: Scene, nodes: int, at_outlines: int, at_contact: int, quadratic: bool
+) -> OrganMesh | QuadraticMesh:
+    """The scene's organ with `nodes` nodes on its outer surface (within 5 %; mid-side nodes count), elements halved
+    `at_outlines` times at the outlines of held regions and `at_contact` times where obstacles will be.
+
+    A mesh file that comes as it is has its own number of nodes and is halved all the same. The wall of a hollow organ
+    has one layer. Raises StudyError for a mesh that cannot be made.
+    """
+    if not remeshed(scene.organ):
+        return mesh_at(scene, nodes, at_outlines, at_contact, quadratic)
+    # Counts hardly depend on where nodes lie, and even ones are quick to make.
+    level = coarse_level(scene, nodes, at_outlines, at_contact, quadratic, even=True)
+    level = coarse_level(scene, nodes, at_outlines, at_contact, quadratic, start=level)
+    return mesh_at(scene, level, at_outlines, at_contact, quadratic)
+
+
+def mesh_at(scene: Scene, level: int, at_outlines: int, at_contact: int, quadratic: bool) -> OrganMesh | QuadraticMesh:
+    """The same from `level` vertices on the outer surface before any is halved."""
+    organ_mesh, coarse, fine = halved(scene, level, at_outlines, at_contact, quadratic)
+    if not quadratic:
+        return linear_mesh(scene, organ_mesh, coarse, fine)
+    return quadratic_mesh(scene, organ_mesh, coarse, fine, middles(scene) if at_outlines else MIDDLE)
+
+
+def middles(scene: Scene) -> float:
+    """Where the middles of sides stand that leave an outline of the scene's held regions (DRAWN)."""
+    if not scene.held:
+        return MIDDLE
+    return HUNG if load_of(scene) == "sag" else DRAWN
+
+
+def halved(
+    scene: Scene, level: int, at_outlines: int, at_contact: int, on_shape: bool = False, even: bool = False
+) -> tuple[OrganMesh, HeldMesh, HeldMesh]:
+    """The organ's mesh, the same with where it is held, and that one halved; all with straight sides, whose vertices
+    are `on_shape` for sides that will be curved, or `even` (studies.meshing.scene_mesh.mesh_for)."""
+    organ_mesh = mesh_for(scene, level, layers=1 if is_hollow(scene) else None, on_shape=on_shape, even=even)
+    coarse = held_mesh(scene, organ_mesh)
+    fine = coarse.refined(scene, at_outlines, at_contact)
+    return organ_mesh, coarse, coarse if fine.mesh.nelements == coarse.mesh.nelements else fine
+
+
+def is_hollow(scene: Scene) -> bool:
+    """Whether the scene's organ has a wall."""
+    if scene.organ.shape == "file":
+        return "wall" in scene.organ.parameters
+    shape = true_shape(scene.organ)
+    return shape is not None and shape.wall is not None
+
+
+def coarse_level(
+    scene: Scene,
+    nodes: int,
+    at_outlines: int,
+    at_contact: int,
+    quadratic: bool,
+    start: int | None = None,
+    even: bool = False,
+) -> int:
+    """Surface vertices before halving that end in `nodes` nodes on the outer surface, near `start` where given; `even`:
+    of a mesh whose nodes are evenly spread. Raises StudyError."""
+    _check_number(scene, nodes, quadratic)
+    found: dict[int, int] = {}
+    level, failed = start or max(FEWEST, (nodes + 6) // 4 if quadratic else nodes), None
+    for tried in range(MOST_TRIES):
+        if tried >= TRIES and (not found or _off(found, nodes) <= TOLERANCE):
+            break
+        try:
+            body = halved(scene, level, at_outlines, at_contact, quadratic, even)[2]
+            found[level] = outer_nodes(body, quadratic)
+        except StudyError as error:
+            failed = failed or error  # raised below, unless a neighbour of this level can be meshed
+            level += max(1, level // 50)
+            continue
+        off = abs(found[level] / nodes - 1.0)
+        level = max(FEWEST, round(level * nodes / found[level]))
+        if off <= CLOSE or (level in found and _off(found, nodes) <= TOLERANCE):
+            break
+        if level in found:
+            level = _untried(level, found)
+    if failed is not None and not found:
+        raise failed
+    best = _best(found, nodes)
+    if _off(found, nodes) > TOLERANCE:
+        raise StudyError(
+            f"scene '{scene.name}': no graded mesh has {nodes} surface nodes; ask for {found[best]}, the nearest found"
+        )
+    return best
+
+
+def _check_number(scene: Scene, nodes: object, quadratic: bool) -> None:
+    most = 4 * MOST - 6 if quadratic else MOST
+    if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or not FEWEST <= nodes <= most:
+        raise StudyError(
+            f"scene '{scene.name}': {nodes!r} surface nodes asked for; give a whole number from {FEWEST} to {most}"
+        )
+
+
+def _best(found: dict[int, int], nodes: int) -> int:
+    """The level whose number of nodes comes nearest."""
+    return min(found, key=lambda tried: abs(found[tried] - nodes))
+
+
+def _off(found: dict[int, int], nodes: int) -> float:
+    """Smallest deviation found, over the wanted number."""
+    return abs(found[_best(found, nodes)] / nodes - 1.0)
+
+
+def _untried(level: int, found: dict[int, int]) -> int:
+    """The nearest level that was not tried: neighbours end in numbers of nodes that jump."""
+    step = max(1, level // 50)
+    near = (level + sign * k * step for k in count(1) for sign in (1, -1))
+    return next(other for other in near if other >= FEWEST and other not in found)
+
+
+def outer_nodes(body: HeldMesh, quadratic: bool) -> int:
+    """Nodes on the outer surface, mid-side nodes among them where there are any."""
+    facets = all_facets(body)[-2]
+    return len(set((facets if quadratic else facets[:, :3]).ravel().tolist()))

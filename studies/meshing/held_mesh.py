@@ -1,0 +1,98 @@
+"""A tetrahedral mesh that knows where it is held, and finer ones of the same straight sides."""
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+from skfem import MeshTet, MeshTet2
+
+from massspring import Obstacle
+from reference_fem import facet_nodes
+from studies.geometry import OrganMesh
+from studies.geometry.mesh.organ_mesh import boundary_triangles
+from studies.geometry.surface.distance import distance_to_surface
+from studies.meshing.scene_mesh import patch_nodes
+from studies.scene.scene import Scene
+
+SAME_POINT = 1e-9
+"""Two points closer than this fraction of the body are one: far above rounding, far below an edge."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldMesh:
+    """A mesh with straight sides, and where on its surface it is held."""
+
+    mesh: MeshTet
+    corners: np.ndarray
+    """Vertices before any refinement [m], (n, 3)."""
+    patches: list[np.ndarray]
+    """Of each held region and last of the lumen: its triangles of `corners`, (f, 3). A finer mesh has parts of them."""
+
+    def facets(self, mesh: MeshTet2) -> list[np.ndarray]:
+        """Of each patch the six nodes of its facets (f, 6) in the second-order mesh with the same vertices."""
+        table, reach = facet_nodes(mesh), SAME_POINT * float(np.ptp(self.corners))
+        middles = self.mesh.p.T[table[:, :3]].mean(axis=1)
+        return [
+            table[distance_to_surface(middles, self.corners, patch) < reach] if len(patch) else table[:0]
+            for patch in self.patches
+        ]
+
+    def at_outlines(self) -> np.ndarray:
+        """Elements with a vertex on an outline: there the stress is singular."""
+        rims = [rim_sides(facets)[:, :2].ravel() for facets in self.facets(MeshTet2.from_mesh(self.mesh))]
+        return np.flatnonzero(np.isin(self.mesh.t, np.concatenate([*rims, []])).any(axis=0))
+
+    def inside(self, obstacles: tuple[Obstacle, ...], t: float) -> np.ndarray:
+        """Boundary elements with a vertex that at rest is where an obstacle will be at time t [s]."""
+        outer = np.unique(boundary_triangles(self.mesh.t.T))
+        x = self.mesh.p[:, outer].T
+        deep = np.zeros(len(x), dtype=bool)
+        for obstacle in obstacles:
+            deep |= obstacle.gap(x, t) < 0
+        return np.flatnonzero(np.isin(self.mesh.t, outer[deep]).any(axis=0))
+
+    def bisected(self, elements: np.ndarray) -> "HeldMesh":
+        """Each of the elements halved at its longest edge, and of their neighbours as many as that takes."""
+        talk = logging.getLogger("skfem.mesh.mesh")
+        before = talk.level
+        talk.setLevel(logging.ERROR)  # it tells that its own slices are copied
+        try:
+            finer = self.mesh.refined(elements)
+        finally:
+            talk.setLevel(before)
+        return replace(self, mesh=MeshTet(np.ascontiguousarray(finer.p), np.ascontiguousarray(finer.t)))
+
+    def refined(self, scene: Scene, at_outlines: int, at_contact: int) -> "HeldMesh":
+        """Halved so many times at the outlines, then at the surface that an obstacle of the scene will have reached at
+        its last checkpoint."""
+        finer = self
+        for _ in range(at_outlines):
+            finer = finer.bisected(finer.at_outlines())
+        for _ in range(at_contact):
+            finer = finer.bisected(finer.inside(scene.obstacles, scene.checkpoints[-1]))
+        return finer
+
+
+def held_mesh(scene: Scene, organ_mesh: OrganMesh) -> HeldMesh:
+    """The organ's mesh with the scene's held regions and its lumen as patches."""
+    patches = [patch_nodes(organ_mesh, held.name, held.region) for held in scene.held]
+    lumen = np.arange(organ_mesh.outer_count, organ_mesh.surface_count)
+    return with_patches(straight(organ_mesh), [*patches, lumen])
+
+
+def straight(organ_mesh: OrganMesh) -> MeshTet:
+    """The tetrahedra as scikit-fem knows them."""
+    return MeshTet(np.ascontiguousarray(organ_mesh.points.T), np.ascontiguousarray(organ_mesh.tetrahedra.T))
+
+
+def with_patches(mesh: MeshTet, patches: list[np.ndarray]) -> HeldMesh:
+    """A mesh that is held at the boundary facets whose vertices are all in one of the patches."""
+    outer = boundary_triangles(mesh.t.T)
+    return HeldMesh(mesh, mesh.p.T.copy(), [outer[np.isin(outer, patch).all(axis=1)] for patch in patches])
+
+
+def rim_sides(facets: np.ndarray) -> np.ndarray:
+    """The outline of a patch of six-node facets (f, 6): sides of one facet only, as end, end, middle, (s, 3)."""
+    sides = facets[:, [[0, 1, 3], [1, 2, 4], [0, 2, 5]]].reshape(-1, 3)
+    _, first, count = np.unique(sides[:, 2], return_index=True, return_counts=True)
+    return sides[first[count == 1]]

@@ -1,0 +1,225 @@
+"""A held mesh laid onto the true shape of its organ, as linear or as quadratic tetrahedra."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+from skfem import MeshTet2
+
+from reference_fem import facet_nodes, nodes
+from reference_fem.elements.shapes import edge_index
+from studies.base.errors import StudyError
+from studies.geometry import OrganMesh, curved
+from studies.geometry.mesh.jacobian import PAIRS
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+from studies.geometry.mesh.quality import tetrahedron_radius_ratio
+from studies.geometry.shape.levelset import Shape, at_depth, project
+from studies.meshing.held_mesh import HeldMesh, rim_sides
+from studies.meshing.outlines import drawn_middles
+from studies.meshing.quadratic_mesh import TURNED, QuadraticMesh, uprightness
+from studies.meshing.retreat import Measure, retreat
+from studies.meshing.true_shape import as_curved, on_true_shape, true_shape
+from studies.scene.scene import Scene
+
+OFF = 1e-3
+"""Of the body's size: nodes farther than this from where they belong are told of."""
+
+
+def linear_mesh(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh) -> OrganMesh:
+    """The finer mesh with its vertices on the true shape, those of rims on the true outline. Raises StudyError.
+
+    That of a file stays as it is: its flat sides enclose the volume of the file's surface already.
+    """
+    cells, shape = upright_cells(fine)[:, :4], None if scene.organ.shape == "file" else true_shape(scene.organ)
+    points = nodes(fine.mesh)[: fine.mesh.nvertices]
+    if shape is not None and fine is not coarse:
+        aim = aimed(scene, fine, shape, laid_out(scene, organ_mesh, coarse, fine, shape))[: len(points)]
+        points = moved_vertices(points, aim, cells, organ_mesh.name)
+        tell(organ_mesh.name, points, aim)
+    order, outer_count, surface_count = boundary_first(fine, cells)
+    new = inverse(order)
+    *held, outer, lumen = (facets[:, :3] for facets in all_facets(fine))
+    return replace(
+        organ_mesh,
+        points=np.ascontiguousarray(points[order]),
+        triangles=new[np.concatenate([outer, lumen])],
+        tetrahedra=new[cells],
+        surface_count=surface_count,
+        outer_count=outer_count,
+        patches=named_patches(scene, organ_mesh.name, held, new),
+    )
+
+
+def quadratic_mesh(
+    scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh, share: float
+) -> QuadraticMesh:
+    """The finer mesh with mid-side nodes, curved where the true shape is known: where not, a warning says so;
+    those of sides that leave an outline at `share` of them from it.
+
+    Raises StudyError.
+    """
+    cells, points, shape = upright_cells(fine), nodes(fine.mesh), true_shape(scene.organ)
+    if shape is None:
+        warnings.warn(
+            f"{organ_mesh.name}: its true shape is not known, so the sides of its quadratic elements stay straight",
+            stacklevel=2,
+        )
+    else:
+        points = curved_points(scene, organ_mesh, coarse, fine, shape)
+    if share != 0.5:
+        points = drawn_points(points, fine, share, organ_mesh.name)
+    order, outer_count, surface_count = boundary_first(fine, cells)
+    new = inverse(order)
+    *held, outer, lumen = all_facets(fine)
+    return QuadraticMesh(
+        name=organ_mesh.name,
+        points=np.ascontiguousarray(points[order]),
+        cells=new[cells],
+        facets=new[np.concatenate([outer, lumen])],
+        lumen=new[lumen][:, TURNED],
+        surface_count=surface_count,
+        outer_count=outer_count,
+        patches=named_patches(scene, organ_mesh.name, held, new),
+        recipe=organ_mesh.recipe,
+    )
+
+
+def curved_points(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh, shape: Shape) -> np.ndarray:
+    """Nodes of the finer second-order mesh [m], (n, 3), those of its boundary on the true shape as far as no element
+    folds; warns of nodes that stay off it. Raises StudyError."""
+    points = laid_out(scene, organ_mesh, coarse, fine, shape)
+    aim = aimed(scene, fine, shape, points)
+    if fine is not coarse:
+        cells = upright_cells(fine)
+        measure = upright_against(nodes(fine.mesh), cells)
+        if not measure(points, cells, np.arange(len(cells))).min() > 0.0:
+            points = less_bent(points, fine, organ_mesh.name)
+        points = moved(points, aim, cells, measure, organ_mesh.name)
+    tell(organ_mesh.name, points, aim)
+    return points
+
+
+def drawn_points(points: np.ndarray, body: HeldMesh, share: float, name: str) -> np.ndarray:
+    """Nodes at `points` (n, 3) [m] with the middles of sides that leave an outline at `share` of them, as far as
+    no element folds."""
+    held, mesh = all_facets(body)[:-2], MeshTet2.from_mesh(body.mesh)
+    outlines = np.concatenate([rim_sides(facets)[:, :2].ravel() for facets in held])
+    cells = upright_cells(body)
+    measure = upright_against(nodes(body.mesh), cells)
+    return moved(points, drawn_middles(points, mesh, outlines, share), cells, measure, name)
+
+
+def less_bent(points: np.ndarray, body: HeldMesh, name: str) -> np.ndarray:
+    """Nodes [m], (n, 3), whose sides bend as far towards `points` (n, 3) as keeps the flat parts of each element
+    upright: the parts of a curved one may not be. Raises StudyError."""
+    cells, count = upright_cells(body), body.mesh.nvertices
+    vertices = moved_vertices(nodes(body.mesh)[:count], points[:count], cells[:, :4], name)
+    plain = with_middles(vertices, body)
+    # A side keeps its bend where its ends are held back.
+    bent = points + plain - with_middles(points[:count], body)
+    return moved(plain, bent, cells, upright_against(plain, cells), name)
+
+
+def with_middles(vertices: np.ndarray, body: HeldMesh) -> np.ndarray:
+    """The vertices (v, 3) and the middles between them, in the order of `reference_fem.nodes`."""
+    return np.concatenate([vertices, vertices[body.mesh.edges].mean(axis=0)])
+
+
+def moved_vertices(safe: np.ndarray, wanted: np.ndarray, cells: np.ndarray, name: str) -> np.ndarray:
+    """Vertices as far on the way from `safe` to `wanted` (v, 3) [m] as leaves no tetrahedron (k, 4) much flatter.
+
+    Raises StudyError."""
+    before = tetrahedron_radius_ratio(safe, cells)
+    return moved(safe, wanted, cells, lambda x, some, which: tetrahedron_radius_ratio(x, some) / before[which], name)
+
+
+def laid_out(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh, shape: Shape) -> np.ndarray:
+    """Nodes of the finer mesh [m], (n, 3), as curved as the coarse one, whose sides follow the true shape as far as
+    that folds none of its elements. Raises StudyError."""
+    plain = MeshTet2.from_mesh(coarse.mesh)
+    bent = on_true_shape(curved(organ_mesh, may_fold=True, shape=shape), coarse, shape, scene.held)
+    cells, straight = upright_cells(coarse), nodes(plain)
+    points = moved(straight, nodes(bent), cells, upright_against(straight, cells), organ_mesh.name)
+    return nodes(as_curved(fine, coarse, replace(plain, doflocs=np.ascontiguousarray(points.T))))
+
+
+def upright_against(points: np.ndarray, cells: np.ndarray) -> Measure:
+    """How upright the elements (k, 10) are, against the straight ones at `points` (n, 3) [m]."""
+    volume = tetrahedron_volumes(points, cells[:, :4])
+    return lambda x, some, which: uprightness(x, some, volume[which])
+
+
+def moved(safe: np.ndarray, wanted: np.ndarray, cells: np.ndarray, measure: Measure, name: str) -> np.ndarray:
+    """Points (n, 3) [m] as far on the way from `safe` to `wanted` as keeps the elements upright. Raises StudyError."""
+    share = retreat(safe, wanted, cells, measure, name)[:, None]
+    # Exact where nothing is held back: safe + (wanted - safe) would be rounded.
+    return np.where(share == 1.0, wanted, safe + share * (wanted - safe))
+
+
+def tell(name: str, points: np.ndarray, aim: np.ndarray) -> None:
+    """Warns of nodes that are off the true shape: `points` (n, 3) belong at `aim` [m]."""
+    off = np.linalg.norm(aim - points, axis=1)
+    far = off > OFF * float(np.ptp(points, axis=0).max())
+    if far.any():
+        warnings.warn(
+            f"{name}: {int(far.sum())} of {len(points)} nodes stay up to {1e3 * off.max():.2g} mm off the true shape, "
+            "or elements would fold; use more nodes",
+            stacklevel=2,
+        )
+
+
+def aimed(scene: Scene, fine: HeldMesh, shape: Shape, points: np.ndarray) -> np.ndarray:
+    """Where the nodes at `points` (n, 3) [m] belong: boundary nodes on the true surface, those of rims on the true
+    outline, the others where they are."""
+    *held, outer, lumen = all_facets(fine)
+    points = points.copy()
+    for facets, surface in ((outer, shape), (lumen, at_depth(shape, shape.wall or 0.0))):
+        chosen = np.unique(facets)
+        points[chosen] = project(surface, points[chosen])
+    for region, facets in zip((h.region for h in scene.held), held, strict=True):
+        rim = np.unique(rim_sides(facets))
+        points[rim] = project(shape, points[rim], (region.level,))
+    return points
+
+
+def all_facets(body: HeldMesh) -> list[np.ndarray]:
+    """Six-node facets (f, 6) of each held region, then of the outer surface, then of the lumen."""
+    mesh = MeshTet2.from_mesh(body.mesh)
+    table, (*held, lumen) = facet_nodes(mesh), body.facets(mesh)
+    return [*held, table[~np.isin(table[:, :3], lumen).all(axis=1)], lumen]
+
+
+def boundary_first(body: HeldMesh, cells: np.ndarray) -> tuple[np.ndarray, int, int]:
+    """The nodes of `cells` in the order of a body: outer surface, lumen, inside; how many are on the outer surface, and
+    how many on the boundary."""
+    used = np.unique(cells)
+    outer, lumen = (np.intersect1d(facets, used) for facets in all_facets(body)[-2:])
+    boundary = np.concatenate([outer, lumen])
+    return np.concatenate([boundary, np.setdiff1d(used, boundary)]), len(outer), len(boundary)
+
+
+def inverse(order: np.ndarray) -> np.ndarray:
+    """New number of each old node, for `order`: the old number of each new one."""
+    new = np.full(int(order.max()) + 1, -1, np.int64)
+    new[order] = np.arange(len(order))
+    return new
+
+
+def named_patches(scene: Scene, name: str, held: list[np.ndarray], new: np.ndarray) -> dict[str, np.ndarray]:
+    """Of each held region the nodes of its facets, in their new numbers. Raises StudyError for a region without."""
+    patches = {}
+    for region, facets in zip(scene.held, held, strict=True):
+        if not len(facets):
+            raise StudyError(f"{name}: region {region.name!r} holds no facet; enlarge it, or use more nodes")
+        patches[region.name] = np.unique(new[facets])
+    return patches
+
+
+def upright_cells(body: HeldMesh) -> np.ndarray:
+    """Elements (k, 10) of positive volume in VTK's order; numbers as `reference_fem.nodes` has them."""
+    mesh = body.mesh
+    corners = mesh.t.T.astype(np.int64)
+    turned = tetrahedron_volumes(mesh.p.T, corners) < 0
+    corners[turned] = corners[turned][:, [0, 2, 1, 3]]
+    middles = edge_index(mesh, corners[:, np.array(PAIRS)].reshape(-1, 2)).reshape(-1, 6)
+    return np.concatenate([corners, mesh.nvertices + middles], axis=1)

@@ -1,0 +1,207 @@
+"""The tables of two results folders, row by row: the same study, scene and recipe, metric by metric."""
+
+import re
+from collections.abc import Hashable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from studies.base.errors import StudyError
+from studies.metrics.compare.verdict import Verdict, verdict_of
+from studies.metrics.metrics import METRICS
+from studies.runs.case import case_from_json
+from studies.runs.recipe_text import recipe_text
+from studies.store.machine import machine_of
+from studies.store.paths import record_files
+from studies.store.record import Record, read_record
+
+Key = tuple[str, str]
+"""Scene and recipe."""
+Row = dict[Hashable, Any]
+METRIC = re.compile(r"^(?P<name>\w+) \[(?P<unit>[^\]]+)\]$")
+STATUS = "status"
+ROW = ("scene", "body", "method", "nodes", "law", "dt/dt_c", "recipe")
+"""Columns of a table that say which case a row is."""
+TIMES = tuple(metric.name for metric in METRICS if metric.spread is not None)
+SPEEDS = tuple(metric.name for metric in METRICS if metric.spread is not None and metric.better == "higher")
+"""Metrics that depend on the machine; of these the ones that are speeds."""
+
+
+class Named(NamedTuple):
+    """A case as tables name it."""
+
+    study: str
+    scene: str
+    body: str
+    method: str
+    nodes: str
+    law: str
+    step: str
+    """Over the stability limit."""
+    recipe: str
+
+
+@dataclass(frozen=True)
+class Change:
+    """A number of a case in both folders."""
+
+    case: Named
+    metric: str
+    unit: str
+    old: float | str
+    new: float | str
+    floor: float
+    """How well it is known, the larger of both, in its unit; NaN where it is not said."""
+    verdict: Verdict
+
+    @property
+    def is_time(self) -> bool:
+        """Whether the number is a computing time, or a speed: it depends on the machine."""
+        return self.metric in TIMES
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All that two folders share, and how many rows they do not."""
+
+    changes: list[Change]
+    only_old: int
+    only_new: int
+
+    machines: tuple[str | None, str | None]
+    """Ids of the machines that measured the old and the new times; None where nothing says so."""
+
+    @property
+    def same_machine(self) -> bool:
+        """Whether times are compared: one machine has measured both, and both folders say so."""
+        old, new = self.machines
+        return old is not None and old == new
+
+    @property
+    def moved(self) -> list[Change]:
+        """What moved, accuracy before times."""
+        moved = [change for change in self.changes if change.verdict == Verdict.MOVED]
+        return sorted(moved, key=lambda change: change.is_time)
+
+    @property
+    def time_ratio(self) -> float:
+        """Median of new over old computing times [1]; NaN where both folders share none."""
+        pairs = [(c.old, c.new) if c.metric not in SPEEDS else (c.new, c.old) for c in self.changes if c.is_time]
+        ratios = [new / old for old, new in pairs if old > 0 and new > 0]  # type: ignore[operator]
+        return float(np.median(ratios)) if ratios else float("nan")
+
+    def table(self) -> pd.DataFrame:
+        """A row per change."""
+        return pd.DataFrame([change.case._asdict() | _numbers(change) for change in self.changes])
+
+    def counts(self, times: bool) -> dict[Verdict, int]:
+        """How many times, or how many other numbers, there are of each verdict, in the order of Verdict."""
+        verdicts = [change.verdict for change in self.changes if change.is_time == times]
+        return {verdict: verdicts.count(verdict) for verdict in Verdict}
+
+
+def _numbers(change: Change) -> dict[str, object]:
+    return {field.name: getattr(change, field.name) for field in fields(change) if field.name != "case"}
+
+
+def compare(old: Path, new: Path) -> Comparison:
+    """Every metric of every case that both folders have in the table of a study.
+
+    Raises StudyError for a folder that is not there or has no table, for a table that lacks what names its rows, and
+    for two folders without a common case.
+    """
+    mine, theirs = tables_of(old), tables_of(new)
+    changes, only_old, only_new = list[Change](), 0, 0
+    machines = machine_of(old), machine_of(new)
+    for study in sorted(set(mine) & set(theirs)):
+        before, after = mine[study], theirs[study]
+        common = [key for key in before if key in after]
+        only_old, only_new = only_old + len(before) - len(common), only_new + len(after) - len(common)
+        same = equal_records(old, new, study)
+        new_changes = [one for key in common for one in changes_of(study, before[key], after[key], key in same)]
+        pair = {machine_of(old, study), machine_of(new, study)}
+        if None in pair or len(pair) > 1:
+            new_changes = [replace(one, verdict=Verdict.OTHER_MACHINE) if one.is_time else one for one in new_changes]
+        changes += new_changes
+    if not changes:
+        raise StudyError(f"{old} and {new} have no case in common; compare folders in which the same study has run")
+    return Comparison(changes, only_old, only_new, machines)
+
+
+def tables_of(folder: Path) -> dict[str, dict[Key, Row]]:
+    """Name of a study -> its rows by scene and recipe. Raises StudyError as `compare`."""
+    if not folder.is_dir():
+        raise StudyError(f"there is no folder {folder}")
+    files = {path.parent.name: path for path in sorted(folder.glob("*/*.csv")) if path.stem == path.parent.name}
+    found = {study: rows for study, path in files.items() if (rows := _read(path))}
+    if not found:
+        raise StudyError(
+            f"{folder} holds no table of a study whose rows name their recipe; `organbench report --results {folder}` "
+            "writes it from the runs"
+        )
+    return found
+
+
+def _read(path: Path) -> dict[Key, Row]:
+    """Nothing where its rows name no recipe."""
+    try:
+        table = pd.read_csv(path)
+    except (ValueError, OSError) as error:
+        again = "write it anew with `organbench report`"
+        raise StudyError(f"{path} cannot be read as a table ({str(error).strip()}); {again}") from error
+    if not {"scene", "recipe"} <= set(table.columns):
+        return {}
+    return {(str(row["scene"]), str(row["recipe"])): row for row in table.to_dict("records")}
+
+
+def changes_of(study: str, old: Row, new: Row, same_bits: bool) -> list[Change]:
+    """How a case ended and all its metrics that one of the folders has."""
+    case = Named(study, *(_text(new.get(name, "")) for name in ROW))
+    found = []
+    if old.get(STATUS) != new.get(STATUS):
+        before, after = str(old.get(STATUS)), str(new.get(STATUS))
+        found.append(Change(case, STATUS, "", before, after, np.nan, Verdict.MOVED))
+    for column in [column for column in old if column in new]:
+        named = METRIC.match(str(column))
+        before, after = old[column], new[column]
+        if named is None or named["name"] == "dt" or (pd.isna(before) and pd.isna(after)):
+            continue
+        name, unit = named["name"], named["unit"]
+        floor = max(_floor(old, name, unit), _floor(new, name, unit))
+        verdict = verdict_of(float(before), float(after), floor, same_bits)
+        found.append(Change(case, name, unit, float(before), float(after), floor, verdict))
+    return found
+
+
+def _text(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def _floor(row: Row, name: str, unit: str) -> float:
+    return float(row.get(f"{name} floor [{unit}]", np.nan))
+
+
+def equal_records(old: Path, new: Path, study: str) -> set[Key]:
+    """(scene, recipe) of the cases whose records both folders hold, with equal fields. Records that cannot be read, or
+    of a scene that there is no more, count as different."""
+    mine, theirs = ({path.name: path for path in record_files(folder, study)} for folder in (old, new))
+    found = set()
+    for name in sorted(set(mine) & set(theirs)):
+        try:
+            records = read_record(mine[name]), read_record(theirs[name])
+            case = case_from_json(records[0].key)
+        except StudyError:
+            continue
+        if _equal(*records):
+            found.add((case.scene.name, recipe_text(case)))
+    return found
+
+
+def _equal(one: Record, other: Record) -> bool:
+    return set(one.fields) == set(other.fields) and all(
+        np.array_equal(field.values, other.fields[name].values, equal_nan=field.values.dtype.kind == "f")
+        for name, field in one.fields.items()
+    )

@@ -1,0 +1,83 @@
+"""Frame times of stored cases, in separate files: timing never touches physics (studies.metrics.timing.protocol)."""
+
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from massspring import Free, Setup, simulate
+from studies.base.compile_watch import watching
+from studies.base.errors import StudyError
+from studies.metrics.timing.protocol import FrameTiming, interleave, pinned
+from studies.metrics.timing.stage_cost import ROWS, stage_times
+from studies.runs.case import Case
+from studies.runs.current import case_fingerprint, case_path
+from studies.runs.prepare import prepare
+from studies.store.machine import machine_id
+from studies.store.new_record import new_record
+from studies.store.paths import timing_path
+from studies.store.record import Record, Status, write_record
+
+REPEATS, FEWEST = 5, 1
+BUDGET = 6.0
+"""Of the repeats of a case [s]: a run of some seconds holds thousands of steps, and is repeated less often."""
+WARM_UP = 1.0
+"""Of a run before anything is measured, at most [s]: it compiles what the case needs."""
+
+
+def timing_file(root: Path, study: str, case: Case) -> Path:
+    """Where this machine's frame times of a case lie."""
+    return timing_path(case_path(root, study, case), machine_id())
+
+
+def timing_of(record: Record) -> FrameTiming:
+    """The frame times in the record of a timing file."""
+    return FrameTiming(record.fields["frame_ns"].values, record.attributes["core"], record.attributes["threads"])
+
+
+def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[[str], None]) -> None:
+    """Times cases alone on one pinned core. Cases that differ by method only take turns, so that their ratio is fair.
+
+    Raises StudyError when a file cannot be written.
+    """
+    groups: dict[str, list[Case]] = {}
+    for case in cases:
+        groups.setdefault(case.replaced(method=Free()).key, []).append(case)
+    with pinned(threads=1) as core:
+        for group in groups.values():
+            started = time.perf_counter()
+            with watching() as watch:
+                setups = {case.key: prepare(case).setup for case in group}
+                contestants = {key: (lambda s=setup: simulate(s).frame_ns) for key, setup in setups.items()}
+                measured = interleave(contestants, max(map(repeats_for, setups.values())), warmups=0)
+                stages = {case.key: stage_times(setups[case.key]) for case in group}
+            seconds = (time.perf_counter() - started - watch.seconds) / len(group)
+            for case in group:
+                timing = FrameTiming(measured[case.key], core, stage_ns=stages[case.key], stages=ROWS)
+                write_timing(root, study, case, timing, seconds)
+                on_case(case.name)
+
+
+def repeats_for(setup: Setup) -> int:
+    """How often the run is timed, from what its first frames take."""
+    simulate(setup, time_limit=0.0)
+    first = simulate(setup, time_limit=WARM_UP)
+    frames = max(first.good_frames, 1)
+    whole = 1e-9 * first.frame_ns[:frames].mean() * setup.clock.frames
+    return int(min(max(BUDGET / whole, FEWEST), REPEATS)) if whole > 0.0 else REPEATS
+
+
+def write_timing(root: Path, study: str, case: Case, timing: FrameTiming, seconds: float | None = None) -> None:
+    """Stores frame times beside the record of their case, and the seconds that measuring them took."""
+    if not (timing.frame_ns > 0).all():
+        raise StudyError(f"case {case.name} broke off while it was timed; run it again")
+    record = new_record(
+        kind="timing",
+        key=case.key,
+        name=case.name,
+        status=Status.OK,
+        message="",
+        fingerprint=case_fingerprint(case),
+        attributes={**timing.attributes(), "seconds": seconds},
+        fields=timing.fields(),
+    )
+    write_record(timing_file(root, study, case), record)

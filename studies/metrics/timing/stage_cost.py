@@ -1,0 +1,174 @@
+"""What a step of a scene costs, stage by stage, what the scene does not need, and what leaving that out saves.
+
+The stages are those that the frame loop of the method times (massspring.kernels.jit.stage_clock): real steps of the
+real run, on one pinned core. The same frames without them are run in turns; what they take beyond is the rest.
+"""
+
+from dataclasses import replace
+from functools import partial
+from time import perf_counter_ns
+
+import numpy as np
+import pandas as pd
+
+from massspring import MassSpringError, Setup, State
+from massspring.kernels.jit.decorators import compiled
+from massspring.kernels.jit.stage_clock import (
+    BETWEEN_FRAMES,
+    INTEGRATION,
+    STAGES,
+    UNTIMED,
+    StageTimes,
+    end_stage,
+    new_stage_times,
+)
+from massspring.run.history import EXTRA, Recorder
+from massspring.run.simulation import check_state
+from studies.metrics.timing.protocol import pinned
+from studies.metrics.timing.skips import SKIPS
+from studies.runs.case import Case
+from studies.runs.prepare import prepare
+
+FRAMES, REPEATS = 100, 5
+BUDGET = 4.0
+"""Time for the repeats [s]: the next turn is left out when it would take longer than that; the first never is."""
+EXPENSIVE = 5.0
+"""Times the run as it is, from where one with a stage is run once only: that is far from the noise."""
+ENDS = 100_000
+"""Ends of stages in a row, to learn what one costs."""
+CALL = "call of the frame"
+"""From Python into compiled code and back, with the copies that leave the old state as it was."""
+ROWS = (*STAGES, CALL)
+PATHS, RECORDING = "paths of obstacles and targets", "recording"
+ENERGIES = "energies: no metric reads them"
+"""Left out of recording, unless a case asks for them."""
+PLAIN, TIMED = "as it is", "with marks"
+STAGE, SKIPPED, FRAME = "stage", "skipped", "per frame"
+
+
+TimedFrames = tuple[np.ndarray, np.ndarray, State]
+"""Time of each frame [ns], (F,); of its ROWS, less what timing them cost, (rows, F); the last state."""
+
+
+def run_frames(setup: Setup, state: State, times: StageTimes = UNTIMED, frames: int | None = None) -> TimedFrames:
+    """Runs the first `frames` of a set-up, or all. Raises MassSpringError for a run that breaks off."""
+    state = replace(state, diagnostics=state.diagnostics._replace(stage_times=times))
+    frames = setup.clock.frames if frames is None else frames
+    frame_ns, stage_ns = np.zeros(frames), np.zeros((len(ROWS), frames))
+    price = end_stage_ns() if times.on[0] else 0.0
+    for frame in range(frames):
+        boundary = setup.boundary(frame)
+        if times.on[0]:
+            times.spent[:], times.ended[:] = 0, 0
+        begin = perf_counter_ns()
+        state = setup.method.advance(state, boundary)
+        frame_ns[frame] = perf_counter_ns() - begin
+        if times.on[0]:
+            # A stage of some nanoseconds may seem to cost less than its end.
+            stage_ns[:BETWEEN_FRAMES, frame] = np.maximum(
+                times.spent[:BETWEEN_FRAMES] - price * times.ended[:BETWEEN_FRAMES], 0.0
+            )
+            stage_ns[BETWEEN_FRAMES, frame] = frame_ns[frame] - times.spent[:BETWEEN_FRAMES].sum()
+        reason = check_state(state, setup.body)
+        if reason is not None:
+            raise MassSpringError(f"the run broke off while its cost was measured: {reason}; take a smaller dt")
+    return frame_ns, stage_ns, state
+
+
+def stage_times(setup: Setup) -> np.ndarray:
+    """Time of each of ROWS in each frame [ns], (rows, F); compiled before."""
+    run_frames(setup, setup.start(), new_stage_times(), frames=1)
+    return run_frames(setup, setup.start(), new_stage_times())[1]
+
+
+@compiled
+def _end_stages(times, count):
+    for _ in range(count):
+        end_stage(times, INTEGRATION)
+
+
+def end_stage_ns() -> float:
+    """What the end of a stage costs [ns]."""
+    times = new_stage_times()
+    _end_stages(times, 1)
+    begin = perf_counter_ns()
+    _end_stages(times, ENDS)
+    return (perf_counter_ns() - begin) / ENDS
+
+
+def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget: float = BUDGET) -> pd.DataFrame:
+    """Rows of stages, rest and the whole step [µs per step], skipped stages with what they would cost and how much of
+    them was skipped, and what Python does once per frame, over as many steps. Times are the shortest of up to `repeats`
+    turns, as many as `budget` [s] allows: attrs["turns"] says how many.
+
+    Raises StudyError or MassSpringError for a case that cannot run."""
+    setup = prepare(case.replaced(frames=min(frames, case.frames or case.scene.frames))).setup
+    skipped = [skip for skip in SKIPS if skip.left_out(setup)]
+    runs = {PLAIN: partial(run_frames, setup, setup.start()), TIMED: partial(_timed, setup)}
+    runs |= {skip.name: partial(run_frames, *skip.included(setup, setup.start())) for skip in skipped}
+    with pinned(threads=1):
+        found = _in_turns(runs, repeats, budget)
+        outside = _per_frame(setup)
+    to_step = 1e-3 / setup.clock.steps
+    whole = {name: to_step * float(np.min([r[0] for r in results], axis=0).mean()) for name, results in found.items()}
+    step = whole[PLAIN]
+    stages = to_step * _fastest(found[TIMED]).mean(axis=1)
+    rows = [(STAGE, name, cost, "") for name, cost in zip(ROWS, stages, strict=True) if cost > 0]
+    rows += [(STAGE, "rest, not attributed", step - float(stages.sum()), ""), (STAGE, "whole step", step, "")]
+    end = found[PLAIN][0][2]
+    rows += [(SKIPPED, skip.name, whole[skip.name] - step, skip.remark(setup, end)) for skip in skipped]
+    rows += [(SKIPPED if name == ENERGIES else FRAME, name, to_step * ns, "") for name, ns in outside.items()]
+    table = pd.DataFrame(rows, columns=["kind", "what", "µs per step", "how much"])
+    table.attrs["turns"] = len(found[PLAIN])
+    table.insert(3, "share of the step", table["µs per step"] / step)
+    return table
+
+
+def _timed(setup: Setup, frames: int | None = None) -> TimedFrames:
+    return run_frames(setup, setup.start(), new_stage_times(), frames)
+
+
+def _in_turns(runs: dict[str, partial[TimedFrames]], repeats: int, budget: float) -> dict[str, list[TimedFrames]]:
+    """Every run up to `repeats` times, in turns, compiled before; one that is `EXPENSIVE`, once. No turn begins that
+    would end after `budget` [s], but the first."""
+    for run in runs.values():
+        run(frames=1)
+    found: dict[str, list[TimedFrames]] = {name: [] for name in runs}
+    shortest = dict.fromkeys(runs, 0.0)
+    began, longest = perf_counter_ns(), 0
+    for turn in range(repeats):
+        start = perf_counter_ns()
+        if turn and start - began + longest > 1e9 * budget:
+            break
+        for name, run in runs.items():
+            if shortest[name] > EXPENSIVE * shortest[PLAIN]:
+                continue
+            found[name].append(run())
+            took = float(found[name][-1][0].sum())
+            shortest[name] = min(took, shortest[name]) if turn else took
+        longest = perf_counter_ns() - start  # later turns leave out what is expensive, so they take no longer
+    return found
+
+
+def _fastest(timed: list[TimedFrames]) -> np.ndarray:
+    """Times of ROWS in the fastest repeat of each frame, (rows, F)."""
+    quickest = np.argmin([frame_ns for frame_ns, _, _ in timed], axis=0)
+    stages = np.stack([stage_ns for _, stage_ns, _ in timed])
+    return stages[quickest, :, np.arange(stages.shape[2])].T
+
+
+def _per_frame(setup: Setup) -> dict[str, float]:
+    """What is done once per frame, outside its time, and what recording the energies too would take: median [ns]."""
+    clock = setup.clock
+    recorded = (setup.body, clock, setup.obstacles, len(setup.attachments), frozenset[int]())
+    bare, full = Recorder(*recorded, ()), Recorder(*recorded, EXTRA)
+    state = setup.method.advance(setup.start(), setup.boundary(0))
+    times = np.zeros((3, clock.frames))
+    for frame in range(clock.frames):
+        records = [partial(recorder.record, frame, state, 0) for recorder in (bare, full)]
+        for row, work in enumerate([partial(setup.boundary, frame), *records]):
+            begin = perf_counter_ns()
+            work()
+            times[row, frame] = perf_counter_ns() - begin
+    paths, recording, energies = (float(t) for t in np.median(times, axis=1))
+    return {PATHS: paths, RECORDING: recording, ENERGIES: energies - recording}

@@ -1,0 +1,150 @@
+"""Packs studies: records, tables, charts and the code that draws them, in a zip file that says what it holds."""
+
+import os
+import shutil
+import zipfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import studies as package
+from massspring.sources import OWN, ROOT
+from studies.base.atomic import is_there, part_beside
+from studies.base.errors import StudyError
+from studies.catalog.study import Study
+from studies.exchange.entry import entry_files
+from studies.metrics.timing.cases import timing_file
+from studies.reference.reference_solves import reference_solves
+from studies.report.archive.crate import CITATION, CODE, citation_file, digest, write_crate
+from studies.report.archive.versions import pins
+from studies.report.publish import check_studies
+from studies.report.results import make_folder, refresh, report
+from studies.runs.current import case_path
+from studies.runs.user_code import files_of
+from studies.store.archived import MANIFEST, check_no_archive
+from studies.store.ledger import Ledger
+from studies.store.links import link_study
+
+SUFFIX = ".zip"
+README = """# Results of organbench {version}: {names}
+
+Nothing in here has to be computed again. Unpack it; the folder is a results folder like any other:
+
+    sha256sum -c {manifest}                    is every file as it was packed?
+    organbench archive --check .               the same, by organbench
+    organbench plot {first} --results .        draws the charts and the table again, from the records
+    organbench table {first} --results .       a row per case
+
+Without organbench: Python with the packages of constraints.txt (`pip install -r constraints.txt`), and the sources in
+the folder `code`: `PYTHONPATH=code python -m studies plot {first} --results .`
+
+`ro-crate-metadata.json` tells what each file is, `machine.json` who measured, `CITATION.cff` how to cite.
+"""
+
+
+@dataclass(frozen=True)
+class Packed:
+    """An archive that was written."""
+
+    path: Path
+    files: int
+    size: int
+    """Bytes."""
+    remarks: list[str]
+    """What report.html had no room for, or cannot show."""
+
+
+def chosen(root: Path, catalogue: Sequence[Study]) -> list[Study]:
+    """The studies of which something is stored. Raises StudyError where nothing is."""
+    found = [s for s in catalogue if any(is_there(case_path(root, s.name, case)) for case in s.cases)]
+    if not found:
+        raise StudyError(f"nothing is stored in {root}: `organbench run` makes results, --results names their folder")
+    return found
+
+
+def pack(root: Path, studies: Sequence[Study], target: Path, day: str, extra: Iterable[Path] = ()) -> Packed:
+    """Packs studies of `root` into the zip file `target`; tables and charts are drawn from the packed records.
+
+    day: of the archive, YYYY-MM-DD; extra: further files, such as a study's own. Raises StudyError when a record or a
+    frame time is missing, damaged or stale, and when the file cannot be written.
+    """
+    if target.suffix != SUFFIX:
+        raise StudyError(f"an archive ends in {SUFFIX}, not '{target.name}'; give -o FILE{SUFFIX}")
+    check_no_archive(root)
+    check_studies(Ledger(root), studies, "archived")
+    make_folder(target.parent)
+    with TemporaryDirectory(dir=target.parent, prefix=f"{target.stem}-") as place:
+        stage = Path(place) / "results"  # as commands in report.html name it
+        remarks = gather(root, studies, stage)
+        describe(stage, studies, day, [path for path in (*extra, *own_files(studies)) if path.is_file()])
+        names = sorted(path for path in stage.rglob("*") if path.is_file())
+        write_zip(stage, names, target, day)
+    return Packed(target, len(names), target.stat().st_size, remarks)
+
+
+def own_files(studies: Sequence[Study]) -> list[Path]:
+    """The user's files in which methods and laws of the cases are."""
+    return [file.path for s in studies for case in s.cases for file in files_of(case.method, case.body.law)]
+
+
+def gather(root: Path, studies: Sequence[Study], stage: Path) -> list[str]:
+    """Records of studies, their references and entries from outside, and what is drawn from them; what report.html had
+    no room for, in sentences. Raises StudyError when a record is missing."""
+    stage.mkdir()
+    for study in studies:
+        found = [case_path(root, study.name, case) for case in study.cases]
+        found += [timing_file(root, study.name, case) for case in study.cases if case.timed]
+        found += [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
+        for path in [*found, *entry_files(root)]:
+            bring(path, stage / path.relative_to(root))
+        ledger = Ledger(stage)
+        link_study(ledger, study.name)
+        missing = refresh(ledger, study)[1]
+        if missing:
+            raise StudyError(f"not archived, something is missing: {study.name}: {missing[0]}")
+    remarks = report(Ledger(stage), studies)[1]
+    shutil.rmtree(stage / "cache")
+    return remarks
+
+
+def bring(source: Path, target: Path) -> None:
+    """The same file under another name where the disk allows it, else a copy; nothing where there is none."""
+    if target.exists() or not is_there(source):
+        return
+    target.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(source, target)
+    except OSError:  # another disk, or one without links
+        shutil.copyfile(source, target)
+
+
+def describe(stage: Path, studies: Sequence[Study], day: str, extra: Iterable[Path]) -> None:
+    """Adds the code, how to cite and to read, what each file is, and its checksum."""
+    version = package.__version__
+    for path in extra:
+        bring(path, stage / path.name)
+    for name in OWN:
+        shutil.copytree(ROOT / name, stage / CODE / name, ignore=shutil.ignore_patterns("__pycache__"))
+    names = [study.name for study in studies]
+    page = README.format(
+        version=version, names=", ".join(names), first=Path(studies[0].word).name or names[0], manifest=MANIFEST
+    )
+    (stage / "README.md").write_text(page, encoding="utf-8")
+    bring(citation_file(), stage / CITATION)
+    (stage / "constraints.txt").write_text(pins(), encoding="utf-8")
+    write_crate(stage, studies, version, day)
+    files = sorted(path for path in stage.rglob("*") if path.is_file())
+    lines = [f"{digest(path)}  {path.relative_to(stage).as_posix()}\n" for path in files]
+    (stage / MANIFEST).write_text("".join(lines), encoding="utf-8")
+
+
+def write_zip(stage: Path, files: Sequence[Path], target: Path, day: str) -> None:
+    """The files as a zip, whole or not at all; equal files on one day are equal bytes."""
+    year, month, date = map(int, day.split("-"))
+    with part_beside(target) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in files:
+            entry = zipfile.ZipInfo(path.relative_to(stage).as_posix(), (year, month, date, 0, 0, 0))
+            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+            with archive.open(entry, "w", force_zip64=True) as written, open(path, "rb") as read:
+                shutil.copyfileobj(read, written, 1 << 20)

@@ -1,0 +1,57 @@
+"""The scenes, one file each. Adding one: a file and a line in SCENES, from which all else follows."""
+
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.ball_ringing import BALL_RINGING
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.scene.library.bladder_fill import BLADDER_FILL
+from studies.scene.library.kidney_probe import KIDNEY_PROBE
+from studies.scene.library.liver_press import LIVER_PRESS
+from studies.scene.library.liver_probe import LIVER_PROBE
+from studies.scene.library.spleen_sag import SPLEEN_SAG
+from studies.scene.library.stomach_press import STOMACH_PRESS
+from studies.scene.library.stomach_probe import STOMACH_PROBE
+from studies.scene.library.stomach_slide import STOMACH_SLIDE
+from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
+from studies.scene.start import InitialConditions
+from studies.scene.tissues import Tissue
+
+SCENES: tuple[Scene, ...] = (
+    BALL_SQUEEZE,
+    BALL_CLAMPED,
+    BALL_RINGING,
+    LIVER_PRESS,
+    LIVER_PROBE,
+    KIDNEY_PROBE,
+    SPLEEN_SAG,
+    STOMACH_PRESS,
+    STOMACH_PROBE,
+    BLADDER_FILL,
+    STOMACH_SLIDE,
+)
+
+JUDGED: tuple[Scene, ...] = tuple(scene for scene in SCENES if scene.reference is not None)
+"""Scenes with a reference: a study may ask how accurate a run of theirs is."""
+
+__all__ = [
+    "BALL_CLAMPED",
+    "BALL_RINGING",
+    "BALL_SQUEEZE",
+    "BLADDER_FILL",
+    "JUDGED",
+    "KIDNEY_PROBE",
+    "LIVER_PRESS",
+    "LIVER_PROBE",
+    "SCENES",
+    "SPLEEN_SAG",
+    "STOMACH_PRESS",
+    "STOMACH_PROBE",
+    "STOMACH_SLIDE",
+    "ForceOutput",
+    "Held",
+    "InitialConditions",
+    "Lumen",
+    "Organ",
+    "ReferencePlan",
+    "Scene",
+    "Tissue",
+]

@@ -1,0 +1,263 @@
+"""A sweep on the workers that a Dask scheduler knows (https://distributed.dask.org)."""
+
+import logging
+import os
+import pickle
+import secrets
+import time
+import warnings
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from importlib.util import find_spec
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+from distributed import Client, Future, KilledWorker, wait
+from distributed.client import FutureCancelledError, FuturesCancelledError
+
+from studies.base.errors import StudyError
+from studies.base.processes import TRIES, Died
+from studies.catalog.study import Study
+from studies.runs.user_code import Given, given_files
+from studies.store.ledger import Ledger
+from studies.sweep.engines.requests import DoJob, FrameTimes, Preparation, check_for, wait_until_seen
+from studies.sweep.engines.worker import MEGABYTES, JobPlugin, do, machine
+from studies.sweep.executor import Progress, Told
+from studies.sweep.job import Job, case_jobs
+from studies.sweep.local import environment, files_for
+
+CONNECT_SECONDS = 10.0
+"""After which a scheduler that does not answer is not there."""
+LOOK_SECONDS = 1.0
+"""Between two looks at which workers there are."""
+BUSY = 0.1
+"""Share of a machine's processors that others may use during frame times, without a warning."""
+GONE = (
+    "the Dask scheduler is gone, or no longer answers: start it and its workers again; what is finished is stored, the "
+    "same command goes on from there"
+)
+
+
+class Session:
+    """The workers of one sweep: those that are fit."""
+
+    def __init__(self, client: Client, patience: float) -> None:
+        """patience: seconds without a fit worker that are waited."""
+        self.client, self.patience = client, patience
+        self.name = f"organbench-{secrets.token_hex(4)}"
+        self.faults: SimpleQueue[str] = SimpleQueue()
+        self.manned = time.monotonic()
+        self.submitted = 0
+
+    def workers(self) -> dict[str, Any]:
+        """All that the scheduler knows now, by address. Raises StudyError when it is gone."""
+        if self.client.status != "running":
+            raise StudyError(GONE)
+        try:
+            return self.client.scheduler_info()["workers"]
+        except OSError as error:
+            raise StudyError(GONE) from error
+
+    def fit(self) -> dict[str, Any]:
+        """Those that get jobs. Warns of those that joined unfit, and raises StudyError when there has been none for
+        too long."""
+        while not self.faults.empty():
+            warnings.warn(f"{self.faults.get()}; it gets no job", stacklevel=2)
+        found = {place: worker for place, worker in self.workers().items() if worker["resources"].get(self.name)}
+        if found:
+            self.manned = time.monotonic()
+        elif time.monotonic() > self.manned + self.patience:
+            raise StudyError(
+                f"the cluster has had no worker for {self.patience:g} s: start some with `organbench worker`; what is "
+                "finished is stored, the same command goes on from there"
+            )
+        return found
+
+    def begin(self, plugin: JobPlugin) -> None:
+        """Returns when all workers that are there are fit, and there is one. Raises StudyError for one that is not."""
+        while not self.workers():
+            self.fit()
+            time.sleep(LOOK_SECONDS / 5)
+        known = self.workers()
+        found: Any = self.client.run(find_spec, "studies")
+        bare = [place for place, spec in found.items() if spec is None]
+        if bare:
+            name = known[bare[0]]["name"]
+            raise StudyError(f"worker {name} has no organbench that can be loaded; install it there; nothing has run")
+        try:
+            self.client.register_plugin(plugin, name=self.name)
+        except StudyError as error:
+            raise StudyError(f"{error}; nothing has run") from error
+        self.client.subscribe_topic(self.name, lambda event: self.faults.put(event[1]))
+
+    def submit(self, request: Any, megabytes: float = 0.0, **options: Any) -> Future:
+        """Has a request answered by a process of a fit worker."""
+        self.submitted += 1
+        options |= {"key": f"{self.name}-{self.submitted}", "priority": -self.submitted, "pure": False}
+        wanted = {self.name: 1, MEGABYTES: megabytes}
+        return self.client.submit(do, self.name, pickle.dumps(request), resources=wanted, **options)
+
+    def result(self, future: Future) -> Any:
+        """The answer. Raises StudyError when the scheduler is gone, what the request raised, Died, and KilledWorker."""
+        try:
+            return pickle.loads(future.result())
+        except FutureCancelledError as error:
+            raise StudyError(GONE) from error
+
+    def ended(self, futures: Iterable[Future]) -> list[Future]:
+        """Those that have ended; waits a moment for the first. Raises StudyError when the scheduler is gone."""
+        try:
+            with suppress(TimeoutError), self.client.as_current():
+                wait(list(futures), timeout=LOOK_SECONDS, return_when="FIRST_COMPLETED")
+        except FuturesCancelledError as error:
+            raise StudyError(GONE) from error
+        return [future for future in futures if future.done()]
+
+    def check_memory(self, jobs: Sequence[Job], needs: Sequence[float]) -> None:
+        """Raises StudyError when a job needs more memory than any fit worker has."""
+        limits = [worker["resources"][MEGABYTES] for worker in self.fit().values()]
+        if limits and needs and max(needs) > max(limits):
+            job = jobs[needs.index(max(needs))]
+            raise StudyError(
+                f"{job.label} needs about {max(needs) / 1e3:.1f} GB, and the largest worker has "
+                f"{max(limits) / 1e3:.1f} GB: start one with more (`organbench worker --memory`)"
+            )
+
+    def end(self) -> None:
+        """Ends what is being done, and the processes on all workers."""
+        with suppress(Exception):  # the scheduler may be gone
+            self.client.unregister_worker_plugin(self.name)
+
+
+class Cluster:
+    """The executor that is a Dask cluster (studies.sweep.executor.Executor)."""
+
+    def __init__(
+        self,
+        scheduler: Callable[[], AbstractContextManager[str]],
+        patience: float,
+        portable: bool = False,
+        to_come: int = 1,
+    ) -> None:
+        """scheduler: makes its address; patience: seconds without any worker that are waited; to_come: jobs that
+        workers not yet there will do at a time."""
+        self.scheduler, self.patience, self.portable, self.to_come = scheduler, patience, portable, to_come
+        self.stack = ExitStack()
+        self.client: Client | None = None
+
+    def __enter__(self) -> "Cluster":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.client = None
+        self.stack.close()
+
+    @property
+    def processes(self) -> int:
+        """Threads of all workers that there are now."""
+        threads: Any = self._connected().nthreads()
+        return max(self.to_come, sum(threads.values()))
+
+    def _connected(self) -> Client:
+        if self.client is None:
+            self.client = self.stack.enter_context(client_of(self.stack.enter_context(self.scheduler())))
+        return self.client
+
+    @contextmanager
+    def _session(self, root: Path, files: tuple[Given, ...], portable: bool) -> Iterator[Session]:
+        session = Session(self._connected(), self.patience)
+        preparation = pickle.dumps(Preparation(os.getcwd(), files))
+        try:
+            with check_for(root, files) as check:
+                session.begin(JobPlugin(session.name, environment(portable), preparation, pickle.dumps(check)))
+                yield session
+        finally:
+            session.end()
+
+    def map(self, jobs: Sequence[Job], on_compile: Told) -> Generator[tuple[Job, str | None]]:
+        """As every executor; what workers compile is not told. No more jobs are with Dask than can be done at a time:
+        a worker that is lost costs those a try that it had."""
+        if not jobs:
+            return
+        with self._session(jobs[0].root, files_for(jobs), self.portable) as session:
+            needs = [job.needs / 1e6 for job in jobs]
+            session.check_memory(jobs, needs)
+            waiting, running, done = deque(range(len(jobs))), dict[Future, int](), list[Path]()
+            while waiting or running:
+                slots = sum(worker["nthreads"] for worker in session.fit().values())
+                while waiting and len(running) < slots:
+                    number = waiting.popleft()
+                    running[session.submit(DoJob(jobs[number]), needs[number], retries=TRIES - 1)] = number
+                for future in session.ended(running):
+                    job = jobs[running.pop(future)]
+                    cause = _cause(session, future)
+                    done += [job.path()] if cause is None else []
+                    yield job, cause
+        wait_until_seen(done)
+
+    def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
+        """As every executor: on one worker of each kind of machine, after all jobs, one machine after the other."""
+        timed = [job for job in case_jobs(root, study) if job.work.timed]
+        cases, chosen = tuple(job.work for job in timed), [t for t in timed if among is None or t.path() in among]
+        if not chosen or (self.client is None and all(map(Ledger(root).timed_somewhere, chosen))):
+            return 0
+        request = FrameTimes(root, study.name, cases, None if among is None else frozenset(among))
+        with self._session(root, given_files(cases), portable=False) as session:
+            names = {place: str(worker["name"]) for place, worker in session.fit().items()}
+            kinds: Any = session.client.run(machine, session.name, workers=list(names))
+            places = {kinds[place]: place for place in sorted(kinds, key=names.__getitem__, reverse=True)}
+            progress.begin("timing", len(places))
+            return sum(_timed(session, places[kind], names[places[kind]], request, progress) for kind in sorted(places))
+
+
+def _cause(session: Session, future: Future) -> str | None:
+    """Why a job is not done; raises what it raised."""
+    try:
+        error = session.result(future)
+    except Died as death:
+        return f"its process died {TRIES} times: {death}"
+    except KilledWorker as lost:
+        return f"its worker was lost {lost.allowed_failures + 1} times"
+    if error is not None:
+        raise error
+    return None
+
+
+def _timed(session: Session, place: str, name: str, request: FrameTimes, progress: Progress) -> int:
+    """On one worker; how many cases that were."""
+    future = session.submit(request, workers=[place])
+    while not session.ended([future]):
+        if place not in session.fit():
+            raise StudyError(f"worker {name} was lost while it measured frame times; the same command goes on")
+    try:
+        count, busy = session.result(future)
+    except Died as death:
+        raise StudyError(f"worker {name} measured frame times, and its process died: {death}") from death
+    if count and busy > BUSY:
+        warnings.warn(
+            f"during the frame times of {request.study} others used {100 * busy:.0f} % of the processors of worker "
+            f"{name}: take them with care",
+            stacklevel=2,
+        )
+    progress.advance("timing", name)
+    return count
+
+
+@contextmanager
+def client_of(address: str) -> Iterator[Client]:
+    """A client of the scheduler at `address`. Raises StudyError where there is none."""
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is a sentence here
+    try:
+        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False, name="organbench")
+    except (OSError, ValueError, TypeError) as error:
+        first = (str(error).splitlines() or [type(error).__name__])[0]
+        raise StudyError(
+            f"there is no Dask scheduler at {address} ({first}); start one with `dask scheduler`, or correct the "
+            "address"
+        ) from error
+    try:
+        yield client
+    finally:
+        client.close(timeout=1)

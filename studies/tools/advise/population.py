@@ -1,0 +1,69 @@
+"""What a recipe did on organs it was never chosen on: the bound that 95 of 100 members of a population kept."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from studies.base.errors import StudyError
+from studies.catalog.population import POPULATION
+from studies.catalog.population.draw import organ_of
+from studies.metrics.distribution import Distribution, distribution
+from studies.metrics.judged import DISPLACEMENT, FORCE
+from studies.metrics.metric import Metric
+from studies.runs.case import Case
+from studies.runs.recipe_text import recipe_text
+from studies.store.record import Status
+from studies.tools.advise.campaign import PUBLISHED
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """Errors of one recipe on the members of a population of the same organ."""
+
+    organ: str
+    force: Distribution
+    displacement: Distribution
+    where: str
+
+
+def unseen(results: Path, case: Case) -> Unseen | None:
+    """Of the recipe of a case on organs of the kind of its scene; None where no such member was ever run.
+
+    Raises StudyError for a table that cannot be read.
+    """
+    tables = [root / POPULATION / f"{POPULATION}.csv" for root in (results, results / PUBLISHED)]
+    path = next((table for table in tables if table.is_file()), None)
+    if path is None:
+        return None
+    try:
+        rows = pd.read_csv(path)
+        organ = case.scene.organ.shape
+        rows = rows.loc[(rows["scene"].map(organ_of) == organ) & (rows["recipe"] == recipe_text(case))]
+        force, displacement = (_of(rows, entry) for entry in (FORCE, DISPLACEMENT))
+    except (KeyError, ValueError, OSError) as error:
+        raise StudyError(f"{path} cannot be read ({error}); `organbench run {POPULATION}` writes it anew") from error
+    return Unseen(organ, force, displacement, str(path)) if force.count else None
+
+
+def _of(rows: pd.DataFrame, entry: Metric) -> Distribution:
+    """Of a column; what ended badly counts as lost."""
+    column = f"{entry.name} [{entry.unit}]"
+    values = rows[column].where(rows["status"] == Status.OK)
+    floors = rows[f"{entry.name} floor [{entry.unit}]"]
+    names = [str(name) for name in rows["scene"]]
+    return distribution(dict(zip(names, values, strict=True)), dict(zip(names, floors, strict=True)))
+
+
+def words(found: Unseen) -> str:
+    """ "in 40 livers it had not seen, 95 of 100 are within 8.1 % (6 to 12) of the force, ..."."""
+
+    def bound(one: Distribution) -> str:
+        low, high = one.bound_interval
+        return f"{one.bound:.2g} % ({low:.2g} to {high:.2g})"
+
+    lost = f", {found.force.lost} more lost" if found.force.lost else ""
+    return (
+        f"on {found.force.count} other organs of the kind ({found.organ}{lost}) 95 of 100 are within "
+        f"{bound(found.force)} of the force and {bound(found.displacement)} in displacement"
+    )

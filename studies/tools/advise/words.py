@@ -1,0 +1,157 @@
+"""An answer as lines for people: the recipe, its errors with their uncertainty, its cost, how to run it again."""
+
+from dataclasses import fields
+
+from studies.catalog.accuracy import ACCURACY
+from studies.metrics.cells import MISSING, value_cell
+from studies.metrics.judged import Judged, Measured
+from studies.metrics.wish import SHAPE, SHAPE_VOLUME, Wish
+from studies.runs.case import BodyRecipe, Case
+from studies.scene.library import SCENES
+from studies.tools.advise.answer import Advice
+from studies.tools.advise.population import words as others
+
+LABEL = 14
+"""Width of the first column [letters]."""
+
+
+def lines_of(answer: Advice) -> list[str]:
+    """What is told of an answer, a line each."""
+    verdict = [f"{answer.scene.name}: {wish_words(answer.wish)}{USUAL if answer.usual else ''}", *_verdict(answer)]
+    if answer.chosen is None:
+        return verdict
+    return [*verdict, *_recipe(answer, answer.chosen)]
+
+
+USUAL = " (the usual wish; --force and --displacement name another)"
+
+
+def wish_words(wish: Wish) -> str:
+    """ "force within 3 %, displacement within 1 %, 1 ms of computing per 1 ms of simulated time"."""
+    told = [
+        f"{name} within {bound:.3g} %"
+        for name, bound in (("force", wish.force), ("displacement", wish.displacement))
+        if bound is not None
+    ]
+    if wish.budget is not None:
+        told.append(f"at most {cost_words(wish.budget)}")
+    return ", ".join(told)
+
+
+def cost_words(cost: float) -> str:
+    """ "0.25 ms of computing per 1 ms of simulated time"."""
+    return f"{cost:.3g} ms of computing per 1 ms of simulated time"
+
+
+def _verdict(answer: Advice) -> list[str]:
+    """Whether the wish is met, and what of it could not be judged."""
+    told = [f"{' and '.join(answer.ignored)} cannot be judged: the scene compares none"] if answer.ignored else []
+    one, wish = answer.chosen, answer.wish
+    if answer.misshapen is not None:
+        body = answer.misshapen.case.body
+        told.append(
+            f"not advised: {body.series}, {body.nodes:,} surface nodes, meets the wish, but "
+            f"{off_shape(answer.misshapen)}"
+        )
+    if answer.alike:
+        told.append(f"it was never run: errors are the worst of {', '.join(answer.alike)}, scenes of the same kind")
+    for name in answer.unknowable:
+        known = max(getattr(row, name).uncertainty for group in answer.stored.found.values() for row in group)
+        told.append(f"cannot be told: the reference is known to ±{known:.2g} % of the {name}")
+    if one is None:
+        return [*told, "nothing can be advised: name an error that the scene compares"]
+    if answer.meets:
+        return [*told, *_borderline(one, wish)]
+    shares = {name: share for name, share in one.shares(wish).items() if share > 1.0}
+    if shares:
+        words = [f"{name} {share:.2g} times too large" for name, share in shares.items() if name not in one.off_shape]
+        missed = ", ".join([*words, off_shape(one)] if one.off_shape else words)
+        return [*told, f"nothing here does; the nearest is ({missed}):"]
+    blind = "its computing time is not known here" if not one.cost.known else "measured against it, the nearest is:"
+    return [*told, blind]
+
+
+def off_shape(one: Judged) -> str:
+    """What a body beyond the bounds of the shape lacks: "it is up to 10 % of the liver's size away from the true shape
+    and lacks 2.4 % of its volume (allowed: 1 and 0.5 %)"."""
+    organ = one.case.scene.organ.shape
+    name = "organ" if organ == "file" else organ
+    parts = [f"is up to {value_cell(one.shape.value)} % of the {name}'s size away from the true shape"]
+    if one.shape_volume.known:
+        verb = "lacks" if one.shape_volume.value < 0.0 else "has"
+        more = "of its volume" if one.shape_volume.value < 0.0 else "too much volume"
+        parts.append(f"{verb} {value_cell(abs(one.shape_volume.value))} % {more}")
+    return f"it {' and '.join(parts)} (allowed: {SHAPE:g} and {SHAPE_VOLUME:g} %)"
+
+
+def _shape(one: Judged) -> str:
+    if not one.shape.known:
+        return "not measured"
+    volume = f", volume {_error(one.shape_volume, True)}" if one.shape_volume.known else ""
+    return f"{_error(one.shape)} of the organ's size at most{volume}"
+
+
+def _borderline(one: Judged, wish: Wish) -> list[str]:
+    """A remark where the uncertainty of an error reaches beyond the wish."""
+    near = [
+        name
+        for name in ("force", "displacement")
+        if (bound := getattr(wish, name)) is not None
+        and (error := getattr(one, name)).known
+        and abs(error.value) + error.uncertainty > bound
+    ]
+    return [f"the uncertainty of the reference reaches beyond the wish ({' and '.join(near)})"] if near else []
+
+
+def _recipe(answer: Advice, one: Judged) -> list[str]:
+    case = one.case
+    step = f", {1e3 * one.dt:.3g} ms" if one.dt == one.dt else ""
+    rows = {
+        "recipe": f"{case.body.series}, {case.body.nodes:,} surface nodes, dt = {case.dt_fraction:g} dt_c{step}",
+        "force": _error(one.force, True),
+        "displacement": f"{_error(one.displacement)} (mean over the true surface, of the largest)",
+        "shape": _shape(one),
+        "computing": _computing(answer, one),
+        "measured in": answer.stored.where,
+        "again": _command(answer, case),
+        "in Python": in_python(case),
+    }
+    if answer.unseen is not None:
+        rows["others"] = others(answer.unseen)
+    return [f"  {name:<{LABEL}}{words}" for name, words in rows.items()]
+
+
+def _error(error: Measured, signed: bool = False) -> str:
+    if not error.known:
+        return f"{MISSING} not compared"
+    return f"{value_cell(error.value, error.uncertainty, signed=signed)} %"
+
+
+def _computing(answer: Advice, one: Judged) -> str:
+    if not one.cost.known:
+        return "not known; leave --no-timing out to time it here"
+    spread = f" ± {one.cost.uncertainty:.1g}" if one.cost.uncertainty == one.cost.uncertainty else ""
+    told = f"{one.cost.value:.3g}{spread} ms per 1 ms of simulated time, {1.0 / one.cost.value:.3g} times real time"
+    if answer.short is not None:
+        whole = answer.scene.duration
+        return f"{told}, on this machine, timed over the first {answer.short.covered:.2g} of {whole:g} s"
+    return f"{told}, on {'this' if one.timed_here else 'another'} machine"
+
+
+def _command(answer: Advice, case: Case) -> str:
+    if answer.alike:
+        return "the line below with `measure` of studies: no stored study has this scene"
+    return f"organbench run {ACCURACY.name} --case {case.name}"
+
+
+def in_python(case: Case) -> str:
+    """The case as it is written down: "Case(LIVER_PRESS, BodyRecipe(kind='quadratic', nodes=794), dt_fraction=0.8)"."""
+    scene = case.scene.name.upper() if case.scene in SCENES else "scene"
+    return f"Case({scene}, {body_in_python(case.body)}, dt_fraction={case.dt_fraction:g})"
+
+
+def body_in_python(body: BodyRecipe) -> str:
+    """ "BodyRecipe(kind='quadratic', nodes=794)"."""
+    usual = BodyRecipe()
+    names = [field.name for field in fields(BodyRecipe) if getattr(body, field.name) != getattr(usual, field.name)]
+    return f"BodyRecipe({', '.join(f'{name}={getattr(body, name)!r}' for name in names)})"

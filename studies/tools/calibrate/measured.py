@@ -1,0 +1,64 @@
+"""The runs that a calibration rests on: made once, stored with the others, read back where they are current."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from studies.base.errors import StudyError
+from studies.metrics.judged import Judged, judged
+from studies.metrics.run import Run
+from studies.reference.load import Reference, load_reference
+from studies.runs.case import BodyRecipe, Case
+from studies.scene.scene import Scene
+from studies.store.ledger import Ledger
+from studies.store.record import read_record
+from studies.sweep.executor import Progress, Told, perform
+from studies.sweep.job import CaseJob, Job, reference_jobs
+from studies.sweep.local import Local
+from studies.sweep.run_studies import check_writable
+from studies.tools.calibrate.stored import STUDY
+
+
+def pending(root: Path, scenes: Iterable[Scene], start: BodyRecipe) -> list[Job]:
+    """Pieces of references and runs of the starting body that are missing or stale, the longest first."""
+    ledger, scenes = Ledger(root), list(scenes)
+    jobs = [*reference_jobs(root, scenes), *(CaseJob(root, STUDY, Case(scene, start)) for scene in scenes)]
+    return sorted((job for job in jobs if ledger.why(job) is not None), key=lambda job: -job.weight)
+
+
+def bring_up_to_date(todo: list[Job], root: Path, jobs: int, progress: Progress, on_compile: Told) -> None:
+    """Does them in `jobs` processes. Raises StudyError when results cannot be written."""
+    check_writable(root)
+    perform(Local(jobs), todo, progress, on_compile, Job.store_failure)
+
+
+class Measurements:
+    """Errors of recipes in scenes, from stored runs where there are any."""
+
+    def __init__(self, root: Path, scenes: Iterable[Scene]) -> None:
+        self.root, self.ledger = root, Ledger(root)
+        self.references: dict[str, Reference | None] = {scene.name: load_reference(root, scene) for scene in scenes}
+        self.made = 0
+        """Runs that were not there."""
+
+    def errors(self, scene: Scene, recipe: BodyRecipe) -> Judged | None:
+        """Of one recipe in one scene; None where its run ended badly."""
+        return judged(self._run(scene, recipe))
+
+    def first_errors(self, scene: Scene, recipe: BodyRecipe) -> Judged:
+        """The same. Raises StudyError, with the reason, where the run ended badly."""
+        run = self._run(scene, recipe)
+        errors = judged(run)
+        if errors is None:
+            raise StudyError(
+                f"{run.case.name} is {run.record.status} before anything is fitted ({run.record.message}); "
+                "give another number of nodes"
+            )
+        return errors
+
+    def _run(self, scene: Scene, recipe: BodyRecipe) -> Run:
+        job = CaseJob(self.root, STUDY, Case(scene, recipe))
+        if self.ledger.why(job) is not None:
+            job.run()
+            self.ledger.look_again()
+            self.made += 1
+        return Run(job.work, read_record(job.path()), self.references[scene.name])

@@ -1,0 +1,132 @@
+"""What is installed: Python packages, those of the extras, and the system libraries that gmsh loads."""
+
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, metadata, requires, version
+
+from packaging.requirements import Requirement
+
+from studies.tools.doctor.finding import Finding, fault, note, ok
+
+DISTRIBUTION = "organbench"
+GMSH_LIBRARIES = (
+    "libglu1-mesa", "libgl1", "libxft2", "libxcursor1", "libxinerama1", "libxrender1", "libxfixes3", "libxext6",
+    "libfontconfig1", "libx11-6", "libgomp1",
+)  # fmt: skip
+"""Debian packages with the X and GL libraries that the wheel of gmsh lacks; .ci/setup installs the same."""
+NATIVE = ("numba", "h5py", "gmsh", "mmgpy")
+"""Modules of required packages that load libraries of the system."""
+PURPOSE = {
+    "masks": "label masks of scans (NIfTI, NRRD)",
+    "view": "what reads the files of `organbench view` without ParaView",
+    "crosscheck": "the second finite-element code of `organbench verify`",
+    "parquet": "`organbench table --parquet`",
+    "cluster": "`organbench run --on` workers of other machines",
+}
+"""What an extra is for; those of developers (tests, documentation) are not listed."""
+PATIENCE = 60.0
+"""Seconds that a module may take to load."""
+
+
+def software() -> list[Finding]:
+    """Python, the required packages, the extras, and whether what is installed also loads."""
+    try:
+        needed = required()
+    except PackageNotFoundError:
+        line = f"{shlex.quote(sys.executable)} -m pip install --editable ."
+        return [fault(f"{DISTRIBUTION} itself is not installed, so it is not known what it needs", line)]
+    found = [ok(f"{DISTRIBUTION} {version(DISTRIBUTION)}, Python {platform.python_version()}"), packages(needed)]
+    found += [loads(module) for module in NATIVE if is_installed(module)]
+    return found + [extra(name, required(name)) for name in extras()]
+
+
+def required(extra: str = "") -> list[Requirement]:
+    """What the distribution requires of others, or what an extra adds. Raises PackageNotFoundError."""
+    every = map(Requirement, requires(DISTRIBUTION) or [])
+    plain = {"extra": ""}
+    return [
+        one
+        for one in every
+        if one.name != DISTRIBUTION
+        and (one.marker is None or one.marker.evaluate({"extra": extra}))
+        and (not extra or (one.marker is not None and not one.marker.evaluate(plain)))
+    ]
+
+
+def extras() -> list[str]:
+    """Extras of the distribution that a user may want."""
+    return [name for name in metadata(DISTRIBUTION).get_all("Provides-Extra") or [] if name in PURPOSE]
+
+
+def packages(needed: Sequence[Requirement]) -> Finding:
+    """Whether all required packages are there, in versions that fit."""
+    wrong = [(one, what) for one in needed if (what := lacking(one)) is not None]
+    if not wrong:
+        return ok(f"all {len(needed)} required packages are installed")
+    words = ", ".join(f"{one.name} {what}" for one, what in wrong)
+    return fault(f"required packages: {words}", install([one for one, _ in wrong]))
+
+
+def extra(name: str, needed: Sequence[Requirement]) -> Finding:
+    """Whether an extra is installed."""
+    wrong = [one for one in needed if lacking(one) is not None]
+    what = f"extra {name}, {PURPOSE[name]}"
+    return note(f"{what}: not installed", install(wrong)) if wrong else ok(what)
+
+
+def lacking(one: Requirement) -> str | None:
+    """What is wrong with a package, None when nothing is."""
+    try:
+        there = version(one.name)
+    except PackageNotFoundError:
+        return "is not installed"
+    return None if one.specifier.contains(there, prereleases=True) else f"is {there}, needed is {one.specifier}"
+
+
+def install(needed: Sequence[Requirement]) -> str:
+    """The line that installs packages where organbench runs."""
+    names = [shlex.quote(f"{one.name}{one.specifier}") for one in needed]
+    return " ".join([shlex.quote(sys.executable), "-m", "pip", "install", *names])
+
+
+def is_installed(package: str) -> bool:
+    """Whether there is a package of that name; another finding says so when there is none."""
+    try:
+        version(package)
+    except PackageNotFoundError:
+        return False
+    return True
+
+
+def loads(module: str) -> Finding:
+    """Whether a module can be imported, tried in a process of its own: a missing library may end it."""
+    command = [sys.executable, "-c", f"import {module}"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    except subprocess.TimeoutExpired:
+        return fault(f"{module} takes more than {PATIENCE:g} s to load", reinstall(module))
+    if done.returncode == 0:
+        return ok(f"{module} loads")
+    why = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+    missing = "cannot open shared object file" in why
+    return fault(f"{module} does not load: {why}", system_libraries() if missing else reinstall(module))
+
+
+def reinstall(package: str) -> str:
+    """The line that installs a package anew, in the version that is there."""
+    one = shlex.quote(f"{package}=={version(package)}")
+    return f"{shlex.quote(sys.executable)} -m pip install --force-reinstall --no-deps {one}"
+
+
+def system_libraries() -> str:
+    """The line that installs the libraries of X and GL; elsewhere than on Debian, the packages that hold them there."""
+    names = " ".join(GMSH_LIBRARIES)
+    if shutil.which("apt-get") is None:
+        return f"# by your system's own means, what these packages of Debian hold: {names}"
+    sudo = "" if os.name == "posix" and os.geteuid() == 0 else "sudo "
+    return f"{sudo}apt-get update && {sudo}apt-get install -y --no-install-recommends {names}"

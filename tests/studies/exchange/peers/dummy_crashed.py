@@ -1,0 +1,1 @@
+from tests.studies.exchange.peers.dummies import crashed as run  # noqa: F401

@@ -1,0 +1,1 @@
+from tests.studies.exchange.peers.dummies import hung as run  # noqa: F401

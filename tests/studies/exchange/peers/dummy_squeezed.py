@@ -1,0 +1,1 @@
+from tests.studies.exchange.peers.dummies import squeezed as run  # noqa: F401

@@ -1,0 +1,176 @@
+"""Programs that hand in, refuse, crash, hang or are not there: each has its row, and the rest goes on."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import Free, ImplicitVolume, Plane, Xpbd
+from studies.exchange.entry import HALF_STEP, entries_beside, outside
+from studies.exchange.export import export
+from studies.exchange.judge import unfinished_record
+from studies.exchange.peers.contest import PEERS, Attempt, Peer, contest, hand_over
+from studies.exchange.peers.scene_folder import CannotDo, SceneFolder, moved, turn_to
+from studies.metrics.run import Run
+from studies.metrics.table import study_table
+from studies.metrics.timing.protocol import FrameTiming
+from studies.plots.campaigns.peers import draw, figure, looks_of
+from studies.plots.style.style import GREY, VERMILLION
+from studies.runs.case import BodyRecipe, Case
+from studies.scene.library import BALL_CLAMPED, LIVER_PROBE, STOMACH_PRESS
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.store.record import Status
+from tests.studies.made_up_run import run as made_up
+from tests.studies.octant import SCENE
+
+NODES = 100
+ENDS = {
+    "squeezed": (Status.OK, ""),
+    "unable": (Status.SKIPPED, "unable: it knows no frictionless planes"),
+    "missing": (Status.SKIPPED, "missing: a_program_that_is_not_installed is not installed; pip install"),
+    "crashed": (Status.FAILED, "crashed ended with exit code 1: ZeroDivisionError: in its solver"),
+    "hung": (Status.FAILED, "hung took longer than 3 s"),
+    "shifted": (Status.FAILED, "the positions at t = 0 are up to 1.73 m from those of straight.vtu"),
+}
+
+
+def dummy(name) -> Peer:
+    return Peer(name, f"tests.studies.exchange.peers.dummy_{name}")
+
+
+@pytest.fixture(scope="module")
+def ended(solved, tmp_path_factory, mesh_cache):
+    """(results, records by name) of all of them, one of them also with half its step."""
+    root = shutil.copytree(solved, tmp_path_factory.mktemp("contest") / "results")
+    attempts = {name: Attempt(dummy(name), SCENE, NODES) for name in ENDS}
+    attempts["squeezed-half_step"] = Attempt(dummy("squeezed"), SCENE, NODES, 0.5)
+    limits = {"hung": 3.0}
+    return root, {
+        name: next(contest(root, [attempt], root / "given", limits.get(name, 120.0)))
+        for name, attempt in attempts.items()
+    }
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_each_end_is_a_row_that_says_so(ended, name):
+    record = ended[1][name]
+    status, told = ENDS[name]
+    assert record.status == status and told in record.message
+
+
+def test_tables_and_the_chart_show_them_all(ended, found, tmp_path):
+    root, _ = ended
+    runs, problems = entries_beside(root, [SCENE], lambda scene: found)
+    assert not problems and {run.case.method.name for run in runs} == {*ENDS, "squeezed-half_step"}
+    table = study_table(runs, ("force_end", "volume_worst", "real_time")).set_index("method")
+    row = table.loc["squeezed"]
+    assert row["volume_worst [%]"] == pytest.approx(10.0) and row["real_time [s/s]"] == pytest.approx(0.2)
+    assert row["force_end [%]"] == pytest.approx(100 * (40.0 / found.force[-1] - 1))
+    assert table.loc["squeezed-half_step", "volume_worst [%]"] == pytest.approx(5.0)
+    assert table.loc["crashed", "status"] == "failed" and np.isnan(table.loc["crashed", "volume_worst [%]"])
+    sheet = figure(runs)
+    texts = " ".join(text.get_text() for text in sheet.findobj(lambda a: hasattr(a, "get_text")))
+    assert "squeezed, tetrahedral" in texts and "half step," not in texts
+    assert "Not drawn: " in texts and "; and 3 more reasons." in " ".join(texts.split())
+    drawn = [line for axes in sheet.axes for line in axes.get_lines() if len(line.get_xdata()) == 1]
+    assert [line.get_xdata()[0] for line in drawn] == [5.0] * 4
+    heights = sorted(float(line.get_ydata()[0]) for line in drawn)
+    assert heights[:2] == pytest.approx([5.0, 10.0])
+    assert sum(line.get_markerfacecolor() == "white" for line in drawn) == 2
+    draw(runs, tmp_path / "peers.png")
+    assert (tmp_path / "peers.png").stat().st_size > 10_000
+
+
+def test_a_reason_stands_in_the_chart_once(tmp_path):
+    made, known = made_up(timing=FrameTiming(np.full((2, 4), 1e6))), BodyRecipe("tetrahedral", 150)
+    cases = [Case(scene, known, outside("sofa")) for scene in (BALL_SQUEEZE, BALL_SQUEEZE, BALL_CLAMPED)]
+    lost = [Run(case, unfinished_record(case, Status.SKIPPED, "it is not there")) for case in cases]
+    texts = [text.get_text() for text in figure([made, *lost]).findobj(lambda a: hasattr(a, "get_text"))]
+    told = "Not drawn: sofa on ball_squeeze, sofa on ball_clamped (it is not there)."
+    assert told in " ".join(" ".join(texts).split())
+
+
+def test_the_chart_without_a_run_says_so(tmp_path):
+    draw([], tmp_path / "none.png")
+    draw([made_up(timing=FrameTiming(np.full((2, 4), 1e6)))], tmp_path / "ours.png")
+    assert (tmp_path / "none.png").exists() and (tmp_path / "ours.png").exists()
+
+
+def test_a_program_without_an_adapter_is_a_row_with_its_reason(tmp_path, mesh_cache):
+    (absent,) = [peer for peer in PEERS if peer.absent]
+    (record,) = contest(tmp_path / "r", [Attempt(absent, replace(SCENE, reference=None), NODES)], tmp_path / "g")
+    assert record.status == Status.SKIPPED and record.message == f"sofa: {absent.absent}"
+    assert "no wheel on PyPI" in record.message and all(bool(peer.absent) != bool(peer.module) for peer in PEERS)
+
+
+def test_no_two_contestants_have_one_colour_or_marker():
+    """As many as there are, ours and theirs; half a step changes nothing, and all but ours have no grey."""
+    recipe, times = BodyRecipe("tetrahedral", 150), FrameTiming(np.full((2, 4), 1e6))
+    names = [name for peer in PEERS for name in (peer.name, peer.name + HALF_STEP)]
+    methods = [ImplicitVolume(), Free(), Xpbd(), *map(outside, names)]
+    made = made_up(timing=times)
+    looks = looks_of([replace(made, case=Case(SCENE, recipe, method)) for method in methods])
+    assert len(looks) == 3 + len(PEERS)
+    assert len({look.colour for look in looks.values()}) == len({look.marker for look in looks.values()}) == len(looks)
+    assert looks["tetrahedra, one volume"].colour == VERMILLION and GREY not in [one.colour for one in looks.values()]
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0.6, 0, -0.8), (0.48, 0.6, 0.64)])
+def test_a_quaternion_turns_the_z_axis_to_the_normal(normal):
+    x, y, z, w = turn_to(list(normal))
+    assert (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)) == pytest.approx(normal, abs=1e-12)
+
+
+REFUSED = {
+    "a sphere": (LIVER_PROBE, "knows frictionless planes, not: Rigid sphere"),
+    "friction": (replace(BALL_SQUEEZE, obstacles=(Plane((0, 0, 0.05), (0, 0, -1), friction=0.3),)), "coefficient 0.3"),
+    "a lumen": (STOMACH_PRESS, "knows solid organs"),
+    "moving caps": (BALL_CLAMPED, "held regions that do not move"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_a_scene_beyond_the_adapters_is_refused_with_its_reason(tmp_path, mesh_cache, what):
+    scene, told = REFUSED[what]
+    nodes = 400 if scene.lumen else NODES + 50
+    export(scene, tmp_path / "scene", nodes)
+    given = SceneFolder(tmp_path / "scene")
+    with pytest.raises(CannotDo, match=told):
+        given.check_simple()
+        _ = given.planes
+
+
+def test_a_path_is_read_as_the_scene_means_it(tmp_path, mesh_cache):
+    export(SCENE, tmp_path / "scene", NODES)
+    given = SceneFolder(tmp_path / "scene")
+    for t in (0.0, 1.3, 3.0, 4.0):
+        for plane, obstacle in zip(given.planes, SCENE.obstacles, strict=True):
+            assert moved(plane["path"], t) == pytest.approx(obstacle.path(t), abs=1e-15)
+
+
+LIMITS = {
+    "mujoco": (60.0, 10.0, 0.5),
+    "felupe": (10.0, 0.2, 0.1),
+    "newton": (60.0, 5.0, 0.5),
+    "bullet": (60.0, 2.0, 0.5),
+}
+"""Most [%] that its force, volume and penetration are off on a ball of 100 vertices."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("peer", [peer for peer in PEERS if not peer.absent], ids=lambda peer: peer.name)
+def test_each_program_squeezes_the_ball(ended, found, tmp_path, peer):
+    """Where it is installed: what it hands in is a squeezed ball, and half the step changes little."""
+    scene = replace(SCENE, reference=None)
+    export(scene, tmp_path / "scene", NODES)
+    if hand_over(Attempt(peer, scene, NODES), tmp_path / "scene", tmp_path / "a.npz", 300.0)[0] == Status.SKIPPED:
+        pytest.skip(f"{peer.name} is not installed here")
+    records = list(contest(tmp_path / "r", [Attempt(peer, scene, NODES, s) for s in (1.0, 0.5)], tmp_path / "g"))
+    assert [record.status for record in records] == [Status.OK] * 2, records[0].message
+    runs, _ = entries_beside(tmp_path / "r", [scene], lambda scene: None)
+    table = study_table([replace(run, reference=found) for run in runs], ("force_end", "volume_worst", "penetration"))
+    force, volume, depth = LIMITS[peer.name]
+    assert (table["force_end [%]"].abs() < force).all() and (table["volume_worst [%]"] < volume).all()
+    assert (table["penetration [%]"] < depth).all()
+    assert np.ptp(table["force_end [%]"]) < 5.0

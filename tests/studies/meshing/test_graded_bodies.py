@@ -1,0 +1,64 @@
+"""Bodies on graded and quadratic meshes: held where the scene says, as heavy and as large as their organ."""
+
+import numpy as np
+import pytest
+
+import massspring
+from studies.base.errors import DoesNotApply, StudyError
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.prepare import prepare
+from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
+from studies.scene.library.ball_ringing import BALL_RINGING
+from studies.scene.library.bladder_fill import BLADDER_FILL
+
+BALL = 4 / 3 * np.pi * RADIUS**3
+made = pytest.mark.skipif(not hasattr(massspring, "quadratic_body"), reason="massspring makes no quadratic bodies yet")
+
+
+def held_nodes(prepared):
+    return [attachment.nodes for attachment in prepared.setup.attachments]
+
+
+def test_a_graded_body_holds_the_nodes_of_its_caps_and_has_the_surface_nodes_asked_for(mesh_cache):
+    prepared = prepare(Case(BALL_CLAMPED, BodyRecipe(nodes=300, graded=True)))
+    rest, mesh = prepared.setup.body.rest, prepared.mesh
+    assert abs(mesh.outer_count / 300 - 1) <= 0.05
+    for nodes, sign in zip(held_nodes(prepared), (-1, 1), strict=True):
+        assert (sign * rest[nodes, 2] >= CAP * RADIUS * (1 - 1e-9)).all() and len(nodes) > 10
+    assert prepared.setup.body.mass.sum() == pytest.approx(BALL_CLAMPED.tissue.density * mesh.volume, rel=1e-9)
+    even = prepare(Case(BALL_CLAMPED, BodyRecipe(nodes=300)))
+    assert all(len(ours) > len(theirs) for ours, theirs in zip(held_nodes(prepared), held_nodes(even), strict=True))
+
+
+def test_masses_by_stiffness_are_refused_where_the_body_rings(mesh_cache):
+    case = Case(BALL_RINGING, BodyRecipe("quadratic", 300, mass="stiffness"))
+    with pytest.raises(DoesNotApply, match="masses by stiffness do not apply to scene 'ball_ringing': it starts"):
+        prepare(case)
+
+
+@pytest.mark.parametrize("recipe", [BodyRecipe(nodes=20, graded=True), BodyRecipe("quadratic", 100_000)])
+def test_nodes_that_no_mesher_gives_are_one_sentence(recipe, mesh_cache):
+    with pytest.raises(StudyError, match="surface nodes asked for; give a whole number from 60 to"):
+        prepare(Case(BALL_CLAMPED, recipe))
+
+
+@made
+@pytest.mark.slow
+def test_a_quadratic_body_is_as_large_and_heavy_as_the_ball(mesh_cache):
+    prepared = prepare(Case(BALL_CLAMPED, BodyRecipe("quadratic", 600, mass="stiffness")))
+    body, mesh = prepared.setup.body, prepared.mesh
+    assert body.mass.sum() == pytest.approx(BALL_CLAMPED.tissue.density * BALL, rel=2e-3)
+    assert body.rest_volumes.sum() == pytest.approx(BALL, rel=2e-3)
+    # Four flat triangles to a facet cut off a sixteenth of what one would.
+    assert mesh.volume == pytest.approx(BALL, rel=0.015)
+    for nodes, sign in zip(held_nodes(prepared), (-1, 1), strict=True):
+        assert (sign * body.rest[nodes, 2] >= CAP * RADIUS * (1 - 1e-9)).all()
+
+
+@made
+@pytest.mark.slow
+def test_the_lumen_of_a_quadratic_bladder_is_its_last_volume_and_is_filled(mesh_cache):
+    prepared = prepare(Case(BLADDER_FILL, BodyRecipe("quadratic", 800)))
+    assert prepared.setup.body.kept.names[-1] == "lumen"
+    assert list(prepared.setup.targets) == ["lumen"]
+    assert prepared.mesh.lumen_volume == pytest.approx(prepared.setup.body.rest_volumes[-1], rel=1e-9)

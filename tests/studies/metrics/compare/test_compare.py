@@ -1,0 +1,224 @@
+"""What moved between two results folders: verdicts, rows that belong together, folders that cannot be compared."""
+
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies.base.errors import StudyError
+from studies.cli.commands import compare as compare_command
+from studies.cli.commands.compare import rows_of
+from studies.metrics.compare.folders import compare, equal_records
+from studies.metrics.compare.verdict import MEANING, ROUND_OFF, Verdict, verdict_of
+from studies.store.paths import record_files
+from studies.store.record import read_record, write_record
+from studies.store.tables.csv_table import write_table
+
+PUBLISHED = Path(__file__).parents[4] / "results" / "published"
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "floor", "same", "verdict"),
+    [
+        (2.0, 2.0, 0.1, True, Verdict.SAME_BITS),
+        (2.0, 2.0, 0.1, False, Verdict.ROUND_OFF),
+        (2.0, 2.0 * (1 + 0.5 * ROUND_OFF), NAN, False, Verdict.ROUND_OFF),
+        (2.0, 2.05, 0.1, False, Verdict.WITHIN_FLOOR),
+        (2.0, 1.85, 0.1, False, Verdict.MOVED),
+        (2.0, 2.05, 0.1, True, Verdict.WITHIN_FLOOR),
+        (2.0, 2.05, NAN, False, Verdict.NOT_RESOLVABLE),
+        (NAN, 2.0, 0.1, False, Verdict.NOT_RESOLVABLE),
+        (0.0, 0.0, NAN, False, Verdict.ROUND_OFF),
+    ],
+)
+def test_a_change_is_held_against_what_is_known(old, new, floor, same, verdict):
+    assert verdict_of(old, new, floor, same) == verdict
+
+
+def test_every_verdict_has_its_meaning():
+    assert list(MEANING) == list(Verdict)
+
+
+def rows(**changes):
+    """Two cases of a study."""
+    first = {"scene": "ball", "body": "surface", "method": "free", "status": "ok", "recipe": "{}"}
+    first |= {"dt [ms]": 1.0, "force_end [%]": -30.0, "force_end floor [%]": 0.5, "min_j [1]": 0.5, "doubtful": ""}
+    return [first | changes, first | {"recipe": '{"dt_fraction": 0.1}'}]
+
+
+def folder(path, table, study="made_up"):
+    (path / study).mkdir(parents=True)
+    write_table(path / study / f"{study}.csv", pd.DataFrame(table))
+    return path
+
+
+def told(found, metric="force_end"):
+    return [change.verdict for change in found.changes if change.metric == metric]
+
+
+def test_each_case_is_compared_with_itself(tmp_path):
+    old, new = folder(tmp_path / "old", rows()), folder(tmp_path / "new", rows(**{"force_end [%]": -31.0})[::-1])
+    found = compare(old, new)
+    assert told(found) == [Verdict.MOVED, Verdict.ROUND_OFF] or told(found) == [Verdict.ROUND_OFF, Verdict.MOVED]
+    (moved,) = found.moved
+    assert (moved.case.recipe, moved.old, moved.new, moved.floor, moved.unit) == ("{}", -30.0, -31.0, 0.5, "%")
+    assert {change.metric for change in found.changes} == {"force_end", "min_j"}
+    assert sum(found.counts(times=False).values()) == len(found.changes) == 4
+
+
+def test_the_larger_floor_of_both_counts(tmp_path):
+    old = folder(tmp_path / "old", rows())
+    new = folder(tmp_path / "new", rows(**{"force_end [%]": -31.0, "force_end floor [%]": 2.0}))
+    assert compare(old, new).moved == []
+
+
+def test_a_case_that_ends_otherwise_moved(tmp_path):
+    old, new = folder(tmp_path / "old", rows()), folder(tmp_path / "new", rows(status="diverged"))
+    (moved,) = compare(old, new).moved
+    assert (moved.metric, moved.old, moved.new) == ("status", "ok", "diverged")
+
+
+def test_rows_of_one_folder_are_counted(tmp_path):
+    old, new = folder(tmp_path / "old", rows()[:1]), folder(tmp_path / "new", rows())
+    found = compare(old, new)
+    assert (found.only_old, found.only_new) == (0, 1)
+
+
+def test_records_are_compared_to_the_last_bit(results, tmp_path):
+    other = tmp_path / "other"
+    shutil.copytree(results, other)
+    before = equal_records(results, other, "tiny")
+    assert len(before) == len(record_files(results, "tiny"))
+    path = record_files(other, "tiny")[0]
+    record = read_record(path)
+    volume = record.fields["volume"]
+    nudged = replace(volume, values=np.nextafter(volume.values, 1.0))
+    write_record(path, replace(record, fields={**record.fields, "volume": nudged}))
+    assert len(equal_records(results, other, "tiny")) == len(before) - 1
+    path.write_bytes(b"cut off")
+    assert len(equal_records(results, other, "tiny")) == len(before) - 1
+
+
+def without(path):
+    return path / "nowhere"
+
+
+def empty(path):
+    (path / "empty").mkdir()
+    return path / "empty"
+
+
+def no_recipes(path):
+    return folder(path / "old", [{"a": 1}])
+
+
+def other_study(path):
+    return folder(path / "old", rows(), study="another")
+
+
+def no_table(path):
+    made = folder(path / "old", rows())
+    (made / "made_up" / "made_up.csv").write_bytes(b"")
+    return made
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (without, "there is no folder"),
+        (empty, "holds no table of a study"),
+        (no_recipes, "holds no table of a study"),
+        (other_study, "have no case in common"),
+        (no_table, "cannot be read as a table"),
+    ],
+)
+def test_folders_that_cannot_be_compared_are_refused_in_a_sentence(tmp_path, make, sentence):
+    new = folder(tmp_path / "new", rows())
+    with pytest.raises(StudyError, match=sentence):
+        compare(make(tmp_path), new)
+
+
+TIMED = {"nodes": 550, "step_time [µs]": 20.0, "step_time floor [µs]": 0.5, "real_time [s/s]": 8.0}
+SLOW = {"step_time [µs]": 40.0, "real_time [s/s]": 4.0}
+
+
+def timed(path, machine, **changes):
+    made = folder(path, [TIMED | row for row in rows(**changes)])  # times before accuracy
+    if machine:
+        (made / "machine.json").write_text(f'{{"id": "{machine}"}}')
+    return made
+
+
+@pytest.mark.parametrize("machines", [("one", "other"), ("one", ""), ("", ""), ("one", "one")])
+def test_times_are_judged_on_one_machine_alone(tmp_path, organbench, machines):
+    old, new = timed(tmp_path / "old", machines[0]), timed(tmp_path / "new", machines[1], **SLOW)
+    found, same = compare(old, new), machines == ("one", "one")
+    verdicts = {change.metric: change.verdict for change in found.changes if change.old != change.new}
+    assert verdicts == {
+        "step_time": Verdict.MOVED if same else Verdict.OTHER_MACHINE,
+        "real_time": Verdict.NOT_RESOLVABLE if same else Verdict.OTHER_MACHINE,
+    }
+    code, out, _ = organbench("compare", old, new)
+    assert code == same and out.startswith("accuracy: 4 equal, 0 within uncertainty, 0 moved\nspeed: ")
+    if not same:
+        machine = "another machine" if all(machines) else "machine not known"
+        assert f"speed: {machine}, median ratio 1.5 (new / old), 4 times not judged" in out
+
+
+def test_accuracy_that_moves_ends_with_one_on_any_machine_and_comes_first(tmp_path, organbench):
+    worse = SLOW | {"force_end [%]": -31.0}
+    old = timed(tmp_path / "old", "one")
+    assert organbench("compare", old, timed(tmp_path / "other", "other", **worse))[0] == 1
+    found = compare(old, timed(tmp_path / "same", "one", **dict(reversed(worse.items()))))
+    assert [change.metric for change in found.moved] == ["force_end", "step_time"]
+
+
+def test_no_two_rows_are_equal_and_they_name_the_nodes(tmp_path):
+    more = {"nodes": 300, "law": "lloyd", "recipe": "{1}"}
+    first = rows()[0] | {"law": "uniform", "dt/dt_c": 0.5}
+    table = [
+        first | {"nodes": 550},
+        first | {"nodes": 300},
+        first | more,
+        first | more | {"dt/dt_c": 0.05, "recipe": "{2}"},
+    ]
+    table = [row | {"recipe": f"{{{number}}}"} for number, row in enumerate(table)]
+    moved = [row | {"force_end [%]": -40.0} for row in table]
+    found = compare(folder(tmp_path / "old", table), folder(tmp_path / "new", moved))
+    assert [row[2] for row in rows_of(found.moved, found)] == [
+        "surface, 550, free",
+        "surface, 300, free, uniform, step 0.5",
+        "surface, 300, free, lloyd, step 0.5",
+        "surface, 300, free, lloyd, step 0.05",
+    ]
+
+
+def test_the_published_tables_have_no_two_equal_rows():
+    found = compare(PUBLISHED, PUBLISHED)
+    shown = [tuple(row[:4]) for row in rows_of(found.changes, found)]
+    assert len(shown) > 5000 and len(set(shown)) == len(shown)
+
+
+def test_a_terminal_gets_80_columns(tmp_path, organbench, monkeypatch):
+    old, new = timed(tmp_path / "old", "one"), timed(tmp_path / "new", "one", **SLOW, **{"force_end [%]": -31.0})
+    monkeypatch.setattr(compare_command.console, "_force_terminal", True)
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = organbench("compare", old, new)
+    assert "force_end" in out and "|" not in out
+    assert max(len(line) for line in re.sub(r"\x1b\[[0-9;]*m", "", out).splitlines()) <= 80
+
+
+def test_the_command_prints_markdown_and_ends_with_one_where_something_moved(tmp_path, organbench):
+    old, new = folder(tmp_path / "old", rows()), folder(tmp_path / "new", rows(**{"force_end [%]": -31.0}))
+    code, out, _ = organbench("compare", old, new, "--csv", tmp_path / "all.csv")
+    assert code == 1 and "| made_up | ball | surface, free, {} | force_end [%] | −30 | −31 | −1 | 0.5 |" in out
+    assert len(pd.read_csv(tmp_path / "all.csv")) == 4
+    code, out, _ = organbench("compare", old, old)
+    assert code == 0 and "0 moved" in out
+    code, _, err = organbench("compare", tmp_path / "nowhere", new)
+    assert code == 2 and err.count("\n") == 1

@@ -1,0 +1,56 @@
+"""A short timing keeps to the protocol: pinned, repeated, compiled before; and to its seconds."""
+
+from dataclasses import replace
+
+import pytest
+
+from studies.base.errors import StudyError
+from studies.metrics.timing.cases import REPEATS
+from studies.metrics.timing.protocol import FrameTiming
+from studies.metrics.timing.short import ShortTiming, short_timing
+from studies.scene.library import LIVER_PRESS
+from studies.tools.advise import answer as answers
+from studies.tools.advise.answer import advise
+from tests.plots.made_up import frame_ns
+from tests.studies.tiny import FRAMES, tiny_case
+from tests.studies.tools.advise.made_up_campaign import GRADED, publish, rows_of
+
+
+def test_frames_are_timed_as_often_as_the_protocol_says(mesh_cache):
+    found = short_timing(tiny_case())
+    assert found.timing.frame_ns.shape == (REPEATS, FRAMES) and (found.timing.frame_ns > 0).all()
+    assert found.covered == pytest.approx(tiny_case().scene.duration)
+
+
+def test_a_dear_case_is_timed_over_its_first_frames(mesh_cache):
+    found = short_timing(tiny_case(frames=50), seconds=1e-9)
+    assert found.frames == 1 and found.covered == pytest.approx(tiny_case().scene.duration / 50)
+
+
+def test_a_case_that_breaks_off_is_one_sentence(mesh_cache):
+    with pytest.raises(StudyError, match="cannot be timed here: the run broke off"):
+        short_timing(tiny_case(dt_fraction=3.0, beyond_limit=True, frames=100))
+
+
+def made_up(case):
+    """Half as fast as real time."""
+    return ShortTiming(FrameTiming(frame_ns(200.0), 0), 0.1 * 1.02, 40, 3e-3)
+
+
+def test_advice_times_what_was_timed_elsewhere(tmp_path, monkeypatch):
+    monkeypatch.setattr(answers, "short_timing", made_up)
+    results = publish(tmp_path, rows_of(LIVER_PRESS), machine="0badcafe")
+    found = advise(LIVER_PRESS, results=results)
+    assert found.chosen.case.body == GRADED and found.meets and found.chosen.timed_here
+    assert found.real_time == pytest.approx(0.5) and found.chosen.dt == 3e-3
+    assert found.chosen.cost.uncertainty == pytest.approx(0.5 * 0.04 * 2.0 / 1.02)
+    assert not advise(LIVER_PRESS, budget=1.0, results=results).meets
+    assert advise(LIVER_PRESS, budget=1.0, results=results, timing=False).meets
+
+
+def test_advice_for_a_scene_that_was_never_run_is_timed_in_it(tmp_path, monkeypatch):
+    timed = []
+    monkeypatch.setattr(answers, "short_timing", lambda case: timed.append(case) or made_up(case))
+    mine = replace(LIVER_PRESS, name="mine", duration=9.0)
+    advise(mine, results=publish(tmp_path, rows_of(LIVER_PRESS)))
+    assert [case.scene for case in timed] == [mine]

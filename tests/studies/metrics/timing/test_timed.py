@@ -1,0 +1,141 @@
+"""Frame times live in files of their own: re-timing never touches physics, and rivals take turns."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import Free, simulate
+from studies.base.errors import StudyError
+from studies.metrics.run import Run
+from studies.metrics.table import metric
+from studies.metrics.timing import cases as module
+from studies.metrics.timing.cases import time_cases, timing_file, write_timing
+from studies.metrics.timing.protocol import FrameTiming
+from studies.runs.current import case_path
+from studies.runs.prepare import prepare
+from studies.store import ledger
+from studies.store.entry import CODE_CHANGED, MISSING
+from studies.store.machine import machine_id
+from studies.store.record import Status, read_record, write_record
+from studies.sweep import job as jobs_module
+from studies.sweep.load import frame_times
+from tests.studies.tiny import FRAMES, diverging_case, tiny_case
+
+KEPT, LOOSE = tiny_case(timed=True), tiny_case(method=Free(), timed=True)
+
+
+def content(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_a_file_beside_the_physics(results):
+    file = timing_file(results, "tiny", KEPT)
+    physics = case_path(results, "tiny", KEPT)
+    assert file.name == f"{physics.stem}.timing.{machine_id()}.h5"
+    record = read_record(file)
+    assert (record.kind, record.status, record.key) == ("timing", Status.OK, KEPT.key)
+    assert record.fields["frame_ns"].values.shape == (module.REPEATS, FRAMES)
+    assert record.fields["frame_ns"].unit == "ns"
+    assert record.attributes["threads"] == 1
+    assert "frame_ns" not in read_record(physics).fields
+
+
+def test_timing_again_leaves_the_physics_alone(results):
+    before = content(results / "tiny")
+    time_cases(results, "tiny", [KEPT], lambda name: None)
+    after = content(results / "tiny")
+    changed = {name for name in after if after[name] != before[name]}
+    assert changed == {timing_file(results, "tiny", KEPT).name}
+    assert set(before) == set(after)
+
+
+def test_measured_frames_make_the_time_metrics_numbers(results):
+    record = read_record(case_path(results, "tiny", KEPT))
+    run = Run(KEPT, record, None, read_timing(results, KEPT))
+    assert all(metric(name)(run) > 0 for name in ("step_time", "frame_time", "frame_time_p99", "real_time"))
+
+
+def why_untimed(root, case):
+    return ledger.Ledger(root).why_untimed(jobs_module.CaseJob(root, "tiny", case))
+
+
+def read_timing(root, case):
+    return frame_times(ledger.Ledger(root), jobs_module.CaseJob(root, "tiny", case))
+
+
+def can_be_timed(root, case):
+    return ledger.Ledger(root).can_be_timed(jobs_module.CaseJob(root, "tiny", case))
+
+
+def test_current_until_the_code_changes_or_on_another_machine(results, monkeypatch):
+    assert why_untimed(results, KEPT) is None
+    for asked in (module, jobs_module):
+        monkeypatch.setattr(asked, "case_fingerprint", lambda case: "edited")
+    assert why_untimed(results, KEPT) == CODE_CHANGED
+    assert read_timing(results, KEPT) is None
+    monkeypatch.undo()
+    monkeypatch.setattr(ledger, "machine_id", lambda: "00000000")
+    assert why_untimed(results, KEPT) == MISSING
+
+
+def test_what_diverged_or_never_ran_is_not_timed(results):
+    assert not timing_file(results, "tiny", diverging_case()).exists()
+    assert not can_be_timed(results, diverging_case())
+    assert not can_be_timed(results, tiny_case(dt_fraction=0.3))
+    for status in (Status.INVERTED, Status.DRIFTED, Status.TIMED_OUT, Status.FAILED):
+        path = case_path(results, "tiny", KEPT)
+        write_record(path, replace(read_record(path), status=status))
+        assert can_be_timed(results, KEPT) == (status in (Status.INVERTED, Status.DRIFTED))
+
+
+def test_methods_of_one_body_take_turns(results, monkeypatch):
+    """Their ratio is wanted: a slow minute of the machine must fall on both. Another step is another group."""
+    turns = []
+
+    def spy(setup, **warm_up):
+        if not warm_up:
+            turns.append((setup.method.name, setup.clock.steps))
+        return simulate(setup, **warm_up)
+
+    monkeypatch.setattr(module, "simulate", spy)
+    other = tiny_case(dt_fraction=0.25, timed=True)
+    told = []
+    time_cases(results, "tiny", [KEPT, other, LOOSE], told.append)
+    steps, finer = (prepare(case).setup.clock.steps for case in (KEPT, other))
+    assert steps != finer
+    pairs = [turns[k : k + 2] for k in range(0, 2 * module.REPEATS, 2)]
+    assert all({name for name, _ in pair} == {"implicit_volume", "free"} for pair in pairs)
+    assert {pair[0][0] for pair in pairs} == {"implicit_volume", "free"}  # each goes first now and then
+    assert turns[len(pairs) * 2 :] == [("implicit_volume", finer)] * module.REPEATS
+    assert sorted(told) == sorted([KEPT.name, other.name, LOOSE.name])
+
+
+def test_a_long_run_is_timed_less_often(monkeypatch):
+    setup = prepare(KEPT).setup
+    assert module.repeats_for(setup) == module.REPEATS
+    monkeypatch.setattr(module, "BUDGET", 1e-9)
+    assert module.repeats_for(setup) == module.FEWEST
+
+
+def test_a_run_that_breaks_off_while_timed_is_not_stored(results, monkeypatch):
+    before = content(results / "tiny")
+    monkeypatch.setattr(module, "prepare", lambda case: prepare(diverging_case()))
+    with pytest.raises(StudyError, match=r"positive"):
+        time_cases(results, "tiny", [KEPT], lambda name: None)
+    assert content(results / "tiny") == before
+
+
+def test_unwritable_timing_is_told(tmp_path):
+    (tmp_path / "file").write_text("no folder")
+    timing = FrameTiming(np.full((2, 3), 10))
+    with pytest.raises(StudyError, match="was not written"):
+        write_timing(tmp_path / "file", "tiny", KEPT, timing)
+
+
+def test_the_time_of_each_stage_is_stored_beside_the_frames(finished_sweep):
+    record = read_record(timing_file(finished_sweep, "tiny", tiny_case(timed=True)))
+    stages, times = record.fields["stages"].values.tolist(), record.fields["stage_ns"].values
+    assert times.shape == (len(stages), record.fields["frame_ns"].values.shape[1])
+    assert (times >= 0).all() and (times[stages.index("springs and prediction")] > 0).all()
+    assert (times[stages.index("contact search")] > 0).all()

@@ -1,0 +1,104 @@
+import gc
+import os
+
+import numba
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info
+
+from studies.base.errors import StudyError
+from studies.metrics.timing.protocol import FrameTiming, interleave, pinned
+from studies.store.record import SCHEMA, Record, Status, read_record, write_record
+
+
+def test_pinned_to_one_core_and_one_thread_and_back():
+    threads = numba.get_num_threads()
+    if not hasattr(os, "sched_getaffinity"):
+        with pinned() as core:
+            assert core is None
+        return
+    before = os.sched_getaffinity(0)
+    with pytest.raises(RuntimeError, match="inside"), pinned() as core:
+        assert os.sched_getaffinity(0) == {core}
+        assert {frozenset(os.sched_getaffinity(int(task))) for task in os.listdir("/proc/self/task")} == {
+            frozenset({core})
+        }
+        assert numba.get_num_threads() == 1
+        raise RuntimeError("inside")
+    assert os.sched_getaffinity(0) == before
+    assert numba.get_num_threads() == threads
+
+
+def test_linear_algebra_uses_no_more_threads_than_were_asked_for():
+    """A pool that waits for work on the pinned core takes every other slice of time from what is measured."""
+    np.ones((2, 2)) @ np.ones((2, 2))
+    with pinned(threads=1):
+        pools = threadpool_info()
+        assert pools
+        assert all(pool["num_threads"] == 1 for pool in pools)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="this system cannot pin")
+def test_as_many_cores_as_threads():
+    allowed = os.sched_getaffinity(0)
+    if len(allowed) < 2 or numba.config.NUMBA_NUM_THREADS < 2:
+        pytest.skip("this process may use one core only")
+    with pinned(threads=2) as core:
+        assert len(os.sched_getaffinity(0)) == 2
+        assert core in os.sched_getaffinity(0)
+        assert numba.get_num_threads() == 2
+    with pytest.raises(StudyError, match="threads need as many cores"), pinned(threads=len(allowed) + 1):
+        pass
+
+
+def test_turns_are_taken_and_the_warm_up_is_thrown_away():
+    calls: list[str] = []
+
+    def contestant(name, frames):
+        def run():
+            calls.append(name)
+            assert not gc.isenabled()
+            return np.full(frames, len(calls))
+
+        return run
+
+    times = interleave({"a": contestant("a", 2), "b": contestant("b", 3)}, repeats=3, warmups=1)
+    assert "".join(calls) == "ba" + "ab" + "ba" + "ab"
+    np.testing.assert_array_equal(times["a"], [[3, 3], [6, 6], [7, 7]])
+    np.testing.assert_array_equal(times["b"], [[4] * 3, [5] * 3, [8] * 3])
+    assert gc.isenabled()
+
+
+@pytest.mark.parametrize(("contestants", "repeats"), [({}, 3), ({"a": lambda: np.ones(2)}, 0)])
+def test_nothing_to_measure_is_refused(contestants, repeats):
+    with pytest.raises(StudyError, match="timing needs a contestant and at least one repeat"):
+        interleave(contestants, repeats)
+
+
+def test_a_contestant_that_changes_its_frames_is_named():
+    lengths = iter([2, 2, 3])
+    with pytest.raises(StudyError, match="'a' must return the same number of frame times"):
+        interleave({"a": lambda: np.ones(next(lengths))}, repeats=2)
+    assert gc.isenabled()
+
+
+@pytest.mark.parametrize("frame_ns", [np.ones(3), np.ones((0, 3)), np.zeros((2, 2)), np.full((1, 2), np.nan)])
+def test_impossible_frame_times_are_refused(frame_ns):
+    with pytest.raises(StudyError, match="frame times must be positive"):
+        FrameTiming(frame_ns)
+
+
+def test_a_stage_needs_a_name():
+    with pytest.raises(StudyError, match="one name per row"):
+        FrameTiming(np.ones((1, 2)), stage_ns=np.ones((2, 2)), stages=("springs",))
+
+
+def test_a_timing_survives_the_store(tmp_path):
+    frame_ns = np.arange(1, 7).reshape(2, 3)
+    timing = FrameTiming(frame_ns, core=1, stage_ns=np.ones((2, 3)), stages=("springs", "volume"))
+    record = Record(SCHEMA, "timing", "{}", "x", Status.OK, "", "f", "01234567", timing.attributes(), timing.fields())
+    write_record(tmp_path / "x.h5", record)
+    back = read_record(tmp_path / "x.h5")
+    np.testing.assert_array_equal(back.fields["frame_ns"].values, frame_ns)
+    assert tuple(back.fields["stages"].values) == ("springs", "volume")
+    assert back.attributes == {"core": 1, "threads": 1, "repeats": 2}

@@ -1,1 +1,0 @@
-from tests.studies.peers.dummies import shifted as run  # noqa: F401

@@ -1,1 +1,0 @@
-from tests.studies.peers.dummies import unable as run  # noqa: F401

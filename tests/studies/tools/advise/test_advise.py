@@ -1,0 +1,238 @@
+"""Advice is the cheapest recipe that was measured to be good enough, and nothing beyond what was measured."""
+
+from dataclasses import replace
+
+import pytest
+
+import studies
+from massspring import Probe
+from studies.base.errors import StudyError
+from studies.metrics.table import study_table
+from studies.metrics.true_surface import ShapeErrors
+from studies.metrics.wish import usual_wish
+from studies.runs.case import BodyRecipe
+from studies.scene.library import (
+    BALL_CLAMPED,
+    BLADDER_FILL,
+    KIDNEY_PROBE,
+    LIVER_PRESS,
+    LIVER_PROBE,
+    SPLEEN_SAG,
+    STOMACH_PRESS,
+)
+from studies.store.record import Status
+from studies.store.tables.csv_table import write_table
+from studies.tools.advise import answer as answers
+from studies.tools.advise.answer import advise, recommended
+from tests.plots.made_up import run
+from tests.studies.tools.advise.made_up_campaign import EVEN, FINE, GRADED, LADDER, ONE, PAPER, publish, row, rows_of
+
+NAN = float("nan")
+
+
+@pytest.fixture
+def results(tmp_path):
+    """A published campaign of one scene."""
+    return publish(tmp_path, rows_of(LIVER_PRESS))
+
+
+@pytest.fixture
+def never_timed(monkeypatch):
+    """A timing run here would be one too many."""
+
+    def refuse(case):
+        raise AssertionError(f"{case.name} was timed")
+
+    monkeypatch.setattr(answers, "short_timing", refuse)
+
+
+def body(found):
+    return found.chosen.case.body
+
+
+def test_the_usual_wish_is_met_by_the_cheapest_that_meets_both_errors(results, never_timed):
+    found = advise("liver_press", results=results)
+    assert body(found) == GRADED and found.meets and found.usual
+    assert (found.wish.force, found.wish.displacement) == (3.0, 1.0)
+    assert found.chosen.force == (-1.2, 0.5) and found.chosen.displacement == (0.8, 0.1)
+    assert found.real_time == pytest.approx(2.0)
+    assert recommended(LIVER_PRESS, results) == (GRADED, 0.8)
+
+
+@pytest.mark.parametrize(
+    ("wish", "chosen"),
+    [
+        ({"force": 0.03}, EVEN),
+        ({"displacement": 0.05}, ONE),
+        ({"force": 0.8, "displacement": 0.2}, PAPER),
+        ({"force": 0.01}, FINE),
+        ({"force": 0.35, "budget": 0.02}, ONE),
+        ({"budget": 0.5}, GRADED),
+    ],
+)
+def test_only_what_is_named_counts(results, never_timed, wish, chosen):
+    found = advise(LIVER_PRESS, **wish, results=results)
+    assert body(found) == chosen and found.meets
+
+
+@pytest.mark.parametrize(
+    ("wish", "nearest"),
+    [
+        ({"budget": 0.25}, EVEN),  # 1.4 times the displacement; the next is twice as dear
+        ({"displacement": 0.002}, FINE),
+        ({"force": 0.2, "budget": 0.019}, ONE),
+    ],
+)
+def test_where_none_meets_the_nearest_is_named(results, never_timed, wish, nearest):
+    found = advise(LIVER_PRESS, **wish, results=results)
+    assert body(found) == nearest and not found.meets and not found.unknowable
+
+
+def test_no_error_is_promised_that_the_reference_does_not_know(results, never_timed):
+    found = advise(LIVER_PRESS, force=0.004, results=results)
+    assert found.unknowable == ("force",) and not found.meets and body(found) == FINE
+
+
+def test_a_recipe_that_ended_badly_is_none(tmp_path, never_timed):
+    rows = [row(LIVER_PRESS, b, n, status="inverted" if b == GRADED else "ok") for b, n in LADDER.items()]
+    assert body(advise(LIVER_PRESS, results=publish(tmp_path, rows))) == FINE
+
+
+def test_hollow_organs_may_be_farther_off(tmp_path, never_timed):
+    assert (usual_wish(STOMACH_PRESS).force, usual_wish(STOMACH_PRESS).displacement) == (6.0, 3.0)
+    assert body(advise(STOMACH_PRESS, results=publish(tmp_path, rows_of(STOMACH_PRESS)))) == EVEN
+
+
+def test_what_a_scene_does_not_compare_is_said_and_left_out(tmp_path, never_timed):
+    results = publish(tmp_path, rows_of(SPLEEN_SAG, **{"force_end [%]": NAN, "force_end floor [%]": NAN}))
+    found = advise(SPLEEN_SAG, results=results)
+    assert found.ignored == ("force",) and found.meets and body(found) == GRADED
+    alone = advise(SPLEEN_SAG, force=0.03, results=results)
+    assert alone.chosen is None and not alone.meets and alone.ignored == ("force",)
+
+
+def test_what_was_published_by_the_writer_of_tables_is_read_back(tmp_path, never_timed):
+    """No recipe, error or time is lost on the way through the table of a study."""
+    options = {"nodes": 794, "fraction": 0.5, "frame_ms": 100.0, "recipe": {"graded": True, "mass": "stiffness"}}
+    runs = [run(LIVER_PRESS, "quadratic", error=0.02, **options), run(LIVER_PRESS, error=0.5, frame_ms=50.0)]
+    publish(tmp_path, [])
+    write_table(tmp_path / "published" / "accuracy" / "accuracy.csv", study_table(runs, ("force_end", "mean_error",
+                "real_time")))  # fmt: skip
+    found = advise(LIVER_PRESS, force=0.025, results=tmp_path)
+    assert found.chosen.case == runs[0].case.replaced(timed=False)
+    assert found.chosen.force == pytest.approx((-2.0, 2.0))
+    assert found.chosen.cost.value == pytest.approx(0.1 * 1.02 / (LIVER_PRESS.duration / 40), rel=1e-5)
+    assert found.chosen.dt == pytest.approx(1e-3)
+
+
+def stored_runs(monkeypatch, *runs):
+    """Runs that lie in the results folder, of octahedra that count as livers in shape."""
+    monkeypatch.setattr("studies.metrics.run.shape_errors", lambda *given, **options: ShapeErrors(0.0, 0.0))
+    keys = [each.case.key for each in runs]
+    monkeypatch.setattr(
+        "studies.tools.advise.campaign.case_path", lambda root, study, case: case.replaced(recorded=()).key
+    )
+    monkeypatch.setattr("studies.tools.advise.campaign.is_there", lambda path: path in keys)
+    monkeypatch.setattr("studies.tools.advise.campaign.load_runs", lambda root, study: (list(runs), []))
+
+
+GRADED_RUN = {"nodes": 794, "fraction": 0.8, "frame_ms": 10.0, "recipe": {"graded": True, "mass": "stiffness"}}
+
+
+def test_a_run_replaces_its_published_row_and_the_others_stay(results, monkeypatch, never_timed):
+    stored = run(LIVER_PRESS, "quadratic", error=0.02, **GRADED_RUN)
+    stored_runs(monkeypatch, stored)
+    found = advise(LIVER_PRESS, force=0.025, results=results)
+    assert found.chosen.case == stored.case and found.chosen.force.value == pytest.approx(-2.0)
+    assert found.stored.where == f"{results / 'accuracy'} and {results / 'published' / 'accuracy' / 'accuracy.csv'}"
+    assert found.chosen.cost.uncertainty > 0  # repeats are stored, not only their median
+    assert body(advise(LIVER_PRESS, force=0.005, results=results)) == FINE
+
+
+def test_a_run_that_ended_badly_here_is_not_advised_for_its_published_row(results, monkeypatch, never_timed):
+    stored_runs(monkeypatch, run(LIVER_PRESS, "quadratic", status=Status.DIVERGED, **GRADED_RUN))
+    assert body(advise(LIVER_PRESS, results=results)) == FINE
+
+
+def test_a_run_without_a_reference_leaves_its_published_row(results, monkeypatch, never_timed):
+    stored_runs(monkeypatch, run(LIVER_PRESS, "quadratic", with_reference=False, **GRADED_RUN))
+    found = advise(LIVER_PRESS, results=results)
+    assert body(found) == GRADED and found.chosen.force.value == -1.2
+
+
+def like(scene, **changes):
+    return replace(scene, name="mine", title="mine", reference=None, duration=2 * scene.duration, **changes)
+
+
+def test_a_scene_that_was_never_run_gets_the_worst_of_its_kind(tmp_path, never_timed):
+    worse = {b: (2 * f, 0.5 * u, 3 * c) for b, (f, u, c) in LADDER.items() if b != EVEN}
+    results = publish(tmp_path, [*rows_of(LIVER_PROBE), *rows_of(KIDNEY_PROBE, worse), *rows_of(LIVER_PRESS)])
+    found = advise(like(LIVER_PROBE), results=results, timing=False)
+    assert found.alike == ("liver_probe", "kidney_probe")
+    assert body(found) == GRADED and found.chosen.case.scene.name == "mine"
+    assert found.chosen.force.value == pytest.approx(-2.4) and found.chosen.displacement.value == 0.8
+    assert found.chosen.cost.value == pytest.approx(1.5) and not found.chosen.timed_here
+    strict = advise(like(LIVER_PROBE), force=0.02, results=results, timing=False)
+    assert body(strict) == FINE
+
+
+def test_the_same_name_with_another_load_was_never_run(results):
+    deeper = replace(LIVER_PRESS, duration=9.0)
+    assert advise(deeper, results=results, timing=False).alike == ("liver_press",)
+    assert advise(replace(LIVER_PRESS, reference=None), results=results, timing=False).alike == ()
+
+
+def test_a_scene_that_refuses_masses_by_stiffness_is_not_advised_them(tmp_path):
+    lumped = replace(GRADED, mass="lumped")
+    results = publish(tmp_path, rows_of(LIVER_PRESS, LADDER | {lumped: (-1.3, 0.8, 0.9)}))
+    (plane,) = LIVER_PRESS.obstacles
+    fast = replace(plane, path=replace(plane.path, times=(0.0, 0.1)))
+    found = advise(replace(LIVER_PRESS, name="fast", obstacles=(fast,)), results=results, timing=False)
+    assert body(found) == lumped
+
+
+def test_a_kind_that_was_never_measured_is_not_guessed(results):
+    with pytest.raises(StudyError, match=r"nothing is known for scene 'ball_ringing': .* \(solid, motion\)"):
+        advise("ball_ringing", results=results)
+    thin = replace(LIVER_PRESS, name="thin", obstacles=(Probe((0.0, 0.0, 0.3)),))
+    with pytest.raises(StudyError, match="solid, thin probe"):
+        advise(thin, results=results)
+
+
+@pytest.mark.parametrize("scene", [BALL_CLAMPED, BLADDER_FILL])
+def test_where_nothing_is_stored_the_command_that_measures_is_named(results, scene):
+    with pytest.raises(StudyError, match=r"nothing is stored of the study 'accuracy' for .*organbench run accuracy"):
+        advise(scene, results=results)
+
+
+@pytest.mark.parametrize("missing", ["recipe", "dt [ms]", "status"])
+def test_a_table_that_names_no_recipes_is_one_sentence(tmp_path, missing):
+    rows = [{k: v for k, v in each.items() if k != missing} for each in rows_of(LIVER_PRESS)]
+    with pytest.raises(StudyError, match=r"accuracy\.csv cannot be read"):
+        advise(LIVER_PRESS, results=publish(tmp_path, rows))
+
+
+@pytest.mark.parametrize("bound", [-0.1, 0.0, NAN, float("inf"), "3%"])
+@pytest.mark.parametrize("name", ["force", "displacement", "budget"])
+def test_a_bound_that_is_none_is_one_sentence(results, name, bound):
+    with pytest.raises(StudyError, match=f"{name} is .*; give a positive number"):
+        advise(LIVER_PRESS, **{name: bound}, results=results)
+
+
+def test_an_unknown_scene_is_answered_with_the_nearest(results):
+    with pytest.raises(StudyError, match="did you mean 'liver_press'"):
+        advise("liver_pres", results=results)
+
+
+def test_nothing_is_recommended_that_does_not_meet_the_usual_wish(tmp_path):
+    results = publish(tmp_path, rows_of(LIVER_PRESS, {ONE: LADDER[ONE]}))
+    with pytest.raises(StudyError, match="no recipe is recommended for scene 'liver_press': none meets"):
+        recommended(LIVER_PRESS, results)
+    coarse = publish(tmp_path, rows_of(LIVER_PRESS, **{"mean_error floor [%]": 1.5}))
+    with pytest.raises(StudyError, match="the reference is too coarse to tell"):
+        recommended(LIVER_PRESS, coarse)
+
+
+def test_it_is_offered_where_users_import():
+    assert studies.advise is advise and studies.recommended is recommended
+    assert isinstance(EVEN, BodyRecipe)

@@ -1,0 +1,64 @@
+"""What `advise` says of organs that a recipe was not chosen on: read off the table of the population."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from massspring import ImplicitVolume
+from studies.base.errors import StudyError
+from studies.catalog.population import Population, member
+from studies.catalog.population.draw import organ_of
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.recipe_text import recipe_text
+from studies.scene.library import KIDNEY_PROBE, LIVER_PROBE
+from studies.tools.advise.population import unseen, words
+
+CASE = Case(LIVER_PROBE, BodyRecipe("quadratic", 794, graded=True), ImplicitVolume(), dt_fraction=0.8)
+FORCES = np.linspace(-4.0, 4.0, 41)
+
+
+def table(path, case=CASE):
+    """Forty-one livers and a lost one, a kidney, and another recipe."""
+    rows = [(f"liver_0_{number:03d}", "ok", force, recipe_text(case)) for number, force in enumerate(FORCES)]
+    rows += [("liver_0_041", "diverged", 99.0, recipe_text(case)), ("kidney_0_000", "ok", 77.0, recipe_text(case))]
+    rows += [
+        ("liver_0_000", "ok", 66.0, recipe_text(replace(case, dt_fraction=0.4))),
+        ("liver_press", "ok", 55.0, "{}"),
+    ]
+    frame = pd.DataFrame(rows, columns=["scene", "status", "force_end [%]", "recipe"])
+    frame["force_end floor [%]"], frame["mean_error [%]"], frame["mean_error floor [%]"] = 0.5, 1.0, 0.1
+    path.parent.mkdir(parents=True)
+    frame.to_csv(path, index=False)
+
+
+@pytest.mark.parametrize("place", ["population", "published/population"])
+def test_only_members_of_that_organ_with_that_recipe_count(tmp_path, place):
+    table(tmp_path / place / "population.csv")
+    found = unseen(tmp_path, CASE)
+    assert found is not None and (found.force.count, found.force.lost, found.organ) == (41, 1, "liver")
+    assert found.force.bound == pytest.approx(np.quantile(np.abs(FORCES), 0.95))
+    assert "41 other organs" in words(found) and "1 more lost" in words(found) and "3.8 %" in words(found)
+
+
+def test_nothing_is_said_where_nothing_was_run(tmp_path):
+    assert unseen(tmp_path, CASE) is None
+    table(tmp_path / "population" / "population.csv")
+    assert unseen(tmp_path, replace(CASE, dt_fraction=0.1)) is None
+    assert unseen(tmp_path, replace(CASE, scene=KIDNEY_PROBE)).force.count == 1
+
+
+def test_a_table_that_lacks_a_column_is_named(tmp_path):
+    table(tmp_path / "population" / "population.csv")
+    path = tmp_path / "population" / "population.csv"
+    pd.read_csv(path).drop(columns="recipe").to_csv(path, index=False)
+    with pytest.raises(StudyError, match=r"population\.csv cannot be read"):
+        unseen(tmp_path, CASE)
+
+
+def test_names_of_members_and_of_nothing_else_tell_their_organ():
+    names = [scene.name for scene in Population("kidney", 2, 7).scenes()]
+    assert [organ_of(name) for name in names] == ["kidney", "kidney"]
+    assert organ_of(member("liver", 0, 1234).name) == "liver"
+    assert [organ_of(name) for name in ("liver_press", "liver", "lever_0_001", "liver_0_x")] == [None] * 4

@@ -1,0 +1,153 @@
+"""Trials of the stress campaign: drawn alike everywhere, ended by name, reduced to what matters."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import Free, MassSpringError, simulate
+from massspring.layout.threads import cores
+from massspring.methods.implicit_volume import ImplicitVolume
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+from studies.tools.fuzz import outcome as module
+from studies.tools.fuzz.bodies import body_of, mesh_of
+from studies.tools.fuzz.outcome import UNEXPLAINED, simplest, tried
+from studies.tools.fuzz.surroundings import setup_of
+from studies.tools.fuzz.trial import CHOICES, Trial, draw
+from studies.tools.fuzz.truths import broken, named, other_bits
+
+CALM = Trial(seed=0, number=0, method="implicit_volume")
+
+
+def test_a_trial_is_its_seed_and_number():
+    assert draw(3, 7) == draw(3, 7) != draw(3, 8) and draw(4, 7) != draw(3, 7)
+    assert "--seed 3 --trial 7" in draw(3, 7).line
+
+
+def test_everything_is_drawn():
+    trials = [draw(1, number) for number in range(1500)]
+    for name, values in CHOICES.items():
+        assert {getattr(trial, name) for trial in trials} == set(values)
+    assert max(trial.heaviest for trial in trials) > 1e5
+    assert max(trial.speed for trial in trials) > 9 and max(trial.depth for trial in trials) > 0.85
+
+
+@pytest.mark.parametrize("shape", ["cloud", "needle", "sheet", "sliver", "two", "cell"])
+def test_bodies_are_upright_and_as_odd_as_they_are_called(shape):
+    points, cells = mesh_of(replace(CALM, shape=shape, nodes=60))
+    assert (tetrahedron_volumes(points, cells) > 0).all() and set(cells.ravel()) == set(range(len(points)))
+    extent = np.ptp(points, axis=0)
+    if shape == "needle":
+        assert extent[0] > 10 * extent[2]
+    if shape == "sheet":
+        assert extent[2] < 0.1 * extent[0]
+
+
+def test_masses_and_the_origin_are_where_they_are_asked():
+    plain, odd = body_of(CALM), body_of(replace(CALM, heaviest=1e6, far=10.0))
+    ratio = odd.mass / plain.mass
+    assert ratio.max() / ratio.min() > 1e3
+    np.testing.assert_allclose(np.linalg.norm((odd.rest - plain.rest).mean(axis=0)), 10.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "status"),
+    [
+        ({}, "ok"),
+        ({"dt_fraction": 3.5, "load": "plane", "steps": 600}, "diverged"),
+        ({"method": "shake", "precision": "float32"}, "refused"),
+        ({"start": "mirrored", "volumes": "nodal", "law": "cotangent", "nodes": 60}, "inverted"),
+        ({"held": True, "precision": "float32"}, "ok"),
+        ({"steps": 12 * 10**12}, "refused"),
+    ],
+)
+def test_each_end_has_its_name(changes, status, monkeypatch):
+    monkeypatch.setattr(module, "SECONDS", 600.0)  # compiling counts, on a busy machine
+    found = tried(replace(CALM, **changes))
+    assert found.status == status
+    assert bool(found.message) == (status != "ok")
+
+
+def test_an_error_that_is_not_ours_is_the_finding(monkeypatch):
+    def fails(trial):
+        raise ZeroDivisionError("in the middle")
+
+    monkeypatch.setattr(module, "setup_of", fails)
+    found = tried(CALM)
+    assert (found.status, found.message) == (UNEXPLAINED, "ZeroDivisionError: in the middle")
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    setup = setup_of(replace(CALM, load="plane", held=True, nodes=40, depth=0.3, speed=10.0, steps=240))
+    return setup, simulate(setup)
+
+
+def test_a_good_run_meets_every_truth(pressed):
+    setup, history = pressed
+    assert broken(setup, history) is None
+    assert named(setup, replace(history, min_j=np.abs(history.min_j))) == ("ok", "")
+    assert np.linalg.norm(history.contact_force).max() > 0, "the plane pressed"
+
+
+def test_each_truth_is_missed_by_what_breaks_it(pressed):
+    """Mutants of a history: what is recorded, and where the nodes are."""
+    setup, history = pressed
+    assert "not finite" in str(broken(setup, replace(history, pressure=history.pressure * np.nan)))
+    assert "encloses" in str(broken(setup, replace(history, volume=history.volume * (1 + 1e-6))))
+    shifted = replace(history, final=history.final + np.array([1e-6, 0.0, 0.0]))
+    assert "from where it is held" in str(broken(setup, shifted))
+    deep = replace(history, penetration=history.penetration + 0.5 * setup.body.size)
+    assert "inside obstacle 0" in str(broken(setup, deep))
+    upright = {"min_j": np.abs(history.min_j)}
+    assert named(setup, replace(deep, **upright))[0] == "penetrated"
+    assert named(setup, replace(history, volume=1.1 * history.volume, **upright))[0] == "drifted"
+    assert named(setup, replace(history, min_j=history.min_j * 0.0))[0] == "inverted"
+
+
+@pytest.mark.skipif(cores() < 2, reason="one core")
+def test_threads_are_compared_bit_for_bit(pressed, monkeypatch):
+    setup, history = pressed
+    assert other_bits(setup, history) is None
+    two = replace(setup, threads=2)
+    assert other_bits(two, history) is None
+    assert "2 threads" in str(other_bits(two, replace(history, final=history.final * (1 + 1e-15))))
+
+
+def test_a_failure_is_reduced_to_the_choices_that_matter():
+    """A target beside ten harmless choices."""
+    noisy = replace(CALM, nodes=80, gravity=9.81, friction=0.5, modulus=5e4, far=10.0, dt_fraction=3.9)
+    noisy = replace(noisy, load="plane", steps=600, heaviest=30.0)
+    assert tried(noisy).status == "diverged"
+    found = simplest(tried(noisy))
+    assert found.status == "diverged" and set(found.trial.changed) <= {
+        "dt_fraction",
+        "steps",
+        "load",
+        "heaviest",
+        "nodes",
+    }
+    assert "dt_fraction" in found.trial.changed
+
+
+def test_a_trial_is_made_gentler_choice_by_choice_and_by_halves():
+    trials = replace(CALM, nodes=80, gravity=9.81).gentler()
+    assert [(trial.nodes, trial.gravity) for trial in trials] == [(12, 9.81), (80, 0.0), (36, 9.81)]
+
+
+def test_a_method_that_forgets_the_volume_is_found(monkeypatch):
+    """The mutant: implicit_volume that runs as free."""
+    monkeypatch.setattr(ImplicitVolume, "advance", lambda self, state, boundary: Free().advance(state, boundary))
+    found = tried(replace(CALM, load="pinch", depth=0.6, speed=10.0, nodes=40, steps=600, damping=0.3))
+    assert found.status in ("drifted", "inverted")
+
+
+def test_errors_of_bodies_are_sentences():
+    with pytest.raises(MassSpringError, match="regions asked of 1 tetrahedra"):
+        body_of(replace(CALM, shape="cell", volumes="regions"))
+
+
+def test_elements_refuse_a_body_whose_only_volume_is_the_whole():
+    """A single tetrahedron: its one patch is its surface, which no sums over elements keep."""
+    found = tried(draw(7, 156))
+    assert found.status == "refused" and "keep one volume per node" in found.message
