@@ -8,7 +8,6 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_triangular
-from scipy.optimize import nnls
 
 from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.state import State
@@ -109,6 +108,8 @@ def complementary(compliance: np.ndarray, missing: np.ndarray) -> np.ndarray:
     if found is not None:
         return found
     root = cholesky(compliance + SOFTNESS * compliance.diagonal().max() * np.eye(len(missing)))
+    from scipy.optimize import nnls  # 0.15 s that every command would wait for
+
     return nnls(root, solve_triangular(root, missing, trans=1))[0]
 
 
