@@ -26,7 +26,7 @@ study-%: setup-run ## run one study and draw it: make study-volume_loss
 report: setup-run ## charts, tables and report.html, one page that opens anywhere, from the stored results
 	$(BIN)/organbench report
 
-study-peers: setup-run ## other programs beside ours on the same ball and liver: the extra `peers` (minutes)
+study-peers: setup-run ## other programs and ours on the same ball and liver: the extra `peers` (minutes)
 	$(BIN)/python -m pip install -q -c constraints.txt --no-build-isolation -e ".[peers]"
 	$(BIN)/organbench run studies/exchange/peers/study.py
 	$(BIN)/python -m studies.exchange.peers.main
@@ -36,7 +36,7 @@ verify: setup-verify docs ## before a release: oracles, campaigns, browsers, clu
 	$(BIN)/organbench verify
 	$(PYTEST) -m campaign
 
-smoke: setup-run ## the main studies with their smallest settings: does it all hang together?
+smoke: setup-run ## the main studies with their smallest settings: a quick check of the whole chain
 	$(BIN)/organbench run --smoke
 
 test: setup-test compiled ## every test but the campaigns, which `make verify` runs
@@ -75,7 +75,7 @@ bench: setup-run ## measure the numbers that the README promises (quiet machine,
 OLD ?= HEAD~1
 BENCH ?=
 ASV = OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/asv --config studies/bench/asv.conf.json
-speeds: setup-run ## the promised speeds of the last commit beside those of OLD, by asv (quiet machine, please)
+speeds: setup-run ## the promised speeds of the last commit against those of OLD, by asv (quiet machine, please)
 	$(BIN)/python -m pip install -q -c constraints.txt --no-build-isolation -e ".[bench]"
 	$(ASV) machine --yes
 	rm -rf build/asv/old && mkdir -p build/asv/old && git archive $(OLD) | tar -x -C build/asv/old

@@ -53,7 +53,7 @@ class Chart:
             ) from error
         if callable(drawing):
             return cast("Drawing", drawing)
-        raise StudyError(f"chart {self.file}: {self.drawing!r} is no function; give one of the runs and a path")
+        raise StudyError(f"chart {self.file}: {self.drawing!r} is not a function; give one of the runs and a path")
 
     def __post_init__(self) -> None:
         if readable(self.file) != self.file:
@@ -95,7 +95,7 @@ class Study:
                 raise StudyError(f"{what} is {given!r}; give a tuple, such as ({given!r},)")
             odd = [item for item in given if not isinstance(item, kind) and not (kind is str and _is_metric(item))]
             if odd:
-                raise StudyError(f"{what} holds {odd[0]!r}, which is no {kind.__name__}")
+                raise StudyError(f"{what} holds {odd[0]!r}, which is not a {kind.__name__}")
         for status in self.expects:
             lookup(status, [str(known) for known in Status], "status that a study expects")
 

@@ -50,7 +50,7 @@ def main() -> None:
     if code in (interrupts.CODE, interrupts.exit_code()):
         interrupts.close_ears()
         what = "interrupted" if code == interrupts.CODE else "ended by SIGTERM"
-        complain(f"organbench: {what}; what is finished is stored, the same command goes on from there")
+        complain(f"organbench: {what}; finished work is stored; run the same command to continue")
     sys.exit(flushed(code))
 
 
@@ -85,7 +85,7 @@ def message(error: Exception) -> str:
 
 def unwritten(error: OSError) -> str:
     """The sentence for an output that takes no more."""
-    return f"the output could not be written ({error.strerror}); what was stored before is kept"
+    return f"the output could not be written ({error.strerror}); stored results are kept"
 
 
 def complain(sentence: str) -> None:

@@ -46,7 +46,7 @@ COMMANDS = {
     "mesh-check": Entry(MESHES, "List the faults of a mesh and how to repair each."),
     "place": Entry(MESHES, "Place hold and probe on a scan and write a study."),
     "export": Entry(SHARE, "Write a scene for another program.", "scenes"),
-    "judge": Entry(SHARE, "Judge the results of another program as our own.", "scenes"),
+    "judge": Entry(SHARE, "Judge the results of another program like our own.", "scenes"),
     "archive": Entry(SHARE, "Pack records, tables, charts and code into a zip file.", "studies"),
     "publish": Entry(SHARE, "Copy tables and charts to results/published.", "studies"),
     "restamp": Entry(MAINTAIN, "Keep results after a change of code that moves no number.", "studies"),

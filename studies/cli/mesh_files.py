@@ -49,7 +49,7 @@ def ask_before_large(path: Path, yes: bool) -> None:
     if yes:
         errors.print(f"warning: {sentence}", markup=False, highlight=False)
     elif not (sys.stdin.isatty() and typer.confirm(visible(f"{sentence}. Go on?"))):
-        raise StudyError(f"{sentence}; say --yes to go on, or thin it out in the program that made it")
+        raise StudyError(f"{sentence}; say --yes to go on, or reduce it in the program that made it")
 
 
 def asked_unit(source: Source) -> Source:

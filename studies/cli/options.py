@@ -63,7 +63,9 @@ def share(text: str, noun: str) -> float | None:
     found = re.fullmatch(f"{NUMBER}(%?)\\s*", text)
     value = float(found[1]) / (100.0 if found[2] else 1.0) if found else 0.0
     if not 0.0 < value <= 1.0:
-        raise StudyError(f"{noun} {text!r} is no tolerance; give a share above 0 and up to 100 %, such as 3% or 0.03")
+        raise StudyError(
+            f"{noun} {text!r} is not a tolerance; give a share above 0 and up to 100 %, such as 3% or 0.03"
+        )
     return value
 
 
@@ -75,6 +77,6 @@ def budget(text: str) -> float | None:
     value = float(found[1]) * PER_MS[found[2]] if found else 0.0
     if not 0.0 < value < float("inf"):
         raise StudyError(
-            f"budget {text!r} is no time; give the computing time per 1 ms of simulated time, such as 1ms or 250us"
+            f"budget {text!r} is not a time; give the computing time per 1 ms of simulated time, such as 1ms or 250us"
         )
     return value

@@ -125,7 +125,7 @@ def dry_run(console: Console, study: str, planned: list[Planned], jobs: int, roo
         console.print(text, markup=False, highlight=False)
 
     if not planned:
-        say(f"{study}: nothing would run, all is current")
+        say(f"{study}: nothing would run: all results are current")
         return
     say(f"{study}: {amounts(Counter(piece.kind for piece in planned))} would run")
     groups: dict[tuple[str, str], list[Planned]] = {}

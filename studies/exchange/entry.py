@@ -42,7 +42,7 @@ class Outside(Method):
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """Raises StudyError."""
-        raise StudyError(f"'{self.name}' is an entry from outside: only the program that made it can run it")
+        raise StudyError(f"'{self.name}' is a result of another program: only that program can run it")
 
 
 @cache
@@ -74,7 +74,7 @@ def entry_name(case: Case) -> str:
 def case_of_entry(record: Record) -> Case:
     """The case of an entry's record. Raises StudyError for a record that is none."""
     if record.attributes.get(ENTRY) is None:
-        raise StudyError(f"'{record.name}' is no entry from outside")
+        raise StudyError(f"'{record.name}' is not a result of another program")
     data = json.loads(record.key)
     recipe = BodyRecipe(data["body"]["kind"], int(data["body"]["nodes"]))
     return Case(scene_of_key(record.key), recipe, outside(data["method"]["name"]))

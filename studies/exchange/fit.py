@@ -54,7 +54,7 @@ def force_at(name: str, t: np.ndarray, times: np.ndarray, force: np.ndarray, sce
     Raises StudyError for a step that is missing there, and for one without a number.
     """
     if not len(times):
-        raise StudyError(f"{name} holds no force")
+        raise StudyError(f"{name} has no force")
     nearest = np.abs(times[None] - t[:, None]).argmin(axis=1)
     missing = np.abs(times[nearest] - t) > SAME_TIME * scene.duration
     if missing.any():
@@ -71,7 +71,7 @@ def _times(handed: Handed, scene: Scene) -> np.ndarray:
         what = "files" if handed.t is None else "steps"
         raise StudyError(f"{name}: {steps} {what} for {t.size} times; hand in rest and {len(wanted) - 1} checkpoints")
     if not np.isfinite(t).all() or (np.diff(t) <= 0).any():
-        raise StudyError(f"{name}: the times of the steps must be numbers that ascend")
+        raise StudyError(f"{name}: the times of the steps must be increasing numbers")
     near = SAME_TIME * scene.duration
     if len(t) > 1 and abs(t[-1] / 1e3 - scene.duration) <= near:
         raise StudyError(f"{name}: the times go to {t[-1]:g}, the scene to {scene.duration:g} s: give seconds, not ms")
@@ -103,8 +103,8 @@ def _mesh_of(name: str, count: int, meshes: Sequence[GivenMesh]) -> GivenMesh:
             return mesh
     known = " and ".join(f"{FILES[mesh.kind]} {len(mesh.points)}" for mesh in meshes)
     raise StudyError(
-        f"{name}: positions of {count} nodes, but {known} at this number of vertices; it is of another mesh (--nodes "
-        "says with how many vertices the scene was exported)"
+        f"{name}: positions of {count} nodes, but {known} at this number of vertices; they belong to another mesh "
+        "(--nodes gives the number of vertices of the exported mesh)"
     )
 
 
@@ -134,8 +134,8 @@ def _check_rest(name: str, rest: np.ndarray, mesh: GivenMesh) -> None:
             )
     gap = _gap(rest, points)
     raise StudyError(
-        f"{name}: the positions at t = 0 are up to {gap:.3g} m from those of {file}; it is of another rest mesh, or "
-        "not at rest"
+        f"{name}: the positions at t = 0 are up to {gap:.3g} m from those of {file}; they belong to another rest mesh, "
+        "or are not at rest"
     )
 
 

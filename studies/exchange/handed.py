@@ -53,7 +53,7 @@ def read_handed(path: Path) -> Handed:
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, EOFError, ElementTree.ParseError) as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise StudyError(
-            f"{path.name} cannot be read ({reason}); README.md of the scene says what it must hold"
+            f"{path.name} cannot be read ({reason}); README.md of the scene describes what it must contain"
         ) from error
 
 
@@ -92,7 +92,7 @@ def _check_separators(path: Path) -> None:
 
 def _read_npz(path: Path) -> Handed:
     if not is_zipfile(path):
-        raise StudyError(f"{path.name} is no npz file; numpy.savez writes one")
+        raise StudyError(f"{path.name} is not an npz file; numpy.savez writes one")
     with np.load(path, allow_pickle=False) as file:
         missing = [name for name in ("t", "positions") if name not in file]
         if missing:
@@ -122,10 +122,10 @@ def _read_vtkhdf(path: Path) -> Handed:
         root: Any = file["VTKHDF"]
         steps = root.get("Steps")
         if steps is None:
-            raise StudyError(f"{path.name} holds no steps; write them all into one file, or as VTU files")
+            raise StudyError(f"{path.name} has no steps; write them all into one file, or as VTU files")
         t, count = np.asarray(steps["Values"], np.float64), np.asarray(root["NumberOfPoints"], np.int64)
         if "NumberOfParts" in steps and (np.asarray(steps["NumberOfParts"]) != 1).any():
-            raise StudyError(f"{path.name} holds its grid in several parts; write it in one")
+            raise StudyError(f"{path.name} has its grid in several parts; write it as one")
         part = np.asarray(steps["PartOffsets"] if "PartOffsets" in steps else np.zeros(len(t)), np.int64)
         sizes = count[part]
         begins = np.asarray(steps["PointOffsets"], np.int64)
@@ -168,7 +168,7 @@ def _stacked(name: str, points: Sequence[np.ndarray], moved: Sequence[np.ndarray
     if not still or not fields:
         return np.stack(points)
     if len(fields) != len(points) or any(np.shape(row) != points[0].shape for row in fields):
-        raise StudyError(f"{name}: '{DISPLACEMENT}' must be there in every step, three numbers for each node")
+        raise StudyError(f"{name}: '{DISPLACEMENT}' must be in every step, with three numbers for each node")
     return np.stack([rows + row for rows, row in zip(points, fields, strict=True)])
 
 

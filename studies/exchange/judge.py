@@ -38,12 +38,12 @@ def entry_record(
     """
     method = outside(name)
     if seconds is not None and not 0.0 < seconds < np.inf:
-        raise StudyError(f"{seconds} s of computing for a simulated second is no time; give a positive number")
+        raise StudyError(f"{seconds} s of computing for a simulated second is not a time; give a positive number")
     handed = read_handed(path)
     fitting = fitted(handed, scene, given_meshes(scene, nodes)[0])
     if force is not None:
         if "force" in fitting.histories:
-            raise StudyError(f"{handed.name} holds the force already; leave {force.name} out")
+            raise StudyError(f"{handed.name} already has the force; leave out {force.name}")
         fitting.histories["force"] = force_at(force.name, fitting.t, *read_force(force), scene)
     case = Case(scene, fitting.mesh.recipe, method)
     values = measured(fitting)
@@ -53,7 +53,7 @@ def entry_record(
         key=case.key,
         name=entry_name(case),
         status=Status.INVERTED if inverted else Status.OK,
-        message="an element ends inside out" if inverted else "",
+        message="an element ends inverted" if inverted else "",
         fingerprint=source_fingerprint(__name__),
         attributes=_attributes(fitting) | _sway(fitting, values) | {ENTRY: _named(path, fitting), SECONDS: seconds},
         fields=new_fields(RUN_FIELDS, values),

@@ -8,7 +8,7 @@ TEXT = """# {name}
 {title}.
 
 Everything is in SI units: metres, seconds, kilograms, newtons, pascals. `scene.json` holds all numbers of this page and
-more, each beside words; {version_words}.
+more, each with a description; {version_words}.
 
 ## Files
 

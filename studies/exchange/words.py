@@ -63,7 +63,7 @@ def lumen_words(lumen: Lumen | None) -> str:
     if lumen.content == "open":
         return "The lumen is drained: its wall feels no pressure from inside."
     if set(lumen.filling.values) == {1.0}:
-        return "The lumen is closed and full of an incompressible fluid without weight: its volume stays what it is."
+        return "The lumen is closed and full of an incompressible fluid without weight: its volume does not change."
     return f"The lumen is closed; its volume is its volume at rest times {ramped(lumen.filling)}, linear in between."
 
 

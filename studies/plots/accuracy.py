@@ -134,7 +134,7 @@ def _notes() -> list[str]:
     return [
         "Force: over all checkpoints. Surface, interior: displacement, relative L2; not compared where a rigid turn is "
         "free. Silhouette: Hausdorff distance over body size. Nothing is drawn below the uncertainty of the reference: "
-        "a bar on it means no more than that."
+        "a bar on that line is only an upper bound."
     ]
 
 

@@ -59,7 +59,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         _draw_scene(panel, group, looks)
     reference = reference_handle(linestyle="-", linewidth=1)
     handles = [*body_method_handles(shown, looks), reference, band_handle("± its uncertainty")]
-    notes = ["At the end of each line: its error there, after all has come to rest. Dotted: the press stops."]
+    notes = ["At the end of each line: its error there, once everything is at rest. Dotted: the press stops."]
     return finish(sheet, TITLE, handles, [*notes, *unresolved_notes(shown, FORCES), *remarks(runs)], columns=3)
 
 

@@ -72,7 +72,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     """One row per scene: force error left, step limit right; a line joins the meshes of one law and its volumes."""
     shown = [run for run in runs if run.record.status in COMPARABLE]
     if not shown:
-        return blank(TITLE, "no run has ended yet")
+        return blank(TITLE, "no run has finished yet")
     (metric,) = (metric for metric in METRICS if metric.name == FORCE)
     scenes, looks = by_scene(shown), _looks(shown)
     sheet = page(9.6, 3.4 * len(scenes) + 0.4)

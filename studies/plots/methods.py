@@ -84,7 +84,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     """Panels side by side share the rows; error bars of the reference are dotted lines of the scene's colour."""
     shown = [run for run in runs if run.record.status in COMPARABLE]
     if not shown:
-        return blank(TITLE, "no run has ended yet")
+        return blank(TITLE, "no run has finished yet")
     names = row_names(shown)
     rows = list(dict.fromkeys(names.values()))
     metrics = [metric for name in QUANTITIES for metric in METRICS if metric.name == name]

@@ -35,7 +35,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     """Four pictures in a row, one scale and one camera."""
     squeezed = _chosen(runs)
     if not squeezed:
-        return blank(TITLE, f"no run of {readable(SCENE)} has come to its end yet")
+        return blank(TITLE, f"no run of {readable(SCENE)} has finished yet")
     some = squeezed[0]
     reference = some.reference
     sheet = page(3.0 * (len(squeezed) + (2 if reference else 1)), 3.75)

@@ -12,7 +12,7 @@ from studies.plots.style.page import blank, finish, log_axis, page, panels
 from studies.plots.style.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, heading, readable, save, styled
 from studies.reference.uncertainty import Uncertainty
 
-TITLE = "What the references leave open"
+TITLE = "Uncertainty of the references"
 LOOKS = {"mesh": (BLUE, "o"), "contact": (VERMILLION, "s"), "kappa": (GREEN, "^"), "steps": (ORANGE, "D")}
 """Colour and marker of each share."""
 WORDS = {

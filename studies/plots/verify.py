@@ -35,7 +35,7 @@ def figure(curves: Sequence[Curve]) -> Figure:
     axes = sheet.axes[0]
     axes.set_ylabel("relative error [1]")
     notes = [
-        "Behind each name: order of convergence between the two finest meshes; with contact it need not be steady.",
+        "After each name: order of convergence between the two finest meshes; with contact it need not be steady.",
         "Manufactured solution: relative L2 errors.",
     ]
     return finish(sheet, TITLE, [], notes)
@@ -86,7 +86,7 @@ def kappa_figure(ratios: np.ndarray, rows: dict[str, np.ndarray]) -> Figure:
     )
     axes.set(xscale="log", yscale="log", xlabel="bulk over shear modulus, kappa/mu [1]")
     axes.set_ylabel(f"relative change from {ratios[-1]:,.0f} [1]")
-    return finish(sheet, "What a finite bulk modulus does to a result", handles, columns=2)
+    return finish(sheet, "Effect of a finite bulk modulus", handles, columns=2)
 
 
 def draw_kappa(ratios: np.ndarray, rows: dict[str, np.ndarray], path: Path) -> None:

@@ -207,7 +207,7 @@ def _notes(scenes: dict[str, list[Judged]]) -> list[str]:
     if named:
         told.append(f"Recommended, the cheapest that is accurate enough: {'; '.join(named)}.")
     if lacking:
-        told.append(f"Nothing here is accurate enough for {', '.join(lacking)}.")
+        told.append(f"No body is accurate enough for {', '.join(lacking)}.")
     return told
 
 
@@ -218,7 +218,7 @@ def _left_out(runs: Sequence[Run]) -> list[str]:
     told = remarks(well)
     if ended:
         more = f" and {len(ended) - MOST_NAMED} more" if len(ended) > MOST_NAMED else ""
-        told.append(f"Not drawn, because they ended with a fault: {', '.join(ended[:MOST_NAMED])}{more}.")
+        told.append(f"Not drawn, because they failed: {', '.join(ended[:MOST_NAMED])}{more}.")
     untimed = sum(run.timing is None for run in well)
     if untimed:
         told.append(f"Not drawn: {untimed} without frame times from this machine and this code.")

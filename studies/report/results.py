@@ -101,7 +101,9 @@ def charts_and_tables(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Pa
     if not is_archive(root):
         write_machine(root / "machine.json")
     if absent:
-        remarks.append(f"not run here, what is drawn of them stays: {', '.join(absent)}; make study-NAME runs one")
+        remarks.append(
+            f"skipped (no results here; existing charts kept): {', '.join(absent)}. Run `make study-NAME` first"
+        )
     return written, remarks
 
 

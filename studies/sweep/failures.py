@@ -21,11 +21,11 @@ class Failures:
         """Whether the file of a job can be written; notes a folder in its place as the cause of a failure."""
         path = job.path()
         if path.is_dir():
-            self.causes[job.label] = f"{path} is a folder in the place of its file: delete it"
+            self.causes[job.label] = f"{path} is a folder where a file belongs: delete it"
         return not path.is_dir()
 
     def sentence(self, again: str) -> str:
         """All of them in one sentence; again: the command that tries them once more."""
         (label, cause), *others = self.causes.items()
         more = f", and {len(others)} more" if others else ""
-        return f"failed: {label} ({cause}){more}; the rest is done, `{again}` tries again"
+        return f"failed: {label} ({cause}){more}; all others are done, `{again}` retries"

@@ -85,7 +85,7 @@ def rates(ledger: Ledger, jobs: Sequence[Job]) -> dict[str, float]:
 
 
 def _of_job(ledger: Ledger, job: Job, measured: Mapping[str, float]) -> Planned:
-    why = ledger.why(job) or "its result is a failure"
+    why = ledger.why(job) or "its result failed"
     seconds, size = _cost(ledger.entry(job))
     guess = 0.0 if seconds is not None else job.seconds * measured.get(job.kind, 1.0)
     return Planned(PHYSICS, job.kind, job.label, why, seconds, size or job.size, guess, job.kind in measured)
@@ -125,4 +125,4 @@ def free_bytes(folder: Path) -> int:
     try:
         return shutil.disk_usage(there).free
     except OSError as problem:
-        raise StudyError(f"{there} does not tell how much room it has ({problem.strerror})") from problem
+        raise StudyError(f"{there} does not report its free space ({problem.strerror})") from problem

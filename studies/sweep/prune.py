@@ -30,10 +30,10 @@ class Rule(StrEnum):
 
 
 MEANING = {
-    Rule.STALE: "of other code, of another layout, or damaged: the next run replaces them",
-    Rule.FAILED: "stored as failed, timed out or not converged: the next run tries them again",
-    Rule.SUPERSEDED: "of cases that the study has no more",
-    Rule.ORPHANS: "unfinished files of processes that are gone, and frame times without their run",
+    Rule.STALE: "of other code or another format, or damaged: the next run replaces them",
+    Rule.FAILED: "failed, timed out or not converged: the next run repeats them",
+    Rule.SUPERSEDED: "of cases that the study no longer has",
+    Rule.ORPHANS: "unfinished files of ended processes, and frame times without their run",
 }
 
 

@@ -60,7 +60,7 @@ def test_a_filter_plans_what_it_lets_run(results):
     stale(results, tiny_case(timed=True))
     assert plan(Ledger(results), tiny_study(), partial(failed, Ledger(results))) == []
     (piece, *_) = plan(Ledger(results), tiny_study(), lambda task: task.label == diverging_case().name)
-    assert (piece.label, piece.why) == (diverging_case().name, "its result is a failure")
+    assert (piece.label, piece.why) == (diverging_case().name, "its result failed")
 
 
 def piece(stage, kind, seconds):
@@ -93,7 +93,7 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
     assert re.search(r"  1 case \(the code has changed since\): about \d+ s of computing\n", out)
     assert "with 2 processes, from earlier runs of 1 case; compiling comes on top" in out
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--only", "failed", "--results", results)
-    assert out.strip() == "tiny: nothing would run, all is current"
+    assert out.strip() == "tiny: nothing would run: all results are current"
 
 
 def test_a_disk_without_room_is_told_beforehand(organbench, tiny_file, tmp_path, monkeypatch):

@@ -52,7 +52,7 @@ def placed_organs(folder: Path, unit: str | None = None) -> Iterator[Placed]:
         raise StudyError(f"there is no folder {folder}; give one with surfaces ({', '.join(SURFACES)})")
     files = sorted(path for path in folder.iterdir() if path.is_file() and path.name.lower().endswith(SURFACES))
     if not files:
-        raise StudyError(f"{folder} holds no surface; known are {', '.join(SURFACES)}")
+        raise StudyError(f"{folder} has no surface; supported formats are {', '.join(SURFACES)}")
     names = dict[str, int]()
     for path in files:
         name = python_name(stem_of(path))
@@ -105,11 +105,11 @@ def study_on(study: Study, folder: Path, unit: str | None = None) -> tuple[Study
         check_unit(unit)
     solid = [case for case in study.cases if not has_wall(case.scene)]
     if not solid:
-        raise StudyError(f"study '{study.name}' is about hollow organs alone; a surface from a file is a solid one")
+        raise StudyError(f"study '{study.name}' needs hollow organs, but a surface from a file is solid")
     placed = list(placed_organs(folder, unit))
     scenes = [one.scene for one in placed if one.scene is not None]
     if not scenes:
-        raise StudyError(f"every file in {folder} is refused; the first: {placed[0].words[0]}")
+        raise StudyError(f"no file in {folder} can be used; the first: {placed[0].words[0]}")
     recipes = {case.replaced(scene=scenes[0], frames=None).key: case for case in solid}
     cases = tuple(case.replaced(scene=scene, frames=None) for scene in scenes for case in recipes.values())
     name = readable(f"{study.name}-{folder.resolve().name}")

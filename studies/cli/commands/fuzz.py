@@ -81,6 +81,4 @@ def write(results: Path, folder: str, table: pd.DataFrame, counted: pd.DataFrame
 
 def tell(outcome: Outcome) -> None:
     """How a trial ended, and the line that repeats it."""
-    say(
-        f"{outcome.status}: {outcome.message or 'nothing to object to'} ({outcome.seconds:.2g} s): {outcome.trial.line}"
-    )
+    say(f"{outcome.status}: {outcome.message or 'no fault'} ({outcome.seconds:.2g} s): {outcome.trial.line}")

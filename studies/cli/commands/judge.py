@@ -48,7 +48,7 @@ def judge(
         say(line)
     warn(hints_of(run))
     beside = [study.name for study in STUDIES if found.name in [each.name for each in study.scenes]]
-    shown = f", shown beside our methods by `organbench table {beside[-1]}`" if beside else ""
+    shown = f", shown next to our methods by `organbench table {beside[-1]}`" if beside else ""
     say(f"stored in {path}{shown}")
 
 
@@ -57,7 +57,7 @@ def reference_of(results: Path, scene: Scene) -> Reference | None:
     try:
         return load_reference(results, scene)
     except StudyError as problem:
-        warn([f"no errors are judged, the reference is not there: {problem}"])
+        warn([f"errors are not judged, because the reference is missing: {problem}"])
         return None
 
 
@@ -67,7 +67,7 @@ def hints_of(run: Run) -> list[str]:
     error = FORCE(run)
     if error < REVERSED:
         hints.append(
-            f"the force has the other sign: reversed, its error is {plain(2 * REVERSED - error, '+')} % and not "
+            f"the force has the wrong sign: reversed, its error is {plain(2 * REVERSED - error, '+')} % and not "
             f"{plain(error)} %; a press is positive (force in scene.json)"
         )
     return hints

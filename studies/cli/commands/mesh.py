@@ -68,18 +68,18 @@ def mesh(
 def check_one(name: str, source: Path | None, seed: int | None) -> None:
     """Raise StudyError unless an organ or a file is asked for, and no file with a seed."""
     if bool(name) == (source is not None):
-        raise StudyError("say what to mesh: the name of an organ (see `organbench list`), or --from FILE")
+        raise StudyError("name what to mesh: an organ (see `organbench list`), or --from FILE")
     if source is not None and seed is not None:
-        raise StudyError("--seed varies synthetic organs; a file comes as it is, leave it out")
+        raise StudyError("--seed varies synthetic organs; leave it out for a file")
 
 
 def check_filling(output: Path, fill: bool | None, order: int) -> bool:
     """Whether the body gets tetrahedra: as asked, or as its file can hold them. Raises StudyError where it cannot."""
     filled = holds_tetrahedra(output) if fill is None else fill
     if filled and not holds_tetrahedra(output):
-        raise StudyError(f"{output.name}: {output.suffix} holds triangles only; use .vtu, or leave --fill out")
+        raise StudyError(f"{output.name}: {output.suffix} holds triangles only; use .vtu, or leave out --fill")
     if order == 2 and not filled:
-        raise StudyError("curved elements (--order 2) fill a body; leave --surface out, and write .vtu, .vtk or .msh")
+        raise StudyError("curved elements (--order 2) fill a body; leave out --surface and write .vtu, .vtk or .msh")
     return filled
 
 
@@ -92,7 +92,7 @@ def refuse_file_options(given: Mapping[str, object]) -> None:
     """Raise StudyError for options that only a file can have, by name; None, False and 0 are not given."""
     wrong = [option for option, value in given.items() if value not in (None, False)]
     if wrong:
-        raise StudyError(f"{' and '.join(wrong)} are for files (--from); a synthetic organ needs none of it")
+        raise StudyError(f"{' and '.join(wrong)} are for files (--from); leave them out for a synthetic organ")
 
 
 def synthetic(name: str, nodes: int, seed: int | None, wall: float | None, filled: bool, exact: bool) -> OrganMesh:

@@ -54,10 +54,10 @@ def show(found: Findings) -> None:
         console.print(f"{number}. {finding.sentence}", markup=False, highlight=False)
         console.print(f"   -> {finding.mend}", markup=False, highlight=False)
     if found.command:
-        console.print(f"tried, and a clean body of {NODES} surface nodes came out:", highlight=False)
+        console.print(f"tested; this gives a clean body of {NODES} surface nodes:", highlight=False)
         console.print(found.command, markup=False, highlight=False, soft_wrap=True)
     if found.clean:
-        console.print("nothing is wrong with it")
+        console.print("no faults found")
 
 
 def parts_table(parts: list[dict[str, Any]]) -> Table:

@@ -103,7 +103,7 @@ def answer_for(source: Source, placing: Proposal, tissue: str) -> Advice | None:
     try:
         return advise(scene, results=SHIPPED, timing=False)
     except StudyError as error:
-        warn([f"the scene has one body alone, for nothing can be recommended: {error}"])
+        warn([f"the scene has only one body, because none can be recommended: {error}"])
         return None
 
 
@@ -113,7 +113,7 @@ def second_body(answer: Advice | None) -> Recommended | None:
         return None
     case = answer.chosen.case
     errors = f"force {answer.chosen.force.value:+.2g} %, displacement {answer.chosen.displacement.value:.2g} %"
-    near = "" if answer.meets else ", the nearest to the usual accuracy"
+    near = "" if answer.meets else ", closest to the default target"
     alike = answer.alike or (answer.scene.name,)
     say(f"bodies: tetrahedral of one volume; {case.body.series}, {case.body.nodes} nodes (recommended{near})")
     say(f"  worst errors of the recommended one in {' and '.join(alike)}: {errors}")

@@ -49,7 +49,7 @@ def load_own_files(path: Path, given: list[Path]) -> None:
     """
     record = peek(path)
     if record.attributes.get(ENTRY) is not None:
-        raise StudyError(f"{path} is an entry from outside: only the program that made it can run it again")
+        raise StudyError(f"{path} is a result of another program: only that program can run it again")
     wanted = _own_files(path, record)
     by_name = {file.name: file for file in given}
     if len(wanted) == len(given) == 1:

@@ -31,7 +31,7 @@ def restamp(
     not converge or took too long stays stale."""
     kinds = outdated(results, find_studies(studies or []))
     if not kinds:
-        say("nothing is stale by a change of the code alone")
+        say("no result is stale only because the code changed")
     differ = False
     for members in kinds:
         replayed = members if every else sample(members)

@@ -36,7 +36,7 @@ from studies.sweep.standings import causes, failed, standings, summary, unexpect
 
 JOBS = 2
 """Processes, where nothing is said."""
-AGAIN = "timing: measure the stored cases again on this machine; run nothing else"
+AGAIN = "timing: re-measure stored cases on this machine; run nothing else"
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 GIVEN = f"studies, or a FILE.py with STUDY or SCENE ({PROGRAM}); default: {MAIN_STUDIES}"
 Wanted = Callable[[Job], bool] | None
@@ -125,17 +125,17 @@ def _bring_up_to_date(
 
 def _check_again(again: str, others: dict[str, object]) -> None:
     """Raises StudyError for anything but timing, and for options that choose or place what runs."""
-    lookup(again, [TIMING], "thing to do again (--again)")
+    lookup(again, [TIMING], "value of --again")
     given = [name for name, value in others.items() if value]
     if given:
-        raise StudyError(f"--again {again} times what is stored on this machine, whatever it is; leave {given[0]} out")
+        raise StudyError(f"--again {again} measures all stored cases on this machine; leave out {given[0]}")
 
 
 def _time_again(ledger: Ledger, study: Study, dry: bool, drawn: bool) -> None:
     """Times the stored cases of a study, or says which; nothing of it runs."""
     planned = plan_again(ledger, study)
     if not planned:
-        say(f"{study.name}: nothing is stored of this code that can be timed; `organbench run` runs it")
+        say(f"{study.name}: no stored case of this code can be timed; run `organbench run` first")
         return
     if dry:
         dry_run(console, study.name, planned, 1, ledger.root)

@@ -41,7 +41,7 @@ def status(
         chosen, results = [entry.smoke() for entry in chosen], results / SMOKE
     ledger = Ledger(results, check)
     for entry in chosen:
-        with busy(f"looking at {entry.name}"):
+        with busy(f"checking {entry.name}"):
             found = standings(ledger, entry)
         say(f"{entry.name}: {summary(found)}")
         if study:

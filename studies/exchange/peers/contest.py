@@ -109,7 +109,7 @@ def hand_over(attempt: Attempt, given: Path, out: Path, limit: float) -> tuple[S
         return Status.FAILED, f"{attempt.peer.name} took longer than {limit:g} s"
     if ended.returncode == 0:
         return Status.OK, ""
-    last = ([line for line in ended.stderr.splitlines() if line.strip()] or ["without a word"])[-1]
+    last = ([line for line in ended.stderr.splitlines() if line.strip()] or ["without a message"])[-1]
     if ended.returncode in (CANNOT, MISSING):
         return Status.SKIPPED, f"{attempt.peer.name}: {last}"
     return Status.FAILED, f"{attempt.peer.name} ended with exit code {ended.returncode}: {last}"

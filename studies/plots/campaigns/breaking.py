@@ -25,7 +25,7 @@ from studies.plots.style.style import (
     styled,
 )
 
-TITLE = "What methods survive: random bodies, steps, starts and surroundings"
+TITLE = "Which trials methods survive: random bodies, steps, starts and surroundings"
 LOOKS = {
     "ok": (GREEN, ""),
     "inverted": (PURPLE, "////"),
@@ -68,11 +68,11 @@ def figure(table: pd.DataFrame) -> Figure:
     _finish_shares(right)
     handles = [Patch(facecolor=LOOKS[s][0], hatch=LOOKS[s][1], edgecolor="white", label=s) for s in shown]
     notes = [
-        f"{len(table):,} trials, {len(table) - len(runs):,} of them refused with a sentence. In brackets: runs of a "
+        f"{len(table):,} trials, {len(table) - len(runs):,} of them refused. In brackets: runs of a "
         "method. Dashed: the stability limit of the springs alone.",
         "Bodies with slivers and mass ratios to 1e6, flattened, mirrored or collapsed starts, targets that jump and "
-        "obstacles to 10 m/s and 90 % squeeze: many trials have no good end. Methods get what their table supports: "
-        "implicit_volume also many volumes, quadratic bodies and thin probes, which are harder.",
+        "obstacles to 10 m/s and 90 % squeeze: many trials cannot succeed. Each method gets only options that it "
+        "supports: implicit_volume also many volumes, quadratic bodies and thin probes, which are harder.",
     ]
     return finish(sheet, TITLE, handles, notes, columns=4)
 

@@ -16,7 +16,7 @@ from studies.plots.style.families import family_of
 from studies.plots.style.page import band_handle, blank, finish, log_axis, page, panels
 from studies.plots.style.style import GREY, SMALL, heading, remark, save, styled
 
-TITLE = "Organs nobody has seen: how many of a population are at most so far off"
+TITLE = "Randomly generated organs: share of a population within an error"
 SHOWN = {"force_end": "error of the force [%]", "mean_error": "mean error / largest u [%]"}
 LOWEST = 0.02
 """Errors below are drawn at the edge [%]."""

@@ -45,7 +45,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         panel.set_xlabel("time [s]")
         panel.tick_params(labelbottom=True)
     notes = [
-        "J is the volume of a tetrahedron over its rest volume: 1 at rest, 0 flat, below 0 inside out. "
+        "J is the volume of a tetrahedron over its rest volume: 1 at rest, 0 flat, below 0 inverted. "
         f"Less than {LOWEST:g} is drawn there.",
         *_ends(shown, looks),
     ]
@@ -105,7 +105,7 @@ def _ends(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list[str]:
             span = dict.fromkeys(
                 f"{share:.2g}" if share < 10 else f"{share:.0f}" for share in (shares.min(), shares.max())
             )
-            left = f"; else {' to '.join(span)} % stay flat or inside out"
+            left = f"; else {' to '.join(span)} % stay flat or inverted"
         sentences.append(f"{_model(group[0].case, looks)}: back from {len(group) - len(lost)} of {len(group)}{left}.")
     return sentences
 

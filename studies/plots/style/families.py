@@ -73,7 +73,9 @@ def family_of(case: Case) -> Family:
     known = FAMILIES.get((body.kind, body.graded, volumes))
     if known is not None and case.method.name == WHOLE:
         return known
-    if known is not None and case.method.name not in OUR_METHODS:  # an entry from outside, or a method of one's own
+    if (
+        known is not None and case.method.name not in OUR_METHODS
+    ):  # an entry of another program, or a method of one's own
         return Family(f"{case.method.name.replace('_', ' ')}, {body.kind}", method_colour(case.method.name), "X")
     own = "" if case.method.name == WHOLE else f", {case.method.name.replace('_', ' ')}"
     return Family(f"{body.series}{own}", GREY, "X" if known is None else known.marker)

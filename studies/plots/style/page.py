@@ -116,7 +116,7 @@ def remarks(runs: Sequence[Run]) -> list[str]:
         if has_frames(run) and good_frames(run) < len(run.fields.t)
     ]
     bare = [name for name, group in by_scene(runs).items() if all(run.reference is None for run in group)]
-    missing = [f"No reference for {', '.join(map(readable, bare))}: no error can be given there."] if bare else []
+    missing = [f"No reference for {', '.join(map(readable, bare))}: so no error is shown there."] if bare else []
     return [*missing, *ended]
 
 

@@ -174,7 +174,7 @@ def readable(name: str) -> str:
 
 
 def method_label(name: str) -> str:
-    """The name of a method in a legend: that of a user's own method, or of an entry from outside, stays as it is."""
+    """The name of a method in a legend: that of a user's own method, or of an external entry, stays as it is."""
     ours = [method.name for method in (*METHODS, *LITERATURE)]
     return readable(name) if name in ours else name
 

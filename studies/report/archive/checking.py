@@ -42,7 +42,7 @@ def _of_folder(folder: Path, name: str) -> IO[bytes]:
     """A file of a folder, opened. A pipe or a device would be read for ever, also where a link leads to it."""
     file = folder / name
     if file.exists() and not file.is_file():
-        raise DamagedFile(f"{folder}: {name} is no regular file: {AGAIN}")
+        raise DamagedFile(f"{folder}: {name} is not a regular file: {AGAIN}")
     if not Path(os.path.realpath(file)).is_relative_to(os.path.realpath(folder)):
         raise DamagedFile(f"{folder}: {name} is a link that leads outside: {AGAIN}")
     return open(file, "rb")
@@ -65,7 +65,7 @@ def _compare(path: Path, opened: Opener) -> int:
         except (zipfile.BadZipFile, zlib.error, EOFError, OSError) as problem:
             raise DamagedFile(f"{path}: {name} cannot be read ({problem}): {AGAIN}") from problem
         if found != expected:
-            raise DamagedFile(f"{path}: {name} is not what was packed: {AGAIN}")
+            raise DamagedFile(f"{path}: {name} has changed since it was packed: {AGAIN}")
         count += 1
     return count
 
@@ -76,7 +76,7 @@ def _entries(path: Path, opened: Opener) -> Iterable[tuple[str, str]]:
         with opened(MANIFEST) as file:
             content = file.read(LARGEST + 1)
     except (KeyError, FileNotFoundError) as problem:
-        raise StudyError(f"{path} is no archive of organbench: it has no {MANIFEST}") from problem
+        raise StudyError(f"{path} is not an archive of organbench: it has no {MANIFEST}") from problem
     except OSError as problem:
         raise StudyError(f"{path / MANIFEST} cannot be read ({problem.strerror}): change its permissions") from problem
     if len(content) > LARGEST:
@@ -85,9 +85,11 @@ def _entries(path: Path, opened: Opener) -> Iterable[tuple[str, str]]:
     for line in content.decode("utf-8", errors="replace").splitlines():
         expected, separator, name = line.partition("  ")
         if not separator or len(expected) != 64 or name in names:
-            raise DamagedFile(f"{path}: {MANIFEST} is not what was packed: {AGAIN}")
+            raise DamagedFile(f"{path}: {MANIFEST} has changed since it was packed: {AGAIN}")
         if not _inside(name):
-            raise DamagedFile(f"{path}: {MANIFEST} names {name!r}, which lies outside: it is no archive of ours")
+            raise DamagedFile(
+                f"{path}: {MANIFEST} names {name!r}, which lies outside: it is not an archive of organbench"
+            )
         names.add(name)
         yield name, expected
 

@@ -39,7 +39,7 @@ Nothing in here has to be computed again. Unpack it; the folder is a results fol
 Without organbench: Python with the packages of constraints.txt (`pip install -r constraints.txt`), and the sources in
 the folder `code`: `PYTHONPATH=code python -m studies plot {first} --results .`
 
-`ro-crate-metadata.json` tells what each file is, `machine.json` who measured, `CITATION.cff` how to cite.
+`ro-crate-metadata.json` describes each file, `machine.json` the machine, `CITATION.cff` how to cite.
 """
 
 
@@ -70,7 +70,7 @@ def pack(root: Path, studies: Sequence[Study], target: Path, day: str, extra: It
     frame time is missing, damaged or stale, and when the file cannot be written.
     """
     if target.suffix != SUFFIX:
-        raise StudyError(f"an archive ends in {SUFFIX}, not '{target.name}'; give -o FILE{SUFFIX}")
+        raise StudyError(f"the name of an archive ends in {SUFFIX}, not '{target.name}'; give -o FILE{SUFFIX}")
     check_no_archive(root)
     check_studies(Ledger(root), studies, "archived")
     make_folder(target.parent)
@@ -89,7 +89,7 @@ def own_files(studies: Sequence[Study]) -> list[Path]:
 
 
 def gather(root: Path, studies: Sequence[Study], stage: Path) -> list[str]:
-    """Records of studies, their references and entries from outside, and what is drawn from them; what report.html had
+    """Records of studies, their references and external entries, and what is drawn from them; what report.html had
     no room for, in sentences. Raises StudyError when a record is missing."""
     stage.mkdir()
     for study in studies:

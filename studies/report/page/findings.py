@@ -51,7 +51,7 @@ def volume(tables: Tables) -> Finding | None:
     return Finding(
         "How well volumes are kept",
         f"{_small(kept[VOLUME])} %",
-        f"is the farthest that a volume kept by {KEPT} is off in {counted(len(pairs), 'pair')} of runs "
+        f"is the largest error of a volume kept by {KEPT} in {counted(len(pairs), 'pair')} of runs "
         f"({_name(kept)}). Without the constraint the same bodies are off by up to {plain(lost[VOLUME])} % "
         f"({_name(lost)}). A volume is compared with the body's own at rest, which rounding alone blurs.",
     )
@@ -102,7 +102,7 @@ def cost(tables: Tables) -> Finding | None:
     cells = [value_cell(percent, spread, signed=True) for percent, spread in added]
     kept, free = max(pairs, key=lambda pair: pair[0][FRAME] / pair[1][FRAME])
     return Finding(
-        "What keeping a volume costs",
+        "Cost of keeping a volume",
         f"{' to '.join(dict.fromkeys((cells[0], cells[-1])))} %",
         f"is what {KEPT} adds to the time of a frame in {counted(len(pairs), 'pair')} of runs. The most is in "
         f"{_name(kept)}: {_measured(kept, FRAME, signed=False)} ms against {_measured(free, FRAME, signed=False)} ms. "
@@ -147,7 +147,7 @@ def entries(tables: Tables) -> Finding | None:
     won = [_win(column, best, ours) for column, best, ours in contests if best.get("entry")]
     told = "; ".join(won[:MOST_NAMED]) + (f"; and {len(won) - MOST_NAMED} more" if len(won) > MOST_NAMED else "")
     return Finding(
-        "Entries from outside",
+        "Results of other programs",
         f"{len(won)} of {len(contests)}",
         "numbers that other programs handed in, scene by scene (force, displacement, volume, speed), are better than "
         f"those of all our bodies and methods in that scene{': ' if won else '.'}{told}{'.' if won else ''}",

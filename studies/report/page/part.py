@@ -55,7 +55,7 @@ def write_part(root: Path, study: Study, runs: Sequence[Run], table: pd.DataFram
     files = [chart.file for chart in study.charts]
     charts = [{"file": name, "svg": pictures[name]} for name in files if name in pictures]
     remarks = [
-        f"chart {name} is left out: it was not drawn by studies.plots.style.style.save"
+        f"chart {name} is omitted: studies.plots.style.style.save did not draw it"
         for name in files
         if name not in pictures
     ]
@@ -105,7 +105,7 @@ def other_studies(root: Path, studies: Sequence[Study]) -> tuple[list[Study], li
         others.append(replace(kept, **{name: str(part["study"][name]) for name in ABOUT if name != "name"}))
         if max(path.stat().st_mtime_ns for path in records) > part_path(root, kept).stat().st_mtime_ns:
             again = command_line("report", others[-1:])
-            remarks.append(f"report.html: {folder.name} is shown as it was drawn last; `{again}` draws it again")
+            remarks.append(f"report.html: {folder.name} shows its last charts; `{again}` redraws them")
     return others, remarks
 
 

@@ -195,7 +195,7 @@ def page(parts: Parts, given: Mapping[str, Any], machine: dict[str, Any]) -> byt
 
 def _counted(rows: Sequence[dict[str, Any]]) -> str:
     theirs = sum(bool(row.get("entry")) for row in rows)
-    entries = f", among them {counted(theirs, 'entry', 'entries')} from outside," if theirs else ""
+    entries = f", among them {counted(theirs, 'entry', 'entries')} of other programs," if theirs else ""
     return f"{counted(len(rows), 'case')}{entries}"
 
 

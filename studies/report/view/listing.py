@@ -27,7 +27,7 @@ def listing(root: Path) -> tuple[list[str], list[str]]:
             lines.append(f"{name}: {counted(len(cases), 'case')}, {reference or 'no reference'}")
             lines += [f"  {_line(case)}" for case in cases]
     if not lines:
-        raise StudyError(f"nothing to view is stored in {root}: `organbench run` does that")
+        raise StudyError(f"nothing to view is stored in {root}; run `organbench run` first")
     return lines, sentences(problems)
 
 

@@ -89,7 +89,7 @@ CASE = "number of the body in case_name"
 def _point_data(bodies: Sequence[Shown], offset: np.ndarray, case: np.ndarray) -> dict[str, Data]:
     found = {
         "displacement": Data(np.concatenate([b.displacement for b in bodies], axis=1), True, "m", "from rest"),
-        "offset": Data(offset, False, "m", "how far the body was moved aside: its positions are points minus this"),
+        "offset": Data(offset, False, "m", "shift of the body to the side: its positions are points minus this"),
         "case": Data(case, False, "1", CASE),
     }
     if any(body.error is not None for body in bodies):
@@ -104,5 +104,5 @@ def _field_data(times: np.ndarray, bodies: Sequence[Shown]) -> dict[str, Data]:
         "time": Data(times[:, None, None], True, "s", "scene time of the step"),
         "volume_ratio": Data(ratios[:, None], True, "1", "V/V0 of each body: of the volume that is farthest off"),
         "force": Data(forces[:, None], True, "N", "the probed force of each body"),
-        "case_name": Data(np.array([body.name for body in bodies]), False, "", "what each body is"),
+        "case_name": Data(np.array([body.name for body in bodies]), False, "", "description of each body"),
     }

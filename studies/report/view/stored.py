@@ -101,5 +101,5 @@ def _in_file(word: str) -> list[Stored]:
         return []
     run = stored_run(Path(word))
     if run is None:
-        raise StudyError(f"{word} holds no run with something to see in it; `organbench show` tells what it holds")
+        raise StudyError(f"{word} has no run to view; `organbench show` lists its content")
     return [run]

@@ -85,7 +85,7 @@ def view(root: Path, words: Sequence[str], own: Sequence[Scene] = ()) -> View:
         references.of(root, scene)
     shown = [shown_reference(solution, f"reference {path.stem}") for path, solution in references.read.items()]
     if not shown and not cases:
-        raise StudyError(f"nothing of '{scene.name}' is stored in {root}: `organbench run` does that")
+        raise StudyError(f"nothing of '{scene.name}' is stored in {root}; run `organbench run` first")
     return View(scene, [*shown, *cases], [*remarks, *references.remarks])
 
 
@@ -105,13 +105,13 @@ def _one_scene(root: Path, named: Sequence[Scene], runs: Sequence[Run], remarks:
     """The scene of all runs; without runs the one that was named. Raises StudyError where there are several."""
     scenes = [run.case.scene for run in runs] or list(named)
     if not scenes:
-        raise StudyError(remarks[0] if remarks else f"nothing is stored in {root}: `organbench run` does that")
+        raise StudyError(remarks[0] if remarks else f"there are no results in {root}; run `organbench run` first")
     for other in scenes[1:]:
         if other.name != scenes[0].name:
             raise StudyError(f"'{scenes[0].name}' and '{other.name}' are two scenes; view each in a file of its own")
         if other.checkpoints != scenes[0].checkpoints:
             raise StudyError(
-                f"the chosen cases of '{other.name}' have not the same checkpoints: the scene has changed between "
-                "them; name cases with the same ones"
+                f"the chosen cases of '{other.name}' have different checkpoints, because the scene has changed; "
+                "name cases with the same ones"
             )
     return scenes[0]

@@ -61,8 +61,8 @@ def run(whole: bool, table: Path | None = None) -> None:
 def main() -> None:
     """Exit codes: 0 all is compiled; 1 something could not be; 130 interrupted."""
     parser = argparse.ArgumentParser(prog="python -m studies.sweep.compiling.main", description=__doc__)
-    parser.add_argument("--essential", action="store_true", help="only what the main studies begin with")
-    parser.add_argument("--again", action="store_true", help="go through all tasks also when they were done before")
+    parser.add_argument("--essential", action="store_true", help="only what the main studies need first")
+    parser.add_argument("--again", action="store_true", help="repeat tasks that are already done")
     parser.add_argument("--table", type=Path, metavar="FILE", help="list every function that is compiled in a CSV file")
     options = parser.parse_args()
     whole = not options.essential
@@ -75,7 +75,7 @@ def main() -> None:
         print(f"organbench: {error}", file=sys.stderr)
         sys.exit(1)
     except KeyboardInterrupt:
-        print("organbench: interrupted; what is compiled is kept", file=sys.stderr)
+        print("organbench: interrupted; compiled functions are kept", file=sys.stderr)
         sys.exit(exit_code())
 
 

@@ -35,7 +35,7 @@ LOOK_SECONDS = 1.0
 BUSY = 0.1
 """Share of a machine's processors that others may use during frame times, without a warning."""
 GONE = (
-    "the Dask scheduler is gone, or no longer answers: start it and its workers again; what is finished is stored, the "
+    "the Dask scheduler no longer answers: restart it and its workers; what is finished is stored, the "
     "same command goes on from there"
 )
 
@@ -85,7 +85,7 @@ class Session:
         bare = [place for place, spec in found.items() if spec is None]
         if bare:
             name = known[bare[0]]["name"]
-            raise StudyError(f"worker {name} has no organbench that can be loaded; install it there; nothing has run")
+            raise StudyError(f"worker {name} cannot load organbench; install it there; nothing has run")
         try:
             self.client.register_plugin(plugin, name=self.name)
         except StudyError as error:
@@ -237,8 +237,8 @@ def _timed(session: Session, place: str, name: str, request: FrameTimes, progres
         raise StudyError(f"worker {name} measured frame times, and its process died: {death}") from death
     if count and busy > BUSY:
         warnings.warn(
-            f"during the frame times of {request.study} others used {100 * busy:.0f} % of the processors of worker "
-            f"{name}: take them with care",
+            f"during the frame times of {request.study} other programs used {100 * busy:.0f} % of the processors of "
+            f"worker {name}: they may be too slow",
             stacklevel=2,
         )
     progress.advance("timing", name)

@@ -94,7 +94,7 @@ def read_settings(path: Path) -> Settings:
         # Words alone: YAML itself would read 2:00:00 as 7200, and a queue called 12 as a number.
         given = yaml.load(path.read_text(encoding="utf-8"), yaml.BaseLoader)
     except FileNotFoundError:
-        raise StudyError(f"there is no file {path}; write one as docs/cluster.md shows") from None
+        raise StudyError(f"there is no file {path}; docs/cluster.md shows how to write one") from None
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise StudyError(f"{path} cannot be read as YAML ({' '.join(str(error).split())})") from error
     if not isinstance(given, dict):
@@ -200,7 +200,7 @@ def _start_workers(cluster: SpecCluster, settings: Settings) -> None:
     except (OSError, RuntimeError, ValueError) as error:
         for job in cluster.workers.values():
             job.status = Status.failed  # else closing the cluster fails
-        said, here = " ".join(str(error).split()), "correct `kind`, or run where it is"
+        said, here = " ".join(str(error).split()), "correct `kind`, or run on a machine that has it"
         if isinstance(error, OSError):
             raise StudyError(f"{settings.kind} cannot be used here ({said}): {here}") from error
         raise StudyError(f"{settings.kind} did not take a job ({said}): correct the settings") from error

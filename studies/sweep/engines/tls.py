@@ -19,7 +19,7 @@ def make_key(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, mode=0o700)
     except OSError as error:
-        raise StudyError(f"{folder} cannot be made ({error.strerror}): choose a results folder to write to") from error
+        raise StudyError(f"{folder} cannot be created ({error.strerror}): choose a writable results folder") from error
     command = ["openssl", "req", "-x509", "-nodes", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1"]
     command += ["-days", str(DAYS), "-subj", "/CN=organbench"]
     command += ["-keyout", str(folder / KEY), "-out", str(folder / CERTIFICATE)]

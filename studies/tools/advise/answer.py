@@ -91,14 +91,14 @@ def advise(
 def recommended(scene: Scene | str, results: Path | str = RESULTS) -> Recommendation:
     """Body and step that `advise` chooses for the usual wish, without timing.
 
-    Raises StudyError where nothing meets it, or the reference is too coarse to tell.
+    Raises StudyError where nothing meets it, or the reference is not accurate enough to decide.
     """
     answer = advise(scene, results=results, timing=False)
     if answer.chosen is None or not answer.meets:
         raise StudyError(
             f"no recipe is recommended for scene '{answer.scene.name}': "
-            f"{'the reference is too coarse to tell' if answer.unknowable else 'none meets the usual wish'}; "
-            f"`organbench advise {answer.scene.name}` names the nearest"
+            f"{'the reference is not accurate enough to decide' if answer.unknowable else 'no body meets the target'}"
+            f"; `organbench advise {answer.scene.name}` names the closest candidate"
         )
     return Recommendation(answer.chosen.case.body, answer.chosen.case.dt_fraction)
 
@@ -122,7 +122,7 @@ def _known(scene: Scene, results: Path) -> tuple[Stored, tuple[str, ...]]:
     alike = same_kind(scene, ACCURACY.scenes)
     if not alike:
         raise StudyError(
-            f"nothing is known for scene '{scene.name}': the study '{ACCURACY.name}' has no scene of its kind "
+            f"no results apply to scene '{scene.name}': the study '{ACCURACY.name}' has no scene of its kind "
             f"({kind_of(scene)}); `organbench list` names its scenes, or run your own study"
         )
     found = stored(results, alike)

@@ -54,7 +54,7 @@ def stored(results: Path, scenes: Iterable[Scene]) -> Stored:
             origins += [str(results / ACCURACY.name)] * bool(own) + [str(_table(results))] * bool(others)
     if not found:
         raise StudyError(
-            f"nothing is stored of the study '{ACCURACY.name}' for {', '.join(wanted)}, neither below "
+            f"no results of the study '{ACCURACY.name}' for {', '.join(wanted)}, neither below "
             f"{results / ACCURACY.name} nor in {_table(results)}; `organbench run {ACCURACY.name}` measures it"
         )
     return Stored(found, " and ".join(dict.fromkeys(origins)))

@@ -42,7 +42,7 @@ def unseen(results: Path, case: Case) -> Unseen | None:
         rows = rows.loc[(rows["scene"].map(organ_of) == organ) & (rows["recipe"] == recipe_text(case))]
         force, displacement = (_of(rows, entry) for entry in (FORCE, DISPLACEMENT))
     except (KeyError, ValueError, OSError) as error:
-        raise StudyError(f"{path} cannot be read ({error}); `organbench run {POPULATION}` writes it anew") from error
+        raise StudyError(f"{path} cannot be read ({error}); `organbench run {POPULATION}` writes it again") from error
     return Unseen(organ, force, displacement, str(path)) if force.count else None
 
 
@@ -56,7 +56,7 @@ def _of(rows: pd.DataFrame, entry: Metric) -> Distribution:
 
 
 def words(found: Unseen) -> str:
-    """ "in 40 livers it had not seen, 95 of 100 are within 8.1 % (6 to 12) of the force, ..."."""
+    """ "in 40 livers it had not seen, 95 % are within 8.1 % (6 to 12) of the force, ..."."""
 
     def bound(one: Distribution) -> str:
         low, high = one.bound_interval
@@ -64,6 +64,6 @@ def words(found: Unseen) -> str:
 
     lost = f", {found.force.lost} more lost" if found.force.lost else ""
     return (
-        f"on {found.force.count} other organs of the kind ({found.organ}{lost}) 95 of 100 are within "
+        f"on {found.force.count} other organs of this kind ({found.organ}{lost}) 95 % are within "
         f"{bound(found.force)} of the force and {bound(found.displacement)} in displacement"
     )

@@ -23,7 +23,7 @@ def lines_of(answer: Advice) -> list[str]:
     return [*verdict, *_recipe(answer, answer.chosen)]
 
 
-USUAL = " (the usual wish; --force and --displacement name another)"
+USUAL = " (default target; --force and --displacement set another)"
 
 
 def wish_words(wish: Wish) -> str:
@@ -45,29 +45,35 @@ def cost_words(cost: float) -> str:
 
 def _verdict(answer: Advice) -> list[str]:
     """Whether the wish is met, and what of it could not be judged."""
-    told = [f"{' and '.join(answer.ignored)} cannot be judged: the scene compares none"] if answer.ignored else []
+    told = [f"{' and '.join(answer.ignored)} ignored: the scene does not compare it"] if answer.ignored else []
     one, wish = answer.chosen, answer.wish
     if answer.misshapen is not None:
         body = answer.misshapen.case.body
         told.append(
-            f"not advised: {body.series}, {body.nodes:,} surface nodes, meets the wish, but "
+            f"not recommended: {body.series}, {body.nodes:,} surface nodes, meets the target, but "
             f"{off_shape(answer.misshapen)}"
         )
     if answer.alike:
-        told.append(f"it was never run: errors are the worst of {', '.join(answer.alike)}, scenes of the same kind")
+        told.append(
+            f"this scene has not run: errors are the worst of {', '.join(answer.alike)}, scenes of the same kind"
+        )
     for name in answer.unknowable:
         known = max(getattr(row, name).uncertainty for group in answer.stored.found.values() for row in group)
-        told.append(f"cannot be told: the reference is known to ±{known:.2g} % of the {name}")
+        told.append(f"undecided: the reference is only known to ±{known:.2g} % of the {name}")
     if one is None:
-        return [*told, "nothing can be advised: name an error that the scene compares"]
+        return [*told, "no recommendation: name an error that the scene compares"]
     if answer.meets:
         return [*told, *_borderline(one, wish)]
     shares = {name: share for name, share in one.shares(wish).items() if share > 1.0}
     if shares:
         words = [f"{name} {share:.2g} times too large" for name, share in shares.items() if name not in one.off_shape]
         missed = ", ".join([*words, off_shape(one)] if one.off_shape else words)
-        return [*told, f"nothing here does; the nearest is ({missed}):"]
-    blind = "its computing time is not known here" if not one.cost.known else "measured against it, the nearest is:"
+        return [*told, f"no body meets it; the closest candidate is ({missed}):"]
+    blind = (
+        "its computing time is not known on this machine"
+        if not one.cost.known
+        else "measured against it, the closest candidate is:"
+    )
     return [*told, blind]
 
 
@@ -100,7 +106,7 @@ def _borderline(one: Judged, wish: Wish) -> list[str]:
         and (error := getattr(one, name)).known
         and abs(error.value) + error.uncertainty > bound
     ]
-    return [f"the uncertainty of the reference reaches beyond the wish ({' and '.join(near)})"] if near else []
+    return [f"the uncertainty of the reference reaches beyond the target ({' and '.join(near)})"] if near else []
 
 
 def _recipe(answer: Advice, one: Judged) -> list[str]:
@@ -129,7 +135,7 @@ def _error(error: Measured, signed: bool = False) -> str:
 
 def _computing(answer: Advice, one: Judged) -> str:
     if not one.cost.known:
-        return "not known; leave --no-timing out to time it here"
+        return "not known; leave out --no-timing to measure it here"
     spread = f" ± {one.cost.uncertainty:.1g}" if one.cost.uncertainty == one.cost.uncertainty else ""
     told = f"{one.cost.value:.3g}{spread} ms per 1 ms of simulated time, {1.0 / one.cost.value:.3g} times real time"
     if answer.short is not None:

@@ -73,11 +73,11 @@ def _scenes_of(folds: Sequence[Fold]) -> list[Scene]:
     """Every scene of the folds once. Raises StudyError for folds that lack one, a scene without a reference, and two
     that share a name."""
     if not folds or not all(fold.fitted and fold.judged for fold in folds):
-        raise StudyError("a calibration needs scenes to be fitted on and others to be judged on")
+        raise StudyError("a calibration needs scenes to fit and other scenes to test")
     scenes: dict[str, Scene] = {}
     for scene in (scene for fold in folds for scene in fold.scenes):
         if scene.reference is None:
-            raise StudyError(f"scene '{scene.name}' has no reference to be fitted to or judged by")
+            raise StudyError(f"scene '{scene.name}' has no reference for fitting or scoring")
         if scenes.setdefault(scene.name, scene) != scene:
             raise StudyError(f"two scenes of a calibration are called '{scene.name}'; rename one")
     return list(scenes.values())
@@ -151,9 +151,9 @@ def _remarks(start: BodyRecipe, fold: Fold, found: Fit, after: dict[str, Judged 
     if left:
         yield f"{' and '.join(left)} stayed: the scene compares fewer errors than the body has parameters"
     if found.at_bound:
-        yield f"{' and '.join(found.at_bound)} ended at the end of the range that is searched"
+        yield f"{' and '.join(found.at_bound)} ended at a bound of the search range"
     if not found.converged:
-        yield "the search was ended before it came to rest"
+        yield "the search stopped before it converged"
     lost = [name for name, errors in after.items() if errors is None]
     if lost:
         yield f"with the fitted body {' and '.join(lost)} ended badly"

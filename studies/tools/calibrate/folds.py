@@ -30,7 +30,7 @@ def own_scenes(organ: str) -> tuple[Scene, ...]:
     own = tuple(scene for scene in known if scene.organ.shape == organ)
     if not own:
         names = ", ".join(dict.fromkeys(scene.organ.shape for scene in known))
-        raise StudyError(f"organ '{organ}' has no scene with a reference to be fitted on; there are scenes of {names}")
+        raise StudyError(f"organ '{organ}' has no scene with a reference to fit; choose one of {names}")
     return own
 
 

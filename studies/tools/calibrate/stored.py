@@ -104,20 +104,22 @@ def read_calibration(path: Path | str) -> Calibration:
             f"{path} cannot be read ({error.strerror}); give a file that `organbench calibrate` wrote"
         ) from error
     except ValueError as error:
-        raise DamagedFile(f"{path} is damaged or no calibration ({_first_line(error)}); {ANEW}") from error
+        raise DamagedFile(f"{path} is damaged or not a calibration ({_first_line(error)}); {ANEW}") from error
     if not isinstance(whole, dict) or whole.get("kind") != KIND or not isinstance(whole.get("calibration"), dict):
-        raise StudyError(f"{path} is JSON, but no calibration; {ANEW}")
+        raise StudyError(f"{path} is JSON, but not a calibration; {ANEW}")
     if whole.get("schema") != SCHEMA:
-        raise OtherVersion(f"{path} was written by another version, in another layout; {ANEW}")
+        raise OtherVersion(f"{path} was written by another version in another format; {ANEW}")
     data = whole["calibration"]
     if whole.get("digest") != _digest(data):
-        raise DamagedFile(f"{path} was changed after it was written, so it is no record of a fit; {ANEW}")
+        raise DamagedFile(f"{path} was changed after it was written, so it no longer records a fit; {ANEW}")
     try:
         found = _adapter().validate_python(data)
     except ValidationError as error:
-        raise OtherVersion(f"{path} holds what this version cannot read ({_first_line(error)}); {ANEW}") from error
+        raise OtherVersion(
+            f"{path} has content that this version cannot read ({_first_line(error)}); {ANEW}"
+        ) from error
     if _data(found) != data:
-        raise OtherVersion(f"{path} holds settings that this version does not know; {ANEW}")
+        raise OtherVersion(f"{path} has settings that this version does not know; {ANEW}")
     return found
 
 

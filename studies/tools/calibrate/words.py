@@ -14,9 +14,9 @@ HEAD = (
     f"  {'scene':<14}{'':<8}{'before':>9}{'after':>8}{'±':>6}{'before':>11}{'after':>8}{'±':>6}",
 )
 SENTENCES = {
-    Verdict.HOLDS: "the fit holds, scenes that it has not seen gain at least half as much",
-    Verdict.MEMORISES: "the fit memorises, scenes that it has not seen gain less than half as much",
-    Verdict.UNRESOLVED: "not resolvable, the reference knows no finer than what the fit changes",
+    Verdict.HOLDS: "the fit generalises: unseen scenes gain at least half as much",
+    Verdict.MEMORISES: "the fit overfits: unseen scenes gain less than half as much",
+    Verdict.UNRESOLVED: "not resolvable: the fit changes less than the uncertainty of the reference",
 }
 
 

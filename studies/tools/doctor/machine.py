@@ -23,7 +23,7 @@ def machine(root: Path) -> list[Finding]:
     caches = [
         ("compiled code", compiled_folder(), "NUMBA_CACHE_DIR"),
         ("meshes", mesh_folder(), "ORGANBENCH_CACHE"),
-        ("what is known of the sources", user_cache(), "XDG_CACHE_HOME"),
+        ("cached code analysis", user_cache(), "XDG_CACHE_HOME"),
     ]
     found = [cores(), memory(this_machine().memory_gb), compiler()]
     found += [cache(what, folder, variable) for what, folder, variable in caches]
@@ -35,16 +35,16 @@ def cores() -> Finding:
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     there = os.cpu_count() or 1
     said = f"{usable} of {there} cores may be used"
-    return ok(said) if usable > 1 else note(f"{said}: frame times are measured beside everything else that runs")
+    return ok(said) if usable > 1 else note(f"{said}: other programs disturb the frame times")
 
 
 def memory(gigabytes: int | None) -> Finding:
     """Whether two references fit."""
     if gigabytes is None:
-        return note("the system does not tell its memory")
+        return note("the system does not report its memory")
     if gigabytes >= MEMORY:
         return ok(f"{gigabytes} GB of memory")
-    return note(f"{gigabytes} GB of memory, {MEMORY} are used by two processes", "organbench run --jobs 1")
+    return note(f"{gigabytes} GB of memory, two processes use {MEMORY}", "organbench run --jobs 1")
 
 
 def compiler() -> Finding:
@@ -64,7 +64,7 @@ def cache(what: str, folder: Path, variable: str) -> Finding:
         return ok(f"cache of {what}: {folder}")
     elsewhere = Path(tempfile.gettempdir()) / "organbench"
     line = f"unset {variable}" if os.environ.get(variable) else f"export {variable}={shlex.quote(str(elsewhere))}"
-    return fault(f"cache of {what}: {folder} cannot be written to ({problem}): it is made anew every time", line)
+    return fault(f"cache of {what}: {folder} cannot be written to ({problem}): it is rebuilt every time", line)
 
 
 def cannot_write(folder: Path) -> str | None:

@@ -16,11 +16,11 @@ def results_folder(root: Path, studies: Collection[str]) -> list[Finding]:
     if not root.exists():
         return [note(f"no results yet: there is no folder {root}", "organbench run")]
     if not root.is_dir():
-        return [fault(f"{root} is no folder, results cannot be stored there", "unset ORGANBENCH_RESULTS")]
+        return [fault(f"{root} is not a folder, so results cannot be stored there", "unset ORGANBENCH_RESULTS")]
     problem = cannot_write(root)
     if problem is not None:
         line = f"chmod u+rwx {shlex.quote(str(root))}"
-        return [fault(f"nothing can be stored in {root} ({problem}), charts are not drawn again", line)]
+        return [fault(f"nothing can be stored in {root} ({problem}), so charts are not redrawn", line)]
     return list(_files(root, studies))
 
 

@@ -23,7 +23,7 @@ NATIVE = ("numba", "h5py", "gmsh", "mmgpy")
 """Modules of required packages that load libraries of the system."""
 PURPOSE = {
     "masks": "label masks of scans (NIfTI, NRRD)",
-    "view": "what reads the files of `organbench view` without ParaView",
+    "view": "reads the files of `organbench view` without ParaView",
     "crosscheck": "the second finite-element code of `organbench verify`",
     "parquet": "`organbench table --parquet`",
     "cluster": "`organbench run --on` workers of other machines",
@@ -39,7 +39,7 @@ def software() -> list[Finding]:
         needed = required()
     except PackageNotFoundError:
         line = f"{shlex.quote(sys.executable)} -m pip install --editable ."
-        return [fault(f"{DISTRIBUTION} itself is not installed, so it is not known what it needs", line)]
+        return [fault(f"{DISTRIBUTION} itself is not installed, so its requirements are unknown", line)]
     found = [ok(f"{DISTRIBUTION} {version(DISTRIBUTION)}, Python {platform.python_version()}"), packages(needed)]
     found += [loads(module) for module in NATIVE if is_installed(module)]
     return found + [extra(name, required(name)) for name in extras()]
@@ -85,7 +85,7 @@ def lacking(one: Requirement) -> str | None:
         there = version(one.name)
     except PackageNotFoundError:
         return "is not installed"
-    return None if one.specifier.contains(there, prereleases=True) else f"is {there}, needed is {one.specifier}"
+    return None if one.specifier.contains(there, prereleases=True) else f"is {there}, but {one.specifier} is required"
 
 
 def install(needed: Sequence[Requirement]) -> str:
@@ -127,6 +127,6 @@ def system_libraries() -> str:
     """The line that installs the libraries of X and GL; elsewhere than on Debian, the packages that hold them there."""
     names = " ".join(GMSH_LIBRARIES)
     if shutil.which("apt-get") is None:
-        return f"# by your system's own means, what these packages of Debian hold: {names}"
+        return f"# install the equivalents of these Debian packages: {names}"
     sudo = "" if os.name == "posix" and os.geteuid() == 0 else "sudo "
     return f"{sudo}apt-get update && {sudo}apt-get install -y --no-install-recommends {names}"

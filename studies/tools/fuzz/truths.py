@@ -19,7 +19,7 @@ def named(setup: Setup, history: History) -> tuple[str, str]:
     """What a finished run is called, and why: ok, inverted, drifted or penetrated."""
     smallest = float(history.min_j[-1])
     if smallest <= 0.0:
-        return "inverted", f"an element ends inside out (smallest volume ratio {smallest:.3g})"
+        return "inverted", f"an element ends inverted (smallest volume ratio {smallest:.3g})"
     deepest = float(np.max(history.penetration[-1], initial=0.0))
     if deepest > INSIDE * setup.body.size:
         return "penetrated", f"a node lies {1e3 * deepest:.3g} mm inside an obstacle"
@@ -42,13 +42,13 @@ def other_bits(setup: Setup, history: History) -> str | None:
         return None
     alone = simulate(replace(setup, threads=1))
     same = np.array_equal(alone.final, history.final) and alone.outcome == history.outcome
-    return None if same else f"{setup.threads} threads give other positions than one"
+    return None if same else f"{setup.threads} threads give different positions from one"
 
 
 def _not_finite(history: History) -> str | None:
     for name in ("volume", "pressure", "contact_force", "penetration", "held_force", "final"):
         if not np.isfinite(getattr(history, name)).all():
-            return f"the history of '{name}' holds a number that is not finite"
+            return f"the history of '{name}' has a number that is not finite"
     return None
 
 

@@ -72,7 +72,7 @@ def test_the_nearest_is_marked(found, named):
 
 @pytest.mark.parametrize("shape", [ShapeErrors(0.0101, 0.0), ShapeErrors(0.0, -0.0051), ShapeErrors(0.0, 0.0051)])
 def test_a_body_that_does_not_keep_the_shape_is_not_recommended(shape):
-    """The cheaper one meets the wish, but lacks a piece of its organ."""
+    """The cheaper one meets the target, but lacks a piece of its organ."""
     short = run(EVEN, -0.02, shape=shape)
     assert "594" not in recommended_of([run(PAPER, -0.7), short, run(GRADED, 0.01)])
     row, note = (line for line in recommended_of([run(PAPER, -0.7), short]).splitlines()[2:] if line)

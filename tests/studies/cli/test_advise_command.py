@@ -32,7 +32,7 @@ def told(organbench, tmp_path):
 
 def test_an_answer_holds_recipe_errors_cost_source_and_commands(told, tmp_path):
     out = told("liver_press")
-    assert "liver_press: force within 3 %, displacement within 1 % (the usual wish" in out
+    assert "liver_press: force within 3 %, displacement within 1 % (default target" in out
     assert "graded quadratic, masses by stiffness, 794 surface nodes, dt = 0.8 dt_c, 2 ms" in out
     assert "−1.2 ± 0.5 %" in out and "0.8 ± 0.1 %" in out
     assert "0.5 ms per 1 ms of simulated time, 2 times real time, on this machine" in out
@@ -48,15 +48,15 @@ def test_an_answer_holds_recipe_errors_cost_source_and_commands(told, tmp_path):
 def test_a_miss_says_by_how_much(told):
     out = told("liver_press", "--budget", "250us")
     assert "at most 0.25 ms of computing per 1 ms of simulated time" in out
-    assert "nothing here does; the nearest is (displacement 1.4 times too large):" in out
+    assert "no body meets it; the closest candidate is (displacement 1.4 times too large):" in out
 
 
 def test_a_wish_finer_than_the_reference_cannot_be_told(told):
-    assert "cannot be told: the reference is known to ±0.5 % of the force" in told("liver_press", "--force", "0.4%")
+    assert "undecided: the reference is only known to ±0.5 % of the force" in told("liver_press", "--force", "0.4%")
 
 
 def test_a_wish_within_the_uncertainty_is_said(told):
-    assert "reaches beyond the wish (displacement)" in told("liver_press", "--displacement", "0.85 %")
+    assert "reaches beyond the target (displacement)" in told("liver_press", "--displacement", "0.85 %")
     assert "reaches beyond" not in told("liver_press")
 
 
@@ -64,7 +64,7 @@ def test_a_scene_of_the_user_gets_the_worst_of_its_kind(told, tmp_path):
     file = tmp_path / "mine.py"
     file.write_text(STUDY.format(scenes="[MINE]"))
     out = told(file, "--no-timing")
-    assert "it was never run: errors are the worst of liver_probe, kidney_probe, scenes of the same kind" in out
+    assert "this scene has not run: errors are the worst of liver_probe, kidney_probe, scenes of the same kind" in out
     assert "on another machine" in out and "in Python     Case(scene, BodyRecipe(kind='quadratic'" in out
 
 
@@ -78,18 +78,18 @@ def test_a_budget_without_a_time_is_not_met(organbench, tmp_path):
     rows = [row(LIVER_PRESS, b, n) | {"real_time [s/s]": float("nan")} for b, n in LADDER.items()]
     publish(tmp_path, rows)
     _, out, _ = organbench("advise", "liver_press", "--budget", "1ms", "--no-timing", "--results", tmp_path)
-    assert "its computing time is not known here" in out and "leave --no-timing out" in out
+    assert "its computing time is not known on this machine" in out and "leave out --no-timing" in out
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("liver_pres",), "unknown scene 'liver_pres'; did you mean 'liver_press'"),
-        (("liver_press", "--force", "much"), "force 'much' is no tolerance"),
-        (("liver_press", "--displacement", "-1%"), "displacement '-1%' is no tolerance"),
-        (("liver_press", "--budget", "1"), "budget '1' is no time"),
-        (("liver_press",), "nothing is stored of the study 'accuracy'"),
-        (("ball_ringing",), "nothing is known for scene 'ball_ringing'"),
+        (("liver_press", "--force", "much"), "force 'much' is not a tolerance"),
+        (("liver_press", "--displacement", "-1%"), "displacement '-1%' is not a tolerance"),
+        (("liver_press", "--budget", "1"), "budget '1' is not a time"),
+        (("liver_press",), "no results of the study 'accuracy'"),
+        (("ball_ringing",), "no results apply to scene 'ball_ringing'"),
         (("nothing.py",), "there is no file nothing.py"),
     ],
 )

@@ -66,9 +66,7 @@ def test_output_that_is_not_taken(organbench, monkeypatch):
         monkeypatch.setattr(sys, "stdout", full)
         code, _, err = organbench("list")
     assert code == 2
-    assert err == (
-        "organbench: the output could not be written (No space left on device); what was stored before is kept\n"
-    )
+    assert err == ("organbench: the output could not be written (No space left on device); stored results are kept\n")
 
 
 def test_a_folder_that_may_not_be_entered(refused, tiny_file, results, monkeypatch):

@@ -72,7 +72,7 @@ def test_both_kinds_of_file_are_taken(organbench, write, tmp_path, monkeypatch, 
     command, *options = words
     for part in (SCENE, STUDY):
         _, out, err = organbench(command, write(part), *options)
-        assert out or "nothing is stored of the study 'accuracy'" in err, err
+        assert out or "no results of the study 'accuracy'" in err, err
 
 
 def test_the_example_of_contributing_is_a_scene_for_other_programs(organbench, tmp_path):

@@ -25,11 +25,11 @@ def test_no_text_is_no_bound():
 
 @pytest.mark.parametrize("text", ["3", "0", "0%", "-3%", "101%", "three", "%", "3%%", "3,0%", "nan", "inf", "1 2"])
 def test_what_is_no_share_is_refused(text):
-    with pytest.raises(StudyError, match="is no tolerance; give a share above 0 and up to 100 %"):
+    with pytest.raises(StudyError, match="is not a tolerance; give a share above 0 and up to 100 %"):
         share(text, "force")
 
 
 @pytest.mark.parametrize("text", ["1", "0ms", "-1ms", "1 min", "ms", "1mss", "nan ms", "1e999s"])
 def test_what_is_no_time_is_refused(text):
-    with pytest.raises(StudyError, match="is no time; give the computing time per 1 ms of simulated time"):
+    with pytest.raises(StudyError, match="is not a time; give the computing time per 1 ms of simulated time"):
         budget(text)

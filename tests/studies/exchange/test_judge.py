@@ -159,7 +159,7 @@ def test_an_entry_cannot_be_replayed(organbench, refused, ours, scene_file, tmp_
     path = ours.npz(tmp_path / "a.npz")
     organbench("judge", scene_file, path, "--nodes", NODES, "--results", tmp_path / "r")
     (stored,) = entry_files(tmp_path / "r")
-    assert "is an entry from outside: only the program that made it" in refused("replay", stored)
+    assert "is a result of another program: only that program" in refused("replay", stored)
 
 
 def test_an_entry_inside_out_says_so(ours, tmp_path):
@@ -171,7 +171,7 @@ def test_an_entry_inside_out_says_so(ours, tmp_path):
 def test_without_its_reference_nothing_but_errors_is_left_out(organbench, ours, scene_file, tmp_path):
     path = ours.npz(tmp_path / "a.npz")
     code, out, err = organbench("judge", scene_file, path, "--nodes", NODES, "--results", tmp_path / "none")
-    assert code == 0 and "no errors are judged, the reference is not there" in err
+    assert code == 0 and "errors are not judged, because the reference is missing" in err
     assert "volume_worst" in out and "force_end" not in out
 
 
@@ -179,7 +179,7 @@ def test_a_force_of_the_other_sign_is_named_and_ours_is_not(organbench, ours, sc
     for sign, named in ((-1, True), (1, False)):
         path = ours.npz(tmp_path / "a.npz", force=sign * ours.force)
         code, out, err = organbench("judge", scene_file, path, "--nodes", NODES, "--results", results)
-        assert code == 0 and ("the force has the other sign: reversed, its error is" in err) == named, err
+        assert code == 0 and ("the force has the wrong sign: reversed, its error is" in err) == named, err
     own = next(line.split()[1] for line in out.splitlines() if "force_end" in line)
     assert f"is {own}" not in err
 

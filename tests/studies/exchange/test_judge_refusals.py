@@ -49,7 +49,7 @@ HISTORIES = {
     "missing steps": (lambda o: {"t": o.t[:30], "positions": o.positions[:30]}, "steps are missing at t = 4 s"),
     "no rest": (lambda o: {"t": o.t[1:], "positions": o.positions[1:]}, "missing at t = 0 s (t = 0 is the rest shape)"),
     "milliseconds": (lambda o: {"t": 1e3 * o.t}, "the times go to 4000, the scene to 4 s: give seconds, not ms"),
-    "descending": (lambda o: {"t": o.t[::-1]}, "must be numbers that ascend"),
+    "descending": (lambda o: {"t": o.t[::-1]}, "must be increasing numbers"),
     "no times": (lambda o: {"t": None}, "a.npz lacks 't'"),
     "other names": (
         lambda o: {"t": None, "time": o.t, "x": o.positions},
@@ -71,7 +71,7 @@ def test_times_and_forces_that_do_not_fit_are_refused(refused, ours, scene_file,
 
 FILES = {
     "a.txt": ("", "entries are read from .npz, .csv, .vtkhdf, .hdf, .pvd or a folder of .vtu files"),
-    "a.npz": ("no zip", "a.npz is no npz file; numpy.savez writes one"),
+    "a.npz": ("no zip", "a.npz is not an npz file; numpy.savez writes one"),
     "a.vtkhdf": ("no HDF5", "a.vtkhdf cannot be read"),
     "a.pvd": ("<VTKFile>", "a.pvd cannot be read"),
     "a.csv": ("t,node,x,y\n0,0,0,0\n", "a.csv lacks the column 'z'"),
@@ -100,6 +100,6 @@ def test_names_and_times_that_are_none_are_refused(refused, ours, scene_file, tm
     assert "give a positive number" in refused(*options, "--seconds", -1)
     force = tmp_path / "force.csv"
     force.write_text("t,force\n0,0\n")
-    assert "a.npz holds the force already; leave force.csv out" in refused(*options, "--force", force)
+    assert "a.npz already has the force; leave out force.csv" in refused(*options, "--force", force)
     path = ours.npz(tmp_path / "a.npz", force=None)
     assert "force.csv has no force at t = 0.1, 0.2" in refused(*options, "--force", force)

@@ -148,5 +148,5 @@ def test_a_liver_that_is_five_per_cent_shorter_is_caught_by_metric_table_and_adv
     )
     assert found.meets and found.chosen is not None and found.chosen.case.body.nodes == 1194
     assert found.misshapen is not None and found.misshapen.case.body == LIVER
-    (line,) = [line for line in lines_of(found) if line.startswith("not advised: ")]
+    (line,) = [line for line in lines_of(found) if line.startswith("not recommended: ")]
     assert f"{distance:.3g} % of the liver's size" in line and f"lacks {-volume:.3g} % of its volume" in line

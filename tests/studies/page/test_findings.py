@@ -56,7 +56,7 @@ def test_forces_and_their_uncertainty(told):
 
 
 def test_times_and_their_spread(told):
-    cost = told["What keeping a volume costs"]
+    cost = told["Cost of keeping a volume"]
     assert cost.number == "+25 ± 11 %" and "in 1 pair of runs" in cost.text and "In 0 pairs" in cost.text
     assert "0.25 ± 0.01 ms against 0.20 ± 0.01 ms" in cost.text
     assert told["Speed"].number == "1 of 2" and "0.9 s" in told["Speed"].text
@@ -81,12 +81,12 @@ def beside(*entries):
 
 def test_an_entry_is_told_where_it_is_the_best_of_its_scene_and_only_there():
     best = loss("tetrahedral", "theirs", 5.0, -0.9, mean=5.0)
-    (finding,) = [one for one in findings(beside(best)) if one.title == "Entries from outside"]
+    (finding,) = [one for one in findings(beside(best)) if one.title == "Results of other programs"]
     assert finding.number == "1 of 3"  # force; neither mean displacement nor volume
     told = "force of theirs in ball, −0.9 ± 0.2 % (ours at best −35.3 ± 0.2 %, ball, tetrahedral, 550 nodes by "
     assert told + "implicit_volume)." in finding.text and finding.text.count(" of theirs in ") == 1
     worse = loss("tetrahedral", "theirs", 5.0, -36.0, mean=5.0)
-    (finding,) = [one for one in findings(beside(worse)) if one.title == "Entries from outside"]
+    (finding,) = [one for one in findings(beside(worse)) if one.title == "Results of other programs"]
     assert finding.number == "0 of 3" and finding.text.endswith("in that scene.")
     alone = loss("tetrahedral", "theirs", 5.0, -36.0, scene="spleen")
     assert "force of theirs in spleen, −36.0 ± 0.2 %;" in findings(beside(alone))[-1].text

@@ -192,7 +192,7 @@ def test_entries_from_outside_stand_beside_ours_under_their_own_names(page):
     assert shown[-1] - POINTS[:6] == pytest.approx(1.05 * (truth[-1] - POINTS[:6]), abs=2e-4)
     assert "replay" not in unable and unable["why"] == "Nothing was computed, so there is no replay."
     assert "skipped (unable: it knows no caps)" in unable["about"]
-    assert f"{len(losses()) + 2} cases, among them 2 entries from outside, of 2 studies" in page[1]
+    assert f"{len(losses()) + 2} cases, among them 2 entries of other programs, of 2 studies" in page[1]
 
 
 @pytest.mark.parametrize(("less", "outside"), [(300, 1), (5_000, 4), (10**6, 12)])

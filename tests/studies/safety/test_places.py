@@ -56,7 +56,7 @@ def test_a_folder_is_not_run_and_named_and_the_rest_runs(organbench, tiny_file, 
     other = case_path(results, "tiny", tiny_case(dt_fraction=3.0, beyond_limit=True))
     other.unlink()
     code, _, err = organbench("run", tiny_file, "--results", results)
-    assert code == 1 and f"{place} is a folder in the place of its file: delete it" in err and "Traceback" not in err
+    assert code == 1 and f"{place} is a folder where a file belongs: delete it" in err and "Traceback" not in err
     assert other.is_file() and (place / "mine.txt").read_text() == "kept"
 
 

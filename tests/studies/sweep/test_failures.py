@@ -112,7 +112,7 @@ def test_a_case_that_ends_its_process_is_stored_and_the_rest_goes_on(organbench,
     assert "tiny: 2 cases: 1 ok, 1 failed\n  failed: its process died 3 times" in out
     (sentence,) = err.splitlines()
     assert sentence.startswith("warning: failed: tiny_squeeze-tetrahedral-60-fatal-dt0.5 (its process died 3")
-    assert sentence.endswith(f"the rest is done, `organbench run {file} --only failed` tries again")
+    assert sentence.endswith(f"the rest is done, `organbench run {file} --only failed` retries")
     assert organbench("status", file, "--results", results)[1].splitlines()[0] == "tiny: 2 cases: 1 ok, 1 failed"
     code, out, _ = organbench("run", file, "--results", results)
     assert code == 1 and "tiny: nothing ran" in out, "what failed is known, does not run again, and is not forgotten"

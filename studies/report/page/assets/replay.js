@@ -123,7 +123,7 @@ function tellColours(given, truth) {
   else if (replay.comparable) said.push(`Colour: distance of each point from the same point of the reference, known ${momentsOf(replay)} and in proportion between them.`);
   else said.push("The body may turn or slip freely in this scene: single points are not comparable, and no error is coloured.");
   if (truth) said.push("The reference is drawn in its own shape; it moves in a straight line from checkpoint to checkpoint.");
-  else if (replay.reference) said.push(`The reference cannot be drawn: its file is not in the folder ${DATA.folder} beside this page, or it has too many nodes.`);
+  else if (replay.reference) said.push(`The reference cannot be drawn: its file is not in the folder ${DATA.folder} next to this page, or it has too many nodes.`);
   if (replay.straight) said.push(`So does ${given.entry ? "the entry" : "this case"}: of its positions those at checkpoints are stored, no others.`);
   said.push(`${replay.times.length} moments, rounded to ${replay.rounding} of the body's size.`);
   byId("colours").textContent = said.join(" ");
@@ -173,7 +173,7 @@ async function choose(id) {
   document.querySelectorAll("#cases tr.chosen").forEach((row) => row.classList.remove("chosen"));
   document.querySelectorAll(`#cases a[href="#case=${id}"]`).forEach((link) => link.closest("tr").classList.add("chosen"));
   tellAbout(head);
-  const absent = { histories: {}, why: `Histories and replay of this case lie in ${DATA.folder}/case-${id}.js beside this page, and that file is not there. Copy the folder along with the page.` };
+  const absent = { histories: {}, why: `Histories and replay of this case are in ${DATA.folder}/case-${id}.js next to this page, but that file is missing. Copy the folder along with the page.` };
   const given = { ...head, ...(await piece(`case-${id}`) ?? absent) };
   if (state.id !== id) return; // another case was chosen meanwhile
   Object.assign(state, { given, t: fullLoad(given) });

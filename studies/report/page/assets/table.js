@@ -1,4 +1,4 @@
-// Sorting and filtering a real table: the rows are moved and hidden, nothing is drawn anew.
+// Sorting and filtering a real table: the rows are moved and hidden, nothing is drawn again.
 
 const rows = [...document.querySelectorAll("#cases tbody tr")];
 

@@ -81,9 +81,9 @@ def _run(trial: ReferenceTrial, ask: Callable[[], None], reached: Reached) -> tu
     except SolveError as stuck:
         status, message = "not-converged", str(stuck)
         if len(stuck.converged) != reached.count:
-            return UNEXPLAINED, f"the error tells of {len(stuck.converged)} states of {reached.count}: {stuck}"
+            return UNEXPLAINED, f"the error reports {len(stuck.converged)} states of {reached.count}: {stuck}"
     except TimedOut:
-        status, message = "timed-out", f"{reached.count} of {trial.steps} wanted times reached"
+        status, message = "timed-out", f"{reached.count} of {trial.steps} requested times reached"
     if reached.found is None:
         return status, message
     wrong = broken(system, reached.found, reached.state)
@@ -91,9 +91,9 @@ def _run(trial: ReferenceTrial, ask: Callable[[], None], reached: Reached) -> tu
         return UNEXPLAINED, wrong
     least, flattest = corner_ratio(system, reached.found.u)
     if status == "ok" and flattest <= 0.0:
-        return "inverted", f"an element is inside out at a corner, at rest already (volume ratio {flattest:.3g})"
+        return "inverted", f"an element is inverted at a corner at rest (volume ratio {flattest:.3g})"
     if status == "ok" and least <= 0.0:
-        return "inverted", f"an element ends inside out at a corner (least volume ratio {least:.3g})"
+        return "inverted", f"an element ends inverted at a corner (least volume ratio {least:.3g})"
     return status, message
 
 

@@ -36,13 +36,13 @@ def always(system: System, found: Equilibrium) -> Iterator[tuple[bool, str]]:
     names = ("u", "p", "obstacle_force", "held_force", "reaction", "J", "cavity_pressure", "energy")
     kinetic = found.kinetic if isinstance(found, Moment) else 0.0
     for name in (*names, "v", "a") if isinstance(found, Moment) else names:
-        yield not np.isfinite(getattr(found, name)).all(), f"'{name}' holds a number that is not finite"
+        yield not np.isfinite(getattr(found, name)).all(), f"'{name}' has a number that is not finite"
     yield not found.J.min() > 0.0, f"the least volume ratio is {found.J.min():.3g} where the elements are integrated"
     least = -ROUND_OFF * system.problem.material.mu * system.volume
     yield min(found.energy, kinetic) < least, f"the energies are {found.energy:.3g} and {kinetic:.3g} J"
     inside = enclosed(system, found.u)
     off = abs(found.volume / inside - 1.0) if inside is not None else 0.0
-    yield off > ROUND_OFF, f"the volume told is {off:.3g} off what the surface encloses"
+    yield off > ROUND_OFF, f"the reported volume differs by {off:.3g} from the volume of the surface"
 
 
 def at_rest(system: System, found: Equilibrium, state: State) -> Iterator[tuple[bool, str]]:
@@ -51,7 +51,7 @@ def at_rest(system: System, found: Equilibrium, state: State) -> Iterator[tuple[
     off, allowed = unbalanced(system, found, state)
     yield off > allowed, f"forces of {off:.3g} N are out of balance, {allowed:.3g} N allowed"
     off, allowed = unequal(system, found, state)
-    yield off > allowed, f"nodes that nothing touches feel {off:.3g} N, {allowed:.3g} N allowed"
+    yield off > allowed, f"nodes without contact feel {off:.3g} N, {allowed:.3g} N allowed"
     off, allowed = pressure_gap(system, found, state), system.settings.volume_tol + ROUND_OFF
     yield off > allowed, f"V/V0 - 1 is {off:.3g} off the mean pressure over kappa, {allowed:.3g} allowed"
     deep, moved = depth(system, state), float(np.abs(state.x[: system.displacement_count]).max())

@@ -21,7 +21,7 @@ pytestmark = [
     pytest.mark.usefixtures("heard"),
 ]
 REPOSITORY = Path(__file__).parents[4]
-SAID = "organbench: interrupted; what is finished is stored, the same command goes on from there"
+SAID = "organbench: interrupted; finished work is stored; run the same command to continue"
 
 
 def press():

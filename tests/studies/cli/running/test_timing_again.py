@@ -66,7 +66,7 @@ def test_what_is_stale_broke_off_or_is_missing_is_not_timed(organbench, tiny_fil
     assert plan_again(Ledger(results), tiny_study()) == [] and diverging_case() in tiny_study().cases
     before = content(results / "tiny")
     code, out, _ = organbench("run", tiny_file, "--results", results, "--again", "timing")
-    assert code == 0 and "nothing is stored of this code that can be timed" in out
+    assert code == 0 and "no stored case of this code can be timed" in out
     assert content(results / "tiny") == before
 
 
@@ -91,10 +91,10 @@ def test_old_times_stay_where_the_new_ones_are_not_whole(results, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--again", "timings"), "unknown thing to do again (--again) 'timings'; did you mean 'timing'"),
-        (("--again", "timing", "--only", "failed"), "leave --only out"),
-        (("--again", "timing", "--on", "local:2"), "leave --on out"),
-        (("--again", "timing", "--portable"), "leave --portable out"),
+        (("--again", "timings"), "unknown value of --again 'timings'; did you mean 'timing'"),
+        (("--again", "timing", "--only", "failed"), "leave out --only"),
+        (("--again", "timing", "--on", "local:2"), "leave out --on"),
+        (("--again", "timing", "--portable"), "leave out --portable"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )

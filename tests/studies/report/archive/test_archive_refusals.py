@@ -20,7 +20,7 @@ def test_a_file_that_is_missing_or_changed_is_named(refused, unpacked):
     content = path.read_bytes()
     path.write_bytes(content[:-1] + b"?")
     said = refused("archive", "--check", unpacked)
-    assert f"tiny/{path.name} is not what was packed: get the archive again" in said
+    assert f"tiny/{path.name} has changed since it was packed: get the archive again" in said
     path.unlink()
     assert f"{unpacked} lacks tiny/{path.name}" in refused("archive", "--check", unpacked)
     runs, remarks = load_runs(unpacked, STUDY)

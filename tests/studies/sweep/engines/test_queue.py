@@ -92,7 +92,7 @@ def test_a_queueing_system_that_is_not_here_is_a_sentence(tmp_path, monkeypatch,
     (tmp_path / "openssl").symlink_to(str(shutil.which("openssl")))
     monkeypatch.setenv("PATH", str(tmp_path))
     said = refusal(tmp_path, "kind: pbs\nworkers: 2\nhost: 127.0.0.1", refused)
-    assert re.search(r"pbs cannot be used here \(.*qsub.*\): correct `kind`, or run where it is", said)
+    assert re.search(r"pbs cannot be used here \(.*qsub.*\): correct `kind`, or run on a machine that has it", said)
 
 
 def test_a_job_that_is_refused_is_a_sentence(slurm, refused):

@@ -192,7 +192,7 @@ def test_a_scene_that_refuses_masses_by_stiffness_is_not_advised_them(tmp_path):
 
 
 def test_a_kind_that_was_never_measured_is_not_guessed(results):
-    with pytest.raises(StudyError, match=r"nothing is known for scene 'ball_ringing': .* \(solid, motion\)"):
+    with pytest.raises(StudyError, match=r"no results apply to scene 'ball_ringing': .* \(solid, motion\)"):
         advise("ball_ringing", results=results)
     thin = replace(LIVER_PRESS, name="thin", obstacles=(Probe((0.0, 0.0, 0.3)),))
     with pytest.raises(StudyError, match="solid, thin probe"):
@@ -201,7 +201,7 @@ def test_a_kind_that_was_never_measured_is_not_guessed(results):
 
 @pytest.mark.parametrize("scene", [BALL_CLAMPED, BLADDER_FILL])
 def test_where_nothing_is_stored_the_command_that_measures_is_named(results, scene):
-    with pytest.raises(StudyError, match=r"nothing is stored of the study 'accuracy' for .*organbench run accuracy"):
+    with pytest.raises(StudyError, match=r"no results of the study 'accuracy' for .*organbench run accuracy"):
         advise(scene, results=results)
 
 
@@ -229,7 +229,7 @@ def test_nothing_is_recommended_that_does_not_meet_the_usual_wish(tmp_path):
     with pytest.raises(StudyError, match="no recipe is recommended for scene 'liver_press': none meets"):
         recommended(LIVER_PRESS, results)
     coarse = publish(tmp_path, rows_of(LIVER_PRESS, **{"mean_error floor [%]": 1.5}))
-    with pytest.raises(StudyError, match="the reference is too coarse to tell"):
+    with pytest.raises(StudyError, match="the reference is not accurate enough to decide"):
         recommended(LIVER_PRESS, coarse)
 
 

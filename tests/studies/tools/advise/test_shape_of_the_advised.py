@@ -40,8 +40,9 @@ def test_a_body_beyond_a_bound_of_the_shape_is_passed_over(tmp_path, shape):
 def test_what_it_lacks_is_said(tmp_path):
     lines = lines_of(answer(tmp_path, shaped(LIVER_PRESS, graded=(11.3, -4.0))))
     assert (
-        "not advised: graded quadratic, masses by stiffness, 794 surface nodes, meets the wish, but it is up to 11.3 % "
-        "of the liver's size away from the true shape and lacks 4 % of its volume (allowed: 1 and 0.5 %)" in lines
+        "not recommended: graded quadratic, masses by stiffness, 794 surface nodes, meets the target, but it is up "
+        "to 11.3 % of the liver's size away from the true shape and lacks 4 % of its volume (allowed: 1 and 0.5 %)"
+        in lines
     )
     lines = lines_of(answer(tmp_path, shaped(LIVER_PRESS, graded=(0.2, 0.8))))
     assert any("and has 0.8 % too much volume" in line for line in lines)
@@ -51,8 +52,8 @@ def test_where_none_keeps_the_shape_none_is_recommended(tmp_path):
     rows = shaped(LIVER_PRESS, graded=(11.3, -4.0), fine=(2.0, -0.1))
     found = answer(tmp_path, rows)
     assert not found.meets and body(found) == EVEN  # 1.4 times the displacement, the fine one twice the shape
-    assert "nothing here does; the nearest is (displacement 1.4 times too large):" in lines_of(found)
-    with pytest.raises(StudyError, match="none meets the usual wish"):
+    assert "no body meets it; the closest candidate is (displacement 1.4 times too large):" in lines_of(found)
+    with pytest.raises(StudyError, match="no body meets the target"):
         recommended(LIVER_PRESS, publish(tmp_path, rows))
     worse = answer(tmp_path, [each for each in rows if each["mean_error [%]"] < 1.0])
     (line,) = [line for line in lines_of(worse) if line.startswith("nothing here does")]

@@ -62,7 +62,7 @@ def test_each_end_has_its_name(changes, status, words):
 
 def test_time_is_processor_time_and_has_an_end():
     found = tried(PRESSED, seconds=0.0)
-    assert (found.status, found.message) == ("timed-out", "0 of 2 wanted times reached")
+    assert (found.status, found.message) == ("timed-out", "0 of 2 requested times reached")
 
 
 def test_an_error_that_is_not_ours_is_the_finding(monkeypatch):
