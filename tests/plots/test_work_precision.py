@@ -112,7 +112,7 @@ def test_a_run_that_ended_with_a_fault_is_no_point():
     figure = work.figure([LADDER[0], faulty, run(BALL_CLAMPED, nodes=99)])
     assert markers(figure.axes[0], "o") == []
     told = words(figure).replace("\n", " ")
-    assert f"ended with a fault: {faulty.case.name} inverted." in told
+    assert f"failed: {faulty.case.name} inverted." in told
     assert "Not drawn: 1 without frame times" in told
 
 

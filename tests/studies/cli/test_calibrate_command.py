@@ -33,7 +33,7 @@ def test_the_table_shows_both_sides():
     ("verdicts", "said"),
     [
         ((Verdict.HOLDS, Verdict.HOLDS), "force: the fit holds,"),
-        ((Verdict.HOLDS, Verdict.MEMORISES), "force: the fit memorises,"),
+        ((Verdict.HOLDS, Verdict.MEMORISES), "force: the fit overfits:"),
         ((Verdict.UNRESOLVED, Verdict.HOLDS), "force: the fit holds,"),
         ((Verdict.UNRESOLVED, Verdict.UNRESOLVED), "force: not resolvable,"),
     ],
@@ -83,4 +83,4 @@ def test_a_study_file_runs_a_fitted_recipe(organbench, refused, tmp_path):
     code, out, _ = organbench("run", file, "--dry-run", "--results", tmp_path)
     assert code == 0 and "1 case (missing)" in out
     path.write_text("{")
-    assert "is damaged or no calibration" in refused("run", file, "--dry-run", "--results", tmp_path)
+    assert "is damaged or not a calibration" in refused("run", file, "--dry-run", "--results", tmp_path)

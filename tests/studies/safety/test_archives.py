@@ -48,7 +48,7 @@ def test_nothing_but_regular_files_of_the_folder_is_opened(refused, tmp_path, ki
         file.mkdir()
     else:
         file.symlink_to({"device": "/dev/zero", "link": "/proc/self/status", "link above": "../secret"}[kind])
-    said = "leads outside" if kind.startswith("link") else "is no regular file"
+    said = "leads outside" if kind.startswith("link") else "is not a regular file"
     assert f"{named} is" in (sentence := refused("archive", "--check", path)) and said in sentence
 
 
@@ -63,7 +63,7 @@ def test_a_large_manifest_is_not_read_to_its_end(refused, tmp_path):
 def test_a_file_that_is_named_twice_is_not_read_twice(refused, tmp_path):
     path = manifest(tmp_path / "evil", "a", "a")
     (path / "a").write_bytes(b"")
-    assert "manifest-sha256.txt is not what was packed" in refused("archive", "--check", path)
+    assert "manifest-sha256.txt has changed since it was packed" in refused("archive", "--check", path)
 
 
 def test_an_encrypted_archive_is_one_sentence(refused, tmp_path):

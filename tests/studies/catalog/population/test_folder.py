@@ -74,7 +74,7 @@ def test_what_is_no_folder_of_organs_is_refused(folder, tmp_path):
     with pytest.raises(StudyError, match="unit"):
         study_on(ONE, folder, "furlong")
     (tmp_path / "a.ply").write_text("")
-    with pytest.raises(StudyError, match=r"every file in .* is refused; the first: a.ply"):
+    with pytest.raises(StudyError, match=r"no file in .* can be used; the first: a.ply"):
         study_on(ONE, tmp_path)
     hollow = Study("hollow", "?", (Case(STOMACH_PROBE),), (), ("force_end",))
     with pytest.raises(StudyError, match="hollow organs alone"):

@@ -17,7 +17,7 @@ from tests.geometry.real import real_surface
 EGG = split(*box((-1, -1, -1), (1, 1, 1)), times=3)
 POINTS = EGG[0] / np.linalg.norm(EGG[0], axis=1, keepdims=True) * (30, 25, 20)
 FACES = EGG[1]
-TRIED = "tried, and a clean body of 550 surface nodes came out:"
+TRIED = "tested; this gives a clean body of 550 surface nodes:"
 
 
 def stored(path, points, faces):

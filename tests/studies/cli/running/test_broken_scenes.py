@@ -95,7 +95,7 @@ BROKEN = {
 CHARTS = {
     "no module": ("nowhere.at_all:draw", "there is no function 'nowhere.at_all:draw' (ModuleNotFoundError"),
     "no function": ("studies.plots.volume_history:drow", "there is no function 'studies.plots.volume_history:drow'"),
-    "no callable": ("studies.plots.volume_history:__name__", "is no function; give one of the runs and a path"),
+    "no callable": ("studies.plots.volume_history:__name__", "is not a function; give one of the runs and a path"),
 }
 
 

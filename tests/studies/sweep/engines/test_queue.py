@@ -168,7 +168,7 @@ def test_words_say_where_jobs_run(tmp_path):
         ("local:none", r"give the number of processes, as local:4"),
         ("local:0", "give the number of processes"),
         ("slurm", r"--on 'slurm' is not known; give local:N, an address as tcp://HOST:8786, or a FILE\.yaml"),
-        ("nowhere.yaml", r"there is no file nowhere\.yaml; write one as docs/cluster\.md shows"),
+        ("nowhere.yaml", r"there is no file nowhere\.yaml; docs/cluster\.md shows how to write one"),
     ],
 )
 def test_other_words_are_refused(on, told):

@@ -109,9 +109,9 @@ def test_a_body_that_ends_badly_from_the_start_is_named(made):
 
 
 def test_scenes_are_needed_on_both_sides(tmp_path):
-    with pytest.raises(StudyError, match="scenes to be fitted on and others to be judged on"):
+    with pytest.raises(StudyError, match="scenes to fit and other scenes to test"):
         calibrate("ball", BODY, tmp_path, folds=())
-    with pytest.raises(StudyError, match="has no reference to be fitted to"):
+    with pytest.raises(StudyError, match="has no reference for fitting"):
         calibrate("ball", BODY, tmp_path, folds=(Fold((DEEP,), (replace(BALL_SQUEEZE, reference=None),)),))
     with pytest.raises(StudyError, match="two scenes of a calibration are called 'ball_squeeze'"):
         calibrate("ball", BODY, tmp_path, folds=(Fold((DEEP,), (SHALLOW, replace(DEEP, damping=1.0))),))

@@ -82,7 +82,7 @@ def test_a_package_that_is_there_and_does_not_load_is_installed_anew(broken, lin
 
 def test_elsewhere_than_on_debian_the_packages_are_named(monkeypatch):
     monkeypatch.setattr(software.shutil, "which", lambda name: None)
-    assert software.system_libraries().startswith("# by your system's own means")
+    assert software.system_libraries().startswith("# install the equivalents")
 
 
 def test_set_up_installs_the_same_system_libraries():
