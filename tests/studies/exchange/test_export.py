@@ -130,7 +130,7 @@ def test_the_page_holds_what_our_own_bodies_reach(exported, tmp_path, organbench
     assert chosen is not None and f"| recommended: {body_words(chosen.case.body)} surface nodes | " in page
     words = ("export", "ball_clamped", "-o", tmp_path / "out", "--nodes", NODES, "--results", tmp_path)
     code, _, err = organbench(*words)
-    assert code == 0 and "warning: README.md names no measured body: nothing is stored" in err
+    assert code == 0 and "warning: README.md names no measured body: no results" in err
     assert "No measured body of ours was at hand" in (tmp_path / "out" / "README.md").read_text()
 
 

@@ -81,6 +81,6 @@ def test_an_archive_that_lost_its_machine_is_one_sentence(unpacked, content):
 
 
 def test_bad_words_are_one_sentence(refused, tmp_path):
-    assert "there are no results in" in refused("archive", "--results", tmp_path)
+    assert "nothing is stored in" in refused("archive", "--results", tmp_path)
     assert "unknown study 'stres'" in refused("archive", "stres", "--results", tmp_path)
     assert "an archive ends in .zip" in refused("archive", "stress", "-o", tmp_path / "a.tar", "--results", tmp_path)
