@@ -7,18 +7,26 @@ import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
-from studies.metrics.timing.cases import timing_file, timing_is_current
+from studies.metrics.timing.cases import timing_file
 from studies.reference.reference_solves import ReferenceSolve
-from studies.runs.current import case_fingerprint, case_path, why_case_is_stale
+from studies.runs.current import case_fingerprint, case_path
 from studies.store.entry import CODE_CHANGED
+from studies.store.ledger import Ledger
 from studies.store.record import Status, peek, read_record, write_record
 from studies.sweep import restamp as module
+from studies.sweep.job import case_jobs
 from studies.sweep.restamp import AT_RANDOM, outdated, restamp, sample
 from tests.studies.octant import LEVELS, SCENE
 from tests.studies.tiny import tiny_case, tiny_study
 
 FORMER = "f" * 64
 CASES = tiny_study().cases
+
+
+def reasons(root):
+    """Why each case is stale, and why its frame times are."""
+    ledger, jobs = Ledger(root), case_jobs(root, tiny_study())
+    return [ledger.why(job) for job in jobs], [ledger.why_untimed(job) for job in jobs]
 
 
 def change(path, **changes):
@@ -32,7 +40,7 @@ def old(results):
     """The finished tiny study as other code left it: three cases and their frame times."""
     for path in (results / "tiny").glob("*-*.h5"):
         change(path, fingerprint=FORMER)
-    assert [why_case_is_stale(results, "tiny", case) for case in CASES] == [CODE_CHANGED] * 3
+    assert reasons(results) == ([CODE_CHANGED] * 3, [CODE_CHANGED] * 3)
     return results
 
 
@@ -44,8 +52,7 @@ def test_equal_results_are_restamped_with_their_frame_times(old, organbench, tin
     before = [read_record(path) for path in paths(old)]
     code, out, _ = organbench("restamp", tiny_file, "--results", old)
     assert code == 0 and "3 results restamped" in out
-    assert [why_case_is_stale(old, "tiny", case) for case in CASES] == [None] * 3
-    assert all(timing_is_current(old, "tiny", case) for case in CASES)
+    assert reasons(old) == ([None] * 3, [None] * 3)
     for was, path in zip(before, paths(old), strict=True):
         now = read_record(path)
         assert now.attributes.pop("restamped") == f"from {FORMER} by 3 replays"
