@@ -20,7 +20,7 @@ ONE = Study("asked", "?", (Case(KIDNEY_PROBE, BodyRecipe(nodes=150), ImplicitVol
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A kidney in millimetres, the same with a hole, text that is no mesh, and a file of another kind."""
+    """A kidney in millimetres, the same with a hole, text that is not a mesh, and a file of another kind."""
     place = tmp_path_factory.mktemp("organs")
     mesh = organ("kidney", 200, fill=False)
     for name, triangles in (("whole", mesh.triangles), ("open", mesh.triangles[9:])):
