@@ -142,8 +142,8 @@ def _check_region(scene: Scene, name: str, level: np.ndarray, points: np.ndarray
     spacing = float(np.linalg.norm(points[triangles[:, 0]] - points[triangles[:, 1]], axis=1).mean())
     if level.min() > spacing:
         raise StudyError(
-            f"scene '{scene.name}': region '{name}' contains no part of the body, which begins {1e3 * level.min():.3g} mm "
-            "from it: move or enlarge it"
+            f"scene '{scene.name}': region '{name}' contains no part of the body, "
+            f"which begins {1e3 * level.min():.3g} mm away from it: move or enlarge it"
         )
 
 
