@@ -18,6 +18,7 @@ from studies.store.paths import study_folder
 
 CRATE_VERSION = "1.1"
 CITATION = "CITATION.cff"
+DISTRIBUTION = "organbench"
 CODE = "code"
 """Folder with the sources; it is described as a whole."""
 FORMATS = {
@@ -91,7 +92,7 @@ def citation_file() -> Path:
     """
     places = [ROOT / CITATION, ROOT.parent / CITATION]
     with suppress(PackageNotFoundError):  # the code of an archive
-        places += [Path(str(file.locate())) for file in distribution("organbench").files or [] if file.name == CITATION]
+        places += [Path(str(file.locate())) for file in distribution(DISTRIBUTION).files or [] if file.name == CITATION]
     for place in places:
         if place.is_file():
             return place

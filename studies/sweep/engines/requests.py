@@ -76,7 +76,7 @@ class Check:
     def fault(self) -> str:
         """What is wrong here; "" when nothing is."""
         if not is_there(self.token) or self.token.read_text(encoding="utf-8") != self.content:
-            return f"does not see {self.token.parents[2]}; put the results on a folder that every worker shares"
+            return f"does not see {self.token.parents[1]}; put the results on a folder that every worker shares"
         trial = part_path(self.token)
         write_whole(trial, b"")
         trial.unlink()

@@ -323,4 +323,4 @@ def test_scripts_and_style_are_small_and_belong_to_the_package():
     assert files == sorted([*SCRIPTS, "page.css", "page.html"])
     assert all(len(path.read_text(encoding="utf-8").splitlines()) <= 250 for path in ASSETS.iterdir())
     settings = (ASSETS.parents[3] / "pyproject.toml").read_text(encoding="utf-8")
-    assert 'studies = ["report/page/assets/*"]' in settings
+    assert "report/page/assets/*" in settings

@@ -22,7 +22,7 @@ from tests.geometry.boxes import box, together
 
 PAGE = Path(__file__).parents[4] / "docs" / "own-organ.md"
 COMMANDS = re.findall(r"^    organbench (.+)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
-CODES = {"check scan.ply": 1}
+CODES = {"mesh-check scan.ply": 1}
 """Exit codes other than 0."""
 KIDNEY = 0.105
 """Its length [m]."""

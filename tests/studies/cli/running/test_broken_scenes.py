@@ -11,7 +11,7 @@ from studies.scene.checks import check_scene, depth_at_start, surface_of
 from studies.scene.library import SCENES
 from studies.scene.library.stress import STRESS_SCENES
 from studies.scene.scene import Organ
-from studies.sweep import pool
+from studies.sweep.local import Local
 from tests.studies.tiny import SQUEEZE, tiny_case
 
 STUDY = """from dataclasses import replace
@@ -102,7 +102,7 @@ CHARTS = {
 @pytest.fixture
 def nothing_runs(monkeypatch):
     """No task is handed to a process, so nothing is meshed."""
-    monkeypatch.setattr(pool.Pool, "perform", lambda *words, **more: pytest.fail("it began to run"))
+    monkeypatch.setattr(Local, "map", lambda *words, **more: pytest.fail("it began to run"))
 
 
 def check_refused(refused, tmp_path, text: str, sentence: str) -> None:
