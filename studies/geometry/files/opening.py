@@ -30,7 +30,7 @@ def opened(source: Source) -> Content:
     """
     path = source.path
     if not path.is_file():
-        raise StudyError(f"there is not a mesh file {path}; check the name")
+        raise StudyError(f"there is no mesh file {path}; check the name")
     output = io.StringIO()
     try:
         check_promises(path)

@@ -120,7 +120,7 @@ def test_what_is_no_mesh_gets_a_sentence(tmp_path, surface, capfd):
     nan = points.copy()
     nan[3] = np.nan
     cases = {
-        "there is not a mesh file": tmp_path / "missing.stl",
+        "there is no mesh file": tmp_path / "missing.stl",
         r"notes\.stl": text,
         r"empty\.ply is not a mesh that can be read": empty,
         r"body\.xyz is not a mesh that can be read": odd,

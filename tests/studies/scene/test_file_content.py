@@ -69,6 +69,6 @@ def test_a_scene_is_meshed_from_the_file_that_it_was_made_for(tmp_path):
         mesh_for(scene, 0)
     assert mesh_for(file_scene(path), 0, filled=False).volume == pytest.approx(1.331e-3)
     path.unlink()
-    with pytest.raises(StudyError, match="there is not a mesh file"):
+    with pytest.raises(StudyError, match="there is no mesh file"):
         mesh_for(scene, 0)
     assert "sha256" not in Organ("file", {"path": str(path), "unit": "m"}).parameters

@@ -140,7 +140,7 @@ def asked_wrongly(folder):
         "few nodes": ((*scan, "--nodes", 10, *out), "10 surface nodes asked for"),
         "few nodes of an organ": (("mesh", "liver", "--nodes", 20, *out), "20 surface nodes asked for"),
         "folder": (("mesh", "ball", "--nodes", 150, "-o", folder / "egg.ply" / "out.vtu"), "was not written"),
-        "missing": (("mesh-check", folder / "none.ply"), "there is not a mesh file"),
+        "missing": (("mesh-check", folder / "none.ply"), "there is no mesh file"),
     }
 
 

@@ -140,7 +140,7 @@ def test_bad_input_is_one_sentence(refused, scan_file, tmp_path):
     cases = {
         ("place", "scan.ply", "--unit", "mm", "-o", "scene.txt"): "a scene file is Python",
         ("place", "scan.ply", "--unit", "mm", "--picture", "a.jpg"): "the picture is a PNG",
-        ("place", "liver.ply", "--unit", "mm"): "there is not a mesh file",
+        ("place", "liver.ply", "--unit", "mm"): "there is no mesh file",
         ("place", "scan.ply", "--unit", "mm"): "scan does not name its organ; say which tissue it is: --tissue",
         ("place", "scan.ply", "--unit", "mm", "--tissue", "brain"): "unknown tissue 'brain'",
         ("place", "scan.ply", "--unit", "mm", "--hold", "topp"): "unknown side 'topp'; did you mean 'top'",
