@@ -155,7 +155,7 @@ class _Memory:
 VERSION = 2
 """Of what is remembered."""
 MOST = 20_000
-"""Texts that are remembered; then it begins anew, for most are of former versions."""
+"""Texts that are remembered; then the cache starts again, since most belong to old versions."""
 
 
 @cache

@@ -15,7 +15,7 @@ def mean_edge(body: Body) -> float:
 
 
 def new_pair() -> Pair:
-    """One for everything: it is filled anew for each point and triangle."""
+    """One for everything: each point and triangle overwrites it."""
     return Pair(np.zeros((2, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3))
 
 

@@ -58,7 +58,7 @@ class Volumes:
 
     def __post_init__(self) -> None:
         if len(set(self.names)) != len(self.names) or len(self.names) != self.count:
-            raise MassSpringError(f"{self.count} volumes are named {self.names}; give each a name of its own")
+            raise MassSpringError(f"{self.count} volumes are named {self.names}; give each its own name")
 
     @property
     def count(self) -> int:

@@ -77,7 +77,7 @@ class Element(Method):
     capabilities: ClassVar[Capabilities] = Capabilities(
         "tetrahedra",
         "penalty",
-        thin_probes=No("what a contact does to the volumes of all tetrahedra is not solved for"),
+        thin_probes=No("its solve does not include how a contact changes the volumes of the tetrahedra"),
     )
 
     def __post_init__(self) -> None:

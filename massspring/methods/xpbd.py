@@ -78,7 +78,7 @@ def mend(frame, cells, target, compliance, iterations, whole):
 
 @dataclass(frozen=True)
 class Xpbd(Method):
-    """Mends volumes of the predicted shape one after the other, a fixed number of times."""
+    """Corrects volumes of the predicted shape one after the other, in a fixed number of sweeps."""
 
     volumes: Literal["element", "whole"] = "element"
     """Each tetrahedron's, or the one of the whole."""
@@ -95,7 +95,7 @@ class Xpbd(Method):
     capabilities: ClassVar[Capabilities] = Capabilities(
         "tetrahedra",
         "full",
-        thin_probes=No("what a contact does to the volumes that it has mended is not made up for"),
+        thin_probes=No("it does not correct the volumes again after a contact has changed them"),
     )
 
     def __post_init__(self) -> None:

@@ -109,7 +109,7 @@ def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.nda
         )
     if isinstance(body.kept, PointVolumes):
         raise MassSpringError(
-            f"obstacle {number} is a thin probe, beside which the volumes of a quadratic body are not kept; "
+            f"obstacle {number} is a thin probe, and the volumes of a quadratic body cannot be kept next to one; "
             "use a Sphere, or a tetrahedral body"
         )
     edge = mean_edge(body)
@@ -152,7 +152,7 @@ def starting_depth(obstacle: Plane | Sphere | Capsule, body: Body, x: np.ndarray
 def check_threads(threads: int, method: Method) -> None:
     """Raises MassSpringError for what is no number of threads, for more than cores, and where `method` has no use."""
     if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        raise MassSpringError(f"{threads!r} is no number of threads; give 1 or more")
+        raise MassSpringError(f"{threads!r} is not a number of threads; give 1 or more")
     if threads > cores():
         raise MassSpringError(f"{threads} threads need as many cores, this process may use {cores()}; give fewer")
     supported = method.capabilities.threads

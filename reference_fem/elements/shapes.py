@@ -179,7 +179,7 @@ def check_neighbours(mesh: MeshTet):
         pair = mesh.f2t[:, bad[0]]
         raise SolveError(
             f"elements {pair[0]} and {pair[1]} overlap across their common face ({bad.size} such faces, limit 0): "
-            f"one of them is inverted, mend the mesh"
+            f"one of them is inverted, repair the mesh"
         )
 
 

@@ -113,7 +113,7 @@ def _sentence(path: Path, size: int | None, problem: OSError) -> str:
             "everything stored before is kept"
         )
     if path.is_dir():
-        return f"{path} was not written, a folder lies in its place: move that folder or delete it, and run again"
+        return f"{path} was not written, a folder has its name: move or delete that folder, and run again"
     reason = problem.strerror or str(problem)
     return (
         f"{path} was not written ({reason}): choose a results folder that can be written to; "

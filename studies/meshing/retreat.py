@@ -28,7 +28,7 @@ def retreat(safe: np.ndarray, wanted: np.ndarray, cells: np.ndarray, measure: Me
     worst = int(at_rest.argmin())
     if at_rest[worst] <= 0.0:
         place = ", ".join(f"{1e3 * x:.1f}" for x in safe[cells[worst]].mean(axis=0))
-        raise StudyError(f"{name}: the element at ({place}) mm is flat or inside out; use more nodes, or mesh again")
+        raise StudyError(f"{name}: the element at ({place}) mm is flat or inverted; use more nodes, or mesh again")
     floor = np.minimum(FLOOR, (1.0 - 1e-9) * at_rest)
     way, share = wanted - safe, np.ones(len(safe))
     while True:

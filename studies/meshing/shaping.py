@@ -22,7 +22,7 @@ from studies.meshing.true_shape import as_curved, on_true_shape, true_shape
 from studies.scene.scene import Scene
 
 OFF = 1e-3
-"""Of the body's size: nodes farther than this from where they belong are told of."""
+"""Of the body's size: nodes farther than this from where they belong cause a warning."""
 
 
 def linear_mesh(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh) -> OrganMesh:

@@ -1,4 +1,4 @@
-"""Numbers as people read them: a value beside the uncertainty of what it is compared with."""
+"""Numbers as people read them: a value with the uncertainty of its reference."""
 
 import math
 

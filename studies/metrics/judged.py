@@ -1,4 +1,4 @@
-"""A recipe in a scene with what was measured of it, and how it stands to a wish."""
+"""A recipe in a scene with its measured values, and how it compares with an accuracy target."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ UNKNOWN = Measured(NAN)
 
 @dataclass(frozen=True)
 class Judged:
-    """A case that ended well, beside its errors and its cost."""
+    """A case that ended well, with its errors and its cost."""
 
     case: Case
     force: Measured = UNKNOWN

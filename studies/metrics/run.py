@@ -20,7 +20,7 @@ from studies.store.schema import RunAttributes, RunFields
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A measured case, beside its reference and its frame times where there are any."""
+    """A measured case, with its reference and its frame times where there are any."""
 
     case: Case
     record: Record

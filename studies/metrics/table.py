@@ -1,4 +1,4 @@
-"""One row per case: what it was, how it ended, and the study's metrics beside the floor of their reference."""
+"""One row per case: what it was, how it ended, and the study's metrics with the uncertainty of their reference."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -55,7 +55,7 @@ def frame_of(rows: Sequence[Row]) -> pd.DataFrame:
 
 
 def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
-    """What a run was, how it ended, and its metrics beside their floors."""
+    """What a run was, how it ended, and its metrics with their uncertainties."""
     case, attributes = run.case, run.record.attributes
     row: Row = {
         "scene": case.scene.name,

@@ -1,4 +1,4 @@
-"""How good an answer somebody wishes for, and what is enough where nothing is said."""
+"""Accuracy targets, and the default target."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Load paths half-way, beside the record they are to become: a crash costs one load step, not the path.
+"""Partial load paths, next to the record they will become: a crash costs one load step, not the path.
 
 A file holds arrays and one text, and no pickle: reading one that a stranger made runs none of its code.
 """
@@ -27,7 +27,7 @@ STAMP, PATH, STATE = "stamp", "path_", "state_"
 UNREADABLE = (LookupError, TypeError, ValueError, EOFError, OSError, MemoryError, NotImplementedError, RuntimeError)
 """What NumPy and zipfile raise for content of another make (RuntimeError: encrypted)."""
 
-IGNORED = "holds no load steps that can be read; it is ignored, the path begins again"
+IGNORED = "holds no readable load steps; it is ignored, and the load path starts again"
 
 
 def steps_path(record: Path) -> Path:
@@ -69,7 +69,7 @@ def kept(record: Path, stamp: str) -> "Checkpoint | None":
         return _checkpoint(whole[DIGEST:], stamp)
     except (*UNREADABLE, SolveError, zipfile.BadZipFile, zlib.error):
         warnings.warn(
-            f"{file} holds no load steps that can be read; it is ignored, the path begins again", stacklevel=2
+            f"{file} holds no readable load steps; it is ignored, and the load path starts again", stacklevel=2
         )
         return None
 

@@ -106,7 +106,7 @@ class Sample:
     def _told(self, name: str, words: str) -> float:
         known = self.solution.record.attributes
         if name not in known:
-            raise StudyError(f"the reference {self.solution.record.name} does not tell {words}; solve it again")
+            raise StudyError(f"the reference {self.solution.record.name} does not record {words}; solve it again")
         return float(known[name])
 
     def series(self, name: str) -> np.ndarray:

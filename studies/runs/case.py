@@ -97,7 +97,7 @@ class Case:
     precision: Literal["float64", "float32"] = "float64"
     """Of the mass-spring state; float32 for methods that claim it."""
     recorded: tuple[str, ...] = ()
-    """Fields beside those that metrics read: of `massspring.run.history.EXTRA`, the energies; "surface", positions of
+    """Fields that metrics do not read: of `massspring.run.history.EXTRA`, the energies; "surface", positions of
     the outer surface for a replay (studies.runs.surface_frames)."""
     timed: bool = False
     """Whether frame times are measured by the timing protocol."""

@@ -10,7 +10,7 @@ from massspring.run.precision import check_precision
 from studies.base.errors import StudyError
 
 RECORDABLE = (*EXTRA, "surface")
-"""What a case may ask for beside what metrics read: energies, and positions of the outer surface for a replay."""
+"""Fields that a case may record on request: energies, and positions of the outer surface for a replay."""
 
 
 def check_recipe(recipe: Any) -> None:

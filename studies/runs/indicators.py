@@ -1,4 +1,4 @@
-"""What tells that an answer should not be believed although the run ended well: a body that may lock, pressures that
+"""Signs that a result is not reliable although the run ended well: a body that may lock, pressures that
 alternate between neighbours, a force that sways while nothing outside moves."""
 
 import numpy as np
@@ -42,7 +42,7 @@ def remarks(found: dict[str, float]) -> list[str]:
         said.append(f"pressures alternate by {part:.2g} of the shear modulus between neighbouring volumes; smooth them")
     if found["sway"] > SWAYS:
         percent = 100 * found["sway"]
-        said.append(f"the force sways by {percent:.2g} % at the end while nothing outside moves; halve the step")
+        said.append(f"the force oscillates by {percent:.2g} % at the end while nothing outside moves; halve the step")
     return said
 
 

@@ -11,7 +11,7 @@ from studies.scene.scene import Scene
 def recipe_text(case: Case) -> str:
     """JSON of the settings that are not those of `Case(scene)`: '{"body": {"kind": "quadratic", "nodes": 794}}'.
 
-    What is recorded beside is left out: it changes no number of a table."""
+    Additional recorded fields are left out: it changes no number of a table."""
     usual, given = _parts(Case(case.scene)), _parts(case.replaced(recorded=()))
     differing = {name: value for name, value in given.items() if value != usual.get(name)}
     return json.dumps({name: _chosen(value, usual.get(name)) for name, value in differing.items()})
@@ -22,9 +22,9 @@ def case_of_recipe(scene: Scene, text: str) -> Case:
     try:
         chosen = json.loads(text)
     except (TypeError, ValueError) as error:
-        raise StudyError(f"{str(text)[:60]!r} is no recipe of a case ({error})") from error
+        raise StudyError(f"{str(text)[:60]!r} is not a recipe of a case ({error})") from error
     if not isinstance(chosen, dict):
-        raise StudyError(f"{text[:60]!r} is no recipe of a case; it must be a JSON object")
+        raise StudyError(f"{text[:60]!r} is not a recipe of a case; it must be a JSON object")
     whole = case_to_dict(Case(scene))
     for name, value in chosen.items():
         mixes = name == "body" and isinstance(value, dict)

@@ -90,7 +90,7 @@ def judge(case: Case, prepared: Prepared, history: History) -> tuple[Status, str
         return Status(history.outcome), history.message
     smallest = float(history.min_j[-1])
     if smallest <= 0:
-        return Status.INVERTED, f"an element ends inside out (smallest volume ratio {smallest:.3g})"
+        return Status.INVERTED, f"an element ends inverted (smallest volume ratio {smallest:.3g})"
     # A body that starts with a wrong volume is judged by the one it ends with.
     since = 0 if case.scene.start is None else -1
     drift = float(np.max(np.abs(history.volume[since:] / history.volume_target[since:] - 1)))

@@ -7,7 +7,7 @@ from studies.runs.prepare import Prepared
 from studies.store.schema import SURFACE
 
 MOMENTS = 60
-"""Over the duration, in even steps; beside these the start, the checkpoints and the last frame."""
+"""Over the duration, in even steps; in addition the start, the checkpoints and the last frame."""
 
 
 def moments(frames: int, checkpoints: list[int]) -> list[int]:

@@ -196,7 +196,7 @@ def own_law(law: StiffnessLaw) -> str:
         raise StudyError(f"a law is {law!r}; give a StiffnessLaw, as StiffnessLaw(function)")
     file = file_of(law.stiffness)
     if file is None:
-        raise StudyError(f"law '{law.name}' is written in no file; write its function in a FILE.py")
+        raise StudyError(f"law '{law.name}' is not written in a file; write its function in a FILE.py")
     before = _LAWS.get(law.name)
     project = (*laws_by_name(), *SMOOTHED, *MEMBRANE_LAWS)
     _check_free("law", law.name, project, file, before and file_of(before.stiffness))

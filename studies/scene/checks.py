@@ -1,4 +1,4 @@
-"""What a scene and its organ's surface tell before there is a mesh: obstacles inside, regions off it, units."""
+"""Checks of a scene and its organ's surface before there is a mesh: obstacles inside, regions off it, units."""
 
 import json
 import warnings
@@ -117,7 +117,7 @@ def _check_names(scene: Scene) -> None:
     names = [held.name for held in scene.held]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise StudyError(f"scene '{scene.name}' holds two regions called '{twice[0]}'; give each a name of its own")
+        raise StudyError(f"scene '{scene.name}' has two regions called '{twice[0]}'; give each its own name")
     probed, count = scene.probed, len(scene.obstacles if scene.probed.what == "obstacle" else scene.held)
     if scene.reference is not None and "force" in scene.quantities and not 0 <= probed.number < count:
         what = "obstacles" if probed.what == "obstacle" else "held regions"
@@ -142,8 +142,8 @@ def _check_region(scene: Scene, name: str, level: np.ndarray, points: np.ndarray
     spacing = float(np.linalg.norm(points[triangles[:, 0]] - points[triangles[:, 1]], axis=1).mean())
     if level.min() > spacing:
         raise StudyError(
-            f"scene '{scene.name}': region '{name}' holds nothing, the body begins {1e3 * level.min():.3g} mm away "
-            "from it: move or enlarge it"
+            f"scene '{scene.name}': region '{name}' contains no part of the body, "
+            f"which begins {1e3 * level.min():.3g} mm away from it: move or enlarge it"
         )
 
 
@@ -166,7 +166,8 @@ def _unusual(scene: Scene, what: str, value: float, usual: tuple[float, float], 
     """A warning for a number outside its usual range. Raises StudyError for one that cannot be meant."""
     low, high = usual
     sentence = (
-        f"scene '{scene.name}': the {what} is {value!r} {unit}, usual are {low:,g} to {high:,g}: is it in {unit}?"
+        f"scene '{scene.name}': the {what} is {value!r} {unit}, "
+        f"the usual range is {low:,g} to {high:,g}: is it in {unit}?"
     )
     if not is_number(value) or not low / UNUSUAL <= value <= high * UNUSUAL:
         raise StudyError(sentence)

@@ -37,9 +37,11 @@ def place_of(text: str) -> Place:
     try:
         x, y, z = (1e-3 * float(number) for number in text.split(","))
     except ValueError as error:
-        raise StudyError(f"'{text}' is no place; give x,y,z in mm such as 10,-20.5,3, or {', '.join(SIDES)}") from error
+        raise StudyError(
+            f"'{text}' is not a place; give x,y,z in mm such as 10,-20.5,3, or {', '.join(SIDES)}"
+        ) from error
     if not np.isfinite([x, y, z]).all():
-        raise StudyError(f"'{text}' is no place; give finite numbers")
+        raise StudyError(f"'{text}' is not a place; give finite numbers")
     return (x, y, z)
 
 

@@ -18,7 +18,7 @@ class Kind:
     regions; "sag": its weight; "fill": its lumen; "thin probe"; "motion": it starts in motion; "rest": nothing."""
 
     def __str__(self) -> str:
-        """As it is told: "hollow, press"."""
+        """As text: "hollow, press"."""
         return f"{'hollow' if self.hollow else 'solid'}, {self.load}"
 
 

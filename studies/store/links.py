@@ -39,7 +39,7 @@ def link_study(ledger: Ledger, study: str) -> list[str]:
     if index.is_dir():
         return [
             *unreadable,
-            f"{index} is a folder in the place of the study's index: delete it, and run the study again",
+            f"{index} is a folder, but the study's index belongs there: delete it, and run the study again",
         ]
     if not is_there(index) or index.read_bytes() != content:  # a folder that cannot be written to may be looked at
         write_whole(index, content)

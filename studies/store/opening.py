@@ -52,7 +52,7 @@ def open_results(path: Path) -> Iterator[h5py.File]:
     """
     path = Path(path)
     if path.suffix == ".h5" and is_there(path) and not path.is_file():
-        raise DamagedFile(f"{path} is no file but in the place of one: delete it, and run its study again")
+        raise DamagedFile(f"{path} is not a file: delete it, and run its study again")
     if not is_there(path) or not path.is_file():
         raise StudyError(f"there is no results file {path}: `organbench status` says which cases are stored")
     try:

@@ -55,7 +55,7 @@ def timing_path(path: Path, machine: str) -> Path:
 
 
 def timing_name(file: str, machine: str) -> str:
-    """What the timing file beside the record `file` is called."""
+    """Name of the timing file that belongs to the record `file`."""
     return f"{file.removesuffix(SUFFIX)}{TIMING}{machine}{SUFFIX}"
 
 

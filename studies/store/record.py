@@ -198,7 +198,7 @@ def _header(path: Path, file: h5py.File, wanted: Collection[str] | None = None) 
             "or read it with the version that wrote it"
         )
     if _plain(attributes.get("kind")) == INDEX_KIND:
-        raise StudyError(f"{path} is the index of a study, not a case: give one of the files beside it")
+        raise StudyError(f"{path} is the index of a study, not a case: give one of the files next to it")
     names = [name for name in wanted or attributes if name in attributes and name != PART_DIGESTS]
     values = {name: _plain(attributes[name]) for name in names}
     header = {name: values.pop(name) for name in HEADER}

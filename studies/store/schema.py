@@ -35,7 +35,7 @@ class Status(StrEnum):
 
 
 STATUSES: dict[Status, str] = {
-    Status.OK: "finished, with nothing to object to",
+    Status.OK: "finished without a failure",
     Status.DIVERGED: "values not finite, or nodes that left",
     Status.INVERTED: "an element ends inverted",
     Status.DRIFTED: "a kept volume more than 1 % off",
@@ -114,8 +114,8 @@ class RunAttributes(Timed):
     springs = value(int, "1", "springs of the body")
     triangles = value(int, "1", "surface triangles of the body", "s")
     law = value(str, "", "stiffness law")
-    skipped_steps = value(int, "1", "steps in which a volume had nothing to push on")
-    capped_steps = value(int, "1", "steps that made up for a part of a wrong volume")
+    skipped_steps = value(int, "1", "steps in which a volume had no gradient to push on")
+    capped_steps = value(int, "1", "steps that corrected only part of a volume error")
     volumes = value(int, "1", "kept volumes", "m")
     lumen_column = value(int, "1", "which kept volume is a lumen; -1: none")
     unknowns_per_volume = optional_value(float, "1", "coordinates for each kept volume")
@@ -155,7 +155,7 @@ class ReferenceAttributes(Table):
 
     scene = value(str, "", "name of the scene")
     level = value(float, "1", "mesh of the family: surface nodes, or element size over radius")
-    variant = value(str, "", "the setting that was made better; empty for none")
+    variant = value(str, "", "the refined setting; empty for none")
     unknowns = value(int, "1", "unknowns of the finite-element problem")
     steps_done = value(int, "1", "checkpoints that were reached")
     seconds = value(float, "s", "wall time of the solution")

@@ -9,7 +9,7 @@ from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.jit.decorators import compiled, njit_inlined
 
 WRONG = 1e-6
-"""Of a volume: an error that is counted where nothing can mend it; 1 % of what a kept volume may be off."""
+"""Of a volume: an error that is counted where nothing can correct it; 1 % of what a kept volume may be off."""
 
 
 @compiled

@@ -19,4 +19,4 @@ class Frame(NamedTuple):
     probing: Probing | None = None
     """Thin probes; None where there are none: the loop is then compiled without their stage."""
     team: ThreadTeam | None = None
-    """Threads that share the longest loops; None for one thread. Only loops are compiled anew for it."""
+    """Threads that share the longest loops; None for one thread. Only loops are compiled again for it."""

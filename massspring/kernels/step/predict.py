@@ -1,4 +1,4 @@
-"""Forces beside those of springs."""
+"""Forces other than those of springs."""
 
 from massspring.kernels.jit.decorators import compiled
 

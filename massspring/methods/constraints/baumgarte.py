@@ -3,7 +3,7 @@
 Baumgarte, Computer Methods in Applied Mechanics and Engineering 1 (1972): instead of d²V/dt² = 0, which drifts, ask for
 d²(V − V0)/dt² + 2 alpha d(V − V0)/dt + beta² (V − V0) = 0 (docs/theory.md, eq. 10.5).
 
-Limits: stable for (beta dt)² + 4 alpha dt < 4 and 0 < 2 alpha dt < 2. A wrong volume takes time to mend: the larger
+Limits: stable for (beta dt)² + 4 alpha dt < 4 and 0 < 2 alpha dt < 2. A wrong volume takes time to correct: the larger
 root of eq. 10.6 is what a step leaves of it. 2 alpha = beta = 1/dt is HCJ05 with the convective term.
 """
 

@@ -106,7 +106,7 @@ class ExplicitElements(Method):
         prestress=True,
         point_volumes=True,
         facet_contact=True,
-        thin_probes=No("how its elements meet them is not tried"),
+        thin_probes=No("contact of its elements with them is untested"),
     )
 
     def __post_init__(self) -> None:

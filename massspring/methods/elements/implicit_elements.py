@@ -9,7 +9,7 @@ with b = mu/3 on quadratic bodies, 0 on linear ones. A step solves
 
     M (1 + c dt) (x⁺ − x)/dt = M v + dt (f(x⁺) + m g) + Cᵀ γ/dt
 
-by Newton's method with the exact derivative of f, factored anew in every pass; attached nodes are eliminated, obstacles
+by Newton's method with the exact derivative of f, factored in every pass; attached nodes are eliminated, obstacles
 hold nodes as constraints C of each pass, with friction as in `implicit_springs`.
 
 Limits: linear tetrahedra lock, the more the larger K: held at both caps and pressed, a ball of 251 nodes takes 78 % too

@@ -1,4 +1,4 @@
-"""The stiffness of elastic elements and springs in a pattern made once, factored anew at every Newton pass."""
+"""The stiffness of elastic elements and springs in a pattern made once, factored again at every Newton pass."""
 
 from typing import Any
 

@@ -49,7 +49,7 @@ class Recovery:
 
 
 def why_not_recover(body: Body) -> str | None:
-    """Why nobody can tell whether `body` is back; None when one can."""
+    """Why it cannot be decided whether `body` has recovered; None when it can."""
     return None if len(body.tetrahedra) else "it is back when its tetrahedra are, the body has none; fill its mesh"
 
 

@@ -62,7 +62,7 @@ class AngularSprings(Method):
     capabilities: ClassVar[Capabilities] = Capabilities(
         "none",
         triangle_springs=No("its angles are as stiff as springs between two nodes"),
-        thin_probes=No("how its angles meet them is not tried"),
+        thin_probes=No("contact of its angular springs with them is untested"),
     )
 
     def __post_init__(self) -> None:

@@ -34,7 +34,7 @@ def judge(
     nodes: Annotated[int, typer.Option(help="vertices on the outer surface, as in the exported mesh")] = NODES,
     results: Results = Path("results"),
 ) -> None:
-    """Judge the results of another program as our own: positions, forces, times. Keep them with our results."""
+    """Judge the results of another program like our own: positions, forces, times. Keep them with our results."""
     found = find_scene(scene)
     with busy(f"judging {file.name}"):
         record = entry_record(found, file, name or file.stem, nodes, force, seconds)

@@ -18,7 +18,7 @@ OPENINGS, FOLDS = 5e-3, 3e-3
 MOST = 100_000
 """Triangles up to which advice is tried: seconds, which the mesh command does not need again."""
 BEYOND = {"bad_points", "size", "small", "far_away", "one_sided", "duplicate_tetrahedra"}
-"""Findings that no option of the command mends."""
+"""Findings that no option of the command repairs."""
 
 
 def tried(source: Source, found: Findings) -> Findings:
@@ -49,7 +49,7 @@ def marked(mend: str, works: bool, attempts: Mapping[str, Findings | None]) -> s
         return plain
     if not attempts:
         return TRY + plain
-    words = f"no option was found that mends all of it; tried: {'; '.join(attempts)}"
+    words = f"no option repairs everything; tried: {'; '.join(attempts)}"
     bodies = {name: body for name, body in attempts.items() if body is not None}
     if not bodies:
         return f"{words}; none makes a body: repair it in the program that made it"

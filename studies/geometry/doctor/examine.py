@@ -29,7 +29,7 @@ class Findings:
     """Numbers by name, SI units, JSON-able; docs/meshes.md has the list."""
     findings: tuple[Finding, ...]
     command: str | None = None
-    """That was tried and mends all of it (studies.geometry.api.advice); None where none was found."""
+    """That was tried and repairs everything (studies.geometry.api.advice); None where none was found."""
 
     @property
     def clean(self) -> bool:

@@ -141,7 +141,7 @@ RULES: tuple[Rule, ...] = (
     (
         "duplicate_triangles",
         _number("duplicate_triangles"),
-        lambda m: f"{m['duplicate_triangles']} triangles are there twice, so the surface is double there",
+        lambda m: f"{m['duplicate_triangles']} triangles occur twice, so the surface is double there",
         "organbench mesh --from FILE leaves the second ones out",
     ),
     (
@@ -232,7 +232,7 @@ RULES: tuple[Rule, ...] = (
         "inverted",
         _number("inverted_tetrahedra"),
         lambda m: f"{m['inverted_tetrahedra']} tetrahedra have a negative or no volume: they are turned inside out",
-        "try organbench mesh --from FILE: it fills the surface anew",
+        "try organbench mesh --from FILE: it fills the surface again",
     ),
     (
         "tetrahedron_slivers",

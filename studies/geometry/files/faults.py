@@ -88,12 +88,12 @@ def check_stl(path: Path, head: bytes) -> None:
 
 
 def known_kind(head: bytes) -> str | None:
-    """The kind of a file that is no mesh, by its first bytes."""
+    """The kind of a file that is not a mesh, by its first bytes."""
     return next((kind for first, kind in OTHER_KINDS.items() if head.lstrip().lower().startswith(first.lower())), None)
 
 
 def unreadable(path: Path, reason: str) -> StudyError:
-    """The sentence for a file that is no mesh."""
+    """The sentence for a file that is not a mesh."""
     return StudyError(f"{path.name} is not a mesh that can be read ({reason}); give {KNOWN}")
 
 
@@ -116,7 +116,7 @@ WORDS: tuple[tuple[tuple[type[BaseException], ...], str], ...] = (
     ((ParseError,), "its XML breaks off or is damaged"),
     ((EOFError, struct.error, zlib.error, gzip.BadGzipFile, lzma.LZMAError), "it is cut short, or damaged"),
     ((PermissionError,), "it may not be read: change its permissions"),
-    ((FileNotFoundError,), "a file that belongs to it is missing beside it"),
+    ((FileNotFoundError,), "a file that belongs to it is missing from its folder"),
     ((IndexError, KeyError), "it breaks off, or names what is not there"),
     ((ValueError, AssertionError), "something in it is no number, or numbers are missing"),
 )

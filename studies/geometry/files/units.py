@@ -118,7 +118,7 @@ def length_of(text: str) -> float:
     """Metres of a length such as "19cm" or "190 mm". Raises StudyError for anything else."""
     found = re.fullmatch(r"\s*([0-9.]+(?:[eE][-+]?\d+)?)\s*([a-z]+)\s*", text)
     if not found or found[2] not in UNITS or found[1].count(".") > 1 or found[1] == ".":
-        raise StudyError(f"'{text}' is no length; give a number and its unit ({', '.join(UNITS)}), such as 19cm")
+        raise StudyError(f"'{text}' is not a length; give a number and its unit ({', '.join(UNITS)}), such as 19cm")
     return float(found[1]) * UNITS[found[2]]
 
 

@@ -20,7 +20,7 @@ ROUNDS = 30
 REACH = (0.2, 0.1, 0.04, 0.01, 0.003)
 """Trial moves in lengths of the edge."""
 MOST_BAD = 0.05
-"""Share of such elements beyond which single nodes cannot mend the mesh."""
+"""Share of such elements beyond which single nodes cannot repair the mesh."""
 
 
 @dataclass(frozen=True, eq=False)

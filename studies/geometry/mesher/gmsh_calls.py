@@ -1,4 +1,4 @@
-"""All calls of gmsh. Runs in the worker process only: gmsh may hang or crash, and is not safe beside other threads."""
+"""All calls of gmsh. Runs in the worker process only: gmsh may hang or crash, and is not safe with other threads."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -114,9 +114,9 @@ def fill_once(
         tags, all_points, tetrahedra = read_elements(TETRAHEDRON)
     count = len(points)
     if len(tags) < count or (tags[:count] != np.arange(1, count + 1)).any():
-        raise StudyError("gmsh dropped nodes of the surface when filling it; mend the surface first")
+        raise StudyError("gmsh dropped nodes of the surface when filling it; repair the surface first")
     if (all_points[:count] != points).any() or not same_triangles(boundary_triangles(tetrahedra), triangles):
-        raise StudyError("gmsh changed the surface when filling it; mend the surface first")
+        raise StudyError("gmsh changed the surface when filling it; repair the surface first")
     inverted = tetrahedron_volumes(all_points, tetrahedra) < 0
     tetrahedra[inverted] = tetrahedra[inverted][:, [0, 2, 1, 3]]
     return all_points, tetrahedra

@@ -182,4 +182,4 @@ def wayout(recipe: dict[str, Any]) -> str:
     """What a person can do about a mesh that could not be made."""
     if recipe["kind"] in ("scan", "level"):
         return "smooth the surface (--smooth 3), or ask for another node count"
-    return "mend the surface, or make a new one (--nodes N)" if recipe["kind"] == "fill" else "try another node count"
+    return "repair the surface, or make a new one (--nodes N)" if recipe["kind"] == "fill" else "try another node count"

@@ -70,7 +70,7 @@ def read_lines(process: subprocess.Popen[str], lines: queue.Queue[str | None]) -
 
 
 def told(lines: queue.Queue[str | None], name: str) -> str:
-    """Tells of the stages as they come, and of the time they take, until the last one, which it returns."""
+    """Logs each stage and how long it takes until the last one, which it returns."""
     stage, since = "", time.monotonic()
     while True:
         try:

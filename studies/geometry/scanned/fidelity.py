@@ -11,7 +11,7 @@ from studies.geometry.surface.node_count import handles_of
 MOST = 40_000
 """Places of a surface that are measured: more are thinned out evenly."""
 TOLD = 0.02
-"""Largest distance over the diagonal, and change of the volume, beyond which a person is told."""
+"""Largest distance over the diagonal, and change of the volume, beyond which the user is warned."""
 
 Surface = tuple[np.ndarray, np.ndarray]
 

@@ -20,7 +20,7 @@ COARSEST, FINEST = 1 / 40, 1 / 160
 CELLS_PER_EDGE = 2.5
 """Cells along an edge of the wanted mesh, between these limits."""
 MISSED, FINER = 0.01, 1.6
-"""Distance over the diagonal at which the grid is made so many times finer: half of what a person is told of."""
+"""Distance over the diagonal at which the grid is made so many times finer: half of the limit of the warning."""
 ASKED = 5000
 """Nodes of the file at which that is looked at."""
 ROOM = 4

@@ -10,7 +10,7 @@ from studies.geometry.scanned.scan_shape import COARSEST, Surface, faithful
 from studies.geometry.surface.family import enclosed_volume
 
 NEAR = 0.002
-"""Distance over the diagonal that the shape may miss of the surface: a tenth of what a person is told of."""
+"""Distance over the diagonal that the shape may miss of the surface: a tenth of the limit of the warning."""
 
 
 def true_grid(points: np.ndarray, triangles: np.ndarray, name: str) -> DistanceGrid:

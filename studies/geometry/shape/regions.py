@@ -119,7 +119,7 @@ def region_to_dict(region: Any) -> dict[str, Any]:
     """JSON-able form of a region; raises StudyError for anything that is not one of KINDS."""
     kind = type(region).__name__
     if KINDS.get(kind) is not type(region):
-        raise StudyError(f"{region!r} is no region; use one of {', '.join(KINDS)}")
+        raise StudyError(f"{region!r} is not a region; use one of {', '.join(KINDS)}")
     fields = {key: np.asarray(value, float).tolist() for key, value in asdict(region).items()}
     return {"kind": kind, **fields}
 

@@ -1,4 +1,4 @@
-"""What can be mended without guessing: doubled and flat triangles, parts, orientation, small holes."""
+"""Repairs that need no guessing: doubled and flat triangles, parts, orientation, small holes."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ Surface = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Mended:
-    """A mended surface and what was done to it."""
+    """A repaired surface and what was done to it."""
 
     points: np.ndarray
     triangles: np.ndarray

@@ -150,7 +150,7 @@ def _read(path: Path) -> dict[Key, Row]:
     try:
         table = pd.read_csv(path)
     except (ValueError, OSError) as error:
-        again = "write it anew with `organbench report`"
+        again = "write it again with `organbench report`"
         raise StudyError(f"{path} cannot be read as a table ({str(error).strip()}); {again}") from error
     if not {"scene", "recipe"} <= set(table.columns):
         return {}

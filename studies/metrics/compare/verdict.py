@@ -22,9 +22,9 @@ MEANING: dict[Verdict, str] = {
     Verdict.ROUND_OFF: f"equal to a relative {ROUND_OFF:g}, which is what a table shows",
     Verdict.WITHIN_FLOOR: "the change is not larger than what is not known: the reference's uncertainty, or the "
     "spread of the timing",
-    Verdict.MOVED: "the change is larger than that",
-    Verdict.NOT_RESOLVABLE: "nothing says how well the number is known, or one folder lacks it",
-    Verdict.OTHER_MACHINE: "a time that another machine measured; it is not judged",
+    Verdict.MOVED: "the change is larger than that uncertainty",
+    Verdict.NOT_RESOLVABLE: "the number has no stated uncertainty, or one folder lacks it",
+    Verdict.OTHER_MACHINE: "a time from another machine; it is not compared",
 }
 
 

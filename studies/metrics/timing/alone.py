@@ -37,4 +37,6 @@ def _lock(descriptor: int, path: Path, waits: Callable[[], object]) -> None:
         waits()
         fcntl.flock(descriptor, fcntl.LOCK_EX)
     except OSError as error:
-        warnings.warn(f"{path} cannot be locked ({error.strerror}): run no second command beside this", stacklevel=2)
+        warnings.warn(
+            f"{path} cannot be locked ({error.strerror}): run no other command at the same time", stacklevel=2
+        )

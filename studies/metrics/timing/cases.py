@@ -67,7 +67,7 @@ def repeats_for(setup: Setup) -> int:
 
 
 def write_timing(root: Path, study: str, case: Case, timing: FrameTiming, seconds: float | None = None) -> None:
-    """Stores frame times beside the record of their case, and the seconds that measuring them took."""
+    """Stores frame times next to the record of their case, and the seconds that measuring them took."""
     if not (timing.frame_ns > 0).all():
         raise StudyError(f"case {case.name} broke off while it was timed; run it again")
     record = new_record(

@@ -64,7 +64,7 @@ def damaged(content, seed):
         if content[80:84] == np.uint32(len(FACES)).tobytes():
             yield f"says {number}", content[:80] + np.uint32(min(number, 2**32 - 1)).tobytes() + content[84:]
     yield "numbers that are none", re.sub(rb"0\.0[0-9]", b"nan", content)
-    yield "text", b"this is no mesh at all\n" * 20
+    yield "text", b"this is not a mesh at all\n" * 20
     yield "a picture", b"\x89PNG\r\n\x1a\n" + bytes(200)
     yield "zeros", bytes(len(content))
 

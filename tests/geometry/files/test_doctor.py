@@ -66,7 +66,7 @@ def broken():
         "disagreeing": (POINTS, turned, 3, "at 3 edges neighbouring triangles look to opposite sides"),
         "inside_out": (POINTS, FACES[:, ::-1], 1, "the surface is inside out (volume -"),
         "crowded": (np.vstack([POINTS, [[0.1, 0, 0]]]), hinge, 1, "1 edges have more than two triangles"),
-        "duplicate_triangles": (POINTS, np.vstack([FACES, FACES[4:6]]), 2, "2 triangles are there twice"),
+        "duplicate_triangles": (POINTS, np.vstack([FACES, FACES[4:6]]), 2, "2 triangles occur twice"),
         "collapsed": (POINTS, np.vstack([FACES, [[0, 0, 1]]]), 1, "1 triangles use a point twice"),
         "unused_points": (np.vstack([POINTS, [[0, 0, 0.0]]]), FACES, 1, "1 points belong to nothing"),
         "duplicate_points": (np.vstack([POINTS, POINTS[FACES[0, :1]]]), apart, 1, "1 points lie on others"),

@@ -112,7 +112,7 @@ def truncated_stl(path, points, triangles):
 def test_what_is_no_mesh_gets_a_sentence(tmp_path, surface, capfd):
     points, triangles = surface
     text = tmp_path / "notes.stl"
-    text.write_text("this is no mesh at all\n")
+    text.write_text("this is not a mesh at all\n")
     empty = tmp_path / "empty.ply"
     empty.write_bytes(b"")
     odd = tmp_path / "body.xyz"

@@ -85,7 +85,7 @@ def test_a_squeezed_ball_comes_to_rest_between_equal_forces(fraction):
 @pytest.mark.parametrize("friction", [0.0, FRICTION])
 def test_a_wide_contact_stands_still(friction):
     """A flat block between planes that cover its sides, where volumes undo most of what contact does (eq. 9.6); with
-    the part 0.8 of eq. 9.3 the force sways by a tenth."""
+    the part 0.8 of eq. 9.3 the force oscillates by a tenth."""
     body = quadratic_body(*quadratic_block((4, 4, 2), distortion=0.1), SOFT, inertia="stiffness")
     dt = 0.8 * step_limit(body).undamped
     low, high = body.rest[:, 2].min(), body.rest[:, 2].max()

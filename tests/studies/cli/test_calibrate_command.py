@@ -32,10 +32,10 @@ def test_the_table_shows_both_sides():
 @pytest.mark.parametrize(
     ("verdicts", "said"),
     [
-        ((Verdict.HOLDS, Verdict.HOLDS), "force: the fit holds,"),
+        ((Verdict.HOLDS, Verdict.HOLDS), "force: the fit generalises:"),
         ((Verdict.HOLDS, Verdict.MEMORISES), "force: the fit overfits:"),
-        ((Verdict.UNRESOLVED, Verdict.HOLDS), "force: the fit holds,"),
-        ((Verdict.UNRESOLVED, Verdict.UNRESOLVED), "force: not resolvable,"),
+        ((Verdict.UNRESOLVED, Verdict.HOLDS), "force: the fit generalises:"),
+        ((Verdict.UNRESOLVED, Verdict.UNRESOLVED), "force: not resolvable:"),
     ],
 )
 def test_the_worst_trial_of_a_quantity_has_its_sentence(verdicts, said):
@@ -67,7 +67,7 @@ def test_a_damaged_or_foreign_file_is_one_sentence(refused, tmp_path):
     path.write_text(path.read_text().replace("1.626", "1.627"))
     assert "was changed after it was written" in refused("calibrate", path)
     path.write_text('{"name": "something else"}')
-    assert "is JSON, but no calibration" in refused("calibrate", path)
+    assert "is JSON, but not a calibration" in refused("calibrate", path)
 
 
 STUDY = """

@@ -165,7 +165,7 @@ def test_a_study_that_the_page_cannot_show_is_named(organbench, write, tmp_path,
     for record in (tmp_path / "results" / "tiny").glob("tiny_squeeze*.h5"):
         record.touch()
     err = organbench("report")[2]
-    assert "tiny is shown as it was drawn last; `organbench report mine.py` draws it again" in err
+    assert "tiny shows its last charts; `organbench report mine.py` redraws them" in err
     for damage in (lambda: part.write_text(json.dumps(kept)), part.unlink):
         damage()
         err = organbench("report")[2]

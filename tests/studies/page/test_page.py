@@ -291,7 +291,7 @@ def test_commands_name_the_file_of_an_own_study(kept, tmp_path):
 
 def test_a_chart_that_keeps_no_svg_is_left_out_and_said(results):
     study = tiny_study(charts=(Chart("own.png", lambda runs, path: path.write_bytes(b"own")),))
-    assert any("chart own.png is left out" in remark for remark in report(Ledger(results), [study])[1])
+    assert any("chart own.png is omitted" in remark for remark in report(Ledger(results), [study])[1])
 
 
 def test_charts_are_the_same_again_small_and_without_what_a_page_has_no_use_for(kept, tmp_path):

@@ -78,7 +78,7 @@ def test_a_checkerboard_counts_and_a_gradient_does_not():
 
 @pytest.mark.parametrize(
     ("changed", "word"),
-    [({"unknowns_per_volume": 0.6}, "locks"), ({"alternation": 0.6}, "alternate"), ({"sway": 2 * SWAYS}, "sways")],
+    [({"unknowns_per_volume": 0.6}, "locks"), ({"alternation": 0.6}, "alternate"), ({"sway": 2 * SWAYS}, "oscillates")],
 )
 def test_each_indicator_is_told_beyond_its_bound(changed, word):
     assert remarks(GOOD) == [] and remarks(dict.fromkeys(GOOD, np.nan)) == []

@@ -31,7 +31,7 @@ def test_a_method_comes_back_with_its_settings(method):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "is no recipe of a case"),
+        ("", "is not a recipe of a case"),
         ("[1]", "must be a JSON object"),
         ('{"body": {"nodes": 300, "shape": "cube"}}', "the text is no stored case"),
         ('{"steps": 3}', "nothing reads steps"),

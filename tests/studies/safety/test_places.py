@@ -47,7 +47,7 @@ def test_what_is_no_file_costs_its_case_alone(organbench, tiny_file, results, pl
     assert code == 0 and "1 stale" in out and "2 ok" not in err
     code, out, err = organbench("table", tiny_file, "--results", results)
     assert code == 0 and "free" in out
-    assert f"{place} is no file but in the place of one: delete it, and run its study again" in err
+    assert f"{place} is not a file: delete it, and run its study again" in err
 
 
 def test_a_folder_is_not_run_and_named_and_the_rest_runs(organbench, tiny_file, results, place):
@@ -68,6 +68,6 @@ def test_a_folder_in_the_place_of_the_index_is_one_sentence(organbench, tiny_fil
     index = index_path(results, "tiny")
     index.mkdir()
     code, _, err = organbench("run", tiny_file, "--results", results)
-    assert code == 0 and f"{index} is a folder in the place of the study's index: delete it" in err
+    assert code == 0 and f"{index} is a folder, but the study's index belongs there: delete it" in err
     index.rmdir()
     assert organbench("run", tiny_file, "--results", results)[0] == 0 and index.is_file()

@@ -60,7 +60,7 @@ def test_a_piece_that_died_is_stored_as_failed(tmp_path):
     assert "the reference of 'ball_squeeze' on mesh 0.9 is failed: its process died" in remarks[0]
     assert [solve_standing(ledger, solve).state for solve in reference_solves(scene)] == ["failed"] * 6
     said = failures.sentence("again")
-    assert said.startswith(f"failed: {jobs[0].label} (its process died), and 6 more; the rest is done")
+    assert said.startswith(f"failed: {jobs[0].label} (its process died), and 6 more; all others are done")
 
 
 def test_what_another_command_has_done_meanwhile_is_not_done_again(results):
@@ -112,7 +112,7 @@ def test_a_case_that_ends_its_process_is_stored_and_the_rest_goes_on(organbench,
     assert "tiny: 2 cases: 1 ok, 1 failed\n  failed: its process died 3 times" in out
     (sentence,) = err.splitlines()
     assert sentence.startswith("warning: failed: tiny_squeeze-tetrahedral-60-fatal-dt0.5 (its process died 3")
-    assert sentence.endswith(f"the rest is done, `organbench run {file} --only failed` retries")
+    assert sentence.endswith(f"all others are done, `organbench run {file} --only failed` retries")
     assert organbench("status", file, "--results", results)[1].splitlines()[0] == "tiny: 2 cases: 1 ok, 1 failed"
     code, out, _ = organbench("run", file, "--results", results)
     assert code == 1 and "tiny: nothing ran" in out, "what failed is known, does not run again, and is not forgotten"

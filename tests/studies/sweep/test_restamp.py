@@ -59,7 +59,7 @@ def test_equal_results_are_restamped_with_their_frame_times(old, organbench, tin
         assert now.attributes == pytest.approx(was.attributes, nan_ok=True)
         for name, field in was.fields.items():
             np.testing.assert_array_equal(now.fields[name].values, field.values)
-    assert "nothing is stale" in organbench("restamp", tiny_file, "--results", old)[1]
+    assert "no result is stale" in organbench("restamp", tiny_file, "--results", old)[1]
 
 
 def test_a_second_restamp_keeps_the_first_in_the_record(old):

@@ -20,7 +20,7 @@ ONE = Study("asked", "?", (Case(KIDNEY_PROBE, BodyRecipe(nodes=150), ImplicitVol
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A kidney in millimetres, the same with a hole, text that is no mesh, and a file of another kind."""
+    """A kidney in millimetres, the same with a hole, text that is not a mesh, and a file of another kind."""
     place = tmp_path_factory.mktemp("organs")
     mesh = organ("kidney", 200, fill=False)
     for name, triangles in (("whole", mesh.triangles), ("open", mesh.triangles[9:])):
@@ -69,7 +69,7 @@ def test_it_has_a_name_that_every_command_understands(folder):
 def test_what_is_no_folder_of_organs_is_refused(folder, tmp_path):
     with pytest.raises(StudyError, match="there is no folder"):
         find_study(f"population@{tmp_path / 'gone'}")
-    with pytest.raises(StudyError, match="holds no surface"):
+    with pytest.raises(StudyError, match="has no surface"):
         study_on(ONE, tmp_path)
     with pytest.raises(StudyError, match="unit"):
         study_on(ONE, folder, "furlong")

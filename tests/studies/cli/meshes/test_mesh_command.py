@@ -122,8 +122,8 @@ def asked_wrongly(folder):
     egg = stored(folder / "egg.ply", POINTS, FACES)
     out, scan = ("-o", folder / "out.vtu"), ("mesh", "--from", egg, "--unit", "mm")
     return {
-        "nothing to mesh": (("mesh", *out), "say what to mesh"),
-        "both": (("mesh", "ball", "--from", egg, *out), "say what to mesh"),
+        "nothing to mesh": (("mesh", *out), "name what to mesh"),
+        "both": (("mesh", "ball", "--from", egg, *out), "name what to mesh"),
         "unknown organ": (("mesh", "livr", *out), "did you mean 'liver'"),
         "unit": (("mesh", "--from", egg, *out), "does not say its unit; its longest side is 60"),
         "odd unit": (("mesh", "--from", egg, "--unit", "ft", *out), "unit 'ft' is not known"),

@@ -144,7 +144,7 @@ def test_bad_input_is_one_sentence(refused, scan_file, tmp_path):
         ("place", "scan.ply", "--unit", "mm"): "scan does not name its organ; say which tissue it is: --tissue",
         ("place", "scan.ply", "--unit", "mm", "--tissue", "brain"): "unknown tissue 'brain'",
         ("place", "scan.ply", "--unit", "mm", "--hold", "topp"): "unknown side 'topp'; did you mean 'top'",
-        ("place", "scan.ply", "--unit", "mm", "--probe", "1;2;3"): "'1;2;3' is no place; give x,y,z in mm",
+        ("place", "scan.ply", "--unit", "mm", "--probe", "1;2;3"): "'1;2;3' is not a place; give x,y,z in mm",
         ("place", "scan.ply", "--unit", "mm", "--probe", "1,nan,3"): "give finite numbers",
     }
     before = sorted(p.name for p in tmp_path.iterdir())

@@ -58,11 +58,11 @@ BROKEN = {
     ),
     "region off the body": (
         "held=(Held('bottom', BallRegion((0, 0, -0.08), 0.01)),)",
-        "region 'bottom' holds nothing, the body begins 20 mm away from it",
+        "region 'bottom' contains no part of the body, which begins 20 mm away from it",
     ),
     "two regions of one name": (
         "held=tuple(Held('pole', HalfSpace((0, 0, z), (0, 0, -z))) for z in (-0.04, 0.04))",
-        "holds two regions called 'pole'",
+        "has two regions called 'pole'",
     ),
     "force at no obstacle": (
         "reference=PLAN, probed=ForceOutput('obstacle', 2, (0, 0, 1))",
@@ -70,17 +70,17 @@ BROKEN = {
     ),
     "tissue in MPa": (
         "tissue=replace(SOFT, shear_modulus=0.0018)",
-        "the shear modulus is 0.0018 Pa, usual are 100 to 100,000: is it in Pa?",
+        "the shear modulus is 0.0018 Pa, the usual range is 100 to 100,000: is it in Pa?",
     ),
     "density in g/cm³": (
         "tissue=replace(SOFT, density=1.06)",
-        "the density is 1.06 kg/m³, usual are 500",
+        "the density is 1.06 kg/m³, the usual range is 500",
     ),
     "endless": ("duration=float('inf')", "the duration is inf s; give a finite number above 0"),
     "no duration": ("duration=float('nan')", "the duration is nan s; give a finite number above 0"),
     "backwards": ("duration=-1.0", "the duration is -1.0 s; give a finite number above 0"),
     "duration in words": ("duration='8'", "the duration is '8' s; give a finite number above 0"),
-    "duration in µs": ("duration=8e6", "the duration is 8000000.0 s, usual are 0.001 to 1,000"),
+    "duration in µs": ("duration=8e6", "the duration is 8000000.0 s, the usual range is 0.001 to 1,000"),
     "no frames": ("frames=0", "frames is 0; give a whole number from 1 on"),
     "compared after its end": (
         "reference=PLAN, duration=1.0",
@@ -138,7 +138,7 @@ def warnings_for(**changes) -> list[str]:
 def test_numbers_that_are_hardly_meant_are_a_warning_each():
     soft, sphere = SQUEEZE.tissue, Sphere((0.0, 0.0, 0.27), 0.2)
     for changes, words in (
-        ({"tissue": replace(soft, shear_modulus=5.0)}, "the shear modulus is 5.0 Pa, usual are 100 to"),
+        ({"tissue": replace(soft, shear_modulus=5.0)}, "the shear modulus is 5.0 Pa, the usual range is 100 to"),
         ({"tissue": replace(soft, density=2500.0)}, "the density is 2500.0 kg/m³"),
         ({"duration": 8000.0}, "the duration is 8000.0 s"),
         ({"obstacles": (sphere,)}, "obstacle 0 is 0.4 m long, the body 0.173 m"),

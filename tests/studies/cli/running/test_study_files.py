@@ -86,7 +86,7 @@ BROKEN |= {
         "mine.py: scene 'tiny_squeeze': the duration is inf s; give a finite number above 0",
     ),
     "columns": (OWN + "STUDY = tiny_study(columns='volume_worst')\n", "columns is 'volume_worst'; give a tuple"),
-    "no case": (OWN + "STUDY = tiny_study(cases=(3,))\n", "cases holds 3, which is no Case"),
+    "no case": (OWN + "STUDY = tiny_study(cases=(3,))\n", "cases holds 3, which is not a Case"),
     "reserved": (OWN + "STUDY = tiny_study(name='cache')\n", "a study cannot be called 'cache'"),
     "chart elsewhere": (
         OWN + "STUDY = tiny_study(charts=(Chart('../../a.png', print),))\n",

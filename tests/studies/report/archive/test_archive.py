@@ -136,7 +136,7 @@ def test_a_study_file_is_packed_with_its_records(organbench, results, tiny_file,
     target = tmp_path / "new" / "tiny.zip"
     code, out, err = organbench("archive", tiny_file, "-o", target, "--results", results)
     assert code == 0 and out.startswith(f"{target}: ")
-    assert err.startswith("warning: report.html: chart picture.txt is left out"), "it is no picture"
+    assert err.startswith("warning: report.html: chart picture.txt is omitted"), "it is no picture"
     with zipfile.ZipFile(target) as archive:
         assert archive.read(tiny_file.name) == tiny_file.read_bytes()
         assert archive.read("tiny/picture.txt") == b"3 runs"

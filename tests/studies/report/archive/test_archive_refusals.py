@@ -46,8 +46,8 @@ def test_a_bit_that_flips_is_noticed(refused, packed, tmp_path):
 def test_what_is_no_archive_is_one_sentence(refused, tmp_path):
     with zipfile.ZipFile(tmp_path / "other.zip", "w") as other:
         other.writestr("a.txt", "")
-    assert "is no archive of organbench" in refused("archive", "--check", tmp_path / "other.zip")
-    assert "is no archive of organbench" in refused("archive", "--check", tmp_path)
+    assert "is not an archive of organbench" in refused("archive", "--check", tmp_path / "other.zip")
+    assert "is not an archive of organbench" in refused("archive", "--check", tmp_path)
     assert "there is no archive" in refused("archive", "--check", tmp_path / "none.zip")
 
 

@@ -126,7 +126,7 @@ def test_what_does_not_belong_in_one_file_is_refused(root, refused):
 
 def test_files_of_other_kinds_are_refused(root, refused):
     (reference,) = (root / "reference").iterdir()
-    assert "holds no run with something to see" in refused("view", reference, "--results", root)
+    assert "has no run to view" in refused("view", reference, "--results", root)
 
 
 def test_files_of_an_earlier_version_are_one_warning(root, organbench):

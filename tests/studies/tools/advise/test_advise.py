@@ -226,7 +226,7 @@ def test_an_unknown_scene_is_answered_with_the_nearest(results):
 
 def test_nothing_is_recommended_that_does_not_meet_the_usual_wish(tmp_path):
     results = publish(tmp_path, rows_of(LIVER_PRESS, {ONE: LADDER[ONE]}))
-    with pytest.raises(StudyError, match="no recipe is recommended for scene 'liver_press': none meets"):
+    with pytest.raises(StudyError, match="no recipe is recommended for scene 'liver_press': no body meets"):
         recommended(LIVER_PRESS, results)
     coarse = publish(tmp_path, rows_of(LIVER_PRESS, **{"mean_error floor [%]": 1.5}))
     with pytest.raises(StudyError, match="the reference is not accurate enough to decide"):

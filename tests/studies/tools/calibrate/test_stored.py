@@ -55,8 +55,8 @@ def rewritten(path, change):
         (lambda whole: whole["calibration"].update(verdict="holds!"), DamagedFile, "was changed after"),
         (lambda whole: whole.pop("digest"), DamagedFile, "was changed after"),
         (lambda whole: whole.update(schema=99), OtherVersion, "another version"),
-        (lambda whole: whole.update(kind="something"), StudyError, "is JSON, but no calibration"),
-        (lambda whole: whole.update(calibration=[1]), StudyError, "is JSON, but no calibration"),
+        (lambda whole: whole.update(kind="something"), StudyError, "is JSON, but not a calibration"),
+        (lambda whole: whole.update(calibration=[1]), StudyError, "is JSON, but not a calibration"),
     ],
 )
 def test_a_changed_file_is_one_sentence(path, change, kind, said):
@@ -90,7 +90,7 @@ def test_settings_that_this_version_does_not_have_are_one_sentence(path, change,
 def test_another_file_is_one_sentence(tmp_path, content):
     file = tmp_path / "file.json"
     file.write_bytes(content)
-    with pytest.raises(StudyError, match="no calibration") as refused:
+    with pytest.raises(StudyError, match="not a calibration") as refused:
         calibrated(file)
     assert "\n" not in str(refused.value)
 

@@ -37,7 +37,7 @@ def test_an_extra_adds_to_what_is_required():
 def test_a_package_that_is_missing_or_too_old_is_named_with_the_line_that_installs_it():
     found = software.packages([Requirement("not-there>=2"), Requirement("numpy>=999"), Requirement("scipy>=1")])
     assert found.level is Level.FAULT
-    assert "not-there is not installed, numpy is " in found.said and "needed is >=999" in found.said
+    assert "not-there is not installed, numpy is " in found.said and "but >=999 is required" in found.said
     assert found.mend == f"{sys.executable} -m pip install 'not-there>=2' 'numpy>=999'"
 
 

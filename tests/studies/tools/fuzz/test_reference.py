@@ -85,7 +85,7 @@ def test_an_error_without_the_states_that_converged_is_unexplained(monkeypatch):
             raise module.SolveError(str(error)) from error
 
     monkeypatch.setattr(module, "_solve", forgets)
-    assert "tells of 0 states" in tried(stuck).message
+    assert "reports 0 states" in tried(stuck).message
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_each_truth_is_missed_by_what_breaks_it(pressed):
     hears("not finite", u=found.u * np.nan)
     hears("least volume ratio", J=found.J * 0.0)
     hears("energies", energy=-1.0)
-    hears("surface encloses", volume=found.volume * (1.0 + 1e-7))
+    hears("volume of the surface", volume=found.volume * (1.0 + 1e-7))
     hears("out of balance", obstacle_force=found.obstacle_force * 1.01)
     count = system.displacement_count
     for first, last, size, words in ((0, count, 1e-6, "nothing touches"), (count, None, 1.0, "mean pressure")):
