@@ -105,9 +105,11 @@ def constraint(published: Path) -> str:
     }
     more = [100 * (time / times[*key, "free"] - 1) for (*key, method), time in times.items() if method == OURS]
     return (
-        f"**The constraint keeps the volume and costs little.** In the scenes of the study `volume_loss` the volume is "
-        f"never more than {lost[OURS]:.6f} % off with it; springs alone lose up to {lost['free']:.0f} %. A step takes "
-        f"{_range(more)} % longer ([frame times](results/published/frame_rate/cost_ratio.png))."
+        f"**The constraint keeps the volume and costs little.** In the study `volume_loss` (one kept volume, "
+        f"{max(row['nodes'] for row in rows)} surface nodes) the volume is never more than {lost[OURS]:.6f} % off "
+        f"with it; springs alone lose up to "
+        f"{lost['free']:.0f} %. A step takes {_range(more)} % longer ([frame "
+        f"times](results/published/frame_rate/cost_ratio.png))."
     )
 
 
@@ -120,8 +122,9 @@ def one_volume(published: Path) -> str:
     )
     return (
         f"**The volume alone does not make the force right.** If only the total volume of a ball or liver is "
-        f"kept, the force of tetrahedral bodies is {_range(filled)} % too small, and that of the surface bodies of Jung et al. "
-        f"{_range(surface)} % ([forces](results/published/volume_loss/force.png))."
+        f"kept, the force of tetrahedral bodies is {_range(filled)} % too small, and that of the surface bodies of "
+        f"Jung "
+        f"et al. {_range(surface)} % ([forces](results/published/volume_loss/force.png))."
     )
 
 
@@ -131,7 +134,8 @@ def recommended(published: Path) -> str:
     return (
         f"**Bodies of quadratic tetrahedra that keep one volume per vertex are accurate without fitting.** In "
         f"{len(speeds) - len(missed)} of {len(speeds)} scenes one of them is [accurate "
-        f"enough](docs/accuracy.md#accurate-enough); in the others we show the closest. They are {_range(speeds, 1)} "
+        f"enough](docs/accuracy.md#accurate-enough) by the central value; in the others we show the closest. They are "
+        f"{_range(speeds, 1)} "
         f"times as fast as real time on one core. The exceptions: {'; '.join(missed) or 'none'}."
     )
 
@@ -140,8 +144,9 @@ def exceptions(published: Path) -> str:
     """The scenes in which no body is accurate enough."""
     speeds, missed = _chosen(published)
     return (
-        f"**{len(missed)} of {len(speeds)} scenes have no body that is [accurate "
-        f"enough](docs/accuracy.md#accurate-enough) beyond doubt.** {'; '.join(missed) or 'None'}."
+        f"**In {len(missed)} of {len(speeds)} scenes no body is shown to be [accurate "
+        f"enough](docs/accuracy.md#accurate-enough).** Elsewhere the central value decides. "
+        f"{'; '.join(missed) or 'None'}."
     )
 
 
@@ -199,18 +204,26 @@ def _why_not(one: Judged, wish: Wish) -> str:
 
 def other_programs(published: Path) -> str:
     """What MuJoCo, FElupe, Newton and PyBullet reach on the pressed liver."""
-    rows = [row for row in table(published, "peers") if row["scene"] == "liver_press"]
+    peers = [row for row in table(published, "peers") if row["scene"] in ("ball_squeeze", "liver_press")]
+    rows = [row for row in peers if row["scene"] == "liver_press"]
     ours = [row for row in rows if row["method"] == OURS and row["body"] == "quadratic"]
     felupe = [row for row in rows if row["method"] == "felupe"]
+    ball = [row for row in peers if row["scene"] == "ball_squeeze" and row["body"] == "quadratic"]
+    squeezed = {
+        name: [abs(force) for force in column((row for row in ball if row["method"] == name), FORCE)]
+        for name in (OURS, "felupe")
+    }
     linear = [row for row in rows if row["method"] in ("mujoco", "newton", "bullet")]
     speeds = {name: {row["nodes"]: row[SPEED] for row in of} for name, of in (("ours", ours), ("theirs", felupe))}
     off, off_felupe, off_linear = ([abs(force) for force in column(of, FORCE)] for of in (ours, felupe, linear))
     faster = mean(speed / speeds["theirs"][nodes] for nodes, speed in speeds["ours"].items())
     return (
-        f"**Implicit elements are more accurate and slower.** On the pressed liver FElupe's quadratic elements are "
+        f"**On the pressed liver implicit elements are more accurate and slower.** FElupe's quadratic elements are "
         f"{_range(off_felupe, 1)} % off in force. Our quadratic bodies with elements of one size (here we "
         f"recommend graded ones) are {_range(off)} % off and {faster:.0f} times as fast. MuJoCo, Newton and PyBullet, "
-        f"on linear tetrahedra, are {_range(off_linear)} % off ([other programs](results/published/peers/peers.png))."
+        f"on linear tetrahedra, are {_range(off_linear)} % off ([other programs](results/published/peers/peers.png)). "
+        f"On the squeezed ball our quadratic bodies are {_range(squeezed[OURS], 1)} % off, FElupe's "
+        f"{_range(squeezed['felupe'], 1)} %."
     )
 
 
@@ -244,9 +257,11 @@ def laws(published: Path) -> str:
     )
     return (
         f"**Which stiffness law, how many volumes** (`make study-laws`, [chart](results/published/laws/laws.png)): "
-        f"with one volume the force of a filled ball at full load is {_range(short)} % too small under each of the "
+        f"with one volume the force of the squeezed ball at full load is {_range(short)} % too small under each of the "
         f"{count} laws that allow one volume. One volume per node with cotangent springs brings the error along the "
-        f"path to {nodal['force_error [%]']:.1f} % at {nodal['nodes']} surface nodes."
+        f"path to {nodal['force_error [%]']:.1f} % at {nodal['nodes']} surface nodes, but makes the clamped ball and "
+        f"the "
+        f"liver [too stiff](docs/paper.md#from-the-papers-one-volume-to-the-continuum)."
     )
 
 
