@@ -57,7 +57,7 @@ def test_a_force_that_changes_changes_the_sentence(published):
     def shorten(rows):
         rows.loc[rows["body"] == "surface", "force_end [%]"] = -12.3
 
-    assert "that of the paper's surface bodies 12 to 12 %" in changed(published, "volume_loss", shorten)
+    assert "that of the surface bodies of Jung et al. 12 to 12 %" in changed(published, "volume_loss", shorten)
 
 
 def test_a_scene_whose_reference_decides_nothing_is_not_called_missed(published):
@@ -65,7 +65,7 @@ def test_a_scene_whose_reference_decides_nothing_is_not_called_missed(published)
         rows.loc[rows["scene"] == "ball_clamped", "mean_error floor [%]"] = 2.0
 
     text = changed(published, "accuracy", spoil)
-    assert "in 6 of 9 scenes" in text
+    assert "In 6 of 9 scenes" in text
     assert "ball_clamped is undecided, because its reference is only known to ±2 % in displacement" in text
 
 
@@ -73,7 +73,7 @@ def test_a_scene_without_an_accurate_body_says_by_how_much_it_misses(published):
     def spoil(rows):
         rows.loc[rows["scene"] == "kidney_probe", "force_end [%]"] = 3.5
 
-    assert "kidney_probe misses the target of 3 % for force by 0.5 %" in changed(published, "accuracy", spoil)
+    assert "kidney_probe misses the target of 3 % for force with 3.5 %" in changed(published, "accuracy", spoil)
 
 
 def test_a_missing_table_is_one_sentence(published):

@@ -19,19 +19,20 @@ massspring/methods. Equations and sources are in the docstring of each method an
 CLAIMS = """
 ## Claims
 
-A test, tests/massspring/methods/test_methods.py, measures every claim. *Order*: the error of a trajectory
-falls with this power of the time step. *Volume*: |V/V0 − 1| after a quiet step at half the stability limit. *Angular
-momentum*: conserved to round-off in free flight.
+A test, tests/massspring/methods/test_methods.py, checks every claim. *Order*: the error of a trajectory
+falls with this power of the time step. *Volume*: the claim is that |V/V0 − 1| stays below this after a quiet step at
+half the stability limit; – is no claim. *Angular momentum*: conserved to round-off in free flight.
 """
 CAPABILITIES = """
 ## Capabilities
 
 *Keeps*: no volume; the **whole**, one volume inside the body's surface; **several** volumes of any kind; every volume
 of the **tetrahedra**; those over the **points** of quadratic elements; or those of the **elements** of an elastic
-solid, linear or quadratic. *Correction* of a wrong volume: **limited**, a volume moves a node by a limited length in
-each step; **full**, the whole error in one step; **penalty**, by a force that the stable step bounds; **unbounded**, by
-a force without a bound. *Stable*: below the stability limit, or at any step. A method refuses what it does not support
-with one sentence. Every method supports planes, spheres and capsules with friction, attachments, gravity and damping.
+solid, linear or quadratic. *Correction* of a wrong volume: **limited**, a volume moves no node farther than a set
+length in a step; **full**, the whole error in one step; **penalty**, by a force that the stable step bounds;
+**unbounded**, by a force without a bound. *Stable*: below the stability limit, or at any step. A method refuses
+what it does not support with one sentence. Every method supports planes, spheres and capsules with friction,
+attachments, gravity and damping.
 """
 REASONS = """
 ## Why not
