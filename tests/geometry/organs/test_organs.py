@@ -175,7 +175,7 @@ def test_octant_is_an_eighth_of_a_ball_graded_to_its_pole(sizes):
         (lambda: ball(radius=-0.05), "ball of radius -0.05 m cannot be meshed"),
         (lambda: ball(150, regions={"far": HalfSpace((0, 0, 1), (0, 0, -1))}), "region 'far' holds no surface node"),
         (lambda: ball(150, regions={"bad": HalfSpace((0, 0, 0), (0, 0, 0))}), "has no length"),
-        (lambda: ball(150, regions={"bad": "top"}), "'top' is no region"),
+        (lambda: ball(150, regions={"bad": "top"}), "'top' is not a region"),
         (lambda: ball_octant(0.05, 0.06, 0.01), "h = 0.06 m is outside"),
         (lambda: liver(20), "liver: 20 surface nodes"),
     ],

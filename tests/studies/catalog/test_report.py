@@ -68,7 +68,7 @@ def test_studies_that_were_not_run_are_named_in_one_line(results):
     _, remarks = report(
         Ledger(results), [tiny_study(), *(replace(tiny_study(), name=name) for name in ("other", "third"))]
     )
-    assert [remark for remark in remarks if "not run" in remark] == [
+    assert [remark for remark in remarks if "no results here" in remark] == [
         "skipped (no results here; existing charts kept): other, third. Run `make study-NAME` first"
     ]
 

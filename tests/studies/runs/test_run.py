@@ -152,7 +152,7 @@ def test_ending_inside_out(ended, smallest, status):
     case, prepared, history = ended
     verdict, message = judge(case, prepared, replace(history, min_j=np.append(history.min_j[:-1], smallest)))
     assert verdict == status
-    assert ("inside out" in message) == (status == Status.INVERTED)
+    assert ("ends inverted" in message) == (status == Status.INVERTED)
 
 
 @pytest.mark.parametrize(("off", "status"), [(0.009, Status.OK), (-0.011, Status.DRIFTED), (0.05, Status.DRIFTED)])

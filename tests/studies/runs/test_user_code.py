@@ -154,7 +154,7 @@ NAMES = {
     "metric": ('Metric("force_mean"', 'Metric("min_j"', "metric 'min_j' is one of the project's own"),
     "quantity": ('"-", force_mean', '"-", force_mean, "forse"', "unknown quantity of a reference in metric"),
     "no law": ("StiffnessLaw(bars)", "bars", "give a StiffnessLaw"),
-    "notebook": ("StiffnessLaw(bars)", "StiffnessLaw(eval('lambda e, m: e', {}))", "is written in no file"),
+    "notebook": ("StiffnessLaw(bars)", "StiffnessLaw(eval('lambda e, m: e', {}))", "is not written in a file"),
 }
 
 

@@ -77,5 +77,5 @@ def test_what_is_no_folder_of_organs_is_refused(folder, tmp_path):
     with pytest.raises(StudyError, match=r"no file in .* can be used; the first: a.ply"):
         study_on(ONE, tmp_path)
     hollow = Study("hollow", "?", (Case(STOMACH_PROBE),), (), ("force_end",))
-    with pytest.raises(StudyError, match="hollow organs alone"):
+    with pytest.raises(StudyError, match="needs hollow organs"):
         study_on(hollow, folder, "mm")

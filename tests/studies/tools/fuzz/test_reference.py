@@ -115,7 +115,7 @@ def test_each_truth_is_missed_by_what_breaks_it(pressed):
     hears("volume of the surface", volume=found.volume * (1.0 + 1e-7))
     hears("out of balance", obstacle_force=found.obstacle_force * 1.01)
     count = system.displacement_count
-    for first, last, size, words in ((0, count, 1e-6, "nothing touches"), (count, None, 1.0, "mean pressure")):
+    for first, last, size, words in ((0, count, 1e-6, "nodes without contact"), (count, None, 1.0, "mean pressure")):
         x = state.x.copy()
         x[first:last] += (
             size
