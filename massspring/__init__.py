@@ -1,5 +1,7 @@
 """Mass-spring bodies that keep their volume: Jung, Hong, Choi (2005). Knows no file, no plot, no scene.
 
+`massspring.sources` alone names the packages around it: it fingerprints their code.
+
 The public names are those of the stub, `__init__.pyi`, and the methods; a name loads its module when it is first used.
 """
 

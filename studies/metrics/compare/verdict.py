@@ -20,8 +20,7 @@ class Verdict(StrEnum):
 MEANING: dict[Verdict, str] = {
     Verdict.SAME_BITS: "the records of both folders are equal to the last bit, and so are the numbers",
     Verdict.ROUND_OFF: f"equal to a relative {ROUND_OFF:g}, which is what a table shows",
-    Verdict.WITHIN_FLOOR: "the change is not larger than what is not known: the reference's uncertainty, or the "
-    "spread of the timing",
+    Verdict.WITHIN_FLOOR: "the change is within the uncertainty of the reference, or within the spread of the timing",
     Verdict.MOVED: "the change is larger than that uncertainty",
     Verdict.NOT_RESOLVABLE: "the number has no stated uncertainty, or one folder lacks it",
     Verdict.OTHER_MACHINE: "a time from another machine; it is not compared",

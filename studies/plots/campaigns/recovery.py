@@ -56,7 +56,7 @@ def _draw_start(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
     axes.axhspan(LOWEST - 1, 0.0, color=GREY, alpha=0.13, linewidth=0)
     axes.axhline(1.0, color=BLACK, linewidth=0.8)
     axes.annotate(
-        "inside out",
+        "inverted",
         (0.0, 0.0),
         (6, -4),
         axes.get_yaxis_transform(),

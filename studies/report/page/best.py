@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from studies.base.counting import counted
-from studies.metrics.cells import MISSING, value_cell
+from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.judged import Judged, Measured, by_cost, cheapest, judged, nearest
 from studies.metrics.run import Run
 from studies.metrics.wish import SHAPE, SHAPE_VOLUME, usual_wish
@@ -147,7 +147,7 @@ def _span(rows: Sequence[Best], name: str) -> str:
     known = sorted((row[name] for row in rows if row[name]), key=lambda number: abs(number[0]))
     if len(known) < 2:
         return "".join(value_cell(*number, signed=name == "force") for number in known)
-    low, high = (f"{abs(number[0]):.2g}" for number in (known[0], known[-1]))
+    low, high = (plain(float(f"{abs(number[0]):.2g}")) for number in (known[0], known[-1]))
     return low if low == high else f"{low} to {high}"
 
 

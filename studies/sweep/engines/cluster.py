@@ -238,7 +238,7 @@ def _timed(session: Session, place: str, name: str, request: FrameTimes, progres
     if count and busy > BUSY:
         warnings.warn(
             f"during the frame times of {request.study} other programs used {100 * busy:.0f} % of the processors of "
-            f"worker {name}: they may be too slow",
+            f"worker {name}: the times may be too long",
             stacklevel=2,
         )
     progress.advance("timing", name)

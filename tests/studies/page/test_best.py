@@ -99,3 +99,8 @@ def test_of_several_studies_the_best_body_counts_and_a_time_of_either():
 )
 def test_where_no_error_of_a_body_is_known_none_is_named(made):
     assert best_bodies([made], named) == [] and answers([]) == {}
+
+
+def test_fast_bodies_have_a_speed_without_an_exponent():
+    best = best_bodies([good(frame_ms=0.5), good(BALL_CLAMPED, frame_ms=0.1)], named)
+    assert "How fast? 390 to 980 s simulated in a second" in lines(best)
