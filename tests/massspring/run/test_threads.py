@@ -131,7 +131,7 @@ def test_without_threads_none_is_made(ball):
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, True, "2"])
 def test_what_is_no_number_of_threads(ball, threads):
-    with pytest.raises(MassSpringError, match="no number of threads"):
+    with pytest.raises(MassSpringError, match="is not a number of threads; give 1 or more"):
         slid(ball, Free(), threads=threads)
 
 

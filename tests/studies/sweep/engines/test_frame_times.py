@@ -66,7 +66,7 @@ def test_one_worker_of_each_kind_of_machine_measures(tmp_path):
 
 def test_a_machine_that_others_use_is_told_of(tmp_path):
     with pytest.warns(
-        UserWarning, match=r"during the frame times of tiny other programs used 40 % .* of worker c: they may"
+        UserWarning, match=r"during the frame times of tiny other programs used 40 % .* of worker c: the times may"
     ):
         measured(tmp_path, lambda place: (3, 0.4 if place == "c" else 0.05))
 

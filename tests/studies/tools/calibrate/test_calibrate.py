@@ -104,7 +104,7 @@ def test_an_interrupted_calibration_goes_on(made, tmp_path, monkeypatch):
 def test_a_body_that_ends_badly_from_the_start_is_named(made):
     folder, _, _ = made
     runs = Measurements(folder, (DEEP,))
-    with pytest.raises(StudyError, match=r"is failed before anything is fitted .*give another number of nodes"):
+    with pytest.raises(StudyError, match=r"is failed before the fit .*give another number of nodes"):
         runs.first_errors(DEEP, BodyRecipe(nodes=3))
 
 
