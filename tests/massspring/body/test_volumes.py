@@ -108,7 +108,10 @@ BAD = {
     "no surface": (lambda b: Volumes.closed_surfaces(b, {}), "name at least one"),
     "open": (lambda b: Volumes.closed_surfaces(b, {"lumen": hollow_surfaces()["lumen"][1:]}), "'lumen': .* open at 3"),
     "inside-out": (turned_lumen, "'lumen': .* inside-out"),
-    "one name twice": (lambda b: Volumes.whole(b).joined(replace(lumen_of(b), names=("whole",))), "give each its own name"),
+    "one name twice": (
+        lambda b: Volumes.whole(b).joined(replace(lumen_of(b), names=("whole",))),
+        "give each its own name",
+    ),
 }
 
 

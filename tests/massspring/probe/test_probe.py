@@ -227,7 +227,11 @@ BAD = {
     "negative radius": (lambda: Probe((0, 0, 1), -0.1), {}, "zero or positive"),
     "nan radius": (lambda: Probe((0, 0, 1), np.nan), {}, "zero or positive"),
     "too thick": (lambda: Probe((0, 0, 1), 2 * EDGE), {}, "use a Sphere, or a finer surface"),
-    "other method": (lambda: Probe((0, 0, 1)), {"method": Xpbd("whole")}, "'xpbd' does not meet: it does not correct the volumes again"),
+    "other method": (
+        lambda: Probe((0, 0, 1)),
+        {"method": Xpbd("whole")},
+        "'xpbd' does not meet: it does not correct the volumes again",
+    ),
 }
 
 
