@@ -176,7 +176,7 @@ def read_source(content: bytes, module: str, file: Path, stub: bytes = b"") -> S
     try:
         tree = ast.parse(content)
     except SyntaxError as error:
-        raise MassSpringError(f"{file} is no Python ({error.msg}, line {error.lineno}): correct it") from error
+        raise MassSpringError(f"{file} is not valid Python ({error.msg}, line {error.lineno}): correct it") from error
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
     imports = sorted(set(_imports(tree, package)))
     public = _imports(ast.parse(stub), package)

@@ -71,7 +71,7 @@ class Body:
     membrane: Membrane = NO_MEMBRANE
     """Triangle springs of a wall."""
     local_bulk: float = 0.0
-    """b [Pa]: a pressure −b (J_q − 1) at the points of `PointVolumes` beside that of the volumes."""
+    """b [Pa]: a pressure −b (J_q − 1) at the points of `PointVolumes`, added to that of the volumes."""
     contact_facets: np.ndarray = field(default_factory=lambda: NO_FACETS)
     """Quadratic facets at whose points obstacles touch a body of `PointVolumes`, (f, 6); of none: at its nodes."""
     inertia: np.ndarray | None = None
@@ -106,7 +106,7 @@ class Body:
         if not (self.rest_volumes > 0).all():
             worst = int(np.argmin(self.rest_volumes))
             name, volume = self.kept.names[worst], self.rest_volumes[worst]
-            raise MassSpringError(f"volume '{name}' is {volume:.3g} m³ at rest; turn its triangles round")
+            raise MassSpringError(f"volume '{name}' is {volume:.3g} m³ at rest; flip its triangles")
 
     def _check_springs(self) -> None:
         springs = self.springs

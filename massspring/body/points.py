@@ -1,4 +1,4 @@
-"""Volumes of quadratic tetrahedra: one per vertex, summed over points inside the elements, and closed surfaces beside.
+"""Volumes of quadratic tetrahedra: one per vertex, summed over points inside the elements, and closed surfaces.
 
 V_r = Σ_q ρ_rq w_q J_q with J_q = det F_q at the points q of the elements, Σ_r ρ_rq = 1 (docs/theory.md, eq. 8.9):
 with ρ_rq the linear shape function of vertex r it is the pressure space of Taylor and Hood (1973).
@@ -13,7 +13,7 @@ from scipy.sparse import csr_array, vstack
 from massspring.body.volumes import Volumes
 
 PAIRS = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
-"""Corners beside each mid-side node, in VTK's order of a quadratic tetrahedron."""
+"""Corners next to each mid-side node, in VTK's order of a quadratic tetrahedron."""
 POINTS = 4
 """Of an element: exact for polynomials of second degree (Hammer, Marlowe, Stroud 1956)."""
 FAR, NEAR = (5.0 - np.sqrt(5.0)) / 20.0, (5.0 + 3.0 * np.sqrt(5.0)) / 20.0
@@ -111,7 +111,7 @@ class PointVolumes:
         return self.weight[:, :, None, None] * np.einsum("kqij,kqaj->kqai", np.stack(columns, axis=-1), self.gradient)
 
     def parts_of(self, triangles: np.ndarray) -> np.ndarray:
-        """What each volume has in the tissue, (m,): 1 of each vertex, 0 of closed surfaces beside it."""
+        """What each volume has in the tissue, (m,): 1 for each vertex, 0 for closed surfaces."""
         return np.r_[np.ones(self.vertex_count), np.zeros(self.count - self.vertex_count)]
 
     def renumbered(self, number: np.ndarray) -> "PointVolumes":

@@ -38,11 +38,11 @@ def check_surface(points: np.ndarray, triangles: np.ndarray) -> None:
     backward = edges[:, 1] * len(points) + edges[:, 0]
     if len(np.unique(forward)) != len(forward):
         raise MassSpringError(
-            "an edge is walked twice in the same sense; the surface is not manifold, or not consistently oriented"
+            "two triangles use an edge in the same direction; the surface is not manifold, or not consistently oriented"
         )
     lonely = np.setdiff1d(forward, backward)
     if len(lonely):
         raise MassSpringError(f"the surface is open at {len(lonely)} edges; close it, its volume is not defined")
     volume = enclosed_volume(points, triangles)
     if not volume > 0:
-        raise MassSpringError(f"the surface encloses {volume:.3g} m³; it is flat or inside-out, flip its triangles")
+        raise MassSpringError(f"the surface encloses {volume:.3g} m³; it is flat or inverted; flip its triangles")

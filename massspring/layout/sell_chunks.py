@@ -10,7 +10,7 @@ from massspring.kernels.fused.chunk import LANES
 from massspring.layout.morton import along_curve
 
 LONGEST, PIECE = 24, 10
-"""Springs beside its ring up to which a node has a lane of its own; beyond it is cut into pieces of so many. A virtual
+"""Springs besides its ring up to which a node has a lane of its own; beyond it is cut into pieces of so many. A virtual
 node joined to forty others would make 63 lanes wait for it."""
 CACHE_LINE = 64  # bytes
 WINDOW = 2048

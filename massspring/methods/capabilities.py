@@ -45,7 +45,7 @@ class Capabilities:
     """Whether steps beyond the stability limit diverge; where not, accuracy alone limits the step."""
     triangle_springs: Support = True
     """Bodies with triangle springs (membranes)."""
-    prestress: Support = No("it starts without the pressures that balance them at rest")
+    prestress: Support = No("it does not start with the pressures that balance these springs at rest")
     """Springs without rest length, balanced at rest by the pressure of the kept volumes."""
     point_volumes: Support = No("it has no sums over points")
     """Volumes over points of quadratic elements."""
@@ -103,7 +103,9 @@ def _why_not_one_volume(body: Body) -> str | None:
     if isinstance(kept, PointVolumes) or kept.count > 1:
         return f"it keeps one volume, the body keeps {kept.count}; keep the whole, or take implicit_volume"
     if not (np.abs(kept.share.data) == 1.0).all():
-        return "it keeps what one closed surface encloses, the body keeps a share of it; take implicit_volume"
+        return (
+            "it keeps the volume of one closed surface, but this body keeps part of that volume; take implicit_volume"
+        )
     return None
 
 

@@ -42,7 +42,7 @@ class Method(Protocol):
         return None
 
     def added_stiffness(self, body: Body) -> csr_array | None:
-        """B [√(N/m)], (3n, r): small oscillations about rest feel B Bᵀ beside the springs; None for nothing."""
+        """B [√(N/m)], (3n, r): small oscillations about rest feel B Bᵀ in addition to the springs; None for nothing."""
         return None
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:

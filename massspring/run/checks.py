@@ -32,7 +32,8 @@ def check_surroundings(gravity: tuple[float, float, float], damping: float, dt: 
         raise MassSpringError(f"damping is {damping} 1/s; it must be zero or positive")
     if damping * dt >= 1:
         raise MassSpringError(
-            f"damping {damping:g} 1/s turns velocities round within dt = {dt:.3g} s; keep dt below {1 / damping:.3g} s"
+            f"damping {damping:g} 1/s reverses velocities within one step of {dt:.3g} s; "
+            f"keep dt below {1 / damping:.3g} s"
         )
 
 
@@ -104,7 +105,7 @@ def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.nda
     supported = method.capabilities.thin_probes
     if isinstance(supported, No):
         raise MassSpringError(
-            f"obstacle {number} is a thin probe, which method '{method.name}' does not meet: {supported.because}; "
+            f"method '{method.name}' does not support thin probes (obstacle {number}): {supported.because}; "
             "use a Sphere, or implicit_volume"
         )
     if isinstance(body.kept, PointVolumes):

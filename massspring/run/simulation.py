@@ -89,8 +89,8 @@ class Setup:
         rate = fastest_filling(self.body)
         for name in self.ramped:
             warnings.warn(
-                f"the target of volume '{name}' moves faster than {rate:.3g} of its rest volume a second, which would"
-                " throw the body apart; it is followed at that rate",
+                f"the target of volume '{name}' moves faster than {rate:.3g} of its rest volume per second, which would"
+                " tear the body apart; the target is limited to that rate",
                 stacklevel=3,
             )
 

@@ -1,4 +1,4 @@
-"""What an update of 1 ms costs: mass-spring bodies beside implicit elements on coarse bodies that are less accurate."""
+"""What an update of 1 ms costs: mass-spring bodies and implicit elements on coarse bodies that are less accurate."""
 
 from dataclasses import replace
 

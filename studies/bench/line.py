@@ -1,11 +1,11 @@
-"""A line of `make bench`: a promised number beside the measured one, or what the machine itself gives."""
+"""A line of `make bench`: a promised number next to the measured one, or what the machine itself gives."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class BenchLine:
-    """A promised number beside the measured one; without a target it measures the machine, not the code."""
+    """A promised number next to the measured one; without a target it measures the machine, not the code."""
 
     what: str
     measured: float

@@ -1,4 +1,4 @@
-"""What can be told of a study before anything is meshed."""
+"""Checks of a study before anything is meshed."""
 
 from studies.catalog.study import Study
 from studies.metrics.table import check_columns

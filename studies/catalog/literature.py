@@ -29,7 +29,7 @@ def literature_cases(scene: Scene) -> tuple[Case, ...]:
 
 
 def ours(scene: Scene) -> tuple[Case, ...]:
-    """What they stand beside: one volume on the springs of the first, and the body that is recommended."""
+    """What they are compared with: one volume on the springs of the first, and the body that is recommended."""
     springs = WALL if has_wall(scene) else STRAIGHT
     return (
         Case(scene, springs, ImplicitVolume(), dt_fraction=SHORT, timed=True),

@@ -69,7 +69,7 @@ def asked_unit(source: Source) -> Source:
 
 
 class Telling(logging.Handler):
-    """Shows what the mesher is at: beside the moving line of a terminal, elsewhere as a line now and then."""
+    """Shows what the mesher is at: next to the moving line of a terminal, elsewhere as a line now and then."""
 
     def __init__(self, what: str, status: Status | None):
         """what: the work as a whole; status: the terminal's moving line."""

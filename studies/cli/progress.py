@@ -102,7 +102,7 @@ class TerminalProgress:
 
 @contextmanager
 def compiling(console: Console, doing: str) -> Iterator[Callable[[str], None]]:
-    """Inside, what is given names is told as being compiled: on a terminal in a line that moves, beside what is being
+    """Inside, what is given names is shown as being compiled: on a terminal in a line that moves, next to what is being
     done; in a log once, and then at most every QUIET_SECONDS."""
     last_report = -QUIET_SECONDS
     with console.status(f"{doing} …") if console.is_terminal else nullcontext() as status:
@@ -149,7 +149,7 @@ def basis(planned: list[Planned]) -> str:
 
 
 def disk(planned: list[Planned], root: Path) -> str:
-    """What pieces will store, beside what the disk has left."""
+    """What pieces will store, and what the disk has left."""
     stored, unknown = expected_bytes(planned)
     free = free_bytes(root)
     more = f" (without {unknown} reference solutions of unknown size)" if unknown else ""

@@ -1,4 +1,4 @@
-"""A scene as scene.json: all that another program needs, in SI units, numbers beside words."""
+"""A scene as scene.json: all that another program needs, in SI units, as numbers and in words."""
 
 from collections.abc import Sequence
 from typing import Any

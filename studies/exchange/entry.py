@@ -81,7 +81,7 @@ def case_of_entry(record: Record) -> Case:
 
 
 def run_of_entry(record: Record, reference: Reference | None) -> Run:
-    """An entry beside what it is judged by."""
+    """An entry with what it is judged by."""
     seconds = record.attributes.get(SECONDS)
     timing = None
     if seconds is not None:

@@ -18,7 +18,7 @@ from studies.geometry.files.grids import SUFFIX, read_points
 DISPLACEMENT = "displacement"
 """Point data of a grid that stands still."""
 OPTIONAL = ("force", "pressure", "lumen_pressure")
-"""Histories that a npz file may hold beside the positions, one number for each step."""
+"""Histories that an npz file may hold besides the positions, one number for each step."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,7 +53,7 @@ def entry_record(
         key=case.key,
         name=entry_name(case),
         status=Status.INVERTED if inverted else Status.OK,
-        message="an element ends inverted" if inverted else "",
+        message="an element is inverted at the end" if inverted else "",
         fingerprint=source_fingerprint(__name__),
         attributes=_attributes(fitting) | _sway(fitting, values) | {ENTRY: _named(path, fitting), SECONDS: seconds},
         fields=new_fields(RUN_FIELDS, values),

@@ -55,7 +55,7 @@ class Judged:
 
     @property
     def advisable(self) -> bool:
-        """Whether it may be advised: a body by implicit_volume. Other methods stand beside it to be compared."""
+        """Whether it may be advised: a body by implicit_volume. Other methods are there for comparison."""
         return isinstance(self.case.method, ImplicitVolume)
 
     @property

@@ -132,9 +132,9 @@ def _handles(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list:
 
 def _notes() -> list[str]:
     return [
-        "Force: over all checkpoints. Surface, interior: displacement, relative L2; not compared where a rigid turn is "
-        "free. Silhouette: Hausdorff distance over body size. Nothing is drawn below the uncertainty of the reference: "
-        "a bar on that line is only an upper bound."
+        "Force: over all checkpoints. Surface, interior: displacement, relative L2; not compared where rigid rotation "
+        "is possible. Silhouette: Hausdorff distance over body size. Nothing is drawn below the uncertainty of the "
+        "reference: a bar on that line is only an upper bound."
     ]
 
 

@@ -1,4 +1,4 @@
-"""The probed force while a scene is pressed and then held, beside the reference at its checkpoints."""
+"""The probed force while a scene is pressed and then held, next to the reference at its checkpoints."""
 
 from collections.abc import Sequence
 from itertools import product

@@ -39,7 +39,7 @@ from studies.plots.style.style import (
 )
 from studies.runs.case import chosen_settings
 
-TITLE = "Ways to keep a volume, on the same bodies, at one share of their step limits unless a step is named"
+TITLE = "Ways to keep a volume: same bodies, same fraction of the step limit unless a step is named"
 QUANTITIES = {
     "force_error": "force error [%]",
     "interior_error": "displacement error [%]",
@@ -167,9 +167,9 @@ def _notes(shown: Sequence[Run], metrics: Sequence[Metric], runs: Sequence[Run])
         for run in shown
     )
     return [
-        f"Body: {'; '.join(bodies)}; the limit counts what a method adds to the springs. Force: over all checkpoints. "
-        "Displacement: volume-weighted relative L2, not compared where a rigid turn is free. J: 5th to 95th percentile "
-        "at the last checkpoint. Computing time per simulated second, one core. Arrows: less than can be drawn.",
+        f"Body: {'; '.join(bodies)}; the limit includes the method's own stiffness. Force: over all checkpoints. "
+        "Displacement: volume-weighted relative L2, not compared where rigid rotation is possible. J: 5th to 95th "
+        "percentile at the last checkpoint. Computing time per simulated second, one core. Arrows: too small to draw.",
         *unresolved_notes(shown, metrics),
         *remarks(runs),
     ]

@@ -85,8 +85,8 @@ def _notes(known: Mapping[str, Mapping[str, Uncertainty]]) -> list[str]:
     orders = [u.order for quantities in known.values() for u in quantities.values() if u.order == u.order]
     seen = f" Observed orders {np.min(orders):.2g} to {np.max(orders):.2g}." if orders else ""
     return [
-        "Bar: root of the sum of the squares of the shares; it is the floor in the other charts. Settings are changed "
-        f"on the coarsest mesh. Shares below {LOWEST:g} % are drawn there.{seen}"
+        "Bar: root of the sum of the squares of the shares; the other charts show it as the uncertainty. Settings are "
+        f"changed on the coarsest mesh. Shares below {LOWEST:g} % are drawn there.{seen}"
     ]
 
 

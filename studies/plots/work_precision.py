@@ -32,7 +32,7 @@ from studies.store.record import Status
 
 TITLE = "Accuracy for computing time: down and to the left is better"
 COLUMNS = 3
-"""Scenes beside each other."""
+"""Scenes next to each other."""
 ROWS = {FORCE.name: "error of the force [%]", DISPLACEMENT.name: "mean error / largest u [%]"}
 FIELDS = {FORCE.name: "force", DISPLACEMENT.name: "displacement"}
 """Of a wish and of a judged case."""
@@ -221,7 +221,7 @@ def _left_out(runs: Sequence[Run]) -> list[str]:
         told.append(f"Not drawn, because they failed: {', '.join(ended[:MOST_NAMED])}{more}.")
     untimed = sum(run.timing is None for run in well)
     if untimed:
-        told.append(f"Not drawn: {untimed} without frame times from this machine and this code.")
+        told.append(f"Not drawn (no frame times for this machine and code version): {untimed}.")
     return told
 
 

@@ -46,7 +46,7 @@ the same reference. The study `literature` runs them in every scene; a case that
 reason.
 """
 AROUND: Mapping[str, Surroundings] = {
-    "nothing held": Surroundings(),
+    "free bodies": Surroundings(),
     "weight": Surroundings(attachments=1, gravity=(0.0, 0.0, -9.81)),
     "friction": Surroundings((Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), friction=0.3),), 1),
     "a start in motion": Surroundings(attachments=1, moved=True),

@@ -15,7 +15,7 @@ from studies.runs.case import BodyRecipe
 from studies.runs.recipe_text import body_words
 
 PAPER = 550
-"""Surface nodes of the paper's body where it stands beside others."""
+"""Surface nodes of the paper's body where it is compared with others."""
 LADDER_SCENES = ("ball_clamped", "liver_press")
 """Scenes in which every rung has a force and a displacement."""
 

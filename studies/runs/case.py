@@ -205,10 +205,10 @@ def case_from_json(text: str) -> Case:
             recorded=tuple(data.get("recorded", ())),
         )
     except (json.JSONDecodeError, KeyError, TypeError, ValidationError) as error:
-        raise StudyError(f"the text is no stored case: {_first_line(error)}") from error
+        raise StudyError(f"the text is not a stored case: {_first_line(error)}") from error
     unread = _unread(data, case_to_dict(case))
     if unread:
-        raise StudyError(f"the text is no stored case: nothing reads {', '.join(unread)}; correct or remove it")
+        raise StudyError(f"the text is not a stored case: unknown setting {', '.join(unread)}; correct or remove it")
     return case
 
 

@@ -42,8 +42,8 @@ def check_size(duration: float, frames: int, dt: float, limit: StepLimit, body: 
     seconds = 1e-9 * LEAST_NS * steps * max(body.springs.count, nodes)
     if seconds > TIME_LIMIT:
         raise StudyError(
-            f"dt = {dt:.3g} s makes {steps:.1g} steps of {body.springs.count:,} springs, {seconds / 3600:.2g} hours at "
-            f"the very least; a run is given up after {TIME_LIMIT:g} s: {_advice(dt, limit)}"
+            f"dt = {dt:.3g} s makes {steps:.1g} steps of {body.springs.count:,} springs, at least "
+            f"{seconds / 3600:.2g} hours; runs are stopped after {TIME_LIMIT:g} s: {_advice(dt, limit)}"
         )
     prepared = NUMBER * (steps / frames) * (volumes + 12 * around + 2)
     if prepared > MOST_BYTES:

@@ -90,14 +90,14 @@ def judge(case: Case, prepared: Prepared, history: History) -> tuple[Status, str
         return Status(history.outcome), history.message
     smallest = float(history.min_j[-1])
     if smallest <= 0:
-        return Status.INVERTED, f"an element ends inverted (smallest volume ratio {smallest:.3g})"
+        return Status.INVERTED, f"an element is inverted at the end (smallest volume ratio {smallest:.3g})"
     # A body that starts with a wrong volume is judged by the one it ends with.
     since = 0 if case.scene.start is None else -1
     drift = float(np.max(np.abs(history.volume[since:] / history.volume_target[since:] - 1)))
     if case.method.volume_tol is not None and drift > DRIFT:
         return (
             Status.DRIFTED,
-            f"the volume was off by {100 * drift:.3g} %, a kept volume may be off by {100 * DRIFT:g} %",
+            f"volume error {100 * drift:.3g} % (allowed: {100 * DRIFT:g} %)",
         )
     return Status.OK, ""
 

@@ -63,7 +63,7 @@ class SafeStep:
         if self.verified:
             return "verified"
         if self.bracket is None:
-            return "not verified: no pair of runs was found of which one holds and the next diverges"
+            return "not verified: found no stable step next to an unstable one"
         if self.bracket[0] > self.limit.damped:
             return "not verified: the limit is longer than predicted; many kept volumes take the stiffest modes away"
         return f"not verified: the limit is shorter than predicted; keep dt below {1e3 * self.bracket[0]:.3g} ms"

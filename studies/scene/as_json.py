@@ -26,7 +26,7 @@ def scene_of_key(key: str) -> Scene:
     try:
         return scene_from_dict(json.loads(key)["scene"])
     except (ValueError, KeyError, TypeError, ValidationError) as error:
-        raise StudyError(f"the text is no stored case, it has no scene: {str(error).splitlines()[0]}") from error
+        raise StudyError(f"the text is not a stored case, it has no scene: {str(error).splitlines()[0]}") from error
 
 
 @cache

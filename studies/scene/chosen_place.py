@@ -72,7 +72,9 @@ def palpated_at(
     flatness. Raises StudyError where the body is held, or stands in the probe's way."""
     place, radius = snapped(surface, point, length, name), RADIUS * length
     if float(hold.level(place[None])[0]) < radius:
-        raise StudyError(f"{name} is held, or less than the probe's radius ({1e3 * radius:.3g} mm) from what is held")
+        raise StudyError(
+            f"{name} is in the clamped region, or closer to it than the probe's radius ({1e3 * radius:.3g} mm)"
+        )
     away = np.linalg.norm(surface[0] - place, axis=1)
     mean = normals[away < max(PATCH * length, float(away.min()))].mean(axis=0)
     for direction in (mean, normals[int(away.argmin())]):

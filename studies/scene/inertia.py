@@ -23,11 +23,11 @@ def why_inertia_matters(scene: Scene) -> str | None:
     wave = float(np.sqrt(scene.tissue.shear_modulus / scene.tissue.density))
     for path in [moving.path for moving in (*scene.obstacles, *scene.held)]:
         if turns(path):
-            return "what touches or holds the body turns on its way"
+            return "an obstacle or clamped region rotates"
         if top_speed(path) > SLOW * wave:
             return (
-                f"what touches or holds the body moves at {1e3 * top_speed(path):.3g} mm/s, "
-                f"over a hundredth of the speed of its shear waves, {wave:.2g} m/s"
+                f"an obstacle or clamped region moves at {1e3 * top_speed(path):.3g} mm/s, "
+                f"more than 1 % of the speed of shear waves in the tissue, {wave:.2g} m/s"
             )
     return None
 

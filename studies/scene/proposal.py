@@ -135,7 +135,7 @@ def palpated(
         able &= outward @ np.asarray(SIDES[side]) > FACING
         score = mean @ np.asarray(SIDES[side])
     if not able.any():
-        which = "lies far from its held end" if side is None else f"far from its held end looks to the {side}"
+        which = "lies far from its clamped end" if side is None else f"far from its clamped end faces {side}"
         raise StudyError(f"{name}: no freely reachable patch {which}; choose a point: organbench place --probe x,y,z")
     best = int(np.flatnonzero(able)[score[able].argmax()])
     return vector(points[best]), vector(outward[best]), float(flat[best])

@@ -26,7 +26,7 @@ def fault(kind: str, status: Status, attributes: Mapping[str, Any], fields: Mapp
             return wrong
     unknown = sorted(set(fields) - set(field_specs))
     if unknown:
-        return f"holds {unknown[0]!r}, which is no field of a {kind}"
+        return f"holds {unknown[0]!r}, which is not a field of a {kind}"
     lengths = {spec.length: attributes[name] for name, spec in attribute_specs.items() if spec.length}
     for name, spec in field_specs.items():
         wrong = _field_fault(name, spec, fields, lengths)
@@ -41,7 +41,7 @@ def _attribute_fault(name: str, spec: AttributeSpec, attributes: Mapping[str, An
         return None if spec.optional else f"lacks the attribute {name!r}"
     value = value.item() if isinstance(value, np.generic) else value
     if isinstance(value, bool) or not isinstance(value, TYPES[spec.kind]):
-        return f"has {name} = {str(value)[:40]!r}, which is no {spec.kind}"
+        return f"has {name} = {str(value)[:40]!r}, not a {spec.kind}"
     return None
 
 

@@ -166,7 +166,9 @@ def _check(record: Record) -> None:
                 " of numbers; an array is a field"
             )
     for name in (name for name in HEADER if "\0" in str(getattr(record, name))):
-        raise StudyError(f"{name} {getattr(record, name)[:60]!r} of a record holds a zero byte, which no file can keep")
+        raise StudyError(
+            f"{name} {getattr(record, name)[:60]!r} of a record contains a null byte, which cannot be stored"
+        )
     for name, item in record.fields.items():
         kind = np.asarray(item.values).dtype.kind
         if "/" in name or kind not in "biufU" or not item.description or (not item.unit and kind != "U"):

@@ -37,7 +37,7 @@ class Status(StrEnum):
 STATUSES: dict[Status, str] = {
     Status.OK: "finished without a failure",
     Status.DIVERGED: "values not finite, or nodes that left",
-    Status.INVERTED: "an element ends inverted",
+    Status.INVERTED: "an element is inverted at the end",
     Status.DRIFTED: "a kept volume more than 1 % off",
     Status.NOT_CONVERGED: "the reference found no equilibrium at a checkpoint",
     Status.BLOCKED: "a thin probe was driven through tissue that had nowhere to go",

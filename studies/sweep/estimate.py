@@ -53,13 +53,13 @@ scene of the catalogue has more."""
 MESH, GRADED_MESH = 3.0, 10.0
 """Seconds for the mesh and the body of a case."""
 HEAD, NUMBER = 22_000, 8
-"""Bytes of a record's attributes, names, descriptions and of what HDF5 keeps beside the numbers; of a number."""
+"""Bytes of a record's attributes, names, descriptions and of what HDF5 keeps besides the numbers; of a number."""
 NODES = {"surface": 1.0, "membrane": 1.0, "tetrahedral": 1.6, "quadratic": 3.0}
 """Nodes of a body of each kind per node on its surface."""
 CELLS = {"surface": 0.0, "membrane": 0.0, "tetrahedral": 3.5, "quadratic": 4.2}
 """Tetrahedra per node."""
 SERIES, STAGES, REPLAY = 10, 8, 62
-"""Numbers of a frame beside those of its volumes, obstacles and held regions; of its timing; moments of a replay."""
+"""Numbers of a frame besides those of its volumes, obstacles and held regions; of its timing; moments of a replay."""
 MARGIN = 1.2
 """Box of an organ over the extent of its surface."""
 
@@ -133,7 +133,7 @@ def solve_memory(solve: ReferenceSolve, unknowns: int | None) -> float:
 
 
 def factor_memory(unknowns: float) -> float:
-    """Of the factors of a matrix with so many unknowns, with what is kept beside them."""
+    """Of the factors of a matrix with so many unknowns, with what is kept with them."""
     return PER_UNKNOWN * unknowns * max(1.0, unknowns / MEASURED) ** ORDER
 
 

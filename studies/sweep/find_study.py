@@ -16,7 +16,7 @@ from studies.sweep.find_scene import SUFFIX, read_user_file
 
 ON = "@"
 """Between the name of a study and a folder of surfaces: "population@meshes", or "population@meshes:mm"."""
-NO_CASE = "the text is no stored case: "
+NO_CASE = "the text is not a stored case: "
 """How `case_from_json` begins; of a case that was never stored these words say nothing."""
 MAIN = "main"
 """Stands for the main studies of the catalogue; no study has this name."""
@@ -26,7 +26,7 @@ def find_study(name: str) -> Study:
     """A study of the catalogue, or that of a Python file (STUDY, else one of SCENE); either on a folder of surfaces,
     where ON and one follow.
 
-    Warns of files in the folder that are mended or refused. Raises StudyError, for whatever is wrong with the file.
+    Warns of files in the folder that are repaired or refused. Raises StudyError, for whatever is wrong with the file.
     """
     if ON in name:
         return _on_folder(*name.split(ON, 1))

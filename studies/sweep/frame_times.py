@@ -1,4 +1,4 @@
-"""The second phase of a sweep: frame times, measured by one process with nothing beside it."""
+"""The second phase of a sweep: frame times, measured by one process with nothing else running."""
 
 from collections.abc import Callable
 from pathlib import Path

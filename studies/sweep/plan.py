@@ -120,7 +120,7 @@ def expected_bytes(found: Sequence[Planned]) -> tuple[int, int]:
 
 
 def free_bytes(folder: Path) -> int:
-    """Of the disk on which a folder lies, or will lie. Raises StudyError where that cannot be told."""
+    """Of the disk on which a folder lies, or will lie. Raises StudyError where that cannot be determined."""
     there = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
     try:
         return shutil.disk_usage(there).free

@@ -30,7 +30,7 @@ class Rule(StrEnum):
 
 
 MEANING = {
-    Rule.STALE: "of other code or another format, or damaged: the next run replaces them",
+    Rule.STALE: "made by other code, in an old format, or damaged; the next run replaces them",
     Rule.FAILED: "failed, timed out or not converged: the next run repeats them",
     Rule.SUPERSEDED: "of cases that the study no longer has",
     Rule.ORPHANS: "unfinished files of ended processes, and frame times without their run",
@@ -70,7 +70,7 @@ def prunable(
 
 
 def remove(found: Collection[Prunable]) -> list[Prunable]:
-    """Removes them; what another command has written anew meanwhile stays. Those that are gone.
+    """Removes them; what another command has rewritten meanwhile stays. Those that are gone.
 
     Raises StudyError where a file cannot be removed."""
     gone = []

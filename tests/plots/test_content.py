@@ -38,7 +38,7 @@ def test_a_diverged_run_ends_where_it_broke_and_does_not_scale_the_axis():
 
 
 def test_a_missing_reference_is_said():
-    said = "No reference for ball squeeze"
+    said = "No error is shown for ball squeeze"
     assert said in words(volume_history.figure([run(with_reference=False)]))
     assert said in words(accuracy.figure([run(with_reference=False)]))
     assert said not in words(volume_history.figure([run()]))
@@ -113,7 +113,7 @@ def test_a_reference_that_is_not_ten_times_better_is_marked(chart):
 
     assert UNRESOLVED_MARK not in said(3.0)
     assert f"Ball clamped {UNRESOLVED_MARK}" in said(0.05)
-    note = said(0.05).split(f"{UNRESOLVED_MARK} Ball clamped: the reference's uncertainty is ")[1]
+    note = said(0.05).split(f"{UNRESOLVED_MARK} Ball clamped: the uncertainty of the reference is ")[1]
     assert note.startswith(("up to", "as large as"))
     assert "force" in note
 

@@ -113,7 +113,7 @@ def test_a_run_that_ended_with_a_fault_is_no_point():
     assert markers(figure.axes[0], "o") == []
     told = words(figure).replace("\n", " ")
     assert f"failed: {faulty.case.name} inverted." in told
-    assert "Not drawn: 1 without frame times" in told
+    assert "Not drawn (no frame times for this machine and code version): 1." in told
 
 
 def test_what_a_scene_does_not_compare_is_said():

@@ -77,7 +77,7 @@ class ImplicitElements(Method):
         if isinstance(kept, PointVolumes):
             return None if kept.closed is None else "its elements keep no volume of a lumen; take explicit_elements"
         own = kept.names == tuple(f"node {i}" for i in range(body.node_count))
-        return None if own else "its elements keep no volumes beside those of nodes; take explicit_elements"
+        return None if own else "it keeps nodal volumes only; take explicit_elements"
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """The body at rest, or with velocities `v` (n, 3) [m/s], with the pattern of its stiffness."""

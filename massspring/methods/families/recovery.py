@@ -109,7 +109,7 @@ def followed_by(state: State, recovery: Recovery, simple: State, steps: int) -> 
 
 
 def _is_stuck(state: State, wave: float) -> bool:
-    """Whether the volume has nothing to push on, or the body has come to rest beside a common motion."""
+    """Whether the volume has nothing to push on, or the body has come to rest apart from a common motion."""
     v = state.nodes.v
     fastest = math.sqrt(float(((v - v.mean(axis=0)) ** 2).sum(axis=1).max()))
     return state.diagnostics.singular[0] > 0 or fastest < SLOW * wave

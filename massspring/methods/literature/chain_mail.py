@@ -97,11 +97,11 @@ class ChainMail(Method):
     def why_not_among(self, surroundings: Surroundings) -> str | None:
         """Why the method cannot run in such surroundings; None when it can."""
         if any(surroundings.gravity):
-            return "it has no masses, so that nothing weighs"
+            return "it has no masses, so gravity has no effect"
         if surroundings.moved:
-            return "it has no masses, so that nothing moves by itself"
+            return "it has no masses, so nothing moves by itself"
         if surroundings.rough:
-            return "what slides on an obstacle has no force to rub it"
+            return "it has no forces, so no friction"
         return "it keeps no volume that could be filled" if surroundings.targets else None
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:

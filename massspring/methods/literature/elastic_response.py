@@ -79,8 +79,8 @@ class ElasticResponse(Method):
         size = 8.0 * columns * 3 * body.node_count
         if size > MOST_BYTES:
             raise MassSpringError(
-                f"{self.name} would keep {columns:,} columns of {body.node_count:,} nodes, {size / 1e9:.2g} GB; at "
-                f"most {MOST_BYTES / 1e9:g} GB are: give a coarser mesh"
+                f"{self.name} would keep {columns:,} columns of {body.node_count:,} nodes, {size / 1e9:.2g} GB; "
+                f"the limit is {MOST_BYTES / 1e9:g} GB: use a coarser mesh"
             )
         state = start(body, attachments, v)
         held = linear_body(body, state.model, self.bulk_ratio * body.rest_pressure)

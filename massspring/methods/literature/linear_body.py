@@ -98,7 +98,9 @@ def check_held(model: Model) -> None:
     place = model.held_rest
     extent = np.linalg.svd(place - place.mean(axis=0), compute_uv=False) if len(place) > 2 else np.zeros(3)
     if not extent[1] > STRAIGHT * extent[0]:
-        raise MassSpringError("the held nodes lie on a line, about which a linear body turns; hold three that do not")
+        raise MassSpringError(
+            "the clamped nodes lie on a line, so the body can rotate about it; clamp three nodes that are not collinear"
+        )
 
 
 def why_not_linear(body: Body) -> str | None:
@@ -109,7 +111,7 @@ def why_not_linear(body: Body) -> str | None:
 def why_not_among(surroundings: Surroundings) -> str | None:
     """Why a linear body cannot be in such surroundings; None when it can."""
     if not surroundings.attachments:
-        return "nothing is held, and a linear body swells where it turns; hold a part of it"
+        return "no nodes are clamped, and a linear body swells when it rotates; clamp part of it"
     if surroundings.rough:
         return "its contacts are frictionless; take implicit_elements"
     if surroundings.targets:

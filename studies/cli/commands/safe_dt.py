@@ -19,5 +19,5 @@ def safe_dt(
         console.print(f"run at             {1e3 * dt:.4g} ms  ({dt / limit.damped:.3g} of the limit): {outcome}")
     if found.bracket is not None:
         below, above = found.bracket
-        console.print(f"bracket            holds at {1e3 * below:.4g} ms, diverges at {1e3 * above:.4g} ms")
+        console.print(f"bracket            stable at {1e3 * below:.4g} ms, diverges at {1e3 * above:.4g} ms")
     console.print(found.verdict)

@@ -25,7 +25,7 @@ REFERENCES = "reference"
 LEAVES = 200
 """Files of a study that are named; `--all` names the rest."""
 WIDE, NARROW = 120, 70
-"""Columns of a terminal from which descriptions stand beside the numbers, and below which shape and unit go."""
+"""Columns of a terminal from which descriptions stand next to the numbers, and below which shape and unit go."""
 
 
 def show(
@@ -143,7 +143,7 @@ def _index(path: Path, links: dict[str, str], every: bool) -> Tree:
 
 
 def _entries(path: Path) -> dict[str, Entry]:
-    """What is known of the files beside a study's index; nothing where it does not lie in a results folder."""
+    """What is known of the files next to a study's index; nothing where it does not lie in a results folder."""
     folder = path.absolute().parent
     return Ledger(folder.parent).files(folder.name) if folder.name == path.stem else {}
 

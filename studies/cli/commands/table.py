@@ -24,7 +24,7 @@ from studies.sweep.rows import table_rows
 
 Row = Mapping[Any, Any]
 SETTINGS = {"law": "law {}", "nodes": "{} nodes", "stiffness": "stiffness {}", "dt/dt_c": "dt = {} dt_c"}
-"""What rows may differ by, beside scene, body and method."""
+"""What rows may differ by, besides scene, body and method."""
 
 
 def table(
@@ -115,7 +115,7 @@ class Layout:
         return ", ".join([name, *(SETTINGS[key].format(setting(first, key)) for key in self.shared)])
 
     def fitting(self, metrics: list[Metric]) -> list[Column]:
-        """Columns of as many of the first metrics as fit beside the labels; one at least."""
+        """Columns of as many of the first metrics as fit next to the labels; one at least."""
         headings = max(len(self.heading(name)) for name in self.groups)
         width, columns = sum(column.width + 2 for column in self.labels) - 2, list[Column]()
         for metric in metrics:
@@ -158,7 +158,7 @@ def setting(row: Row, key: str) -> str:
 
 
 def cell(row: Row, metric: Metric) -> str:
-    """A metric of a row beside its uncertainty; a volume is compared with the body's own, which is known."""
+    """A metric of a row with its uncertainty; a volume is compared with the body's own, which is known."""
     known = metric.quantity is not None and metric.quantity not in ALWAYS
     uncertainty = float(row.get(f"{metric.name} floor [{metric.unit}]", "nan")) if known else float("nan")
     unresolved = metric.name in str(row[UNRESOLVED]).split()

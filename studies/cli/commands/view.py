@@ -1,4 +1,4 @@
-"""`organbench view`: stored cases beside their reference in one file for ParaView."""
+"""`organbench view`: stored cases with their reference in one file for ParaView."""
 
 from pathlib import Path
 from typing import Annotated

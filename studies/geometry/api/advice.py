@@ -22,7 +22,7 @@ BEYOND = {"bad_points", "size", "small", "far_away", "one_sided", "duplicate_tet
 
 
 def tried(source: Source, found: Findings) -> Findings:
-    """The findings of the file with the command that mends all of them, and makes a clean body of NODES surface nodes.
+    """The findings of the file with the command that fixes all of them, and makes a clean body of NODES surface nodes.
 
     Where no command does, each advice says what was tried and what came nearest; advice that was not tried begins with
     "try"."""

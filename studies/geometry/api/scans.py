@@ -35,7 +35,7 @@ from studies.geometry.surface.painted import painted_region
 from studies.geometry.surface.repair import Mended, border, mend
 
 LEVEL_KEYS = ("name", "solid", "smooth")
-"""Of a recipe: what decides the true shape, beside the surface itself."""
+"""Of a recipe: what decides the true shape, besides the surface itself."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Remeshing:
             raise StudyError(f"{name}: smoothing over {1e3 * self.smooth:g} mm asked for; give 0 or a few millimetres")
         if self.solid is not None and not 0 <= self.solid < np.inf:
             millimetres = 1e3 * self.solid
-            raise StudyError(f"{name}: openings up to {millimetres:g} mm shall be closed; give 0 or some millimetres")
+            raise StudyError(f"{name}: cannot close openings of {millimetres:g} mm; give 0 or a few millimetres")
         if self.wall is not None and not 0 < self.wall < np.inf:
             raise StudyError(f"{name}: a wall of {1e3 * self.wall:g} mm asked for; give a thickness above 0")
 
@@ -70,8 +70,7 @@ class Remeshing:
         """Raise StudyError unless `nodes` is a whole number, or None and the triangles of the file can stay."""
         if nodes is None and (self.smooth or self.wall is not None or self.solid is not None):
             raise StudyError(
-                f"{name}: smoothing, a wall and a filled shell need a new surface; say how many nodes it shall "
-                "have (--nodes)"
+                f"{name}: smoothing, a wall and a filled shell need a new surface; set its number of nodes (--nodes)"
             )
         if nodes is not None and (isinstance(nodes, bool) or not isinstance(nodes, int | np.integer)):
             raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
@@ -147,7 +146,7 @@ def painted_on(source: Source, content: Content, name: str) -> PaintedRegion:
 
 def true_shape_of(source: Source, **how: Any) -> Shape:
     """The true shape of the surface in a file, the same for meshes of any number of nodes; it has the volume of the
-    surface. how: the fields of Remeshing. Raises StudyError for what cannot be read or mended."""
+    surface. how: the fields of Remeshing. Raises StudyError for what cannot be read or repaired."""
     remeshing, name = Remeshing(**how), source.path.name
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the meshes of the shape tell of every change
@@ -160,13 +159,13 @@ def true_shape_of(source: Source, **how: Any) -> Shape:
 
 
 def level_arrays(recipe: Mapping[str, Any], mended: Mended) -> dict[str, np.ndarray]:
-    """The grid of the true shape of a mended surface; recipe: of a scan."""
+    """The grid of the true shape of a repaired surface; recipe: of a scan."""
     deciding = {key: recipe[key] for key in LEVEL_KEYS if key in recipe} | {"kind": "level"}
     return level_of(deciding, {"points": mended.points, "triangles": mended.triangles})
 
 
 def mended_surface(source: Source, content: Content, remeshing: Remeshing) -> tuple[Mended, dict[str, Any]]:
-    """The surface of a file, welded and mended, and the recipe of the file. Warns of every change."""
+    """The surface of a file, welded and repaired, and the recipe of the file. Warns of every change."""
     path = source.path
     welded = weld(*in_metres(source, content))
     # What a shell encloses needs no closed surface, and all parts of it.
@@ -202,14 +201,14 @@ def in_metres(source: Source, content: Content) -> tuple[np.ndarray, np.ndarray]
     distance = metres * float(np.linalg.norm(points.mean(axis=0)))
     if distance > FAR_AWAY:
         raise StudyError(
-            f"{name}: it lies {distance:.3g} m from the origin of its coordinates, where numbers have too few digits "
-            "left; move it to the origin in the program that made it"
+            f"{name}: it lies {distance:.3g} m from the origin of its coordinates, where coordinates lose "
+            "precision; move it to the origin in the program that made it"
         )
     return points * metres, triangles
 
 
 def as_it_is(mended: Mended, recipe: dict[str, Any], fill: bool) -> OrganMesh:
-    """The mended surface with the file's own triangles, filled when asked."""
+    """The repaired surface with the file's own triangles, filled when asked."""
     check_surface(mended.points, mended.triangles, recipe["file"])
     check_one_part(mended.triangles, recipe["file"])
     check_amount(signed_volume(mended.points, mended.triangles), recipe["file"])

@@ -1,1 +1,1 @@
-"""What is wrong with a mesh, and which option mends it."""
+"""Faults of a mesh, and the option that fixes each."""

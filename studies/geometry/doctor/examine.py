@@ -1,4 +1,4 @@
-"""The mesh doctor: what is wrong with a mesh, how much of it, and what mends it."""
+"""The mesh doctor: what is wrong with a mesh, how much of it, and what fixes it."""
 
 import warnings
 from dataclasses import dataclass
@@ -70,7 +70,7 @@ def examine(
 
 
 def how_long(source: Source, content: Content) -> tuple[dict[str, Any], float]:
-    """The unit, whether it was said, and metres per unit of the file."""
+    """The unit, whether it was stated, and metres per unit of the file."""
     side = source.scale * content.longest_side
     said = source.unit or content.unit
     likely = likely_units(side)

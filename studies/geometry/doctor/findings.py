@@ -1,4 +1,4 @@
-"""The findings of the mesh doctor: for each one a plain sentence and the option that mends it."""
+"""The findings of the mesh doctor: for each one a plain sentence and the option that fixes it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -52,7 +52,9 @@ def _unit_sentence(m: dict[str, Any]) -> str:
 
 
 def _size_sentence(m: dict[str, Any]) -> str:
-    return f"the longest side is {max(m['size']):.4g} m, which is no organ's: the unit is probably not {m['unit']}"
+    return (
+        f"the longest side is {max(m['size']):.4g} m, not a plausible organ size: the unit is probably not {m['unit']}"
+    )
 
 
 def _wrong_size(m: dict[str, Any]) -> int:
@@ -112,24 +114,24 @@ RULES: tuple[Rule, ...] = (
         "small",
         _too_small,
         lambda m: f"it encloses {1e6 * abs(m['volume']):.2g} mL, and no organ is smaller than 1 mL",
-        "say another --unit, or choose another --part",
+        "give another --unit, or choose another --part",
     ),
     (
         "far_away",
         lambda m: int(m.get("distance", 0.0) > FAR_AWAY),
-        lambda m: f"it lies {m['distance']:.3g} m from the origin of its coordinates, where digits are lost",
+        lambda m: f"it lies {m['distance']:.3g} m from the origin of its coordinates, where coordinates lose precision",
         "move it to the origin in the program that made it",
     ),
     (
         "duplicate_points",
         _number("duplicate_points"),
-        lambda m: f"{m['duplicate_points']} points lie on others: triangles that look joined are not",
+        lambda m: f"{m['duplicate_points']} points coincide: triangles that look joined are not",
         "organbench mesh --from FILE joins (welds) them",
     ),
     (
         "unused_points",
         _number("unused_points"),
-        lambda m: f"{m['unused_points']} points belong to nothing and would be masses without springs",
+        lambda m: f"{m['unused_points']} points are not used by any triangle and would be masses without springs",
         "organbench mesh --from FILE leaves them out",
     ),
     (
@@ -175,16 +177,16 @@ RULES: tuple[Rule, ...] = (
         "disagreeing",
         lambda m: m["disagreeing_edges"] if m.get("two_sided") else 0,
         lambda m: (
-            f"at {m['disagreeing_edges']} edges neighbouring triangles look to opposite sides, so the volume comes "
+            f"at {m['disagreeing_edges']} edges neighbouring triangles have opposite orientations, so the volume comes "
             "out wrong"
         ),
-        "organbench mesh --from FILE turns them round",
+        "organbench mesh --from FILE flips them",
     ),
     (
         "inside_out",
         _number("inside_out_parts"),
-        lambda m: f"the surface is inside out (volume {1e6 * m['volume']:.4g} mL): its triangles look inwards",
-        "organbench mesh --from FILE turns it round",
+        lambda m: f"the surface is inverted (volume {1e6 * m['volume']:.4g} mL): its triangles face inwards",
+        "organbench mesh --from FILE flips it",
     ),
     (
         "pinched",
@@ -213,7 +215,7 @@ RULES: tuple[Rule, ...] = (
     (
         "flat",
         _number("flat_triangles"),
-        lambda m: f"{m['flat_triangles']} triangles have no area to speak of, and no normal",
+        lambda m: f"{m['flat_triangles']} triangles have practically no area, and so no normal",
         REMESH,
     ),
     (
@@ -225,13 +227,13 @@ RULES: tuple[Rule, ...] = (
     (
         "duplicate_tetrahedra",
         _number("duplicate_tetrahedra"),
-        lambda m: f"{m['duplicate_tetrahedra']} tetrahedra are there twice",
+        lambda m: f"{m['duplicate_tetrahedra']} tetrahedra occur twice",
         EXPORT,
     ),
     (
         "inverted",
         _number("inverted_tetrahedra"),
-        lambda m: f"{m['inverted_tetrahedra']} tetrahedra have a negative or no volume: they are turned inside out",
+        lambda m: f"{m['inverted_tetrahedra']} tetrahedra have zero or negative volume: they are inverted",
         "try organbench mesh --from FILE: it fills the surface again",
     ),
     (

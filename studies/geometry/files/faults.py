@@ -82,9 +82,9 @@ def check_stl(path: Path, head: bytes) -> None:
         return
     kind = next((kind for first, kind in NO_STL.items() if head.startswith(first)), None)
     if kind is not None:
-        raise unreadable(path, f"it is no STL but {kind}: give it the ending of its format")
+        raise unreadable(path, f"it is not an STL file but {kind}: give it the ending of its format")
     if is_text(head[:HEADER]) and not head.lstrip().startswith(b"solid") and known_kind(head) is None:
-        raise unreadable(path, "it is no STL: it is a text without facets")
+        raise unreadable(path, "it is not an STL file: it is text without facets")
 
 
 def known_kind(head: bytes) -> str | None:
@@ -98,7 +98,7 @@ def unreadable(path: Path, reason: str) -> StudyError:
 
 
 def reason_of(path: Path, error: BaseException, said: str) -> str:
-    """Why a reader stumbled over the file, from the file first, then from what the reader `said`, then its error."""
+    """Why a reader failed on the file, from the file first, then from what the reader `said`, then its error."""
     end = ENDS.get(path.suffix.lower())
     if (end and end not in tail(path)) or is_open_stl(path):
         return "it is cut short: its end is missing"
@@ -111,14 +111,14 @@ def reason_of(path: Path, error: BaseException, said: str) -> str:
 
 OTHERWISE = "its content does not follow its format"
 WORDS: tuple[tuple[tuple[type[BaseException], ...], str], ...] = (
-    ((MemoryError, OverflowError), "it promises more than fits into the memory"),
-    ((UnicodeError,), "it holds bytes that are no text where text must stand"),
-    ((ParseError,), "its XML breaks off or is damaged"),
+    ((MemoryError, OverflowError), "it declares more data than fits into memory"),
+    ((UnicodeError,), "it contains binary data where text is expected"),
+    ((ParseError,), "its XML is truncated or damaged"),
     ((EOFError, struct.error, zlib.error, gzip.BadGzipFile, lzma.LZMAError), "it is cut short, or damaged"),
     ((PermissionError,), "it may not be read: change its permissions"),
     ((FileNotFoundError,), "a file that belongs to it is missing from its folder"),
-    ((IndexError, KeyError), "it breaks off, or names what is not there"),
-    ((ValueError, AssertionError), "something in it is no number, or numbers are missing"),
+    ((IndexError, KeyError), "it is truncated or refers to missing data"),
+    ((ValueError, AssertionError), "a number in it is malformed or missing"),
 )
 
 

@@ -129,7 +129,7 @@ def whole_numbers(data: np.ndarray, path: Path) -> np.ndarray:
             raise no_mask(path.name, "fractions")
         data = data.astype(np.int64)
     if data.dtype.kind not in "iub":
-        raise StudyError(f"{path.name} holds colours or records: it is no label mask; give the segmentation")
+        raise StudyError(f"{path.name} contains colours or records, so it is not a label mask; give the segmentation")
     return data
 
 
@@ -157,7 +157,7 @@ def check_labels(labels: np.ndarray, count: int, name: str) -> None:
 
 
 def chosen_label(mask: Mask, wanted: str | None, name: str) -> int:
-    """The label asked for, by number or name. Raises StudyError where it cannot be told."""
+    """The label asked for, by number or name. Raises StudyError where it cannot be determined."""
     known = voxels_of(mask.labels)
     if not known:
         raise StudyError(f"{name} holds no label: every voxel is 0; give the segmentation")

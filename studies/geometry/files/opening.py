@@ -46,8 +46,8 @@ def opened(source: Source) -> Content:
         warnings.warn(f"{path.name}: {remark}", stacklevel=3)
     if content.unit_by_custom and source.unit is None and source.longest_side is None:
         warnings.warn(
-            f"{path.name}: its header does not say the unit; millimetres are taken, as is the custom; "
-            "--unit names another",
+            f"{path.name}: its header does not say the unit; assuming millimetres (the convention); "
+            "--unit sets another",
             stacklevel=3,
         )
     content = check_content(content, path.name)

@@ -1,4 +1,4 @@
-"""Several bodies in one file: told apart by name where the file has names, else by what hangs together."""
+"""Several bodies in one file, separated by name where the file has names, else by what hangs together."""
 
 from dataclasses import dataclass, replace
 

@@ -67,7 +67,7 @@ class Legacy:
         dtype = np.dtype(TYPES[kind.lower()])
         size = count * (dtype.itemsize if self.binary else 2)
         if size > len(self.data) - self.at + 1:
-            raise meshio.ReadError(f"it is cut short: {count:,} numbers are promised and are not there")
+            raise meshio.ReadError(f"it is cut short: {count:,} of the declared numbers are missing")
         if self.binary:
             values = np.frombuffer(self.data, dtype, count, self.at)
             self.at += size
@@ -79,7 +79,7 @@ class Legacy:
         while len(found) < count:
             words = self.words()
             if not words:
-                raise meshio.ReadError(f"it is cut short: {count:,} numbers are promised and are not there")
+                raise meshio.ReadError(f"it is cut short: {count:,} of the declared numbers are missing")
             found += words
         return np.array(found[:count], dtype=float).astype(dtype)
 

@@ -57,7 +57,7 @@ class Source:
             raise StudyError(f"{name}: give the longest side, or a unit and a scale, but not both")
 
     def metres(self, side: float, said: str | None) -> float:
-        """Metres per unit of the file, whose longest side is `side` and whose header has `said` a unit or None.
+        """Metres per unit of the file, whose longest side is `side` and whose header states the unit `said`, or None.
 
         Raises StudyError where the unit has to be given.
         """
@@ -75,7 +75,7 @@ class Source:
 
     @property
     def recipe(self) -> dict[str, object]:
-        """What of it decides a mesh beside the content of the file, JSON-able, without the place of the file."""
+        """What of it decides a mesh besides the content of the file, JSON-able, without the place of the file."""
         given = {"scale": None if self.scale == 1.0 else self.scale, "longest_side": self.longest_side}
         return {key: value for key, value in (given | {"part": self.part}).items() if value is not None}
 
@@ -86,7 +86,7 @@ def stem_of(path: Path) -> str:
 
 
 def as_source(path: "str | Path | Source", unit: str | None) -> Source:
-    """A path and a unit as a Source. Raises StudyError for a unit beside a Source."""
+    """A path and a unit as a Source. Raises StudyError for a unit together with a Source."""
     if not isinstance(path, Source):
         return Source(Path(path), unit)
     if unit is not None:
@@ -133,7 +133,7 @@ def unit_question(name: str, side: float) -> str:
     if likely:
         guess = " or ".join(NAMES[unit] for unit in likely)
         return f"{name} does not say its unit; its longest side is {side:.4g}, the size of an organ in {guess}"
-    return f"{name} does not say its unit; its longest side is {side:.4g}, which is no organ's size in m, cm or mm"
+    return f"{name} does not say its unit; its longest side is {side:.4g}, not a plausible organ size in m, cm or mm"
 
 
 def settled_unit(name: str, side: float, unit: str | None) -> str:

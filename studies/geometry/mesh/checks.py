@@ -133,7 +133,7 @@ def check_volume(points: np.ndarray, triangles: np.ndarray, name: str) -> None:
     if abs(volume) <= 1e-9 * scale:
         raise StudyError(f"{name}: the enclosed volume is zero ({volume:.2g} m³); a body needs a thickness")
     if volume < 0:
-        raise StudyError(f"{name}: the surface is inside out (volume {volume:.4g} m³); reverse its triangles")
+        raise StudyError(f"{name}: the surface is inverted (volume {volume:.4g} m³); flip its triangles")
 
 
 def check_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray, name: str = "the mesh") -> None:

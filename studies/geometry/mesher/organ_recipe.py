@@ -64,7 +64,7 @@ def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict
 
 
 def has_exact_volume(recipe: dict[str, Any]) -> bool:
-    """Whether the mesh has the volume of its shape, its nodes a little off it: of a scan, or of an organ on wish."""
+    """Whether the mesh has the volume of its shape, its nodes a little off it: of a scan, or of an organ on request."""
     return recipe["kind"] == "scan" or recipe.get("exact", False)
 
 

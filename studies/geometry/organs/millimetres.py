@@ -19,7 +19,7 @@ def check_lengths(organ: str, **lengths: float) -> None:
     """Raise StudyError unless every length [mm] is a finite number above 0."""
     for name, value in lengths.items():
         if not 0 < value < np.inf:
-            raise StudyError(f"{organ}: {name} = {value} mm is no length; give a finite number above 0")
+            raise StudyError(f"{organ}: {name} = {value} mm is not a length; give a finite number above 0")
 
 
 def check_wall(organ: str, wall: float, narrowest: float) -> None:

@@ -24,7 +24,7 @@ def vary(name: str, seed: int, spread: float = 0.2) -> dict[str, float]:
     """
     shape = lookup(name, SHAPES, "organ")
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise StudyError(f"{name}: the seed {seed!r} is no whole number from 0 on; give one such as 1")
+        raise StudyError(f"{name}: the seed {seed!r} is not a whole number from 0 on; give one such as 1")
     if not 0 <= spread <= WIDEST:
         raise StudyError(f"{name}: a spread of {spread} is outside 0 to {WIDEST}; 0.2 means 20 % up or down")
     rng = np.random.default_rng([int(seed), zlib.crc32(name.encode())])

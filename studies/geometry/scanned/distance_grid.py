@@ -29,7 +29,7 @@ def distance_grid(points: np.ndarray, triangles: np.ndarray, cell: float, margin
 def squared_distance(corners: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Squared distance of grid points to triangles, corners (t, 3, 3), in cells: exact within BAND.
 
-    Farther out it is that to the triangle nearest to the nearest grid point beside the surface.
+    Farther out it is that to the triangle nearest to the nearest grid point next to the surface.
     """
     squared, owner, scratch = np.full(shape, np.inf), np.zeros(shape, np.uint32), np.empty((4, 3))
     band_distance_into(corners, BAND, scratch, squared, owner)

@@ -67,8 +67,8 @@ def warnings_of(lost: dict[str, Any]) -> list[str]:
     """Sentences for what a person has to know; none where all is near."""
     told = []
     for key, what in (
-        ("file_to_mesh", "the file has something there that the mesh has not"),
-        ("mesh_to_file", "the mesh has something there that the file has not"),
+        ("file_to_mesh", "this part of the file is missing from the mesh"),
+        ("mesh_to_file", "the mesh has a part here that the file does not"),
     ):
         far, place = lost[key]["max"], lost[key]["where"]
         if far > min(TOLD * lost["diagonal"], lost["edge"]):
@@ -76,7 +76,7 @@ def warnings_of(lost: dict[str, Any]) -> list[str]:
             share = f"{100 * far / lost['diagonal']:.2g} % of the diagonal"
             told.append(
                 f"the surface is up to {1e3 * far:.3g} mm off ({share}) at ({where}) mm: {what}; use more nodes, or "
-                "smooth it away knowingly (--smooth)"
+                "remove it with --smooth"
             )
     if lost["handles"]:
         told.append(

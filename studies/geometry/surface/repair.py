@@ -47,14 +47,14 @@ def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = Fal
         remarks.append(f"{count - 1} of {count} separate parts are left out ({100 * lost:.2g} % of the area)")
     triangles, turned = oriented(triangles, name)
     if turned:
-        remarks.append(f"{turned} triangles are turned to agree with their neighbours")
+        remarks.append(f"{turned} triangles are flipped to agree with their neighbours")
     if holes:
         points, triangles, closed = without_holes(points, triangles)
         if closed:
             remarks.append(f"{closed} holes are closed by flat fans")
     if signed_volume(points, triangles) < 0:
         triangles = triangles[:, ::-1].copy()
-        remarks.append("the surface was inside out and is turned round")
+        remarks.append("the surface was inverted and has been flipped")
     used, renumbered = np.unique(triangles, return_inverse=True)
     return Mended(points[used], renumbered.reshape(triangles.shape), tuple(remarks))
 

@@ -51,8 +51,8 @@ def with_volume(
     off = signed_volume(after, triangles) / volume - 1.0
     if abs(off) > ENOUGH or len(crossing_triangles(after, triangles)):
         raise StudyError(
-            f"its nodes cannot be moved so that the mesh has the shape's volume ({100 * off:+.2g} % are left); "
-            "use more nodes, or a smoother shape"
+            f"its nodes cannot be moved so that the mesh has the shape's volume "
+            f"({100 * off:+.2g} % difference remains); use more nodes, or a smoother shape"
         )
     return after
 

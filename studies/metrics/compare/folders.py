@@ -54,7 +54,7 @@ class Change:
     old: float | str
     new: float | str
     floor: float
-    """How well it is known, the larger of both, in its unit; NaN where it is not said."""
+    """How well it is known, the larger of both, in its unit; NaN where it is not stated."""
     verdict: Verdict
 
     @property

@@ -28,7 +28,7 @@ MEANING: dict[Verdict, str] = {
 
 
 def verdict_of(old: float, new: float, floor: float, same_bits: bool) -> Verdict:
-    """The verdict on a number that was `old` and is `new`. floor: how well it is known, NaN where that is not said;
+    """The verdict on a number that was `old` and is `new`. floor: how well it is known, NaN where that is not stated;
     same_bits: whether the records that it was read off are equal."""
     change = abs(new - old)
     if change != change:

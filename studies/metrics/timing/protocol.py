@@ -61,7 +61,7 @@ def pinned(threads: int = 1) -> Iterator[int | None]:
     interrupts); compiled code uses no more, linear algebra one. Gives the last core's number, or None where the
     system cannot pin. Raises StudyError where the process may use fewer cores.
 
-    A pool of a linear algebra library that waits for work keeps its core busy for 0.1 s: beside it, on one core, a
+    A pool of a linear algebra library that waits for work keeps its core busy for 0.1 s: next to it, on one core, a
     kernel seemed to take 2.5 times as long.
     """
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))

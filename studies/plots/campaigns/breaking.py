@@ -41,7 +41,7 @@ EDGES = 2.0 ** np.arange(-4.0, 2.1, 1.0)
 """Of the ranges of the step over the stability limit."""
 REFUSED = "refused"
 FEWEST = 5
-"""Trials in a range below which no share is told."""
+"""Fewest trials in a range for which a share is shown."""
 
 
 @styled

@@ -1,4 +1,4 @@
-"""Other programs beside our methods: error of the force and lost volume against computing time."""
+"""Other programs and our methods: error of the force and lost volume against computing time."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -126,9 +126,10 @@ def _real_time() -> Line2D:
 
 def _notes() -> list[str]:
     return [
-        "Two sizes of mesh each; hollow: with half the step. Grey: uncertainty of the reference. Ours: median frame on "
-        "one core. Others: processor time of the whole run; a path of equilibria has no frames, and is as long as its "
-        "load steps are few. Volume: the worst over all steps handed in, of ours over all frames."
+        "Two mesh sizes each; hollow: with half the step. Grey: uncertainty of the reference. Time of our bodies: "
+        "median frame on one core. Time of the others: processor time of the whole run. Programs that solve for "
+        "equilibria have no frames; they need less time for fewer load steps. Volume: the worst of all "
+        "submitted steps; for our bodies, of all frames."
     ]
 
 

@@ -86,7 +86,7 @@ def _notes(found: Sequence[Group]) -> list[str]:
         mine = [group.of(metric("force_end")) for group in found if group.organ == organ]
         count, lost = max(d.count for d in mine), max(d.lost for d in mine)
         words = f"{heading(organ)}: {count} members judged"
-        words += f", at most {lost} lost by a body (its line ends below 1)" if lost else ""
+        words += f", up to {lost} failed runs per body (its line ends below 1)" if lost else ""
         if count < ENOUGH:
             words += (
                 f"; too few to bound 95 % of all by their worst with 95 % confidence ({100 * (1 - BOUND**count):.0f} %)"

@@ -116,7 +116,7 @@ def window(axes: Axes, points: np.ndarray, camera: Camera) -> None:
 
 
 def _describe(axes: Axes, mesh: OrganMesh, shape: Shape) -> None:
-    """Volumes beside the literature's, and how many of what."""
+    """Volumes next to those of the literature, with counts."""
     inside = f"{1e6 * (mesh.lumen_volume if mesh.hollow else mesh.volume):,.0f} mL"
     words = [f"wall {1e3 * (shape.wall or 0.0):g} mm, content {inside}" if mesh.hollow else inside]
     if shape.literature is not None:

@@ -116,7 +116,7 @@ def remarks(runs: Sequence[Run]) -> list[str]:
         if has_frames(run) and good_frames(run) < len(run.fields.t)
     ]
     bare = [name for name, group in by_scene(runs).items() if all(run.reference is None for run in group)]
-    missing = [f"No reference for {', '.join(map(readable, bare))}: so no error is shown there."] if bare else []
+    missing = [f"No error is shown for {', '.join(map(readable, bare))}, because it has no reference."] if bare else []
     return [*missing, *ended]
 
 
@@ -130,7 +130,7 @@ def unresolved_notes(runs: Sequence[Run], metrics: Sequence[Metric]) -> list[str
             what = ", ".join(readable(metric.name) for metric in weak)
             percent = f"up to {100 * worst:.0f} % of" if worst < 1 else "as large as"
             notes.append(
-                f"{UNRESOLVED_MARK} {heading(name)}: the reference's uncertainty is {percent} some {what} drawn."
+                f"{UNRESOLVED_MARK} {heading(name)}: the uncertainty of the reference is {percent} the {what}."
             )
     return notes
 

@@ -104,7 +104,7 @@ def _which(best: Sequence[Best]) -> str:
         start = f"In {readable(row['scene'])}: {_body(row['body'])}"
         if within:
             return f"{start}. It is the cheapest body within the target ({row['target']})."
-        return f"{start}. No body here meets the target ({row['target']}); this one is nearest."
+        return f"{start}. No body here meets the target ({row['target']}); this body comes closest."
     bodies = Counter(_body(row["body"]) for row in within).most_common()
     named = "; ".join(f"{body} in {counted(count, 'scene')}" for body, count in bodies)
     start = f"A body meets the target in {len(within)} of {len(best)} scenes"
@@ -123,7 +123,7 @@ def _errors(rows: Sequence[Best]) -> str:
     force, displacement, shape = (_span(rows, name) for name in ("force", "displacement", "shape"))
     words = {
         f"force off by {force} %": force,
-        f"displacement off by {displacement} % on the mean": displacement,
+        f"mean displacement error {displacement} %": displacement,
         f"shape off by {shape} % of the organ's size at most": shape,
     }
     return ", ".join(part for part, known in words.items() if known)

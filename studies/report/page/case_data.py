@@ -1,4 +1,4 @@
-"""What the page shows of one case: words, histories, and its surface beside that of the reference."""
+"""What the page shows of one case: words, histories, and its surface next to that of the reference."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -51,8 +51,8 @@ def volume(tables: Tables) -> Finding | None:
     return Finding(
         "How well volumes are kept",
         f"{_small(kept[VOLUME])} %",
-        f"is the largest error of a volume kept by {KEPT} in {counted(len(pairs), 'pair')} of runs "
-        f"({_name(kept)}). Without the constraint the same bodies are off by up to {plain(lost[VOLUME])} % "
+        f"Largest error of a volume kept by {KEPT}, in {counted(len(pairs), 'pair')} of runs ({_name(kept)}). "
+        f"Without the constraint the same bodies are off by up to {plain(lost[VOLUME])} % "
         f"({_name(lost)}). A volume is compared with the body's own at rest, which rounding alone blurs.",
     )
 
@@ -68,8 +68,8 @@ def one_volume(tables: Tables) -> Finding | None:
     return Finding(
         "Forces of bodies with one volume",
         f"{_measured(worst, FORCE)} %",
-        f"is the largest error of a force at the deepest point ({_name(worst)}). Bodies that keep one volume are off "
-        f"by {' and by '.join(said)}, over {counted(len({row['scene'] for row in rows}), 'scene')}.",
+        f"Largest force error at the deepest point, of bodies that keep one volume ({_name(worst)}). Their errors are "
+        f"{' and '.join(said)}, over {counted(len({row['scene'] for row in rows}), 'scene')}.",
     )
 
 
@@ -82,14 +82,14 @@ def nearest_force(tables: Tables) -> Finding | None:
     if not best:
         return None
     said = [
-        f"{_measured(row, FORCE)} % in {row['scene']} ({row['body']}, {row['nodes']} nodes; displacement on the mean "
+        f"{_measured(row, FORCE)} % in {row['scene']} ({row['body']}, {row['nodes']} nodes; mean displacement error "
         f"{_measured(row, MEAN, signed=False)} %)"
         for row in best.values()
     ]
     return Finding(
         "The force nearest to the reference",
         _range(list(best.values()), FORCE),
-        f"is how far the best body of each scene that keeps its volume is off: {'; '.join(said)}.",
+        f"Force errors of the best body that keeps its volume, in each scene: {'; '.join(said)}.",
     )
 
 
@@ -104,7 +104,7 @@ def cost(tables: Tables) -> Finding | None:
     return Finding(
         "Cost of keeping a volume",
         f"{' to '.join(dict.fromkeys((cells[0], cells[-1])))} %",
-        f"is what {KEPT} adds to the time of a frame in {counted(len(pairs), 'pair')} of runs. The most is in "
+        f"Time that {KEPT} adds to a frame, in {counted(len(pairs), 'pair')} of runs. The most is in "
         f"{_name(kept)}: {_measured(kept, FRAME, signed=False)} ms against {_measured(free, FRAME, signed=False)} ms. "
         f"In {counted(sum(spread > abs(percent) for percent, spread in added), 'pair')} the repeats spread by more "
         "than the difference.",
@@ -120,7 +120,7 @@ def real_time(tables: Tables) -> Finding | None:
     return Finding(
         "Speed",
         f"{sum(row[REAL] > 1 for row in rows)} of {len(rows)}",
-        "timed bodies simulate more than a second in a second of computing on one core. The slowest, "
+        "Timed bodies that simulate more than a second in a second of computing on one core. The slowest, "
         f"{_name(slowest)} by {slowest['method']}, simulates {_measured(slowest, REAL, signed=False)} s.",
     )
 
@@ -134,8 +134,8 @@ def limit(tables: Tables) -> Finding | None:
     return Finding(
         "The limit of the time step",
         f"{below.count('diverged')} of {len(below)}",
-        f"runs below the predicted limit of the time step diverge; above it {len(above) - above.count('diverged')} of "
-        f"{len(above)} do not. These are counts of single runs.",
+        "Runs below the predicted limit of the time step that diverge; above it "
+        f"{len(above) - above.count('diverged')} of {len(above)} do not. These are counts of single runs.",
     )
 
 
@@ -149,8 +149,8 @@ def entries(tables: Tables) -> Finding | None:
     return Finding(
         "Results of other programs",
         f"{len(won)} of {len(contests)}",
-        "numbers that other programs handed in, scene by scene (force, displacement, volume, speed), are better than "
-        f"those of all our bodies and methods in that scene{': ' if won else '.'}{told}{'.' if won else ''}",
+        "Results (force, displacement, volume and speed in each scene) in which another program beats all our bodies "
+        f"and methods{': ' if won else '.'}{told}{'.' if won else ''}",
     )
 
 
@@ -210,7 +210,7 @@ def _floor(row: Row, column: str) -> float | None:
 
 
 def _measured(row: Row, column: str, signed: bool = True) -> str:
-    """A value beside its uncertainty."""
+    """A value with its uncertainty."""
     floor = _floor(row, column)
     return value_cell(row[column], float("nan") if floor is None else floor, signed=signed)
 

@@ -36,7 +36,7 @@ def unpack_series(packed: dict[str, Any]) -> np.ndarray:
 
 
 def pack_frames(positions: np.ndarray, size: float) -> dict[str, Any]:
-    """Positions (P, n, 3) [m] of a body of `size` [m]; the step of the grid that they are rounded to stands beside."""
+    """Positions (P, n, 3) [m] of a body of `size` [m]; with the step of the grid that they are rounded to."""
     low = positions.min(axis=(0, 1)).astype(float)
     extent = float((positions.max(axis=(0, 1)) - low).max())
     step = max(STEP * size, extent / DEEPEST)

@@ -125,13 +125,13 @@ def _scene_word(study: Study, scene: str) -> str:
 
 
 def run_id(run: Run) -> str:
-    """The same for runs with the same numbers, whatever is recorded beside them; of an entry the same in all studies
+    """The same for runs with the same numbers, whatever else is recorded; of an entry the same in all studies
     with its scene."""
     return key_hash(run.record.key if is_entry(run.case) else run.case.replaced(recorded=()).key)
 
 
 def _named(root: Path, path: Path) -> Path:
-    """As the command names it where the results folder lies: nobody's other folders are told."""
+    """As the command names it where the results folder lies: other folders stay private."""
     return root.name / path.relative_to(root)
 
 

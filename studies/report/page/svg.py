@@ -60,7 +60,9 @@ def cleaned(text: str) -> str:
     try:
         root = ElementTree.fromstring(text[text.index("<svg") : text.rindex("</svg>") + len("</svg>")])
     except (ValueError, ElementTree.ParseError) as error:
-        raise StudyError(f"a stored chart is no SVG ({error}); delete the folder cache of the results") from error
+        raise StudyError(
+            f"a stored chart is not an SVG file ({error}); delete the folder cache of the results"
+        ) from error
     _clean(root)
     root.attrib.pop("style", None)  # it could lay the chart over the page
     return ElementTree.tostring(root, encoding="unicode", short_empty_elements=False)

@@ -140,7 +140,7 @@ def _heads(cases: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _pieces(parts: Parts, cases: Mapping[str, Any], first: str | None) -> dict[str, Any]:
-    """What may lie beside the page, by name, in the order in which it gets room: of each case the rest, and before it
+    """What may lie next to the page, by name, in the order in which it gets room: of each case the rest, and before it
     the shape of its reference."""
     references = {name: shape for _, part in parts for name, shape in part["references"].items()}
     pieces: dict[str, Any] = {}

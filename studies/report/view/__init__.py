@@ -1,1 +1,1 @@
-"""Stored cases beside their reference in one file for ParaView."""
+"""Stored cases with their reference in one file for ParaView."""

@@ -37,7 +37,7 @@ class Stored:
 
     @property
     def physics(self) -> str:
-        """Its case but for what is recorded beside: the same for runs with the same numbers."""
+        """Its case without what else is recorded: the same for runs with the same numbers."""
         data = json.loads(self.header.key)
         data.pop("recorded", None)
         return json.dumps(data, sort_keys=True)

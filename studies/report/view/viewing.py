@@ -1,4 +1,4 @@
-"""From words to bodies: the cases that they name, beside the reference of their scene."""
+"""From words to bodies: the cases that they name, with the reference of their scene."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -23,7 +23,7 @@ INNER = 0.5
 
 
 def press(element: str) -> None:
-    """A unit cube under a plane and beside a sphere that holds what it touches."""
+    """A unit cube under a plane and next to a sphere that holds what it touches."""
     obstacles = (
         RigidPlane((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), lambda t: (0.0, 0.0, -0.02 * t)),
         RigidSphere((1.5, 0.5, 0.5), 0.5, lambda t: (-0.02 * t, 0.0, 0.0), slip="no_slip"),

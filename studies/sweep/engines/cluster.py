@@ -35,8 +35,8 @@ LOOK_SECONDS = 1.0
 BUSY = 0.1
 """Share of a machine's processors that others may use during frame times, without a warning."""
 GONE = (
-    "the Dask scheduler no longer answers: restart it and its workers; what is finished is stored, the "
-    "same command goes on from there"
+    "the Dask scheduler no longer answers: restart it and its workers; finished work is stored; run "
+    "the same command to continue"
 )
 
 
@@ -70,8 +70,8 @@ class Session:
             self.manned = time.monotonic()
         elif time.monotonic() > self.manned + self.patience:
             raise StudyError(
-                f"the cluster has had no worker for {self.patience:g} s: start some with `organbench worker`; what is "
-                "finished is stored, the same command goes on from there"
+                f"the cluster has had no worker for {self.patience:g} s: start some with `organbench worker`; finished "
+                "work is stored; run the same command to continue"
             )
         return found
 
@@ -177,7 +177,7 @@ class Cluster:
             session.end()
 
     def map(self, jobs: Sequence[Job], on_compile: Told) -> Generator[tuple[Job, str | None]]:
-        """As every executor; what workers compile is not told. No more jobs are with Dask than can be done at a time:
+        """As every executor; what workers compile is not shown. No more jobs are with Dask than can be done at a time:
         a worker that is lost costs those a try that it had."""
         if not jobs:
             return

@@ -39,7 +39,7 @@ LONELY_SECONDS = 120
 NO_PAGES = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
 """Dask opens the port of its web pages in any case: here, and for this machine alone."""
 MEMORY_GB = 2.0
-"""Of each process, where nothing is said: a reference of 90,000 unknowns takes 1.4."""
+"""Of each process by default: a reference of 90,000 unknowns takes 1.4."""
 DISK = "1 GB"
 """That HTCondor is asked for; results go to the shared folder."""
 Kind = Literal["slurm", "sge", "pbs", "lsf", "htcondor", "oar", "command"]

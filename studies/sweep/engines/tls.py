@@ -29,8 +29,8 @@ def make_key(folder: Path) -> None:
         detail = getattr(error, "stderr", b"") or str(error).encode()
         last = (detail.decode(errors="replace").strip().splitlines() or [""])[-1]
         raise StudyError(
-            f"the scheduler needs a key, for it listens on the network, and openssl made none ({last}): install the "
-            "program openssl"
+            f"no key could be created (openssl failed: {last}), and the scheduler listens on the network, so it "
+            "needs one; install openssl"
         ) from error
 
 

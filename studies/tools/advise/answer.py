@@ -41,7 +41,7 @@ class Advice:
     """Whether the wished errors are the usual ones, because none was named."""
     stored: Stored
     chosen: Judged | None
-    """The cheapest that meets the wish, else the nearest; None where the scene compares nothing that was wished."""
+    """The cheapest that meets the wish, else the nearest; None where the scene compares nothing that was asked for."""
     meets: bool
     unknowable: tuple[str, ...]
     """Errors wished finer than the reference of a scene is known."""
@@ -130,7 +130,7 @@ def _known(scene: Scene, results: Path) -> tuple[Stored, tuple[str, ...]]:
 
 
 def _chosen(scene: Scene, named: Wish, rows: list[Judged], found: Stored) -> Advice:
-    """The cheapest that meets the wish and keeps the shape, else the nearest. No error is wished finer than the
+    """The cheapest that meets the wish and keeps the shape, else the nearest. No error is asked for finer than the
     reference is known."""
     wish = named.or_usual(scene)
     errors = {name: bound for name in ERRORS if (bound := getattr(wish, name)) is not None}

@@ -91,7 +91,7 @@ def published_rows(published: Path, scene: Scene) -> list[Judged]:
         if isinstance(error, StudyError):
             raise
         raise StudyError(
-            f"{path} cannot be read ({error}); `organbench run {ACCURACY.name}` and `organbench publish` write it anew"
+            f"{path} cannot be read ({error}); `organbench run {ACCURACY.name}` and `organbench publish` rewrite it"
         ) from error
 
 

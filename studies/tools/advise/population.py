@@ -56,14 +56,14 @@ def _of(rows: pd.DataFrame, entry: Metric) -> Distribution:
 
 
 def words(found: Unseen) -> str:
-    """ "in 40 livers it had not seen, 95 % are within 8.1 % (6 to 12) of the force, ..."."""
+    """ "on 40 other organs of this kind, 95 % have a force error below 8.1 % (6 to 12) ..."."""
 
     def bound(one: Distribution) -> str:
         low, high = one.bound_interval
         return f"{one.bound:.2g} % ({low:.2g} to {high:.2g})"
 
-    lost = f", {found.force.lost} more lost" if found.force.lost else ""
+    lost = f", {found.force.lost} more failed" if found.force.lost else ""
     return (
-        f"on {found.force.count} other organs of this kind ({found.organ}{lost}) 95 % are within "
-        f"{bound(found.force)} of the force and {bound(found.displacement)} in displacement"
+        f"on {found.force.count} other organs of this kind ({found.organ}{lost}) 95 % have a force "
+        f"error below {bound(found.force)} and a displacement error below {bound(found.displacement)}"
     )

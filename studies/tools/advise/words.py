@@ -16,7 +16,7 @@ LABEL = 14
 
 
 def lines_of(answer: Advice) -> list[str]:
-    """What is told of an answer, a line each."""
+    """An answer in words, line by line."""
     verdict = [f"{answer.scene.name}: {wish_words(answer.wish)}{USUAL if answer.usual else ''}", *_verdict(answer)]
     if answer.chosen is None:
         return verdict

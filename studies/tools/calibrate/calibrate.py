@@ -149,11 +149,11 @@ def _remarks(start: BodyRecipe, fold: Fold, found: Fit, after: dict[str, Judged 
         yield f"judged on other organs ({', '.join(others)})"
     left = [parameter.name for parameter in parameters_of(start) if parameter not in found.parameters]
     if left:
-        yield f"{' and '.join(left)} stayed: the scene compares fewer errors than the body has parameters"
+        yield f"{' and '.join(left)} not fitted: the scene compares fewer errors than the body has parameters"
     if found.at_bound:
         yield f"{' and '.join(found.at_bound)} ended at a bound of the search range"
     if not found.converged:
         yield "the search stopped before it converged"
     lost = [name for name, errors in after.items() if errors is None]
     if lost:
-        yield f"with the fitted body {' and '.join(lost)} ended badly"
+        yield f"the fitted body failed in {' and '.join(lost)}"

@@ -50,7 +50,7 @@ class Measurements:
         errors = judged(run)
         if errors is None:
             raise StudyError(
-                f"{run.case.name} is {run.record.status} before the fit ({run.record.message}); "
+                f"{run.case.name} ended as {run.record.status} before the fit ({run.record.message}); "
                 "give another number of nodes"
             )
         return errors

@@ -44,8 +44,8 @@ STIFFNESS = Parameter(
 )
 """On every spring: forces of a slowly moved body are proportional to it, displacements do not depend on it."""
 INNER_WEIGHT = Parameter("inner weight", lambda recipe: weights_of(recipe)[INNER], _with_inner, 0.02, 50.0)
-"""Of the springs to the axis beside those on the surface: of the ratios of the four weights the one that moves the
-displacement most (docs/accuracy.md). The ratios among the others have less effect, and the same."""
+"""Of the springs to the axis, relative to those on the surface: the ratio of weights that changes the displacement most
+(docs/accuracy.md). The other ratios have the same effect, and less of it."""
 
 
 def parameters_of(recipe: BodyRecipe) -> tuple[Parameter, ...]:

@@ -52,7 +52,7 @@ def verdict_of(fitted: Iterable[Compared], judged: Iterable[Compared]) -> Verdic
 
 
 def worst(verdicts: Iterable[Verdict | None]) -> Verdict:
-    """The verdict on all of them: one that memorises spoils it, one that holds is enough beside unresolved ones."""
+    """The verdict on all of them: one that memorises spoils it, one that holds is enough among unresolved ones."""
     found = set(verdicts)
     return next((one for one in (Verdict.MEMORISES, Verdict.HOLDS) if one in found), Verdict.UNRESOLVED)
 

@@ -21,7 +21,7 @@ SENTENCES = {
 
 
 def lines_of(found: Calibration) -> list[str]:
-    """What is told of a calibration, a line each."""
+    """A calibration in words, line by line."""
     start = found.start
     lines = [f"{found.organ}: {start.series} body, {start.nodes:,} surface nodes", *HEAD]
     for trial in found.trials:

@@ -1,1 +1,1 @@
-"""Whether this machine has what organbench needs, and the line that mends it."""
+"""Whether this machine has what organbench needs, and the command that fixes it."""

@@ -15,7 +15,7 @@ class Level(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """A thing that was looked at: what is said of it, and the line for a shell that mends it."""
+    """A check: its result in words, and the shell command that fixes it."""
 
     level: Level
     said: str

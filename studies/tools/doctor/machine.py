@@ -23,7 +23,7 @@ def machine(root: Path) -> list[Finding]:
     caches = [
         ("compiled code", compiled_folder(), "NUMBA_CACHE_DIR"),
         ("meshes", mesh_folder(), "ORGANBENCH_CACHE"),
-        ("cached code analysis", user_cache(), "XDG_CACHE_HOME"),
+        ("code fingerprints", user_cache(), "XDG_CACHE_HOME"),
     ]
     found = [cores(), memory(this_machine().memory_gb), compiler()]
     found += [cache(what, folder, variable) for what, folder, variable in caches]

@@ -118,7 +118,7 @@ def loads(module: str) -> Finding:
 
 
 def reinstall(package: str) -> str:
-    """The line that installs a package anew, in the version that is there."""
+    """The command that reinstalls a package in the version that is there."""
     one = shlex.quote(f"{package}=={version(package)}")
     return f"{shlex.quote(sys.executable)} -m pip install --force-reinstall --no-deps {one}"
 

@@ -19,7 +19,7 @@ def named(setup: Setup, history: History) -> tuple[str, str]:
     """What a finished run is called, and why: ok, inverted, drifted or penetrated."""
     smallest = float(history.min_j[-1])
     if smallest <= 0.0:
-        return "inverted", f"an element ends inverted (smallest volume ratio {smallest:.3g})"
+        return "inverted", f"an element is inverted at the end (smallest volume ratio {smallest:.3g})"
     deepest = float(np.max(history.penetration[-1], initial=0.0))
     if deepest > INSIDE * setup.body.size:
         return "penetrated", f"a node lies {1e3 * deepest:.3g} mm inside an obstacle"
@@ -72,7 +72,7 @@ def _moved_hold(setup: Setup, history: History) -> str | None:
         wanted = setup.body.rest[attachment.nodes] + attachment.path(setup.clock.duration)
         off = float(np.abs(history.final[attachment.nodes] - wanted).max())
         if off > _allowed(setup):
-            return f"a held node is {off:.3g} m from where it is held"
+            return f"a clamped node is {off:.3g} m from its prescribed position"
     return None
 
 

@@ -135,7 +135,7 @@ def reference_of(root: Path, scene: Scene) -> Reference:
 
 
 def verdict(judge: Judge, reference: Reference) -> Outcome:
-    """The reference's numbers beside the judge's; allowed is the reference's bar and the judge's change."""
+    """The numbers of the reference and of the judge; allowed is the reference's bar and the judge's change."""
     coarse, fine = judge.answer(judge.coarse), judge.answer(judge.fine)
     assert judge.scene.reference is not None  # it has been solved
     what = f"{fine.mesh.ne} {judge.elements} of third order"

@@ -47,7 +47,7 @@ def whole(folder):
 
 
 def damaged(content, seed):
-    """Kinds of damage: cut short, bytes flipped, a piece lost, numbers promised, other content."""
+    """Kinds of damage: cut short, bytes flipped, a piece lost, numbers declared, other content."""
     rng = np.random.default_rng(seed)
     yield "empty", b""
     for share in (0.02, 0.3, 0.6, 0.95):
@@ -114,12 +114,16 @@ COMMAS += b" endloop\nendfacet\nendsolid x\n"
         ("a.vtk", b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\n", "a.vtk"),
         ("a.vtp", b'<VTKFile type="PolyData"><PolyData><Piece NumberOfPoints="3"', "it is cut short"),
         ("a.stl", b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "it is cut short: its end is missing"),
-        ("a.stl", b"ply\nformat ascii 1.0\n" + bytes(900), "it is no STL but a PLY file: give it the ending of its"),
-        ("a.stl", b"glTF\x02\x00\x00\x00" + b"\xf7" * 900, "it is no STL but a glTF file"),
+        (
+            "a.stl",
+            b"ply\nformat ascii 1.0\n" + bytes(900),
+            "it is not an STL file but a PLY file: give it the ending of its",
+        ),
+        ("a.stl", b"glTF\x02\x00\x00\x00" + b"\xf7" * 900, "it is not an STL file but a glTF file"),
         (
             "a.stl",
             b"Dear reader, this is a letter of more than eighty-four letters and no surface. " * 9,
-            "it is no STL: it",
+            "it is not an STL file: it",
         ),
         ("a.stl", COMMAS.replace(b".", b","), "line 4 has decimal commas, 'vertex 1,5 0,25 -3e0': export it with"),
     ],

@@ -63,20 +63,20 @@ def broken():
     return {
         "bad_points": (nan, FACES, 1, "1 points are not numbers"),
         "open": (POINTS, FACES[7:], None, "so it has no inside"),
-        "disagreeing": (POINTS, turned, 3, "at 3 edges neighbouring triangles look to opposite sides"),
-        "inside_out": (POINTS, FACES[:, ::-1], 1, "the surface is inside out (volume -"),
+        "disagreeing": (POINTS, turned, 3, "at 3 edges neighbouring triangles have opposite orientations"),
+        "inside_out": (POINTS, FACES[:, ::-1], 1, "the surface is inverted (volume -"),
         "crowded": (np.vstack([POINTS, [[0.1, 0, 0]]]), hinge, 1, "1 edges have more than two triangles"),
         "duplicate_triangles": (POINTS, np.vstack([FACES, FACES[4:6]]), 2, "2 triangles occur twice"),
         "collapsed": (POINTS, np.vstack([FACES, [[0, 0, 1]]]), 1, "1 triangles use a point twice"),
-        "unused_points": (np.vstack([POINTS, [[0, 0, 0.0]]]), FACES, 1, "1 points belong to nothing"),
-        "duplicate_points": (np.vstack([POINTS, POINTS[FACES[0, :1]]]), apart, 1, "1 points lie on others"),
+        "unused_points": (np.vstack([POINTS, [[0, 0, 0.0]]]), FACES, 1, "1 points are not used by any triangle"),
+        "duplicate_points": (np.vstack([POINTS, POINTS[FACES[0, :1]]]), apart, 1, "1 points coincide"),
         "parts": (*together((POINTS, FACES), speck), 1, "there are 2 separate parts; a body is one"),
         "self_intersections": (folded, FACES, None, "pairs of triangles cut through each other"),
         "slivers": (spiky, FACES, 1, "is a sliver (radius ratio 0.0"),
-        "size": (1e3 * POINTS, FACES, 1, "the longest side is 60 m, which is no organ's"),
+        "size": (1e3 * POINTS, FACES, 1, "the longest side is 60 m, not a plausible organ size"),
         "handles": (*ring(), 1, "the surface has 1 handles or tunnels"),
         "pinched": (both_ends, pinch, 1, "at 1 points two sheets of the surface touch"),
-        "flat": (*sliver(flat, both), 2, "2 triangles have no area to speak of"),
+        "flat": (*sliver(flat, both), 2, "2 triangles have practically no area"),
     }
 
 

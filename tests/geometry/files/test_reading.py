@@ -72,7 +72,7 @@ def test_body_keeps_its_tetrahedra_and_gets_its_surface_first(tmp_path, balls):
 def test_inside_out_is_said_and_mended_on_request(tmp_path, balls, surface):
     points, triangles = surface
     path = write(tmp_path / "b.ply", points, triangle=triangles[:, ::-1])
-    with pytest.raises(StudyError, match=r"b\.ply: the surface is inside out"):
+    with pytest.raises(StudyError, match=r"b\.ply: the surface is inverted"):
         read_mesh(path)
     assert read_mesh(path, flip=True).volume == pytest.approx(balls[150].volume, rel=1e-6)
     body = balls[150]

@@ -24,10 +24,10 @@ def test_neighbours_are_made_to_agree_and_to_look_outward():
     mended = mend(points, mixed, "box")
     assert signed_volume(mended.points, mended.triangles) == pytest.approx(1.0, rel=1e-12)
     check_surface(mended.points, mended.triangles)
-    assert mended.remarks == (f"{turn.sum()} triangles are turned to agree with their neighbours",)
+    assert mended.remarks == (f"{turn.sum()} triangles are flipped to agree with their neighbours",)
     mended = mend(points, faces[:, ::-1], "box")
     assert signed_volume(mended.points, mended.triangles) == pytest.approx(1.0, rel=1e-12)
-    assert mended.remarks == ("the surface was inside out and is turned round",)
+    assert mended.remarks == ("the surface was inverted and has been flipped",)
 
 
 def test_moebius_bands_are_refused():

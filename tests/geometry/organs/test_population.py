@@ -62,7 +62,7 @@ def test_topology_that_is_not_as_promised_is_refused(mesh_cache):
     with pytest.raises(StudyError, match="the fill ends elsewhere than at the surface"):
         check_topology(replace(mesh, tetrahedra=mesh.tetrahedra[mesh.tetrahedra[:, 0] != mesh.tetrahedra[0, 0]]))
     inside_out = np.concatenate([mesh.outer_triangles, mesh.lumen_triangles])
-    with pytest.raises(StudyError, match="lumen: the surface is inside out"):
+    with pytest.raises(StudyError, match="lumen: the surface is inverted"):
         check_topology(replace(mesh, triangles=inside_out))
     with pytest.raises(StudyError, match="negative volume"):
         check_topology(replace(mesh, tetrahedra=mesh.tetrahedra[:, [1, 0, 2, 3]]))

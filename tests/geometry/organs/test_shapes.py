@@ -178,13 +178,13 @@ def test_an_organ_is_a_file_of_under_forty_lines_of_code(name):
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [
-        (lambda: SHAPES["kidney"](length=-110.0), "kidney: length = -110.0 mm is no length"),
-        (lambda: SHAPES["spleen"](notch=float("nan")), "spleen: notch = nan mm is no length"),
+        (lambda: SHAPES["kidney"](length=-110.0), "kidney: length = -110.0 mm is not a length"),
+        (lambda: SHAPES["spleen"](notch=float("nan")), "spleen: notch = nan mm is not a length"),
         (lambda: SHAPES["stomach"](wall=40.0), "stomach: a wall of 40 mm leaves no lumen"),
         (lambda: SHAPES["bladder"](wall=12.0), "bladder: a wall of 12 mm leaves no lumen"),
-        (lambda: SHAPES["liver"](depth=float("inf")), "liver: depth = inf mm is no length"),
+        (lambda: SHAPES["liver"](depth=float("inf")), "liver: depth = inf mm is not a length"),
         (lambda: vary("kidny", 0), "unknown organ 'kidny'; did you mean 'kidney'"),
-        (lambda: vary("kidney", -1), "the seed -1 is no whole number"),
+        (lambda: vary("kidney", -1), "the seed -1 is not a whole number"),
         (lambda: vary("kidney", 0, 0.5), "a spread of 0.5 is outside 0 to 0.3"),
     ],
 )

@@ -32,7 +32,7 @@ def test_what_is_missing_is_told_with_its_place():
     # Weighted by area the speck counts for nothing.
     assert far["p95"] < 1e-6 and far["mean"] < 1e-4 and found["mesh_to_file"]["max"] < 1e-9
     (told,) = warnings_of(found)
-    assert "up to 32.1 mm off" in told and "(82, 2, 2) mm: the file has something there" in told
+    assert "up to 32.1 mm off" in told and "(82, 2, 2) mm: this part of the file is missing" in told
 
 
 def test_nothing_is_told_where_nothing_is_lost():

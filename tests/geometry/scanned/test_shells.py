@@ -40,7 +40,7 @@ def capsule(tmp_path_factory):
     return stored(tmp_path_factory.mktemp("capsule") / "capsule.ply", points[used], faces.reshape(-1, 3))
 
 
-@pytest.mark.filterwarnings("ignore:.*the mesh has something there that the file has not")
+@pytest.mark.filterwarnings("ignore:.*the mesh has a part here that the file does not")
 def test_a_capsule_is_found_and_the_way_out_works(capsule):
     found = {finding.code: finding for finding in examine(capsule, unit="mm").findings}
     assert "0.49 mm thick" in found["shell"].sentence or "0.5 mm thick" in found["shell"].sentence
@@ -53,7 +53,7 @@ def test_a_capsule_is_found_and_the_way_out_works(capsule):
     assert body.losses["file_to_mesh"]["max"] < 0.03 * body.losses["diagonal"]
 
 
-@pytest.mark.filterwarnings("ignore:.*the mesh has something there that the file has not")
+@pytest.mark.filterwarnings("ignore:.*the mesh has a part here that the file does not")
 def test_a_surface_with_a_hole_is_filled_too(tmp_path):
     faces = BALL[1][OUTER[BALL[1]].mean(axis=1)[:, 2] < 19.5]
     path = stored(tmp_path / "open.ply", OUTER, faces)
@@ -67,7 +67,7 @@ def test_what_encloses_nothing_is_told(tmp_path):
     path = stored(tmp_path / "bowl.ply", OUTER, faces)
     with pytest.raises(StudyError, match=r"bowl: the surface encloses nothing when openings up to 3 mm are closed"):
         scan(path, solid=0.003, **FLAT)
-    with pytest.raises(StudyError, match="openings up to -1 mm"):
+    with pytest.raises(StudyError, match="cannot close openings of -1 mm"):
         scan(path, solid=-0.001, **FLAT)
 
 

@@ -100,13 +100,13 @@ def with_nan(body: Body) -> np.ndarray:
 
 REFUSED = {
     "open": (lambda b: {"triangles": b.triangles[1:]}, "open at 3 edges"),
-    "inside-out": (lambda b: {"triangles": b.triangles[:, ::-1].copy()}, "inside-out"),
+    "inverted": (lambda b: {"triangles": b.triangles[:, ::-1].copy()}, "flat or inverted"),
     "one triangle turned": (lambda b: {"triangles": turned(b)}, "not consistently oriented"),
     "doubled": (lambda b: {"triangles": np.vstack([b.triangles, b.triangles])}, "not manifold"),
     "nan": (lambda b: {"rest": with_nan(b)}, "not finite"),
     "massless": (lambda b: {"mass": np.where(np.arange(b.node_count) == 2, 0.0, b.mass)}, "node 2 has mass 0"),
     "too few masses": (lambda b: {"mass": b.mass[:-1]}, "one mass per node"),
-    "flat": (lambda b: {"rest": b.rest * [1, 1, 0]}, "flat or inside-out"),
+    "flat": (lambda b: {"rest": b.rest * [1, 1, 0]}, "flat or inverted"),
     "missing node": (lambda b: {"triangles": b.triangles + 10}, "names node"),
     "one triangle": (lambda b: {"triangles": b.triangles[:1]}, "at least 4"),
 }

@@ -173,9 +173,9 @@ def test_what_it_cannot_do_is_said(block_body):
     body = tetrahedral_body(points, triangles, tetrahedra, SOFT, "cotangent")
     refused(
         body.keeping(Volumes.nodal(body).joined(Volumes.closed_surfaces(body, {"lumen": lumen}))),
-        "beside those of nodes",
+        "it keeps nodal volumes only",
     )
-    refused(body.keeping(Volumes.patches(body)), "beside those of nodes")
+    refused(body.keeping(Volumes.patches(body)), "it keeps nodal volumes only")
     for settings in ({"bulk_ratio": -1.0}, {"tolerance": 0.0}, {"most_passes": 0}):
         with pytest.raises(MassSpringError, match=f"{next(iter(settings))} is .*(must be positive|at least one)"):
             ImplicitElements(**settings)

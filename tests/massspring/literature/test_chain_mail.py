@@ -150,9 +150,9 @@ def test_what_is_pressed_beyond_all_links_is_counted(filled_ball):
 @pytest.mark.parametrize(
     ("around", "sentence"),
     [
-        ({"gravity": (0.0, 0.0, -9.81)}, "nothing weighs"),
+        ({"gravity": (0.0, 0.0, -9.81)}, "gravity has no effect"),
         ({"velocity": 0.1}, "nothing moves by itself"),
-        ({"obstacles": (Sphere((0.0, 0.0, 1.0), 0.01, friction="no_slip"),)}, "no force to rub it"),
+        ({"obstacles": (Sphere((0.0, 0.0, 1.0), 0.01, friction="no_slip"),)}, "it has no forces, so no friction"),
         ({"targets": {"body": Ramp((0.0, 1.0), (1.0, 1.1))}}, "could be filled"),
     ],
 )

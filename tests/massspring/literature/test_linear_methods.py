@@ -245,4 +245,4 @@ def test_settings_that_are_none_are_refused(settings):
 
 def test_columns_beyond_memory_are_refused(monkeypatch):
     monkeypatch.setattr("massspring.methods.literature.elastic_response.MOST_BYTES", 1e4)
-    refused(linear_solid((2, 2, 2)), ElasticResponse(), "give a coarser mesh")
+    refused(linear_solid((2, 2, 2)), ElasticResponse(), "use a coarser mesh")

@@ -33,7 +33,7 @@ from tests.massspring.rows import CONTESTANTS, KINDS, SUPPORTED, by_pairs, kinds
 
 EACH = pytest.mark.parametrize("method", CONTESTANTS.values(), ids=CONTESTANTS.keys())
 MANY, NO_TETRAHEDRA = "it keeps one volume, the body keeps", "the body has none; fill its mesh"
-SHARE, LUMEN = "the body keeps a share of it", "the body keeps a lumen too"
+SHARE, LUMEN = "this body keeps part of that volume", "the body keeps a lumen too"
 POINTS = "its volumes lie at points; take a quadratic body"
 ELASTIC = {"points": POINTS, "elements": "its springs must have no length"}
 REFUSED = {
@@ -116,7 +116,10 @@ def test_a_body_runs_or_is_refused_with_the_sentence_of_the_table(method, kind, 
 
 
 ASKED = {
-    "thin_probes": ({"obstacles": (Probe((0.0, 0.0, 1.0)),)}, "is a thin probe, which method '{}' does not meet: {};"),
+    "thin_probes": (
+        {"obstacles": (Probe((0.0, 0.0, 1.0)),)},
+        r"method '{}' does not support thin probes \(obstacle 0\): {};",
+    ),
     "targets": ({"targets": {"whole": Ramp((0.0, 1e3), (1.0, 1.1))}}, "which method '{}' does not follow: {};"),
     "threads": ({"threads": 2}, "method '{}' runs on one thread, {};"),
     "float32": ({"precision": "float32"}, "method '{}' runs in float64 only, {};"),

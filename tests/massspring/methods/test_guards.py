@@ -132,7 +132,7 @@ def test_a_target_that_jumps_is_followed_behind_a_warning(case):
     clock = clock_for(case.body, 12, 10, fraction=0.1, method=case.method)
     jump = dict.fromkeys(case.body.kept.names, Ramp((0.0,), (1.1,)))
     with pytest.warns(
-        UserWarning, match="moves faster than .* would throw the body apart; it is followed at that rate"
+        UserWarning, match="moves faster than .* would tear the body apart; the target is limited to that rate"
     ):
         setup = case.setup(clock, damping=30.0, targets=jump)
     history = simulate(setup)

@@ -230,7 +230,7 @@ BAD = {
     "other method": (
         lambda: Probe((0, 0, 1)),
         {"method": Xpbd("whole")},
-        "'xpbd' does not meet: it does not correct the volumes again",
+        "'xpbd' does not support thin probes .*: it does not correct the volumes again",
     ),
 }
 

@@ -78,7 +78,7 @@ def test_refusals(checkout):
     with pytest.raises(MassSpringError, match=r"no module 'studies.nothing' in massspring"):
         fresh("studies.nothing")
     (checkout / "studies" / "user.py").write_text("x = = 1\n")
-    with pytest.raises(MassSpringError, match=r"user\.py is no Python \(.*, line 1\)"):
+    with pytest.raises(MassSpringError, match=r"user\.py is not valid Python \(.*, line 1\)"):
         fresh("studies.user")
 
 

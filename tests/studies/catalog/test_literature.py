@@ -61,10 +61,10 @@ def test_metrics_without_a_reference_are_numbers(ran):
 @pytest.mark.parametrize(
     ("scene", "method", "body", "sentence"),
     [
-        (BALL_SQUEEZE, LinearModes(), NODAL, "nothing is held"),
-        (BALL_SQUEEZE, ElasticResponse(), NODAL, "nothing is held"),
+        (BALL_SQUEEZE, LinearModes(), NODAL, "no nodes are clamped"),
+        (BALL_SQUEEZE, ElasticResponse(), NODAL, "no nodes are clamped"),
         (BALL_CLAMPED, ElasticResponse(), BodyRecipe(nodes=150), "its springs must have no length"),
-        (SPLEEN_SAG, ChainMail(), BodyRecipe(nodes=150), "nothing weighs"),
+        (SPLEEN_SAG, ChainMail(), BodyRecipe(nodes=150), "gravity has no effect"),
     ],
     ids=lambda value: getattr(value, "name", ""),
 )

@@ -202,6 +202,6 @@ def test_safe_dt_predicts_and_verifies(organbench):
     assert (code, err) == (0, "")
     assert "stability limit" in out
     assert "of the limit): diverged" in out
-    assert re.search(r"bracket +holds at [\d.]+ ms, diverges at [\d.]+ ms", out)
+    assert re.search(r"bracket +stable at [\d.]+ ms, diverges at [\d.]+ ms", out)
     assert out.strip().endswith("verified")
     assert "not verified" not in out

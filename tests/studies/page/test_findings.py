@@ -52,7 +52,7 @@ def test_forces_and_their_uncertainty(told):
     assert one.number == "−83.8 ± 0.2 %" and "−35.3 ± 0.2 % in tetrahedral bodies" in one.text
     best = told["The force nearest to the reference"]
     assert best.number == "+1.1 ± 0.2 to −35.3 ± 0.2 %"
-    assert "+1.1 ± 0.2 % in liver (quadratic, 550 nodes; displacement on the mean 0.8 ± 0.3 %)" in best.text
+    assert "+1.1 ± 0.2 % in liver (quadratic, 550 nodes; mean displacement error 0.8 ± 0.3 %)" in best.text
 
 
 def test_times_and_their_spread(told):
@@ -87,7 +87,7 @@ def test_an_entry_is_told_where_it_is_the_best_of_its_scene_and_only_there():
     assert told + "implicit_volume)." in finding.text and finding.text.count(" of theirs in ") == 1
     worse = loss("tetrahedral", "theirs", 5.0, -36.0, mean=5.0)
     (finding,) = [one for one in findings(beside(worse)) if one.title == "Results of other programs"]
-    assert finding.number == "0 of 3" and finding.text.endswith("in that scene.")
+    assert finding.number == "0 of 3" and finding.text.endswith("and methods.")
     alone = loss("tetrahedral", "theirs", 5.0, -36.0, scene="spleen")
     assert "force of theirs in spleen, −36.0 ± 0.2 %;" in findings(beside(alone))[-1].text
 

@@ -61,7 +61,7 @@ def test_text_stays_text():
 
 @pytest.mark.parametrize("text", ["", "no chart", "<svg", "<svg><g></svg>", "<svg>&a;</svg>", "</svg><svg"])
 def test_what_is_no_svg_is_refused(text):
-    with pytest.raises(StudyError, match="is no SVG"):
+    with pytest.raises(StudyError, match="is not an SVG file"):
         inline(text, "c", "A chart")
 
 

@@ -33,9 +33,9 @@ def test_a_method_comes_back_with_its_settings(method):
     [
         ("", "is not a recipe of a case"),
         ("[1]", "must be a JSON object"),
-        ('{"body": {"nodes": 300, "shape": "cube"}}', "the text is no stored case"),
-        ('{"steps": 3}', "nothing reads steps"),
-        ('{"body": {"kind": "cubic"}}', "the text is no stored case"),
+        ('{"body": {"nodes": 300, "shape": "cube"}}', "the text is not a stored case"),
+        ('{"steps": 3}', "unknown setting steps"),
+        ('{"body": {"kind": "cubic"}}', "the text is not a stored case"),
     ],
 )
 def test_what_is_no_recipe_is_one_sentence(text, said):

@@ -97,7 +97,7 @@ def test_constraints_never_shorten_the_limit(volumes):
 
 def test_a_limit_that_no_run_shows_has_no_bracket():
     calm = SafeStep(StepLimit(2.0, 0.0), 0.5, ((0.95, Status.OK), (1.1, Status.OK)))
-    assert calm.bracket is None and "no pair of runs" in calm.verdict
+    assert calm.bracket is None and "no stable step" in calm.verdict
     assert calm.margin == pytest.approx(2.0)
 
 

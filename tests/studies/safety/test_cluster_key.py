@@ -96,5 +96,5 @@ def test_a_worker_holds_the_key_that_lies_beside_its_file(scheduler, monkeypatch
 
 def test_without_openssl_there_is_one_sentence_and_no_scheduler(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(StudyError, match=r"openssl made none \(.*\): install the program openssl"):
+    with pytest.raises(StudyError, match=r"openssl failed: .*\), .*; install openssl"):
         tls.make_key(tmp_path / "folder")

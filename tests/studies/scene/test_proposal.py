@@ -79,7 +79,7 @@ def cup():
 REFUSED = {
     "off the surface": ((0.03, 0.0, 0.0), (0.0, 0.0, 0.1), "--probe is 85 mm from the surface, which lies between"),
     "in metres": ((30.0, 0.0, 0.0), None, "--hold is 2.99.* mm from the surface"),
-    "held": ((0.03, 0.0, 0.0), (0.028, 0.0, 0.0), "--probe is held, or less than the probe's radius"),
+    "held": ((0.03, 0.0, 0.0), (0.028, 0.0, 0.0), "--probe is in the clamped region, or closer to it"),
 }
 
 
@@ -114,5 +114,5 @@ def test_a_tissue_is_taken_from_a_name_that_tells_one():
 def test_a_body_without_a_free_patch_is_told():
     points, faces = egg()
     inside_out = body_of(points, faces[:, ::-1])
-    with pytest.raises(StudyError, match="egg: no freely reachable patch lies far from its held end"):
+    with pytest.raises(StudyError, match="egg: no freely reachable patch lies far from its clamped end"):
         proposal(inside_out)

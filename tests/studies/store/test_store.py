@@ -136,14 +136,14 @@ def test_a_record_that_is_not_as_its_table_says_is_not_written(tmp_path):
         "holds 'rest' with shape (27, 2), not (27, 3)": replace(
             stored, fields=stored.fields | {"rest": replace(stored.fields["rest"], values=np.zeros((27, 2)))}
         ),
-        "holds 'more', which is no field of a run": replace(
+        "holds 'more', which is not a field of a run": replace(
             stored, fields=stored.fields | {"more": Field(np.zeros(1), "1", "more")}
         ),
-        "has frames = '4.0', which is no whole number": replace(stored, attributes=stored.attributes | {"frames": 4.0}),
+        "has frames = '4.0', not a whole number": replace(stored, attributes=stored.attributes | {"frames": 4.0}),
         "lacks the attribute 'law'": replace(
             stored, attributes={n: v for n, v in stored.attributes.items() if n != "law"}
         ),
-        "holds a zero byte": replace(stored, name="a\0b"),
+        "contains a null byte": replace(stored, name="a\0b"),
     }
     for told, one in odd.items():
         with pytest.raises(StudyError) as problem:

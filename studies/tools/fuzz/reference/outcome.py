@@ -93,7 +93,7 @@ def _run(trial: ReferenceTrial, ask: Callable[[], None], reached: Reached) -> tu
     if status == "ok" and flattest <= 0.0:
         return "inverted", f"an element is inverted at a corner at rest (volume ratio {flattest:.3g})"
     if status == "ok" and least <= 0.0:
-        return "inverted", f"an element ends inverted at a corner (least volume ratio {least:.3g})"
+        return "inverted", f"an element is inverted at a corner (smallest volume ratio {least:.3g})"
     return status, message
 
 

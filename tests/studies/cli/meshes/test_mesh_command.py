@@ -64,7 +64,7 @@ def test_a_file_is_mended_remeshed_and_filled(organbench, tmp_path):
     target = tmp_path / "scan.vtu"
     code, out, err = organbench("mesh", "--from", path, "--unit", "mm", "--nodes", 150, "-o", target)
     assert code == 0 and "150 outer nodes" in out
-    assert "scan.stl: 1 of 2 separate parts are left out" in err and "inside out and is turned round" in err
+    assert "scan.stl: 1 of 2 separate parts are left out" in err and "inverted and has been flipped" in err
     made = read_mesh(target)
     assert made.volume == pytest.approx(1e-9 * signed_volume(POINTS, FACES), rel=1e-3)
     assert organbench("mesh-check", target)[0] == 0
@@ -136,7 +136,7 @@ def asked_wrongly(folder):
         "options": (("mesh", "ball", "--smooth", 2, "--close-holes", *out), "--smooth and --close-holes are for files"),
         "solid": (("mesh", "liver", "--wall", 3, *out), "the liver is solid; --wall is for ball"),
         "thick wall": ((*scan, "--nodes", 150, "--wall", 30, *out), "does not fit into it"),
-        "wall of a file": ((*scan, "--wall", 3, *out), "say how many nodes"),
+        "wall of a file": ((*scan, "--wall", 3, *out), "set its number of nodes"),
         "few nodes": ((*scan, "--nodes", 10, *out), "10 surface nodes asked for"),
         "few nodes of an organ": (("mesh", "liver", "--nodes", 20, *out), "20 surface nodes asked for"),
         "folder": (("mesh", "ball", "--nodes", 150, "-o", folder / "egg.ply" / "out.vtu"), "was not written"),

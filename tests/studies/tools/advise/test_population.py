@@ -39,7 +39,7 @@ def test_only_members_of_that_organ_with_that_recipe_count(tmp_path, place):
     found = unseen(tmp_path, CASE)
     assert found is not None and (found.force.count, found.force.lost, found.organ) == (41, 1, "liver")
     assert found.force.bound == pytest.approx(np.quantile(np.abs(FORCES), 0.95))
-    assert "41 other organs" in words(found) and "1 more lost" in words(found) and "3.8 %" in words(found)
+    assert "41 other organs" in words(found) and "1 more failed" in words(found) and "3.8 %" in words(found)
 
 
 def test_nothing_is_said_where_nothing_was_run(tmp_path):

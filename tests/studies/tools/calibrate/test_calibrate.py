@@ -104,7 +104,7 @@ def test_an_interrupted_calibration_goes_on(made, tmp_path, monkeypatch):
 def test_a_body_that_ends_badly_from_the_start_is_named(made):
     folder, _, _ = made
     runs = Measurements(folder, (DEEP,))
-    with pytest.raises(StudyError, match=r"is failed before the fit .*give another number of nodes"):
+    with pytest.raises(StudyError, match=r"ended as failed before the fit .*give another number of nodes"):
         runs.first_errors(DEEP, BodyRecipe(nodes=3))
 
 
@@ -132,9 +132,9 @@ def test_what_limits_a_trial_is_said(monkeypatch):
     body = BodyRecipe("surface", NODES)
     found = calibration("liver", body, (Fold((liver,), (DEEP,)),), Runs(), Silent())  # type: ignore[arg-type]
     (trial,) = found.trials
-    assert [remark.split()[0] for remark in trial.remarks] == ["judged", "inner", "stiffness", "the", "with"]
+    assert [remark.split()[0] for remark in trial.remarks] == ["judged", "inner", "stiffness", "the", "the"]
     assert trial.remarks[0] == "judged on other organs (ball)"
-    assert trial.remarks[-1] == "with the fitted body ball_squeeze ended badly"
+    assert trial.remarks[-1] == "the fitted body failed in ball_squeeze"
     assert found.verdict is trial.force is Verdict.MEMORISES and trial.errors[1].force.after is None
 
 

@@ -96,7 +96,7 @@ def test_each_truth_is_missed_by_what_breaks_it(pressed):
     assert "not finite" in str(broken(setup, replace(history, pressure=history.pressure * np.nan)))
     assert "encloses" in str(broken(setup, replace(history, volume=history.volume * (1 + 1e-6))))
     shifted = replace(history, final=history.final + np.array([1e-6, 0.0, 0.0]))
-    assert "from where it is held" in str(broken(setup, shifted))
+    assert "from its prescribed position" in str(broken(setup, shifted))
     deep = replace(history, penetration=history.penetration + 0.5 * setup.body.size)
     assert "inside obstacle 0" in str(broken(setup, deep))
     upright = {"min_j": np.abs(history.min_j)}
