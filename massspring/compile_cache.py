@@ -40,6 +40,10 @@ def folder() -> Path:
     return Path(chosen) if chosen else cache_folder() / "compiled"
 
 
+_ready: set[str] = set()
+"""Folders that were made, or can be written to, in this process."""
+
+
 class ByMeaning(caching.UserProvidedCacheLocator):
     """numba's locator for functions of this distribution: a folder for each state of the code of a module."""
 
@@ -48,7 +52,13 @@ class ByMeaning(caching.UserProvidedCacheLocator):
         module = py_func.__module__
         given = ARGUMENTS if module.startswith("massspring.") else ()
         self._stamp = source_fingerprint(module, *given, within=COMPILED)
-        self._cache_path = str(folder() / f"{module}-{self._stamp[:16]}")
+        self._cache_path = os.path.join(config.CACHE_DIR, f"{module}-{self._stamp[:16]}")  # pyright: ignore[reportAttributeAccessIssue]
+
+    def ensure_cache_path(self) -> None:
+        """Makes the folder, once for all functions of a module. Raises OSError."""
+        if self._cache_path not in _ready:
+            super().ensure_cache_path()
+            _ready.add(self._cache_path)
 
     def get_source_stamp(self) -> str:
         """What the stored code must have been compiled from."""

@@ -50,7 +50,7 @@ def source_fingerprint(*modules: str, within: tuple[str, ...] = OWN) -> str:
         if name in known:
             continue
         known[name] = _source(name)
-        waiting += [other for other in _followed(known[name]) if _counts(other, within)]
+        waiting += [other for other in _followed(name) if _counts(other, within)]
     _remembered().keep()
     digest = hashlib.sha256()
     for name in sorted(known):
@@ -79,6 +79,7 @@ def own_modules() -> tuple[str, ...]:
     return tuple(".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for file in files)
 
 
+@cache
 def _counts(module: str, within: tuple[str, ...]) -> bool:
     return _is_within(module, within) and not _is_within(module, APART)
 
@@ -87,11 +88,11 @@ def _is_within(module: str, within: tuple[str, ...]) -> bool:
     return any(module == part or module.startswith(part + ".") for part in within)
 
 
-def _followed(source: Source) -> Iterator[str]:
-    """The modules that the imported names come from; a package that passes a name on is passed over."""
-    for module, name in source.imports:
-        if own_file(module) is not None:
-            yield _origin(module, name)
+@cache
+def _followed(module: str) -> frozenset[str]:
+    """The modules that the names it imports come from; a package that passes a name on is passed over."""
+    imports = _source(module).imports
+    return frozenset(_origin(other, name) for other, name in imports if own_file(other) is not None)
 
 
 def _stub(module: str) -> Path:

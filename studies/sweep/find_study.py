@@ -1,7 +1,7 @@
 """A study by name: of the catalogue, or of a Python file of the user."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,6 @@ from typing import Any
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
-from studies.catalog.population import POPULATION, population_study, study_on
 from studies.runs.case import Case, case_from_json, case_to_dict
 from studies.scene.clock import check_clock
 from studies.sweep.find_scene import SUFFIX, read_user_file
@@ -43,6 +42,8 @@ def find_study(name: str) -> Study:
 
 
 def _on_folder(name: str, given: str) -> Study:
+    from studies.catalog.population import study_on  # with the geometry of scans, which takes a while to load
+
     folder, _, unit = given.partition(":") if not Path(given).is_dir() else (given, "", "")
     study, placed = study_on(find_study(name), Path(folder), unit or None)
     for one in placed:
@@ -57,7 +58,11 @@ def known_studies(names: Sequence[str]) -> list[Study]:
 
     Raises StudyError with the nearest name.
     """
-    makers = {study.name: (lambda study=study: study) for study in STUDIES} | {POPULATION: population_study}
+    makers: dict[str, Callable[[], Study]] = {study.name: lambda study=study: study for study in STUDIES}
+    if not makers.keys() >= set(names):
+        from studies.catalog.population import POPULATION, population_study  # as above
+
+        makers[POPULATION] = population_study
     return [lookup(name, makers, "study")() for name in names]
 
 

@@ -13,7 +13,6 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
 from studies.catalog.checks import check_study
-from studies.catalog.population import POPULATION
 from studies.cli.options import case_named
 from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import PROGRAM, SMOKE, Results, Smoke, console, say, warn
@@ -35,7 +34,7 @@ from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import causes, failed, standings, summary, unexpected, warnings_of
 
 JOBS = 2
-"""Processes, where nothing is said."""
+"""Processes by default."""
 AGAIN = "timing: re-measure stored cases on this machine; run nothing else"
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 GIVEN = f"studies, or a FILE.py with STUDY or SCENE ({PROGRAM}); default: {MAIN_STUDIES}"
@@ -66,6 +65,8 @@ def run(
     root, rules, failures = results / SMOKE if smoke else results, _rules(only), Failures()
     ledger = Ledger(root)
     if organs:
+        from studies.catalog.population import POPULATION  # with the geometry of scans, which takes a while to load
+
         studies = [f"{name}{ON}{organs}" for name in studies or [POPULATION]]
     chosen, well = [_chosen(study, smoke, case) for study in find_studies(studies or [])], True
     for study in [] if again else chosen:

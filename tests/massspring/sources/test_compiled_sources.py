@@ -128,7 +128,7 @@ def test_every_named_tuple_of_the_kernels_is_part_of_their_stamps():
         module = waiting.pop()
         if module not in covered:
             covered.add(module)
-            waiting += [other for other in sources._followed(sources._source(module)) if other.startswith(COMPILED)]
+            waiting += [other for other in sources._followed(module) if other.startswith(COMPILED)]
     assert own <= covered
 
 
