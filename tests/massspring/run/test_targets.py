@@ -75,7 +75,7 @@ def blown_up(body, fraction: float, damping: float = 0.0):
     """The history of a body whose volumes are asked to jump by 30 %, for a while of several oscillations."""
     dt = fraction * step_limit(body).undamped
     jump = Ramp((0.0,), (JUMP,))
-    with pytest.warns(UserWarning, match="followed at that rate"):
+    with pytest.warns(UserWarning, match="limited to that rate"):
         setup = Setup(
             body,
             ImplicitVolume(),

@@ -91,7 +91,7 @@ def test_a_key_that_is_no_case_cannot_be_replayed(refused, results):
     data = json.loads(record.key)
     data["body"]["noodles"] = 100
     write_record(path, replace(record, key=json.dumps(data)))
-    assert "no stored case" in refused("replay", path)
+    assert "not a stored case" in refused("replay", path)
 
 
 @pytest.mark.parametrize("command", [("run",), ("plot",), ("table", "--csv", "TARGET")])

@@ -141,7 +141,7 @@ UNREADABLE = {
     "dt NaN": (lambda d: d.update(dt=float("nan")), "dt is nan"),
     "fraction": (lambda d: d.update(dt_fraction=0.0), "dt_fraction is 0.0"),
     "frames": (lambda d: d.update(frames=0), "frames is 0"),
-    "extra": (lambda d: d.update(colour="red"), "nothing reads colour"),
+    "extra": (lambda d: d.update(colour="red"), "unknown setting colour"),
 }
 
 
@@ -154,7 +154,7 @@ def test_what_no_one_would_read_is_refused_by_name(edit, named):
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "3", "null", '"case"', "{}", '{"scene": 3}'])
 def test_malformed_text_is_refused(text):
-    with pytest.raises(StudyError, match="no stored case"):
+    with pytest.raises(StudyError, match="not a stored case"):
         case_from_json(text)
 
 

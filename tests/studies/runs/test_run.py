@@ -152,7 +152,7 @@ def test_ending_inside_out(ended, smallest, status):
     case, prepared, history = ended
     verdict, message = judge(case, prepared, replace(history, min_j=np.append(history.min_j[:-1], smallest)))
     assert verdict == status
-    assert ("ends inverted" in message) == (status == Status.INVERTED)
+    assert ("inverted at the end" in message) == (status == Status.INVERTED)
 
 
 @pytest.mark.parametrize(("off", "status"), [(0.009, Status.OK), (-0.011, Status.DRIFTED), (0.05, Status.DRIFTED)])
@@ -162,7 +162,7 @@ def test_a_kept_volume_that_was_not_kept(ended, off, status):
     volume[2] = (1 + off) * prepared.setup.body.volume
     verdict, message = judge(case, prepared, replace(history, volume=volume))
     assert verdict == status
-    assert (f"off by {100 * abs(off):.3g} %" in message) == (status == Status.DRIFTED)
+    assert (f"volume error {100 * abs(off):.3g} %" in message) == (status == Status.DRIFTED)
     # A method that claims no volume cannot break the claim.
     assert judge(case.replaced(method=Free()), prepared, replace(history, volume=volume))[0] == Status.OK
 
