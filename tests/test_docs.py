@@ -3,7 +3,6 @@
 import re
 import shlex
 import tokenize
-import unicodedata
 from pathlib import Path
 from typing import Any
 
@@ -201,11 +200,3 @@ def test_names_of_the_notation_stand_in_the_code():
     assert len(names) > 10
     gone = sorted(name for name in names if not re.search(rf"\b{name}\b", code))
     assert not gone, f"docs/notation.md names what the code does not have: {', '.join(gone)}"
-
-
-def test_prose_of_the_docs_fits_a_screen():
-    """At most 120 columns, but for tables and lines that hold a link."""
-    for page in PAGES:
-        for line in read(page).split("\n"):
-            width = sum(not unicodedata.combining(letter) for letter in line)
-            assert width <= 120 or line.startswith(("|", "    ")) or "](" in line, f"{page.name}: {line[:60]}"

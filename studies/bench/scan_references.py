@@ -17,15 +17,13 @@ from studies.catalog.population.folder import DURATION, NODES, PLAN, placed_scen
 from studies.geometry import HalfSpace, OrganMesh, scan
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import triangle_areas
-from studies.reference.load import Reference, load_reference
-from studies.reference.reference_solves import reference_fingerprint, reference_solves
-from studies.reference.solve import solve
+from studies.reference.load import Reference
 from studies.scene.chosen_place import vector
 from studies.scene.placing import scaled
 from studies.scene.proposal import HELD, Proposal, proposal
 from studies.scene.scene import ForceOutput, Held, Scene
 from studies.scene.scene_file import python_name
-from studies.store.entry import why_stale
+from studies.tools.verify.second_judge import reference_of
 
 PRESSED_IN, LIFTED = 0.1, 0.15
 """How far a plane goes in, of the depth along its way, and the free end goes up, of the organ's length."""
@@ -80,16 +78,6 @@ def lifted(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
     return replace(probed, title=title, obstacles=(), held=held, reference=plan, probed=ForceOutput("held", 1, up))
 
 
-def solved(root: Path, scene: Scene) -> Reference:
-    """The scene's reference, of which is solved what is not in `root` yet. Raises StudyError where a solve fails."""
-    for one in reference_solves(scene):
-        if why_stale(one.path(root), one.key, reference_fingerprint()) is not None:
-            solve(root, one)
-    reference = load_reference(root, scene)
-    assert reference is not None  # all of these scenes have a plan
-    return reference
-
-
 def row(scene: Scene, reference: Reference) -> str:
     """What a reference says: force on each mesh [N], unknowns, seconds, and how far its finest is to be trusted [%]."""
     family = (*reversed(reference.coarser), reference)
@@ -122,7 +110,7 @@ def rows(root: Path, paths: list[Path], loads: list[str], fine: bool = False) ->
         for load in loads:
             scene = refined(scenes[load]) if fine else scenes[load]
             try:
-                yield row(scene, solved(root, scene))
+                yield row(scene, reference_of(root, scene))
             except StudyError as error:
                 yield f"{scene.name:28}  {error}"
 

@@ -1,1 +1,1 @@
-"""The promised speeds over commits, for asv: `make bench-commits`."""
+"""The promised speeds over commits, for asv: `make speeds`."""

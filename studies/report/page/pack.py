@@ -28,13 +28,6 @@ def pack_series(values: np.ndarray) -> dict[str, Any]:
     return {"low": low, "high": high, "data": _text(levels.astype("<u2").tobytes())}
 
 
-def unpack_series(packed: dict[str, Any]) -> np.ndarray:
-    """What the page reads, (n,)."""
-    levels = np.frombuffer(base64.b64decode(packed["data"]), "<u2")
-    values = packed["low"] + (packed["high"] - packed["low"]) * (levels / LEVELS)
-    return np.where(levels > LEVELS, np.nan, values)
-
-
 def pack_frames(positions: np.ndarray, size: float) -> dict[str, Any]:
     """Positions (P, n, 3) [m] of a body of `size` [m]; with the step of the grid that they are rounded to."""
     low = positions.min(axis=(0, 1)).astype(float)
@@ -45,14 +38,6 @@ def pack_frames(positions: np.ndarray, size: float) -> dict[str, Any]:
     change = np.ascontiguousarray(np.diff(levels, axis=0, prepend=0).astype("<i2").transpose(2, 1, 0))
     planes = change.view(np.uint8).reshape(-1, 2).T.tobytes()
     return {"shape": list(positions.shape[:2]), "low": low.tolist(), "step": step, "data": _deflated(planes)}
-
-
-def unpack_frames(packed: dict[str, Any]) -> np.ndarray:
-    """What the page reads, (P, n, 3) [m]."""
-    planes = np.frombuffer(zlib.decompress(base64.b64decode(packed["data"])), np.uint8).reshape(2, -1)
-    count, nodes = packed["shape"]
-    change = np.ascontiguousarray(planes.T).view("<i2").reshape(3, nodes, count).transpose(2, 1, 0)
-    return np.asarray(packed["low"]) + packed["step"] * np.cumsum(change, axis=0, dtype=np.int64)
 
 
 def pack_indices(indices: np.ndarray) -> str:

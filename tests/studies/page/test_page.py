@@ -17,7 +17,6 @@ from studies.catalog import Chart
 from studies.metrics.table import study_table
 from studies.report.page import write as module
 from studies.report.page.markup import script_json
-from studies.report.page.pack import unpack_frames, unpack_series
 from studies.report.page.part import part_path, read_part, write_part
 from studies.report.page.svg import inline
 from studies.report.page.write import ASSETS, SCRIPTS, write_page
@@ -25,6 +24,7 @@ from studies.report.results import draw_charts, report
 from studies.store.ledger import Ledger
 from tests.plots.made_up import POINTS, STRETCH
 from tests.studies.page.made_up_page import COLUMNS, HELD, MOMENTS, NASTY, losses, made_up_parts, rates, theirs
+from tests.studies.page.unpack import unpack_frames, unpack_series
 from tests.studies.tiny import tiny_study
 
 VOID = {"meta", "link", "input", "br", "img"}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from studies.bench import scan_references
-from studies.bench.scan_references import LIFTED, LOADS, PRESSED_IN, main, refined, row, scan_scenes, solved
+from studies.bench.scan_references import LIFTED, LOADS, PRESSED_IN, main, reference_of, refined, row, scan_scenes
 from studies.geometry import organ
 from tests.geometry.real import real_surface
 
@@ -83,7 +83,7 @@ def test_references_of_real_organs_can_judge(name, load, force, tmp_path, mesh_c
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # thin margins are told of
         scene = scan_scenes(real_surface(name))[load]
-        reference = solved(tmp_path, scene)
+        reference = reference_of(tmp_path, scene)
     bars = reference.total_uncertainty
     assert bars["force_end"] < force and bars["surface_mean"] < 0.005
     assert row(scene, reference).startswith(scene.name)

@@ -13,12 +13,12 @@ import pytest
 from studies.cli.commands.place import SHIPPED, UNKNOWNS, VARIANTS
 from studies.geometry import organ, read_mesh
 from studies.meshing.scene_mesh import mesh_for
-from studies.report.page.pack import unpack_frames
 from studies.runs.case import BodyRecipe
 from studies.scene.chosen_place import DEPTH
 from studies.scene.tissues import SPLEEN
 from studies.tools.advise.answer import advise
 from tests.geometry.boxes import box, together
+from tests.studies.page.unpack import unpack_frames
 
 PAGE = Path(__file__).parents[4] / "docs" / "own-organ.md"
 COMMANDS = re.findall(r"^    organbench (.+)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
