@@ -9,7 +9,7 @@ import h5py
 from studies.base.atomic import is_there, sweep_parts, write_whole
 from studies.store.entry import Entry
 from studies.store.ledger import Ledger
-from studies.store.opening import BLOCK, sealed
+from studies.store.opening import sealed
 from studies.store.paths import DIGITS, SUFFIX, TIMING, index_path
 from studies.store.record import INDEX_KIND, SCHEMA
 
@@ -31,7 +31,7 @@ def link_study(ledger: Ledger, study: str) -> list[str]:
     )
     targets = _targets(records, {"timing"}) | _targets(timings)
     image = io.BytesIO()
-    with h5py.File(image, "w", userblock_size=BLOCK) as file:
+    with h5py.File(image, "w") as file:
         file.attrs.update({"schema": SCHEMA, "kind": INDEX_KIND, "name": study})
         for name, target in targets.items():
             file[name] = h5py.ExternalLink(target, "/")

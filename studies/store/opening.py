@@ -4,9 +4,11 @@ The seal is looked at before the HDF5 library sees the file: single bits send th
 """
 
 import hashlib
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 import h5py
 
@@ -14,32 +16,44 @@ from studies.base.atomic import is_there
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
 
 AGAIN = "delete it, or run its study again, which replaces it"
-BLOCK = 512
-"""Bytes before the HDF5 file proper, its user block: the smallest that the format allows."""
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
-LABEL = b"organbench results; bytes and SHA-256 of what follows these 512: "
+FORMAT = ("v110", "v110")
+"""Of HDF5: the first that can hold the views of studies.store.vtk_group."""
+SUPERBLOCK = 3
+"""The byte behind the signature in files of this format."""
+SEAL = 160
+"""Bytes behind the HDF5 file proper, whose readers ignore them."""
+LABEL = b"\norganbench results; bytes and SHA-256 of what precedes these 160: "
+FORMER_SEAL = 512
+"""Bytes before the HDF5 file proper in files written earlier: the smallest user block that the format allows."""
+FORMER_LABEL = b"organbench results; bytes and SHA-256 of what follows these 512: "
+CHUNK = 1 << 20
 
 
 def sealed(image: bytes) -> bytes:
-    """The HDF5 file `image`, made with a user block of BLOCK bytes, with its length and digest in there."""
-    digest = hashlib.sha256(memoryview(image)[BLOCK:]).hexdigest()
-    return _seal(len(image) - BLOCK, digest) + image[BLOCK:]
+    """The HDF5 file `image` with its length and digest behind it."""
+    return image + _seal(len(image), hashlib.sha256(image).hexdigest())
 
 
 def check_seal(path: Path) -> None:
     """Raises DamagedFile unless every byte of a file is as it was written, OtherVersion for HDF5 without a seal, and
     OSError; about a millisecond per megabyte."""
     with open(path, "rb") as file:
-        head, digest = file.read(BLOCK), hashlib.file_digest(file, "sha256").hexdigest()
-        size = file.tell()
-    if head == _seal(size - BLOCK, digest):
+        head, size = file.read(FORMER_SEAL), file.seek(0, os.SEEK_END)
+        former = head.startswith(FORMER_LABEL)
+        place, length = (FORMER_SEAL, size - FORMER_SEAL) if former else (0, size - SEAL)
+        file.seek(place)
+        digest = _digest(file, length)
+        tail = file.read()
+    if (former and head == _former_seal(length, digest)) or tail == _seal(length, digest):
         return
-    if head.startswith(SIGNATURE):
+    if head.startswith(SIGNATURE) and not tail.startswith(LABEL) and head[len(SIGNATURE) :][:1] != bytes([SUPERBLOCK]):
         raise OtherVersion(
             f"{path} is an HDF5 file of another program, or of an earlier version of organbench, which stored no "
             "checksums: run its case again, or read it with the version that wrote it"
         )
-    what = "is cut off or damaged" if head.startswith(LABEL) else "is not an HDF5 file, or was cut off"
+    known = former or head.startswith(SIGNATURE)
+    what = "is cut off or damaged" if known else "is not an HDF5 file, or was cut off"
     raise DamagedFile(f"{path} {what} ({size} bytes): {AGAIN}")
 
 
@@ -78,5 +92,18 @@ def _without_lock(path: Path) -> h5py.File:
         return h5py.File(path, "r")
 
 
+def _digest(file: BinaryIO, length: int) -> str:
+    """SHA-256 (hex) of the next `length` bytes."""
+    digest = hashlib.sha256()
+    while length > 0 and (chunk := file.read(min(length, CHUNK))):
+        digest.update(chunk)
+        length -= len(chunk)
+    return digest.hexdigest()
+
+
 def _seal(length: int, digest: str) -> bytes:
-    return (LABEL + f"{length} {digest}\n".encode()).ljust(BLOCK, b"\0")
+    return (LABEL + f"{length} {digest}".encode()).ljust(SEAL - 1) + b"\n"
+
+
+def _former_seal(length: int, digest: str) -> bytes:
+    return (FORMER_LABEL + f"{length} {digest}\n".encode()).ljust(FORMER_SEAL, b"\0")

@@ -17,7 +17,7 @@ from studies.base.atomic import write_whole
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.base.lookup import lookup
 from studies.store.faults import fault
-from studies.store.opening import AGAIN, BLOCK, open_results, sealed
+from studies.store.opening import AGAIN, FORMAT, open_results, sealed
 from studies.store.schema import LAYOUTS, Status
 from studies.store.vtk_group import add_vtk_group
 
@@ -26,8 +26,6 @@ INDEX_KIND = "index"
 SCHEMA = 2
 """Version of the layout (studies.store.schema); raised when a reader of the old one would misread the new one. 1 had no
 seal."""
-FORMAT = ("v110", "v110")
-"""Of HDF5: the first that can hold the views of studies.store.vtk_group."""
 PART_DIGESTS = "checksums"
 """Attribute of files written earlier, with digests of their parts, which the seal of the whole file replaces."""
 DIMENSION = "This is a netCDF dimension but not a netCDF variable.%10d"
@@ -78,7 +76,7 @@ def write_record(path: Path, record: Record) -> None:
     _check(record)
     # Built in memory: a full disk then fails in one plain write, never half-way inside the HDF5 library.
     image = io.BytesIO()
-    with h5py.File(image, "w", libver=FORMAT, userblock_size=BLOCK) as file:
+    with h5py.File(image, "w", libver=FORMAT) as file:
         attributes = {name: getattr(record, name) for name in HEADER} | record.attributes
         for name, value in attributes.items():
             plain = str(value) if isinstance(value, str) else value  # an Enum of text is not text to HDF5

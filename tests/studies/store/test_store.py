@@ -1,5 +1,6 @@
 import json
 from dataclasses import replace
+from hashlib import sha256
 
 import h5py
 import numpy as np
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from studies.base.errors import OtherVersion, StudyError
-from studies.store.entry import CASE_CHANGED, CODE_CHANGED, MISSING, OTHER_VERSION, why_stale
+from studies.store.entry import CASE_CHANGED, CODE_CHANGED, DAMAGED, MISSING, OTHER_VERSION, why_stale
 from studies.store.new_record import new_fields, new_record
 from studies.store.opening import open_results, sealed
 from studies.store.record import SCHEMA, Field, Record, Status, peek, read_record, write_record
@@ -167,6 +168,28 @@ def test_a_file_with_digests_of_its_parts_is_read_as_before(tmp_path):
     assert why_stale(path, stored.key, stored.fingerprint) is None
 
 
+@pytest.mark.parametrize("spoilt", [None, 5, 600, -1])
+def test_a_file_with_its_seal_at_the_beginning_is_read_as_before(tmp_path, spoilt):
+    """In the user block of HDF5, as files written earlier have it; a changed byte is damage there too."""
+    path, stored = tmp_path / "a.h5", made_up_run.run().record
+    write_record(path, stored)
+    with h5py.File(path) as new, h5py.File(tmp_path / "b.h5", "w", libver="v110", userblock_size=512) as old:
+        old.attrs.update(new.attrs)
+        for name in new:
+            new.copy(name, old)
+    image = (tmp_path / "b.h5").read_bytes()[512:]
+    words = (
+        f"organbench results; bytes and SHA-256 of what follows these 512: {len(image)} {sha256(image).hexdigest()}\n"
+    )
+    content = bytearray(words.encode().ljust(512, b"\0") + image)
+    if spoilt is not None:
+        content[spoilt] ^= 1
+    path.write_bytes(content)
+    assert why_stale(path, stored.key, stored.fingerprint) == (None if spoilt is None else DAMAGED)
+    if spoilt is None:
+        assert_same(stored, read_record(path))
+
+
 def test_the_former_layout_is_stale_and_says_so(tmp_path):
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:
@@ -194,7 +217,7 @@ KINDS = {
 def test_xarray_opens_a_record_with_named_dimensions(tmp_path, kind):
     path, stored = tmp_path / "a.h5", KINDS[kind]()
     write_record(path, stored)
-    with xarray.open_dataset(path, engine="h5netcdf") as shown:
+    with xarray.open_dataset(path) as shown:
         assert set(shown.variables) == set(stored.fields)
         for name, field in stored.fields.items():
             assert shown[name].dims == tuple(LAYOUTS[kind][0][name].shape.split())
