@@ -15,9 +15,8 @@ help: ## this list
 	@awk -F ':.*## ' '/^[a-z%\/.-]+:.*## / {printf "  %-22s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 	@echo "Main studies: $$(grep -l main=True studies/catalog/*.py | xargs -n 1 basename -s .py | xargs)"
 
-study: compiled-essential ## run the main studies, then the charts and tables (the main job; minutes)
-	$(BIN)/organbench run
-	$(BIN)/organbench report
+study: setup-run ## run the main studies, then the charts and tables (the main job; minutes)
+	$(BIN)/organbench run --report
 
 study-%: setup-run ## run one study and draw it: make study-volume_loss
 	$(BIN)/organbench run $*

@@ -19,3 +19,14 @@ def status_counts(statuses: Iterable[str]) -> str:
     """ "16 ok, 2 stale": ok first, then by number."""
     counts = Counter(status.replace("-", " ") for status in statuses)
     return ", ".join(f"{n} {word}" for word, n in sorted(counts.items(), key=lambda c: (c[0] != "ok", -c[1], c[0])))
+
+
+def readable(name: str) -> str:
+    """A name of the code as words: "implicit_volume" -> "implicit volume"."""
+    return name.replace("_", " ").replace("-", " ")
+
+
+def heading(name: str) -> str:
+    """The same with a capital letter."""
+    words = readable(name)
+    return words[:1].upper() + words[1:]

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import bootstrap
 
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run
@@ -85,6 +84,8 @@ def _bound(values: np.ndarray, axis: int = -1) -> np.ndarray:
 def _interval(values: np.ndarray, statistic: object, seed: int) -> tuple[float, float]:
     if len(values) < 2:
         return (np.nan, np.nan)
+    from scipy.stats import bootstrap  # which takes a quarter of a second to load
+
     found = bootstrap(
         (values,),
         statistic,

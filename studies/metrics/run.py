@@ -1,5 +1,6 @@
 """A run with what it is judged by: the stored case, its reference, its frame times."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -156,3 +157,11 @@ class Run:
         area = triangle_areas(self.fields.rest, triangles)
         share = np.bincount(triangles.ravel(), weights=np.repeat(area / 3, 3), minlength=len(self.fields.rest))
         return share[self.material_nodes]
+
+
+def by_scene(runs: Sequence[Run]) -> dict[str, list[Run]]:
+    """Runs of each scene, in the order in which they come."""
+    groups: dict[str, list[Run]] = {}
+    for run in runs:
+        groups.setdefault(run.case.scene.name, []).append(run)
+    return groups

@@ -8,14 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from studies.base.counting import heading, readable
 from studies.metrics.metric import RESOLVED_SHARE, Metric
 from studies.metrics.metrics import METRICS
-from studies.metrics.run import Run
+from studies.metrics.run import Run, by_scene
 from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
     band_handle,
     blank,
-    by_scene,
     finish,
     grouped,
     has_frames,
@@ -26,7 +26,7 @@ from studies.plots.style.page import (
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, readable, remark, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, method_colour, remark, save, styled
 from studies.runs.case import BodyRecipe
 from studies.store.record import Status
 

@@ -8,11 +8,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from massspring import Free
+from studies.base.counting import heading
 from studies.metrics.run import Run
 from studies.metrics.timing.statistics import Ratio, ratio_with_spread
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, finish, grouped, page
-from studies.plots.style.style import BLACK, GREY, NORMAL, heading, method_colour, method_label, save, styled
+from studies.plots.style.style import BLACK, GREY, NORMAL, method_colour, method_label, save, styled
 
 TITLE = "Cost of keeping the volume"
 Row = tuple[str, str, Ratio]

@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from massspring import Trajectory
+from studies.base.counting import heading
 from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import METRICS, force_end
-from studies.metrics.run import Run
+from studies.metrics.run import Run, by_scene
 from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
     band_handle,
     blank,
-    by_scene,
     finish,
     good_frames,
     grouped,
@@ -30,7 +30,7 @@ from studies.plots.style.page import (
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, method_colour, save, styled
 from studies.runs.case import BodyRecipe
 from studies.scene.library import Scene
 

@@ -9,12 +9,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from studies.base.counting import heading
 from studies.metrics.run import Run
 from studies.metrics.timing.protocol import FrameTiming
 from studies.metrics.timing.statistics import percentiles
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import band_handle, blank, finish, grouped, log_axis, page, panels, remarks
-from studies.plots.style.style import BLACK, GREY, SMALL, heading, method_colour, method_label, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, method_colour, method_label, save, styled
 
 TITLE = "Time of a frame"
 DEADLINES_MS = {33.0: "33 ms", 2.0: "2 ms", 1.0: "1 ms"}

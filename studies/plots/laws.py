@@ -10,13 +10,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
+from studies.base.counting import heading, readable
 from studies.metrics.metric import COMPARABLE, Metric
 from studies.metrics.metrics import METRICS
-from studies.metrics.run import Run
+from studies.metrics.run import Run, by_scene
 from studies.plots.style.page import (
     band_handle,
     blank,
-    by_scene,
     finish,
     grouped,
     log_axis,
@@ -37,8 +37,6 @@ from studies.plots.style.style import (
     SKY,
     SPARE_LOOKS,
     VERMILLION,
-    heading,
-    readable,
     remark,
     save,
     styled,

@@ -9,34 +9,13 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from massspring import Method
+from studies.base.counting import heading, readable
 from studies.metrics.metric import COMPARABLE, Metric
 from studies.metrics.metrics import METRICS, real_time
-from studies.metrics.run import Run
+from studies.metrics.run import Run, by_scene
 from studies.plots.style.bodies import body_looks
-from studies.plots.style.page import (
-    blank,
-    by_scene,
-    finish,
-    log_axis,
-    page,
-    panels,
-    remarks,
-    unresolved_mark,
-    unresolved_notes,
-)
-from studies.plots.style.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SMALL,
-    heading,
-    method_label,
-    readable,
-    save,
-    styled,
-)
+from studies.plots.style.page import blank, finish, log_axis, page, panels, remarks, unresolved_mark, unresolved_notes
+from studies.plots.style.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, method_label, save, styled
 from studies.runs.case import chosen_settings
 
 TITLE = "Ways to keep a volume: same bodies, same fraction of the step limit unless a step is named"

@@ -10,12 +10,13 @@ from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull
 
 from massspring import Plane
+from studies.base.counting import readable
 from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import force_end, volume_end, volume_worst
 from studies.metrics.run import Run
 from studies.plots.style.page import blank, finish, page, panels
 from studies.plots.style.render import Camera, draw_surface, frame, scale_bar, uniform
-from studies.plots.style.style import BLACK, GREY, NORMAL, SMALL, method_colour, method_label, readable, save, styled
+from studies.plots.style.style import BLACK, GREY, NORMAL, SMALL, method_colour, method_label, save, styled
 
 TITLE = "A soft ball between two planes"
 SCENE, BODY = "ball_squeeze", "tetrahedral"

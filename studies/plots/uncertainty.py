@@ -8,8 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from studies.base.counting import heading, readable
 from studies.plots.style.page import blank, finish, log_axis, page, panels
-from studies.plots.style.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, heading, readable, save, styled
+from studies.plots.style.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, save, styled
 from studies.reference.uncertainty import Uncertainty
 
 TITLE = "Uncertainty of the references"

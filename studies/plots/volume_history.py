@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
+from studies.base.counting import heading
 from studies.metrics.metric import COMPARABLE
-from studies.metrics.run import Run
+from studies.metrics.run import Run, by_scene
 from studies.plots.style.bodies import body_looks, body_method_handles
 from studies.plots.style.page import (
     blank,
-    by_scene,
     finish,
     good_frames,
     grouped,
@@ -24,7 +24,7 @@ from studies.plots.style.page import (
     reference_handle,
     remarks,
 )
-from studies.plots.style.style import BLACK, GREY, heading, method_colour, save, styled
+from studies.plots.style.style import BLACK, GREY, method_colour, save, styled
 
 TITLE = "How much volume each model loses"
 PERCENT = 100.0

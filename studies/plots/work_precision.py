@@ -9,23 +9,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
+from studies.base.counting import heading, readable
 from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, front, judged
 from studies.metrics.metric import Metric
-from studies.metrics.run import Run
+from studies.metrics.run import Run, by_scene
 from studies.metrics.wish import usual_wish
 from studies.plots.style.families import PAPER, Family, family_of
-from studies.plots.style.page import (
-    blank,
-    by_scene,
-    finish,
-    log_axis,
-    page,
-    panels,
-    remarks,
-    unresolved_mark,
-    unresolved_notes,
-)
-from studies.plots.style.style import BLACK, GREEN, GREY, SMALL, heading, readable, remark, save, styled
+from studies.plots.style.page import blank, finish, log_axis, page, panels, remarks, unresolved_mark, unresolved_notes
+from studies.plots.style.style import BLACK, GREEN, GREY, SMALL, remark, save, styled
 from studies.runs.case import BodyRecipe
 from studies.scene.scene import Scene
 from studies.store.record import Status

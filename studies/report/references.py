@@ -10,7 +10,6 @@ from massspring.sources import own_modules, source_fingerprint
 from studies.base.atomic import write_whole
 from studies.metrics.rest_surface import rest_surfaces
 from studies.metrics.true_surface import ShapeErrors, shape_errors
-from studies.plots.uncertainty import draw
 from studies.reference.load import Reference
 from studies.reference.reference_solves import STUDY
 from studies.reference.solve import VARIANTS
@@ -79,6 +78,8 @@ def refresh_uncertainty(references: References, scenes: Iterable[Scene]) -> list
     solved = known_references(references, each)
     if not solved:
         return []
+    from studies.plots.uncertainty import draw  # with matplotlib, which takes half a second to load
+
     write_table(paths[0], uncertainty_table(solved))
     draw({name: reference.uncertainty for name, reference in solved.items()}, paths[1])
     write_whole(stamp, state.encode())

@@ -14,10 +14,6 @@ from studies.exchange.entry import entries_beside
 from studies.geometry import SHAPES, organ
 from studies.metrics.run import Run
 from studies.metrics.table import metric, study_table
-from studies.plots.figures import paper_ball, paper_slide
-from studies.plots.figures.organ_springs import draw_organ_springs
-from studies.plots.figures.organs import draw_organs
-from studies.plots.style.style import svg_copies
 from studies.report.kept_volume import kept_volumes
 from studies.report.page.part import read_part, write_part
 from studies.report.page.write import write_page
@@ -146,6 +142,8 @@ def load(ledger: Ledger, study: Study, references: References) -> Loaded:
 def draw(loaded: Loaded, state: str) -> list[str]:
     """Writes tables, summaries, charts and the part of the page; what is missing, in sentences. state: kept, so that
     nothing is drawn until it changes."""
+    from studies.plots.style.style import svg_copies  # with matplotlib, which takes half a second to load
+
     root, study, runs = loaded.root, loaded.study, [*loaded.runs, *loaded.submissions]
     rows = study_table(runs, study.columns)
     write_table(study_folder(root, study.name) / f"{study.name}.csv", rows)
@@ -184,6 +182,9 @@ def state_of_study(ledger: Ledger, study: Study) -> str:
 
 def draw_figures(root: Path) -> list[Path]:
     """The gallery of all organs, and Figures 1 to 4 of Jung, Hong and Choi (2005) from our runs; their paths."""
+    from studies.plots.figures.organ_springs import draw_organ_springs  # with matplotlib, as above
+    from studies.plots.figures.organs import draw_organs
+
     gallery, springs = root / FIGURES / "organs.png", root / FIGURES / "organ_springs.png"
     make_folder(gallery.parent)
     draw_organs({name: organ(name, FIGURE_NODES) for name in SHAPES}, gallery)
@@ -195,6 +196,8 @@ def draw_figures(root: Path) -> list[Path]:
 
 def draw_paper(folder: Path) -> list[Path]:
     """The paper's Figures 2 to 4, run now: two balls in seconds, the refined stomach in about a minute."""
+    from studies.plots.figures import paper_ball, paper_slide  # with matplotlib, as above
+
     squeezed, volume, slide = (folder / f"paper_{name}.png" for name in ("squeezed", "volume", "slide"))
     paper_ball.draw(squeezed_balls(), squeezed, volume)
     paper_slide.draw(play(slide_case()), slide)

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, Literal
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
@@ -139,7 +139,7 @@ class Case:
         """The method and its chosen settings: "element bulk_modulus1e+06 hard"."""
         return " ".join([self.method.name, *_settings(self.method)])
 
-    @property
+    @cached_property
     def key(self) -> str:
         """Canonical JSON; equal text means equal case."""
         return json.dumps(case_to_dict(self), sort_keys=True, ensure_ascii=False)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from studies.catalog.study import Study
+from studies.store.ledger import Ledger
 from studies.sweep.job import Job
 
 Told = Callable[[str], object]
@@ -61,8 +62,10 @@ class Executor(Protocol):
         Raises StudyError before anything runs where a job cannot run, and what a job raises."""
         ...
 
-    def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
-        """Times alone what is not timed yet of a study, of `among` where given; how many cases that were."""
+    def measure(
+        self, ledger: Ledger, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None
+    ) -> int:
+        """Times alone what is not timed yet of a study, of `among` (absolute paths) where given; how many that were."""
         ...
 
 

@@ -14,16 +14,16 @@ from studies.sweep.executor import Progress, Told
 from studies.sweep.job import CaseJob, case_jobs
 
 
-def measure_times(root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
-    """Times what is not timed yet, of `among` where given, when no other command does; how many that were."""
-    ledger = Ledger(root)
+def measure_times(ledger: Ledger, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
+    """Times what is not timed yet, of `among` (absolute paths) where given, when no other command does; how many that
+    were."""
 
     def pending() -> list[Case]:
         ledger.look_again()
         untimed = [job for job in timed_jobs(ledger, study) if ledger.why_untimed(job) is not None]
-        return [job.work for job in untimed if among is None or job.path() in among]
+        return [job.work for job in untimed if among is None or job.path().absolute() in among]
 
-    return _measured(root, study, progress, on_compile, pending)
+    return _measured(ledger.root, study, progress, on_compile, pending)
 
 
 def measure_again(ledger: Ledger, study: Study, progress: Progress, on_compile: Told) -> int:

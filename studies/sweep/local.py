@@ -14,6 +14,7 @@ from studies.base.processes import Tell, run_each
 from studies.catalog.study import Study
 from studies.geometry.mesher.jobs import cache_folder
 from studies.runs.user_code import Given, given_files, load_given
+from studies.store.ledger import Ledger
 from studies.sweep.executor import Progress, Told
 from studies.sweep.frame_times import measure_times
 from studies.sweep.job import CaseJob, Job, do
@@ -63,6 +64,8 @@ class Local:
         for ended in run_each(jobs, self.processes, do, prepare, environment(self.portable), on_compile):
             yield ended.job, ended.cause
 
-    def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
+    def measure(
+        self, ledger: Ledger, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None
+    ) -> int:
         """As every executor: in this process."""
-        return measure_times(root, study, progress, on_compile, among)
+        return measure_times(ledger, study, progress, on_compile, among)

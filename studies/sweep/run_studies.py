@@ -50,7 +50,7 @@ def run_studies(
         storable = [job for job in todo if failures.can_store(job)]
         perform(executor, storable, progress, on_compile, failures.add)
     among = None if wanted is None else {job.path() for job in todo}
-    measured = sum(executor.measure(root, study, progress, on_compile, among) for study in studies)
+    measured = sum(executor.measure(ledger, study, progress, on_compile, among) for study in studies)
     ledger.look_again()
     return len(todo) + measured
 

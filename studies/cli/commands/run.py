@@ -19,6 +19,7 @@ from studies.cli.terminal import PROGRAM, SMOKE, Results, Smoke, console, say, w
 from studies.geometry.mesher.jobs import cache_folder
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.report.results import refresh
+from studies.report.results import report as write_report
 from studies.store.entry import MISSING
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
@@ -56,10 +57,13 @@ def run(
     portable: Annotated[bool, typer.Option(help="the same bits on every x86-64 processor; slower")] = False,
     organs: Annotated[str, typer.Option(help="run on the surfaces of this folder: FOLDER or FOLDER:mm")] = "",
     dry: Annotated[bool, typer.Option("--dry-run", help="only print what would run, why, and for how long")] = False,
+    report: Annotated[bool, typer.Option("--report", help="then do what `organbench report` does")] = False,
 ) -> None:
     """Run what is missing or stale, then draw the charts. Interrupt it any time: the same command continues it."""
     if on and jobs is not None:
         raise StudyError("give either --jobs or --on: --on local:4 stands for --jobs 4")
+    if case and report:
+        raise StudyError("give either --case or --report: a report shows whole studies")
     if again:
         _check_again(again, {"--on": on, "--only": only, "--portable": portable})
     root, rules, failures = results / SMOKE if smoke else results, _rules(only), Failures()
@@ -69,9 +73,11 @@ def run(
 
         studies = [f"{name}{ON}{organs}" for name in studies or [POPULATION]]
     chosen, well = [_chosen(study, smoke, case) for study in find_studies(studies or [])], True
-    for study in [] if again else chosen:
-        if plan(ledger, study, _wanted(ledger, study, rules)):
-            warn(check_study(study, drawn=not case))
+    todo = [study for study in chosen if not again and plan(ledger, study, _wanted(ledger, study, rules))]
+    for study in todo:
+        warn(check_study(study, drawn=not case))
+    if todo and report and not (on or dry):
+        _compile()
     with executor_for(on, jobs or JOBS, portable, root, say) as executor:
         for study in chosen:
             if again:
@@ -82,7 +88,24 @@ def run(
                 dry_run(console, study.name, plan(ledger, study, wanted), jobs or JOBS, root)
             else:
                 well = _bring_up_to_date(ledger, study, executor, wanted, not case, failures) and well
+    if report and not dry:
+        _report(ledger, chosen)
     _exit(well, failures, studies or [])
+
+
+def _compile() -> None:
+    """Compiles what most studies need, in two processes that share it, before two that would both compile it."""
+    from studies.sweep.compiling import main as compiling  # with both solvers, which take a second to load
+
+    compiling.bring_up_to_date(whole=False)
+
+
+def _report(ledger: Ledger, chosen: list[Study]) -> None:
+    """As `organbench report`, with the studies that ran."""
+    written, remarks = write_report(ledger, list({study.name: study for study in (*STUDIES, *chosen)}.values()))
+    warn(remarks)
+    for path in written:
+        say(path)
 
 
 def _exit(well: bool, failures: Failures, names: list[str]) -> None:

@@ -8,26 +8,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from studies.base.counting import heading
 from studies.exchange.entry import HALF_STEP, is_entry, outside
 from studies.metrics.judged import FORCE, cost_of
 from studies.metrics.metric import COMPARABLE, Metric
-from studies.metrics.run import Run
+from studies.metrics.run import Run, by_scene
 from studies.metrics.table import metric
 from studies.plots.style.families import FAMILIES, Family, family_of
-from studies.plots.style.page import blank, by_scene, finish, log_axis, page, panels
-from studies.plots.style.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    MUTED,
-    ORANGE,
-    PURPLE,
-    heading,
-    remark,
-    save,
-    styled,
-)
+from studies.plots.style.page import blank, finish, log_axis, page, panels
+from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, MUTED, ORANGE, PURPLE, remark, save, styled
 
 TITLE = "Other programs on the same meshes: down and to the left is better"
 VOLUME = metric("volume_worst")

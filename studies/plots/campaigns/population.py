@@ -8,13 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from studies.base.counting import heading
 from studies.metrics.distribution import BOUND, ENOUGH, Group, groups
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.plots.style.families import family_of
 from studies.plots.style.page import band_handle, blank, finish, log_axis, page, panels
-from studies.plots.style.style import GREY, SMALL, heading, remark, save, styled
+from studies.plots.style.style import GREY, SMALL, remark, save, styled
 
 TITLE = "Randomly generated organs: share of a population within an error"
 SHOWN = {"force_end": "error of the force [%]", "mean_error": "mean error / largest u [%]"}

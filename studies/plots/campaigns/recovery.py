@@ -8,11 +8,12 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from studies.metrics.run import Run
+from studies.base.counting import heading, readable
+from studies.metrics.run import Run, by_scene
 from studies.metrics.table import metric
 from studies.plots.style.bodies import BodyLook, body_handle, body_looks
-from studies.plots.style.page import blank, by_scene, finish, good_frames, grouped, has_frames, log_axis, page, panels
-from studies.plots.style.style import BLACK, GREY, PURPLE, SMALL, heading, method_colour, readable, save, styled
+from studies.plots.style.page import blank, finish, good_frames, grouped, has_frames, log_axis, page, panels
+from studies.plots.style.style import BLACK, GREY, PURPLE, SMALL, method_colour, save, styled
 from studies.runs.case import BodyRecipe, Case, chosen_settings
 
 TITLE = "From which starts a body finds its rest shape again"

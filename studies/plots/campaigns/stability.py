@@ -10,10 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
+from studies.base.counting import heading, readable
 from studies.metrics.run import Run
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, finish, grouped, log_axis, page, panels
-from studies.plots.style.style import BLACK, STATUS_LOOKS, heading, method_label, readable, save, styled
+from studies.plots.style.style import BLACK, STATUS_LOOKS, method_label, save, styled
 from studies.store.record import Status
 
 TITLE = "Stability: time step × stiffness"

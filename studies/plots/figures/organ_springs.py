@@ -12,12 +12,13 @@ from matplotlib.lines import Line2D
 
 from massspring import Body, Material, surface_body
 from massspring.body.springs import SpringKind
+from studies.base.counting import heading
 from studies.geometry import OrganMesh
 from studies.geometry.organs.make_shape import make_shape
 from studies.plots.figures.organs import FRONT, draw_smooth, window
 from studies.plots.style.page import blank, finish, page, panels
 from studies.plots.style.render import vertex_normals
-from studies.plots.style.style import BLACK, BLUE, NORMAL, VERMILLION, heading, save, styled
+from studies.plots.style.style import BLACK, BLUE, NORMAL, VERMILLION, save, styled
 
 TITLE = "Springs of the surface body"
 PANELS = {

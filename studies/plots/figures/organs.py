@@ -10,6 +10,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from studies.base.counting import heading, readable
 from studies.geometry import OrganMesh
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.shape.levelset import Shape
@@ -18,7 +19,7 @@ from studies.geometry.surface.first_surface import first_surface
 from studies.plots.style.cut import cut_face, cut_surface
 from studies.plots.style.page import blank, finish, page, panels
 from studies.plots.style.render import Camera, draw_faces, draw_surface, frame, scale_bar, smooth_normals, uniform
-from studies.plots.style.style import BLUE, GREEN, NORMAL, ORANGE, PURPLE, SKY, heading, readable, save, styled
+from studies.plots.style.style import BLUE, GREEN, NORMAL, ORANGE, PURPLE, SKY, save, styled
 
 TITLE = "Organs"
 FRONT = Camera(azimuth=-72.0, elevation=14.0)

@@ -7,11 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from studies.base.counting import heading
 from studies.plots.figures.organs import TISSUE
 from studies.plots.squeeze import volume_words
 from studies.plots.style.page import finish, page, panels
 from studies.plots.style.render import Camera, draw_faces, frame, scale_bar, smooth_normals, uniform
-from studies.plots.style.style import GREY, NORMAL, SMALL, heading, save, styled
+from studies.plots.style.style import GREY, NORMAL, SMALL, save, styled
 from studies.runs.paper import Played, moments, tip_of
 from studies.scene.library.stomach_slide import PROBE
 

@@ -8,9 +8,9 @@ from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
-from studies.metrics.run import Run
-from studies.plots.style.page import by_scene
-from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, method_label, readable
+from studies.base.counting import readable
+from studies.metrics.run import Run, by_scene
+from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, method_label
 from studies.runs.case import BodyRecipe
 
 OPTIONS = ("law", "axis", "weights", "stiffness", "nodes")

@@ -12,10 +12,11 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 from scipy.optimize import isotonic_regression
 
+from studies.base.counting import heading, readable
 from studies.metrics.cells import UNRESOLVED_MARK
 from studies.metrics.metric import Metric
-from studies.metrics.run import Run
-from studies.plots.style.style import BLACK, GREY, SMALL, heading, readable, remark, styled
+from studies.metrics.run import Run, by_scene
+from studies.plots.style.style import BLACK, GREY, SMALL, remark, styled
 
 ROW, LINE, MARGIN = 0.25, 0.19, 0.12
 """Heights of a legend row, of a line of notes, and of the space around them [inch]."""
@@ -89,14 +90,6 @@ def blank(title: str, reason: str) -> Figure:
     axes.set_axis_off()
     remark(axes, reason)
     return finish(figure, title, [])
-
-
-def by_scene(runs: Sequence[Run]) -> dict[str, list[Run]]:
-    """Runs of each scene, in the order in which they come."""
-    groups: dict[str, list[Run]] = {}
-    for run in runs:
-        groups.setdefault(run.case.scene.name, []).append(run)
-    return groups
 
 
 def grouped(runs: Sequence[Run], key: Callable[[Run], object]) -> list[list[Run]]:

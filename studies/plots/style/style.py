@@ -17,6 +17,7 @@ from matplotlib.typing import LineStyleType
 
 from massspring import LITERATURE, METHODS
 from studies.base.atomic import write_whole
+from studies.base.counting import readable
 from studies.store.record import Status
 
 P = ParamSpec("P")
@@ -168,21 +169,10 @@ def method_colour(name: str) -> str:
     return spare[zlib.crc32(name.encode()) % len(spare)]
 
 
-def readable(name: str) -> str:
-    """A name of the code as words: "implicit_volume" -> "implicit volume"."""
-    return name.replace("_", " ").replace("-", " ")
-
-
 def method_label(name: str) -> str:
     """The name of a method in a legend: that of a user's own method, or of an external entry, stays as it is."""
     ours = [method.name for method in (*METHODS, *LITERATURE)]
     return readable(name) if name in ours else name
-
-
-def heading(name: str) -> str:
-    """The same with a capital letter."""
-    words = readable(name)
-    return words[:1].upper() + words[1:]
 
 
 def remark(axes: Axes, text: str) -> None:

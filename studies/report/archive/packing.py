@@ -92,18 +92,19 @@ def gather(root: Path, studies: Sequence[Study], stage: Path) -> list[str]:
     """Records of studies, their references and external entries, and what is drawn from them; what report.html had
     no room for, in sentences. Raises StudyError when a record is missing."""
     stage.mkdir()
+    ledger = Ledger(stage)
     for study in studies:
         found = [case_path(root, study.name, case) for case in study.cases]
         found += [timing_file(root, study.name, case) for case in study.cases if case.timed]
         found += [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
         for path in [*found, *entry_files(root)]:
             bring(path, stage / path.relative_to(root))
-        ledger = Ledger(stage)
+        ledger.look_again()
         link_study(ledger, study.name)
         missing = refresh(ledger, study)[1]
         if missing:
             raise StudyError(f"not archived, something is missing: {study.name}: {missing[0]}")
-    remarks = report(Ledger(stage), studies)[1]
+    remarks = report(ledger, studies)[1]
     shutil.rmtree(stage / "cache")
     return remarks
 

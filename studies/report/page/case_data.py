@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from massspring import Capsule, Obstacle, Plane
+from studies.base.counting import readable
 from studies.metrics.metric import PERCENT
 from studies.metrics.run import Run
-from studies.plots.style.style import readable
 from studies.report.page.pack import STEP, pack_frames, pack_indices, pack_series
 from studies.report.page.reference_shape import MOST_NODES, from_rest, reference_id
 from studies.scene.quantities import allowed

@@ -2,9 +2,9 @@
 
 from typing import Any
 
+from studies.base.counting import readable
 from studies.exchange.entry import ENTRY
 from studies.metrics.run import Run
-from studies.plots.style.style import readable
 from studies.report.page.case_data import (
     checkpoint_surface,
     histories,

@@ -8,10 +8,10 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from studies.base.counting import heading, readable
 from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED
-from studies.plots.style.style import heading, readable
 from studies.report.page.svg import inline
 
 ASSETS = Path(__file__).parent / "assets"

@@ -58,6 +58,12 @@ def run(whole: bool, table: Path | None = None) -> None:
     print(f"compiling: {summary(compiled, 0)[0]}; {perf_counter() - begin:.0f} s in all", flush=True)
 
 
+def bring_up_to_date(whole: bool) -> None:
+    """Compiles what is missing of all, or of what is essential; nothing where that was done before."""
+    if not is_done(whole):
+        run(whole)
+
+
 def main() -> None:
     """Exit codes: 0 all is compiled; 1 something could not be; 130 interrupted."""
     parser = argparse.ArgumentParser(prog="python -m studies.sweep.compiling.main", description=__doc__)

@@ -197,11 +197,15 @@ class Cluster:
                     yield job, cause
         wait_until_seen(done)
 
-    def measure(self, root: Path, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
+    def measure(
+        self, ledger: Ledger, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None
+    ) -> int:
         """As every executor: on one worker of each kind of machine, after all jobs, one machine after the other."""
+        root = ledger.root.absolute()
         timed = [job for job in case_jobs(root, study) if job.work.timed]
         cases, chosen = tuple(job.work for job in timed), [t for t in timed if among is None or t.path() in among]
-        if not chosen or (self.client is None and all(map(Ledger(root).timed_somewhere, chosen))):
+        ledger.look_again()
+        if not chosen or (self.client is None and all(map(ledger.timed_somewhere, chosen))):
             return 0
         request = FrameTimes(root, study.name, cases, None if among is None else frozenset(among))
         with self._session(root, given_files(cases), portable=False) as session:

@@ -19,6 +19,7 @@ from studies.reference.reference_solves import reference_fingerprint
 from studies.runs.case import Case
 from studies.runs.current import run_fingerprint
 from studies.runs.user_code import Given, load_given, read_code
+from studies.store.ledger import Ledger
 from studies.store.machine import machine_id, this_machine
 from studies.sweep.executor import Silent
 from studies.sweep.frame_times import measure_times
@@ -134,7 +135,7 @@ class FrameTimes:
         busy = psutil.cpu_percent(WATCHED) / 100
         study = Study(self.study, "", self.cases, (), ())
         among = None if self.among is None else set(self.among)
-        return measure_times(self.root, study, Silent(), lambda name: None, among), busy
+        return measure_times(Ledger(self.root), study, Silent(), lambda name: None, among), busy
 
 
 def wait_until_seen(paths: Iterable[Path], seconds: float = SIGHT_SECONDS) -> None:

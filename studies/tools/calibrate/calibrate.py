@@ -12,6 +12,7 @@ from studies.runs.case import BodyRecipe
 from studies.runs.current import run_fingerprint
 from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
+from studies.store.ledger import Ledger
 from studies.store.machine import this_machine
 from studies.sweep.executor import Progress, Silent, Told
 from studies.tools.calibrate.fit import Fit, fit
@@ -60,11 +61,13 @@ def calibrate(
     start = starting_recipe(organ, body) if isinstance(body, str) else body
     parameters_of(start)  # refused before anything runs
     scenes = _scenes_of(tried)
-    tasks = pending(root, scenes, start)
+    ledger = Ledger(root)
+    tasks = pending(ledger, scenes, start)
     if tasks:
         bring_up_to_date(tasks, root, jobs, progress or Silent(), on_compile or (lambda name: None))
+        ledger.look_again()
     with watching(on_compile or (lambda name: None)):
-        found = calibration(organ, start, tried, Measurements(root, scenes), progress or Silent())
+        found = calibration(organ, start, tried, Measurements(ledger, scenes), progress or Silent())
     write_calibration(root, found)
     return found
 

@@ -18,9 +18,9 @@ from studies.sweep.run_studies import check_writable
 from studies.tools.calibrate.stored import STUDY
 
 
-def pending(root: Path, scenes: Iterable[Scene], start: BodyRecipe) -> list[Job]:
+def pending(ledger: Ledger, scenes: Iterable[Scene], start: BodyRecipe) -> list[Job]:
     """Pieces of references and runs of the starting body that are missing or stale, the longest first."""
-    ledger, scenes = Ledger(root), list(scenes)
+    root, scenes = ledger.root, list(scenes)
     jobs = [*reference_jobs(root, scenes), *(CaseJob(root, STUDY, Case(scene, start)) for scene in scenes)]
     return sorted((job for job in jobs if ledger.why(job) is not None), key=lambda job: -job.weight)
 
@@ -34,8 +34,9 @@ def bring_up_to_date(todo: list[Job], root: Path, jobs: int, progress: Progress,
 class Measurements:
     """Errors of recipes in scenes, from stored runs where there are any."""
 
-    def __init__(self, root: Path, scenes: Iterable[Scene]) -> None:
-        self.root, self.ledger = root, Ledger(root)
+    def __init__(self, ledger: Ledger, scenes: Iterable[Scene]) -> None:
+        self.root = root = ledger.root
+        self.ledger = ledger
         self.references: dict[str, Reference | None] = {scene.name: load_reference(root, scene) for scene in scenes}
         self.made = 0
         """Runs that were not there."""

@@ -65,6 +65,13 @@ def test_a_smoke_run_is_kept_apart(organbench, tiny_file, results):
     assert all(path.parts[0] == "smoke" for path in after.keys() - before.keys())
 
 
+def test_a_run_and_its_report_are_one_command(organbench, tiny_file, results):
+    (results / "report.html").unlink(missing_ok=True)
+    code, out, _ = organbench("run", tiny_file, "--results", results, "--report")
+    assert code == 0 and out.splitlines()[-1] == str(results / "report.html")
+    assert "tiny: nothing ran" in out and (results / "report.html").is_file()
+
+
 def test_the_index_opens_like_a_tree(organbench, tiny_file, results):
     assert organbench("run", tiny_file, "--results", results)[0] == 0
     with h5py.File(index_path(results, "tiny")) as file:

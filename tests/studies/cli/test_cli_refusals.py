@@ -43,6 +43,7 @@ REPOSITORY = Path(__file__).parents[3]
         (("show", "nothing.h5"), "there is no results file nothing.h5"),
         (("replay", "nothing.h5"), "there is no results file nothing.h5"),
         (("run", "nothing.py"), "there is no file nothing.py"),
+        (("run", "volume_loss", "--case", "ball", "--report"), "give either --case or --report"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )

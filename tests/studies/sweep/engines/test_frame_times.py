@@ -55,7 +55,7 @@ def measured(root, answer):
     session, progress = MadeUp(answer), Silent()
     executor = Here(lambda: None, 1.0, portable=True)  # type: ignore[arg-type]
     executor.client = session.client  # type: ignore[assignment]
-    return executor.measure(root, tiny_study(), progress, print, None), progress, session.asked
+    return executor.measure(Ledger(root), tiny_study(), progress, print, None), progress, session.asked
 
 
 def test_one_worker_of_each_kind_of_machine_measures(tmp_path):
@@ -83,7 +83,7 @@ def timed_somewhere(root):
 def test_what_any_machine_has_timed_asks_for_no_cluster(results):
     study = tiny_study()
     assert timed_somewhere(results) == [True, True, True]
-    assert Cluster(lambda: None, 1.0).measure(results, study, Silent(), print, None) == 0  # type: ignore[arg-type]
+    assert Cluster(lambda: None, 1.0).measure(Ledger(results), study, Silent(), print, None) == 0  # type: ignore[arg-type]
     for file in (results / "tiny").glob("*.timing.*.h5"):
         file.unlink()
     assert timed_somewhere(results) == [False, False, True], "one diverges"

@@ -9,6 +9,7 @@ import pytest
 from studies.base.errors import StudyError
 from studies.runs.case import BodyRecipe
 from studies.scene.library import BALL_SQUEEZE, Organ, ReferencePlan
+from studies.store.ledger import Ledger
 from studies.tools.calibrate.calibrate import calibrate, calibration, starting_recipe
 from studies.tools.calibrate.folds import Fold
 from studies.tools.calibrate.measured import Measurements
@@ -57,7 +58,7 @@ def test_the_final_recipe_lies_between_those_of_the_trials(made):
 @pytest.mark.slow
 def test_judged_errors_are_those_of_the_fitted_body(made):
     folder, found, _ = made
-    runs = Measurements(folder, (DEEP, SHALLOW))
+    runs = Measurements(Ledger(folder), (DEEP, SHALLOW))
     for trial, scene in zip(found.trials, (SHALLOW, DEEP), strict=True):
         (judged,) = (errors for errors in trial.errors if not errors.fitted)
         body = replace(BODY, stiffness=trial.parameters["stiffness"])
@@ -103,7 +104,7 @@ def test_an_interrupted_calibration_goes_on(made, tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_a_body_that_ends_badly_from_the_start_is_named(made):
     folder, _, _ = made
-    runs = Measurements(folder, (DEEP,))
+    runs = Measurements(Ledger(folder), (DEEP,))
     with pytest.raises(StudyError, match=r"ended as failed before the fit .*give another number of nodes"):
         runs.first_errors(DEEP, BodyRecipe(nodes=3))
 

@@ -12,6 +12,7 @@ from studies.metrics.run import Run
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE
+from studies.store.ledger import Ledger
 from studies.tools.calibrate.fit import DIFFERENCE, fit
 from studies.tools.calibrate.measured import Measurements
 from studies.tools.calibrate.parameters import INNER_WEIGHT, STIFFNESS, parameters_of, scaled, weights_of
@@ -106,7 +107,7 @@ def test_springs_made_too_soft_by_two_are_found_to_be(tmp_path, body):
     case = Case(SQUEEZE, body, frames=None)
     whole = Run(case, measure(case))
     reference = SimpleNamespace(force=whole.force[whole.checkpoint_frames], total_uncertainty={"force_end": 0.01})
-    runs = Measurements(tmp_path, ())
+    runs = Measurements(Ledger(tmp_path), ())
     runs.references[SQUEEZE.name] = reference  # type: ignore[assignment]
     soft = scaled(body, (STIFFNESS,), (0.5,))
     assert soft.stiffness == 0.5
