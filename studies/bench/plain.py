@@ -41,7 +41,7 @@ class Plain(NamedTuple):
 
 
 @numba.njit(**SETTINGS)
-def add_springs(ends, rest_length, stiffness, x, force):
+def add_springs(ends: np.ndarray, rest_length: np.ndarray, stiffness: np.ndarray, x: np.ndarray, force: np.ndarray):
     """f_i += (k − k L/|d|) d, f_j −= the same (eq. 1.1) [N]."""
     for s in range(ends.shape[0]):
         i, j = ends[s, 0], ends[s, 1]
@@ -53,7 +53,7 @@ def add_springs(ends, rest_length, stiffness, x, force):
 
 
 @numba.njit(**SETTINGS)
-def add_triangles(triangles, x, gradient):
+def add_triangles(triangles: np.ndarray, x: np.ndarray, gradient: np.ndarray):
     """6 G (eq. 2.2) [m²], (n, 3); returns V [m³] (eq. 2.1), seen from a node of the surface."""
     o, volume = triangles[0, 0], 0.0
     o0, o1, o2 = x[o, 0], x[o, 1], x[o, 2]
@@ -77,7 +77,7 @@ def add_triangles(triangles, x, gradient):
 
 
 @numba.njit(**SETTINGS)
-def clamp(x, v, inverse_mass, point, normal, step):
+def clamp(x: np.ndarray, v: np.ndarray, inverse_mass: np.ndarray, point: np.ndarray, normal: np.ndarray, step: float):
     """Nodes below a plane are put on it, and their velocity is what that makes of it."""
     for i in range(x.shape[0]):
         away = normal[0] * (x[i, 0] - point[0]) + normal[1] * (x[i, 1] - point[1]) + normal[2] * (x[i, 2] - point[2])
@@ -88,7 +88,15 @@ def clamp(x, v, inverse_mass, point, normal, step):
 
 
 @numba.njit(**SETTINGS)
-def plain_frame(plain, targets, points, normals, dt, damping, fall):
+def plain_frame(
+    plain: Plain,
+    targets: np.ndarray,
+    points: np.ndarray,
+    normals: np.ndarray,
+    dt: float,
+    damping: float,
+    fall: np.ndarray,
+):
     """As many steps as there are `targets` (q,) [m³]; planes through `points` (q, o, 3); `fall` = dt g [m/s]."""
     ends, rest_length, stiffness, triangles, inverse_mass, held, x, v, force, gradient = plain
     real = x.dtype.type

@@ -52,7 +52,7 @@ class PlainPoints(NamedTuple):
 
 
 @numba.njit(**SETTINGS)
-def add_springs(ends, stiffness, x, force):
+def add_springs(ends: np.ndarray, stiffness: np.ndarray, x: np.ndarray, force: np.ndarray):
     """f_i += k (x_j − x_i), f_j −= the same (eq. 4.9) [N]."""
     for s in range(ends.shape[0]):
         i, j = ends[s, 0], ends[s, 1]
@@ -63,7 +63,7 @@ def add_springs(ends, stiffness, x, force):
 
 
 @numba.njit(**SETTINGS)
-def measure(plain, volume):
+def measure(plain: PlainPoints, volume: np.ndarray):
     """w_q cof F_q, −b (J_q − 1) and the volumes of the vertices (eq. 8.8–8.10, 8.12)."""
     x, rho = plain.x, plain.rho
     volume[:] = 0.0
@@ -91,7 +91,7 @@ def measure(plain, volume):
 
 
 @numba.njit(**SETTINGS)
-def add_push(plain, p, with_own, force):
+def add_push(plain: PlainPoints, p: np.ndarray, with_own: bool, force: np.ndarray):
     """Jᵀ p and, `with_own`, the points' own pressures (eq. 8.11, 8.12) [N]."""
     for k in range(plain.cells.shape[0]):
         for q in range(4):
@@ -105,7 +105,7 @@ def add_push(plain, p, with_own, force):
 
 
 @numba.njit(**SETTINGS)
-def flow_into(plain, u, product):
+def flow_into(plain: PlainPoints, u: np.ndarray, product: np.ndarray):
     """J u [m³/s], (m,) (eq. 8.11)."""
     product[:] = 0.0
     for k in range(plain.cells.shape[0]):
@@ -120,7 +120,7 @@ def flow_into(plain, u, product):
 
 
 @numba.njit(**SETTINGS)
-def solve(plain, residual, allowed):
+def solve(plain: PlainPoints, residual: np.ndarray, allowed: np.ndarray):
     """lam += S⁻¹ residual by conjugate gradients (eq. 8.4, 8.13)."""
     lam = plain.lam
     search, image = np.zeros_like(lam), np.zeros_like(lam)
@@ -144,7 +144,7 @@ def solve(plain, residual, allowed):
 
 
 @numba.njit(**SETTINGS)
-def plain_frame(plain, points, normals, dt, damping):
+def plain_frame(plain: PlainPoints, points: np.ndarray, normals: np.ndarray, dt: float, damping: float):
     """As many steps as `points` (q, o, 3) of the planes; x, v and lam [Pa], with the rest pressure, go on."""
     x, v, lam = plain.x, plain.v, plain.lam
     force, product, volume = np.zeros_like(x), np.zeros_like(lam), np.zeros_like(lam)

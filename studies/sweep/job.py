@@ -118,32 +118,26 @@ class CaseJob(Job):
 
     @property
     def label(self) -> str:
-        """As Job's."""
         return self.work.name
 
     @property
     def weight(self) -> float:
-        """As Job's."""
         return self.work.body.nodes / self.work.dt_fraction
 
     @property
     def needs(self) -> float:
-        """As Job's."""
         return MEMORY
 
     @property
     def seconds(self) -> float:
-        """As Job's."""
         return case_seconds(self.work)
 
     @property
     def size(self) -> int:
-        """As Job's."""
         return case_bytes(self.work)
 
     @property
     def fingerprint(self) -> str:
-        """As Job's."""
         return case_fingerprint(self.work)
 
     @cached_property
@@ -151,17 +145,14 @@ class CaseJob(Job):
         return case_path(self.root, self.study, self.work)
 
     def path(self) -> Path:
-        """As Job's."""
         return self._path
 
     def run(self) -> Path:
-        """As Job's."""
         from studies.runs.run import run_case  # with the solver, which takes most of a second to load
 
         return run_case(self.root, self.study, self.work)
 
     def failure(self, cause: str) -> Record:
-        """As Job's."""
         from studies.runs.run import OWN_FILES
 
         own = {str(file.path): file.sha256 for file in files_of(self.work.method, self.work.body.law)}
@@ -177,33 +168,27 @@ class ReferenceJob(Job):
 
     @property
     def label(self) -> str:
-        """As Job's."""
         return REFERENCE + self.work.name
 
     @property
     def weight(self) -> float:
-        """As Job's."""
         return 1e9 + self.work.weight
 
     @property
     def needs(self) -> float:
-        """As Job's."""
         known = read_entry(self.path()).unknowns if is_there(self.path()) else None
         return solve_memory(self.work, known)
 
     @property
     def seconds(self) -> float:
-        """As Job's."""
         return solve_seconds(self.work)
 
     @property
     def size(self) -> None:
-        """As Job's."""
         return None
 
     @property
     def fingerprint(self) -> str:
-        """As Job's."""
         return reference_fingerprint()
 
     @cached_property
@@ -211,11 +196,10 @@ class ReferenceJob(Job):
         return self.work.path(self.root)
 
     def path(self) -> Path:
-        """As Job's."""
         return self._path
 
     def run(self) -> Path:
-        """As Job's. A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""
+        """A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""
         from studies.reference.solve import solve
 
         try:
@@ -224,7 +208,6 @@ class ReferenceJob(Job):
             return self.store_failure(str(error))
 
     def failure(self, cause: str) -> Record:
-        """As Job's."""
         work = self.work
         nothing = {"unknowns": 0, "steps_done": 0, "seconds": float("nan")}
         about = {"scene": work.scene.name, "level": float(work.level), "variant": work.variant}

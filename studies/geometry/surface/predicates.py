@@ -1,5 +1,7 @@
 """On which side a point lies, decided without error: floating point first, whole numbers where it cannot know."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 BOUND_3, BOUND_2 = 7.8e-16, 3.4e-16
@@ -13,7 +15,7 @@ def orientation(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> n
     u, v, w = a - d, b - d, c - d
     positive = [u[:, i] * v[:, j] * w[:, k] for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
     negative = [u[:, i] * v[:, j] * w[:, k] for i, j, k in ((2, 1, 0), (1, 0, 2), (0, 2, 1))]
-    value = sum(positive) - sum(negative)
+    value = np.asarray(sum(positive) - sum(negative))
     return decided(value, BOUND_3, positive + negative, (a, b, c, d), exact_3)
 
 
@@ -24,7 +26,13 @@ def orientation_2(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     return decided(products[0] - products[1], BOUND_2, products, (a, b, c), exact_2)
 
 
-def decided(value, bound, products, corners, exact) -> np.ndarray:
+def decided(
+    value: np.ndarray,
+    bound: float,
+    products: Sequence[np.ndarray],
+    corners: Sequence[np.ndarray],
+    exact: Callable[..., np.ndarray],
+) -> np.ndarray:
     """Signs of `value` (n,) where it exceeds its rounding, and exact ones elsewhere."""
     doubtful = np.abs(value) < 2.0 * bound * sum(np.abs(product) for product in products)
     sign = np.sign(value).astype(int)

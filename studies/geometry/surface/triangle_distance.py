@@ -9,7 +9,7 @@ FLAT = 1e-20
 
 
 @compiled
-def squared_to_segment(w0, w1, w2, d0, d1, d2):
+def squared_to_segment(w0: float, w1: float, w2: float, d0: float, d1: float, d2: float):
     """|w - s d|² at the nearest s in [0, 1]: w from the start of the segment to the point, d along the segment."""
     length = d0 * d0 + d1 * d1 + d2 * d2
     along = w0 * d0 + w1 * d1 + w2 * d2
@@ -19,7 +19,7 @@ def squared_to_segment(w0, w1, w2, d0, d1, d2):
 
 
 @compiled
-def squared_to_triangle(p, triangle, u, v, n):
+def squared_to_triangle(p: np.ndarray, triangle: np.ndarray, u: np.ndarray, v: np.ndarray, n: np.ndarray):
     """Squared distance of the point p (3,) to a triangle (3, 3) with edges u, v from its first corner, n = u x v.
 
     Over the face it is the height, (w·n)²/n², elsewhere the distance to the nearest edge: also of a triangle so flat
@@ -42,7 +42,7 @@ def squared_to_triangle(p, triangle, u, v, n):
 
 
 @compiled
-def edges_into(triangle, u, v, n):
+def edges_into(triangle: np.ndarray, u: np.ndarray, v: np.ndarray, n: np.ndarray):
     """Edges u, v (3,) from the first corner of a triangle (3, 3), and n = u x v; returns n²."""
     for k in range(3):
         u[k] = triangle[1, k] - triangle[0, k]
@@ -52,7 +52,7 @@ def edges_into(triangle, u, v, n):
 
 
 @compiled
-def nearest_into(queries, corners, near, scratch, found):
+def nearest_into(queries: np.ndarray, corners: np.ndarray, near: np.ndarray, scratch: np.ndarray, found: np.ndarray):
     """found (q,): squared distance of each of `queries` (q, 3) to the nearest of its triangles `near` (q, k) among
     corners (f, 3, 3); scratch (3, 3)."""
     u, v, n = scratch
@@ -64,7 +64,7 @@ def nearest_into(queries, corners, near, scratch, found):
 
 
 @compiled
-def band_distance_into(corners, reach, scratch, squared, owner):
+def band_distance_into(corners: np.ndarray, reach: float, scratch: np.ndarray, squared: np.ndarray, owner: np.ndarray):
     """Lower squared (a, b, c) to the squared distance to the triangles at grid points within `reach` of their boxes.
 
     Lengths in cells from the first grid point. corners (t, 3, 3); scratch (4, 3); owner (a, b, c) gets the nearest one.
@@ -90,7 +90,7 @@ def band_distance_into(corners, reach, scratch, squared, owner):
 
 
 @compiled
-def far_distance_into(corners, reach, owner, scratch, squared):
+def far_distance_into(corners: np.ndarray, reach: float, owner: np.ndarray, scratch: np.ndarray, squared: np.ndarray):
     """Lower squared (a, b, c) beyond `reach` to the squared distance to the triangle owner (a, b, c). In cells."""
     u, v, n, p = scratch
     for i in range(squared.shape[0]):
@@ -104,7 +104,7 @@ def far_distance_into(corners, reach, owner, scratch, squared):
 
 
 @compiled
-def cells_between(coordinates, reach, size):
+def cells_between(coordinates: np.ndarray, reach: float, size: int):
     """First grid row within `reach` of three coordinates, and the one after the last, inside [0, size)."""
     low = min(coordinates[0], coordinates[1], coordinates[2]) - reach
     high = max(coordinates[0], coordinates[1], coordinates[2]) + reach

@@ -82,7 +82,7 @@ def stage_times(setup: Setup) -> np.ndarray:
 
 
 @compiled
-def _end_stages(times, count):
+def _end_stages(times: StageTimes, count: int):
     for _ in range(count):
         end_stage(times, INTEGRATION)
 
