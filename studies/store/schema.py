@@ -121,7 +121,7 @@ class RunAttributes(Timed):
     unknowns_per_volume = optional_value(float, "1", "coordinates for each kept volume")
     alternation = optional_value(float, "1", "rms of pressure less the mean of its neighbours', over mu")
     sway = optional_value(float, "1", "range of the force at rest about its trend, over its mean")
-    warnings = value(str, "", "what preparing the case warned of, and what its indicators tell")
+    warnings = value(str, "", "what preparing the case warned of, and what its indicators report")
     entry = optional_value(str, "", "of an entry from outside: its file, with the SHA-256 of its positions")
     entry_seconds = optional_value(float, "s/s", "of an entry from outside: computing time for a simulated second")
     own_files = optional_value(str, "", "files of the user with the method and the law: JSON, path to SHA-256")
