@@ -86,7 +86,7 @@ def build_pattern(dofs: np.ndarray, held_mask: np.ndarray) -> Pattern:
     starts = width * np.arange(count + 1)
     members = sp.csr_matrix((np.ones(dofs.size, dtype=np.int32), rank[dofs].ravel(), starts), shape=(count, n + m))
     shared = (members.T[:n] @ members).tocsr()
-    upper, lift = sp.triu(shared[:, :n], format="csr"), shared[:, n:]
+    upper, lift = sp.csr_matrix(sp.triu(shared[:, :n])), sp.csr_matrix(shared[:, n:])
     upper.sort_indices()
     lift.sort_indices()
     return Pattern(free, held, rank, upper.indptr, upper.indices, lift.indptr, lift.indices)

@@ -21,7 +21,7 @@ from studies.store.entry import file_state, read_entry, why_entry_is_stale
 from studies.store.new_record import new_record
 from studies.store.paths import key_digest
 from studies.store.record import Record, Status, write_record
-from studies.sweep.estimate import MEMORY, case_bytes, case_seconds, solve_memory, solve_seconds
+from studies.sweep.estimate import MEMORY, case_bytes, case_seconds, solve_memory, solve_seconds, unknowns
 
 REFERENCE = "reference "
 """Before the name of a reference solution in its label."""
@@ -170,7 +170,7 @@ class CaseJob(Job):
 
 @dataclass(frozen=True)
 class ReferenceJob(Job):
-    """One solution of the reference of a scene."""
+    """The reference of a scene."""
 
     work: ReferenceSolve
     kind = "reference"
@@ -183,7 +183,7 @@ class ReferenceJob(Job):
     @property
     def weight(self) -> float:
         """As Job's."""
-        return 1e9 + self.work.weight
+        return 1e9 + unknowns(self.work)
 
     @property
     def needs(self) -> float:
@@ -226,8 +226,8 @@ class ReferenceJob(Job):
     def failure(self, cause: str) -> Record:
         """As Job's."""
         work = self.work
-        nothing = {"unknowns": 0, "steps_done": 0, "seconds": float("nan")}
-        about = {"scene": work.scene.name, "level": float(work.level), "variant": work.variant}
+        nothing = {"unknowns": 0, "steps_done": 0, "seconds": float("nan"), "off_shape": 0, "stopped": ""}
+        about = {"scene": work.scene.name}
         return _failed(self, "reference", cause, about | nothing)
 
 
@@ -255,7 +255,7 @@ def case_jobs(root: Path, study: Study) -> list[CaseJob]:
 
 
 def reference_jobs(root: Path, scenes: Iterable[Scene]) -> list[ReferenceJob]:
-    """A job per solution of the references of scenes."""
+    """A job per reference of the scenes."""
     return [ReferenceJob(root, REFERENCES, one) for scene in scenes for one in reference_solves(scene)]
 
 
