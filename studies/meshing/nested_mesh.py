@@ -10,6 +10,7 @@ from reference_fem import nodes
 from reference_fem.elements.evaluate import Evaluator
 from reference_fem.elements.shapes import basis_table, element_nodes
 from studies.geometry.mesh.jacobian import smallest_jacobian
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.meshing.held_mesh import HeldMesh, held_mesh, rim_sides
 from studies.meshing.outlines import drawn_middles
 from studies.meshing.reference_mesh import on_true_sides
@@ -25,6 +26,12 @@ UPRIGHT = 0.05
 """Smallest Jacobian, over that of the mean, below which the new nodes of an element go back to its parent's curve."""
 LEAST = 0.02
 """The same below which an element keeps its middles where they are."""
+SMALLEST = 0.012
+"""Of the diagonal of the body: elements at outlines are not halved to a smaller edge. The strain there grows without
+bound as they shrink, until a neo-Hookean element inverts and no equilibrium is found; 0.012 leaves 0.1 % of the force
+of the clamped ball (docs/theory.md, section 6)."""
+REGULAR = 1.0 / (6.0 * np.sqrt(2.0))
+"""Volume of a regular tetrahedron over the cube of its edge."""
 CHILD = 0.25
 """Of an element's error indicator that each half of it is expected to have."""
 GROWTH = 1.3
@@ -58,6 +65,18 @@ class NestedMesh:
         """Nodes of each held region."""
         return [np.unique(facets) for facets in self.body.facets(self.mesh)[:-1]]
 
+    @cached_property
+    def small_at_outlines(self) -> np.ndarray:
+        """Elements with a vertex on an outline whose halves would be smaller than SMALLEST, (ne,) bool."""
+        flat = MeshTet2.from_mesh(self.body.mesh)
+        *held, _ = self.body.facets(flat)
+        outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), []])
+        corners = self.body.mesh.t.T
+        volume = np.abs(tetrahedron_volumes(self.points, corners))
+        size = np.cbrt(0.5 * volume / REGULAR)
+        least = SMALLEST * float(np.linalg.norm(np.ptp(self.points, axis=0)))
+        return np.isin(corners, outlines).any(axis=1) & (size < least)
+
     @property
     def lumen(self) -> np.ndarray:
         """Middles of the corners of the lumen's facets [m], (f, 3)."""
@@ -66,7 +85,7 @@ class NestedMesh:
     def finer(self, indicator: np.ndarray, elements: int) -> tuple["NestedMesh", np.ndarray]:
         """A mesh of about so many elements, those halved whose indicator (ne,) is largest; and the element of this mesh
         of which each of its elements is a part, (new ne,)."""
-        body, parents = marked(self.body, indicator, elements)
+        body, parents = marked(self.body, np.where(self.small_at_outlines, 0.0, indicator), elements)
         cells, flat = element_nodes(body.mesh), MeshTet2.from_mesh(self.body.mesh)
         owner = at_nodes(body.mesh, parents)
         bent = Evaluator(replace(flat, doflocs=np.ascontiguousarray(self.points.T)))

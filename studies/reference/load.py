@@ -17,6 +17,12 @@ from studies.store.record import Status, read_record
 class Reference(Solution):
     """The solution on the finest mesh, with what the others say of it."""
 
+    @property
+    def source(self) -> str:
+        """The published set and file that it is of, as "2027.1 0a1b2c3d"; "solved here" for one that nobody
+        published."""
+        return str(self.record.attributes.get("set", "solved here"))
+
     @cached_property
     def _samples(self) -> tuple[SamplePoints, list[Sample]]:
         return samples_in(self.scene, self.record)

@@ -85,8 +85,8 @@ def solve_nested(scene: Scene, variants: Mapping[str, Varied]) -> FamilySolution
     for target in targets(coarsest.system.total, plan.most):
         try:
             latest, parents = refined(latest, target)
-        except StepFailed as failure:
-            stopped = f"{scene.name} has no equilibrium on a mesh of about {target:.0f} unknowns: {failure}"
+        except SolveError as failure:
+            stopped = f"the mesh of about {target:.0f} unknowns is left out: {failure}"
             break
         ancestors = ancestors[parents]
         samples.insert(0, end_sample(scene, latest, at))
@@ -124,15 +124,32 @@ def targets(first: int, most: float) -> list[float]:
 def refined(solved: MeshSolution, unknowns: float) -> tuple[MeshSolution, np.ndarray]:
     """The solution on a mesh of about so many unknowns, and the coarser element of each of its elements.
 
-    Raises StepFailed where Newton finds no equilibrium from the carried solution.
+    Where Newton finds no equilibrium from the carried solution, a path from rest is tried. Raises SolveError where that
+    breaks off.
     """
     mesh, system = solved.mesh, solved.system
     indicator = stress_indicator(system, solved.state.x)
     finer, parents = mesh.finer(indicator, round(mesh.mesh.nelements * unknowns / system.total))
     fine = System(problem_of(finer), LOOSE)
     system.solver.release()
+    if fine.sticks.any():  # what an obstacle without slip holds depends on its way
+        return MeshSolution(finer, fine, from_rest(fine, mesh.scene.checkpoints)), parents
     to = transfer(mesh.mesh, at_nodes(finer.body.mesh, parents), nodes(finer.mesh))
-    return MeshSolution(finer, fine, continued(fine, carried(system, solved.state, fine, to))), parents
+    try:
+        state = continued(fine, carried(system, solved.state, fine, to))
+    except StepFailed:
+        state = from_rest(fine, mesh.scene.checkpoints)
+    return MeshSolution(finer, fine, state), parents
+
+
+def from_rest(system: System, times: Sequence[float]) -> State:
+    """The state at the last of the times [s], by a load path. Raises SolveError where it breaks off."""
+    state = system.rest()
+    if system.starts_loaded():
+        state, *_ = advance(system, state, system.settings.start, 1.0, [])
+    for t in times:
+        state, *_ = advance(system, state, t, 1.0, [])
+    return state
 
 
 def end_sample(scene: Scene, solved: MeshSolution, at: SamplePoints) -> Sample:
@@ -155,33 +172,35 @@ def fine_enough(scene: Scene, at: SamplePoints, samples: Sequence[Sample], toler
 def all_checkpoints(
     scene: Scene, coarsest: MeshSolution, states: Sequence[State], finest: MeshSolution, ancestors: np.ndarray
 ) -> list[Equilibrium]:
-    """The finest mesh at every checkpoint, from the last to the first, to the usual tolerances.
+    """The finest mesh at every checkpoint, from the last to the first, to the usual tolerances; by a load path where
+    that does not lead there. Raises SolveError where the path breaks off.
 
-    Each starts from the coarsest mesh's state, plus what the finest mesh changed at the checkpoint after it, in
-    proportion to the displacement. Where Newton finds no equilibrium from there, the load is taken back in steps.
-    Raises SolveError where that ends too.
+    ancestors: the element of the coarsest mesh of each of the finest one's. Each checkpoint starts from the coarsest
+    mesh's state, plus what the finest mesh changed at the checkpoint after it, in proportion to the displacement.
     """
-    system = System(finest.system.problem, NewtonSettings())
+    problem = finest.system.problem
     finest.system.solver.release()
+    if finest.system.sticks.any():
+        return equilibrium_path(problem, scene.checkpoints)
+    system = System(problem, NewtonSettings())
     to = transfer(coarsest.mesh.mesh, at_nodes(finest.mesh.body.mesh, ancestors), nodes(finest.mesh.mesh))
     on_fine = [carried(coarsest.system, state, system, to) for state in states]
-    found: list[Equilibrium] = []
     try:
         state = continued(system, finest.state)
-        found.append(describe(system, state, state.iterations, 1))
-        for k in range(len(states) - 2, -1, -1):
-            start, after = on_fine[k], on_fine[k + 1]
-            share = np.linalg.norm(start.x) / max(float(np.linalg.norm(after.x)), 1e-300)
-            x = start.x + share * (state.x - after.x)
-            x[system.pattern.held] = system.held_at(start.t)
-            try:
-                state, substeps = continued(system, replace(start, x=x)), 1
-                iterations = state.iterations
-            except StepFailed:
-                state, iterations, substeps = advance(system, state, start.t, 1.0, [])
-            found.append(describe(system, state, iterations, substeps))
-    except StepFailed as failure:
-        raise SolveError(f"no equilibrium found at t = {scene.checkpoints[-1]:g} s: {failure}") from failure
+        equilibria = [describe(system, state, state.iterations, 1)]
+        for start, after in zip(on_fine[-2::-1], on_fine[:0:-1], strict=True):
+            state = continued(system, corrected(system, start, after, state))
+            equilibria.insert(0, describe(system, state, state.iterations, 1))
+    except StepFailed:
+        return equilibrium_path(problem, scene.checkpoints)
     finally:
         system.solver.release()
-    return found[::-1]
+    return equilibria
+
+
+def corrected(system: System, start: State, after: State, solved: State) -> State:
+    """A carried state, plus what solving changed in the carried state `after`, in proportion to the unknowns."""
+    share = np.linalg.norm(start.x) / max(float(np.linalg.norm(after.x)), np.finfo(float).tiny)
+    x = start.x + share * (solved.x - after.x)
+    x[system.pattern.held] = system.held_at(start.t)
+    return replace(start, x=x)

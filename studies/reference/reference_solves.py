@@ -29,7 +29,7 @@ class ReferenceSolve:
         """What the solution depends on, besides the code: not the frames; without motion not the damping or the
         start."""
         data = json.loads(scene_to_json(physics_of(self.scene)))
-        return json.dumps({"scene": _with_floats(data)}, sort_keys=True, ensure_ascii=False)
+        return json.dumps({"scene": with_floats(data)}, sort_keys=True, ensure_ascii=False)
 
     @property
     def moves(self) -> bool:
@@ -48,12 +48,12 @@ def physics_of(scene: Scene) -> Scene:
     return plain if scene.reference.dt is not None else replace(plain, damping=0.0, start=None)
 
 
-def _with_floats(value: object) -> object:
+def with_floats(value: object) -> object:
     """JSON-able data with every number as a float: a scene read back from a record has 350.0 for 350."""
     if isinstance(value, dict):
-        return {key: _with_floats(inner) for key, inner in value.items()}
+        return {key: with_floats(inner) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_with_floats(inner) for inner in value]
+        return [with_floats(inner) for inner in value]
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 

@@ -172,6 +172,7 @@ class ReferenceAttributes(Table):
     steps_done = value(int, "1", "checkpoints that were reached")
     off_shape = value(int, "1", "boundary nodes that are not on the true shape, or elements would fold")
     stopped = value(str, "", "why refinement ended before the plan's tolerance; empty where it did not")
+    set = optional_value(str, "", "the published set and file of references that it is of")
     seconds = value(float, "s", "wall time of all solutions")
     portable = optional_value(str, "", "settings of a result that is equal on every x86-64 processor")
     restamped = optional_value(str, "", "former code, and replays by which the result was kept for this code")

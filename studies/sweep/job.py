@@ -11,8 +11,9 @@ from typing import Any, ClassVar
 from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
+from studies.reference.published import fingerprint_of, published, record_of
 from studies.reference.reference_solves import STUDY as REFERENCES
-from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint, reference_solves
+from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import Case
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.user_code import files_of
@@ -175,6 +176,10 @@ class ReferenceJob(Job):
     work: ReferenceSolve
     kind = "reference"
 
+    @cached_property
+    def _published(self) -> bool:
+        return published(self.work.scene) is not None
+
     @property
     def label(self) -> str:
         """As Job's."""
@@ -183,18 +188,20 @@ class ReferenceJob(Job):
     @property
     def weight(self) -> float:
         """As Job's."""
-        return 1e9 + unknowns(self.work)
+        return 1e9 + (0.0 if self._published else unknowns(self.work))
 
     @property
     def needs(self) -> float:
         """As Job's."""
+        if self._published:
+            return MEMORY
         known = read_entry(self.path()).unknowns if is_there(self.path()) else None
         return solve_memory(self.work, known)
 
     @property
     def seconds(self) -> float:
         """As Job's."""
-        return solve_seconds(self.work)
+        return 0.0 if self._published else solve_seconds(self.work)
 
     @property
     def size(self) -> None:
@@ -204,7 +211,7 @@ class ReferenceJob(Job):
     @property
     def fingerprint(self) -> str:
         """As Job's."""
-        return reference_fingerprint()
+        return fingerprint_of(self.work.scene)
 
     @cached_property
     def _path(self) -> Path:
@@ -215,7 +222,12 @@ class ReferenceJob(Job):
         return self._path
 
     def run(self) -> Path:
-        """As Job's. A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""
+        """As Job's. A published reference is copied, not solved. A mesh that cannot be made is stored as a failure: it
+        costs its scene, not the sweep."""
+        entry = published(self.work.scene)
+        if entry is not None:
+            write_record(self.path(), record_of(self.work.scene, entry))
+            return self.path()
         from studies.reference.solve import solve
 
         try:
