@@ -26,18 +26,22 @@ from studies.scene.scene import Scene
 GROWTH = 2.5
 """Unknowns of a mesh over those of the one before, at most: more, and its indicator knows too little of the next."""
 LOOSE = NewtonSettings(force_tol=1e-4, penetration_tol=1e-3)
-"""Between the coarsest and the finest mesh: forces differ by 1e-4 from those of the usual tolerances, in half the
-time."""
+"""On all meshes but the coarsest: forces differ by at most 3e-4 from those of the usual tolerances, in half the time."""
 DISPLACEMENT = 2.5
 """Bar of the mean displacement that weighs as much as one of the force: it falls faster, so less is allowed."""
 
 
 class MeshSolution(NamedTuple):
-    """One mesh, solved at the last checkpoint."""
+    """One mesh, solved at every checkpoint."""
 
     mesh: NestedMesh
     system: System
-    state: State
+    states: Sequence[State]
+
+    @property
+    def equilibria(self) -> list[Equilibrium]:
+        """At every checkpoint."""
+        return [describe(self.system, state, state.iterations, 1) for state in self.states]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,34 +77,25 @@ def solve_nested(scene: Scene, variants: Mapping[str, Varied]) -> FamilySolution
     problem, states = problem_of(base), list[State]()
     at = SamplePoints(nodes(base.mesh)[: base.mesh.nvertices], base.mesh.t[:4].T.astype(np.int64))
     try:
-        path = equilibrium_path(problem, times, on_checkpoint=lambda checkpoint: states.append(checkpoint.state))
+        equilibria = equilibrium_path(problem, times, on_checkpoint=lambda checkpoint: states.append(checkpoint.state))
         varied = [varied_sample(scene, problem, variants[name], at, name) for name in settings_varied(scene)]
     except SolveError as error:
-        return FamilySolution(
-            problem, [e for e in error.converged if e.t in times], at, [], base.off, failure=str(error)
-        )
-    coarsest = MeshSolution(base, System(problem, LOOSE), states[-1])
-    samples, latest, stopped = [sample_of(scene, problem, path, at, math.nan)], coarsest, ""
-    ancestors = np.arange(base.mesh.nelements)
-    for target in targets(coarsest.system.total, plan.most):
+        reached = [e for e in error.converged if e.t in times]
+        return FamilySolution(problem, reached, at, [], base.off, failure=str(error))
+    latest = MeshSolution(base, System(problem, LOOSE), states)
+    samples, stopped = [sample_of(scene, problem, equilibria, at, math.nan)], ""
+    for target in targets(latest.system.total, plan.most):
         try:
-            latest, parents = refined(latest, target)
+            latest = refined(latest, target)
         except SolveError as failure:
             stopped = f"the mesh of about {target:.0f} unknowns is left out: {failure}"
             break
-        ancestors = ancestors[parents]
-        samples.insert(0, end_sample(scene, latest, at))
+        equilibria = latest.equilibria
+        samples.insert(0, sample_of(scene, latest.system.problem, equilibria, at, math.nan))
         if len(samples) > 2 and fine_enough(scene, at, samples, plan.tolerance):
             break
-    if latest is coarsest:
-        return FamilySolution(problem, path, at, [*samples, *varied], base.off, stopped)
-    fine, off = latest.system.problem, latest.mesh.off
-    try:
-        equilibria = all_checkpoints(scene, coarsest, states, latest, ancestors)
-    except SolveError as error:
-        return FamilySolution(fine, [], at, [], off, stopped, failure=str(error))
-    samples[0] = sample_of(scene, fine, equilibria, at, math.nan)
-    return FamilySolution(fine, equilibria, at, [*samples, *varied], off, stopped)
+    latest.system.solver.release()
+    return FamilySolution(latest.system.problem, equilibria, at, [*samples, *varied], latest.mesh.off, stopped)
 
 
 def varied_sample(scene: Scene, problem: Problem, better: Varied, at: SamplePoints, name: str) -> Sample:
@@ -121,41 +116,48 @@ def targets(first: int, most: float) -> list[float]:
     return [first * (most / first) ** (k / steps) for k in range(1, steps + 1)]
 
 
-def refined(solved: MeshSolution, unknowns: float) -> tuple[MeshSolution, np.ndarray]:
-    """The solution on a mesh of about so many unknowns, and the coarser element of each of its elements.
+def refined(solved: MeshSolution, unknowns: float) -> MeshSolution:
+    """The solution on a mesh of about so many unknowns, refined where the last checkpoint needs it.
 
-    Where Newton finds no equilibrium from the carried solution, a path from rest is tried. Raises SolveError where that
+    Where Newton finds no equilibrium from the carried states, a path from rest is tried. Raises SolveError where that
     breaks off.
     """
-    mesh, system = solved.mesh, solved.system
-    indicator = stress_indicator(system, solved.state.x)
+    mesh, system, times = solved.mesh, solved.system, solved.mesh.scene.checkpoints
+    indicator = stress_indicator(system, solved.states[-1].x)
     finer, parents = mesh.finer(indicator, round(mesh.mesh.nelements * unknowns / system.total))
     fine = System(problem_of(finer), LOOSE)
     system.solver.release()
     if fine.sticks.any():  # what an obstacle without slip holds depends on its way
-        return MeshSolution(finer, fine, from_rest(fine, mesh.scene.checkpoints)), parents
+        return MeshSolution(finer, fine, from_rest(fine, times))
     to = transfer(mesh.mesh, at_nodes(finer.body.mesh, parents), nodes(finer.mesh))
     try:
-        state = continued(fine, carried(system, solved.state, fine, to))
+        states = from_carried(fine, [carried(system, state, fine, to) for state in solved.states])
     except StepFailed:
-        state = from_rest(fine, mesh.scene.checkpoints)
-    return MeshSolution(finer, fine, state), parents
+        states = from_rest(fine, times)
+    return MeshSolution(finer, fine, states)
 
 
-def from_rest(system: System, times: Sequence[float]) -> State:
-    """The state at the last of the times [s], by a load path. Raises SolveError where it breaks off."""
-    state = system.rest()
+def from_carried(system: System, starts: Sequence[State]) -> list[State]:
+    """The equilibria near carried states, the last first: each other one starts with what solving changed in the one
+    after it, in proportion to the unknowns. Raises StepFailed."""
+    states = [continued(system, starts[-1])]
+    for start, after in zip(starts[-2::-1], starts[:0:-1], strict=True):
+        share = np.linalg.norm(start.x) / max(float(np.linalg.norm(after.x)), np.finfo(float).tiny)
+        x = start.x + share * (states[0].x - after.x)
+        x[system.pattern.held] = system.held_at(start.t)
+        states.insert(0, continued(system, replace(start, x=x)))
+    return states
+
+
+def from_rest(system: System, times: Sequence[float]) -> list[State]:
+    """The states at the times [s] of a load path. Raises SolveError where it breaks off."""
+    state, states = system.rest(), list[State]()
     if system.starts_loaded():
         state, *_ = advance(system, state, system.settings.start, 1.0, [])
     for t in times:
         state, *_ = advance(system, state, t, 1.0, [])
-    return state
-
-
-def end_sample(scene: Scene, solved: MeshSolution, at: SamplePoints) -> Sample:
-    """The sample of a mesh that is solved at the last checkpoint alone."""
-    equilibrium = describe(solved.system, solved.state, solved.state.iterations, 1)
-    return sample_of(scene, solved.system.problem, [equilibrium], at, math.nan)
+        states.append(state)
+    return states
 
 
 def fine_enough(scene: Scene, at: SamplePoints, samples: Sequence[Sample], tolerance: float) -> bool:
@@ -167,40 +169,3 @@ def fine_enough(scene: Scene, at: SamplePoints, samples: Sequence[Sample], toler
     }
     factors = {"force_end": 1.0, "surface_mean": DISPLACEMENT}
     return all(factors[name] * bar.uncertainty <= tolerance for name, bar in bars.items())
-
-
-def all_checkpoints(
-    scene: Scene, coarsest: MeshSolution, states: Sequence[State], finest: MeshSolution, ancestors: np.ndarray
-) -> list[Equilibrium]:
-    """The finest mesh at every checkpoint, from the last to the first, to the usual tolerances; by a load path where
-    that does not lead there. Raises SolveError where the path breaks off.
-
-    ancestors: the element of the coarsest mesh of each of the finest one's. Each checkpoint starts from the coarsest
-    mesh's state, plus what the finest mesh changed at the checkpoint after it, in proportion to the displacement.
-    """
-    problem = finest.system.problem
-    finest.system.solver.release()
-    if finest.system.sticks.any():
-        return equilibrium_path(problem, scene.checkpoints)
-    system = System(problem, NewtonSettings())
-    to = transfer(coarsest.mesh.mesh, at_nodes(finest.mesh.body.mesh, ancestors), nodes(finest.mesh.mesh))
-    on_fine = [carried(coarsest.system, state, system, to) for state in states]
-    try:
-        state = continued(system, finest.state)
-        equilibria = [describe(system, state, state.iterations, 1)]
-        for start, after in zip(on_fine[-2::-1], on_fine[:0:-1], strict=True):
-            state = continued(system, corrected(system, start, after, state))
-            equilibria.insert(0, describe(system, state, state.iterations, 1))
-    except StepFailed:
-        return equilibrium_path(problem, scene.checkpoints)
-    finally:
-        system.solver.release()
-    return equilibria
-
-
-def corrected(system: System, start: State, after: State, solved: State) -> State:
-    """A carried state, plus what solving changed in the carried state `after`, in proportion to the unknowns."""
-    share = np.linalg.norm(start.x) / max(float(np.linalg.norm(after.x)), np.finfo(float).tiny)
-    x = start.x + share * (solved.x - after.x)
-    x[system.pattern.held] = system.held_at(start.t)
-    return replace(start, x=x)

@@ -18,7 +18,7 @@ from studies.reference.solve import solve
 from studies.scene.library import JUDGED
 from studies.scene.scene import Scene
 
-MOST, TOLERANCE = 110e3, 0.002
+MOST, TOLERANCE = 80e3, 0.002
 """Of published nested references: finer than the plan of the scene, which a user can afford."""
 PROCESSES = 2
 
