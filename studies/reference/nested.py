@@ -26,7 +26,7 @@ from studies.scene.scene import Scene
 GROWTH = 2.5
 """Unknowns of a mesh over those of the one before, at most: more, and its indicator knows too little of the next."""
 LOOSE = NewtonSettings(force_tol=1e-4, penetration_tol=1e-3)
-"""On all meshes but the coarsest: forces differ by at most 3e-4 from those of the usual tolerances, in half the time."""
+"""On all meshes but the coarsest: forces are within 3e-4 of those of the usual tolerances, in half the time."""
 DISPLACEMENT = 2.5
 """Bar of the mean displacement that weighs as much as one of the force: it falls faster, so less is allowed."""
 

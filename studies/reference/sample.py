@@ -88,10 +88,9 @@ def sample_of(
 ) -> Sample:
     """The sample of equilibria, the last ones of the scene's checkpoints or all of them."""
     series = {name: np.full(len(scene.checkpoints), np.nan) for name in SERIES}
-    held = np.array([e.held_force for e in found])
-    series["force"][-len(found) :] = scene.output_force(
-        whole_forces(scene, np.array([e.obstacle_force for e in found])), held
-    )
+    if allowed(scene, "force"):
+        forces = whole_forces(scene, np.array([e.obstacle_force for e in found]))
+        series["force"][-len(found) :] = scene.output_force(forces, np.array([e.held_force for e in found]))
     series["volume"][-len(found) :] = [e.volume / e.volume0 for e in found]
     series["pressure"][-len(found) :] = [mean_pressure(problem, e) for e in found]
     if scene.filled:
