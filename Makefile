@@ -5,7 +5,7 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help study study-peers report verify smoke test check lint docs links figures fuzz stress bench speeds \
+.PHONY: help demo study study-peers report verify smoke test check lint docs links figures fuzz stress bench speeds \
 	coverage clean distclean compiled \
 	compiled-essential setup-run \
 	setup-test setup-verify setup-dev FORCE
@@ -14,6 +14,9 @@ help: ## this list
 	@echo "make TARGET"
 	@awk -F ':.*## ' '/^[a-z%\/.-]+:.*## / {printf "  %-22s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 	@echo "Main studies: $$(grep -l main=True studies/catalog/*.py | xargs -n 1 basename -s .py | xargs)"
+
+demo: setup-run ## squeeze a ball with three bodies: three numbers each, and a page (a minute)
+	$(BIN)/organbench demo --output results/demo
 
 study: setup-run ## run the main studies, then the charts and tables (the main job; minutes)
 	$(BIN)/organbench run --report

@@ -23,9 +23,10 @@ SCATTER = 2.0
 and the finest may be two of these off."""
 SLOWEST, FASTEST = 1.0, 3.0
 """Range of orders in the element size that are believed; 3 is that of the displacement of quadratic elements."""
-SLOWEST_AT_OUTLINES, FASTEST_AT_OUTLINES = 0.5, 1.0
-"""The same in the size of the elements where a held patch ends: the displacement goes as √r, which they hold to order
-½, and that leaves order 1 in energy, force and displacement elsewhere, however small they are."""
+NESTED_RATE = 2.0 / 3.0
+"""Power of the unknowns by which the error of nested, adaptively bisected meshes is taken to fall. In theory it is 1
+where outlines of held regions dominate, 4/3 elsewhere; the marks of a single step decide too much for a rate to be
+observed in three values (docs/theory.md, section 6)."""
 Range = tuple[float, float]
 """Slowest and fastest order that are believed."""
 BELIEVED: Range = (SLOWEST, FASTEST)
@@ -52,17 +53,21 @@ class MeshError:
         return self.order == self.order
 
 
-def orders_at_outlines(sizes: Sequence[float], at_outlines: Sequence[float]) -> Range:
-    """Range of orders q to believe of errors ~ at_outlines^q, of meshes fine to coarse.
+def nested_error(unknowns: Sequence[float], changes: Sequence[float]) -> float:
+    """Error of the finest of two or three nested meshes, fine to coarse, in the unit of the changes.
 
-    sizes: of the elements away from outlines [m]; at_outlines: of those there, measured [m]. The error at an outline
-    has order ½ to 1 there; what is left elsewhere falls no faster than sizes^FASTEST, however fast the elements at
-    outlines shrink.
-    Raises SolveError for sizes that do not grow.
+    unknowns: n1 > n2 (> n3); changes: |f2 − f1| (and |f3 − f1|), of numbers or norms of fields. The larger of
+    SAFETY |fi − f1|/((n1/ni)^NESTED_RATE − 1): a change that is small by chance does not make the bar small. Two
+    meshes: safety TWO_MESHES. Raises SolveError for unknowns that do not fall, and changes that are not finite.
     """
-    pairs = zip(_ratios(sizes), _ratios(at_outlines), strict=True)
-    fastest = min(FASTEST_AT_OUTLINES, *(FASTEST * np.log(ratio) / np.log(outline) for ratio, outline in pairs))
-    return min(SLOWEST_AT_OUTLINES, float(fastest)), float(fastest)
+    if len(unknowns) not in (2, 3) or len(changes) != len(unknowns) - 1 or not np.isfinite(changes).all():
+        raise SolveError("an error bar needs two or three solved meshes, fine to coarse")
+    if not all(fine > coarse for fine, coarse in pairwise(unknowns)):
+        raise SolveError(f"nested meshes have {', '.join(f'{n:g}' for n in unknowns)} unknowns, which do not fall")
+    safety = SAFETY if len(unknowns) == 3 else TWO_MESHES
+    ratios = [unknowns[0] / coarse for coarse in unknowns[1:]]
+    pairs = zip(changes, ratios, strict=True)
+    return max(safety * abs(change) / (ratio**NESTED_RATE - 1.0) for change, ratio in pairs)
 
 
 def observed_order(

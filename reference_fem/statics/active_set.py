@@ -86,7 +86,10 @@ def points_near(system: System, touch: Touch, x: np.ndarray, change: np.ndarray)
 
 
 class Influence:
-    """How all points move when one of them is pushed; found when first asked for."""
+    """How all points move when one of them is pushed; found when first asked for.
+
+    Newton's change, solved before with the same factors, has checked them: these solves are not checked again.
+    """
 
     def __init__(self, system: System, tangent: Tangent, points: Points):
         self.tangent, self.points = tangent, points
@@ -98,7 +101,8 @@ class Influence:
         new = [k for k in chosen if k not in self.known]
         for first in range(0, len(new), BATCH):
             batch = new[first : first + BATCH]
-            moves = self.points.directions @ self.tangent.respond(self.pushes[batch].T.toarray(order="F"))
+            pushes = self.pushes[batch].T.toarray(order="F")
+            moves = self.points.directions @ self.tangent.respond(pushes, checked=False)
             self.known |= dict(zip(batch, moves.T, strict=True))
         return np.array([self.known[k] for k in chosen]).reshape(len(chosen), len(self.points.gap)).T
 

@@ -32,14 +32,16 @@ class StepFailed(Exception):
     """A load step did not converge; the path tries a smaller one."""
 
 
-def solve_step(system: System, state: State, t: float, load: float) -> State:
+def solve_step(system: System, state: State, t: float, load: float, more: np.ndarray | float = 0.0) -> State:
     """The equilibrium at time t from the one in `state`; raises StepFailed.
+
+    more: a further dead force, (field_count,) [N].
 
     Multipliers are updated, and the penalty raised, only while some point is deeper than allowed, or is pushed from as
     far outside; the next step starts low again.
     """
     target, stiffness = system.held_at(t), 1.0
-    force, filling = system.force_at(t, load), system.filling_at(t, load)
+    force, filling = system.force_at(t, load) + more, system.filling_at(t, load)
     loads = Loads(force, system.obstacles_at(t), state.pressure, filling, grip=state.hold)
     x, found, before = state.x, first_guess(system, state, loads), None
     for iteration in range(1, system.settings.max_iterations + 1):

@@ -22,15 +22,22 @@ class Tangent:
                 if lumen.by_pressure:
                     self.matrix[k] = np.eye(len(system.lumens))[k]
 
-    def respond(self, forces: np.ndarray, misfits: np.ndarray | float = 0.0, lifted: np.ndarray | float = 0.0):
+    def respond(
+        self,
+        forces: np.ndarray,
+        misfits: np.ndarray | float = 0.0,
+        lifted: np.ndarray | float = 0.0,
+        checked: bool = True,
+    ):
         """Change of all unknowns (total, ...) that balances forces on the free ones (n, ...) and closes the misfits.
 
         misfits (nc, ...): of the cavities. lifted (m, ...): change of the held unknowns, its forces among `forces`.
+        checked: whether the solve checks its residual (SymmetricSolver.solve).
         """
         system, m = self.system, self.system.field_count
         change = np.zeros((system.total, *forces.shape[1:]))
         change[system.pattern.held] = lifted
-        change[system.pattern.free] = system.solver.solve(forces)
+        change[system.pattern.free] = system.solver.solve(forces, checked)
         if system.lumens:
             right = misfits - self.found.gradients @ change[:m]
             for k, lumen in enumerate(system.lumens):

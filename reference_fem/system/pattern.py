@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from reference_fem.compiled import compiled
+
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
@@ -18,8 +20,6 @@ class Pattern:
     """Global index of each free unknown, (n,)."""
     held: np.ndarray
     """Global index of each held unknown, (m,)."""
-    keys: np.ndarray
-    """Sorted key of every slot."""
     rank: np.ndarray
     """Position of every unknown in `free`, or n + its position in `held`, (total,)."""
     indptr: np.ndarray
@@ -44,41 +44,49 @@ class Pattern:
 
     def positions(self, dofs: np.ndarray):
         """Slots of the packed upper triangles (row by row) of the local matrices on dofs (k, l): (k, l(l+1)/2)."""
-        keys = pair_keys(self.rank, len(self.free), len(self.held), dofs)
-        slots = np.searchsorted(self.keys, keys)
-        return np.minimum(slots, self.size - 1).astype(np.uint32)
+        count = dofs.shape[1]
+        slots = np.empty((len(dofs), count * (count + 1) // 2), dtype=np.uint32)
+        rows = (self.indptr, self.indices), (self.lift_indptr, self.lift_indices)
+        find_slots(np.ascontiguousarray(self.rank[dofs]), len(self.free), *rows, slots)
+        return slots
 
 
-def pair_keys(rank: np.ndarray, n: int, m: int, dofs: np.ndarray):
-    """One sortable number per local pair: free-free pairs first, row by row, then free-held, then the rest."""
-    rows, cols = np.triu_indices(dofs.shape[1])
-    a, b = rank[dofs[:, rows]], rank[dofs[:, cols]]
-    low, high = np.minimum(a, b), np.maximum(a, b)
-    keys = low * n + high
-    lift = high >= n
-    keys[lift] = n * n + low[lift] * m + (high[lift] - n)
-    keys[low >= n] = n * n + n * m
-    return keys
+@compiled()
+def find_slots(local: np.ndarray, n: int, upper: tuple, lift: tuple, slots: np.ndarray):
+    """Slot of every pair of each row of `local` (k, l), positions as in Pattern.rank, into slots (k, l(l+1)/2).
+
+    upper, lift: (indptr, indices) of the two parts. Each pair is searched in its row.
+    """
+    for k in range(local.shape[0]):
+        slot = 0
+        for a in range(local.shape[1]):
+            for b in range(a, local.shape[1]):
+                low, high = min(local[k, a], local[k, b]), max(local[k, a], local[k, b])
+                if low >= n:
+                    slots[k, slot] = len(upper[1]) + len(lift[1])
+                elif high < n:
+                    first, last = upper[0][low], upper[0][low + 1]
+                    slots[k, slot] = first + np.searchsorted(upper[1][first:last], high)
+                else:
+                    first, last = lift[0][low], lift[0][low + 1]
+                    slots[k, slot] = len(upper[1]) + first + np.searchsorted(lift[1][first:last], high - n)
+                slot += 1
 
 
 def build_pattern(dofs: np.ndarray, held_mask: np.ndarray) -> Pattern:
-    """Pattern of all element matrices on dofs (ne, l); held_mask (total,) marks prescribed unknowns."""
+    """Pattern of all element matrices on dofs (ne, l); held_mask (total,) marks prescribed unknowns.
+
+    With E (ne, total), 1 where an element has an unknown, EᵀE is not zero where two unknowns share an element.
+    """
     free, held = np.flatnonzero(~held_mask), np.flatnonzero(held_mask)
     n, m = len(free), len(held)
-    rank = np.empty(len(held_mask), dtype=np.int64)
+    rank = np.empty(len(held_mask), dtype=np.int32)
     rank[free], rank[held] = np.arange(n), n + np.arange(m)
-    chunks = [np.unique(pair_keys(rank, n, m, part)) for part in np.array_split(dofs, 1 + len(dofs) // 2000)]
-    keys = np.unique(np.concatenate(chunks))
-    keys = keys[keys < n * n + n * m]
-    own, lift = keys[keys < n * n], keys[keys >= n * n] - n * n
-    width = max(m, 1)
-    return Pattern(
-        free, held, keys, rank,
-        row_starts(own // n, n), (own % n).astype(np.int32),
-        row_starts(lift // width, n), (lift % width).astype(np.int32),
-    )  # fmt: skip
-
-
-def row_starts(rows: np.ndarray, n: int):
-    """CSR indptr from sorted row numbers."""
-    return np.searchsorted(rows, np.arange(n + 1)).astype(np.int32)
+    count, width = dofs.shape
+    starts = width * np.arange(count + 1)
+    members = sp.csr_matrix((np.ones(dofs.size, dtype=np.int32), rank[dofs].ravel(), starts), shape=(count, n + m))
+    shared = (members.T[:n] @ members).tocsr()
+    upper, lift = sp.csr_matrix(sp.triu(shared[:, :n])), sp.csr_matrix(shared[:, n:])
+    upper.sort_indices()
+    lift.sort_indices()
+    return Pattern(free, held, rank, upper.indptr, upper.indices, lift.indptr, lift.indices)

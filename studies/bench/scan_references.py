@@ -32,12 +32,8 @@ GAP = 0.002
 UNTIL = 0.6 * DURATION
 """When nothing moves any more [s]."""
 LOADS = ("lifted", "pressed", "probed")
-FINE = {"levels": (360, 550, 800), "at_outlines": (2, 3, 4)}
-"""Of the plan, for organs with thin margins: coarser meshes cannot follow these."""
-FINE_CONTACT = (4, 5, 5)
-"""Times that elements under a probe are then halved."""
-UNDER_PLANE = (1, 2, 2)
-"""Times that elements under a plane are halved: it touches many, a probe few."""
+FINE = 100e3
+"""Unknowns of `--fine`, for organs with thin margins."""
 
 
 def scan_scenes(path: Path, unit: str = "mm") -> dict[str, Scene]:
@@ -58,7 +54,7 @@ def pressed(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
     path = Trajectory((0.0, UNTIL), ((0.0, 0.0, 0.0), scaled(inward, (PRESSED_IN + GAP) * depth)))
     plane = Plane(scaled(inward, float(ways.min()) - GAP * depth), inward, path)
     title = f"{mesh.name}: held at one end, pressed by a plane from the side"
-    plan = replace(PLAN, at_contact=UNDER_PLANE)
+    plan = replace(PLAN, at_contact=0)
     return replace(probed, title=title, obstacles=(plane,), reference=plan, probed=ForceOutput("obstacle", 0, inward))
 
 
@@ -80,23 +76,19 @@ def lifted(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
 
 def row(scene: Scene, reference: Reference) -> str:
     """What a reference says: force on each mesh [N], unknowns, seconds, and how far its finest is to be trusted [%]."""
-    family = (*reversed(reference.coarser), reference)
+    family = reference.meshes[::-1]
     forces = " / ".join(f"{one.force[-1]:.4g}" for one in family)
-    told = [one.record.attributes for one in family]
-    unknowns = " / ".join(f"{one['unknowns']:,}" for one in told)
+    unknowns = " / ".join(f"{one.unknowns:,}" for one in family)
     bars = reference.total_uncertainty
-    seconds = sum(float(one["seconds"]) for one in told)
     shares = f"{100 * bars['force_end']:8.2f} %  {100 * bars['surface_mean']:9.2f} %"
+    seconds = float(reference.record.attributes["seconds"])
     return f"{scene.name:28}  {shares}  {forces:28}  {unknowns:24}  {seconds:5.0f}"
 
 
 def refined(scene: Scene) -> Scene:
     """The scene with its reference on finer meshes."""
     assert scene.reference is not None  # all of these scenes have a plan
-    probed = scene.reference.at_contact == PLAN.at_contact
-    return replace(
-        scene, reference=replace(scene.reference, **FINE, **({"at_contact": FINE_CONTACT} if probed else {}))
-    )
+    return replace(scene, reference=replace(scene.reference, most=FINE))
 
 
 def rows(root: Path, paths: list[Path], loads: list[str], fine: bool = False) -> Iterator[str]:
@@ -121,7 +113,7 @@ def main(words: list[str]) -> int:
     parser.add_argument("files", nargs="+", type=Path)
     parser.add_argument("--root", type=Path, default=Path("results"))
     parser.add_argument("--loads", nargs="+", default=list(LOADS), choices=LOADS)
-    parser.add_argument("--fine", action="store_true", help=f"references on {FINE['levels']} surface nodes")
+    parser.add_argument("--fine", action="store_true", help=f"references of up to {FINE:g} unknowns")
     given = parser.parse_args(words)
     print(f"{'scene':28}  force_end   mean_error  force [N]                     unknowns                  seconds")
     for line in rows(given.root, given.files, given.loads, given.fine):

@@ -144,7 +144,7 @@ def smoke_nodes(case: Case) -> int:
 def smoke_case(case: Case) -> Case:
     """A case small enough for a smoke run."""
     plan = case.scene.reference
-    coarse = replace(plan.coarsest(2), variants=()) if plan is not None else None
+    coarse = plan.smaller() if plan is not None else None
     return case.replaced(
         scene=replace(case.scene, reference=coarse),
         body=replace(

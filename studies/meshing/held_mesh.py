@@ -53,14 +53,28 @@ class HeldMesh:
 
     def bisected(self, elements: np.ndarray) -> "HeldMesh":
         """Each of the elements halved at its longest edge, and of their neighbours as many as that takes."""
+        return self.halved(elements)[0]
+
+    def halved(self, elements: np.ndarray) -> tuple["HeldMesh", np.ndarray]:
+        """The same, and for each new element the number of the old one that it is, or is a part of."""
+        rounds: list[np.ndarray] = []
+
+        class Recording(MeshTet):
+            def _adaptive_sort_mesh(self, p, t, marked):
+                rounds.append(marked)
+                return super()._adaptive_sort_mesh(p, t, marked)
+
         talk = logging.getLogger("skfem.mesh.mesh")
         before = talk.level
         talk.setLevel(logging.ERROR)  # it tells that its own slices are copied
         try:
-            finer = self.mesh.refined(elements)
+            finer = Recording(self.mesh.p, self.mesh.t).refined(elements)
         finally:
             talk.setLevel(before)
-        return replace(self, mesh=MeshTet(np.ascontiguousarray(finer.p), np.ascontiguousarray(finer.t)))
+        parents = np.arange(self.mesh.nelements)
+        for marked in rounds:  # scikit-fem keeps one half in its place and puts the other at the end
+            parents = np.concatenate((parents, parents[marked]))
+        return replace(self, mesh=MeshTet(np.ascontiguousarray(finer.p), np.ascontiguousarray(finer.t))), parents
 
     def refined(self, scene: Scene, at_outlines: int, at_contact: int) -> "HeldMesh":
         """Halved so many times at the outlines, then at the surface that an obstacle of the scene will have reached at

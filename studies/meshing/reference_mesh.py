@@ -1,4 +1,4 @@
-"""The mesh of a reference: the mesher's, finer where it counts, its sides curved onto the true surface and outlines."""
+"""The mesh of a reference: the mesher's, its sides curved onto the true surface and outlines."""
 
 from dataclasses import replace
 
@@ -8,8 +8,7 @@ from skfem import MeshTet, MeshTet2
 from reference_fem import SolveError, curve, nodes
 from reference_fem.elements.shapes import check_neighbours
 from studies.geometry import OrganMesh, ball_octant, curved, project_ball
-from studies.meshing.held_mesh import HeldMesh, held_mesh, rim_sides, straight
-from studies.meshing.reference_outlines import drawn_to_outlines
+from studies.meshing.held_mesh import HeldMesh, held_mesh, straight
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.shaping import laid_out
 from studies.meshing.true_shape import as_curved, on_true_shape, true_shape
@@ -23,23 +22,16 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
     """The second-order mesh on one level of the scene's plan, the nodes of each of its held regions, and the middles of
     the corners of the lumen's facets [m], (f, 3).
 
-    A region is held at the nodes of its facets: a mid-side node outside them, across a dent, stays free. Where elements
-    at outlines are halved, their middles are drawn to the outline as well (studies.meshing.reference_outlines).
-    Whether an element folds is judged where the reference integrates it, by reference_fem: the mesher's bound refuses
-    more. Raises StudyError for a mesh that cannot be made.
+    A region is held at the nodes of its facets: a mid-side node outside them, across a dent, stays free. Whether an
+    element folds is judged where the reference integrates it, by reference_fem: the mesher's bound refuses more.
+    Raises StudyError for a mesh that cannot be made.
     """
-    plan = scene.reference
-    assert plan is not None  # never called for a scene without one
     if scene.symmetric:
         return _curved_octant(scene, straight(_octant(scene, level))), [], np.empty((0, 3))
     organ_mesh = mesh_for(scene, int(level), on_shape=True, even=True)
-    coarse = held_mesh(scene, organ_mesh)
-    at_outlines, at_contact = plan.bisections(level)
-    body = coarse.refined(scene, at_outlines, at_contact)
-    mesh = on_true_sides(scene, organ_mesh, coarse, body)
+    body = held_mesh(scene, organ_mesh)
+    mesh = on_true_sides(scene, organ_mesh, body, body)
     *held, wall = body.facets(mesh)
-    if at_outlines:
-        mesh = drawn_to_outlines(mesh, np.concatenate([rim_sides(facets)[:, :2].ravel() for facets in held]))
     return mesh, [np.unique(facets) for facets in held], nodes(mesh)[wall[:, :3]].mean(axis=1)
 
 

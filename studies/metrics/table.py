@@ -68,6 +68,7 @@ def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
         "dt/dt_c": attributes["dt"] / attributes["dt_limit"] if "dt" in attributes else float("nan"),
         "status": str(run.record.status),
         "recipe": recipe_text(case),
+        "reference": "" if run.reference is None else run.reference.source,
     }
     for entry in metrics:
         row[f"{entry.name} [{entry.unit}]"] = entry(run)

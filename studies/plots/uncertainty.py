@@ -17,7 +17,7 @@ TITLE = "Uncertainty of the references"
 LOOKS = {"mesh": (BLUE, "o"), "contact": (VERMILLION, "s"), "kappa": (GREEN, "^"), "steps": (ORANGE, "D")}
 """Colour and marker of each share."""
 WORDS = {
-    "mesh": "mesh (three of them)",
+    "mesh": "mesh (finest three)",
     "contact": "contact (penalty × 3)",
     "kappa": "bulk modulus (× 10)",
     "steps": "load steps (halved)",

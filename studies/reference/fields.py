@@ -1,19 +1,20 @@
 """What of an equilibrium path is stored."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from reference_fem import Equilibrium, Moment, Problem, nodes
+from reference_fem import Equilibrium, Moment, nodes
+from studies.reference.nested import FamilySolution
 from studies.reference.problem import whole_forces
+from studies.reference.sample import mean_pressure, sample_fields
 from studies.scene.scene import Scene
 from studies.store.new_record import new_fields
 from studies.store.record import Field
 from studies.store.schema import REFERENCE_FIELDS
 
 
-def fields_of(scene: Scene, problem: Problem, found: Sequence[Equilibrium]) -> dict[str, Field]:
-    """The equilibria at the checkpoints, one row each; NaN where the path did not get there."""
+def fields_of(scene: Scene, solution: FamilySolution) -> dict[str, Field]:
+    """The equilibria at the checkpoints, one row each, NaN where the path did not get there; and the samples."""
+    problem, found = solution.problem, solution.equilibria
     x, tetrahedra = nodes(problem.mesh), problem.mesh.t.T.astype(np.int64)
     lengths = {"K": len(scene.checkpoints), "o": len(scene.obstacles), "g": len(problem.held), "n": len(x)}
 
@@ -22,7 +23,7 @@ def fields_of(scene: Scene, problem: Problem, found: Sequence[Equilibrium]) -> d
             "contact_force": whole_forces(scene, e.obstacle_force[None])[0],
             "held_force": e.held_force,
             "volume": e.volume / e.volume0,
-            "pressure": mean_pressure(tetrahedra, e),
+            "pressure": mean_pressure(problem, e),
             "lumen_pressure": float(e.cavity_pressure.sum()) if scene.filled else np.nan,
             "min_j": e.min_J,
             "max_j": e.max_J,
@@ -36,6 +37,7 @@ def fields_of(scene: Scene, problem: Problem, found: Sequence[Equilibrium]) -> d
 
     rows = [row(e) for e in found]
     values = {"t": np.array(scene.checkpoints), "nodes": x, "tetrahedra": tetrahedra}
+    values |= sample_fields(solution.at, solution.samples)
     for name in REFERENCE_FIELDS.keys() - values.keys():
         shape = REFERENCE_FIELDS[name].shape.split()
         values[name] = np.full([lengths[part] if part in lengths else int(part) for part in shape], np.nan)
@@ -46,9 +48,3 @@ def fields_of(scene: Scene, problem: Problem, found: Sequence[Equilibrium]) -> d
 
 def _of_motion(equilibrium: Equilibrium, name: str) -> float:
     return getattr(equilibrium, name) if isinstance(equilibrium, Moment) else np.nan
-
-
-def mean_pressure(tetrahedra: np.ndarray, equilibrium: Equilibrium) -> float:
-    """Volume mean of −p [Pa]: p of the solver is positive in tension, the multiplier of the springs in compression."""
-    volume = equilibrium.weights.sum(axis=1)
-    return -float(volume @ equilibrium.p[tetrahedra].mean(axis=1) / volume.sum())

@@ -1,61 +1,66 @@
-"""The finite-element reference of a scene, read back: its solutions and their error bar."""
+"""The finite-element reference of a scene, read back: its finest solution and its error bar."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from studies.base.errors import StudyError
-from studies.reference.reference_solves import ReferenceSolve, reference_solves
+from studies.reference.reference_solves import ReferenceSolve
+from studies.reference.sample import Sample, SamplePoints, samples_in
 from studies.reference.solution import Solution
 from studies.reference.uncertainty import Uncertainty, uncertainties
 from studies.scene.scene import Scene
-from studies.store.record import Record, Status, read_record
+from studies.store.record import Status, read_record
 
 
 @dataclass(frozen=True, eq=False)
 class Reference(Solution):
-    """The solution on the finest mesh, with those that say how good it is."""
+    """The solution on the finest mesh, with what the others say of it."""
 
-    coarser: tuple[Solution, ...] = ()
-    """The other meshes of the family, fine to coarse."""
-    sensitivity_runs: tuple[Solution, ...] = ()
-    """The coarsest mesh with one setting made better each."""
+    @property
+    def source(self) -> str:
+        """The published set and file that it is of, as "2027.1 0a1b2c3d"; "solved here" for one that nobody
+        published."""
+        return str(self.record.attributes.get("set", "solved here"))
+
+    @cached_property
+    def _samples(self) -> tuple[SamplePoints, list[Sample]]:
+        return samples_in(self.scene, self.record)
+
+    @property
+    def at(self) -> SamplePoints:
+        """Where solutions are compared."""
+        return self._samples[0]
+
+    @property
+    def meshes(self) -> list[Sample]:
+        """Of the family, fine to coarse."""
+        return [one for one in self._samples[1] if not one.variant]
+
+    @property
+    def variants(self) -> dict[str, Sample]:
+        """The coarsest mesh with one setting made better each."""
+        return {one.variant: one for one in self._samples[1] if one.variant}
 
     @cached_property
     def uncertainty(self) -> dict[str, Uncertainty]:
         """Of each quantity, share by share."""
-        return uncertainties(self, self.coarser, self.sensitivity_runs)
+        return uncertainties(self.scene, self.at, self.meshes, self.variants)
 
     @cached_property
     def total_uncertainty(self) -> dict[str, float]:
         """Uncertainty of each quantity [1], relative to its size (docs, eq. 6.3)."""
-        return {name: found.total for name, found in self.uncertainty.items()}
+        return {name: of_quantity.total for name, of_quantity in self.uncertainty.items()}
 
 
 def load_reference(root: Path, scene: Scene) -> Reference | None:
-    """The finest stored solution with its family and sensitivity runs behind it; None for a scene without a plan.
+    """The stored reference of a scene; None for a scene without a plan.
 
-    Raises StudyError when one is missing, or did not converge.
+    Raises StudyError when it is missing, or did not converge.
     """
     if scene.reference is None:
         return None
-    found = {
-        (reference_solve.level, reference_solve.variant): _converged(root, reference_solve)
-        for reference_solve in reference_solves(scene)
-    }
-    *coarser, finest = [record for (_, variant), record in found.items() if not variant]
-    return Reference(
-        scene,
-        finest,
-        tuple(Solution(scene, record) for record in reversed(coarser)),
-        tuple(Solution(scene, record) for (_, variant), record in found.items() if variant),
-    )
-
-
-def _converged(root: Path, reference_solve: ReferenceSolve) -> Record:
-    record = read_record(reference_solve.path(root))
+    record = read_record(ReferenceSolve(scene).path(root))
     if record.status != Status.OK:
-        what = f" with other {reference_solve.variant}" if reference_solve.variant else ""
-        where = f"the reference of '{reference_solve.scene.name}' on mesh {reference_solve.level:g}{what}"
-        raise StudyError(f"{where} is {record.status}: {record.message}")
-    return record
+        raise StudyError(f"the reference of '{scene.name}' is {record.status}: {record.message}")
+    return Reference(scene, record)

@@ -28,8 +28,13 @@ def reference_problem(scene: Scene, level: float) -> Problem:
 
     Raises StudyError for a mesh that cannot be made, SolveError for one that cannot be used.
     """
+    return problem_on(scene, *reference_mesh(scene, level))
+
+
+def problem_on(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray], lumen: np.ndarray) -> Problem:
+    """The scene on a second-order mesh, with the nodes of each held region and the middles of the corners of the
+    lumen's facets [m], (f, 3). Raises StudyError."""
     tissue = scene.tissue
-    mesh, patches, lumen = reference_mesh(scene, level)
     return Problem(
         mesh=mesh,
         material=NeoHookean(tissue.shear_modulus, tissue.shear_modulus * tissue.bulk_over_shear),

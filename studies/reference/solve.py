@@ -1,13 +1,14 @@
-"""One solution of a scene's reference: how it is solved and stored."""
+"""The reference of a scene: how it is solved and stored."""
 
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from reference_fem import (
     DynamicsSettings,
-    Equilibrium,
     Moment,
     NewtonSettings,
     Problem,
@@ -16,19 +17,18 @@ from reference_fem import (
     motion_path,
     nodes,
 )
-from reference_fem.model.problem import find_held
 from studies.base.errors import StudyError
-from studies.reference.checkpoints import drop, keep, kept
+from studies.geometry.mesh.organ_mesh import tetrahedron_facets
+from studies.geometry.mesh.wall_layers import mean_edge
 from studies.reference.fields import fields_of
+from studies.reference.nested import FamilySolution, solve_nested
 from studies.reference.problem import reference_problem
-from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint
-from studies.reference.size import element_size, outline_size
+from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint, settings_varied
+from studies.reference.sample import Sample, SamplePoints, sample_of
+from studies.reference.uncertainty import KAPPA_FACTOR, PENALTY_FACTOR, STEP_FACTOR
+from studies.scene.scene import Scene
 from studies.store.new_record import new_record
 from studies.store.record import Status, write_record
-
-PENALTY_FACTOR, KAPPA_FACTOR, STEP_FACTOR = 3.0, 10.0, 2.0
-"""How much better a setting is made: stiffer contact with as much less penetration, bulk modulus, load steps."""
-
 
 Set = tuple[Problem, tuple[float, ...], NewtonSettings]
 
@@ -56,76 +56,90 @@ def less_compressible(problem: Problem, times: tuple[float, ...], settings: Newt
     return replace(problem, material=material), times, settings
 
 
-VARIANTS: dict[str, tuple[Callable[[Problem, tuple[float, ...], NewtonSettings], Set], float]] = {
-    "steps": (finer_steps, STEP_FACTOR),
-    "contact": (stiffer_contact, PENALTY_FACTOR),
-    "kappa": (less_compressible, KAPPA_FACTOR),
+VARIANTS: dict[str, Callable[[Problem, tuple[float, ...], NewtonSettings], Set]] = {
+    "steps": finer_steps,
+    "contact": stiffer_contact,
+    "kappa": less_compressible,
 }
-"""Each with the factor by which it makes a setting better."""
+"""By the name that a plan lists; how much better each makes its setting: studies.reference.uncertainty.FACTORS."""
 
 
 def solve(root: Path, reference_solve: ReferenceSolve) -> Path:
-    """Solves the scene's load path and stores it; a path that breaks off is stored up to there."""
-    checkpoints = reference_solve.scene.checkpoints
-    work: Set = (reference_problem(reference_solve.scene, reference_solve.level), checkpoints, NewtonSettings())
-    if reference_solve.variant:
-        work = VARIANTS[reference_solve.variant][0](*work)
-    problem, times, settings = work
-    record_file, stamp = reference_solve.path(root), reference_solve.stamp
-    before = kept(record_file, stamp)
-    started = time.monotonic()
-    status, message = Status.OK, ""
-    try:
-        if reference_solve.moves:
-            path = motion(reference_solve, *work)
-        else:
-            path = equilibrium_path(
-                problem, times, settings, on_checkpoint=lambda c: keep(record_file, stamp, c), resume=before
-            )
-    except SolveError as error:
-        path = error.converged
-        status, message = Status.NOT_CONVERGED, str(error)
-    found = [e for e in path if e.t in checkpoints]
+    """Solves the scene on all meshes of its plan and stores the finest, with what the others say of it; of a path that
+    breaks off what was reached. Raises StudyError for a mesh that cannot be made."""
+    scene, started = reference_solve.scene, time.monotonic()
+    assert scene.reference is not None  # a reference solve belongs to a plan
+    solution = solve_nested(scene, VARIANTS) if scene.reference.nested else solve_levels(scene)
+    record_file = reference_solve.path(root)
     record = new_record(
         kind="reference",
         key=reference_solve.key,
         name=reference_solve.name,
-        status=status,
-        message=message,
+        status=Status.NOT_CONVERGED if solution.failure else Status.OK,
+        message=solution.failure,
         fingerprint=reference_fingerprint(),
-        attributes=_attributes(reference_solve, problem, found, time.monotonic() - started),
-        fields=fields_of(reference_solve.scene, problem, found),
+        attributes={
+            "scene": scene.name,
+            "unknowns": 3 * len(nodes(solution.problem.mesh)) + solution.problem.mesh.nvertices,
+            "steps_done": len(solution.equilibria),
+            "off_shape": solution.off,
+            "stopped": solution.stopped,
+            "seconds": time.monotonic() - started,
+        },
+        fields=fields_of(scene, solution),
     )
     write_record(record_file, record)
-    drop(record_file)
     return record_file
 
 
+def solve_levels(scene: Scene) -> FamilySolution:
+    """The scene on each level of its plan, then the coarsest with each setting made better."""
+    plan, times = scene.reference, scene.checkpoints
+    assert plan is not None  # the scene has a reference
+    runs = [(level, "") for level in plan.levels] + [(plan.levels[0], name) for name in settings_varied(scene)]
+    at, samples, finest = None, list[Sample](), None
+    for level, variant in runs:
+        work: Set = (reference_problem(scene, level), times, NewtonSettings())
+        problem = work[0]
+        if at is None:
+            corners = problem.mesh.t[:4].T.astype(np.int64)
+            at = SamplePoints(nodes(problem.mesh)[: problem.mesh.nvertices], corners, scene.symmetric)
+        if variant:
+            work = VARIANTS[variant](*work)
+        try:
+            path = motion(scene, variant, *work) if plan.dt is not None else equilibrium_path(*work)
+        except SolveError as error:
+            what = f"mesh {level:g}" + (f" with other {variant}" if variant else "")
+            reached = [e for e in error.converged if e.t in times]
+            return FamilySolution(problem, reached, at, samples, failure=f"on {what}: {error}")
+        path = [e for e in path if e.t in times]
+        samples.append(sample_of(scene, work[0], path, at, element_size(scene, level), variant))
+        if (level, variant) == (plan.levels[-1], ""):
+            finest = problem, path
+    assert at is not None and finest is not None  # a plan has two levels or more
+    meshes, variants = samples[: len(plan.levels)], samples[len(plan.levels) :]
+    return FamilySolution(*finest, at, [*reversed(meshes), *variants])
+
+
+def element_size(scene: Scene, level: float) -> float:
+    """Mean edge [m] of the mesh `level` of the scene's plan; of an octant the size away from the contact."""
+    if scene.symmetric:
+        return level * float(scene.organ.parameters["radius"])
+    mesh = reference_problem(scene, level).mesh
+    return mean_edge(nodes(mesh), tetrahedron_facets(mesh.t[:4].T))
+
+
 def motion(
-    reference_solve: ReferenceSolve, problem: Problem, times: tuple[float, ...], settings: NewtonSettings
+    scene: Scene, variant: str, problem: Problem, times: tuple[float, ...], settings: NewtonSettings
 ) -> list[Moment]:
     """The scene's motion from its start, with its damping. Raises SolveError; StudyError for another shape."""
-    scene, plan = reference_solve.scene, reference_solve.scene.reference
+    plan = scene.reference
     assert plan is not None and plan.dt is not None  # it moves
     if scene.start is not None and scene.start.shaped:
         raise StudyError(
             f"scene '{scene.name}' starts in a shape of its own, and the reference from rest or with a speed; "
             f"give it a speed, or no reference"
         )
-    dt = plan.dt / (STEP_FACTOR if reference_solve.variant == "steps" else 1.0)
+    dt = plan.dt / (STEP_FACTOR if variant == "steps" else 1.0)
     velocity = None if scene.start is None else scene.start.velocities(nodes(problem.mesh))
     return motion_path(problem, times, DynamicsSettings(dt, scene.damping, newton=settings), velocity)
-
-
-def _attributes(reference_solve: ReferenceSolve, problem: Problem, found: list[Equilibrium], seconds: float) -> dict:
-    held = [] if reference_solve.scene.symmetric else find_held(problem)  # planes of symmetry hold no region
-    return {
-        "scene": reference_solve.scene.name,
-        "level": float(reference_solve.level),
-        "variant": reference_solve.variant,
-        "size": element_size(reference_solve.scene, reference_solve.level),
-        "outline_size": outline_size(problem.mesh, held),  # pyright: ignore[reportArgumentType]
-        "unknowns": 3 * len(nodes(problem.mesh)) + problem.mesh.nvertices,
-        "steps_done": len(found),
-        "seconds": seconds,
-    }

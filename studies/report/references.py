@@ -12,7 +12,7 @@ from studies.metrics.rest_surface import rest_surfaces
 from studies.metrics.true_surface import ShapeErrors, shape_errors
 from studies.reference.load import Reference
 from studies.reference.reference_solves import STUDY
-from studies.reference.solve import VARIANTS
+from studies.reference.uncertainty import FACTORS
 from studies.scene.scene import Scene
 from studies.store.paths import study_folder
 from studies.store.tables.csv_table import write_table
@@ -40,9 +40,8 @@ def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
     rows = []
     for scene, reference in references.items():
         shape = shape_of_reference(reference)
-        levels = [s.record.attributes["level"] for s in (*reversed(reference.coarser), reference)]
         for quantity, known in reference.uncertainty.items():
-            shares = {f"{name} [%]": 100 * known.shares.get(name, float("nan")) for name in ("mesh", *VARIANTS)}
+            shares = {f"{name} [%]": 100 * known.shares.get(name, float("nan")) for name in ("mesh", *FACTORS)}
             rows.append(
                 {
                     "scene": scene,
@@ -51,7 +50,7 @@ def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
                     "uncertainty [%]": 100 * known.total,
                     "order [1]": known.order,
                     "extrapolated shift [%]": 100 * known.shift,
-                    "levels": " ".join(f"{level:g}" for level in levels),
+                    "meshes": len(reference.meshes),
                     "unknowns": reference.record.attributes["unknowns"],
                     "shape_error [%]": 100 * shape.distance,
                     "shape_volume [%]": 100 * shape.volume,

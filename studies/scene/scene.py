@@ -78,66 +78,67 @@ class ForceOutput:
             raise StudyError(f"a force is probed at an 'obstacle' or a 'held' region, not at '{self.what}'")
 
 
-Times = int | tuple[int, ...]
-"""How often something is done on every mesh of a family, or on each of them, coarse to fine."""
+FEWEST_UNKNOWNS = 1e3
+"""Of a plan's `most`: fewer are no finite-element reference."""
 
 
 @dataclass(frozen=True)
 class ReferencePlan:
-    """The family of meshes the reference is computed on, coarse to fine; the last one is the reference."""
+    """The family of meshes on which the reference is computed; the finest is the reference, all give its error bar.
 
-    mesh: str
-    """"solid": the scene's organ with so many surface nodes; "octant": an eighth of a ball (three symmetry planes)."""
-    levels: tuple[float, ...]
-    """Surface nodes ("solid"), or element size over radius away from the contact ("octant"); three are the rule."""
+    A load path of a whole organ has nested meshes: the coarsest has `base` surface nodes, and each next one halves the
+    elements whose error indicator is largest, until the bar of the probed force and 2.5 times that of the mean surface
+    displacement are below `tolerance`, or the next mesh would have more than `most` unknowns. Octants and motions have
+    `levels` set by hand.
+    """
+
+    mesh: str = "solid"
+    """"solid": the scene's organ; "octant": an eighth of a ball (three symmetry planes)."""
+    levels: tuple[float, ...] = ()
+    """Of an octant the element size over the radius away from the contact, coarse to fine; of a motion of a whole organ
+    its surface nodes. Three are the rule."""
     variants: tuple[str, ...] = ("steps", "contact", "kappa")
     """Settings that are made better on the coarsest mesh, for their share of the error bar."""
-    at_outlines: Times = 0
-    """Times the elements at the outlines of held regions are halved, on every mesh or on each; three halve the size."""
-    at_contact: Times = 0
-    """Times the elements at the surface that an obstacle will reach are halved, likewise."""
-
+    base: int = 270
+    """Surface nodes of the coarsest of nested meshes; fewer than 250 miss thin parts of an organ."""
+    at_contact: int = 2
+    """Times that its elements are halved at the surface that an obstacle will reach."""
+    tolerance: float = 0.005
+    """Relative bar of the force at which nested meshes are fine enough."""
+    most: float = 60e3
+    """Unknowns of the finest of nested meshes."""
     dt: float | None = None
     """Largest time step of a motion [s]; None: a load path without inertia, as slow as it takes."""
 
     def __post_init__(self) -> None:
-        if self.mesh not in ("solid", "octant") or len(self.levels) < 2:
-            raise StudyError(
-                "a reference needs a 'solid' or 'octant' mesh and at least two levels, or it has no error bar"
-            )
-        for times in (self.at_outlines, self.at_contact):
-            listed = times if isinstance(times, tuple) else (times,) * len(self.levels)
-            if len(listed) != len(self.levels) or any(number < 0 for number in listed):
-                raise StudyError(
-                    f"a reference plan halves elements {times} times on meshes {self.levels}; give one number of at "
-                    f"least 0, or one for each mesh"
-                )
+        if self.mesh not in ("solid", "octant"):
+            raise StudyError(f"a reference has a 'solid' or 'octant' mesh, not '{self.mesh}'")
         if self.dt is not None and not 0.0 < self.dt < np.inf:
             raise StudyError(f"a reference plan has dt = {self.dt} s; give a positive time step, or None for no motion")
+        if not self.nested and len(self.levels) < 2:
+            raise StudyError("a reference on an octant or of a motion needs two or more levels, or it has no error bar")
+        if self.nested and self.levels:
+            raise StudyError("nested reference meshes have no levels; give base, tolerance or most in their place")
+        if self.base < 4 or self.at_contact < 0 or not self.tolerance > 0.0 or not self.most >= FEWEST_UNKNOWNS:
+            raise StudyError(
+                f"a reference plan has base = {self.base}, at_contact = {self.at_contact}, tolerance = "
+                f"{self.tolerance} and most = {self.most:g}; give at least 4, 0, more than 0 and {FEWEST_UNKNOWNS:g}"
+            )
 
-    def bisections(self, level: float) -> tuple[int, int]:
-        """Times the elements at outlines and those at the contact are halved on mesh `level`. Raises StudyError."""
-        return _on(self.at_outlines, self.levels, level), _on(self.at_contact, self.levels, level)
+    @property
+    def nested(self) -> bool:
+        """Whether each mesh of the family has parts of the elements of the one before."""
+        return self.mesh == "solid" and self.dt is None
 
-    def alone(self, level: float) -> "ReferencePlan":
-        """What of the plan the mesh `level` depends on: the same in every family that has it. Raises StudyError."""
-        outlines, contact = self.bisections(level)
-        return replace(self, levels=(level, level), variants=(), at_outlines=outlines, at_contact=contact)
-
-    def coarsest(self, count: int) -> "ReferencePlan":
-        """The plan of its `count` coarsest meshes."""
-        outlines, contact = (
-            times[:count] if isinstance(times, tuple) else times for times in (self.at_outlines, self.at_contact)
-        )
-        return replace(self, levels=self.levels[:count], at_outlines=outlines, at_contact=contact)
+    def smaller(self) -> "ReferencePlan":
+        """A plan for a quick look: two meshes, no refined settings."""
+        if self.nested:
+            return replace(self, variants=(), tolerance=1.0, most=min(self.most, SMALLER))
+        return replace(self, levels=self.levels[:2], variants=())
 
 
-def _on(times: Times, levels: tuple[float, ...], level: float) -> int:
-    if not isinstance(times, tuple):
-        return times
-    if level not in levels:
-        raise StudyError(f"mesh {level:g} is none of the plan's, {levels}: it does not say how often to halve there")
-    return times[levels.index(level)]
+SMALLER = 12e3
+"""Unknowns of a quick look."""
 
 
 @dataclass(frozen=True)

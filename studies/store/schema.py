@@ -62,6 +62,9 @@ LENGTHS: dict[str, str] = {
     "c": "tetrahedra",
     "r": "repeats",
     "q": "stages of a step",
+    "f": "solutions of a reference's family",
+    "b": "vertices of its coarsest mesh",
+    "d": "tetrahedra of that",
 }
 
 
@@ -148,17 +151,29 @@ class ReferenceFields(Table):
     displacement = array("K n 3", NUMBER, "m", "displacement of the second-order nodes")
     nodes = array("n 3", NUMBER, "m", "rest positions of the second-order nodes")
     tetrahedra = array("c 4", INDEX, "1", "vertices of each tetrahedron")
+    sample_variant = array("f", TEXT, "", "the setting that was refined; empty for a mesh of the family")
+    sample_unknowns = array("f", INDEX, "1", "unknowns of each solution, meshes from fine to coarse, then variants")
+    sample_size = array("f", NUMBER, "m", "mean edge of the elements; NaN for nested meshes")
+    sample_force = array("f K", NUMBER, "N", "probed force; NaN where a mesh was not solved")
+    sample_volume = array("f K", NUMBER, "1", "volume over rest volume")
+    sample_pressure = array("f K", NUMBER, "Pa", "volume mean of the pressure, compression positive")
+    sample_lumen_pressure = array("f K", NUMBER, "Pa", "pressure of the lumen")
+    sample_frequency = array("f", NUMBER, "Hz", "of the ringing; NaN where nothing rings")
+    sample_displacement = array("f b 3", NUMBER, "m", "displacement of the sample points at the last checkpoint")
+    sample_points = array("b 3", NUMBER, "m", "vertices of the coarsest mesh at rest")
+    sample_tetrahedra = array("d 4", INDEX, "1", "their tetrahedra")
 
 
 class ReferenceAttributes(Table):
     """Of a reference."""
 
     scene = value(str, "", "name of the scene")
-    level = value(float, "1", "mesh of the family: surface nodes, or element size over radius")
-    variant = value(str, "", "the refined setting; empty for none")
-    unknowns = value(int, "1", "unknowns of the finite-element problem")
+    unknowns = value(int, "1", "unknowns of the finest mesh")
     steps_done = value(int, "1", "checkpoints that were reached")
-    seconds = value(float, "s", "wall time of the solution")
+    off_shape = value(int, "1", "boundary nodes that are not on the true shape, or elements would fold")
+    stopped = value(str, "", "why refinement ended before the plan's tolerance; empty where it did not")
+    set = optional_value(str, "", "the published set and file of references that it is of")
+    seconds = value(float, "s", "wall time of all solutions")
     portable = optional_value(str, "", "settings of a result that is equal on every x86-64 processor")
     restamped = optional_value(str, "", "former code, and replays by which the result was kept for this code")
 

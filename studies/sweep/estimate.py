@@ -16,9 +16,6 @@ SECONDS_PER_UNKNOWN = 2e-3
 cores of an AMD EPYC (family 25, model 17) that did other work too; each is within a factor of seven of it."""
 SECONDS_PER_UNKNOWN_STEP = 4e-4
 """Of a motion, for each time step [s]: a fifth of a load path, which has five checkpoints; not measured."""
-FACTOR, POWER, AT_OUTLINES, AT_CONTACT, HOLLOW = 283.0, 0.606, 1.391, 1.097, 1.088
-"""Unknowns of a mesh of n surface nodes: FACTOR n^POWER, times a factor for each halving at outlines and at contacts,
-and for a wall. Fitted to 24 meshes of the catalogue, whose unknowns it meets within 20 % (one standard deviation)."""
 OCTANT = 28.5
 """Unknowns of an octant, times the cube of its element size over the radius: 16,482 at 0.12."""
 STEP = {"surface": 0.40, "membrane": 0.40, "tetrahedral": 0.30, "quadratic": 0.23}
@@ -47,9 +44,8 @@ PER_UNKNOWN, MEASURED = 17e3, 90_000
 and 13.3e3 for 89,598."""
 ORDER = 1 / 3
 """Of the growth of that beyond: factors of a matrix over a volume of n points have n^(4/3) numbers (George 1973)."""
-MOST_PER_NODE, MOST_PER_EDGE = 6.5, 60.0
-"""Unknowns of a reference for n surface nodes, over n^1.5; of an octant for a size h over its radius, times h^3. No
-scene of the catalogue has more."""
+MOST_PER_NODE = 6.5
+"""Unknowns of a reference on a whole organ of n surface nodes, over n^1.5. No scene of the catalogue has more."""
 MESH, GRADED_MESH = 3.0, 10.0
 """Seconds for the mesh and the body of a case."""
 HEAD, NUMBER = 22_000, 8
@@ -65,18 +61,17 @@ MARGIN = 1.2
 
 
 def unknowns(solve: ReferenceSolve) -> float:
-    """About how many unknowns a reference solution will have."""
-    plan, scene = solve.scene.reference, solve.scene
-    assert plan is not None  # a reference solution belongs to a plan
-    if plan.mesh == "octant":
-        return OCTANT / solve.level**3
-    outlines, contact = plan.bisections(solve.level)
-    touched = contact if scene.obstacles else 0
-    return FACTOR * solve.level**POWER * AT_OUTLINES**outlines * AT_CONTACT**touched * (HOLLOW if scene.lumen else 1.0)
+    """About how many unknowns the finest mesh of a reference will have, rather too many."""
+    plan = solve.scene.reference
+    assert plan is not None  # a reference belongs to a plan
+    if plan.nested:
+        return plan.most
+    finest = plan.levels[-1]
+    return OCTANT / finest**3 if plan.mesh == "octant" else MOST_PER_NODE * finest**1.5
 
 
 def solve_seconds(solve: ReferenceSolve) -> float:
-    """Of a reference solution."""
+    """Of a reference, all its meshes."""
     dt = solve.scene.reference and solve.scene.reference.dt
     each = SECONDS_PER_UNKNOWN if dt is None else SECONDS_PER_UNKNOWN_STEP * solve.scene.duration / dt
     return unknowns(solve) * each
@@ -125,11 +120,9 @@ def organ_size(scene: Scene) -> float:
     return MARGIN * float(np.linalg.norm(np.ptp(surface_of(scene.organ, scene.name)[0], axis=0)))
 
 
-def solve_memory(solve: ReferenceSolve, unknowns: int | None) -> float:
-    """Memory of a reference solution, rather too much [bytes]; unknowns: of its last result, where there is one."""
-    level = solve.level
-    count = unknowns or (MOST_PER_NODE * level**1.5 if level > 1 else MOST_PER_EDGE / level**3)
-    return MEMORY + factor_memory(count)
+def solve_memory(solve: ReferenceSolve, known: int | None) -> float:
+    """Memory of a reference, rather too much [bytes]; known: unknowns of its last result, where there is one."""
+    return MEMORY + factor_memory(known or MARGIN * unknowns(solve))
 
 
 def factor_memory(unknowns: float) -> float:

@@ -11,8 +11,9 @@ from typing import Any, ClassVar
 from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
+from studies.reference.published import fingerprint_of, published, record_of
 from studies.reference.reference_solves import STUDY as REFERENCES
-from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint, reference_solves
+from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import Case
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.user_code import files_of
@@ -21,7 +22,7 @@ from studies.store.entry import file_state, read_entry, why_entry_is_stale
 from studies.store.new_record import new_record
 from studies.store.paths import key_digest
 from studies.store.record import Record, Status, write_record
-from studies.sweep.estimate import MEMORY, case_bytes, case_seconds, solve_memory, solve_seconds
+from studies.sweep.estimate import MEMORY, case_bytes, case_seconds, solve_memory, solve_seconds, unknowns
 
 REFERENCE = "reference "
 """Before the name of a reference solution in its label."""
@@ -161,10 +162,14 @@ class CaseJob(Job):
 
 @dataclass(frozen=True)
 class ReferenceJob(Job):
-    """One solution of the reference of a scene."""
+    """The reference of a scene."""
 
     work: ReferenceSolve
     kind = "reference"
+
+    @cached_property
+    def _published(self) -> bool:
+        return published(self.work.scene) is not None
 
     @property
     def label(self) -> str:
@@ -172,16 +177,18 @@ class ReferenceJob(Job):
 
     @property
     def weight(self) -> float:
-        return 1e9 + self.work.weight
+        return 1e9 + (0.0 if self._published else unknowns(self.work))
 
     @property
     def needs(self) -> float:
+        if self._published:
+            return MEMORY
         known = read_entry(self.path()).unknowns if is_there(self.path()) else None
         return solve_memory(self.work, known)
 
     @property
     def seconds(self) -> float:
-        return solve_seconds(self.work)
+        return 0.0 if self._published else solve_seconds(self.work)
 
     @property
     def size(self) -> None:
@@ -189,7 +196,7 @@ class ReferenceJob(Job):
 
     @property
     def fingerprint(self) -> str:
-        return reference_fingerprint()
+        return fingerprint_of(self.work.scene)
 
     @cached_property
     def _path(self) -> Path:
@@ -199,7 +206,12 @@ class ReferenceJob(Job):
         return self._path
 
     def run(self) -> Path:
-        """A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""
+        """A published reference is copied, not solved. A mesh that cannot be made is stored as a failure: it
+        costs its scene, not the sweep."""
+        entry = published(self.work.scene)
+        if entry is not None:
+            write_record(self.path(), record_of(self.work.scene, entry))
+            return self.path()
         from studies.reference.solve import solve
 
         try:
@@ -209,8 +221,8 @@ class ReferenceJob(Job):
 
     def failure(self, cause: str) -> Record:
         work = self.work
-        nothing = {"unknowns": 0, "steps_done": 0, "seconds": float("nan")}
-        about = {"scene": work.scene.name, "level": float(work.level), "variant": work.variant}
+        nothing = {"unknowns": 0, "steps_done": 0, "seconds": float("nan"), "off_shape": 0, "stopped": ""}
+        about = {"scene": work.scene.name}
         return _failed(self, "reference", cause, about | nothing)
 
 
@@ -238,7 +250,7 @@ def case_jobs(root: Path, study: Study) -> list[CaseJob]:
 
 
 def reference_jobs(root: Path, scenes: Iterable[Scene]) -> list[ReferenceJob]:
-    """A job per solution of the references of scenes."""
+    """A job per reference of the scenes."""
     return [ReferenceJob(root, REFERENCES, one) for scene in scenes for one in reference_solves(scene)]
 
 

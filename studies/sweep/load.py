@@ -9,7 +9,8 @@ from studies.catalog.study import Study
 from studies.metrics.run import Run
 from studies.metrics.timing.cases import timing_of
 from studies.metrics.timing.protocol import FrameTiming
-from studies.reference.load import Reference, load_reference
+from studies.reference.load import Reference
+from studies.reference.published import reference_for
 from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
 from studies.store.archived import is_archive, shown_machine
@@ -44,7 +45,7 @@ class References:
         key = scene_to_json(scene)
         if key not in self._read:
             try:
-                self._read[key] = load_reference(self.ledger.root, scene)
+                self._read[key] = reference_for(self.ledger.root, scene)
             except StudyError as error:
                 self._read[key] = error
         return self._read[key]

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from studies.catalog.study import Study
+from studies.reference.published import fingerprint_of
 from studies.reference.reference_solves import STUDY as REFERENCES
-from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint, reference_solves
+from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.reference.solve import solve
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.run import difference, measure
@@ -74,7 +75,7 @@ def outdated(root: Path, studies: Iterable[Study]) -> list[list[Outdated]]:
             add(study.name, path, case.key, case_fingerprint(case), variety, partial(measure, case))
         for each in (each for scene in study.scenes for each in reference_solves(scene)):
             variety = "moves" if each.moves else "rests"
-            add(REFERENCES, each.path(root), each.key, reference_fingerprint(), variety, partial(solved_again, each))
+            add(REFERENCES, each.path(root), each.key, fingerprint_of(each.scene), variety, partial(solved_again, each))
     in_order = sorted(stale.values(), key=lambda one: (*one.kind, one.path))
     return [list(members) for _, members in groupby(in_order, key=lambda one: one.kind)]
 

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 
 from studies.base.counting import amounts, status_counts
 from studies.catalog.study import Study
-from studies.reference.checkpoints import kept
-from studies.reference.reference_solves import STUDY as REFERENCES
-from studies.reference.reference_solves import ReferenceSolve
-from studies.store.entry import CASE_CHANGED, CODE_CHANGED, MISSING, Entry
+from studies.store.entry import MISSING, Entry
 from studies.store.ledger import FAILURES, Ledger
 from studies.store.schema import Status
-from studies.sweep.job import Job, ReferenceJob, case_jobs, jobs_of
+from studies.sweep.job import Job, case_jobs, jobs_of
 
 CAUSES = 8
 """Of failures that are named one by one."""
@@ -110,32 +107,3 @@ def mixture(counts: Counter[str]) -> str | None:
         f"{count} {'portable' if machine == ANY else f'of machine {machine}'}" for machine, count in counts.items()
     ]
     return f"made on {len(counts)} kinds of processors, whose results differ by rounding: {', '.join(parts)}"
-
-
-@dataclass(frozen=True)
-class SolveStanding:
-    """How a solution of a reference stands."""
-
-    reference_solve: ReferenceSolve
-    state: str
-    """ "missing", "half-way", "unreadable", "stale", or the status it ended with."""
-    unknowns: int | None = None
-    """None where nothing is stored."""
-    steps: int = 0
-    """Checkpoints reached."""
-    seconds: float = float("nan")
-    """What solving took [s]; NaN where nothing is stored."""
-
-
-def solve_standing(ledger: Ledger, solve: ReferenceSolve) -> SolveStanding:
-    """How a solution stands, or the load path half-way to it."""
-    begun = kept(solve.path(ledger.root), solve.stamp)
-    if begun is not None:
-        return SolveStanding(solve, "half-way", steps=len([e for e in begun.path if e.t in solve.scene.checkpoints]))
-    job = ReferenceJob(ledger.root, REFERENCES, solve)
-    entry, why = ledger.entry(job), ledger.why(job)
-    if entry is None or entry.fault:
-        return SolveStanding(solve, "missing" if entry is None else "unreadable")
-    state = "stale" if why in (CASE_CHANGED, CODE_CHANGED) else entry.status
-    seconds = float("nan") if entry.seconds is None else entry.seconds
-    return SolveStanding(solve, state, entry.unknowns, entry.steps_done or 0, seconds)

@@ -6,6 +6,7 @@ import pytest
 from reference_fem import SolveError
 from reference_fem.uncertainty import (
     FASTEST,
+    NESTED_RATE,
     SAFETY,
     SCATTER,
     SLOWEST,
@@ -14,8 +15,8 @@ from reference_fem.uncertainty import (
     combined,
     field_error,
     mesh_error,
+    nested_error,
     observed_order,
-    orders_at_outlines,
     setting_error,
 )
 
@@ -61,49 +62,16 @@ def fast_then_slow(h):
 
 
 def test_a_fast_change_of_the_coarse_pair_does_not_hide_the_slow_one():
-    """The observed order is 3 and its bar smaller than what is left; the orders at an outline cover it."""
+    """The observed order is 3 and its bar smaller than what is left; slower orders that are believed cover it."""
     sizes = (1.0, 1.2, 1.45)
     values = [fast_then_slow(h) for h in sizes]
     field = [SLOPES * value for value in values]
     left = np.sqrt(WEIGHTS @ (SLOPES**2).sum(axis=1)) * values[0]
     assert mesh_error(sizes, values).order == FASTEST
     assert field_error(sizes, field, WEIGHTS).uncertainty < left
-    believed = orders_at_outlines(sizes, sizes)
-    assert believed == (0.5, 1.0)
+    believed = (0.5, 1.0)
     assert 1.2 * values[0] < mesh_error(sizes, values, believed).uncertainty < 6 * values[0]
     assert 1.2 * left < field_error(sizes, field, WEIGHTS, believed).uncertainty < 3 * left
-
-
-@pytest.mark.parametrize(
-    ("sizes", "at_outlines", "believed"),
-    [
-        ((1.0, 1.2, 1.5), (1.0, 1.2, 1.5), (0.5, 1.0)),
-        ((1.0, 1.2, 1.5), (1.0, 1.7, 2.9), (0.5, 1.0)),
-        ((1.0, 2.0, 4.0), (1.0, 16.0, 64.0), (0.5, 0.75)),
-        ((1.0, 1.1), (1.0, 2.0), (3 * np.log2(1.1), 3 * np.log2(1.1))),
-    ],
-)
-def test_what_lies_elsewhere_bounds_the_order_at_outlines(sizes, at_outlines, believed):
-    """Sixteen times smaller there, half elsewhere: order 3 elsewhere is ¾ there, and no more is believed."""
-    assert orders_at_outlines(sizes, at_outlines) == pytest.approx(believed, rel=1e-12)
-
-
-@pytest.mark.parametrize("order", [0.5, 0.7, 0.95])
-def test_an_error_at_outlines_is_judged_by_their_elements(order):
-    """Elements there shrink unevenly from mesh to mesh: in the size elsewhere the same values seem to converge fast."""
-    sizes, outlines = (1.0, 1.29, 1.66), (1.0, 1.98, 5.5)
-    values = [0.3 * h**order for h in outlines]
-    error = mesh_error(outlines, values, orders_at_outlines(sizes, outlines))
-    known = min(order, orders_at_outlines(sizes, outlines)[1])
-    assert error.order == pytest.approx(known, rel=1e-9)
-    assert error.uncertainty >= SAFETY * 0.3 * (1 - 1e-9)
-    assert abs(mesh_error(sizes, values).shift) < 0.8 * 0.3 < abs(error.shift) * (1 + 1e-9)
-
-
-@pytest.mark.parametrize(("sizes", "at_outlines"), [((1.0, 1.0), (1.0, 1.4)), ((1.0, 1.2), (1.0, 1.0))])
-def test_one_size_has_no_order(sizes, at_outlines):
-    with pytest.raises(SolveError, match="different size"):
-        orders_at_outlines(sizes, at_outlines)
 
 
 def test_meshes_that_come_together_too_fast_have_a_larger_factor():
@@ -207,3 +175,59 @@ def test_the_bar_is_as_wide_as_the_theory_says():
     """Eq. 6.3: 1.25 times the change left; twice the spread where values go to and fro."""
     assert mesh_error(SIZES, law(2.0)).uncertainty == pytest.approx(1.25 * 0.3, rel=1e-9)
     assert mesh_error(SIZES, [7.0, 7.2, 6.9]).uncertainty == pytest.approx(2 * 0.3, rel=1e-9)
+
+
+UNKNOWNS = (40e3, 15e3, 6e3)
+"""Of nested meshes, fine to coarse; of different ratio."""
+
+
+def changes_of(rate, slope=0.3):
+    """From the finest of UNKNOWNS to the others, of values 7 + slope n^-rate with n in thousands."""
+    left = [slope * (n / 1e3) ** -rate for n in UNKNOWNS]
+    return [abs(other - left[0]) for other in left[1:]], abs(left[0])
+
+
+@pytest.mark.parametrize("slope", [0.3, -0.02])
+def test_nested_meshes_of_the_rate_that_is_taken_have_the_safety_times_their_error(slope):
+    changes, error = changes_of(NESTED_RATE, slope)
+    assert nested_error(UNKNOWNS, changes) == pytest.approx(SAFETY * error, rel=1e-12)
+    assert nested_error(UNKNOWNS[:2], changes[:1]) == pytest.approx(TWO_MESHES * error, rel=1e-12)
+
+
+@pytest.mark.parametrize("rate", [0.6, 1.0, 4 / 3])
+def test_nested_meshes_of_the_rates_of_theory_are_covered(rate):
+    """1 where outlines dominate and 4/3 elsewhere; a little slower than what is taken is within the safety."""
+    changes, error = changes_of(rate)
+    assert error < nested_error(UNKNOWNS, changes) < 6 * error
+
+
+@pytest.mark.parametrize("fine_change", [0.0, 1e-6, 0.01])
+def test_a_fine_change_of_nested_meshes_that_is_small_by_chance_makes_no_small_bar(fine_change):
+    coarse = 0.2
+    wanted = SAFETY * coarse / ((UNKNOWNS[0] / UNKNOWNS[2]) ** (2 / 3) - 1)
+    assert nested_error(UNKNOWNS, [fine_change, coarse]) == pytest.approx(wanted, rel=1e-12)
+    large = SAFETY * coarse / ((UNKNOWNS[0] / UNKNOWNS[1]) ** (2 / 3) - 1)
+    assert nested_error(UNKNOWNS, [-coarse, fine_change]) == pytest.approx(large, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unknowns", "changes", "words"),
+    [
+        ((4e3,), (), "two or three"),
+        ((4e3, 3e3, 2e3, 1e3), (0.1, 0.2, 0.3), "two or three"),
+        ((4e3, 3e3), (0.1, 0.2), "two or three"),
+        ((4e3, 3e3), (np.nan,), "two or three"),
+        ((4e3, 3e3, 2e3), (0.1, np.inf), "two or three"),
+        ((3e3, 4e3), (0.1,), "3000, 4000 unknowns, which do not fall"),
+        ((4e3, 3e3, 3e3), (0.1, 0.2), "do not fall"),
+    ],
+)
+def test_nested_meshes_that_are_no_family_are_refused(unknowns, changes, words):
+    with pytest.raises(SolveError, match=words):
+        nested_error(unknowns, changes)
+
+
+def test_the_rule_of_nested_meshes_covers_what_was_measured():
+    """The clamped ball on 9,186, 22,558 and 45,186 unknowns: 4.2509, 4.2312 and 4.2259 N; true are 4.227 N ± .05 %."""
+    bar = nested_error((45_186, 22_558, 9_186), (4.2312 - 4.2259, 4.2509 - 4.2259))
+    assert abs(4.2259 - 4.227) + 0.0005 * 4.227 < bar < 0.005 * 4.227

@@ -9,13 +9,14 @@ import studies.geometry as geometry
 from massspring import Sphere, Trajectory
 from studies.base.errors import StudyError
 from studies.catalog.population.draw import CHECKPOINTS, FRAMES, GAP, PRESSED
+from studies.catalog.population.ranges import MEMBER as PLAN
 from studies.catalog.study import Study
 from studies.geometry.files.units import Source, check_unit, stem_of
 from studies.scene.chosen_place import DEPTH, RADIUS
 from studies.scene.kind import has_wall
 from studies.scene.placing import along, press_times, scaled
 from studies.scene.proposal import Proposal, proposal
-from studies.scene.scene import ForceOutput, Held, Organ, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Held, Organ, Scene
 from studies.scene.scene_file import python_name
 from studies.scene.tissues import LIVER, Tissue
 from studies.store.paths import readable
@@ -29,7 +30,6 @@ NODES = 550
 """Of the mesh on which hold and probe are placed."""
 DURATION, DAMPING = 8.0, 8.0
 """[s], [1/s]: as in the scenes of the liver."""
-PLAN = ReferencePlan("solid", (250, 360, 550), variants=(), at_outlines=(1, 2, 3), at_contact=(3, 4, 5))
 
 
 @dataclass(frozen=True)

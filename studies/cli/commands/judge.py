@@ -15,7 +15,8 @@ from studies.exchange.meshes import NODES
 from studies.metrics.cells import UNRESOLVED_NOTE, plain, value_cell
 from studies.metrics.judged import FORCE
 from studies.metrics.run import Run
-from studies.reference.load import Reference, load_reference
+from studies.reference.load import Reference
+from studies.reference.published import reference_for
 from studies.scene.quantities import ALWAYS
 from studies.scene.scene import Scene
 from studies.store.record import write_record
@@ -55,7 +56,7 @@ def judge(
 def reference_of(results: Path, scene: Scene) -> Reference | None:
     """The stored reference of a scene; without one, a warning: then no errors are judged."""
     try:
-        return load_reference(results, scene)
+        return reference_for(results, scene)
     except StudyError as problem:
         warn([f"errors are not judged, because the reference is missing: {problem}"])
         return None

@@ -18,8 +18,10 @@ from studies.geometry.files.units import Source, stem_of
 from studies.plots.place import draw_placing
 from studies.scene.chosen_place import RADIUS, SIDES, place_of
 from studies.scene.proposal import Proposal, proposal
+from studies.scene.scene import ReferencePlan
 from studies.scene.scene_file import Recommended, organ_options, python_name, scene_text
 from studies.scene.tissues import TISSUES, tissue_named
+from studies.sweep.estimate import SECONDS_PER_UNKNOWN
 from studies.tools.advise.answer import RESULTS, Advice, advise
 from studies.tools.advise.words import body_in_python
 
@@ -27,12 +29,6 @@ MM = 1e-3
 NODES = 550
 SHIPPED = Path(studies.__file__).parents[1] / RESULTS
 """Results with the published table of accuracy, wherever the command is called from."""
-UNKNOWNS = {250: 10_000, 360: 23_000, 550: 46_000}
-"""Of the reference on each mesh of the plan: the mean of a spleen and a liver of 5,000 nodes, which are 5 % apart."""
-VARIANTS = 3
-"""Solves with better settings on the coarsest mesh."""
-SECONDS = 2.5e-3
-"""Per unknown: liver_probe took 2.3 ms and kidney_probe 2.9 ms on 90,000 unknowns, on a core of a busy machine."""
 MESHING = 60.0
 """Seconds for the meshes of the same spleen and liver: 26 and 51, and those of the bodies."""
 SIDES_HELP = f"{', '.join(SIDES)} (left is -x, front -y, bottom -z)"
@@ -122,11 +118,10 @@ def second_body(answer: Advice | None) -> Recommended | None:
 
 def minutes(answer: Advice | None) -> float:
     """What the study takes on one core, roughly and without compiling: meshes, references, and the recommended body."""
-    unknowns = sum(UNKNOWNS.values()) + VARIANTS * min(UNKNOWNS.values())
     body = 0.0
     if answer is not None and answer.chosen is not None and answer.chosen.cost.known:
         body = answer.chosen.cost.value * answer.scene.duration
-    return (MESHING + SECONDS * unknowns + body) / 60.0
+    return (MESHING + SECONDS_PER_UNKNOWN * ReferencePlan().most + body) / 60.0
 
 
 def lines_of(placing: Proposal) -> list[str]:

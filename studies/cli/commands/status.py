@@ -7,22 +7,13 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from studies.base.counting import status_counts
 from studies.catalog import STUDIES
 from studies.cli.terminal import SMOKE, Results, Smoke, busy, console, say
-from studies.reference.reference_solves import reference_solves
 from studies.scene.scene import Scene
 from studies.store.ledger import Ledger
 from studies.sweep.find_study import find_study
-from studies.sweep.standings import (
-    SolveStanding,
-    Standing,
-    machines_of,
-    mixture,
-    solve_standing,
-    standings,
-    summary,
-)
+from studies.sweep.job import reference_jobs
+from studies.sweep.standings import Standing, machines_of, mixture, standing_of, standings, summary
 
 SHOWN = 8
 """Cases and reference solutions named per reason; `--all` names the rest."""
@@ -49,7 +40,7 @@ def status(
             mixed = mixture(machines_of(found))
             if mixed:
                 say(f"  {mixed}")
-    show_references(ledger, {scene.name: scene for entry in chosen for scene in entry.scenes}.values(), every)
+    show_references(ledger, {scene.name: scene for entry in chosen for scene in entry.scenes}.values())
 
 
 def show_reasons(found: list[Standing], every: bool) -> None:
@@ -67,44 +58,20 @@ def show_reasons(found: list[Standing], every: bool) -> None:
             say(f"    and {len(labels) - len(shown)} more (--all names them)")
 
 
-def show_references(ledger: Ledger, scenes: Iterable[Scene], every: bool) -> None:
-    """How the references stand: a line per scene, or one per mesh and setting."""
-    found = {scene.name: [solve_standing(ledger, solve) for solve in reference_solves(scene)] for scene in scenes}
-    found = {name: rows for name, rows in found.items() if rows}
-    if not found:
+def show_references(ledger: Ledger, scenes: Iterable[Scene]) -> None:
+    """How the references stand, a line per scene."""
+    jobs = reference_jobs(ledger.root, scenes)
+    if not jobs:
         return
+    table = Table(box=None, pad_edge=False)
+    for heading in ("scene", "unknowns", "seconds", "state"):
+        table.add_column(heading, justify="left" if heading in ("scene", "state") else "right")
+    for standing in (standing_of(ledger, job) for job in jobs):
+        entry = standing.entry
+        seconds = "-" if entry is None or entry.seconds is None else f"{entry.seconds:.0f}"
+        table.add_row(standing.job.work.name, _count(entry and entry.unknowns), seconds, standing.status)
     say("references:")
-    console.print(_meshes(found) if every else _scenes(found))
-
-
-def _scenes(found: dict[str, list[SolveStanding]]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for heading in ("scene", "finest mesh", "unknowns", "seconds", "solutions"):
-        table.add_column(heading, justify="left" if heading in ("scene", "solutions") else "right")
-    for name, rows in found.items():
-        finest = max(rows, key=lambda row: row.reference_solve.weight)
-        seconds = sum(row.seconds for row in rows if row.seconds == row.seconds)
-        state = status_counts(_state(row) for row in rows)
-        table.add_row(name, f"{finest.reference_solve.level:g}", _count(finest.unknowns), f"{seconds:.0f}", state)
-    return table
-
-
-def _meshes(found: dict[str, list[SolveStanding]]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for heading in ("scene", "mesh", "better", "unknowns", "seconds", "state"):
-        table.add_column(heading, justify="left" if heading in ("scene", "better", "state") else "right")
-    for name, rows in found.items():
-        for row in rows:
-            seconds = "-" if row.seconds != row.seconds else f"{row.seconds:.1f}"
-            cells = (f"{row.reference_solve.level:g}", row.reference_solve.variant, _count(row.unknowns), seconds)
-            table.add_row(name, *cells, _state(row))
-    return table
-
-
-def _state(row: SolveStanding) -> str:
-    if row.state != "half-way":
-        return row.state
-    return f"half-way ({row.steps} of {len(row.reference_solve.scene.checkpoints)} checkpoints)"
+    console.print(table)
 
 
 def _count(unknowns: int | None) -> str:

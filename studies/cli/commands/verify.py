@@ -1,4 +1,4 @@
-"""`organbench verify`: the reference held against problems whose answers are known from elsewhere."""
+"""`organbench verify`: the reference against problems whose answers are known, and published references again."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,8 +7,10 @@ import pandas as pd
 import typer
 
 from reference_fem import crosscheck
+from studies.base.lookup import lookup
 from studies.cli.terminal import Results, console
 from studies.store.stamps import set_stamp
+from studies.tools.verify.references import published_scenes, solved_again
 from studies.tools.verify.verification import FOLDER, Verdict, run_pack, tolerance, write_kappa, write_verdicts
 
 FAST = "smoke"
@@ -17,9 +19,16 @@ FAST = "smoke"
 
 def verify(
     fast: Annotated[bool, typer.Option("--fast", help="only the fast half, in a minute")] = False,
+    references: Annotated[bool, typer.Option("--references", help="solve the published references again")] = False,
+    scene: Annotated[list[str] | None, typer.Option(help="with --references: only this scene; may be repeated")] = None,
     results: Results = Path("results"),
 ) -> None:
     """Check the reference against known solutions and other codes. Exit code 1: a check failed."""
+    if references:
+        verify_references(scene or [])
+        return
+    if scene:
+        raise typer.BadParameter("--scene goes with --references")
     verdicts = run_pack(results, fast, show)
     root = results / FAST if fast else results
     written = write_verdicts(root / FOLDER, verdicts)
@@ -35,6 +44,23 @@ def verify(
     console.print(f"{count - len(failed)} of {count} checks passed", highlight=False)
     if failed:
         console.print("off: " + "; ".join(failed), markup=False, highlight=False)
+        raise typer.Exit(1)
+
+
+def verify_references(names: list[str]) -> None:
+    """Solves published references again, by the plans of their scenes, and says of each whether it is within the bars.
+
+    Raises StudyError for an unknown name.
+    """
+    found = [lookup(name, published_scenes(), "published reference") for name in names] or published_scenes().values()
+    off = 0
+    for scene in found:
+        checks = solved_again(scene)
+        bad = [check for check in checks if not check.met]
+        off += bool(bad)
+        words = ", ".join(f"{check.quantity} {check.deviation:.2g} of {check.tolerance:.2g}" for check in checks)
+        console.print(f"{scene.name}: {'OFF' if bad else 'within its bars'} ({words})", markup=False, highlight=False)
+    if off:
         raise typer.Exit(1)
 
 

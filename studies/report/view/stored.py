@@ -10,7 +10,7 @@ from typing import Any
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.reference.reference_solves import STUDY as REFERENCES
-from studies.reference.reference_solves import reference_solves
+from studies.reference.reference_solves import ReferenceSolve
 from studies.scene.scene import Scene
 from studies.store.paths import record_files
 from studies.store.record import Record, Status, peek
@@ -75,11 +75,10 @@ def stored_run(path: Path) -> Stored | None:
 
 
 def finest_reference(root: Path, scene: Scene) -> Path | None:
-    """The file of the finest mesh of a scene's reference; None where it is not stored, or did not converge."""
-    family = [solve for solve in reference_solves(scene) if not solve.variant]
-    if not family:
+    """The file of a scene's reference; None where it is not stored, or did not converge."""
+    if scene.reference is None:
         return None
-    path = family[-1].path(root)
+    path = ReferenceSolve(scene).path(root)
     return path if path.is_file() and peek(path).status == Status.OK else None
 
 

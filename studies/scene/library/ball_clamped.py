@@ -30,5 +30,5 @@ BALL_CLAMPED = Scene(
     ),
     probed=ForceOutput("held", 1, (0.0, 0.0, -1.0)),
     damping=15.0,  # a tenth of critical in the slowest mode: what drags at 5 mm/s stays below 2 % of the force
-    reference=ReferencePlan("solid", (150, 230, 350), at_outlines=(1, 2, 3)),
+    reference=ReferencePlan(),
 )

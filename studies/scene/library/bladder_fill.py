@@ -22,7 +22,7 @@ BLADDER_FILL = Scene(
     lumen=Lumen(filling=Ramp((0.0, FILL_END), (1.0, FILLING))),
     probed=ForceOutput("held", 0, (0.0, 0.0, -1.0)),
     damping=15.0,
-    reference=ReferencePlan("solid", (250, 380, 580), at_outlines=(1, 2, 3)),
+    reference=ReferencePlan(),
     quantities=("surface", "interior", "silhouette", "volume"),
     not_for=(("free", "without a volume constraint nothing fills the lumen"),),
 )

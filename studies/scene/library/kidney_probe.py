@@ -32,5 +32,5 @@ KIDNEY_PROBE = Scene(
     held=(Held("hilum", KIDNEY_REGIONS["hilum"]),),
     probed=ForceOutput("obstacle", 0, INWARD),
     damping=15.0,
-    reference=ReferencePlan("solid", (370, 550, 800), at_outlines=(2, 3, 4), at_contact=(3, 4, 4)),
+    reference=ReferencePlan(),
 )

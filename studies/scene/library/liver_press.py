@@ -30,5 +30,5 @@ LIVER_PRESS = Scene(
     held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),
     probed=ForceOutput("obstacle", 0, LIVER_PRESS_DIRECTION),
     damping=2.0,
-    reference=ReferencePlan("solid", (360, 550, 900), at_outlines=(2, 3, 5)),
+    reference=ReferencePlan(at_contact=0),
 )

@@ -31,5 +31,5 @@ LIVER_PROBE = Scene(
     held=(Held("bare_area", LIVER_REGIONS["bare_area"]),),
     probed=ForceOutput("obstacle", 0, INWARD),
     damping=2.0,
-    reference=ReferencePlan("solid", (360, 550, 800), at_outlines=(2, 3, 4), at_contact=(4, 5, 5)),
+    reference=ReferencePlan(),
 )

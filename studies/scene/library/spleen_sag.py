@@ -19,7 +19,7 @@ SPLEEN_SAG = Scene(
     probed=ForceOutput("held", 0, (0.0, 0.0, 1.0)),
     gravity=GRAVITY,
     damping=15.0,
-    reference=ReferencePlan("solid", (200, 360, 650), at_outlines=(1, 3, 4)),
+    reference=ReferencePlan(),
     # The force is the weight, whatever the model: it tells nothing.
     quantities=("surface", "interior", "silhouette", "volume"),
 )

@@ -31,5 +31,5 @@ STOMACH_PRESS = Scene(
     lumen=Lumen(),
     probed=ForceOutput("obstacle", 0, INWARD),
     damping=2.0,
-    reference=ReferencePlan("solid", (430, 500, 800), at_outlines=(1, 2, 4), at_contact=1),
+    reference=ReferencePlan(base=430, at_contact=0),
 )

@@ -35,5 +35,5 @@ STOMACH_PROBE = Scene(
     lumen=Lumen(),
     probed=ForceOutput("obstacle", 0, INWARD),
     damping=2.0,
-    reference=ReferencePlan("solid", (430, 620, 800), at_outlines=(2, 3, 4), at_contact=3),
+    reference=ReferencePlan(base=430),
 )

@@ -6,7 +6,8 @@ from pathlib import Path
 from studies.base.errors import StudyError
 from studies.metrics.judged import Judged, judged
 from studies.metrics.run import Run
-from studies.reference.load import Reference, load_reference
+from studies.reference.load import Reference
+from studies.reference.published import reference_for
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.scene import Scene
 from studies.store.ledger import Ledger
@@ -37,7 +38,7 @@ class Measurements:
     def __init__(self, ledger: Ledger, scenes: Iterable[Scene]) -> None:
         self.root = root = ledger.root
         self.ledger = ledger
-        self.references: dict[str, Reference | None] = {scene.name: load_reference(root, scene) for scene in scenes}
+        self.references: dict[str, Reference | None] = {scene.name: reference_for(root, scene) for scene in scenes}
         self.made = 0
         """Runs that were not there."""
 

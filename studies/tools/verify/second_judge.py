@@ -20,7 +20,6 @@ from reference_fem.oracles import Check, Oracle, Outcome
 from studies.reference.load import Reference, load_reference
 from studies.reference.reference_solves import reference_fingerprint, reference_solves
 from studies.reference.solve import solve
-from studies.reference.uncertainty import SamplePoints
 from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS
 from studies.scene.library.ball_clamped import CAP
 from studies.scene.scene import Scene
@@ -139,7 +138,7 @@ def verdict(judge: Judge, reference: Reference) -> Outcome:
     coarse, fine = judge.answer(judge.coarse), judge.answer(judge.fine)
     assert judge.scene.reference is not None  # it has been solved
     what = f"{fine.mesh.ne} {judge.elements} of third order"
-    place = f"{judge.scene.name}, {judge.scene.reference.levels} against {what}"
+    place = f"{judge.scene.name}, {len(reference.meshes)} meshes against {what}"
     count, bars = int(reference.record.attributes["unknowns"]), reference.total_uncertainty
     ours, theirs = reference.force[-1], fine.force[-1]
     change = abs(coarse.force[-1] / theirs - 1)
@@ -154,7 +153,7 @@ def verdict(judge: Judge, reference: Reference) -> Outcome:
 def surface_mean(reference: Reference, judge: Solution, other: Solution | None = None) -> float:
     """Area-weighted mean distance of surface points of the reference and of the judge, over the largest displacement
     [1]; of the judge and the other judge where one is given."""
-    at = SamplePoints(reference.coarser[-1])
+    at = reference.at
     on = at.areas > 0
     points, weights = at.points[on], at.areas[on] / at.areas.sum()
     moved = reference.displacement(at.points)[on]

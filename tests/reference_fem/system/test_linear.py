@@ -48,6 +48,17 @@ def test_solution_solves_the_whole_symmetric_system(backend):
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
+def test_an_unchecked_solve_gives_the_same_bits_and_asks_no_residual(backend, monkeypatch):
+    solver, A = linear.SymmetricSolver(backend), saddle_matrix()
+    solver.factor(upper(A))
+    b = np.random.default_rng(5).standard_normal((len(A), 3))
+    x = solver.solve(b)
+    monkeypatch.setattr(solver, "misfit", lambda x, b: pytest.fail("a residual was computed"))
+    assert np.array_equal(solver.solve(b, checked=False), x)
+    solver.release()
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_a_singular_matrix_is_refused(backend):
     A = saddle_matrix()
     A[3, :] = A[2, :]

@@ -7,6 +7,8 @@ import pytest
 from skfem import ElementTetP2, MeshTet, MeshTet2
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
+from studies.meshing.reference_outlines import LEAST, SHARE, drawn_to_outlines
+from studies.reference.size import element_size, outline_size
 
 from reference_fem import NewtonSettings, facet_nodes, nodes
 from reference_fem.elements.shapes import basis_table, element_nodes
@@ -16,9 +18,7 @@ from studies.base.errors import StudyError
 from studies.geometry.mesh.jacobian import smallest_jacobian
 from studies.meshing.held_mesh import rim_sides, with_patches
 from studies.meshing.reference_mesh import reference_mesh
-from studies.meshing.reference_outlines import LEAST, SHARE, drawn_to_outlines
 from studies.reference.problem import reference_problem
-from studies.reference.size import element_size, outline_size
 from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.liver_probe import LIVER_PROBE

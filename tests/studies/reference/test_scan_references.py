@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from studies.reference.size import element_size
 
 from reference_fem import facet_nodes, nodes
 from studies.geometry.mesh.jacobian import curved_volume
@@ -14,7 +15,6 @@ from studies.meshing.reference_mesh import reference_mesh
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.true_shape import true_shape
 from studies.reference.reference_solves import ReferenceSolve
-from studies.reference.size import element_size
 from studies.reference.solution import Solution
 from studies.reference.solve import solve
 from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS

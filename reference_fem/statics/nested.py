@@ -1,0 +1,155 @@
+"""Nested iteration: a solution is carried from a mesh to a finer one of the same body and solved there.
+
+Newton then starts next to the answer: 2 to 4 iterations where a path from rest takes 5 to 9 for each load step, and
+no path is needed (docs/theory.md, section 6).
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import KDTree
+from skfem import ElementTetP2, MeshTet
+
+from reference_fem.contact.augmented import NO_GRIP
+from reference_fem.elements.evaluate import Evaluator
+from reference_fem.elements.shapes import basis_table, element_nodes
+from reference_fem.elements.surface import point_positions
+from reference_fem.errors import SolveError
+from reference_fem.statics.newton import StepFailed, solve_step
+from reference_fem.system import assembly
+from reference_fem.system.saddle_point import System
+from reference_fem.system.state import State
+
+REPAIRS = 20
+"""Times that inverted elements of a carried field are repaired; 1 to 3 are enough where it can be."""
+
+
+SMALLEST_SHARE = 1 / 64
+"""Smallest part of the unbalanced forces that is taken away at once."""
+
+
+class Transfer(NamedTuple):
+    """Where the P2 nodes of a finer mesh are in a coarser one, n of them."""
+
+    corners: np.ndarray
+    """Vertices of the element of each, (n, 4)."""
+    linear: np.ndarray
+    """Values of their functions there, (n, 4)."""
+    table: np.ndarray
+    """The ten P2 nodes of the element, (n, 10)."""
+    quadratic: np.ndarray
+    """Values of their functions there, (n, 10)."""
+
+    def displacement(self, u: np.ndarray) -> np.ndarray:
+        """A field at the P2 nodes of the coarser mesh (N2, c) at those of the finer one, (n, c)."""
+        return np.einsum("na,nac->nc", self.quadratic, u[self.table])
+
+    def pressure(self, p: np.ndarray, vertices: int) -> np.ndarray:
+        """A field at the vertices of the coarser mesh (N1,) at the first `vertices` nodes of the finer one."""
+        return np.einsum("na,na->n", self.linear[:vertices], p[self.corners[:vertices]])
+
+
+def transfer(coarse: MeshTet, elements: np.ndarray, points: np.ndarray) -> Transfer:
+    """Transfer to `points` (n, 3) [m], each in or next to the coarse element of `elements` (n,)."""
+    local = Evaluator(coarse).invert(elements, points)
+    quadratic, _ = basis_table(ElementTetP2(), local.T)
+    linear = np.column_stack((1.0 - local.sum(axis=1), local))
+    table = element_nodes(coarse)[elements]
+    return Transfer(table[:, :4], linear, table, quadratic)
+
+
+def carried(coarse: System, state: State, fine: System, to: Transfer) -> State:
+    """The state of the coarser system on the finer one: displacement, pressure, cavities, contact pressures.
+
+    A contact point gets the pressure of the nearest point of the coarser surface at rest. Raises SolveError for
+    obstacles without slip, whose grip depends on the path.
+    """
+    if coarse.sticks.any():
+        raise SolveError("an obstacle without slip holds what it met on its way: solve its path from rest")
+    n, m = coarse.displacement_count, coarse.field_count
+    u = to.displacement(state.x[:n].reshape(-1, 3))
+    p = to.pressure(state.x[n:m], fine.problem.mesh.nvertices)
+    x = np.concatenate((u.ravel(), p, state.x[m:]))
+    x[fine.pattern.held] = fine.held_at(state.t)
+    pressure = carried_contact(coarse, state.pressure, fine)
+    return replace(state, x=x, multiplier=pressure, pressure=pressure, grip=NO_GRIP, hold=NO_GRIP)
+
+
+def carried_contact(coarse: System, pressure: np.ndarray, fine: System) -> np.ndarray:
+    """Contact pressures (no, nf, nq) [Pa] of the coarser surface at the points of the finer one."""
+    if not len(pressure):
+        return np.zeros((0, *fine.surface.weights.shape))
+    rest = [point_positions(np.zeros(len(s.surface.rest)), s.surface) for s in (coarse, fine)]
+    near = KDTree(rest[0].reshape(-1, 3)).query(rest[1].reshape(-1, 3))[1]
+    return pressure.reshape(len(pressure), -1)[:, near].reshape(len(pressure), *rest[1].shape[:2])
+
+
+def continued(system: System, state: State) -> State:
+    """The equilibrium at the time and load of a carried state. Raises StepFailed where Newton finds none from there.
+
+    Where one step fails, the forces that balance the carried state as it is are taken away little by little: at
+    outlines of held regions the strain grows with each refinement, beyond what one step can follow.
+    """
+    state = replace(state, x=repaired(system, state.x))
+    try:
+        return solve_step(system, state, state.t, state.load)
+    except StepFailed:
+        missing = unbalanced(system, state)
+        if missing is None:
+            raise
+    left, step, iterations = 1.0, 0.5, 0
+    while left > 0.0:
+        goal = max(0.0, left - step)
+        try:
+            state = solve_step(system, state, state.t, state.load, goal * missing)
+        except StepFailed:
+            step *= 0.5
+            if step < SMALLEST_SHARE:
+                raise
+            continue
+        iterations, left = iterations + state.iterations, goal
+    return replace(state, iterations=iterations)
+
+
+def unbalanced(system: System, state: State) -> np.ndarray | None:
+    """The dead forces (field_count,) with which a state would be in equilibrium; None where an element is inverted."""
+    loads = system.loads_of(state)
+    found = system.evaluate(state.x, loads, tangent=False)
+    if not found.usable:
+        return None
+    missing = found.residual[: system.field_count].copy()
+    missing[system.pattern.held] = 0.0
+    return missing
+
+
+def repaired(system: System, x: np.ndarray) -> np.ndarray:
+    """Unknowns (total,) with the elements that are inverted at a quadrature point made upright, where that is easy.
+
+    The displaced middles of such an element are put between its displaced vertices, as at rest; if that is not enough,
+    its displacements are averaged with those of its neighbours. Held unknowns stay.
+    """
+    table, n = element_nodes(system.problem.mesh), system.displacement_count
+    sides = table[:, [[0, 1, 4], [1, 2, 5], [0, 2, 6], [0, 3, 7], [1, 3, 8], [2, 3, 9]]]
+    x, free = x.copy(), np.ones(n, dtype=bool)
+    free[system.pattern.held[system.pattern.held < n]] = False
+    free = free.reshape(-1, 3)
+    for attempt in range(REPAIRS):
+        J = np.linalg.det(assembly.deformation(x[: system.field_count], system.elements, 1.0)[0])
+        bad = np.flatnonzero(J.min(axis=1) <= 0.0)
+        if not len(bad):
+            break
+        u = x[:n].reshape(-1, 3)
+        near, middle = sides[bad].reshape(-1, 3)[:, :2], sides[bad].reshape(-1, 3)[:, 2]
+        wanted = u.copy()
+        wanted[middle] = u[near].mean(axis=1)
+        if attempt:
+            around = np.isin(table, table[bad]).any(axis=1)
+            total, count = np.zeros_like(u), np.zeros(len(u))
+            mean = u[table[around]].mean(axis=1)
+            np.add.at(total, table[around], mean[:, None])
+            np.add.at(count, table[around], 1.0)
+            inner = np.unique(table[bad])
+            wanted[inner] = 0.5 * (u[inner] + total[inner] / count[inner, None])
+        x[:n] = np.where(free, wanted, u).ravel()
+    return x

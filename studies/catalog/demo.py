@@ -1,0 +1,23 @@
+"""Three bodies of one ball next to its published reference: springs alone, one kept volume, the recommended body."""
+
+from massspring import Free, ImplicitVolume
+from studies.catalog.study import Chart, Study
+from studies.runs.case import BodyRecipe, Case
+from studies.scene.library import BALL_SQUEEZE
+
+BALL = BodyRecipe("tetrahedral", 150)
+RECOMMENDED = BodyRecipe("quadratic", 594, mass="stiffness")
+
+DEMO = Study(
+    name="demo",
+    question="What do a kept volume and quadratic elements change on a squeezed ball?",
+    cases=(
+        Case(BALL_SQUEEZE, BALL, Free(), recorded=("surface",)),
+        Case(BALL_SQUEEZE, BALL, ImplicitVolume(), recorded=("surface",)),
+        Case(BALL_SQUEEZE, RECOMMENDED, ImplicitVolume(), dt_fraction=0.8, recorded=("surface",)),
+    ),
+    charts=(Chart("squeeze.png", "studies.plots.squeeze:draw"),),
+    columns=("volume_worst", "force_end", "shape_error", "shape_volume"),
+)
+WORDS = ("springs alone", "one kept volume", "recommended body")
+"""What each case is called on the terminal."""

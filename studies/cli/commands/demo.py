@@ -1,0 +1,66 @@
+"""`organbench demo`: a first insight in a minute."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.catalog.demo import DEMO, WORDS
+from studies.cli.terminal import say, warn
+from studies.metrics.metrics import force_end, volume_worst
+from studies.metrics.run import Run
+from studies.report.page.write import write_page
+from studies.report.results import refresh
+from studies.runs.run import run_case
+from studies.store.ledger import Ledger
+from studies.sweep.compiling.main import compile_all
+from studies.sweep.compiling.tasks import is_done
+from studies.sweep.job import CaseJob, case_jobs, do, reference_jobs
+from studies.sweep.load import load_runs
+
+NEEDED = ("implicit_volume, quadratic, float64", "implicit_volume, whole, float64", "free, whole, float64")
+"""What is compiled for it, the longest first."""
+Output = Annotated[Path, typer.Option("-o", "--output", help="folder for results and the page")]
+
+
+def demo(output: Output = Path("organbench-demo")) -> None:
+    """Squeeze a ball with three bodies, next to the published reference: three numbers each, and a page to look at."""
+    begin = time.perf_counter()
+    ledger = Ledger(output)
+    if not is_done(whole=False) and not is_done(whole=True):
+        say("compiling once, in two processes")
+        for done in compile_all(list(NEEDED)):
+            say(f"  {done.name}: {done.seconds:.0f} s")
+    for job in reference_jobs(output, DEMO.scenes):
+        do(job)
+    speeds = []
+    for job, words in zip(case_jobs(output, DEMO), WORDS, strict=True):
+        say(f"{words}: {job.work.body.nodes} surface nodes")
+        speeds.append(run_timed(job))
+    ledger.look_again()
+    runs, problems = load_runs(output, DEMO)
+    warn(problems)
+    for run, words, speed in zip(runs, WORDS, speeds, strict=True):
+        say(line(run, words, speed))
+    warn(refresh(ledger, DEMO)[1])
+    page, _ = write_page(output, [DEMO])
+    say(f"{page}: the moving bodies and a chart ({time.perf_counter() - begin:.0f} s in all)")
+
+
+def run_timed(job: CaseJob) -> float:
+    """Runs a case; simulated over computing time, without mesh and compiling."""
+    times: list[float] = []
+    case = job.work
+    run_case(job.root, DEMO.name, case, lambda frame: times.append(time.perf_counter()))
+    frames = case.frames or case.scene.frames
+    return case.scene.duration * (len(times) - 1) / frames / (times[-1] - times[0])
+
+
+def line(run: Run, words: str, speed: float) -> str:
+    """Volume, force and speed of a run."""
+    reference = run.reference
+    assert reference is not None  # it is published, or was solved
+    known = 100 * reference.total_uncertainty["force_end"]
+    numbers = f"volume {volume_worst(run):.2g} % off, force {force_end(run):+.1f} ± {known:.1f} %"
+    return f"{words}: {numbers}, {speed:.1f} times real time"

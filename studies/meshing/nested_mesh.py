@@ -1,0 +1,151 @@
+"""Nested meshes of a reference: each halves some elements of the one before and is closer to the true shape."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from skfem import ElementTetP2, MeshTet, MeshTet2
+
+from reference_fem import nodes
+from reference_fem.elements.evaluate import Evaluator
+from reference_fem.elements.shapes import basis_table, element_nodes
+from studies.geometry.mesh.jacobian import smallest_jacobian
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+from studies.meshing.held_mesh import HeldMesh, held_mesh, rim_sides
+from studies.meshing.outlines import drawn_middles
+from studies.meshing.reference_mesh import on_true_sides
+from studies.meshing.scene_mesh import mesh_for
+from studies.meshing.shaping import aimed
+from studies.meshing.true_shape import true_shape
+from studies.scene.scene import Scene
+
+SHARE = 0.42
+"""Where the middle of a side stands that leaves an outline, as a share of its length from there (measured,
+docs/theory.md, section 6: nearer ones overshoot once elements are small)."""
+UPRIGHT = 0.05
+"""Smallest Jacobian, over that of the mean, below which the new nodes of an element go back to its parent's curve."""
+LEAST = 0.02
+"""The same below which an element keeps its middles where they are."""
+SMALLEST = 0.012
+"""Of the diagonal of the body: elements at outlines are not halved to a smaller edge. The strain there grows without
+bound as they shrink, until a neo-Hookean element inverts and no equilibrium is found; 0.012 leaves 0.1 % of the force
+of the clamped ball (docs/theory.md, section 6)."""
+REGULAR = 1.0 / (6.0 * np.sqrt(2.0))
+"""Volume of a regular tetrahedron over the cube of its edge."""
+CHILD = 0.25
+"""Of an element's error indicator that each half of it is expected to have."""
+GROWTH = 1.3
+"""Factor by which elements may grow at a time while marks are chosen: then the largest indicators are known again."""
+
+
+@dataclass(frozen=True, eq=False)
+class NestedMesh:
+    """One mesh of a family."""
+
+    scene: Scene
+    body: HeldMesh
+    """Its vertices before they were moved: parts of the flat elements of the coarsest mesh."""
+    points: np.ndarray
+    """P2 nodes on the true shape [m], (n, 3); middles half-way."""
+    off: int = 0
+    """Boundary nodes that were put back, or elements would fold."""
+
+    @cached_property
+    def mesh(self) -> MeshTet2:
+        """The mesh that is solved: middles of sides that leave an outline are drawn to it."""
+        flat = MeshTet2.from_mesh(self.body.mesh)
+        *held, _ = self.body.facets(flat)
+        outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), []]).astype(int)
+        wanted = drawn_middles(self.points, flat, outlines, SHARE)
+        points, _ = upright(self.points, wanted, element_nodes(flat), LEAST)
+        return replace(flat, doflocs=np.ascontiguousarray(points.T))
+
+    @cached_property
+    def patches(self) -> list[np.ndarray]:
+        """Nodes of each held region."""
+        return [np.unique(facets) for facets in self.body.facets(self.mesh)[:-1]]
+
+    @cached_property
+    def small_at_outlines(self) -> np.ndarray:
+        """Elements with a vertex on an outline whose halves would be smaller than SMALLEST, (ne,) bool."""
+        flat = MeshTet2.from_mesh(self.body.mesh)
+        *held, _ = self.body.facets(flat)
+        outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), []])
+        corners = self.body.mesh.t.T
+        volume = np.abs(tetrahedron_volumes(self.points, corners))
+        size = np.cbrt(0.5 * volume / REGULAR)
+        least = SMALLEST * float(np.linalg.norm(np.ptp(self.points, axis=0)))
+        return np.isin(corners, outlines).any(axis=1) & (size < least)
+
+    @property
+    def lumen(self) -> np.ndarray:
+        """Middles of the corners of the lumen's facets [m], (f, 3)."""
+        return nodes(self.mesh)[self.body.facets(self.mesh)[-1][:, :3]].mean(axis=1)
+
+    def finer(self, indicator: np.ndarray, elements: int) -> tuple["NestedMesh", np.ndarray]:
+        """A mesh of about so many elements, those halved whose indicator (ne,) is largest; and the element of this mesh
+        of which each of its elements is a part, (new ne,)."""
+        body, parents = marked(self.body, np.where(self.small_at_outlines, 0.0, indicator), elements)
+        cells, flat = element_nodes(body.mesh), MeshTet2.from_mesh(self.body.mesh)
+        owner = at_nodes(body.mesh, parents)
+        bent = Evaluator(replace(flat, doflocs=np.ascontiguousarray(self.points.T)))
+        where = Evaluator(flat).invert(owner, nodes(body.mesh))
+        guess = interpolated(bent, owner, where)
+        shape = true_shape(self.scene.organ)
+        if shape is None:
+            return replace(self, body=body, points=guess, off=0), parents
+        points, back = upright(guess, aimed(self.scene, body, shape, guess), cells, UPRIGHT)
+        return replace(self, body=body, points=points, off=int(back.sum())), parents
+
+
+def at_nodes(mesh: MeshTet, of_elements: np.ndarray) -> np.ndarray:
+    """For each P2 node the value (ne,) of one of its elements, (n,)."""
+    cells = element_nodes(mesh)
+    values = np.empty(int(cells.max()) + 1, dtype=of_elements.dtype)
+    values[cells] = of_elements[:, None]
+    return values
+
+
+def base_mesh(scene: Scene, surface_nodes: int, at_contact: int) -> NestedMesh:
+    """The coarsest mesh of a family. Raises StudyError for one that cannot be made."""
+    organ_mesh = mesh_for(scene, surface_nodes, on_shape=True)
+    coarse = held_mesh(scene, organ_mesh)
+    body = coarse.refined(scene, 0, at_contact)
+    return NestedMesh(scene, body, nodes(on_true_sides(scene, organ_mesh, coarse, body)))
+
+
+def marked(body: HeldMesh, indicator: np.ndarray, elements: int) -> tuple[HeldMesh, np.ndarray]:
+    """`body` with elements halved until there are `elements`, and the parent of each; largest indicators first."""
+    parents, expected = np.arange(body.mesh.nelements), indicator.astype(float)
+    while body.mesh.nelements < elements:
+        count = body.mesh.nelements
+        room = max(1, (min(elements, int(GROWTH * count)) - count) // 3)
+        # Rounded, then by number: the last bits of an indicator differ between processors.
+        order = np.lexsort((np.arange(count), -np.round(expected / expected.max(), 12)))
+        chosen = order[: min(room, int((expected > CHILD * expected.max()).sum()))]
+        body, of = body.halved(np.sort(chosen))
+        split = np.bincount(of)[of]
+        parents, expected = parents[of], expected[of] * CHILD ** np.log2(split)
+    return body, parents
+
+
+def upright(safe: np.ndarray, wanted: np.ndarray, cells: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
+    """`wanted` (n, 3) [m] with the nodes of elements (k, 10) back at `safe` whose smallest Jacobian would be below
+    `least` and is not at `safe`; and which nodes those are."""
+    back = np.zeros(len(safe), dtype=bool)
+    moved = (wanted != safe).any(axis=1)
+    while True:
+        x = np.where(back[:, None], safe, wanted)
+        folded = np.flatnonzero(smallest_jacobian(x, cells) < least)
+        new = np.zeros_like(back)
+        new[cells[folded]] = True
+        new &= moved & ~back
+        if not new.any():
+            return x, back
+        back |= new
+
+
+def interpolated(mesh: Evaluator, element: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """Points (n, 3) [m] of `mesh` at reference coordinates (n, 3) of its elements (n,)."""
+    values, _ = basis_table(ElementTetP2(), local.T)
+    return np.einsum("na,nai->ni", values, mesh.x[mesh.table[element]])

@@ -1,0 +1,174 @@
+"""Published references: the finest solution of every scene of the catalogue, shipped with the package.
+
+A benchmark's truth is the same for everybody who is judged by it. A published reference stands for a scene as long as
+the physics are the same: organ, tissue, obstacles, holds and checkpoints; an edit of code makes none stale
+(`organbench verify --references` solves them again). A new set is a release with changed results.
+"""
+
+import hashlib
+import json
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.reference.load import Reference, load_reference
+from studies.reference.reference_solves import ReferenceSolve, physics_of, reference_fingerprint, with_floats
+from studies.scene.as_json import scene_to_json
+from studies.scene.scene import Scene
+from studies.store.new_record import new_fields, new_record
+from studies.store.paths import key_digest
+from studies.store.record import Record, Status
+from studies.store.schema import REFERENCE_FIELDS
+
+FOLDER = Path(__file__).parent / "published"
+INDEX = "set.json"
+PRECISION = 1e-5
+"""Largest rounding of a stored length, over the largest displacement."""
+LENGTHS = ("displacement", "nodes", "sample_displacement", "sample_points")
+"""Fields that are rounded; all others keep every digit."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One published reference."""
+
+    name: str
+    """Of the set, as "2027.1"."""
+    file: Path
+    sha256: str
+    """Of the file."""
+
+    @property
+    def words(self) -> str:
+        """For tables: the set, and which file."""
+        return f"{self.name} {self.sha256[:8]}"
+
+
+def physics(scene: Scene) -> str:
+    """SHA-256 of what a reference of the scene depends on, however it is solved."""
+    plain = replace(physics_of(scene), name="", reference=None)
+    return key_digest(json.dumps(with_floats(json.loads(scene_to_json(plain))), sort_keys=True, ensure_ascii=False))
+
+
+def published(scene: Scene, folder: Path = FOLDER) -> Entry | None:
+    """The published reference of the scene's physics; None without one. Warns of a file that is missing or damaged:
+    the scene is then solved."""
+    if scene.reference is None:
+        return None
+    return index(folder).get(physics(scene))
+
+
+@cache
+def index(folder: Path = FOLDER) -> Mapping[str, Entry]:
+    """The references in a folder by their physics, those whose file is as it was published."""
+    if not (folder / INDEX).is_file():
+        return {}
+    data = json.loads((folder / INDEX).read_text(encoding="utf-8"))
+    entries = {}
+    for scene, known in data["references"].items():
+        entry = Entry(data["set"], folder / known["file"], known["sha256"])
+        fault = fault_of(entry)
+        if fault:
+            warnings.warn(
+                f"the published reference of {scene} {fault}; it is solved instead, which takes minutes (install "
+                "organbench again to get it back)",
+                stacklevel=2,
+            )
+        else:
+            entries[known["physics"]] = entry
+    return entries
+
+
+def fault_of(entry: Entry) -> str | None:
+    """What is wrong with the file; None where it is as it was published."""
+    if not entry.file.is_file():
+        return "is missing"
+    found = hashlib.sha256(entry.file.read_bytes()).hexdigest()
+    return None if found == entry.sha256 else "is damaged"
+
+
+def fingerprint_of(scene: Scene) -> str:
+    """What makes the scene's stored reference stale when it changes: the published file, or the code that solves it."""
+    entry = published(scene)
+    return reference_fingerprint() if entry is None else f"published {entry.sha256}"
+
+
+def reference_for(root: Path, scene: Scene) -> Reference | None:
+    """What a scene is judged by: the published reference, else the one stored below `root`; None without a plan.
+
+    Raises StudyError as load_reference.
+    """
+    entry = published(scene)
+    return load_reference(root, scene) if entry is None else Reference(scene, record_of(scene, entry))
+
+
+def record_of(scene: Scene, entry: Entry) -> Record:
+    """The published reference as a record of the scene. Raises StudyError for a file that cannot be read."""
+    try:
+        with h5py.File(entry.file, "r") as file:
+            values = {name: _values(item) for name, item in file.items()}
+            attributes = {name: np.asarray(value).item() for name, value in file.attrs.items()}
+    except (OSError, KeyError) as error:
+        raise StudyError(f"the published reference {entry.file.name} cannot be read ({error})") from error
+    return new_record(
+        kind="reference",
+        key=ReferenceSolve(scene).key,
+        name=scene.name,
+        status=Status.OK,
+        message="",
+        fingerprint=fingerprint_of(scene),
+        attributes=attributes | {"scene": scene.name, "set": entry.words},
+        fields=new_fields(REFERENCE_FIELDS, values),
+    )
+
+
+def _values(dataset: h5py.Dataset) -> np.ndarray:
+    if h5py.check_string_dtype(dataset.dtype) is not None:
+        return np.asarray(dataset.asstr()[()]).astype(str)
+    values = np.asarray(dataset[()])
+    return values.astype({"f": float, "u": np.int64}.get(values.dtype.kind, values.dtype))
+
+
+def write_published(folder: Path, name: str, references: Mapping[str, Reference]) -> Path:
+    """A set of references in a folder, by the names of their scenes; where its index lies. Other files stay."""
+    folder.mkdir(parents=True, exist_ok=True)
+    listed = {}
+    for scene, reference in references.items():
+        file = folder / f"{scene}.h5"
+        write_file(file, reference)
+        bars = {quantity: float(f"{bar:.3g}") for quantity, bar in reference.total_uncertainty.items()}
+        listed[scene] = {
+            "file": file.name,
+            "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
+            "physics": physics(reference.scene),
+            "unknowns": reference.record.attributes["unknowns"],
+            "relative bars": bars,
+        }
+    path = folder / INDEX
+    path.write_text(json.dumps({"set": name, "references": listed}, indent=1) + "\n", encoding="utf-8")
+    index.cache_clear()
+    return path
+
+
+def write_file(path: Path, reference: Reference) -> None:
+    """All fields of a reference, compressed, its lengths rounded to PRECISION of the largest displacement."""
+    largest = np.abs(reference.field("displacement")).max()
+    digits = int(np.ceil(-np.log10(2.0 * PRECISION * largest)))
+    with h5py.File(path, "w", libver="v110") as file:
+        file.attrs.update(reference.record.attributes)
+        for name, item in reference.record.fields.items():
+            values = np.asarray(item.values)
+            if values.dtype.kind == "U":
+                file.create_dataset(name, data=values.astype(h5py.string_dtype()))
+            elif name in LENGTHS:
+                rounded = np.round(values, digits).astype(np.float32)
+                file.create_dataset(name, data=rounded, scaleoffset=digits, compression="gzip")
+            else:
+                options = {"compression": "gzip", "shuffle": True} if values.size > 100 else {}
+                file.create_dataset(name, data=values.astype(np.uint32) if name == "tetrahedra" else values, **options)

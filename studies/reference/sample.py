@@ -1,0 +1,146 @@
+"""What one solution of a reference's family says, where it is compared with the others."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from reference_fem import Equilibrium, Evaluator, Problem, nodes
+from studies.geometry.mesh.organ_mesh import boundary_triangles, tetrahedron_volumes, triangle_areas
+from studies.reference.problem import whole_forces
+from studies.reference.ringing import ringing_frequency
+from studies.scene.quantities import allowed
+from studies.scene.scene import Scene
+from studies.store.record import Record
+
+SERIES = ("force", "volume", "pressure", "lumen_pressure")
+"""Numbers of a sample at every checkpoint; NaN where it was not solved."""
+
+
+@dataclass(frozen=True, eq=False)
+class SamplePoints:
+    """Where solutions are compared: the vertices of the coarsest mesh, with their share of its rest volume and of its
+    surface."""
+
+    points: np.ndarray
+    """[m], (b, 3)."""
+    tetrahedra: np.ndarray
+    """Of the coarsest mesh, (d, 4)."""
+    symmetric: bool = False
+    """Whether the mesh is an octant: its planes of symmetry are no surface."""
+
+    @cached_property
+    def triangles(self) -> np.ndarray:
+        """Of the surface, (s, 3)."""
+        triangles = boundary_triangles(self.tetrahedra)
+        if not self.symmetric:
+            return triangles
+        return triangles[~np.any(np.all(np.abs(self.points[triangles]) < 1e-12, axis=1), axis=1)]
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the whole body [m]."""
+        return (2.0 if self.symmetric else 1.0) * float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    @cached_property
+    def volumes(self) -> np.ndarray:
+        """[m³], (b,)."""
+        return _shares(self.tetrahedra, tetrahedron_volumes(self.points, self.tetrahedra), len(self.points))
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """[m²], (b,)."""
+        return _shares(self.triangles, triangle_areas(self.points, self.triangles), len(self.points))
+
+
+def _shares(corners: np.ndarray, sizes: np.ndarray, count: int) -> np.ndarray:
+    """What each vertex has of the sizes (k,) of elements with `corners` (k, c), (count,)."""
+    width = corners.shape[1]
+    return np.bincount(corners.ravel(), np.repeat(sizes / width, width), count)
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One solution at the sample points."""
+
+    variant: str
+    """The setting that was made better, "" for a mesh of the family."""
+    unknowns: int
+    size: float
+    """Mean edge of the elements [m]; the error of meshes set by hand is a power of it."""
+    u: np.ndarray
+    """Displacement at the last checkpoint [m], (b, 3)."""
+    force: np.ndarray
+    """The probed force [N], (K,)."""
+    volume: np.ndarray
+    """Over that at rest [1], (K,)."""
+    pressure: np.ndarray
+    """Volume mean, compression positive [Pa], (K,)."""
+    lumen_pressure: np.ndarray
+    """[Pa], (K,)."""
+    frequency: float = float("nan")
+    """Of the ringing [Hz]; NaN where nothing rings."""
+
+
+def sample_of(
+    scene: Scene, problem: Problem, found: Sequence[Equilibrium], at: SamplePoints, size: float, variant: str = ""
+) -> Sample:
+    """The sample of equilibria, the last ones of the scene's checkpoints or all of them."""
+    series = {name: np.full(len(scene.checkpoints), np.nan) for name in SERIES}
+    if allowed(scene, "force"):
+        forces = whole_forces(scene, np.array([e.obstacle_force for e in found]))
+        series["force"][-len(found) :] = scene.output_force(forces, np.array([e.held_force for e in found]))
+    series["volume"][-len(found) :] = [e.volume / e.volume0 for e in found]
+    series["pressure"][-len(found) :] = [mean_pressure(problem, e) for e in found]
+    if scene.filled:
+        series["lumen_pressure"][-len(found) :] = [float(e.cavity_pressure.sum()) for e in found]
+    if np.array_equal(nodes(problem.mesh)[: len(at.points)], at.points):
+        moved = np.array([e.u[: len(at.points)] for e in found])
+    else:
+        columns = np.concatenate([e.u for e in found], axis=1)  # one field of 3 k components
+        moved = Evaluator(problem.mesh).displacement(columns, at.points)
+        moved = moved.reshape(len(at.points), len(found), 3).transpose(1, 0, 2)
+    frequency = float("nan")
+    if allowed(scene, "frequency") and len(found) == len(scene.checkpoints):
+        frequency = ringing_frequency(scene, np.array(scene.checkpoints), at.points, moved, at.areas)
+    unknowns = 3 * len(nodes(problem.mesh)) + problem.mesh.nvertices
+    return Sample(variant, unknowns, size, moved[-1], **series, frequency=frequency)
+
+
+def mean_pressure(problem: Problem, equilibrium: Equilibrium) -> float:
+    """Volume mean of −p [Pa]: p of the solver is positive in tension, the multiplier of the springs in compression."""
+    volume, tetrahedra = equilibrium.weights.sum(axis=1), problem.mesh.t[:4].T
+    return -float(volume @ equilibrium.p[tetrahedra].mean(axis=1) / volume.sum())
+
+
+def sample_fields(at: SamplePoints, samples: Sequence[Sample]) -> dict[str, np.ndarray]:
+    """Samples, fine to coarse and then the variants, as the fields of a record."""
+    count = len(samples)
+    each = {f"sample_{name}": np.array([getattr(one, name) for one in samples]).reshape(count, -1) for name in SERIES}
+    return each | {
+        "sample_variant": np.array([one.variant for one in samples], dtype=str),
+        "sample_unknowns": np.array([one.unknowns for one in samples], dtype=np.int64),
+        "sample_size": np.array([one.size for one in samples], dtype=float),
+        "sample_frequency": np.array([one.frequency for one in samples], dtype=float),
+        "sample_displacement": np.array([one.u for one in samples]).reshape(count, len(at.points), 3),
+        "sample_points": at.points,
+        "sample_tetrahedra": at.tetrahedra,
+    }
+
+
+def samples_in(scene: Scene, record: Record) -> tuple[SamplePoints, list[Sample]]:
+    """What `sample_fields` stored."""
+    get = lambda name: record.fields[f"sample_{name}"].values  # noqa: E731
+    at = SamplePoints(get("points"), get("tetrahedra"), scene.symmetric)
+    return at, [
+        Sample(
+            str(variant),
+            int(get("unknowns")[k]),
+            float(get("size")[k]),
+            get("displacement")[k],
+            **{name: get(name)[k] for name in SERIES},
+            frequency=float(get("frequency")[k]),
+        )
+        for k, variant in enumerate(get("variant"))
+    ]

@@ -1,0 +1,52 @@
+"""Published references solved again, by the code as it is."""
+
+import tempfile
+from pathlib import Path
+
+from reference_fem.oracles import Check
+from studies.reference.load import Reference, load_reference
+from studies.reference.published import published, reference_for
+from studies.reference.reference_solves import ReferenceSolve
+from studies.reference.sample import Sample, SamplePoints
+from studies.reference.solve import solve
+from studies.reference.uncertainty import QUANTITIES
+from studies.scene.library import JUDGED
+from studies.scene.scene import Scene
+
+
+def published_scenes() -> dict[str, Scene]:
+    """Scenes of the catalogue that have a published reference, by name."""
+    return {scene.name: scene for scene in JUDGED if published(scene) is not None}
+
+
+def solved_again(scene: Scene) -> list[Check]:
+    """The scene solved by its plan, held against its published reference; allowed are both error bars together.
+
+    Raises StudyError where it does not converge.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        solve(Path(folder), ReferenceSolve(scene))
+        again = load_reference(Path(folder), scene)
+    known = reference_for(Path(), scene)
+    assert again is not None and known is not None  # published scenes have a plan
+    return checks_of(known, again)
+
+
+def checks_of(known: Reference, again: Reference) -> list[Check]:
+    """A check for each quantity of the scene, at the sample points of the second."""
+    place, count = f"{again.scene.name}, {len(again.meshes)} meshes", int(again.record.attributes["unknowns"])
+    there, here = (sample_at(reference, again.at) for reference in (known, again))
+    checks = []
+    for name, bar in again.total_uncertainty.items():
+        allowed = bar + known.total_uncertainty[name]
+        apart = QUANTITIES[name](again.at, here, there)
+        checks.append(Check(name, "1", 0.0, apart, allowed, place, count, absolute=True))
+    return checks
+
+
+def sample_at(reference: Reference, at: SamplePoints) -> Sample:
+    """What the finest mesh of a reference says at sample points of another one's family."""
+    finest = reference.meshes[0]
+    series = {name: reference.field(name) for name in ("volume", "pressure", "lumen_pressure")}
+    u = reference.displacement(at.points)
+    return Sample("", finest.unknowns, finest.size, u, reference.force, **series, frequency=finest.frequency)

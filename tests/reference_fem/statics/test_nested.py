@@ -1,0 +1,313 @@
+"""Solutions carried from mesh to mesh: fields exact where they can be, the equilibrium that of a path from rest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from skfem import MeshTet
+
+from reference_fem import (
+    Cavity,
+    NeoHookean,
+    NewtonSettings,
+    PrescribedDisplacement,
+    Problem,
+    RigidPlane,
+    SolveError,
+    equilibrium_path,
+    nodes,
+)
+from reference_fem.elements.evaluate import Evaluator
+from reference_fem.elements.surface import point_positions
+from reference_fem.statics import nested
+from reference_fem.statics.nested import carried, continued, repaired, transfer, unbalanced
+from reference_fem.statics.newton import StepFailed, solve_step
+from reference_fem.system import assembly
+from reference_fem.system.saddle_point import System
+from tests.reference_fem.bodies import ball_octant, block, symmetry
+from tests.reference_fem.statics.test_cavity import hollow_cube, in_the_middle
+
+DEEP = 0.2
+"""How far the plane goes in, over the radius."""
+STRICT = NewtonSettings(force_tol=1e-8, penetration_tol=1e-6)
+"""What contact sinks in by, within the usual tolerance, depends on the way."""
+
+
+def onto(coarse, fine):
+    """The transfer to a mesh of the same body."""
+    return transfer(coarse, Evaluator(coarse).locate(nodes(fine))[0], nodes(fine))
+
+
+def quadratic(x):
+    """A displacement of second order in every component, (n, 3)."""
+    a, b, c = x.T
+    return np.stack([0.1 * a * b - 0.2 * c, 0.3 * c**2 + 0.1 * a, 0.2 * b * c - 0.1 * a**2 + 0.05], axis=1)
+
+
+def linear(x):
+    """A field of first order, (n,)."""
+    return 2.0 - 0.7 * x[:, 0] + 0.3 * x[:, 1] + 1.1 * x[:, 2]
+
+
+@pytest.fixture(scope="module")
+def straight():
+    """A skew block, and its parts."""
+    coarse = block((3, 2, 2), skew=0.05)
+    return coarse, coarse.refined()
+
+
+def test_parts_of_a_straight_mesh_get_quadratic_fields_exactly(straight):
+    coarse, fine = straight
+    to = onto(coarse, fine)
+    u, p = to.displacement(quadratic(nodes(coarse))), to.pressure(linear(coarse.p.T), fine.nvertices)
+    np.testing.assert_allclose(u, quadratic(nodes(fine)), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(p, linear(fine.p.T), rtol=0, atol=1e-14)
+    assert u.shape == nodes(fine).shape and p.shape == (fine.nvertices,)
+
+
+def test_each_node_gets_the_field_of_its_own_element(straight):
+    """A field that no single polynomial is."""
+    coarse, fine = straight
+    u = np.random.default_rng(2).normal(size=nodes(coarse).shape)
+    wanted = Evaluator(coarse).displacement(u, nodes(fine))
+    np.testing.assert_allclose(onto(coarse, fine).displacement(u), wanted, rtol=0, atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def round_pair():
+    """Two meshes of an eighth of a ball, whose elements are curved."""
+    return ball_octant(3), ball_octant(6)
+
+
+def test_a_curved_mesh_passes_a_linear_displacement_on(round_pair):
+    coarse, fine = round_pair
+    turned = lambda mesh: nodes(mesh) @ np.array([[0.1, 0.2, -0.3], [0.0, 0.4, 0.1], [0.2, 0.0, -0.1]])  # noqa: E731
+    found = onto(coarse, fine).displacement(turned(coarse))
+    np.testing.assert_allclose(found, turned(fine), rtol=0, atol=1e-12)
+
+
+def test_the_functions_of_a_transfer_are_a_partition_of_one(round_pair):
+    coarse, fine = round_pair
+    to = onto(coarse, fine)
+    for values in (to.linear, to.quadratic):
+        np.testing.assert_allclose(values.sum(axis=1), 1.0, rtol=0, atol=1e-12)
+
+
+def pressed(mesh):
+    """An eighth of a ball below a plane that comes down."""
+    plane = RigidPlane((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), lambda t: (0.0, 0.0, -t))
+    return Problem(mesh, NeoHookean(1.0, 1000.0), symmetry(), [plane])
+
+
+@pytest.fixture(scope="module")
+def coarse_end(round_pair):
+    """The coarse ball at the end of its path."""
+    found = []
+    equilibrium_path(pressed(round_pair[0]), (DEEP / 2, DEEP), STRICT, on_checkpoint=found.append)
+    return System(pressed(round_pair[0]), STRICT), found[-1].state
+
+
+@pytest.fixture(scope="module")
+def path(round_pair):
+    """The fine ball from rest."""
+    return equilibrium_path(pressed(round_pair[1]), (DEEP / 2, DEEP), STRICT)
+
+
+@pytest.fixture(scope="module")
+def from_rest(path):
+    """The end of that."""
+    return path[-1]
+
+
+@pytest.fixture
+def start(round_pair, coarse_end):
+    """The fine system, and the coarse state carried to it."""
+    coarse, fine = round_pair
+    system = System(pressed(fine), STRICT)
+    yield system, carried(*coarse_end, system, onto(coarse, fine))
+    system.solver.release()
+
+
+def displacement(system, state):
+    return state.x[: system.displacement_count].reshape(-1, 3)
+
+
+def apart(system, state, truth):
+    """Largest distance to the displacement of an equilibrium, over its largest displacement."""
+    return np.abs(displacement(system, state) - truth.u).max() / np.abs(truth.u).max()
+
+
+def test_a_carried_state_is_that_of_the_coarse_mesh(start, coarse_end, round_pair):
+    """Held unknowns have the values that they are held at, contact points the pressure of their nearest neighbour."""
+    system, state = start
+    coarse, found = coarse_end
+    fine_nodes = nodes(round_pair[1])
+    inside = np.linalg.norm(fine_nodes, axis=1) < 0.9
+    there = Evaluator(round_pair[0]).displacement(displacement(coarse, found), fine_nodes[inside])
+    free = np.abs(fine_nodes[inside]) > 1e-9
+    np.testing.assert_allclose(displacement(system, state)[inside][free], there[free], rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(state.x[system.pattern.held], system.held_at(DEEP))
+    assert (state.t, state.load) == (found.t, found.load)
+    near, far = (point_positions(np.zeros(len(s.surface.rest)), s.surface).reshape(-1, 3) for s in (coarse, system))
+    nearest = np.array([np.argmin(((near - point) ** 2).sum(axis=1)) for point in far[::17]])
+    np.testing.assert_array_equal(state.pressure.ravel()[::17], found.pressure.ravel()[nearest])
+    assert (state.pressure > 0).any() and state.multiplier is state.pressure
+
+
+def test_the_equilibrium_is_that_of_a_path_from_rest_in_fewer_iterations(start, path):
+    """The carried field itself is far off."""
+    system, state = start
+    found = continued(system, state)
+    assert apart(system, state, path[-1]) > 0.05
+    assert apart(system, found, path[-1]) < 1e-4
+    assert 1 <= found.iterations < 0.7 * sum(step.newton_iterations for step in path)
+
+
+def failing(monkeypatch, times):
+    """Makes the first so many steps fail; the dead forces of all that were tried, and the iterations of the others."""
+    forces, iterations = [], []
+
+    def step(system, state, t, load, more=0.0):
+        forces.append(more)
+        if len(forces) <= times:
+            raise StepFailed("made to fail")
+        found = solve_step(system, state, t, load, more)
+        iterations.append(found.iterations)
+        return found
+
+    monkeypatch.setattr(nested, "solve_step", step)
+    return forces, iterations
+
+
+@pytest.mark.parametrize("failures", [1, 2])
+def test_where_one_step_fails_the_missing_forces_are_taken_away_little_by_little(
+    start, from_rest, monkeypatch, failures
+):
+    system, state = start
+    forces, iterations = failing(monkeypatch, failures)
+    missing = unbalanced(system, state)
+    found = continued(system, state)
+    assert apart(system, found, from_rest) < 1e-4
+    tried = [0.0 if np.isscalar(force) else force @ missing / (missing @ missing) for force in forces]
+    first = 1 - 0.5**failures
+    assert tried[0] == 0.0 and tried[failures] == pytest.approx(first)
+    assert tried[failures:] == pytest.approx([first - k * (1 - first) for k in range(len(tried) - failures)])
+    assert tried[-1] == 0.0 and np.all(np.diff(tried[failures:]) < 0)
+    assert found.iterations == sum(iterations) and len(iterations) > 1
+
+
+def test_a_state_that_no_share_of_the_forces_helps_is_given_up(start, monkeypatch):
+    system, state = start
+    forces, _ = failing(monkeypatch, 1000)
+    with pytest.raises(StepFailed, match="made to fail"):
+        continued(system, state)
+    assert len(forces) < 10
+
+
+def heavy(mesh):
+    """A block that hangs by its foot."""
+    held = [PrescribedDisplacement(lambda x: x[2] < 1e-9)]
+    return Problem(mesh, NeoHookean(1.0, 1000.0), held, gravity=(0.2, 0.0, -1.0), density=0.1)
+
+
+def test_the_missing_forces_hold_a_carried_state_as_it_is(straight):
+    """Without contact, whose pressures are found anew; and without them the state moves."""
+    coarse, fine = straight
+    found = []
+    equilibrium_path(heavy(coarse), (1.0,), on_checkpoint=found.append)
+    systems = [System(heavy(mesh), NewtonSettings()) for mesh in (coarse, fine)]
+    state = carried(systems[0], found[-1].state, systems[1], onto(coarse, fine))
+    missing = unbalanced(systems[1], state)
+    assert not missing[systems[1].pattern.held].any()
+    held, moved = solve_step(systems[1], state, 1.0, 1.0, missing), continued(systems[1], state)
+    assert held.iterations == 1 and 1 < moved.iterations <= 4
+    np.testing.assert_allclose(held.x, state.x, rtol=0, atol=1e-12)
+    assert np.abs(displacement(systems[1], moved) - displacement(systems[1], state)).max() > 1e-3
+    upside_down = state.x.copy()
+    upside_down[2 : systems[1].displacement_count : 3] -= 2.5 * nodes(fine)[:, 2]
+    assert unbalanced(systems[1], replace(state, x=upside_down)) is None
+
+
+def inverted(system, x):
+    """Elements that are inside out at a quadrature point."""
+    J = np.linalg.det(assembly.deformation(x[: system.field_count], system.elements, 1.0)[0])
+    return np.flatnonzero(J.min(axis=1) <= 0.0)
+
+
+@pytest.fixture(scope="module")
+def cube():
+    """A block that is held below."""
+    held = [PrescribedDisplacement(lambda x: x[2] < 1e-9)]
+    return System(Problem(block((3, 3, 3)), NeoHookean(1.0, 1000.0), held), NewtonSettings())
+
+
+@pytest.mark.parametrize("kind", ["middle", "vertex"])
+def test_an_inverted_element_is_made_upright(cube, kind):
+    """A middle that is far from between its ends, or a vertex that has gone through a face."""
+    mesh = cube.problem.mesh
+    x, rest = np.zeros(cube.total), nodes(mesh)
+    inner = np.flatnonzero((rest > 0.2).all(axis=1) & (rest < 0.8).all(axis=1))
+    node = inner[inner < mesh.nvertices][0] if kind == "vertex" else inner[inner >= mesh.nvertices][0]
+    x[3 * node : 3 * node + 3] = (0.3, -0.1, 0.2)
+    x[cube.displacement_count :] = 0.4
+    assert len(inverted(cube, x))
+    mended = repaired(cube, x)
+    assert not len(inverted(cube, mended))
+    np.testing.assert_array_equal(mended[cube.displacement_count :], 0.4)
+    np.testing.assert_array_equal(mended[cube.pattern.held], x[cube.pattern.held])
+    if kind == "middle":
+        assert not mended[: cube.displacement_count].any(), "it is put between its ends, and nothing else moves"
+    away = np.linalg.norm(rest - rest[node], axis=1) > 0.8
+    assert not mended[: cube.displacement_count].reshape(-1, 3)[away].any(), "what is far away stays"
+
+
+def test_held_unknowns_stay_where_they_are_held(cube):
+    """A held node is pushed through its element: what is next to it gives way, if it can."""
+    x, rest = np.zeros(cube.total), nodes(cube.problem.mesh)
+    (node,) = np.flatnonzero(np.abs(rest - [1 / 3, 1 / 3, 0.0]).max(axis=1) < 1e-9)
+    x[3 * node : 3 * node + 3] = (0.0, 0.0, 0.35)
+    assert len(inverted(cube, x))
+    mended = repaired(cube, x)
+    np.testing.assert_array_equal(mended[cube.pattern.held], x[cube.pattern.held])
+    assert (mended != x).any()
+
+
+def test_an_upright_state_is_not_touched(start):
+    system, state = start
+    assert not len(inverted(system, state.x))
+    np.testing.assert_array_equal(repaired(system, state.x), state.x)
+
+
+def test_what_sticks_is_not_carried(round_pair):
+    coarse, fine = round_pair
+    plane = RigidPlane((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), lambda t: (0.0, 0.0, -t), "no_slip")
+    systems = [System(replace(pressed(mesh), obstacles=(plane,)), NewtonSettings()) for mesh in (coarse, fine)]
+    with pytest.raises(SolveError, match="solve its path from rest"):
+        carried(systems[0], systems[0].rest(), systems[1], onto(coarse, fine))
+
+
+def filled(mesh):
+    """A hollow cube under its weight, held below and full."""
+    return Problem(
+        mesh,
+        NeoHookean(1.0, 1000.0),
+        [PrescribedDisplacement(lambda x: x[2] < 1e-9)],
+        gravity=(0.0, 0.0, -1.0),
+        density=0.05,
+        cavities=[Cavity(in_the_middle, volume=lambda t: 1.0 + 0.2 * t)],
+    )
+
+
+def test_a_lumen_keeps_its_pressure_and_its_volume():
+    """Without obstacles: the pressure is carried, and the finer wall gives a little."""
+    coarse = hollow_cube()
+    fine = MeshTet(coarse.p, coarse.t).refined()
+    found = []
+    equilibrium_path(filled(coarse), (1.0,), on_checkpoint=found.append)
+    systems = [System(filled(mesh), NewtonSettings()) for mesh in (coarse, fine)]
+    state = carried(systems[0], found[-1].state, systems[1], onto(coarse, fine))
+    assert state.x[-1] == found[-1].state.x[-1] > 0.0 and state.pressure.shape[0] == 0
+    whole = equilibrium_path(filled(fine), (1.0,))[-1]
+    ended = continued(systems[1], state)
+    assert apart(systems[1], ended, whole) < 1e-5
+    assert ended.x[-1] == pytest.approx(float(whole.cavity_pressure[0]), rel=1e-5)

@@ -1,0 +1,254 @@
+"""Nested meshes: parts of their parents, on the true shape, held alike, finer where the indicator is large."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from skfem import MeshTet, MeshTet2
+
+from massspring import Sphere, Trajectory
+from reference_fem import NewtonSettings, facet_nodes, nodes
+from reference_fem.elements.shapes import build_elements, element_nodes
+from reference_fem.system.saddle_point import System
+from studies.geometry.mesh.jacobian import smallest_jacobian
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+from studies.meshing.held_mesh import with_patches
+from studies.meshing.nested_mesh import LEAST, SHARE, NestedMesh, at_nodes, base_mesh, marked, upright
+from studies.reference.nested import problem_of
+from studies.scene.library import BALL_CLAMPED
+from studies.scene.library.ball_clamped import CAP, RADIUS
+from tests.studies.tiny import cube, file_scene, write_obj
+
+BASE = 80
+"""Surface nodes of the ball's coarsest mesh."""
+CORNERS = np.vstack([np.zeros(3), np.eye(3)])
+MESHES = 3
+
+
+def volumes(mesh):
+    """Of the straight elements [m³], (ne,)."""
+    return tetrahedron_volumes(mesh.p.T, mesh.t.T)
+
+
+def barycentric(mesh, elements, points):
+    """Four coordinates of each point in its straight element, (n, 4)."""
+    corners = mesh.p.T[mesh.t.T[elements]]
+    edges = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
+    local = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
+    return np.column_stack([1 - local.sum(axis=1), local])
+
+
+def check_parents(coarse, fine, parents):
+    """Each part lies in its parent, and the parts of each fill it."""
+    middles = fine.p.T[fine.t.T].mean(axis=1)
+    assert barycentric(coarse, parents, middles).min() > 1e-3
+    filled = np.bincount(parents, np.abs(volumes(fine)), coarse.nelements)
+    np.testing.assert_allclose(filled, np.abs(volumes(coarse)), rtol=1e-12)
+
+
+def box_mesh(cells=2):
+    """A cube that is held below."""
+    points, _, tetrahedra = cube(cells)
+    mesh = MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(tetrahedra.T))
+    return with_patches(mesh, [np.flatnonzero(points[:, 2] < -0.049)])
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_halved_elements_know_their_parents(seed):
+    """After one round and after four: neighbours are halved as well, some of them more than once in a round."""
+    body = first = box_mesh()
+    ancestors, noise = np.arange(body.mesh.nelements), np.random.default_rng(seed)
+    for _ in range(4):
+        chosen = noise.choice(body.mesh.nelements, 5, replace=False)
+        finer, parents = body.halved(np.sort(chosen))
+        check_parents(body.mesh, finer.mesh, parents)
+        assert (np.bincount(parents)[chosen] > 1).all(), "all that were chosen are halved"
+        np.testing.assert_array_equal(finer.mesh.p[:, : body.mesh.nvertices], body.mesh.p)
+        same = body.bisected(np.sort(chosen)).mesh
+        np.testing.assert_array_equal(same.t, finer.mesh.t)
+        body, ancestors = finer, ancestors[parents]
+    check_parents(first.mesh, body.mesh, ancestors)
+
+
+def test_nothing_is_halved_where_nothing_is_chosen():
+    body = box_mesh()
+    finer, parents = body.halved(np.array([], dtype=int))
+    np.testing.assert_array_equal(finer.mesh.t, body.mesh.t)
+    np.testing.assert_array_equal(parents, np.arange(body.mesh.nelements))
+
+
+@pytest.fixture(scope="module")
+def base(mesh_cache):
+    """The coarsest mesh of the clamped ball."""
+    return base_mesh(BALL_CLAMPED, BASE, 0)
+
+
+def beside_top_outline(mesh):
+    """An indicator that is large near the outline of the upper cap, (ne,)."""
+    middles = mesh.body.mesh.p.T[mesh.body.mesh.t.T].mean(axis=1)
+    ring = np.hypot(np.hypot(middles[:, 0], middles[:, 1]) - 0.6 * RADIUS, middles[:, 2] - CAP * RADIUS)
+    return volumes(mesh.body.mesh) ** 2 * (ring / RADIUS + 0.05) ** -3
+
+
+@pytest.fixture(scope="module")
+def family(base):
+    """Meshes of 2, 4 and 8 times the elements, and the parents of each."""
+    made = [(base, np.arange(0))]
+    for _ in range(MESHES):
+        latest = made[-1][0]
+        made.append(latest.finer(beside_top_outline(latest), 2 * latest.mesh.nelements))
+    return made
+
+
+def test_a_finer_mesh_is_nested_in_the_coarser_one(family):
+    """The flat elements are; the coarser ones' vertices come first, and those inside do not move."""
+    for (coarse, _), (fine, parents) in pairwise(family):
+        check_parents(coarse.body.mesh, fine.body.mesh, parents)
+        count = coarse.mesh.nvertices
+        np.testing.assert_array_equal(fine.body.mesh.p[:, :count], coarse.body.mesh.p)
+        np.testing.assert_allclose(fine.points[:count], coarse.points[:count], rtol=0, atol=1e-9 * RADIUS)
+        np.testing.assert_array_equal(nodes(fine.mesh)[: fine.mesh.nvertices], fine.points[: fine.mesh.nvertices])
+
+
+def test_a_finer_mesh_has_about_as_many_elements_as_wanted(family):
+    for (coarse, _), (fine, _) in pairwise(family):
+        assert 1.95 < fine.mesh.nelements / coarse.mesh.nelements < 2.25
+
+
+def test_the_boundary_is_on_the_true_surface_and_outlines_on_the_true_outline(family):
+    """None was put back, so all of them are."""
+    for mesh, _ in family[1:]:
+        assert mesh.off == 0
+        flat = MeshTet2.from_mesh(mesh.body.mesh)
+        outer = np.unique(facet_nodes(flat))
+        np.testing.assert_allclose(np.linalg.norm(mesh.points[outer], axis=1), RADIUS, rtol=1e-9)
+        for patch in mesh.patches:
+            height = np.abs(mesh.points[patch, 2]) / (CAP * RADIUS)
+            assert height.min() == pytest.approx(1.0, abs=1e-9)
+            assert (np.abs(height - 1) < 1e-9).sum() >= 16
+
+
+def facet_areas(mesh, chosen):
+    """Area along z of the six-node facets whose nodes are all chosen, four flat triangles to each [m²]."""
+    table = facet_nodes(mesh)
+    x = nodes(mesh)[table[np.isin(table, chosen).all(axis=1)]]
+    parts = [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)]
+    a, b, c = (np.concatenate([x[:, p[k]] for p in parts]) for k in range(3))
+    return abs(np.cross(b - a, c - a)[:, 2].sum()) / 2
+
+
+def test_held_caps_keep_their_area_and_come_closer_to_the_disc(family):
+    """|z| > 0.8 R, seen along z: a disc of radius 0.6 R."""
+    disc = np.pi * (0.6 * RADIUS) ** 2
+    missing = [[1 - facet_areas(mesh.mesh, patch) / disc for patch in mesh.patches] for mesh, _ in family]
+    assert max(map(max, missing)) < 0.03 and min(map(min, missing)) > 0
+    below, above = np.array(missing).T
+    assert (np.diff(above) < 0).all() and above[-1] < 0.2 * above[0]
+    assert below[-1] > 0.5 * below[0], "it was not asked to be finer there"
+
+
+def test_the_volume_approaches_that_of_the_ball(family):
+    ball = 4 / 3 * np.pi * RADIUS**3
+    off = [abs(build_elements(mesh.mesh, 4).weights.sum() / ball - 1) for mesh, _ in family]
+    assert max(off) < 2e-3 and off[-1] < off[0]
+
+
+def test_elements_are_halved_where_the_indicator_is_large(family):
+    """The tenth of the base's elements with the largest indicators has most of the new ones; far ones stay whole."""
+    coarse, (fine, parents) = family[0][0], family[1]
+    indicator = beside_top_outline(coarse)
+    parts = np.bincount(parents, minlength=coarse.mesh.nelements)
+    order = np.argsort(-indicator)
+    count = len(order)
+    assert (parts[order[: count // 10]] > 1).all()
+    assert parts[order[: count // 10]].mean() > 2.5 * parts[order[count // 2 :]].mean()
+    assert (parts[order[-count // 4 :]] == 1).mean() > 0.6
+    assert fine.mesh.nelements == parts.sum()
+
+
+def test_meshes_are_upright_and_their_middles_are_drawn_to_outlines(family):
+    """The solver takes them; sides that leave an outline have their middles nearer to it, all others half-way."""
+    for mesh, _ in family:
+        assert smallest_jacobian(nodes(mesh.mesh), element_nodes(mesh.mesh)).min() >= LEAST
+        System(problem_of(mesh), NewtonSettings()).solver.release()
+        flat = MeshTet2.from_mesh(mesh.body.mesh)
+        moved = np.linalg.norm(nodes(mesh.mesh) - mesh.points, axis=1) > 1e-9 * RADIUS
+        assert moved.any()
+        ends = np.asarray(flat.edges).T[moved[flat.nvertices :]]
+        height = np.abs(np.abs(mesh.points[ends][..., 2]) - CAP * RADIUS) < 1e-9 * RADIUS
+        on_sphere = np.abs(np.linalg.norm(mesh.points[ends], axis=2) - RADIUS) < 1e-9 * RADIUS
+        np.testing.assert_array_equal((height & on_sphere).sum(axis=1), 1)
+        near = np.where((height & on_sphere)[:, :1], ends[:, :1], ends[:, 1:])[:, 0]
+        sides = np.linalg.norm(np.diff(mesh.points[ends], axis=1)[:, 0], axis=1)
+        way = np.linalg.norm(nodes(mesh.mesh)[moved] - mesh.points[near], axis=1) / sides
+        assert np.median(way) == pytest.approx(SHARE, abs=0.01)
+
+
+def test_the_same_marks_give_the_same_bits(base, family):
+    again, parents = base.finer(beside_top_outline(base), 2 * base.mesh.nelements)
+    fine, known = family[1]
+    np.testing.assert_array_equal(again.points, fine.points)
+    np.testing.assert_array_equal(again.mesh.t, fine.mesh.t)
+    np.testing.assert_array_equal(parents, known)
+
+
+def test_the_last_bits_of_an_indicator_change_no_mark(base):
+    """Other processors round otherwise."""
+    indicator = beside_top_outline(base)
+    noisy = indicator * (1 + 1e-15 * np.random.default_rng(1).integers(-2, 3, len(indicator)))
+    (one, _), (other, _) = (marked(base.body, each, 2 * base.mesh.nelements) for each in (indicator, noisy))
+    np.testing.assert_array_equal(one.mesh.t, other.mesh.t)
+    even, _ = marked(base.body, np.ones(len(indicator)), base.mesh.nelements + 1)
+    first, _ = base.body.halved(np.array([0]))
+    np.testing.assert_array_equal(even.mesh.t, first.mesh.t)
+
+
+def test_each_node_belongs_to_an_element_that_has_it(family):
+    mesh = family[2][0].body.mesh
+    cells = element_nodes(mesh)
+    owner = at_nodes(mesh, np.arange(mesh.nelements))
+    assert (cells[owner] == np.arange(len(owner))[:, None]).any(axis=1).all()
+
+
+def test_an_element_that_would_fold_keeps_the_nodes_that_are_safe():
+    """Two elements with a common face; a middle of one of them is moved through the other side."""
+    corners, elements = np.vstack([CORNERS, np.ones(3)]), np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
+    mesh = MeshTet2.from_mesh(MeshTet(np.ascontiguousarray(corners.T), np.ascontiguousarray(elements.T)))
+    cells, safe = element_nodes(mesh), nodes(mesh)
+    wanted = safe.copy()
+    alone = next(n for n in range(mesh.nvertices, len(safe)) if (cells == n).sum() == 1 and n in cells[0])
+    far = next(n for n in range(mesh.nvertices, len(safe)) if (cells == n).sum() == 1 and n in cells[1])
+    wanted[alone] += 2.0 * (safe[cells[0, :4]].mean(axis=0) - safe[alone])
+    wanted[far] += 0.01
+    x, back = upright(safe, wanted, cells, 0.05)
+    np.testing.assert_array_equal(np.flatnonzero(back), [alone])
+    np.testing.assert_array_equal(x[alone], safe[alone])
+    np.testing.assert_array_equal(x[far], wanted[far])
+
+
+def test_a_base_is_finer_where_a_probe_will_be(mesh_cache):
+    way = Trajectory((0.0, 3.0), ((0.0, 0.0, 0.0), (-0.4 * RADIUS, 0.0, 0.0)))
+    probe = Sphere((1.5 * RADIUS, 0.0, 0.0), 0.45 * RADIUS, way)
+    scene = replace(BALL_CLAMPED, obstacles=(probe,))
+
+    def near(times):
+        away = np.linalg.norm(base_mesh(scene, BASE, times).points - [1.1 * RADIUS, 0.0, 0.0], axis=1)
+        return (away < probe.radius).sum(), (away > 2.5 * probe.radius).sum()
+
+    (inside, outside), (more_inside, more_outside) = near(0), near(3)
+    assert more_inside > 3 * inside > 0
+    assert more_outside < 1.5 * outside
+
+
+def test_a_body_that_comes_as_a_mesh_keeps_its_flat_sides(tmp_path):
+    """No true surface is known: nothing is moved."""
+    points, triangles, _ = cube(2)
+    used = np.unique(triangles)
+    path = write_obj(tmp_path / "box.obj", points[used], np.searchsorted(used, triangles))
+    body = box_mesh()
+    start = NestedMesh(file_scene(path), replace(body, patches=[*body.patches, body.patches[0][:0]]), nodes(body.mesh))
+    fine, parents = start.finer(np.arange(1.0, body.mesh.nelements + 1), 3 * body.mesh.nelements)
+    check_parents(body.mesh, fine.body.mesh, parents)
+    np.testing.assert_allclose(fine.points, nodes(fine.body.mesh), rtol=0, atol=1e-15)
+    assert fine.off == 0 and not len(fine.lumen)
