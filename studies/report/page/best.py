@@ -5,10 +5,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from studies.base.counting import counted
+from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.judged import Judged, Measured, by_cost, cheapest, judged, nearest
 from studies.metrics.run import Run
-from studies.metrics.wish import SHAPE, SHAPE_VOLUME, usual_wish
+from studies.metrics.wish import usual_wish
 from studies.plots.style.page import by_scene
 from studies.plots.style.style import readable
 from studies.report.summary import PAPER

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from massspring import Free
-from studies.metrics.true_surface import ShapeErrors
+from studies.meshing.true_surface import ShapeErrors
 from studies.report.page.best import answers, best_bodies, joined_best
 from studies.scene.library import BALL_CLAMPED, LIVER_PRESS
 from tests.plots.made_up import run
