@@ -6,7 +6,6 @@ from typing import Annotated, Any
 
 import typer
 
-import studies
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
@@ -20,13 +19,12 @@ from studies.scene.chosen_place import RADIUS, SIDES, place_of
 from studies.scene.proposal import Proposal, proposal
 from studies.scene.scene_file import Recommended, organ_options, python_name, scene_text
 from studies.scene.tissues import TISSUES, tissue_named
-from studies.tools.advise.answer import RESULTS, Advice, advise
+from studies.tools.advise.answer import Advice, advise
+from studies.tools.advise.campaign import shipped
 from studies.tools.advise.words import body_in_python
 
 MM = 1e-3
 NODES = 550
-SHIPPED = Path(studies.__file__).parents[1] / RESULTS
-"""Results with the published table of accuracy, wherever the command is called from."""
 UNKNOWNS = {250: 10_000, 360: 23_000, 550: 46_000}
 """Of the reference on each mesh of the plan: the mean of a spleen and a liver of 5,000 nodes, which are 5 % apart."""
 VARIANTS = 3
@@ -101,7 +99,7 @@ def answer_for(source: Source, placing: Proposal, tissue: str) -> Advice | None:
     such table."""
     scene = placed_scene(python_name(stem_of(source.path)), source, placing, TISSUES[tissue])
     try:
-        return advise(scene, results=SHIPPED, timing=False)
+        return advise(scene, results=shipped(), timing=False)
     except StudyError as error:
         warn([f"the scene has only one body, because none can be recommended: {error}"])
         return None
