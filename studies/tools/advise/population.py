@@ -32,7 +32,8 @@ def unseen(results: Path, case: Case) -> Unseen | None:
 
     Raises StudyError for a table that cannot be read.
     """
-    tables = [root / POPULATION / f"{POPULATION}.csv" for root in (results, results / PUBLISHED, published_for(results))]
+    roots = (results, results / PUBLISHED, published_for(results))
+    tables = [root / POPULATION / f"{POPULATION}.csv" for root in roots]
     path = next((table for table in tables if table.is_file()), None)
     if path is None:
         return None
