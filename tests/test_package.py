@@ -18,6 +18,8 @@ import reference_fem
 import studies
 
 ROOT = Path(__file__).parents[1]
+TABLES = [Path("results/published", name, f"{name}.csv") for name in ("accuracy", "population")]
+"""What `organbench advise` reads in a folder without results."""
 PACKAGES = (massspring, reference_fem, studies)
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
@@ -46,6 +48,8 @@ from studies.__main__ import main
 from studies.report.archive.crate import citation_file
 print(studies.__file__)
 print(citation_file())
+from studies.tools.advise.answer import advise
+print(advise("liver_press", timing=False).stored.where)
 sys.argv = ["organbench", "list"]
 main()
 """
@@ -55,8 +59,11 @@ main()
 def wheel(tmp_path_factory) -> Path:
     """The wheel, built from a copy of the sources without a network."""
     source, target = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
-    for name in ("pyproject.toml", "README.md", "LICENSE", "CITATION.cff"):
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE", "CITATION.cff"):
         shutil.copy(ROOT / name, source)
+    for table in TABLES:
+        (source / table).parent.mkdir(parents=True)
+        shutil.copy(ROOT / table, source / table)
     for package in PACKAGES:
         name = package.__name__
         shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
@@ -71,6 +78,7 @@ def test_the_wheel_holds_the_three_packages_whole(wheel):
     inside = {name for name in names if ".dist-info/" not in name}
     files = [file for package in PACKAGES for file in (ROOT / package.__name__).rglob("*") if file.is_file()]
     wanted = {file.relative_to(ROOT).as_posix() for file in files if "__pycache__" not in file.parts}
+    wanted |= {f"studies/published/{table.parent.name}/{table.name}" for table in TABLES}
     assert inside == wanted
     assert {f"{package.__name__}/py.typed" for package in PACKAGES} <= inside
     top = {name.split("/")[0] for name in inside}
@@ -89,9 +97,10 @@ def test_the_wheel_runs_from_another_folder(wheel, tmp_path):
     command = [str(home / "bin" / "python"), "-c", PROGRAM]
     done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    where, cited, *lines = done.stdout.splitlines()
+    where, cited, advised, *lines = done.stdout.splitlines()
     assert where == str(place / "studies" / "__init__.py")
     assert Path(cited).is_relative_to(place) and Path(cited).read_bytes() == (ROOT / "CITATION.cff").read_bytes()
+    assert advised == str(place / "studies" / "published" / "accuracy" / "accuracy.csv")
     assert any("volume_loss" in line for line in lines) and any("implicit_volume" in line for line in lines)
 
 

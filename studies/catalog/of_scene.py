@@ -21,5 +21,5 @@ def study_of(scene: Scene) -> Study:
         Chart("volume.png", "studies.plots.volume_history:draw"),
         Chart("force.png", "studies.plots.force_path:draw"),
     )
-    columns = ("volume_worst", "force_end", "mean_error", "silhouette_error", "min_j")
+    columns = ("volume_worst", "force_end", "mean_error", "shape_error", "shape_volume", "silhouette_error", "min_j")
     return Study(scene.name, f"How do three bodies do in {scene.title}?", cases, charts, columns)

@@ -60,7 +60,7 @@ class HeldMesh:
         rounds: list[np.ndarray] = []
 
         class Recording(MeshTet):
-            def _adaptive_sort_mesh(self, p, t, marked):
+            def _adaptive_sort_mesh(self, p: np.ndarray, t: np.ndarray, marked: np.ndarray) -> np.ndarray:
                 rounds.append(marked)
                 return super()._adaptive_sort_mesh(p, t, marked)
 

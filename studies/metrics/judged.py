@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring import ImplicitVolume
+from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.run import Run
 from studies.metrics.table import metric
-from studies.metrics.wish import SHAPE, SHAPE_VOLUME, Wish
+from studies.metrics.wish import Wish
 from studies.runs.case import Case
 from studies.store.record import Status
 

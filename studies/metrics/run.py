@@ -9,10 +9,10 @@ import numpy as np
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import triangle_areas
-from studies.metrics.rest_surface import RestSurface, rest_surfaces, six_node_facets
+from studies.meshing.bounds import SHAPE
+from studies.meshing.rest_surface import RestSurface, rest_surfaces, six_node_facets
+from studies.meshing.true_surface import UNKNOWN, ShapeErrors, shape_errors
 from studies.metrics.timing.protocol import FrameTiming
-from studies.metrics.true_surface import UNKNOWN, ShapeErrors, shape_errors
-from studies.metrics.wish import SHAPE
 from studies.reference.load import Reference
 from studies.runs.case import Case, case_from_json
 from studies.store.record import Record, read_record

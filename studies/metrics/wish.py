@@ -7,8 +7,6 @@ from studies.scene.scene import Scene
 
 SOLID, HOLLOW = (3.0, 1.0), (6.0, 3.0)
 """Errors of force and displacement that are enough [%]."""
-SHAPE, SHAPE_VOLUME = 1.0, 0.5
-"""Bounds of shape_error and |shape_volume| [%]. A body beyond one of them is never recommended, whatever the wish."""
 
 
 @dataclass(frozen=True)

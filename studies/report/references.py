@@ -8,8 +8,8 @@ import pandas as pd
 
 from massspring.sources import own_modules, source_fingerprint
 from studies.base.atomic import write_whole
-from studies.metrics.rest_surface import rest_surfaces
-from studies.metrics.true_surface import ShapeErrors, shape_errors
+from studies.meshing.rest_surface import rest_surfaces
+from studies.meshing.true_surface import ShapeErrors, shape_errors
 from studies.reference.load import Reference
 from studies.reference.reference_solves import STUDY
 from studies.reference.uncertainty import FACTORS

@@ -11,9 +11,10 @@ import pandas as pd
 
 from studies.base.errors import StudyError
 from studies.catalog.accuracy import ACCURACY
+from studies.meshing.bounds import SHAPE
 from studies.metrics.cells import MINUS, plain
 from studies.metrics.judged import Judged, cheapest, nearest
-from studies.metrics.wish import SHAPE, Wish, usual_wish
+from studies.metrics.wish import Wish, usual_wish
 from studies.plots.campaigns.recovery import RETURNED
 from studies.store.record import Status
 from studies.tools.advise.campaign import published_rows

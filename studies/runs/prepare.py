@@ -150,6 +150,9 @@ def prepare(case: Case) -> Prepared:
     check_masses(scene, case.body)
     mesh = mesh_of(scene, case.body)
     body = body_for(scene, case.body, mesh)
+    from studies.meshing.kept_shape import tell_shape  # with the finite elements
+
+    tell_shape(scene, mesh, filled=case.body.kind in ("tetrahedral", "quadratic"))
     if isinstance(mesh, QuadraticMesh):
         mesh = flat_mesh(mesh, body)
     targets = targets_for(scene, mesh, body)

@@ -5,9 +5,9 @@ import pytest
 from matplotlib.colors import to_hex
 
 from massspring import LITERATURE, ExplicitElements, Free, ImplicitElements
+from studies.meshing.true_surface import ShapeErrors
 from studies.metrics.judged import front
 from studies.metrics.metrics import METRICS
-from studies.metrics.true_surface import ShapeErrors
 from studies.plots import work_precision as work
 from studies.plots.style.families import CONTESTANTS, FAMILIES, PAPER, family_of
 from studies.plots.style.style import BLACK, BLUE, GREY, VERMILLION

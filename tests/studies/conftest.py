@@ -12,6 +12,7 @@ from studies.reference.reference_solves import reference_solves
 from studies.reference.solve import solve
 from studies.store import opening
 from studies.sweep.run_studies import run_studies
+from studies.tools.advise import campaign
 from tests.conftest import once_per_run
 from tests.studies.octant import SCENE
 from tests.studies.tiny import TINY, Silent, tiny_study
@@ -44,6 +45,12 @@ def found(solved):
 def results(finished_sweep, tmp_path):
     """A copy of the finished results that a test may spoil."""
     return shutil.copytree(finished_sweep, tmp_path / "results")
+
+
+@pytest.fixture
+def no_tables(monkeypatch, tmp_path):
+    """As if the program had come without its published tables."""
+    monkeypatch.setattr(campaign, "PACKAGE", tmp_path / "nowhere" / "studies")
 
 
 @pytest.fixture

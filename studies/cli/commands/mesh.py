@@ -1,8 +1,10 @@
 """`organbench mesh`: from a name or a file to a mesh."""
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 import typer
@@ -11,13 +13,19 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, settled, source_of, working
 from studies.cli.terminal import say
-from studies.geometry import OrganMesh, curved, organ, scan, true_shape_of, vary
+from studies.geometry import CurvedMesh, OrganMesh, organ, scan, true_shape_of, vary
 from studies.geometry.files.units import NAMES, check_unit
 from studies.geometry.files.writing import SURFACES, VOLUMES, check_target, holds_tetrahedra, write_mesh
 from studies.geometry.mesh.quality import dihedral_angles
 from studies.geometry.organs import SHAPES
-from studies.metrics.wish import SHAPE
+from studies.geometry.shape.levelset import Shape
+from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.scene.scene import Organ
+from studies.scene.scene_file import organ_options
+
+if TYPE_CHECKING:
+    from studies.meshing.rest_surface import RestSurface
+    from studies.meshing.true_surface import ShapeErrors
 
 MM = 1e-3
 NODES = 550
@@ -50,19 +58,45 @@ def mesh(
     if source is None:
         given = {"--smooth": smooth, "--close-holes": close_holes, "--solid": solid, "--unit": unit}
         refuse_file_options(given | {"--scale": scale != 1.0, "--longest-side": longest_side, "--part": part})
-        with working(f"meshing the {name}"):
-            shape, made = None, synthetic(name, nodes or NODES, seed, wall, filled, exact=order == 1)
+
+        def make(count: int | None) -> Made:
+            mesh = synthetic(name, count or NODES, seed, wall, filled, exact=order == 1)
+            return Made(mesh, following(mesh, None) if order == 2 else None)
     else:
         file = settled(source_of(source, unit, scale, longest_side, part), yes)
         how = {"smooth": smooth * MM, "solid": in_metres(solid), "wall": in_metres(wall), "holes": close_holes}
-        with working(f"meshing {source.name}"):
-            made = scan(file, nodes, fill=filled, on_shape=order == 2, **how)
-            shape = true_shape_of(file, **how) if order == 2 and nodes else None
-    with working("curving" if order == 2 else "writing"):
-        write_mesh(made, output, write_unit, curved(made, shape=shape) if order == 2 else None)
-    near = nearness(made) if made.losses or order == 2 or source is not None else [closeness(made)]
-    for line in (*near, f"{summary(made)}; written to {output} in {NAMES[write_unit]}"):
+
+        def make(count: int | None) -> Made:
+            mesh = scan(file, count, fill=filled, on_shape=order == 2, **how)
+            return Made(mesh, following(mesh, true_shape_of(file, **how) if count else None) if order == 2 else None)
+
+    with working(f"meshing {name or (source and source.name)}"):
+        made = make(nodes)
+    with working("writing"):
+        write_mesh(made.mesh, output, write_unit, made.curved)
+    for line in nearness(made.mesh):
         say(line)
+    if source is None:
+        say(closeness(made, Organ(name, made.mesh.recipe["parameters"]), make))
+    elif nodes:
+        known = file if file.longest_side is not None else replace(file, unit=made.mesh.recipe["unit"])
+        say(closeness(made, Organ("file", organ_options(known, how)), make))
+    say(f"{summary(made)}; written to {output} in {NAMES[write_unit]}")
+
+
+class Made(NamedTuple):
+    """A mesh, and the same with curved sides where they were asked for."""
+
+    mesh: OrganMesh
+    curved: CurvedMesh | None
+
+
+def following(mesh: OrganMesh, shape: Shape | None) -> CurvedMesh:
+    """The mesh with sides that follow its shape; shape: of a file. Raises StudyError."""
+    # Loaded where it is used: it brings the finite elements.
+    from studies.meshing.curved_mesh import curved_mesh
+
+    return curved_mesh(mesh, shape)
 
 
 def check_one(name: str, source: Path | None, seed: int | None) -> None:
@@ -109,19 +143,49 @@ def synthetic(name: str, nodes: int, seed: int | None, wall: float | None, fille
     return organ(name, nodes, fill=filled, parameters=parameters, exact=exact, sides="straight" if exact else "curved")
 
 
-def closeness(made: OrganMesh) -> str:
-    """How far a synthetic organ with flat sides is from its true surface, and where that is too far, about how many
-    nodes are not: the distance falls as the area of a facet does."""
-    # Loaded where it is used: it brings the finite elements.
-    from studies.metrics.rest_surface import rest_surfaces
-    from studies.metrics.true_surface import shape_errors
+def closeness(made: Made, truth: Organ, make: Callable[[int | None], Made]) -> str:
+    """How far a mesh is from its true surface, and where that is too far, how many nodes are not: `make` meshes that
+    number."""
+    errors, count = errors_of(made, truth), made.mesh.outer_count
+    told, bounds = f"shape: {errors}", f"within {SHAPE:g} % and {SHAPE_VOLUME:g} %"
+    if not errors.worst > 1.0:
+        return told
+    with working("looking for the number of nodes that keeps the shape"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of meshes that nobody asked for
+        for _ in range(TRIES):
+            count = 10 * int(np.ceil(0.1 * count * min(max(LEAST, SAFETY * errors.worst), MOST)))
+            try:
+                errors = errors_of(make(count), truth)
+            except StudyError:
+                continue  # Not lost: more nodes follow.
+            if errors.worst <= 1.0:
+                return f"{told}; {count:,} nodes keep it {bounds}"
+    return f"{told}; {count:,} nodes do not keep it {bounds} either"
 
-    sides = rest_surfaces(made.points, made.triangles)
-    organ_of = Organ(made.recipe["organ"], made.recipe["parameters"])
-    far = 100.0 * shape_errors(organ_of, sides, filled=len(made.tetrahedra) > 0).distance
-    enough = 10 * int(np.ceil(0.1 * made.outer_count * far / SHAPE))
-    more = f"; about {enough:,} nodes keep it within {SHAPE:g} %" if far > SHAPE else ""
-    return f"shape: up to {far:.2g} % of the organ's size off its true surface{more}"
+
+TRIES = 4
+"""Numbers of nodes that are tried."""
+LEAST, SAFETY, MOST = 1.2, 1.1, 3.0
+"""Steps between them: the distance of flat sides falls as the area of a facet does, of curved ones faster."""
+
+
+def errors_of(made: Made, truth: Organ) -> "ShapeErrors":
+    """Of the body against its organ."""
+    from studies.meshing.true_surface import shape_errors
+
+    return shape_errors(truth, sides_of(made), filled=len(made.mesh.tetrahedra) > 0)
+
+
+def sides_of(made: Made) -> "dict[str, RestSurface]":
+    """Its outer surface and lumen, as curved as they are."""
+    # Loaded where they are used: they bring the finite elements.
+    from studies.meshing.curved_mesh import boundary_facets
+    from studies.meshing.rest_surface import rest_surfaces
+
+    mesh, smooth = made
+    if smooth is None:
+        return rest_surfaces(mesh.points, mesh.triangles)
+    return rest_surfaces(smooth.points, boundary_facets(mesh, smooth.cells))
 
 
 def nearness(made: OrganMesh) -> list[str]:
@@ -140,12 +204,14 @@ def nearness(made: OrganMesh) -> list[str]:
     return [*rows, f"volume: file {1e6 * before:.5g} mL, mesh {1e6 * after:.5g} mL ({change:+.3f} %)"]
 
 
-def summary(made: OrganMesh) -> str:
+def summary(made: Made) -> str:
     """What was made, in a line."""
-    body = f", {len(made.tetrahedra):,} tetrahedra" if len(made.tetrahedra) else ""
-    flattest = (
-        f", flattest angle {float(np.min(dihedral_angles(made.points, made.tetrahedra))):.3g} degrees" if body else ""
-    )
-    lumen = f", lumen {1e6 * made.lumen_volume:.4g} mL" if made.hollow else ""
-    surface = f"{made.outer_count:,} outer nodes, {len(made.outer_triangles):,} outer triangles"
-    return f"{made.name}: {surface}{body}, tissue {1e6 * made.volume:.4g} mL{lumen}{flattest}"
+    mesh, smooth = made
+    body = f", {len(mesh.tetrahedra):,} tetrahedra" if len(mesh.tetrahedra) else ""
+    angle = f"{float(np.min(dihedral_angles(mesh.points, mesh.tetrahedra))):.3g}" if body else ""
+    flattest = f", flattest angle {angle} degrees" if body else ""
+    inside = mesh.lumen_volume if smooth is None or not mesh.hollow else -sides_of(made)["lumen"].volume
+    lumen = f", lumen {1e6 * inside:.4g} mL" if mesh.hollow else ""
+    surface = f"{mesh.outer_count:,} outer nodes, {len(mesh.outer_triangles):,} outer triangles"
+    tissue = mesh.volume if smooth is None else smooth.volume
+    return f"{mesh.name}: {surface}{body}, tissue {1e6 * tissue:.4g} mL{lumen}{flattest}"

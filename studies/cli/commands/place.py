@@ -6,7 +6,6 @@ from typing import Annotated, Any
 
 import typer
 
-import studies
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
@@ -22,13 +21,12 @@ from studies.scene.scene import ReferencePlan
 from studies.scene.scene_file import Recommended, organ_options, python_name, scene_text
 from studies.scene.tissues import TISSUES, tissue_named
 from studies.sweep.estimate import SECONDS_PER_UNKNOWN
-from studies.tools.advise.answer import RESULTS, Advice, advise
+from studies.tools.advise.answer import Advice, advise
+from studies.tools.advise.campaign import shipped
 from studies.tools.advise.words import body_in_python
 
 MM = 1e-3
 NODES = 550
-SHIPPED = Path(studies.__file__).parents[1] / RESULTS
-"""Results with the published table of accuracy, wherever the command is called from."""
 MESHING = 60.0
 """Seconds for the meshes of the same spleen and liver: 26 and 51, and those of the bodies."""
 SIDES_HELP = f"{', '.join(SIDES)} (left is -x, front -y, bottom -z)"
@@ -97,7 +95,7 @@ def answer_for(source: Source, placing: Proposal, tissue: str) -> Advice | None:
     such table."""
     scene = placed_scene(python_name(stem_of(source.path)), source, placing, TISSUES[tissue])
     try:
-        return advise(scene, results=SHIPPED, timing=False)
+        return advise(scene, results=shipped(), timing=False)
     except StudyError as error:
         warn([f"the scene has only one body, because none can be recommended: {error}"])
         return None

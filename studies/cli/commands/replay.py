@@ -22,12 +22,14 @@ def replay(
         list[Path] | None,
         typer.Option(help="the FILE.py that made it. It runs as a program: name only a file you trust"),
     ] = None,
+    changed: Annotated[bool, typer.Option("--changed", help="run a FILE.py also if it has changed since")] = False,
 ) -> None:
     """Run one stored case again and compare the results. Exit code 1: they differ.
 
-    A record is data and starts no program: a case with a method or law of your own needs --file.
+    A record is data and starts no program: a case with a method or law of your own needs --file, and a file whose
+    SHA-256 is not the one in the record --changed too.
     """
-    load_own_files(path, file or [])
+    load_own_files(path, file or [], changed)
     stored, new, difference = replay_run(path)
     if difference is None:
         say(f"{stored.name}: the same, bit for bit ({new.status})")
@@ -40,12 +42,13 @@ def replay(
     raise typer.Exit(1)
 
 
-def load_own_files(path: Path, given: list[Path]) -> None:
+def load_own_files(path: Path, given: list[Path], changed: bool) -> None:
     """Loads the user's files that the run in `path` was made with: those of `given` with the same names, or the only
     one of `given` whatever its name. Where the record says that they lie is not looked at: a stranger may have written
     it, and the SHA-256 with it.
 
-    Warns of a file whose SHA-256 is not the one in the record. Raises StudyError where one is not among `given`.
+    Raises StudyError, before any of them is loaded, where one is not among `given`, or its SHA-256 is not the one in
+    the record; of files that may have `changed` warns instead.
     """
     record = peek(path)
     if record.attributes.get(ENTRY) is not None:
@@ -60,10 +63,14 @@ def load_own_files(path: Path, given: list[Path]) -> None:
             f"{path} was made with the program {missing[0]}, and programs run only when you name them: add "
             f"--file {shlex.quote(missing[0])}, or where it is now, if you trust it"
         )
-    for name, digest in wanted.items():
-        file = by_name[Path(name).name]
+    files = {by_name[Path(name).name]: digest for name, digest in wanted.items()}
+    for file, digest in files.items():
         if file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() != digest:
-            warn([f"{file} is not the file that {path} was made with: its content has changed"])
+            sentence = f"{file} is not the file that {path} was made with: its content has changed"
+            if not changed:
+                raise StudyError(f"{sentence}; add --changed to run it all the same")
+            warn([sentence])
+    for file in files:
         load_file(file)
 
 

@@ -1,14 +1,15 @@
 """The first lines of the page: which body to take, how wrong it is, how fast, and what the paper's body does."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from studies.base.counting import counted, readable
+from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.judged import Judged, Measured, by_cost, cheapest, judged, nearest
 from studies.metrics.run import Run, by_scene
-from studies.metrics.wish import SHAPE, SHAPE_VOLUME, usual_wish
+from studies.metrics.wish import usual_wish
 from studies.report.summary import PAPER
 from studies.runs.recipe_text import body_words
 from studies.tools.advise.words import wish_words
@@ -16,8 +17,9 @@ from studies.tools.advise.words import wish_words
 Best = dict[str, Any]
 """Of a scene, JSON-able: the target in words, whether the body meets it, the body with its step over the limit, the id
 of its case, each number as [value, uncertainty] or None; `paper`: the same of the paper's body, or None."""
-NUMBERS = ("force", "displacement", "shape", "speed")
-HEADS = ("body, surface nodes, step / limit", "force [%]", "mean [%]", "shape [%]", "speed [s/s]")
+NUMBERS = ("force", "displacement", "shape", "volume", "speed")
+HEADS = ("body, surface nodes, step / limit", "force [%]", "mean [%]", "shape [%]", "volume [%]", "speed [s/s]")
+SIGNED = ("force", "volume")
 SHAPE_WORDS = f"shape within {SHAPE:g} % of the organ's size, its volume within {SHAPE_VOLUME:g} %"
 """The bounds that `cheapest` adds to every wish."""
 SPEED, SPEED_FLOOR = "real_time [s/s]", "real_time floor [s/s]"
@@ -54,7 +56,8 @@ def _is_paper(one: Judged) -> bool:
 def _row(one: Judged, ids: Mapping[str, str]) -> Best:
     cost = one.cost
     speed = Measured(1 / cost.value, cost.uncertainty / cost.value**2) if cost.known else cost
-    numbers = {"force": one.force, "displacement": one.displacement, "shape": one.shape, "speed": speed}
+    numbers = {"force": one.force, "displacement": one.displacement, "shape": one.shape, "volume": one.shape_volume}
+    numbers["speed"] = speed
     packed = {
         name: [number.value, number.uncertainty if number.uncertainty == number.uncertainty else 0.0]
         if number.known
@@ -83,8 +86,15 @@ def _timed(row: Best, speeds: Mapping[str, list[float]]) -> Best:
     return row | {"speed": row["speed"] or speeds.get(row["case"])}
 
 
-def answers(best: Sequence[Best]) -> dict[str, str]:
-    """Three questions and their answers; nothing where no body is judged."""
+def own_first(best: Sequence[Best], own: Collection[str]) -> list[Best]:
+    """The rows of the scenes in `own`, then the others."""
+    return sorted(best, key=lambda row: row["scene"] not in own)
+
+
+def answers(best: Sequence[Best], own: Collection[str] = ()) -> dict[str, str]:
+    """Three questions and their answers, for the scenes in `own` where a body is judged in one of them; nothing where
+    none is."""
+    best = [row for row in best if row["scene"] in own] or best
     if not best:
         return {}
     papers = [row["paper"] for row in best if row["paper"]]
@@ -159,5 +169,7 @@ def scene_rows(best: Sequence[Best]) -> list[dict[str, Any]]:
 
 
 def _cells(row: Best) -> dict[str, Any]:
-    numbers = [value_cell(*row[name], signed=name == "force") if row[name] else MISSING for name in NUMBERS]
+    # Parts that are older have no volume.
+    known = {name: number for name in NUMBERS if (number := row.get(name))}
+    numbers = [value_cell(*known[name], signed=name in SIGNED) if name in known else MISSING for name in NUMBERS]
     return {"case": row["case"], "body": row["body"], "numbers": numbers}

@@ -18,7 +18,7 @@ from studies.base.atomic import write_whole
 from studies.base.counting import counted
 from studies.base.errors import StudyError
 from studies.catalog.study import Study, command_line
-from studies.report.page.best import HEADS, answers, joined_best, scene_rows
+from studies.report.page.best import HEADS, answers, joined_best, own_first, scene_rows
 from studies.report.page.case_data import merged
 from studies.report.page.findings import findings
 from studies.report.page.markup import ASSETS, TEMPLATES, machine_words, script_json, table, tabs
@@ -165,12 +165,14 @@ def page(parts: Parts, given: Mapping[str, Any], machine: dict[str, Any]) -> byt
     names = [study.name for study, _ in parts]
     script = "\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)
     studies = [study for study, _ in parts]
-    best = joined_best([part["best"] for _, part in parts], shown)
+    # A study of a FILE is the user's own, and so are its scenes.
+    own = {row["scene"] for study, part in parts if study.word for row in part["best"]}
+    best = own_first(joined_best([part["best"] for _, part in parts], shown), own)
     text = TEMPLATES.get_template("page.html").render(
         style=Markup((ASSETS / "page.css").read_text(encoding="utf-8")),
         summary=f"{_counted(shown)} of {counted(len(parts), 'study', 'studies')}: {', '.join(names)}. "
         "Volume-preserving mass-spring organs against nearly incompressible finite elements.",
-        answers=answers(best),
+        answers=answers(best, own),
         best_heads=HEADS,
         best_rows=scene_rows(best),
         findings=findings(tables),

@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+import studies
 from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.accuracy import ACCURACY
@@ -23,6 +24,7 @@ from studies.sweep.load import load_runs
 PUBLISHED = "published"
 """Folder below the results with tables that come with the repository."""
 COST = "real_time [s/s]"
+PACKAGE = Path(studies.__file__).parent
 
 
 @dataclass(frozen=True)
@@ -37,31 +39,42 @@ class Stored:
 
 def stored(results: Path, scenes: Iterable[Scene]) -> Stored:
     """What is stored of the campaign's `scenes`: the runs of each, and published rows of recipes that were not run.
+    Where no table is published below the results, the one that comes with the program counts.
 
     Raises StudyError when nothing is stored of any.
     """
     wanted = {scene.name: scene for scene in scenes}
     found, origins = dict[str, list[Judged]](), []
+    published = published_for(results)
     for name, scene in wanted.items():
         own, told = _runs(results, scene)
-        others = [
-            one
-            for one in published_rows(results / PUBLISHED, scene)
-            if one.compared and recipe_text(one.case) not in told
-        ]
+        others = [one for one in published_rows(published, scene) if one.compared and recipe_text(one.case) not in told]
         if own or others:
             found[name] = [*own, *others]
-            origins += [str(results / ACCURACY.name)] * bool(own) + [str(_table(results))] * bool(others)
+            origins += [str(results / ACCURACY.name)] * bool(own) + [str(_table(published))] * bool(others)
     if not found:
         raise StudyError(
             f"no results of the study '{ACCURACY.name}' for {', '.join(wanted)}, neither below "
-            f"{results / ACCURACY.name} nor in {_table(results)}; `organbench run {ACCURACY.name}` measures it"
+            f"{results / ACCURACY.name} nor in {_table(published)}; `organbench run {ACCURACY.name}` measures it"
         )
     return Stored(found, " and ".join(dict.fromkeys(origins)))
 
 
-def _table(results: Path) -> Path:
-    return results / PUBLISHED / ACCURACY.name / f"{ACCURACY.name}.csv"
+def published_for(results: Path) -> Path:
+    """The folder of published tables below the results, or where these have no table of the campaign, the one that
+    comes with the program."""
+    own = results / PUBLISHED
+    return own if _table(own).is_file() else shipped() / PUBLISHED
+
+
+def shipped() -> Path:
+    """The results folder with the tables that come with the program: the package itself (setup.py), or in a checkout
+    the one next to it."""
+    return PACKAGE if (PACKAGE / PUBLISHED).is_dir() else PACKAGE.parent / "results"
+
+
+def _table(published: Path) -> Path:
+    return published / ACCURACY.name / f"{ACCURACY.name}.csv"
 
 
 def _runs(results: Path, scene: Scene) -> tuple[list[Judged], set[str]]:
@@ -79,7 +92,7 @@ def _runs(results: Path, scene: Scene) -> tuple[list[Judged], set[str]]:
 
 def published_rows(published: Path, scene: Scene) -> list[Judged]:
     """Rows of the table in a folder of published results. Raises StudyError for a table without complete recipes."""
-    path = published / ACCURACY.name / f"{ACCURACY.name}.csv"
+    path = _table(published)
     if not path.is_file():
         return []
     try:

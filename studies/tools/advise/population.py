@@ -14,7 +14,7 @@ from studies.metrics.metric import Metric
 from studies.runs.case import Case
 from studies.runs.recipe_text import recipe_text
 from studies.store.record import Status
-from studies.tools.advise.campaign import PUBLISHED
+from studies.tools.advise.campaign import PUBLISHED, published_for
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,8 @@ def unseen(results: Path, case: Case) -> Unseen | None:
 
     Raises StudyError for a table that cannot be read.
     """
-    tables = [root / POPULATION / f"{POPULATION}.csv" for root in (results, results / PUBLISHED)]
+    roots = (results, results / PUBLISHED, published_for(results))
+    tables = [root / POPULATION / f"{POPULATION}.csv" for root in roots]
     path = next((table for table in tables if table.is_file()), None)
     if path is None:
         return None

@@ -3,9 +3,10 @@
 from dataclasses import fields
 
 from studies.catalog.accuracy import ACCURACY
+from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.cells import MISSING, value_cell
 from studies.metrics.judged import Judged, Measured
-from studies.metrics.wish import SHAPE, SHAPE_VOLUME, Wish
+from studies.metrics.wish import Wish
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.library import SCENES
 from studies.tools.advise.answer import Advice

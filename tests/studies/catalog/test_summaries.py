@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from massspring.body.quadratic import boundary_facets, parts_of_facets
-from studies.metrics.true_surface import ShapeErrors
+from studies.meshing.true_surface import ShapeErrors
 from studies.report.summary import ladder_of, recommended_of
 from studies.runs.case import BodyRecipe
 from studies.scene.library.spleen_sag import SPLEEN_SAG

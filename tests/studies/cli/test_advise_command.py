@@ -1,10 +1,14 @@
 """`organbench advise` says what was measured, how well that is known, what it costs and how to run it again."""
 
+import shutil
+from pathlib import Path
+
 import pytest
 
 from studies.catalog.accuracy import ACCURACY
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.library import KIDNEY_PROBE, LIVER_PRESS, LIVER_PROBE
+from studies.tools.advise import campaign
 from tests.studies.tools.advise.made_up_campaign import GRADED, LADDER, publish, row, rows_of
 
 STUDY = """
@@ -93,8 +97,23 @@ def test_a_budget_without_a_time_is_not_met(organbench, tmp_path):
         (("nothing.py",), "there is no file nothing.py"),
     ],
 )
-def test_bad_input_is_one_sentence(refused, tmp_path, words, said):
+def test_bad_input_is_one_sentence(refused, no_tables, tmp_path, words, said):
     assert said in refused("advise", *words, "--results", tmp_path)
+
+
+@pytest.mark.parametrize("package", [False, True], ids=["in a checkout", "in a wheel"])
+def test_in_an_empty_folder_the_tables_of_the_program_count(organbench, tmp_path, monkeypatch, package):
+    if package:
+        home = campaign.PACKAGE.parent / "results" / "published"
+        shutil.copytree(home / "accuracy", tmp_path / "package" / "published" / "accuracy")
+        monkeypatch.setattr(campaign, "PACKAGE", tmp_path / "package")
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
+    code, out, err = organbench("advise", "liver_press", "--no-timing")
+    assert (code, err) == (0, "") and "nodes=994" in out and "published/accuracy/accuracy.csv" in out
+    # A table of one's own comes first.
+    publish(Path("results"), rows_of(LIVER_PRESS))
+    assert "nodes=794" in organbench("advise", "liver_press", "--no-timing")[1]
 
 
 def test_a_file_of_two_scenes_is_one_sentence(refused, tmp_path):

@@ -64,6 +64,7 @@ def test_a_scene_alone_is_a_study_of_three_bodies_with_charts(write):
         ("tetrahedral", "implicit_volume", ("surface",)),
         ("quadratic", "implicit_volume", ("surface",)),
     ]
+    assert {"force_end", "mean_error", "shape_error", "shape_volume"} <= set(study.columns)
 
 
 @pytest.mark.parametrize("words", [("run", "--dry-run"), ("status",), ("advise",), ("safe-dt", "--nodes", 60)])

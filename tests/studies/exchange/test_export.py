@@ -20,6 +20,7 @@ from studies.runs.recipe_text import body_words
 from studies.scene.library import SCENES
 from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, PUSH, RADIUS
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.tools.advise import campaign
 from studies.tools.advise.answer import advise
 
 NODES = 150
@@ -119,7 +120,7 @@ def test_numbers_are_as_people_write_them(scene):
     assert np.allclose(rounded(description(scene, [], ""))["checkpoints"], scene.checkpoints, rtol=1e-11)
 
 
-def test_the_page_holds_what_our_own_bodies_reach(exported, tmp_path, organbench, mesh_cache):
+def test_the_page_holds_what_our_own_bodies_reach(exported, tmp_path, organbench, mesh_cache, monkeypatch):
     page = (exported / "README.md").read_text()
     table = pd.read_csv(TABLE).query("scene == 'ball_clamped' and body == 'surface' and nodes == 550")
     (paper,) = re.findall(r"the paper's body: surface, 550 surface nodes \| (\S+) ± \S+ \| (\S+) ± ", page)
@@ -129,6 +130,8 @@ def test_the_page_holds_what_our_own_bodies_reach(exported, tmp_path, organbench
     chosen = advise("ball_clamped", results=exported.parent / "results", timing=False).chosen
     assert chosen is not None and f"| recommended: {body_words(chosen.case.body)} surface nodes | " in page
     words = ("export", "ball_clamped", "-o", tmp_path / "out", "--nodes", NODES, "--results", tmp_path)
+    assert organbench(*words)[2] == "" and (tmp_path / "out" / "README.md").read_text() == page
+    monkeypatch.setattr(campaign, "PACKAGE", tmp_path / "nowhere" / "studies")
     code, _, err = organbench(*words)
     assert code == 0 and "warning: README.md names no measured body: no results" in err
     assert "No measured body of ours was at hand" in (tmp_path / "out" / "README.md").read_text()

@@ -9,10 +9,10 @@ from massspring import quadratic_body, surface_body, tetrahedral_body
 from studies.geometry import organ
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.family import true_volume
-from studies.metrics.rest_surface import LUMEN, OUTER, rest_surfaces
+from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
+from studies.meshing.rest_surface import LUMEN, OUTER, rest_surfaces
+from studies.meshing.true_surface import shape_errors, true_surface
 from studies.metrics.table import metric, study_table
-from studies.metrics.true_surface import shape_errors, true_surface
-from studies.metrics.wish import SHAPE, SHAPE_VOLUME
 from studies.runs.case import BodyRecipe
 from studies.scene.library import LIVER_PRESS
 from studies.scene.scene import Organ

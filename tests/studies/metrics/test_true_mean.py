@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from massspring import quadratic_body
-from studies.metrics.rest_surface import OUTER, RestSurface, rest_surfaces
+from studies.meshing.bounds import SHAPE
+from studies.meshing.rest_surface import OUTER, RestSurface, rest_surfaces
 from studies.metrics.table import metric
-from studies.metrics.wish import SHAPE
 from studies.reference.solution import Boundary, Solution
 from studies.scene.library.ball_squeeze import RADIUS as BALL
 from studies.store.record import Field

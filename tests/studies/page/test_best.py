@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from massspring import Free
-from studies.metrics.true_surface import ShapeErrors
-from studies.report.page.best import answers, best_bodies, joined_best
+from studies.meshing.true_surface import ShapeErrors
+from studies.report.page.best import HEADS, answers, best_bodies, joined_best, own_first, scene_rows
 from studies.scene.library import BALL_CLAMPED, LIVER_PRESS
 from tests.plots.made_up import run
 
@@ -68,6 +68,19 @@ def test_without_a_body_within_the_target_the_nearest_is_named_as_such():
     best = best_bodies([paper(), good(error=0.2)], named)
     assert not best[0]["meets"] and best[0]["case"] == "tetrahedral-300-implicit_volume"
     assert "No body here meets the target" in lines(best)
+
+
+def test_scenes_of_ones_own_are_answered_for_and_come_first():
+    best = best_bodies([good(), good(BALL_CLAMPED, error=0.2)], named)
+    own = {best[1]["scene"]}
+    assert answers(best, own) == answers([best[1]]) != answers(best)
+    assert [row["scene"] for row in own_first(best, own)] == [best[1]["scene"], best[0]["scene"]]
+    assert answers(best, {"a scene in which no body is judged"}) == answers(best)
+
+
+def test_the_volume_at_rest_stands_beside_the_shape():
+    (row,) = scene_rows(best_bodies([shaped(good(), 0.003, -0.0021)], named))
+    assert dict(zip(HEADS[1:], row["best"]["numbers"], strict=True))["volume [%]"] == "−0.21"
 
 
 def test_several_scenes_are_counted_and_ranges_given():

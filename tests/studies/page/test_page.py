@@ -277,12 +277,17 @@ def test_no_part_writes_a_file_elsewhere(kept, tmp_path, monkeypatch, kind, name
     assert "volume_loss is left out" in remarks[0] and not list(tmp_path.rglob("*stray*"))
 
 
-def test_commands_name_the_file_of_an_own_study(kept, tmp_path):
+def test_commands_name_the_file_of_an_own_study(kept, tmp_path, monkeypatch):
     root = shutil.copytree(kept[0], tmp_path / "kept")
     own = replace(kept[1][0], word="my rod.py")
     write_part(root, own, losses(), study_table(losses(), COLUMNS), {})
+    asked = []
+    monkeypatch.setattr(module, "answers", lambda best, scenes: asked.append((best, scenes)) or {})
     path, _ = write_page(root, [own, kept[1][1]])
     assert path is not None
+    # Its scenes are answered for, and come first.
+    best, scenes = asked[-1]
+    assert scenes == {run.case.scene.name for run in losses()} and best[0]["scene"] in scenes
     text = path.read_text(encoding="utf-8")
     assert "organbench run &#39;my rod.py&#39; frame_rate" in text and "organbench report &#39;my rod.py&#39;" in text
     runs = [case["run"] for case in data_of(text)["cases"].values() if "entry" not in case]

@@ -136,9 +136,11 @@ def test_replay_runs_the_file_that_the_user_names(organbench, refused, mine, ran
     user_code.forget()
     assert "the same, bit for bit" in organbench("replay", record, "--file", moved)[1]
     edit(moved, "1.0 / edges.length,", "1.0 / edges.length**2,")
-    code, out, err = organbench("replay", record, "--file", moved)
+    told = f"{moved} is not the file that {record} was made with: its content has changed"
+    assert told in refused("replay", record, "--file", moved)
+    code, out, err = organbench("replay", record, "--file", moved, "--changed")
     assert code == 1 and "differs by up to" in out and "the code has changed since it was stored" in out
-    assert f"warning: {moved} is not the file that {record} was made with: its content has changed" in err
+    assert f"warning: {told}" in err
 
 
 def test_a_view_needs_no_file(organbench, mine, ran, tmp_path):

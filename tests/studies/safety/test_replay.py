@@ -39,14 +39,29 @@ def test_a_program_that_a_record_names_does_not_run(refused, results, evil, tmp_
     assert not (tmp_path / "marker").exists()
 
 
-def test_it_runs_when_the_user_names_it_and_a_change_is_a_warning(organbench, results, evil, tmp_path):
+def test_it_runs_when_the_user_names_it_and_its_digest_fits(organbench, refused, results, evil, tmp_path):
     file, sha256 = evil
     record = record_that_names(results, json.dumps({"evil.py": sha256}))
     code, out, err = organbench("replay", record, "--file", file)
     assert code == 0 and "bit for bit" in out and not err
     assert (tmp_path / "marker").exists()
+    (tmp_path / "marker").unlink()
     file.write_text(file.read_text() + "# another\n")
-    assert "its content has changed" in organbench("replay", record, "--file", file)[2]
+    sentence = refused("replay", record, "--file", file)
+    assert "its content has changed" in sentence and "--changed" in sentence
+    assert not (tmp_path / "marker").exists()
+    code, out, err = organbench("replay", record, "--file", file, "--changed")
+    assert code == 0 and "bit for bit" in out and "its content has changed" in err
+    assert (tmp_path / "marker").exists()
+
+
+def test_no_file_runs_before_the_digests_of_all_are_known(refused, results, evil, tmp_path):
+    file, sha256 = evil
+    other = tmp_path / "other.py"
+    other.write_text("x = 1\n")
+    record = record_that_names(results, json.dumps({"evil.py": sha256, "other.py": "00"}))
+    assert "other.py is not the file" in refused("replay", record, "--file", file, "--file", other)
+    assert not (tmp_path / "marker").exists()
 
 
 @pytest.mark.parametrize("text", ["[]", "{", '{"evil.py": 3}', '"evil.py"'])

@@ -10,13 +10,14 @@ import meshio
 import numpy as np
 import pytest
 
-from studies.cli.commands.place import SHIPPED, UNKNOWNS, VARIANTS
+from studies.cli.commands.place import UNKNOWNS, VARIANTS
 from studies.geometry import organ, read_mesh
 from studies.meshing.scene_mesh import mesh_for
 from studies.runs.case import BodyRecipe
 from studies.scene.chosen_place import DEPTH
 from studies.scene.tissues import SPLEEN
 from studies.tools.advise.answer import advise
+from studies.tools.advise.campaign import shipped
 from tests.geometry.boxes import box, together
 from tests.studies.page.unpack import unpack_frames
 
@@ -129,7 +130,7 @@ def test_a_scene_file_holds_the_tissue_the_hold_and_the_advised_body(organbench,
     assert one.scene.held[0].region.normal == (0, 0, 1) and "held at the bottom" in one.scene.title
     parameters = one.scene.organ.parameters
     assert parameters["holes"] is True and parameters["smooth"] == 1e-3 and parameters["unit"] == "mm"
-    answer = advise(one.scene, results=SHIPPED, timing=False)
+    answer = advise(one.scene, results=shipped(), timing=False)
     assert (two.body, two.dt_fraction) == (answer.chosen.case.body, answer.chosen.case.dt_fraction)
     assert one.body == BodyRecipe(nodes=200) and [case.recorded for case in study.cases] == [("surface",)] * 2
     # What the estimate rests on.

@@ -7,8 +7,8 @@ import pytest
 import studies
 from massspring import Probe
 from studies.base.errors import StudyError
+from studies.meshing.true_surface import ShapeErrors
 from studies.metrics.table import study_table
-from studies.metrics.true_surface import ShapeErrors
 from studies.metrics.wish import usual_wish
 from studies.runs.case import BodyRecipe
 from studies.scene.library import (

@@ -42,7 +42,7 @@ def test_only_members_of_that_organ_with_that_recipe_count(tmp_path, place):
     assert "41 other organs" in words(found) and "1 more failed" in words(found) and "3.8 %" in words(found)
 
 
-def test_nothing_is_said_where_nothing_was_run(tmp_path):
+def test_nothing_is_said_where_nothing_was_run(no_tables, tmp_path):
     assert unseen(tmp_path, CASE) is None
     table(tmp_path / "population" / "population.csv")
     assert unseen(tmp_path, replace(CASE, dt_fraction=0.1)) is None

@@ -15,8 +15,9 @@ from studies.geometry import read_mesh
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.shape.levelset import Shape, at_depth
 from studies.geometry.surface.distance import hausdorff
+from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
+from studies.meshing.rest_surface import LUMEN, OUTER, RestSurface, rest_surfaces
 from studies.meshing.true_shape import true_shape
-from studies.metrics.rest_surface import LUMEN, OUTER, RestSurface, rest_surfaces
 from studies.scene.organ_file import scanned
 from studies.scene.scene import Organ
 
@@ -46,6 +47,14 @@ class ShapeErrors(NamedTuple):
     """Largest distance between both surfaces, seen from either, over the organ's size [1]."""
     volume: float
     """Volume over the true one, less 1 [1]."""
+
+    def __str__(self) -> str:
+        return f"up to {100 * self.distance:.2g} % of the size off the true surface, volume {100 * self.volume:+.2g} %"
+
+    @property
+    def worst(self) -> float:
+        """The larger one over its bound; above 1 the body does not keep the shape."""
+        return 100.0 * max(self.distance / SHAPE, abs(self.volume) / SHAPE_VOLUME)
 
 
 UNKNOWN = ShapeErrors(float("nan"), float("nan"))

@@ -1,0 +1,58 @@
+"""How well a body at rest keeps the shape of its organ and the area where it is held: a warning where it does not."""
+
+import warnings
+
+import numpy as np
+
+from studies.geometry import OrganMesh
+from studies.geometry.mesh.organ_mesh import triangle_areas
+from studies.geometry.surface.sides import along_facets, region_area
+from studies.meshing.bounds import HELD_AREA
+from studies.meshing.quadratic_mesh import QuadraticMesh
+from studies.meshing.rest_surface import OUTER, rest_surfaces
+from studies.meshing.scene_mesh import patch_nodes
+from studies.meshing.true_surface import shape_errors, true_surface
+from studies.scene.organ_file import remeshed
+from studies.scene.scene import Held, Scene
+
+
+def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> None:
+    """Warns, in one sentence, of a body beyond the bounds of studies.meshing.bounds. filled: whether the tissue alone
+    is in it; otherwise it is the outer surface."""
+    found = []
+    # The triangles of a file that come as they are have its shape.
+    if remeshed(scene.organ):
+        facets = mesh.facets if isinstance(mesh, QuadraticMesh) else mesh.triangles if filled else mesh.outer_triangles
+        errors = shape_errors(scene.organ, rest_surfaces(mesh.points, facets), filled)
+        if errors.worst > 1.0:
+            found.append(str(errors))
+    for held in scene.held:
+        off = 100.0 * held_area_error(scene, mesh, held)
+        if abs(off) > HELD_AREA:
+            found.append(f"area of the held region '{held.name}' {off:+.2g} %")
+    if found:
+        flat = "" if isinstance(mesh, QuadraticMesh) else ", or quadratic elements, whose sides follow the surface"
+        what = f"{mesh.name}: the body at rest does not keep the shape of its organ"
+        warnings.warn(f"{what}: {', '.join(found)}; use more nodes{flat}", stacklevel=2)
+
+
+def held_area_error(scene: Scene, mesh: OrganMesh | QuadraticMesh, held: Held) -> float:
+    """Area of the facets of a held region over that of the region on the true surface, less 1 [1]; NaN where that is
+    not known."""
+    truth = true_surface(scene.organ)
+    if truth is None:
+        return float("nan")
+    facets = held_facets(mesh, held)
+    return (
+        float(triangle_areas(*along_facets(mesh.points, facets)).sum()) / region_area(held.region, *truth.sides[OUTER])
+        - 1.0
+    )
+
+
+def held_facets(mesh: OrganMesh | QuadraticMesh, held: Held) -> np.ndarray:
+    """The boundary facets, with three or six nodes, all of whose nodes are held and whose middle is in the region:
+    between two corners of an outline a facet may lie outside with all of its nodes on it."""
+    facets = mesh.facets if isinstance(mesh, QuadraticMesh) else mesh.triangles
+    nodes = mesh.patches[held.name] if isinstance(mesh, QuadraticMesh) else patch_nodes(mesh, held.name, held.region)
+    facets = facets[np.isin(facets, nodes).all(axis=1)]
+    return facets[held.region.level(mesh.points[facets[:, :3]].mean(axis=1)) <= 0.0]

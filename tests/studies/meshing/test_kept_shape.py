@@ -1,0 +1,85 @@
+"""A body that does not keep the shape of its organ, or the area where it is held, says so before it runs."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from studies.geometry import HalfSpace
+from studies.meshing.kept_shape import held_area_error, held_facets, tell_shape
+from studies.meshing.scene_mesh import mesh_for
+from studies.runs.case import BodyRecipe
+from studies.runs.prepare import mesh_of, prepare
+from studies.scene.library import JUDGED, SCENES
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.scene import Held, Organ
+from tests.geometry.boxes import box
+from tests.studies.tiny import SQUEEZE, tiny_case
+
+ORGANS = [scene for scene in JUDGED if scene.held]
+
+
+def told(scene, mesh, filled=True):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        tell_shape(scene, mesh, filled)
+    return [str(one.message) for one in caught]
+
+
+def test_flat_sides_of_few_nodes_are_told_with_both_numbers():
+    with pytest.warns(UserWarning, match=r"ball: .* up to 2 % of the size .* volume -9\.\d %; .* or quadratic"):
+        prepare(tiny_case())
+    (sentence,) = told(SQUEEZE, mesh_for(SQUEEZE, 60, filled=False), filled=False)
+    assert "volume -9." in sentence
+
+
+def test_curved_sides_keep_it():
+    assert told(SQUEEZE, mesh_of(SQUEEZE, BodyRecipe("quadratic", 234))) == []
+
+
+def test_a_volume_that_is_too_large_is_told_as_well():
+    mesh = mesh_of(SQUEEZE, BodyRecipe("quadratic", 234))
+    (sentence,) = told(SQUEEZE, replace(mesh, points=1.003 * mesh.points))
+    assert "volume +0.77 %" in sentence and "or quadratic" not in sentence
+
+
+@pytest.mark.parametrize("kind", ["tetrahedral", "quadratic"])
+def test_a_held_region_that_lost_a_facet_is_told_by_name(kind):
+    scene = BALL_CLAMPED
+    mesh = mesh_of(scene, BodyRecipe(kind, 294))
+    held = scene.held[0]
+    facets, off = held_facets(mesh, held), held_area_error(scene, mesh, held)
+    assert abs(off) < 0.03 and not any("held region" in line for line in told(scene, mesh))
+    fewer = replace(mesh, patches=mesh.patches | {held.name: np.setdiff1d(mesh.patches[held.name], facets[0])})
+    (sentence,) = [line for line in told(scene, fewer) if "held region" in line]
+    assert f"area of the held region '{held.name}' -" in sentence
+
+
+def test_a_file_that_comes_as_it_is_has_its_own_shape(tmp_path):
+    """Its triangles do not follow the outline of a region: the staircase is told."""
+    import meshio
+
+    points, triangles = box((0, 0, 0), (0.1, 0.1, 0.1))
+    meshio.write_points_cells(tmp_path / "box.ply", points, [("triangle", triangles)])
+    organ = Organ("file", {"path": str(tmp_path / "box.ply"), "unit": "m"})
+    whole = replace(SQUEEZE, organ=organ, obstacles=())
+    assert told(whole, mesh_for(whole, 60)) == []
+    region = HalfSpace((0.0, 0.0, 0.03), (0.0, 0.0, 1.0))
+    held = replace(whole, held=(Held("foot", region),))
+    (sentence,) = told(held, mesh_for(held, 60))
+    assert "held region 'foot' -" in sentence and "off the true surface" not in sentence
+
+
+@pytest.mark.slow
+def test_the_flat_stomach_of_300_nodes_holds_too_little():
+    scene = next(scene for scene in SCENES if scene.name == "stomach_press")
+    (sentence,) = told(scene, mesh_of(scene, BodyRecipe(nodes=300)))
+    assert "'cardia' -5.9 %" in sentence and "'pylorus' -6.1 %" in sentence
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("scene", ORGANS, ids=lambda scene: scene.name)
+def test_curved_bodies_hold_the_area_that_their_scene_holds(mesh_cache, scene):
+    mesh = mesh_of(scene, BodyRecipe("quadratic", 794))
+    assert [held.name for held in scene.held if abs(held_area_error(scene, mesh, held)) > 0.03] == []
