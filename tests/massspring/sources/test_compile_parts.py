@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
 from massspring.sources import ROOT
@@ -54,12 +55,8 @@ def test_an_error_of_a_part_reaches_python():
 
     assert caller(3) == 6
     for function in (caller, refused):
-        try:
+        with pytest.raises(ValueError, match="negative"):
             function(-1)
-        except ValueError as error:
-            assert str(error) == "negative"
-        else:
-            raise AssertionError
 
 
 KEPT = """
