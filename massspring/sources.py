@@ -20,7 +20,13 @@ from massspring.errors import MassSpringError
 
 OWN = ("massspring", "reference_fem", "studies")
 """The packages of this distribution, installed side by side; other packages are known by their versions."""
-APART = ("massspring.compile_cache", "massspring.sources", "studies.base.atomic", "studies.store")
+APART = (
+    "massspring.compile_cache",
+    "massspring.compile_parts",
+    "massspring.sources",
+    "studies.base.atomic",
+    "studies.store",
+)
 """Own modules that keep account of code, or files, and change no result: a record has a schema number of its own."""
 ROOT = Path(__file__).parents[1]
 

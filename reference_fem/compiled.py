@@ -1,20 +1,13 @@
-"""The decorator of compiled functions: numba, kept on disk (massspring.compile_cache, which holds no mechanics)."""
+"""The decorator of compiled functions: numba, kept on disk (massspring.compile_parts, which holds no mechanics)."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from numba import njit
-
-from massspring.compile_cache import kept
+from massspring.compile_parts import kept_function
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def compiled(**options: Any) -> Callable[[Function], Function]:
     """Compile on first call, with numba's `options`."""
-
-    def decorate(function: Function) -> Function:
-        with kept():
-            return njit(cache=True, **options)(function)  # pyright: ignore[reportReturnType]
-
-    return decorate
+    return lambda function: kept_function(function, **options)

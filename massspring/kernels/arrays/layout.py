@@ -5,9 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.arrays.spring_layout import Membrane, Slices
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.stage_clock import StageTimes
 
 
+@by_address
 class Model(NamedTuple):
     """What does not change during a run; s springs, f triangles, n nodes, h held nodes, c surface nodes."""
 
@@ -43,6 +45,7 @@ class Model(NamedTuple):
     slices: Slices
 
 
+@by_address
 class Nodes(NamedTuple):
     """Where the n nodes are and what moves them; changes at every step."""
 
@@ -58,6 +61,7 @@ class Nodes(NamedTuple):
     """G = dV/dx of the one volume that is kept [m²], (n, 3); 0 where none is, or several."""
 
 
+@by_address
 class Contacts(NamedTuple):
     """Which nodes obstacles touch in this step, and what that takes from their motion."""
 
@@ -85,6 +89,7 @@ class Contacts(NamedTuple):
     """Distance to the nearest obstacle at the end of the predicted step [m], inf for touched nodes, (n,)."""
 
 
+@by_address
 class Workspace(NamedTuple):
     """Scratch of the pass over all springs: nothing is allocated inside a frame."""
 
@@ -112,6 +117,7 @@ class Push(NamedTuple):
     """lam [Pa] or 1."""
 
 
+@by_address
 class Tips(NamedTuple):
     """Where the tips of p thin probes are during a frame of q steps."""
 
@@ -121,6 +127,7 @@ class Tips(NamedTuple):
     """At the end of each step [m], (q, p, 3)."""
 
 
+@by_address
 class BoundaryConditions(NamedTuple):
     """One frame's outside world, q steps, o obstacles, g attachments."""
 
@@ -162,6 +169,7 @@ class Accuracy(NamedTuple):
     most_iterations: int
 
 
+@by_address
 class FrameDiagnostics(NamedTuple):
     """What a frame measures of itself; the loop adds, the caller starts it at zero."""
 

@@ -4,7 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring.kernels.jit.by_address import by_address
 
+
+@by_address
 class Membrane(NamedTuple):
     """t triangle springs; edge a of a triangle lies opposite its node a."""
 
@@ -18,6 +21,7 @@ class Membrane(NamedTuple):
     """c_a of the two edges that meet at node a [N/m³], (t, 3)."""
 
 
+@by_address
 class Slices(NamedTuple):
     """Who pulls at whom, 64 nodes side by side in S slices; r rows of 64 neighbours.
 

@@ -4,10 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring.kernels.jit.by_address import by_address
+
 SIZE = 64
 """Volumes of a cluster: fewer take more iterations, the inverses of more take longer to read than they save."""
 
 
+@by_address
 class Clusters(NamedTuple):
     """b clusters of m volumes that pull at each other's nodes; the last may be smaller."""
 
@@ -22,6 +25,7 @@ class Clusters(NamedTuple):
     """Scratch: what is asked of a cluster and its answer, (2, 64) float32."""
 
 
+@by_address
 class VolumeRows(NamedTuple):
     """m volumes: J = dV/dx as sparse rows with e entries, its transpose, and scratch."""
 

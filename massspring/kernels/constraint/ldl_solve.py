@@ -4,9 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_lean
 
 
+@by_address
 class Triangular(NamedTuple):
     """L without its unit diagonal, column by column, and D, of the q nodes that respond among n."""
 

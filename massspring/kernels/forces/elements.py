@@ -5,12 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
 
 FLAT = 1e-20
 """Of the square of ∂J/∂x at rest: what is left of it is round-off."""
 
 
+@by_address
 class Elements(NamedTuple):
     """k elements of a nodes with q points each; their shear is in the springs without length of the body."""
 

@@ -6,9 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.forces.springs import SHORTEST
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlined
 
 
+@by_address
 class Cells(NamedTuple):
     """k tetrahedra with what a method remembers of each, and scratch arrays."""
 

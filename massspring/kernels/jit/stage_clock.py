@@ -9,6 +9,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_exposed
 
 STAGES = (
@@ -27,6 +28,7 @@ MONOTONIC = 1
 """The clock's number in POSIX systems (Linux)."""
 
 
+@by_address
 class StageTimes(NamedTuple):
     """Where the time of a frame goes."""
 

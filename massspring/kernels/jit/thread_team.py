@@ -13,6 +13,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
 
 LINE = 8
@@ -24,6 +25,7 @@ PATIENCE = 20_000
 """Looks at a counter before the thread offers its core to others: 5 to 10 µs."""
 
 
+@by_address
 class ThreadTeam(NamedTuple):
     """How T threads share the work: each has the slices and the nodes between two borders of its own.
 

@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring.kernels.jit.by_address import by_address
+
 BLOCK = 16
 """Elements side by side: a multiple of what a vector register holds."""
 NODES, POINTS, CORNERS = 10, 4, 4
@@ -13,6 +15,7 @@ SUMS = ROWS + AREAS
 """Row of the first point's sum in the tile."""
 
 
+@by_address
 class FacetRows(NamedTuple):
     """p points in each of f facets, and the state of their contact."""
 
@@ -56,6 +59,7 @@ class FacetRows(NamedTuple):
     """Scratch: of the forces on them [N], (p, 3)."""
 
 
+@by_address
 class PointRows(NamedTuple):
     """m volumes over b blocks of quadratic tetrahedra, v of vertices and then those inside closed surfaces.
 

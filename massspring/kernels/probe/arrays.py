@@ -9,6 +9,7 @@ import numpy as np
 
 from massspring.kernels.arrays.layout import Contacts, FrameDiagnostics, Model, Nodes, Tips
 from massspring.kernels.arrays.volume_rows import VolumeRows
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.probe.continuous import Pair
 
 COUNTS = (
@@ -24,6 +25,7 @@ COUNTS = (
 IN_CONTACT, SEARCH_ROUNDS, CARRYING, LEFT_BEHIND, COMPARED, TESTED, CARRIED = range(len(COUNTS))
 
 
+@by_address
 class Rows(NamedTuple):
     """Point contacts of the step: row k presses nodes of one triangle along one direction, with an impulse >= 0."""
 
@@ -59,6 +61,7 @@ class Rows(NamedTuple):
     """Right side and solution of the pressing rows, (2, r)."""
 
 
+@by_address
 class Probing(NamedTuple):
     """Thin probes and a surface: sleeping pairs, the pairs of the step, its contacts."""
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.contact.node_contact import axis_share
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_lean
 
 NEVER = 2.0
@@ -24,6 +25,7 @@ CREEPS = 200
 """Steps of an advance that cannot overshoot; a pair that is not through after them has met for all purposes."""
 
 
+@by_address
 class Pair(NamedTuple):
     """One point and one triangle during a step, and where they meet."""
 

@@ -3,10 +3,12 @@
 from typing import NamedTuple
 
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Model, Nodes, Workspace
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.thread_team import ThreadTeam
 from massspring.kernels.probe.arrays import Probing
 
 
+@by_address
 class Frame(NamedTuple):
     """A body, its surroundings during a frame, and what the frame measures of itself."""
 

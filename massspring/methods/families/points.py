@@ -7,6 +7,7 @@ import numpy as np
 
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.constraint.ldl_solve import Triangular, respond_into
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, SEARCH, SPRINGS, VOLUME, end_stage
 from massspring.kernels.points.elements import measure_into, push_into
@@ -31,6 +32,7 @@ from massspring.kernels.step.begin import (
 from massspring.kernels.step.end import end_step
 
 
+@by_address
 class SpringFactor(NamedTuple):
     """Springs without length taken at the end of the step: A = (1 + c dt) M + dt² K, factored once (eq. 12.5)."""
 

@@ -5,12 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_lean
 
 STRAIGHT = 1e-12
 """Sine of an angle that is 0 or π but for round-off: the direction in which it opens is not known."""
 
 
+@by_address
 class Angles(NamedTuple):
     """a angles at nodes."""
 

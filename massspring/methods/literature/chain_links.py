@@ -10,12 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.contact.gaps import gap_and_normal
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
 TOUCHING = 1e-12
 """A node this little inside an obstacle [m] lies on it."""
 
 
+@by_address
 class Links(NamedTuple):
     """2 s links, from both ends of each of s springs; n nodes."""
 
@@ -31,6 +33,7 @@ class Links(NamedTuple):
     """[m], (2s, 3)."""
 
 
+@by_address
 class Mail(NamedTuple):
     """Links and scratch."""
 

@@ -1,0 +1,80 @@
+"""How functions are compiled: for callers in Python by themselves, for compiled callers as a part of each.
+
+numba makes machine code of every function and then of its caller, which has taken the function in; that was half of
+all compiling. Here a function that compiled code calls gets machine code only where its callers have theirs. If Python
+calls it too, it is compiled once more, for Python. Nor is it compiled again for every constant that it is given.
+"""
+
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any, TypeVar
+
+import llvmlite.binding as llvm
+import numba
+from numba import types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import AnalysisPass, register_pass
+from numba.core.typed_passes import IRLegalization
+
+from massspring.compile_cache import kept
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def kept_function(function: Function, **options: Any) -> Function:
+    """The function compiled on first call and kept on disk, with numba's `options`; as it is where that is off."""
+    twin = FunctionType(
+        function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
+    )
+    twin.__qualname__, twin.__module__ = f"{function.__qualname__}.part", function.__module__
+    options = {"cache": True, "no_cfunc_wrapper": True, **options}
+    with kept():
+        made: Any = numba.njit(**options)(function)
+        part: Any = numba.njit(**options | {"no_cpython_wrapper": True, "pipeline_class": PartCompiler})(twin)
+    if made is not function:
+        made.get_overload = part.get_overload
+        made.get_call_template = lambda args, named: part.get_call_template(
+            [types.unliteral(arg) for arg in args], {name: types.unliteral(arg) for name, arg in named.items()}
+        )
+    return made
+
+
+class Part(JITCodeLibrary):
+    """Code for callers; of what becomes machine code here, numba's own variables alone are left."""
+
+    def _optimize_final_module(self) -> None:
+        """Callers do that."""
+
+    def _finalize_final_module(self) -> None:
+        whole, self._finalized = self._final_module, True
+        self._shared_module, self._finalized = self._get_module_for_linking(), False
+        names = [one.name for one in whole.global_variables if one.name.startswith("_ZN08NumbaEnv")]
+        left = "".join(f'@"{name}" = common global ptr null\n' for name in names)
+        self._final_module = llvm.parse_assembly(f'target triple = "{whole.triple}"\n{left}')
+        super()._finalize_final_module()
+
+
+@register_pass(mutates_CFG=False, analysis_only=True)
+class _IntoPart(AnalysisPass):
+    _name = "into_part"
+
+    def __init__(self) -> None:
+        super().__init__()
+
+    def run_pass(self, state: Any) -> bool:
+        """Gives what is compiled its library, before numba would."""
+        state.library = Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return False
+
+
+class PartCompiler(CompilerBase):
+    """numba's compiler, for parts."""
+
+    def define_pipelines(self) -> list[Any]:
+        """numba's own passes, and `_IntoPart`."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.add_pass_after(_IntoPart, IRLegalization)
+        passes.finalize()
+        return [passes]

@@ -1,0 +1,187 @@
+"""Named tuples that compiled code is given by their address.
+
+As a value a tuple of sixty arrays is four hundred numbers of every call that hands it on, and most of the compiler's
+work is to carry them along. An address is one number, and a function reads what it uses. In Python, and where nothing
+is compiled, the tuples are what they were; only compiled code cannot make them.
+"""
+
+import hashlib
+from collections.abc import Iterator
+from typing import Any, TypeVar
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel import models
+from numba.core.typing.templates import AttributeTemplate
+from numba.core.typing.typeof import typeof_impl
+from numba.extending import NativeValue, infer_getattr, lower_getattr_generic, register_model, unbox
+from numba.np.numpy_support import as_dtype
+
+Tuple = TypeVar("Tuple", bound=type)
+
+WORD = 8
+"""Bytes: of a number, an address, a length."""
+NUMBERS = {types.float64: -1, types.int64: -2, types.boolean: -3}
+"""How each is read from its Python object; of arrays the size of an item [bytes], positive, says how."""
+DEPTH = 4
+"""Tuples within tuples at most."""
+WHOLE, BYTE, ADDRESS = ir.IntType(64), ir.IntType(8), cgutils.voidptr_t
+
+
+class ByAddress(types.Type):
+    """The type of such a tuple: its class and the types of its fields.
+
+    places: where each field begins [bytes], and its type; size: of all fields [bytes]
+    """
+
+    def __init__(self, made: type, fields: list[types.Type]) -> None:
+        self.made, self.fields, self.size = made, tuple(fields), 0
+        self.places: dict[str, tuple[int, types.Type]] = {}
+        for name, field in zip(made._fields, fields, strict=True):  # pyright: ignore[reportAttributeAccessIssue]
+            self.places[name] = self.size, field
+            self.size += _size(made, name, field)
+        words = "\0".join((made.__module__, *map(str, fields)))
+        super().__init__(f"{made.__name__}.{hashlib.sha256(words.encode()).hexdigest()[:12]}")
+
+    def leaves(self, path: tuple[int, ...] = (), begin: int = 0) -> Iterator[tuple[int, ...]]:
+        """Of each number and array: DEPTH indices that lead to it, -1 for none; where it is to be [bytes]; how it is
+        read."""
+        for index, (place, field) in enumerate(self.places.values()):
+            here = *path, index
+            if isinstance(field, ByAddress):
+                yield from field.leaves(here, begin + place)
+            elif field is not types.none:
+                how = _item_size(field) if isinstance(field, types.Array) else NUMBERS[field]
+                yield *here, *(-1 for _ in range(DEPTH - len(here))), begin + place, how
+
+
+def by_address(made: Tuple) -> Tuple:
+    """Decorates a named tuple of arrays, numbers, None and other such tuples."""
+
+    @typeof_impl.register(made)
+    def type_of(value: Any, context: Any) -> ByAddress:
+        return ByAddress(type(value), [typeof_impl(item, context) for item in value])
+
+    return made
+
+
+def _item_size(array: types.Array) -> int:
+    return as_dtype(array.dtype).itemsize
+
+
+def _size(made: type, name: str, field: types.Type) -> int:
+    if isinstance(field, types.Array):
+        return (5 + 2 * field.ndim) * WORD
+    if isinstance(field, ByAddress):
+        return field.size
+    if field in NUMBERS or field is types.none:
+        return 0 if field is types.none else WORD
+    raise TypeError(f"{made.__name__}.{name} is of type {field}; by address go arrays, numbers, None and such tuples")
+
+
+register_model(ByAddress)(models.OpaqueModel)
+
+
+@infer_getattr
+class _Fields(AttributeTemplate):
+    key = ByAddress
+
+    def generic_resolve(self, value: Any, attr: str) -> Any:
+        place = value.places.get(attr)
+        return None if place is None else place[1]
+
+
+@lower_getattr_generic(ByAddress)
+def _field(context: Any, builder: Any, group: Any, address: Any, name: str) -> Any:
+    place, field = group.places[name]
+    if isinstance(field, ByAddress):
+        return _at(builder, address, place, BYTE)
+    if field is types.none:
+        return context.get_dummy_value()
+    if not isinstance(field, types.Array):
+        number = _read(builder, address, place, context.get_data_type(field))
+        return builder.trunc(number, ir.IntType(1)) if field is types.boolean else number
+    array = context.make_array(field)(context, builder)
+    kind = context.get_data_type(field.dtype).as_pointer()
+    numbers = [_read(builder, address, place + WORD * at, WHOLE) for at in range(5, 5 + 2 * field.ndim)]
+    array.meminfo, array.parent = (cgutils.get_null_value(part.type) for part in (array.meminfo, array.parent))
+    array.nitems = _read(builder, address, place + 2 * WORD, WHOLE)
+    array.itemsize = WHOLE(_item_size(field))
+    array.data = _read(builder, address, place + 4 * WORD, kind)
+    array.shape = cgutils.pack_array(builder, numbers[: field.ndim])
+    array.strides = cgutils.pack_array(builder, numbers[field.ndim :])
+    return array._getvalue()
+
+
+def _at(builder: Any, address: Any, place: int, kind: Any) -> Any:
+    """Where a value of a kind is, some bytes after an address."""
+    return builder.bitcast(builder.gep(address, [WHOLE(place)]), kind.as_pointer())
+
+
+def _read(builder: Any, address: Any, place: int, kind: Any) -> Any:
+    """Nothing changes what is there while compiled code runs: a loop need not read it again after it has written."""
+    found = builder.load(_at(builder, address, place, kind))
+    found.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return found
+
+
+@unbox(ByAddress)
+def _gathered(group: Any, value: Any, c: Any) -> NativeValue:
+    """The address of what a Python tuple holds, gathered for the time of a call."""
+    builder, kind = c.builder, ir.ArrayType(WHOLE, DEPTH + 2)
+    rows = [ir.Constant(kind, [WHOLE(number) for number in row]) for row in group.leaves()]
+    table = ir.Constant(ir.ArrayType(kind, len(rows)), rows)
+    table = builder.bitcast(cgutils.global_constant(builder, f".leaves.{group.name}", table), ADDRESS)
+    room = builder.bitcast(cgutils.alloca_once(builder, ir.ArrayType(WHOLE, group.size // WORD)), ADDRESS)
+    failed = builder.call(_gather(builder.module), [value, table, WHOLE(len(rows)), room])
+    with builder.if_then(failed, likely=False):
+        c.pyapi.err_set_string(
+            "PyExc_TypeError", f"{group.made.__name__}: an array is not of the type it is meant to be"
+        )
+    # Hidden, so that the compiler does not read from there before all is gathered.
+    hidden = builder.asm(ir.FunctionType(ADDRESS, [ADDRESS]), "", "=r,0,~{memory}", [room], side_effect=True)
+    return NativeValue(hidden, is_error=failed)
+
+
+def _gather(module: Any) -> Any:
+    """The function of a module that gathers: (tuple, leaves, their number, where to) -> whether an array is wrong."""
+    flag, real, code = ir.IntType(1), ir.DoubleType(), ir.IntType(32)
+    kind = ir.FunctionType(flag, [ADDRESS, ADDRESS, WHOLE, ADDRESS])
+    function = cgutils.get_or_insert_function(module, kind, "gather_leaves")
+    if function.blocks:
+        return function
+    function.linkage = "internal"
+    builder = ir.IRBuilder(function.append_basic_block())
+
+    def call(name: str, result: Any, *args: Any) -> Any:
+        kind = ir.FunctionType(result, [arg.type for arg in args])
+        return builder.call(cgutils.get_or_insert_function(module, kind, name), args)
+
+    def is_read(how: int, least: str = "==") -> Any:
+        return builder.if_then(builder.icmp_signed(least, numbers[-1], WHOLE(how)))
+
+    whole, table, count, begin = function.args
+    failed = cgutils.alloca_once_value(builder, flag(0))
+    item = cgutils.alloca_once(builder, ADDRESS)
+    with cgutils.for_range(builder, count) as loop:
+        row = builder.gep(table, [builder.mul(loop.index, WHOLE(WORD * (DEPTH + 2)))])
+        numbers = [builder.load(_at(builder, row, WORD * column, WHOLE)) for column in range(DEPTH + 2)]
+        builder.store(whole, item)
+        for index in numbers[:DEPTH]:
+            with builder.if_then(builder.icmp_signed(">=", index, WHOLE(0))):
+                builder.store(call("PyTuple_GetItem", ADDRESS, builder.load(item), index), item)
+        found, target = builder.load(item), builder.gep(begin, [numbers[DEPTH]])
+        with is_read(NUMBERS[types.float64]):
+            builder.store(call("PyFloat_AsDouble", real, found), _at(builder, target, 0, real))
+        with is_read(NUMBERS[types.int64]):
+            builder.store(call("PyLong_AsLongLong", WHOLE, found), _at(builder, target, 0, WHOLE))
+        with is_read(NUMBERS[types.boolean]):
+            builder.store(builder.trunc(call("PyObject_IsTrue", code, found), BYTE), target)
+        with is_read(0, ">"):
+            wrong = builder.icmp_signed("!=", call("numba_adapt_ndarray", code, found, target), code(0))
+            size = builder.load(_at(builder, target, 3 * WORD, WHOLE))
+            wrong = builder.or_(wrong, builder.icmp_signed("!=", size, numbers[-1]))
+            builder.store(builder.or_(builder.load(failed), wrong), failed)
+    builder.ret(builder.load(failed))
+    return function
