@@ -14,6 +14,7 @@ from reference_fem import (
     SolveError,
     equilibrium_path,
 )
+from reference_fem.system.checks import check_resumed
 from reference_fem.system.state import State
 from tests.reference_fem.bodies import block
 from tests.reference_fem.statics.test_cavity import hollow_cube, in_the_middle
@@ -76,3 +77,13 @@ def test_a_stored_step_with_a_part_missing_is_refused(kept):
     del arrays["pressure"], arrays["hold_anchor"]
     with pytest.raises(SolveError, match="lacks pressure, hold_anchor"):
         State.from_arrays(arrays)
+
+
+@pytest.mark.parametrize("name", ["x", "multiplier", "grip_anchor", "hold_stuck"])
+def test_a_state_of_another_length_is_refused(kept, name):
+    """Compiled loops would read behind its end."""
+    arrays = kept[1].state.to_arrays()
+    check_resumed(kept[1].state, State.from_arrays(arrays))
+    arrays[name] = arrays[name][:0]
+    with pytest.raises(SolveError, match=f"has {name} of shape"):
+        check_resumed(kept[1].state, State.from_arrays(arrays))

@@ -10,7 +10,6 @@ from studies.base.errors import StudyError
 from studies.metrics.timing import cases as timed
 from studies.runs.current import case_path
 from studies.scene.library import ReferencePlan
-from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.store.entry import OTHER_VERSION
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
@@ -19,6 +18,7 @@ from studies.sweep.load import load_runs
 from studies.sweep.local import Local
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, standings, warnings_of
+from tests.studies.octant import SCENE
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
 
 
@@ -114,12 +114,13 @@ def test_missing_is_told(tmp_path):
 
 
 def test_references_are_shared_and_come_first(tmp_path):
-    scene = replace(BALL_SQUEEZE, reference=ReferencePlan("octant", (0.9, 0.5, 0.4)))
-    one, two = (tiny_study(name=name, cases=(tiny_case(scene=scene),)) for name in ("one", "two"))
+    larger = replace(SCENE, name="larger", reference=ReferencePlan("octant", (0.5, 0.25)))
+    cases = tiny_case(scene=SCENE), tiny_case(scene=larger)
+    one, two = (tiny_study(name=name, cases=cases) for name in ("one", "two"))
     jobs = jobs_of(tmp_path, [one, two])
-    assert [job.label for job in jobs[:2]] == ["reference ball_squeeze-0.4", "reference ball_squeeze-0.5"]
-    assert len(jobs) == 6 + 2  # three meshes and three variants, shared; a case of each study
-    assert len({job.path() for job in jobs}) == 8
+    assert [job.label for job in jobs[:2]] == ["reference larger", "reference ball_squeeze"]
+    assert len(jobs) == 2 + 4  # a reference of each scene, shared; two cases of each study
+    assert len({job.path() for job in jobs}) == 6
 
 
 def test_results_that_cannot_be_written_are_told_before_anything_runs(tmp_path, monkeypatch):

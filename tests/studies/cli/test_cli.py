@@ -111,7 +111,7 @@ def test_status_of_everything(organbench, tmp_path):
     counts, references = out.split("references:\n")
     assert [line.split(":")[0] for line in counts.splitlines()] == [study.name for study in STUDIES]
     head, *rows = references.splitlines()
-    assert head.split()[:3] == ["scene", "finest", "mesh"]
+    assert head.split() == ["scene", "unknowns", "seconds", "state"]
     assert len(rows) == len({scene.name for study in STUDIES for scene in study.scenes if reference_solves(scene)})
     assert all(row.split()[-1] == "missing" for row in rows)
     assert all("missing" in line for line in counts.splitlines())

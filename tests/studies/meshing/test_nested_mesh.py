@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from skfem import MeshTet, MeshTet2
 
-from massspring import Sphere, Trajectory
 from reference_fem import NewtonSettings, facet_nodes, nodes
 from reference_fem.elements.shapes import build_elements, element_nodes
 from reference_fem.system.saddle_point import System
@@ -225,20 +224,6 @@ def test_an_element_that_would_fold_keeps_the_nodes_that_are_safe():
     np.testing.assert_array_equal(np.flatnonzero(back), [alone])
     np.testing.assert_array_equal(x[alone], safe[alone])
     np.testing.assert_array_equal(x[far], wanted[far])
-
-
-def test_a_base_is_finer_where_a_probe_will_be(mesh_cache):
-    way = Trajectory((0.0, 3.0), ((0.0, 0.0, 0.0), (-0.4 * RADIUS, 0.0, 0.0)))
-    probe = Sphere((1.5 * RADIUS, 0.0, 0.0), 0.45 * RADIUS, way)
-    scene = replace(BALL_CLAMPED, obstacles=(probe,))
-
-    def near(times):
-        away = np.linalg.norm(base_mesh(scene, BASE, times).points - [1.1 * RADIUS, 0.0, 0.0], axis=1)
-        return (away < probe.radius).sum(), (away > 2.5 * probe.radius).sum()
-
-    (inside, outside), (more_inside, more_outside) = near(0), near(3)
-    assert more_inside > 3 * inside > 0
-    assert more_outside < 1.5 * outside
 
 
 def test_a_body_that_comes_as_a_mesh_keeps_its_flat_sides(tmp_path):

@@ -1,4 +1,4 @@
-"""The pieces of a reference: when they are current, how they stand, what a crash or a path that breaks off leaves."""
+"""The reference of a scene as a job: when it is current, how it stands, what a path that breaks off leaves."""
 
 import json
 import shutil
@@ -12,107 +12,93 @@ from reference_fem import SolveError
 from studies.base.errors import StudyError
 from studies.reference import solve as module
 from studies.reference.load import load_reference
-from studies.reference.reference_solves import ReferenceSolve, reference_solves
+from studies.reference.reference_solves import ReferenceSolve, reference_solves, settings_varied
 from studies.reference.solve import solve
 from studies.report.references import refresh_uncertainty
 from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.library import SCENES, ReferencePlan
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.store.ledger import Ledger
+from studies.store.paths import key_digest
 from studies.store.record import Status, read_record
 from studies.sweep import job as jobs_module
+from studies.sweep.job import reference_jobs
 from studies.sweep.load import References, load_runs
-from studies.sweep.standings import solve_standing
-from tests.studies.octant import LEVELS, SCENE
+from studies.sweep.standings import standing_of
+from tests.studies.octant import SCENE
 from tests.studies.tiny import tiny_case, tiny_study
 
 
-def is_current(root, reference_solve):
-    return Ledger(root).why(jobs_module.ReferenceJob(root, "", reference_solve)) is None
+def is_current(root, scene):
+    (job,) = reference_jobs(root, [scene])
+    return Ledger(root).why(job) is None
 
 
-def test_current_until_the_load_or_the_code_changes(solved, monkeypatch):
-    reference_solve = ReferenceSolve(SCENE, LEVELS[0])
-    assert is_current(solved, reference_solve)
-    renamed_metric = replace(SCENE, damping=1.0, frames=7, title="another", quantities=("volume",))
-    other_family = replace(renamed_metric, reference=ReferencePlan("octant", (0.5, 0.1), variants=()))
-    assert is_current(solved, ReferenceSolve(other_family, LEVELS[0]))
-    assert ReferenceSolve(replace(SCENE, gravity=(0.0, 0.0, -9.81)), 0.5).key != reference_solve.key
-    assert ReferenceSolve(SCENE, 0.5, "kappa").key != reference_solve.key
-    assert not is_current(solved, ReferenceSolve(replace(SCENE, checkpoints=(1.0, 3.9)), LEVELS[0]))
-    monkeypatch.setattr(jobs_module, "reference_fingerprint", lambda: "other")
-    assert not is_current(solved, reference_solve)
+def test_current_until_the_load_the_plan_or_the_code_changes(solved, monkeypatch):
+    assert is_current(solved, SCENE)
+    assert is_current(solved, replace(SCENE, damping=1.0, frames=7, title="another", quantities=("volume",)))
+    for changes in (
+        {"gravity": (0.0, 0.0, -9.81)},
+        {"checkpoints": (1.0, 3.9)},
+        {"reference": ReferencePlan("octant", (0.5, 0.4))},
+        {"reference": replace(SCENE.reference, variants=("kappa",))},
+    ):
+        other = replace(SCENE, **changes)
+        assert not is_current(solved, other) and ReferenceSolve(other).key != ReferenceSolve(SCENE).key
+    monkeypatch.setattr(jobs_module, "fingerprint_of", lambda scene: "other")
+    assert not is_current(solved, SCENE)
 
 
-def test_a_mesh_is_the_same_in_every_plan_that_halves_it_as_often():
-    each = replace(BALL_CLAMPED, reference=ReferencePlan("solid", (150, 230, 350), at_outlines=(1, 2, 3)))
-    alike = replace(BALL_CLAMPED, reference=ReferencePlan("solid", (230, 400), at_outlines=2))
-    assert ReferenceSolve(each, 230).key == ReferenceSolve(alike, 230).key
-    assert ReferenceSolve(each, 150).key != ReferenceSolve(replace(each, reference=alike.reference), 150).key
-    smoke = each.reference.coarsest(2)
-    assert (smoke.levels, smoke.at_outlines, smoke.at_contact) == ((150, 230), (1, 2), 0)
+@pytest.mark.parametrize("changes", [{"base": 100}, {"at_contact": 1}, {"tolerance": 0.01}, {"most": 2e4}])
+def test_another_plan_of_nested_meshes_is_another_reference(changes):
+    other = replace(BALL_CLAMPED, reference=ReferencePlan(**changes))
+    assert ReferenceSolve(other).key != ReferenceSolve(BALL_CLAMPED).key
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
-def test_a_scene_read_back_from_a_record_has_the_same_pieces(scene):
-    """JSON turns the level 350 into 350.0; the solution is the same."""
+def test_a_scene_read_back_from_a_record_has_the_same_reference(scene):
+    """JSON turns the number 350 into 350.0; the solution is the same."""
     back = scene_from_dict(json.loads(scene_to_json(scene)))
-    assert [piece.key for piece in reference_solves(back)] == [piece.key for piece in reference_solves(scene)]
-
-
-@pytest.mark.parametrize("times", [(1, 2), (1, 2, 3, 4), (0, -1, 2), -1])
-def test_a_plan_says_for_each_of_its_meshes_how_often_to_halve(times):
-    with pytest.raises(StudyError, match="one for each mesh"):
-        ReferencePlan("solid", (150, 230, 350), at_outlines=times)
-    with pytest.raises(StudyError, match="one for each mesh"):
-        ReferencePlan("solid", (150, 230, 350), at_contact=times)
+    assert [one.key for one in reference_solves(back)] == [one.key for one in reference_solves(scene)]
+    assert back.reference == scene.reference
 
 
 def test_settings_are_varied_only_where_they_matter():
-    assert [reference_solve.variant for reference_solve in reference_solves(SCENE)] == [
-        "",
-        "",
-        "",
-        "steps",
-        "contact",
-        "kappa",
-    ]
-    assert {reference_solve.level for reference_solve in reference_solves(SCENE) if reference_solve.variant} == {
-        LEVELS[0]
-    }
-    untouched = replace(SCENE, obstacles=(), probed=BALL_CLAMPED.probed)
-    assert [reference_solve.variant for reference_solve in reference_solves(untouched)] == [
-        "",
-        "",
-        "",
-        "steps",
-        "kappa",
-    ]
+    assert settings_varied(SCENE) == ["steps", "contact", "kappa"]
+    assert settings_varied(replace(SCENE, obstacles=(), probed=BALL_CLAMPED.probed)) == ["steps", "kappa"]
+    assert settings_varied(replace(SCENE, reference=replace(SCENE.reference, variants=()))) == []
+    assert len(reference_solves(SCENE)) == 1
     assert reference_solves(replace(SCENE, reference=None)) == []
 
 
-def listed(root):
-    return [solve_standing(Ledger(root), reference_solve) for reference_solve in reference_solves(SCENE)]
+def test_a_reference_holds_its_meshes_and_the_settings_made_better(found):
+    """Fine to coarse; all of them at both checkpoints, compared at the vertices of the coarsest."""
+    assert [len(found.meshes), list(found.variants)] == [3, ["steps", "contact", "kappa"]]
+    unknowns, sizes = ([getattr(one, name) for one in found.meshes] for name in ("unknowns", "size"))
+    assert sorted(unknowns, reverse=True) == unknowns and sorted(sizes) == sizes
+    assert unknowns[0] == found.record.attributes["unknowns"]
+    assert {one.unknowns for one in found.variants.values()} == {unknowns[-1]}
+    for one in (*found.meshes, *found.variants.values()):
+        assert one.u.shape == found.at.points.shape and np.isfinite(one.force).all()
+    np.testing.assert_array_equal(found.meshes[0].force, found.force)
+    assert found.at.symmetric and len(found.at.points) < len(found.field("nodes"))
 
 
-def states(root):
-    return [row.state for row in listed(root)]
+def standing(root):
+    (job,) = reference_jobs(root, [SCENE])
+    return standing_of(Ledger(root), job)
 
 
-def test_listing_says_how_every_piece_stands(solved, tmp_path, monkeypatch):
-    root = shutil.copytree(solved, tmp_path / "results")
-    ReferenceSolve(SCENE, LEVELS[1]).path(root).unlink()
-    damaged = ReferenceSolve(SCENE, LEVELS[0], "kappa").path(root)
-    damaged.write_bytes(damaged.read_bytes()[:500])
-    whole = listed(solved)
-    assert states(solved) == ["ok"] * 6
-    assert [row.steps for row in whole] == [2] * 6
-    assert all(row.seconds > 0 for row in whole)
-    assert sorted(unknowns := [row.unknowns for row in whole[:3]]) == unknowns
-    assert states(root) == ["ok", "missing", "ok", "ok", "ok", "unreadable"]
-    assert [row.unknowns for row in listed(root) if row.state in ("missing", "unreadable")] == [None, None]
-    monkeypatch.setattr(jobs_module, "reference_fingerprint", lambda: "other")
-    assert states(solved) == ["stale"] * 6
+def test_listing_says_how_a_reference_stands(solved, tmp_path, monkeypatch):
+    whole = standing(solved)
+    assert whole.status == "ok" and whole.entry.unknowns > 1000 and whole.entry.seconds > 0
+    assert standing(tmp_path).status == "missing" and standing(tmp_path).entry is None
+    damaged = shutil.copytree(solved, tmp_path / "results")
+    path = ReferenceSolve(SCENE).path(damaged)
+    path.write_bytes(path.read_bytes()[:500])
+    assert (standing(damaged).status, standing(damaged).message) == ("stale", "its file is damaged")
+    monkeypatch.setattr(jobs_module, "fingerprint_of", lambda scene: "other")
+    assert standing(solved).status == "stale"
 
 
 def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, tmp_path, found):
@@ -125,75 +111,64 @@ def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, 
     shares = rows[["mesh [%]", "steps [%]", "contact [%]", "kappa [%]"]].to_numpy()
     np.testing.assert_allclose(np.linalg.norm(shares, axis=1), rows["uncertainty [%]"], rtol=1e-5)
     assert rows["uncertainty [%]"][0] == pytest.approx(100 * found.total_uncertainty["force"], rel=1e-5)
+    assert set(rows["meshes"]) == {3}
     assert chart.read_bytes()[:4] == b"\x89PNG"
     chart.write_bytes(b"old")
     refresh_uncertainty(References(Ledger(root)), [SCENE])
     assert chart.read_bytes() == b"old"
-    solve(root, ReferenceSolve(SCENE, LEVELS[0]))
+    path = ReferenceSolve(SCENE).path(root)
+    path.write_bytes(path.read_bytes())
     refresh_uncertainty(References(Ledger(root)), [SCENE])
     assert chart.read_bytes()[:4] == b"\x89PNG"
     assert refresh_uncertainty(References(Ledger(tmp_path / "empty")), [SCENE]) == []
 
 
-class Killed(BaseException):
-    """What a process that dies leaves behind: nothing is caught, nothing tidied."""
+FOLDS = "the mesh folds; refine it"
 
 
-def test_a_crash_half_way_costs_no_finished_step(solved, tmp_path, monkeypatch):
-    """The second load step dies; the next run starts at the first one's end and finds the same."""
-    reference_solve, true_path, starts = ReferenceSolve(SCENE, LEVELS[0]), module.equilibrium_path, []
+def breaks(monkeypatch, number, reached):
+    """Makes a path break off after so many checkpoints: the first one (0), the second one (1) and so on."""
+    true_path, begun = module.equilibrium_path, []
 
-    def dies(problem, times, settings, on_checkpoint, resume):
-        def then_die(checkpoint):
-            on_checkpoint(checkpoint)
-            raise Killed
+    def path(problem, times, settings):
+        begun.append(times)
+        if len(begun) <= number:
+            return true_path(problem, times, settings)
+        converged = true_path(problem, times[:reached], settings) if reached else []
+        raise SolveError(FOLDS, converged=converged)
 
-        return true_path(problem, times, settings, on_checkpoint=then_die, resume=resume)
-
-    def watched(problem, times, settings, on_checkpoint, resume):
-        starts.append(len(resume.path) if resume else 0)
-        return true_path(problem, times, settings, on_checkpoint=on_checkpoint, resume=resume)
-
-    monkeypatch.setattr(module, "equilibrium_path", dies)
-    with pytest.raises(Killed):
-        solve(tmp_path, reference_solve)
-    assert states(tmp_path) == ["half-way", *["missing"] * 5]
-    assert listed(tmp_path)[0].steps == 1
-    monkeypatch.setattr(module, "equilibrium_path", watched)
-    again, whole = read_record(solve(tmp_path, reference_solve)), read_record(reference_solve.path(solved))
-    assert starts == [1]
-    assert again.status == Status.OK
-    for name in ("displacement", "contact_force", "pressure"):
-        known = whole.fields[name].values
-        # The factorisation may order its sums by the first matrix it sees: rounding, not Newton's tolerance of 1e-6.
-        np.testing.assert_allclose(again.fields[name].values, known, rtol=0, atol=1e-9 * np.abs(known).max())
-    assert states(tmp_path)[0] == "ok"
-    assert not list(tmp_path.rglob("*.steps"))
+    monkeypatch.setattr(module, "equilibrium_path", path)
 
 
-def broken(problem, times, settings, **_):
-    raise SolveError("no equilibrium found between t = 1 s and t = 4 s: the mesh folds; refine it", converged=[])
-
-
-def test_a_path_that_breaks_off_is_stored_and_not_believed(solved, tmp_path, monkeypatch):
-    root = shutil.copytree(solved, tmp_path / "results")
-    true_path = module.equilibrium_path
-
-    def half(problem, times, settings, **_):
-        raise SolveError("the mesh folds; refine it", converged=true_path(problem, times[:1], settings))
-
-    monkeypatch.setattr(module, "equilibrium_path", half)
-    record = read_record(solve(root, ReferenceSolve(SCENE, LEVELS[1])))
+def test_a_path_that_breaks_off_is_stored_and_not_believed(tmp_path, monkeypatch):
+    """On the second of three meshes: the first one is there to be looked at."""
+    breaks(monkeypatch, number=1, reached=1)
+    record = read_record(solve(tmp_path, ReferenceSolve(SCENE)))
     assert record.status == Status.NOT_CONVERGED
-    assert "mesh folds" in record.message
+    assert record.message == f"on mesh 0.4: {FOLDS}" and record.attributes["steps_done"] == 1
     force = record.fields["contact_force"].values
     assert np.isfinite(force[0]).all()
     assert np.isnan(force[1]).all()
-    with pytest.raises(StudyError, match="not-converged: the mesh folds; refine it"):
-        load_reference(root, SCENE)
+    assert record.fields["sample_unknowns"].values.tolist() == [record.fields["sample_unknowns"].values[0]]
+    with pytest.raises(StudyError, match=f"not-converged: on mesh 0.4: {FOLDS}"):
+        load_reference(tmp_path, SCENE)
 
 
-def test_runs_are_loaded_without_a_reference_that_failed(solved, tmp_path, monkeypatch, mesh_cache):
+def test_a_path_that_breaks_off_at_once_is_stored_too(tmp_path, monkeypatch):
+    breaks(monkeypatch, number=0, reached=0)
+    record = read_record(solve(tmp_path, ReferenceSolve(SCENE)))
+    assert (record.status, record.message) == (Status.NOT_CONVERGED, f"on mesh 0.5: {FOLDS}")
+    assert np.isnan(record.fields["contact_force"].values).all()
+
+
+def test_a_better_setting_that_breaks_off_is_named(tmp_path, monkeypatch):
+    plan = ReferencePlan("octant", (0.9, 0.5), variants=("kappa",))
+    breaks(monkeypatch, number=2, reached=0)
+    record = read_record(solve(tmp_path, ReferenceSolve(replace(SCENE, reference=plan))))
+    assert (record.status, record.message) == (Status.NOT_CONVERGED, f"on mesh 0.9 with other kappa: {FOLDS}")
+
+
+def test_runs_are_loaded_without_a_reference_that_failed(solved, tmp_path, mesh_cache):
     from studies.runs.run import run_case
 
     root = shutil.copytree(solved, tmp_path / "results")
@@ -202,17 +177,52 @@ def test_runs_are_loaded_without_a_reference_that_failed(solved, tmp_path, monke
     runs, remarks = load_runs(root, study)
     assert remarks == []
     assert runs[0].reference.force[-1] > 0
-    monkeypatch.setattr(module, "equilibrium_path", broken)
-    solve(root, ReferenceSolve(SCENE, LEVELS[1]))
+    (job,) = reference_jobs(root, [SCENE])
+    job.store_failure(FOLDS)
     runs, remarks = load_runs(root, study)
     assert runs[0].reference is None
     assert len(remarks) == 1
-    assert "not-converged" in remarks[0]
-    ReferenceSolve(SCENE, LEVELS[0]).path(root).unlink()
+    assert FOLDS in remarks[0]
+    job.path().unlink()
     assert "no results file" in load_runs(root, study)[1][0]
 
 
 def test_no_plan_no_reference(tmp_path):
     assert load_reference(tmp_path, replace(SCENE, reference=None)) is None
-    with pytest.raises(StudyError, match="two levels"):
-        ReferencePlan("octant", (0.5,))
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"mesh": "octant", "levels": (0.5,)}, "an octant or of a motion needs two or more levels"),
+        ({"mesh": "octant"}, "needs two or more levels, or it has no error bar"),
+        ({"levels": (300,), "dt": 0.1}, "needs two or more levels"),
+        ({"levels": (250, 360)}, "nested reference meshes have no levels; give base, tolerance or most"),
+        ({"mesh": "hollow"}, "a 'solid' or 'octant' mesh, not 'hollow'"),
+        ({"base": 3}, "base = 3, .*give at least 4"),
+        ({"at_contact": -1}, "at_contact = -1"),
+        ({"tolerance": 0.0}, "tolerance = 0.0 and most"),
+        ({"tolerance": float("nan")}, "tolerance = nan"),
+        ({"most": 999.0}, "most = 999; give at least 4, 0, more than 0 and 1000"),
+        ({"most": float("nan")}, "most = nan"),
+    ],
+)
+def test_a_plan_that_makes_no_reference_is_refused(changes, sentence):
+    with pytest.raises(StudyError, match=sentence):
+        ReferencePlan(**changes)
+
+
+def test_a_quick_look_has_fewer_unknowns_and_no_better_settings():
+    plan = ReferencePlan(base=100, at_contact=0)
+    quick = plan.smaller()
+    assert quick.nested and (quick.base, quick.at_contact, quick.variants) == (100, 0, ())
+    assert quick.most == 12e3 and quick.tolerance == 1.0 and replace(plan, most=5e3).smaller().most == 5e3
+    octant = ReferencePlan("octant", (0.5, 0.4, 0.3)).smaller()
+    assert not octant.nested and (octant.levels, octant.variants) == ((0.5, 0.4), ())
+    moving = ReferencePlan(levels=(200, 300, 400), dt=0.1).smaller()
+    assert not moving.nested and (moving.levels, moving.dt) == ((200, 300), 0.1)
+
+
+def test_keys_tell_scenes_apart_that_differ_in_their_physics_alone():
+    assert key_digest(ReferenceSolve(replace(SCENE, title="other")).key) == key_digest(ReferenceSolve(SCENE).key)
+    assert key_digest(ReferenceSolve(replace(SCENE, name="other")).key) != key_digest(ReferenceSolve(SCENE).key)

@@ -16,9 +16,9 @@ from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.true_shape import true_shape
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solution import Solution
-from studies.reference.solve import solve
+from studies.reference.solve import element_size, solve
 from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
-from studies.scene.scene import Organ
+from studies.scene.scene import Organ, ReferencePlan
 from studies.store.record import read_record
 from tests.geometry.boxes import box, split
 from tests.studies.tiny import write_obj
@@ -41,7 +41,7 @@ def scene(tmp_path_factory, mesh_cache):
     """The clamped ball, its surface read from a file of 3,072 triangles."""
     path = write_obj(tmp_path_factory.mktemp("scan") / "ball.obj", *ball_surface(4))
     organ = Organ("file", {"path": str(path), "unit": "m", "remesh": True})
-    plan = replace(BALL_CLAMPED.reference, levels=(LEVEL, 150), at_outlines=1)
+    plan = ReferencePlan(base=LEVEL, at_contact=0, most=5e3, variants=())
     return replace(BALL_CLAMPED, name="ball_in_a_file", organ=organ, reference=plan)
 
 
@@ -69,7 +69,7 @@ def test_a_graded_quadratic_body_is_on_the_same_shape(scene, shape):
 
 
 def test_sides_follow_the_true_shape_and_outlines_the_true_outline(scene, shape):
-    mesh, patches, _ = reference_mesh(replace(scene, reference=replace(scene.reference, at_outlines=0)), LEVEL)
+    mesh, patches, _ = reference_mesh(scene, LEVEL)
     points = nodes(mesh)
     distance = np.linalg.norm(points, axis=1)
     outer = np.unique(facet_nodes(mesh))
@@ -91,7 +91,7 @@ def test_all_meshes_have_one_shape(scene, shape, mesh_cache):
 
 
 def test_the_size_is_that_of_the_mesh_that_is_curved(scene):
-    mesh = mesh_for(scene, LEVEL, on_shape=True)
+    mesh = mesh_for(scene, LEVEL, on_shape=True, even=True)
     edges = mesh.tetrahedra[:, [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]].reshape(-1, 2)
     edges = np.unique(np.sort(edges, axis=1), axis=0)
     lengths = np.linalg.norm(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]], axis=1)
@@ -104,6 +104,6 @@ def test_a_ball_in_a_file_has_the_reference_of_the_ball(scene, tmp_path):
     known = replace(scene, organ=BALL_CLAMPED.organ, name="ball_by_name")
     forces = []
     for one in (scene, known):
-        record = read_record(solve(tmp_path, ReferenceSolve(one, LEVEL)))
+        record = read_record(solve(tmp_path, ReferenceSolve(one)))
         forces.append(Solution(one, record).force[-1])
     assert forces[0] == pytest.approx(forces[1], rel=0.02)

@@ -30,8 +30,7 @@ def scene(tmp_path_factory, mesh_cache):
     path.write_bytes(writers.vtp(points, faces, "packed", caps))
     organ = Organ("file", {"path": str(path), "unit": "m", "remesh": True})
     held = tuple(replace(one, region=painted(path, one.name, "m")) for one in BALL_CLAMPED.held)
-    plan = replace(BALL_CLAMPED.reference, levels=(LEVEL, 250), at_outlines=0)
-    return replace(BALL_CLAMPED, name="painted_ball", organ=organ, held=held, reference=plan)
+    return replace(BALL_CLAMPED, name="painted_ball", organ=organ, held=held)
 
 
 def heights(points, patch):

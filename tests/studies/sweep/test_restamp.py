@@ -16,7 +16,7 @@ from studies.store.record import Status, peek, read_record, write_record
 from studies.sweep import restamp as module
 from studies.sweep.job import case_jobs
 from studies.sweep.restamp import AT_RANDOM, outdated, restamp, sample
-from tests.studies.octant import LEVELS, SCENE
+from tests.studies.octant import SCENE
 from tests.studies.tiny import tiny_case, tiny_study
 
 FORMER = "f" * 64
@@ -164,10 +164,10 @@ def test_a_sample_has_the_quickest_of_each_variety_and_three_others(old):
 
 
 def test_a_reference_is_solved_again_elsewhere(solved, tmp_path):
-    coarsest = ReferenceSolve(SCENE, LEVELS[0])
-    path = coarsest.path(tmp_path)
+    whole = ReferenceSolve(SCENE)
+    path = whole.path(tmp_path)
     path.parent.mkdir()
-    shutil.copy(coarsest.path(solved), path)
+    shutil.copy(whole.path(solved), path)
     change(path, fingerprint=FORMER)
     study = tiny_study(cases=(tiny_case(scene=SCENE),))
     (members,) = outdated(tmp_path, [study])

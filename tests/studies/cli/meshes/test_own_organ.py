@@ -10,11 +10,11 @@ import meshio
 import numpy as np
 import pytest
 
-from studies.cli.commands.place import UNKNOWNS, VARIANTS
 from studies.geometry import organ, read_mesh
 from studies.meshing.scene_mesh import mesh_for
 from studies.runs.case import BodyRecipe
 from studies.scene.chosen_place import DEPTH
+from studies.scene.scene import ReferencePlan
 from studies.scene.tissues import SPLEEN
 from studies.tools.advise.answer import advise
 from studies.tools.advise.campaign import shipped
@@ -50,11 +50,11 @@ def scan_file(kidney, tmp_path, monkeypatch):
 
 
 SMALLER = {
-    r"\(250, 360, 550\), at_outlines=.*\)": "(150, 200), variants=())",
+    r"ReferencePlan\(\)": "ReferencePlan(base=150, at_contact=1, most=8e3, variants=())",
     r"nodes=\d+": "nodes=594",
     r"frames=240": "frames=60",
 }
-"""Changes to the scene file: it runs in two minutes, on two small reference meshes, with bodies as coarse as can be."""
+"""Changes to the scene file: it runs in two minutes, on small reference meshes, with bodies as coarse as can be."""
 
 
 @pytest.mark.slow
@@ -134,7 +134,7 @@ def test_a_scene_file_holds_the_tissue_the_hold_and_the_advised_body(organbench,
     assert (two.body, two.dt_fraction) == (answer.chosen.case.body, answer.chosen.case.dt_fraction)
     assert one.body == BodyRecipe(nodes=200) and [case.recorded for case in study.cases] == [("surface",)] * 2
     # What the estimate rests on.
-    assert one.scene.reference.levels == tuple(UNKNOWNS) and len(one.scene.reference.variants) == VARIANTS
+    assert one.scene.reference == ReferencePlan()
 
 
 def test_bad_input_is_one_sentence(refused, scan_file, tmp_path):

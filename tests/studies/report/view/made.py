@@ -8,7 +8,8 @@ from skfem import MeshTet
 
 from massspring import ImplicitVolume, Method
 from reference_fem import nodes
-from studies.reference.reference_solves import reference_solves
+from studies.reference.reference_solves import ReferenceSolve
+from studies.reference.sample import Sample, SamplePoints, sample_fields
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.scene import Scene
 from studies.store.new_record import new_fields, new_record
@@ -28,18 +29,21 @@ def stored_case(root: Path, study="made", scene: Scene = SCENE, method: Method |
 
 def reference_record(scene: Scene, status: Status = Status.OK) -> Record:
     """The finest reference of a scene on the cube: at checkpoint k (of K) it is bent by (k + 1) / K."""
-    solve = [solve for solve in reference_solves(scene) if not solve.variant][-1]
+    solve = ReferenceSolve(scene)
     mesh = MeshTet(np.ascontiguousarray(POINTS.T), np.ascontiguousarray(CELLS.T))
     x, steps = nodes(mesh), len(scene.checkpoints)
     lengths = {"K": steps, "o": len(scene.obstacles), "g": len(scene.held), "n": len(x), "c": len(CELLS), "3": 3}
     values = {
         name: np.zeros([lengths[part] for part in spec.shape.split()])
         for name, spec in REFERENCE_FIELDS.items()
-        if name != "tetrahedra"
+        if name != "tetrahedra" and not name.startswith("sample_")
     }
     share = np.arange(1, steps + 1) / steps
     values |= {"t": np.array(scene.checkpoints), "nodes": x, "tetrahedra": np.ascontiguousarray(mesh.t.T)}
     values |= {"displacement": share[:, None, None] * bend(x), "volume": 1 + 0.1 * share}
+    series = np.zeros(steps)
+    whole = Sample("", 1, 1.0, bend(POINTS), series, 1 + 0.1 * share, series, series)
+    values |= sample_fields(SamplePoints(POINTS, CELLS), [whole])
     return new_record(
         kind="reference",
         key=solve.key,
@@ -48,8 +52,7 @@ def reference_record(scene: Scene, status: Status = Status.OK) -> Record:
         message="",
         fingerprint="",
         attributes={
-            "scene": scene.name, "level": float(solve.level), "variant": "", "unknowns": 1, "steps_done": steps,
-            "seconds": 1.0,
+            "scene": scene.name, "unknowns": 1, "steps_done": steps, "off_shape": 0, "stopped": "", "seconds": 1.0,
         },
         fields=new_fields(REFERENCE_FIELDS, values),
     )  # fmt: skip
