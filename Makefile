@@ -16,7 +16,7 @@ help: ## this list
 	@echo "Main studies: $$(grep -l main=True studies/catalog/*.py | xargs -n 1 basename -s .py | xargs)"
 
 demo: setup-run ## squeeze a ball with three bodies: three numbers each, and a page (a minute)
-	$(BIN)/organbench demo --output results/demo
+	$(BIN)/organbench demo --results results/demo
 
 study: setup-run ## run the main studies, then the charts and tables (the main job; minutes)
 	$(BIN)/organbench run --report

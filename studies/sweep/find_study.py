@@ -9,6 +9,7 @@ from typing import Any
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
+from studies.catalog.demo import DEMO
 from studies.runs.case import Case, case_from_json, case_to_dict
 from studies.scene.clock import check_clock
 from studies.sweep.find_scene import SUFFIX, read_user_file
@@ -58,7 +59,7 @@ def known_studies(names: Sequence[str]) -> list[Study]:
 
     Raises StudyError with the nearest name.
     """
-    makers: dict[str, Callable[[], Study]] = {study.name: lambda study=study: study for study in STUDIES}
+    makers: dict[str, Callable[[], Study]] = {study.name: lambda study=study: study for study in (*STUDIES, DEMO)}
     if not makers.keys() >= set(names):
         from studies.catalog.population import POPULATION, population_study  # as above
 

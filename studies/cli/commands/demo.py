@@ -2,12 +2,9 @@
 
 import time
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from studies.catalog.demo import DEMO, WORDS
-from studies.cli.terminal import say, warn
+from studies.cli.terminal import Results, say, warn
 from studies.metrics.metrics import force_end, volume_worst
 from studies.metrics.run import Run
 from studies.report.page.write import write_page
@@ -21,30 +18,29 @@ from studies.sweep.load import load_runs
 
 NEEDED = ("implicit_volume, quadratic, float64", "implicit_volume, whole, float64", "free, whole, float64")
 """What is compiled for it, the longest first."""
-Output = Annotated[Path, typer.Option("-o", "--output", help="folder for results and the page")]
 
 
-def demo(output: Output = Path("organbench-demo")) -> None:
+def demo(results: Results = Path("organbench-demo")) -> None:
     """Squeeze a ball with three bodies, next to the published reference: three numbers each, and a page to look at."""
     begin = time.perf_counter()
-    ledger = Ledger(output)
+    ledger = Ledger(results)
     if not is_done(whole=False) and not is_done(whole=True):
         say("compiling once, in two processes")
         for done in compile_all(list(NEEDED)):
             say(f"  {done.name}: {done.seconds:.0f} s")
-    for job in reference_jobs(output, DEMO.scenes):
+    for job in reference_jobs(results, DEMO.scenes):
         do(job)
     speeds = []
-    for job, words in zip(case_jobs(output, DEMO), WORDS, strict=True):
+    for job, words in zip(case_jobs(results, DEMO), WORDS, strict=True):
         say(f"{words}: {job.work.body.nodes} surface nodes")
         speeds.append(run_timed(job))
     ledger.look_again()
-    runs, problems = load_runs(output, DEMO)
+    runs, problems = load_runs(results, DEMO)
     warn(problems)
     for run, words, speed in zip(runs, WORDS, speeds, strict=True):
         say(line(run, words, speed))
     warn(refresh(ledger, DEMO)[1])
-    page, _ = write_page(output, [DEMO])
+    page, _ = write_page(results, [DEMO])
     say(f"{page}: the moving bodies and a chart ({time.perf_counter() - begin:.0f} s in all)")
 
 

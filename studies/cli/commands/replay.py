@@ -26,8 +26,7 @@ def replay(
 ) -> None:
     """Run one stored case again and compare the results. Exit code 1: they differ.
 
-    A record is data and starts no program: a case with a method or law of your own needs --file, and a file whose
-    SHA-256 is not the one in the record --changed too.
+    A case with a method or law of your own needs --file, and --changed where the file has changed.
     """
     load_own_files(path, file or [], changed)
     stored, new, difference = replay_run(path)

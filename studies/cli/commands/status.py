@@ -23,10 +23,10 @@ def status(
     study: Annotated[str, typer.Argument(help="a study, with its problems; default: all studies, in numbers")] = "",
     results: Results = Path("results"),
     smoke: Smoke = False,
-    every: Annotated[bool, typer.Option("--all", help="name every problem and every mesh")] = False,
+    every: Annotated[bool, typer.Option("--all", help="name every problem")] = False,
     check: Annotated[bool, typer.Option(help="verify the checksums of all files, not only changed ones")] = False,
 ) -> None:
-    """Count what is ok, failed, stale or missing, and say why. References are listed mesh by mesh."""
+    """Count what is ok, failed, stale or missing, and say why."""
     chosen = [find_study(study)] if study else list(STUDIES)
     if smoke:
         chosen, results = [entry.smoke() for entry in chosen], results / SMOKE

@@ -107,7 +107,7 @@ BAD = {
     "no region": (lambda b: Volumes.regions(b, 0), "0 regions asked"),
     "no surface": (lambda b: Volumes.closed_surfaces(b, {}), "name at least one"),
     "open": (lambda b: Volumes.closed_surfaces(b, {"lumen": hollow_surfaces()["lumen"][1:]}), "'lumen': .* open at 3"),
-    "inside-out": (turned_lumen, "'lumen': .* inside-out"),
+    "inside-out": (turned_lumen, "'lumen': .* inverted"),
     "one name twice": (
         lambda b: Volumes.whole(b).joined(replace(lumen_of(b), names=("whole",))),
         "give each its own name",

@@ -228,7 +228,7 @@ def refused(body, method, sentence, **around):
 @pytest.mark.parametrize("method", [ElasticResponse(), LinearModes()], ids=lambda method: method.name)
 def test_what_they_cannot_do_is_said(method):
     body = linear_solid((2, 2, 2))
-    refused(body, method, "nothing is held", attachments=())
+    refused(body, method, "no nodes are clamped", attachments=())
     refused(body, method, "frictionless", obstacles=(Plane((0, 0, -1), (0, 0, 1), friction=0.2),))
     refused(body, method, "follow no target", targets={"node 3": Ramp((0.0, 1.0), (1.0, 1.1))})
     refused(body, method, "on a line", attachments=(Attachment(np.array([0, 1])),))

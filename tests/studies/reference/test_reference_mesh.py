@@ -7,8 +7,6 @@ import pytest
 from skfem import ElementTetP2, MeshTet, MeshTet2
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
-from studies.meshing.reference_outlines import SHARE
-from studies.reference.size import element_size
 
 from reference_fem import NewtonSettings, facet_nodes, nodes
 from reference_fem.elements.shapes import basis_table, element_nodes

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from studies.reference.size import element_size
 
 from reference_fem import facet_nodes, nodes
 from studies.geometry.mesh.jacobian import curved_volume
