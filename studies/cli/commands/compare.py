@@ -55,6 +55,9 @@ def summary(comparison: Comparison) -> list[str]:
     elif sum(times.values()):
         machine = "another machine" if None not in comparison.machines else "machine not known"
         lines.append(f"speed: {machine}, {ratio}, {sum(times.values())} times not judged")
+    other = comparison.counts(times=False)[Verdict.OTHER_REFERENCE]
+    if other:
+        lines.append(f"references: not the same in both folders, {other} errors not judged")
     if comparison.only_old or comparison.only_new:
         lines.append(
             f"cases in the first folder alone: {comparison.only_old}, in the second alone: {comparison.only_new}"

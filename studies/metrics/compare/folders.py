@@ -14,6 +14,7 @@ from studies.metrics.compare.verdict import Verdict, verdict_of
 from studies.metrics.metrics import METRICS
 from studies.runs.case import case_from_json
 from studies.runs.recipe_text import recipe_text
+from studies.scene.quantities import ALWAYS
 from studies.store.machine import machine_of
 from studies.store.paths import record_files
 from studies.store.record import Record, read_record
@@ -28,6 +29,10 @@ ROW = ("scene", "body", "method", "nodes", "law", "dt/dt_c", "recipe")
 TIMES = tuple(metric.name for metric in METRICS if metric.spread is not None)
 SPEEDS = tuple(metric.name for metric in METRICS if metric.spread is not None and metric.better == "higher")
 """Metrics that depend on the machine; of these the ones that are speeds."""
+JUDGED = tuple(metric.name for metric in METRICS if metric.quantity not in (None, *ALWAYS))
+"""Metrics that compare with the reference."""
+REFERENCE = "reference"
+"""Column that names it; tables of before published sets lack it."""
 
 
 class Named(NamedTuple):
@@ -172,6 +177,8 @@ def changes_of(study: str, old: Row, new: Row, same_bits: bool) -> list[Change]:
         name, unit = named["name"], named["unit"]
         floor = max(_floor(old, name, unit), _floor(new, name, unit))
         verdict = verdict_of(float(before), float(after), floor, same_bits)
+        if name in JUDGED and str(old.get(REFERENCE)) != str(new.get(REFERENCE)):
+            verdict = Verdict.OTHER_REFERENCE
         found.append(Change(case, name, unit, float(before), float(after), floor, verdict))
     return found
 

@@ -15,6 +15,7 @@ class Verdict(StrEnum):
     MOVED = "moved"
     NOT_RESOLVABLE = "not resolvable"
     OTHER_MACHINE = "other machine"
+    OTHER_REFERENCE = "other reference"
 
 
 MEANING: dict[Verdict, str] = {
@@ -24,6 +25,7 @@ MEANING: dict[Verdict, str] = {
     Verdict.MOVED: "the change is larger than that uncertainty",
     Verdict.NOT_RESOLVABLE: "the number has no stated uncertainty, or one folder lacks it",
     Verdict.OTHER_MACHINE: "a time from another machine; it is not compared",
+    Verdict.OTHER_REFERENCE: "an error against another reference, or another published set; it is not compared",
 }
 
 

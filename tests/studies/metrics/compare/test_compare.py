@@ -77,6 +77,19 @@ def test_the_larger_floor_of_both_counts(tmp_path):
     assert compare(old, new).moved == []
 
 
+@pytest.mark.parametrize("old", [{}, {"reference": "2027.1 0a0a0a0a"}])
+def test_errors_against_two_references_are_not_judged(tmp_path, organbench, old):
+    """A force that moved by ten times its uncertainty, against another truth; a number without one moves as ever."""
+    before = folder(tmp_path / "old", rows(**old))
+    new = {"reference": "2027.2 0b0b0b0b", "force_end [%]": -25.0, "min_j [1]": 0.5}
+    found = compare(before, folder(tmp_path / "new", rows(**new)))
+    assert Verdict.MOVED not in told(found) and Verdict.OTHER_REFERENCE in told(found)
+    assert Verdict.OTHER_REFERENCE not in told(found, "min_j")
+    code, out, _ = organbench("compare", before, tmp_path / "new")
+    assert code == 0
+    assert "references: not the same in both folders, " in out
+
+
 def test_a_case_that_ends_otherwise_moved(tmp_path):
     old, new = folder(tmp_path / "old", rows()), folder(tmp_path / "new", rows(status="diverged"))
     (moved,) = compare(old, new).moved
