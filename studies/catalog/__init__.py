@@ -12,11 +12,11 @@ from studies.catalog.study import Chart, Study
 from studies.catalog.volume_loss import VOLUME_LOSS
 from studies.catalog.work_precision import WORK_PRECISION
 
-# In this order they run: the first needs least, so that `make study` has a chart early.
+# In this order they run: the headline first, so that `make study` draws volume and squeeze early.
 STUDIES: tuple[Study, ...] = (
+    VOLUME_LOSS,
     STABILITY_MAP,
     FRAME_RATE,
-    VOLUME_LOSS,
     WORK_PRECISION,
     ORGANS,
     STRESS,
