@@ -38,15 +38,12 @@ def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> N
 
 def held_area_error(scene: Scene, mesh: OrganMesh | QuadraticMesh, held: Held) -> float:
     """Area of the facets of a held region over that of the region on the true surface, less 1 [1]; NaN where that is
-    not known."""
+    not known, or the region is off the surface: the run tells that."""
     truth = true_surface(scene.organ)
-    if truth is None:
+    area = 0.0 if truth is None else region_area(held.region, *truth.sides[OUTER])
+    if not area > 0.0:
         return float("nan")
-    facets = held_facets(mesh, held)
-    return (
-        float(triangle_areas(*along_facets(mesh.points, facets)).sum()) / region_area(held.region, *truth.sides[OUTER])
-        - 1.0
-    )
+    return float(triangle_areas(*along_facets(mesh.points, held_facets(mesh, held))).sum()) / area - 1.0
 
 
 def held_facets(mesh: OrganMesh | QuadraticMesh, held: Held) -> np.ndarray:
