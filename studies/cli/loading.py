@@ -25,7 +25,7 @@ class Entry(NamedTuple):
 RUN, LOOK, TOOLS, MESHES = "Run studies", "Look at results", "Recommend and test", "Make meshes"
 SHARE, MAINTAIN = "Share and compare with other programs", "Maintain"
 COMMANDS = {
-    "demo": Entry(RUN, "Squeeze a ball with three bodies: numbers and a page in a minute."),
+    "demo": Entry(RUN, "Squeeze a ball with three bodies, next to the reference."),
     "run": Entry(RUN, "Run what is missing or stale, then draw the charts.", "studies"),
     "status": Entry(RUN, "Count what is ok, failed, stale or missing, and say why.", "studies"),
     "replay": Entry(RUN, "Run one stored case again and compare the results."),

@@ -37,7 +37,7 @@ def fields_of(scene: Scene, solution: FamilySolution) -> dict[str, Field]:
 
     rows = [row(e) for e in found]
     values = {"t": np.array(scene.checkpoints), "nodes": x, "tetrahedra": tetrahedra}
-    values |= sample_fields(solution.at, solution.samples)
+    values |= sample_fields(solution.at, solution.samples, len(scene.checkpoints))
     for name in REFERENCE_FIELDS.keys() - values.keys():
         shape = REFERENCE_FIELDS[name].shape.split()
         values[name] = np.full([lengths[part] if part in lengths else int(part) for part in shape], np.nan)

@@ -5,6 +5,7 @@ from functools import cached_property
 from pathlib import Path
 
 from studies.base.errors import StudyError
+from studies.reference.published import published, record_of
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.sample import Sample, SamplePoints, samples_in
 from studies.reference.solution import Solution
@@ -64,3 +65,12 @@ def load_reference(root: Path, scene: Scene) -> Reference | None:
     if record.status != Status.OK:
         raise StudyError(f"the reference of '{scene.name}' is {record.status}: {record.message}")
     return Reference(scene, record)
+
+
+def reference_for(root: Path, scene: Scene) -> Reference | None:
+    """What a scene is judged by: the published reference, else the one stored below `root`; None without a plan.
+
+    Raises StudyError as load_reference.
+    """
+    entry = published(scene)
+    return load_reference(root, scene) if entry is None else Reference(scene, record_of(scene, entry))

@@ -4,15 +4,21 @@ For a release: a new set changes results (CHANGELOG). Scenes that are not named 
 """
 
 import argparse
+import hashlib
+import json
 import sys
 import tempfile
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+
+import h5py
+import numpy as np
 
 from studies.base.errors import StudyError
 from studies.base.processes import run_each
 from studies.reference.load import Reference, load_reference
-from studies.reference.published import FOLDER, index, published, record_of, write_published
+from studies.reference.published import FOLDER, INDEX, LENGTHS, PRECISION, index, physics, published, record_of
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.scene.library import JUDGED
@@ -60,6 +66,45 @@ def publish(name: str, chosen: list[str], root: Path) -> Path:
             references[key] = Reference(scene, record_of(scene, entry))
     index.cache_clear()
     return write_published(FOLDER, name, references)
+
+
+def write_published(folder: Path, name: str, references: Mapping[str, Reference]) -> Path:
+    """A set of references in a folder, by the names of their scenes; where its index lies. Other files stay."""
+    folder.mkdir(parents=True, exist_ok=True)
+    listed = {}
+    for scene, reference in references.items():
+        file = folder / f"{scene}.h5"
+        write_file(file, reference)
+        bars = {quantity: float(f"{bar:.3g}") for quantity, bar in reference.total_uncertainty.items()}
+        listed[scene] = {
+            "file": file.name,
+            "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
+            "physics": physics(reference.scene),
+            "unknowns": reference.record.attributes["unknowns"],
+            "relative bars": bars,
+        }
+    path = folder / INDEX
+    path.write_text(json.dumps({"set": name, "references": listed}, indent=1) + "\n", encoding="utf-8")
+    index.cache_clear()
+    return path
+
+
+def write_file(path: Path, reference: Reference) -> None:
+    """All fields of a reference, compressed, its lengths rounded to PRECISION of the largest displacement."""
+    largest = np.abs(reference.field("displacement")).max()
+    digits = int(np.ceil(-np.log10(2.0 * PRECISION * largest)))
+    with h5py.File(path, "w", libver="v110") as file:
+        file.attrs.update(reference.record.attributes)
+        for name, item in reference.record.fields.items():
+            values = np.asarray(item.values)
+            if values.dtype.kind == "U":
+                file.create_dataset(name, data=values.astype(h5py.string_dtype()))
+            elif name in LENGTHS:
+                rounded = np.round(values, digits).astype(np.float32)
+                file.create_dataset(name, data=rounded, scaleoffset=digits, compression="gzip")
+            else:
+                options = {"compression": "gzip", "shuffle": True} if values.size > 100 else {}
+                file.create_dataset(name, data=values.astype(np.uint32) if name == "tetrahedra" else values, **options)
 
 
 def main(words: list[str]) -> int:

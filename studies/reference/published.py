@@ -17,7 +17,6 @@ import h5py
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.reference.load import Reference, load_reference
 from studies.reference.reference_solves import ReferenceSolve, physics_of, reference_fingerprint, with_floats
 from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
@@ -99,15 +98,6 @@ def fingerprint_of(scene: Scene) -> str:
     return reference_fingerprint() if entry is None else f"published {entry.sha256}"
 
 
-def reference_for(root: Path, scene: Scene) -> Reference | None:
-    """What a scene is judged by: the published reference, else the one stored below `root`; None without a plan.
-
-    Raises StudyError as load_reference.
-    """
-    entry = published(scene)
-    return load_reference(root, scene) if entry is None else Reference(scene, record_of(scene, entry))
-
-
 def record_of(scene: Scene, entry: Entry) -> Record:
     """The published reference as a record of the scene. Raises StudyError for a file that cannot be read."""
     try:
@@ -133,42 +123,3 @@ def _values(dataset: h5py.Dataset) -> np.ndarray:
         return np.asarray(dataset.asstr()[()]).astype(str)
     values = np.asarray(dataset[()])
     return values.astype({"f": float, "u": np.int64}.get(values.dtype.kind, values.dtype))
-
-
-def write_published(folder: Path, name: str, references: Mapping[str, Reference]) -> Path:
-    """A set of references in a folder, by the names of their scenes; where its index lies. Other files stay."""
-    folder.mkdir(parents=True, exist_ok=True)
-    listed = {}
-    for scene, reference in references.items():
-        file = folder / f"{scene}.h5"
-        write_file(file, reference)
-        bars = {quantity: float(f"{bar:.3g}") for quantity, bar in reference.total_uncertainty.items()}
-        listed[scene] = {
-            "file": file.name,
-            "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
-            "physics": physics(reference.scene),
-            "unknowns": reference.record.attributes["unknowns"],
-            "relative bars": bars,
-        }
-    path = folder / INDEX
-    path.write_text(json.dumps({"set": name, "references": listed}, indent=1) + "\n", encoding="utf-8")
-    index.cache_clear()
-    return path
-
-
-def write_file(path: Path, reference: Reference) -> None:
-    """All fields of a reference, compressed, its lengths rounded to PRECISION of the largest displacement."""
-    largest = np.abs(reference.field("displacement")).max()
-    digits = int(np.ceil(-np.log10(2.0 * PRECISION * largest)))
-    with h5py.File(path, "w", libver="v110") as file:
-        file.attrs.update(reference.record.attributes)
-        for name, item in reference.record.fields.items():
-            values = np.asarray(item.values)
-            if values.dtype.kind == "U":
-                file.create_dataset(name, data=values.astype(h5py.string_dtype()))
-            elif name in LENGTHS:
-                rounded = np.round(values, digits).astype(np.float32)
-                file.create_dataset(name, data=rounded, scaleoffset=digits, compression="gzip")
-            else:
-                options = {"compression": "gzip", "shuffle": True} if values.size > 100 else {}
-                file.create_dataset(name, data=values.astype(np.uint32) if name == "tetrahedra" else values, **options)

@@ -114,10 +114,11 @@ def mean_pressure(problem: Problem, equilibrium: Equilibrium) -> float:
     return -float(volume @ equilibrium.p[tetrahedra].mean(axis=1) / volume.sum())
 
 
-def sample_fields(at: SamplePoints, samples: Sequence[Sample]) -> dict[str, np.ndarray]:
+def sample_fields(at: SamplePoints, samples: Sequence[Sample], checkpoints: int) -> dict[str, np.ndarray]:
     """Samples, fine to coarse and then the variants, as the fields of a record."""
     count = len(samples)
-    each = {f"sample_{name}": np.array([getattr(one, name) for one in samples]).reshape(count, -1) for name in SERIES}
+    shape = count, checkpoints
+    each = {f"sample_{name}": np.array([getattr(one, name) for one in samples]).reshape(shape) for name in SERIES}
     return each | {
         "sample_variant": np.array([one.variant for one in samples], dtype=str),
         "sample_unknowns": np.array([one.unknowns for one in samples], dtype=np.int64),

@@ -122,7 +122,9 @@ def organ_size(scene: Scene) -> float:
 
 def solve_memory(solve: ReferenceSolve, known: int | None) -> float:
     """Memory of a reference, rather too much [bytes]; known: unknowns of its last result, where there is one."""
-    return MEMORY + factor_memory(known or MARGIN * unknowns(solve))
+    plan = solve.scene.reference
+    margin = MARGIN if plan is not None and plan.nested else 2.0  # nested meshes stop at a number, others end at a size
+    return MEMORY + factor_memory(known or margin * unknowns(solve))
 
 
 def factor_memory(unknowns: float) -> float:

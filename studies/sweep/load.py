@@ -9,8 +9,7 @@ from studies.catalog.study import Study
 from studies.metrics.run import Run
 from studies.metrics.timing.cases import timing_of
 from studies.metrics.timing.protocol import FrameTiming
-from studies.reference.load import Reference
-from studies.reference.published import reference_for
+from studies.reference.load import Reference, reference_for
 from studies.scene.as_json import scene_to_json
 from studies.scene.scene import Scene
 from studies.store.archived import is_archive, shown_machine

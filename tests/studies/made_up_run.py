@@ -71,6 +71,7 @@ def quantities() -> list[str]:
 def reference(motion=bend, force=(1.0, 2.0), pressure=(10.0, 20.0)):
     """What Reference promises, with a displacement that is a formula."""
     return SimpleNamespace(
+        source="made up",
         displacement=motion,
         force=np.array(force),
         boundary=Boundary(POINTS, TRIANGLES, motion(POINTS)),

@@ -21,7 +21,7 @@ NEEDED = ("implicit_volume, quadratic, float64", "implicit_volume, whole, float6
 
 
 def demo(results: Results = Path("organbench-demo")) -> None:
-    """Squeeze a ball with three bodies, next to the published reference: three numbers each, and a page to look at."""
+    """Squeeze a ball with three bodies, next to the reference: three numbers each, and a page to look at."""
     begin = time.perf_counter()
     ledger = Ledger(results)
     if not is_done(whole=False) and not is_done(whole=True):

@@ -15,8 +15,7 @@ from studies.exchange.meshes import NODES
 from studies.metrics.cells import UNRESOLVED_NOTE, plain, value_cell
 from studies.metrics.judged import FORCE
 from studies.metrics.run import Run
-from studies.reference.load import Reference
-from studies.reference.published import reference_for
+from studies.reference.load import Reference, reference_for
 from studies.scene.quantities import ALWAYS
 from studies.scene.scene import Scene
 from studies.store.record import write_record

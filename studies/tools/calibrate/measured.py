@@ -6,8 +6,7 @@ from pathlib import Path
 from studies.base.errors import StudyError
 from studies.metrics.judged import Judged, judged
 from studies.metrics.run import Run
-from studies.reference.load import Reference
-from studies.reference.published import reference_for
+from studies.reference.load import Reference, reference_for
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.scene import Scene
 from studies.store.ledger import Ledger

@@ -4,8 +4,8 @@ import tempfile
 from pathlib import Path
 
 from reference_fem.oracles import Check
-from studies.reference.load import Reference, load_reference
-from studies.reference.published import published, reference_for
+from studies.reference.load import Reference, load_reference, reference_for
+from studies.reference.published import published
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.sample import Sample, SamplePoints
 from studies.reference.solve import solve

@@ -9,9 +9,9 @@ from massspring import Capsule, Plane, Ramp, Trajectory
 from reference_fem.model.problem import find_held
 from studies.base.errors import StudyError
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
-from studies.reference.problem import anchor, kept_obstacles, reference_problem
+from studies.reference.problem import anchor, kept_obstacles
 from studies.scene.library import JUDGED, SCENES
-from tests.studies.catalog.test_scenes import coarsest_problem, small_setup
+from tests.studies.catalog.test_scenes import coarse_problem, coarsest_problem, small_setup
 
 
 @pytest.fixture(params=JUDGED, ids=lambda scene: scene.name)
@@ -80,8 +80,7 @@ def test_both_solvers_see_the_same_obstacles(judged):
 def test_both_solvers_hold_the_same_region(judged):
     if judged.symmetric or not judged.held:
         return
-    level = int(judged.reference.levels[0])
-    mesh, problem = mesh_for(judged, level, even=True), coarsest_problem(judged)
+    mesh, problem = mesh_for(judged, judged.reference.base, on_shape=True), coarsest_problem(judged)
     for held, found in zip(judged.held, find_held(problem), strict=True):
         corners = found.nodes[found.nodes < len(mesh.points)]
         patch = patch_nodes(mesh, held.name, held.region)
@@ -97,4 +96,4 @@ def test_both_solvers_hold_the_same_region(judged):
 def test_an_obstacle_that_the_reference_does_not_know_is_refused(obstacle):
     liver = next(s for s in SCENES if s.name == "liver_press")
     with pytest.raises(StudyError, match="the reference knows contact without friction"):
-        reference_problem(replace(liver, obstacles=(obstacle,)), liver.reference.levels[0])
+        coarse_problem(replace(liver, obstacles=(obstacle,), reference=replace(liver.reference, at_contact=0)))

@@ -90,7 +90,9 @@ def test_summary_marks_what_the_reference_does_not_know_well_enough(finished_swe
     runs, _ = load_runs(finished_sweep, tiny_study())
     assert UNRESOLVED_MARK not in results_of(runs)
     uncertainty = dict.fromkeys(("force_end", "silhouette", "force", "volume", "surface_mean"), 0.02)
-    truth = SimpleNamespace(total_uncertainty=uncertainty, force=np.array([1.0]), displacement=lambda x: 0 * x)
+    truth = SimpleNamespace(
+        source="made up", total_uncertainty=uncertainty, force=np.array([1.0]), displacement=lambda x: 0 * x
+    )
     text = results_of([replace(runs[0], reference=truth)])
     assert f"± 2 {UNRESOLVED_MARK} |" in text.replace("2.0", "2")
     assert text.endswith("the uncertainty of the reference is more than a tenth of this error")
@@ -148,10 +150,8 @@ def test_a_stamp_that_is_damaged_is_drawn_again(results, text):
 
 
 def test_studies_of_one_scene_share_its_reference(results, monkeypatch):
-    loaded, load = [], sweep_load.load_reference
-    monkeypatch.setattr(
-        sweep_load, "load_reference", lambda root, scene: loaded.append(scene.name) or load(root, scene)
-    )
+    loaded, load = [], sweep_load.reference_for
+    monkeypatch.setattr(sweep_load, "reference_for", lambda root, scene: loaded.append(scene.name) or load(root, scene))
     shutil.copytree(results / "tiny", results / "twin")
     written, _ = report(Ledger(results), [tiny_study(), tiny_study(name="twin")])
     assert {results / "tiny" / "tiny.csv", results / "twin" / "twin.csv"} <= set(written)

@@ -11,6 +11,8 @@ from massspring import METHODS, simulate
 from reference_fem import NewtonSettings
 from reference_fem.system.saddle_point import System
 from studies.base.errors import StudyError
+from studies.meshing.nested_mesh import base_mesh
+from studies.reference.nested import problem_of
 from studies.reference.problem import reference_problem
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
@@ -52,12 +54,20 @@ def small_setup(scene, kind="tetrahedral"):
 @cache
 def _problem_by_name(name):
     scene = next(scene for scene in JUDGED if scene.name == name)
-    return reference_problem(scene, scene.reference.levels[0])
+    return coarse_problem(scene)
 
 
 def coarsest_problem(scene):
     """The reference problem of a scene on its coarsest mesh, once for all tests, which only read it."""
-    return _problem_by_name(scene.name) if scene in JUDGED else reference_problem(scene, scene.reference.levels[0])
+    return _problem_by_name(scene.name) if scene in JUDGED else coarse_problem(scene)
+
+
+def coarse_problem(scene):
+    """The reference problem of a scene on its coarsest mesh."""
+    plan = scene.reference
+    if not plan.nested:
+        return reference_problem(scene, plan.levels[0])
+    return problem_of(base_mesh(scene, plan.base, plan.at_contact))
 
 
 def test_the_name_is_a_word_for_the_command_line_and_the_title_a_line(scene):

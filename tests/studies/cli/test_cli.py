@@ -25,6 +25,9 @@ from studies.store.record import Field, read_record, write_record
 from studies.sweep.load import load_runs
 from tests.studies.tiny import content, diverging_case, tiny_case, tiny_study
 
+SHAPE = "the body at rest does not keep the shape of its organ"
+"""Of bodies as coarse as those of tests."""
+
 
 def test_list_names_everything():
     result = CliRunner().invoke(cli.app, ["list"], env={"COLUMNS": "200"})
@@ -48,7 +51,7 @@ def test_run_a_file_from_nothing(organbench, tiny_file, tmp_path):
     assert f"tiny: 3 cases, 2 timings ran, charts in {tmp_path / 'results' / 'tiny'}" in out
     assert out.splitlines()[-1] == "tiny: 3 cases: 2 ok, 1 diverged"
     assert (tmp_path / "results" / "tiny" / "picture.txt").read_text() == "3 runs"
-    assert err == ""  # the case that diverges is there on purpose
+    assert [line for line in err.splitlines() if SHAPE not in line] == []  # the case that diverges is there on purpose
     again, out, err = organbench("run", tiny_file, "--results", tmp_path / "results")
     assert (again, err) == (0, "")
     assert "tiny: nothing ran" in out
@@ -206,7 +209,8 @@ def test_only_failed_leaves_the_rest(organbench, tiny_file, results):
 
 def test_safe_dt_predicts_and_verifies(organbench):
     code, out, err = organbench("safe-dt", "ball_squeeze", "--nodes", 60)
-    assert (code, err) == (0, "")
+    assert code == 0
+    assert SHAPE in err
     assert "stability limit" in out
     assert "of the limit): diverged" in out
     assert re.search(r"bracket +stable at [\d.]+ ms, diverges at [\d.]+ ms", out)

@@ -12,7 +12,8 @@ import pytest
 from studies.base.errors import StudyError
 from studies.meshing.true_shape import true_shape
 from studies.reference import published as module
-from studies.reference.load import Reference
+from studies.reference.load import Reference, reference_for
+from studies.reference.publish import write_published
 from studies.reference.published import (
     FOLDER,
     INDEX,
@@ -22,8 +23,6 @@ from studies.reference.published import (
     physics,
     published,
     record_of,
-    reference_for,
-    write_published,
 )
 from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint
 from studies.scene.library import BALL_SQUEEZE, JUDGED, LIVER_PRESS

@@ -41,7 +41,7 @@ def family(rate=2 / 3, slope=0.5):
 
 def test_samples_come_back_from_a_record_bit_for_bit():
     known = [*family(), sample(0.1, "steps"), sample(0.2, "kappa", force=np.full(END + 1, np.nan), frequency=3.25)]
-    fields = new_fields(REFERENCE_FIELDS, empty_fields() | sample_fields(AT, known))
+    fields = new_fields(REFERENCE_FIELDS, empty_fields() | sample_fields(AT, known, len(BALL_CLAMPED.checkpoints)))
     at, found = samples_in(BALL_CLAMPED, SimpleNamespace(fields=fields))
     np.testing.assert_array_equal(at.points, POINTS)
     np.testing.assert_array_equal(at.tetrahedra, CELLS)
@@ -68,7 +68,7 @@ def empty_fields():
 
 def test_no_sample_is_a_record_too():
     """Of a reference that broke off on its coarsest mesh."""
-    fields = new_fields(REFERENCE_FIELDS, empty_fields() | sample_fields(AT, []))
+    fields = new_fields(REFERENCE_FIELDS, empty_fields() | sample_fields(AT, [], len(BALL_CLAMPED.checkpoints)))
     assert samples_in(BALL_CLAMPED, SimpleNamespace(fields=fields))[1] == []
 
 

@@ -45,7 +45,7 @@ def surfaces():
     fin = np.vstack([triangles, [[i, j, p], [j, i, q], [i, p, q], [j, q, p]]])
     return {
         "open": (points, triangles[1:], "open"),
-        "inside out": (points, triangles[:, ::-1], "inside out"),
+        "inside out": (points, triangles[:, ::-1], "inverted"),
         "not manifold": (np.vstack([points, [[1.0, 1.0, 1.0], [1.0, 1.0, 2.0]]]), fin, "not manifold"),
         "duplicated": (points, np.vstack([triangles, triangles[:1]]), "duplicated"),
         "no volume": (np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.0]]), TETRAHEDRON, "enclosed volume is zero"),

@@ -101,6 +101,10 @@ def test_one_command_at_a_time_measures(tmp_path):
     other.stdout.close()
 
 
+SHAPE = "the body at rest does not keep the shape of its organ"
+"""Of bodies as coarse as those of tests."""
+
+
 @pytest.mark.slow
 def test_a_case_that_ends_its_process_is_stored_and_the_rest_goes_on(organbench, tmp_path):
     file, results = tmp_path / "fatal.py", tmp_path / "results"
@@ -108,7 +112,7 @@ def test_a_case_that_ends_its_process_is_stored_and_the_rest_goes_on(organbench,
     code, out, err = organbench("run", file, "--results", results)
     assert code == 1 and "tiny: 2 cases ran, charts in" in out
     assert "tiny: 2 cases: 1 ok, 1 failed\n  failed: its process died 3 times" in out
-    (sentence,) = err.splitlines()
+    (sentence,) = [line for line in err.splitlines() if SHAPE not in line]
     assert sentence.startswith("warning: failed: tiny_squeeze-tetrahedral-60-fatal-dt0.5 (its process died 3")
     assert sentence.endswith(f"all others are done, `organbench run {file} --only failed` retries")
     assert organbench("status", file, "--results", results)[1].splitlines()[0] == "tiny: 2 cases: 1 ok, 1 failed"
@@ -123,7 +127,8 @@ def test_two_commands_on_one_folder_leave_what_one_leaves(finished_sweep, tmp_pa
     command = [sys.executable, "-m", "studies", "run", str(file), "--results", str(results), "--jobs", "1"]
     both = [subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) for _ in range(2)]
     for process in both:
-        assert process.communicate()[1] == "" and process.returncode == 0
+        warned = process.communicate()[1].splitlines()
+        assert all(SHAPE in line for line in warned) and process.returncode == 0
     by_one, by_two = (read_record(case_path(root, "tiny", tiny_case())) for root in (finished_sweep, results))
     for name, field in by_one.fields.items():
         assert np.array_equal(field.values, by_two.fields[name].values, equal_nan=field.values.dtype.kind == "f")

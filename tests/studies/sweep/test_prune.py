@@ -98,7 +98,7 @@ def test_references_stay_unless_they_are_asked_for(solved, tmp_path):
     assert found(root, study, references=True) == {}
     path = next((root / "reference").glob("*.h5"))
     write_record(path, replace(read_record(path), fingerprint="0" * 64))
-    coarse = replace(SCENE, reference=SCENE.reference.alone(SCENE.reference.levels[0]))
+    coarse = replace(SCENE, reference=SCENE.reference.smaller())
     assert found(root, study) == {}
     assert found(root, study, references=True) == {path.name: Rule.STALE}
     fewer = found(root, tiny_study(cases=(tiny_case(scene=coarse),)), references=True)
