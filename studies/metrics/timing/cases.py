@@ -1,6 +1,7 @@
 """Frame times of stored cases, in separate files: timing never touches physics (studies.metrics.timing.protocol)."""
 
 import time
+import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -46,7 +47,9 @@ def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[
         for group in groups.values():
             started = time.perf_counter()
             with watching() as watch:
-                setups = {case.key: prepare(case).setup for case in group}
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", UserWarning)  # the run has stored what preparing it warns of
+                    setups = {case.key: prepare(case).setup for case in group}
                 contestants = {key: (lambda s=setup: simulate(s).frame_ns) for key, setup in setups.items()}
                 measured = interleave(contestants, max(map(repeats_for, setups.values())), warmups=0)
                 stages = {case.key: stage_times(setups[case.key]) for case in group}
