@@ -79,7 +79,7 @@ def _handles() -> list:
     ]
     hollow = {"marker": "o", "color": BLUE, "markerfacecolor": "white", "linestyle": "", "markersize": 7}
     bar = Line2D([], [], color=LIGHT, linewidth=9, label="all together, number in %")
-    return [*shares, Line2D([], [], label="mesh, not monotone: spread", **hollow), bar]
+    return [*shares, Line2D([], [], label="mesh, no order observed", **hollow), bar]
 
 
 def _notes(known: Mapping[str, Mapping[str, Uncertainty]]) -> list[str]:
