@@ -73,7 +73,8 @@ def carried(coarse: System, state: State, fine: System, to: Transfer) -> State:
     x = np.concatenate((u.ravel(), p, state.x[m:]))
     x[fine.pattern.held] = fine.held_at(state.t)
     pressure = carried_contact(coarse, state.pressure, fine)
-    return replace(state, x=x, multiplier=pressure, pressure=pressure, grip=NO_GRIP, hold=NO_GRIP)
+    carried_over = replace(state, x=x, multiplier=pressure, pressure=pressure)
+    return replace(carried_over, stiffness=1.0, grip=NO_GRIP, hold=NO_GRIP)
 
 
 def carried_contact(coarse: System, pressure: np.ndarray, fine: System) -> np.ndarray:

@@ -25,6 +25,8 @@ from studies.scene.scene import Scene
 
 GROWTH = 2.5
 """Unknowns of a mesh over those of the one before, at most: more, and its indicator knows too little of the next."""
+LEAST_GROWTH = 1.5
+"""The same at least, also where the plan's `most` is smaller."""
 LOOSE = NewtonSettings(force_tol=1e-4, penetration_tol=1e-3)
 """On all meshes but the coarsest: forces are within 3e-4 of those of the usual tolerances, in half the time."""
 DISPLACEMENT = 2.5
@@ -111,8 +113,10 @@ def problem_of(mesh: NestedMesh) -> Problem:
 
 
 def targets(first: int, most: float) -> list[float]:
-    """Unknowns of the meshes after the first one, up to `most`, each in the same ratio to the one before."""
-    steps = max(1, math.ceil(math.log(most / first) / math.log(GROWTH) - 1e-9)) if most > first else 0
+    """Unknowns of the meshes after the first one, up to `most`, each in the same ratio to the one before; at least one
+    that is LEAST_GROWTH times as large, for without a second mesh there is no error bar."""
+    most = max(most, LEAST_GROWTH * first)
+    steps = max(1, math.ceil(math.log(most / first) / math.log(GROWTH) - 1e-9))
     return [first * (most / first) ** (k / steps) for k in range(1, steps + 1)]
 
 

@@ -145,8 +145,9 @@ def test_targets_are_even_steps_that_end_at_most(first, most, count):
     assert 1 < ratios[0] <= GROWTH * (1 + 1e-9)
 
 
-def test_no_target_is_left_where_the_first_mesh_is_large_enough():
-    assert targets(1000, 1000.0) == targets(1001, 1000.0) == []
+def test_a_second_mesh_is_solved_where_the_first_is_large_enough():
+    """One mesh alone has no error bar."""
+    assert targets(1000, 1000.0) == targets(1000, 10.0) == [1500.0]
 
 
 def failing_from(monkeypatch, name, number, error):
