@@ -126,7 +126,7 @@ def test_many_labels_side_by_side_are_a_mask(tmp_path):
 
 def test_a_header_without_a_unit_means_millimetres(tmp_path):
     path = nifti(tmp_path / "liver.nii", *ellipsoid(), unit="unknown")
-    sentence = r"liver\.nii: its header does not say the unit; millimetres are taken, as is the custom; --unit names"
+    sentence = r"liver\.nii: its header does not say the unit; assuming millimetres \(the convention\); --unit sets"
     with pytest.warns(UserWarning, match=sentence):
         surface = scan(Source(path, part="1"), fill=False)
     assert 1e3 * np.ptp(surface.points[:, 0]) == pytest.approx(2 * AXES[0], rel=0.05)

@@ -44,7 +44,7 @@ def broken_surfaces():
     return {
         "1 points are not finite, the first is number 2": (nan, FACES),
         "open, 3 edges have one triangle only": (REGULAR, FACES[1:]),
-        "inside out": (REGULAR, FACES[:, ::-1]),
+        "is inverted": (REGULAR, FACES[:, ::-1]),
         "not manifold, 1 edges have over two triangles": (hinged, pair),
         "not manifold, it is pinched at point 0": two(0),
         "turned in opposite directions": (REGULAR, turned),

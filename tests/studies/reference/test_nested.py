@@ -24,7 +24,7 @@ from studies.store.record import Status, read_record
 from studies.tools.verify.second_judge import JUDGES, verdict
 
 TRUTH = 4.227
-"""Force at the end [N], within .05 %: meridians of NGSolve (4.2263) and of our own (docs/theory.md, section 6)."""
+"""Force at the end [N], within .05 %: meridians of NGSolve and of our own (docs/theory.md, section 6)."""
 PLAN = ReferencePlan(base=60, at_contact=0, most=8e3, tolerance=1e-4, variants=("steps", "kappa"))
 SCENE = replace(BALL_CLAMPED, checkpoints=(2.0, 4.0), reference=PLAN)
 SMALL = replace(SCENE, reference=replace(PLAN, most=4e3, variants=()))
