@@ -127,7 +127,7 @@ FOLDS = "the mesh folds; refine it"
 
 
 def breaks(monkeypatch, number, reached):
-    """Makes a path break off after so many checkpoints: the first one (0), the second one (1) and so on."""
+    """Makes a path break off after so many checkpoints: 0 of them for the first one, and so on."""
     true_path, begun = module.equilibrium_path, []
 
     def path(problem, times, settings):
