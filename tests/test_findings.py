@@ -124,9 +124,9 @@ def test_numbers_that_the_list_of_limits_quotes():
     assert sizes.removeprefix("is ") in " ".join((ROOT / "docs/findings.md").read_text(encoding="utf-8").split())
 
 
-def test_every_reference_has_three_meshes_and_three_refined_settings():
+def test_every_reference_has_three_meshes_or_more_and_three_refined_settings():
     rows = pd.read_csv(TABLES / "reference" / "uncertainty.csv")
-    assert {len(levels.split()) for levels in rows["levels"].astype(str)} == {3}
+    assert rows["meshes"].min() == 3
     assert len(VARIANTS) == 3
 
 
