@@ -27,9 +27,10 @@ UPRIGHT = 0.05
 LEAST = 0.02
 """The same below which an element keeps its middles where they are."""
 SMALLEST = 0.012
-"""Of the diagonal of the body: elements at outlines are not halved to a smaller edge. The strain there grows without
-bound as they shrink, until a neo-Hookean element inverts and no equilibrium is found; 0.012 leaves 0.1 % of the force
-of the clamped ball (docs/theory.md, section 6)."""
+"""Of the diagonal of the body: elements at outlines whose halves would have a smaller edge are not marked. A mesh may
+halve what is larger several times, and neighbours with it: down to a fifth of that was seen. The strain there grows
+without bound as they shrink, until a neo-Hookean element inverts and no equilibrium is found; 0.012 leaves 0.1 to 0.2 %
+of the force of the clamped ball (docs/theory.md, section 6)."""
 REGULAR = 1.0 / (6.0 * np.sqrt(2.0))
 """Volume of a regular tetrahedron over the cube of its edge."""
 CHILD = 0.25
@@ -117,7 +118,7 @@ def base_mesh(scene: Scene, surface_nodes: int, at_contact: int) -> NestedMesh:
 def marked(body: HeldMesh, indicator: np.ndarray, elements: int) -> tuple[HeldMesh, np.ndarray]:
     """`body` with elements halved until there are `elements`, and the parent of each; largest indicators first."""
     parents, expected = np.arange(body.mesh.nelements), indicator.astype(float)
-    while body.mesh.nelements < elements:
+    while body.mesh.nelements < elements and expected.max() > 0.0:
         count = body.mesh.nelements
         room = max(1, (min(elements, int(GROWTH * count)) - count) // 3)
         # Rounded, then by number: the last bits of an indicator differ between processors.

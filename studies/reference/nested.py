@@ -88,9 +88,12 @@ def solve_nested(scene: Scene, variants: Mapping[str, Varied]) -> FamilySolution
     samples, stopped = [sample_of(scene, problem, equilibria, at, math.nan)], ""
     for target in targets(latest.system.total, plan.most):
         try:
-            latest = refined(latest, target)
+            latest, before = refined(latest, target), latest
         except SolveError as failure:
             stopped = f"the mesh of about {target:.0f} unknowns is left out: {failure}"
+            break
+        if latest.system.total == before.system.total:
+            stopped = "no element of the finest mesh has an error indicator above 0"
             break
         equilibria = latest.equilibria
         samples.insert(0, sample_of(scene, latest.system.problem, equilibria, at, math.nan))

@@ -18,7 +18,7 @@ import numpy as np
 from studies.base.errors import StudyError
 from studies.base.processes import run_each
 from studies.reference.load import Reference, load_reference
-from studies.reference.published import FOLDER, INDEX, LENGTHS, PRECISION, index, physics, published, record_of
+from studies.reference.published import FOLDER, INDEX, LENGTHS, PRECISION, index, physics
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.scene.library import JUDGED
@@ -48,30 +48,22 @@ def solved(work: tuple[str, str]) -> None:
 
 
 def publish(name: str, chosen: list[str], root: Path) -> Path:
-    """Solves the chosen scenes below `root` and writes them, with those already published, as the set `name`; where
-    its index lies. Raises StudyError for a scene that did not converge."""
-    scenes = judged_scenes()
+    """Solves the chosen scenes below `root` and writes them as the set `name`, in which the others keep their files;
+    where its index lies. Raises StudyError for a scene that did not converge."""
     for scene, _, cause in run_each([(scene, str(root)) for scene in chosen], PROCESSES, solved):
         if cause is not None:
             raise StudyError(f"{scene[0]} was not solved: {cause}")
         print(f"solved {scene[0]}", flush=True)
-    references: dict[str, Reference] = {}
-    for key, scene in scenes.items():
-        entry = published(scene)
-        if key in chosen:
-            reference = load_reference(root, finer(scene))
-            assert reference is not None  # it was solved
-            references[key] = reference
-        elif entry is not None:
-            references[key] = Reference(scene, record_of(scene, entry))
-    index.cache_clear()
-    return write_published(FOLDER, name, references)
+    references = {key: load_reference(root, finer(judged_scenes()[key])) for key in chosen}
+    return write_published(FOLDER, name, {key: one for key, one in references.items() if one is not None})
 
 
 def write_published(folder: Path, name: str, references: Mapping[str, Reference]) -> Path:
-    """A set of references in a folder, by the names of their scenes; where its index lies. Other files stay."""
+    """A set of references in a folder, by the names of their scenes; where its index lies. Others that are listed there
+    stay as they are."""
     folder.mkdir(parents=True, exist_ok=True)
-    listed = {}
+    path = folder / INDEX
+    listed = json.loads(path.read_text(encoding="utf-8"))["references"] if path.is_file() else {}
     for scene, reference in references.items():
         file = folder / f"{scene}.h5"
         write_file(file, reference)
@@ -83,7 +75,6 @@ def write_published(folder: Path, name: str, references: Mapping[str, Reference]
             "unknowns": reference.record.attributes["unknowns"],
             "relative bars": bars,
         }
-    path = folder / INDEX
     path.write_text(json.dumps({"set": name, "references": listed}, indent=1) + "\n", encoding="utf-8")
     index.cache_clear()
     return path

@@ -68,10 +68,19 @@ def index(folder: Path = FOLDER) -> Mapping[str, Entry]:
     """The references in a folder by their physics, those whose file is as it was published."""
     if not (folder / INDEX).is_file():
         return {}
-    data = json.loads((folder / INDEX).read_text(encoding="utf-8"))
+    try:
+        data = json.loads((folder / INDEX).read_text(encoding="utf-8"))
+        listed = [
+            (scene, known["physics"], Entry(data["set"], folder / known["file"], known["sha256"]))
+            for scene, known in data["references"].items()
+        ]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        warnings.warn(
+            f"the list of published references cannot be read ({error}); all are solved instead", stacklevel=2
+        )
+        return {}
     entries = {}
-    for scene, known in data["references"].items():
-        entry = Entry(data["set"], folder / known["file"], known["sha256"])
+    for scene, key, entry in listed:
         fault = fault_of(entry)
         if fault:
             warnings.warn(
@@ -80,7 +89,7 @@ def index(folder: Path = FOLDER) -> Mapping[str, Entry]:
                 stacklevel=2,
             )
         else:
-            entries[known["physics"]] = entry
+            entries[key] = entry
     return entries
 
 

@@ -3,6 +3,7 @@
 import time
 from pathlib import Path
 
+from studies.base.errors import StudyError
 from studies.catalog.demo import DEMO, WORDS
 from studies.cli.terminal import Results, say, warn
 from studies.metrics.metrics import force_end, volume_worst
@@ -11,23 +12,17 @@ from studies.report.page.write import write_page
 from studies.report.results import refresh
 from studies.runs.run import run_case
 from studies.store.ledger import Ledger
-from studies.sweep.compiling.main import compile_all
-from studies.sweep.compiling.tasks import is_done
+from studies.store.record import read_record
+from studies.sweep.compiling.main import bring_up_to_date
 from studies.sweep.job import CaseJob, case_jobs, do, reference_jobs
 from studies.sweep.load import load_runs
-
-NEEDED = ("implicit_volume, quadratic, float64", "implicit_volume, whole, float64", "free, whole, float64")
-"""What is compiled for it, the longest first."""
 
 
 def demo(results: Results = Path("organbench-demo")) -> None:
     """Squeeze a ball with three bodies, next to the reference: three numbers each, and a page to look at."""
     begin = time.perf_counter()
     ledger = Ledger(results)
-    if not is_done(whole=False) and not is_done(whole=True):
-        say("compiling once, in two processes")
-        for done in compile_all(list(NEEDED)):
-            say(f"  {done.name}: {done.seconds:.0f} s")
+    bring_up_to_date(whole=False)
     for job in reference_jobs(results, DEMO.scenes):
         do(job)
     speeds = []
@@ -50,13 +45,16 @@ def run_timed(job: CaseJob) -> float:
     case = job.work
     run_case(job.root, DEMO.name, case, lambda frame: times.append(time.perf_counter()))
     frames = case.frames or case.scene.frames
+    if len(times) < 2:
+        raise StudyError(f"{case.name} did not run: {read_record(job.path()).message}")
     return case.scene.duration * (len(times) - 1) / frames / (times[-1] - times[0])
 
 
 def line(run: Run, words: str, speed: float) -> str:
     """Volume, force and speed of a run."""
     reference = run.reference
-    assert reference is not None  # it is published, or was solved
+    if reference is None:
+        raise StudyError(f"the scene '{run.case.scene.name}' has no reference: `organbench status demo` says why")
     known = 100 * reference.total_uncertainty["force_end"]
     numbers = f"volume {volume_worst(run):.2g} % off, force {force_end(run):+.1f} ± {known:.1f} %"
     return f"{words}: {numbers}, {speed:.1f} times real time"

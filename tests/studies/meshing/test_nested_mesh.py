@@ -238,3 +238,9 @@ def test_a_body_that_comes_as_a_mesh_keeps_its_flat_sides(tmp_path):
     check_parents(body.mesh, fine.body.mesh, parents)
     np.testing.assert_allclose(fine.points, nodes(fine.body.mesh), rtol=0, atol=1e-15)
     assert fine.off == 0 and not len(fine.lumen)
+
+
+def test_nothing_is_marked_where_nothing_is_indicated():
+    body = base_mesh(BALL_CLAMPED, 80, 0).body
+    finer, parents = marked(body, np.zeros(body.mesh.nelements), 2 * body.mesh.nelements)
+    assert finer is body and np.array_equal(parents, np.arange(body.mesh.nelements))

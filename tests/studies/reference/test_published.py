@@ -119,6 +119,21 @@ def test_what_is_damaged_or_missing_is_named_and_solved(elsewhere, tmp_path, har
     assert job.seconds > 1  # an estimate of a solution, not of a copy
 
 
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"set": "1", "references": {"liver_press": {}}}'])
+def test_a_list_that_cannot_be_read_is_named_and_all_are_solved(copied, text):
+    (copied / INDEX).write_text(text)
+    with pytest.warns(UserWarning, match="list of published references cannot be read .* all are solved instead"):
+        assert published(LIVER_PRESS, copied) is None
+
+
+def test_one_that_is_published_again_leaves_the_others_as_they_are(copied):
+    before = {file.name: file.read_bytes() for file in copied.glob("*.h5")}
+    write_published(copied, "2027.2", {"ball_squeeze": reference_for(copied, BALL_SQUEEZE)})
+    after = {file.name: file.read_bytes() for file in copied.glob("*.h5")}
+    assert {name for name in before if before[name] != after[name]} <= {"ball_squeeze.h5"}
+    assert [published(scene, copied).name for scene in JUDGED] == ["2027.2"] * len(JUDGED)
+
+
 def test_a_folder_without_a_set_has_no_references(tmp_path):
     assert published(LIVER_PRESS, tmp_path) is None
 
