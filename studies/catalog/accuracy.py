@@ -5,17 +5,15 @@ from typing import Literal
 
 from massspring import ExplicitElements, ImplicitElements, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import ADAPTIVE, BodyRecipe, Case, neighbours
 from studies.scene.inertia import why_inertia_matters
-from studies.scene.kind import has_wall, load_of
+from studies.scene.kind import NOT_ADAPTIVE, has_wall, load_of
 from studies.scene.library import JUDGED
 from studies.scene.scene import Scene
 from studies.store.schema import Status
 
-VERTICES = (150, 200, 250, 300)
-"""On the outer surface of an even quadratic body."""
-BUDGETS = tuple(4 * vertices - 6 for vertices in VERTICES)
-"""Nodes on its outer surface, mid-side nodes among them (Euler); of graded bodies too."""
+BUDGETS = (594, 794, 994, 1194)
+"""Nodes on the outer surface of a quadratic body, mid-side nodes among them: 4 v − 6 with v vertices (Euler)."""
 SHORT, LONG = 0.5, 0.8
 """Steps over the stability limit: of linear bodies, and of quadratic ones."""
 COARSE = BodyRecipe(nodes=150, law="cotangent", volumes="nodal"), BodyRecipe("quadratic", 294, contact="nodes")
@@ -49,13 +47,36 @@ def linear_bodies(scene: Scene) -> tuple[BodyRecipe, ...]:
 
 
 def headline(scene: Scene) -> BodyRecipe:
-    """Graded, of the second size, with the masses that allow the longest step."""
-    return BodyRecipe("quadratic", BUDGETS[1], graded=can_be_graded(scene), mass=_mass(scene))
+    """The finest of the graded bodies, or of the even ones where grading changes nothing, with the masses that allow
+    the longest step."""
+    return (graded(scene) or even(scene))[-1]
 
 
 def headline_case(scene: Scene) -> Case:
     """The headline at the long step; it can be seen move (studies.runs.surface_frames)."""
-    return Case(scene, headline(scene), ImplicitVolume(), dt_fraction=LONG, recorded=("surface",), timed=True)
+    return replace(_timed(scene, headline(scene), LONG), recorded=("surface",))
+
+
+def even(scene: Scene) -> tuple[BodyRecipe, ...]:
+    """Quadratic bodies with elements of one size: those that are fast."""
+    return tuple(BodyRecipe("quadratic", nodes, mass=_mass(scene)) for nodes in BUDGETS[:2])
+
+
+def graded(scene: Scene) -> tuple[BodyRecipe, ...]:
+    """Quadratic bodies with smaller elements where the scene needs them, from the second size on; none where grading
+    changes nothing."""
+    if not is_adaptive(scene) and not can_be_graded(scene):
+        return ()
+    way = ADAPTIVE if is_adaptive(scene) else True
+    return tuple(BodyRecipe("quadratic", nodes, graded=way, mass=_mass(scene)) for nodes in BUDGETS[1:])
+
+
+def is_adaptive(scene: Scene) -> bool:
+    """Whether one solution of a coarse body can say where elements should be small (studies.reference.adaptive_mesh).
+
+    What hangs by an outline is left out: small elements there turn inside out.
+    """
+    return bool(scene.held) and load_of(scene) not in NOT_ADAPTIVE
 
 
 def can_be_graded(scene: Scene) -> bool:
@@ -64,18 +85,14 @@ def can_be_graded(scene: Scene) -> bool:
 
 
 def quadratic_cases(scene: Scene) -> tuple[Case, ...]:
-    """Even bodies in all sizes and graded ones from the second size on, at the long step. Of the headline also half its
-    step, the other masses and the other contact, and among the graded bodies the next finer one."""
-    even = [BodyRecipe("quadratic", nodes, mass=_mass(scene)) for nodes in BUDGETS]
-    graded = [replace(body, graded=True) for body in even[1:] if can_be_graded(scene)]
-    best = headline_case(scene)
-    head = best.body
-    others = [replace(head, mass="lumped")] if _mass(scene) != "lumped" else []
-    if scene.obstacles:
-        others.append(replace(head, contact="nodes"))
-    found = [_timed(scene, body, LONG) if body != head else best for body in (*even, *graded, *others)]
-    found.append(_timed(scene, head, LONG / 2))
-    return tuple({case.key: case for case in found}.values())
+    """Even and graded bodies in all sizes at the long step, each on five neighbouring meshes. The headline is recorded,
+    and the middle one of each five is timed."""
+    best, found = headline_case(scene), list[Case]()
+    for body in (*even(scene), *graded(scene)):
+        for mesh in neighbours(body):
+            case = _timed(scene, mesh, LONG) if mesh == body else replace(_timed(scene, mesh, LONG), timed=False)
+            found.append(best if mesh == best.body else case)
+    return tuple(found)
 
 
 def element_cases(scene: Scene) -> tuple[Case, ...]:

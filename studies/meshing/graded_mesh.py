@@ -97,7 +97,7 @@ def coarse_level(
 ) -> int:
     """Surface vertices before halving that end in `nodes` nodes on the outer surface, near `start` where given; `even`:
     of a mesh whose nodes are evenly spread. Raises StudyError."""
-    _check_number(scene, nodes, quadratic)
+    check_number(scene, nodes, quadratic)
     found: dict[int, int] = {}
     level, failed = start or max(FEWEST, (nodes + 6) // 4 if quadratic else nodes), None
     for tried in range(MOST_TRIES):
@@ -126,7 +126,8 @@ def coarse_level(
     return best
 
 
-def _check_number(scene: Scene, nodes: object, quadratic: bool) -> None:
+def check_number(scene: Scene, nodes: object, quadratic: bool) -> None:
+    """Raises StudyError for a number of surface nodes that no body can have."""
     most = 4 * MOST - 6 if quadratic else MOST
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or not FEWEST <= nodes <= most:
         raise StudyError(

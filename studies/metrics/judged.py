@@ -1,7 +1,7 @@
 """A recipe in a scene with its measured values, and how it compares with an accuracy target."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.metrics.wish import Wish
-from studies.runs.case import Case
+from studies.runs.case import BodyRecipe, Case, neighbours
 from studies.store.record import Status
 
 NAN = float("nan")
@@ -53,11 +53,17 @@ class Judged:
     """shape_error [%]; unknown in tables of older code."""
     shape_volume: Measured = UNKNOWN
     """shape_volume [%], signed."""
+    members: "tuple[Judged, ...]" = ()
+    """Of a recipe that ran on five neighbouring meshes: each of them; the errors are then the largest."""
 
     @property
     def advisable(self) -> bool:
         """Whether it may be advised: a body by implicit_volume. Other methods are there for comparison."""
         return isinstance(self.case.method, ImplicitVolume)
+
+    def median(self, name: str) -> float:
+        """Of an error by name over the meshes [%]: of the size of a signed one."""
+        return float(np.median([abs(getattr(one, name).value) for one in self.members or (self,)]))
 
     @property
     def compared(self) -> bool:
@@ -99,6 +105,35 @@ def judged(run: Run) -> Judged | None:
     dt, timed = float(run.attributes.dt), run.timing is not None
     shape, volume = Measured(DISTANCE(run)), Measured(VOLUME(run))
     return Judged(run.case, force, displacement, cost_of(run), dt, timed, shape, volume)
+
+
+def over_meshes(found: Iterable[Judged]) -> list[Judged]:
+    """Rows of one scene, those of neighbouring meshes as one, with the largest errors, at the place of the middle one.
+
+    Where any quadratic recipe ran on all five, one that did not is left out: on one mesh it may be right by luck, and
+    of five where one ended badly it is not reliable."""
+    rows = {(one.case.body, _setting(one)): one for one in found}
+    families = dict[tuple[BodyRecipe, str], Judged]()
+    for (body, setting), one in rows.items():
+        members = [rows.get((mesh, setting)) for mesh in neighbours(body)]
+        if body.kind == "quadratic" and all(members):
+            families[body, setting] = _largest(one, tuple(member for member in members if member is not None))
+    if not families:
+        return list(rows.values())
+    return [families.get(key, one) for key, one in rows.items() if key in families or key[0].kind != "quadratic"]
+
+
+def _setting(one: Judged) -> str:
+    """What besides the body sets a case apart."""
+    return replace(one.case, body=BodyRecipe(), recorded=(), timed=False).key
+
+
+def _largest(middle: Judged, members: "tuple[Judged, ...]") -> Judged:
+    worst = {
+        name: max((getattr(one, name) for one in members), key=lambda error: abs(error.value) if error.known else -1.0)
+        for name in ("force", "displacement", "shape", "shape_volume")
+    }
+    return replace(middle, members=members, **worst)
 
 
 def cost_of(run: Run) -> Measured:

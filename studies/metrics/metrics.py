@@ -7,9 +7,14 @@ import numpy as np
 
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.geometry.surface.distance import hausdorff
+from studies.geometry.surface.sides import along_facets
+from studies.meshing.rest_surface import OUTER
 from studies.metrics.metric import PERCENT, Metric
 from studies.metrics.run import Run
 from studies.reference.ringing import ringing_frequency
+
+TOUCH = 1e-3
+"""Of the body's size: what is nearer to an obstacle touches it."""
 
 
 def volume_worst(run: Run) -> float:
@@ -175,6 +180,33 @@ def sway(run: Run) -> float:
     return PERCENT * float(run.record.attributes.get("sway", np.nan))
 
 
+def contact_facets(run: Run) -> float:
+    """Outer facets with a point within 0.1 % of the size of the probed obstacle at the last checkpoint [1].
+
+    NaN where the force is not that of an obstacle, or the facets are not known."""
+    scene, sides = run.case.scene, run.sides
+    if scene.probed.what != "obstacle" or sides is None or scene.probed.number >= len(scene.obstacles):
+        return float("nan")
+    facets = sides[OUTER].facets
+    places, _ = along_facets(run.fields.snapshots[-1], facets)
+    gap = scene.obstacles[scene.probed.number].gap(places, scene.checkpoints[-1])
+    return float((gap.reshape(len(facets), -1) < TOUCH * run.size).any(axis=1).sum())
+
+
+def contact_turn(run: Run) -> float:
+    """Angle between the force of the probed obstacle and its push at the last checkpoint [degrees].
+
+    Too few facets in a contact turn its force; the true one may have an angle of its own. NaN without an obstacle.
+    """
+    scene = run.case.scene
+    forces = run.fields.contact_force
+    if scene.probed.what != "obstacle" or scene.probed.number >= forces.shape[1]:
+        return float("nan")
+    force = forces[run.checkpoint_frames[-1], scene.probed.number]
+    size = float(np.linalg.norm(force))
+    return float(np.degrees(np.arccos(np.clip(force @ scene.probed.direction / size, -1, 1)))) if size else float("nan")
+
+
 def _timing(run: Run, quantile: float) -> float:
     return float("nan") if run.timing is None else float(np.quantile(run.timing.frame_ns, quantile))
 
@@ -232,6 +264,8 @@ METRICS: tuple[Metric, ...] = (
     Metric("penetration", "%", "lower", penetration),
     Metric("alternation", "%", "lower", alternation),
     Metric("sway", "%", "lower", sway),
+    Metric("contact_facets", "1", "higher", contact_facets),
+    Metric("contact_turn", "deg", "lower", contact_turn),
     Metric("step_time", "µs", "lower", step_time, spread=_time_spread(step_time)),
     Metric("frame_time", "ms", "lower", frame_time, spread=_time_spread(frame_time)),
     Metric("frame_time_p99", "ms", "lower", frame_time_p99, spread=_time_spread(frame_time_p99)),

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
 from studies.base.counting import heading, readable
-from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, front, judged
+from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, front, judged, over_meshes
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run, by_scene
 from studies.metrics.wish import usual_wish
@@ -76,7 +76,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 def _judged(group: Sequence[Run]) -> list[Judged]:
     """Those that ended well and were timed here."""
-    return [one for one in map(judged, group) if one is not None and one.cost.known]
+    return [one for one in over_meshes(filter(None, map(judged, group))) if one.cost.known]
 
 
 def _ends(values: Sequence[float]) -> tuple[float, float]:
@@ -98,7 +98,7 @@ def _draw_scene(column: np.ndarray, found: Sequence[Judged], scene: Scene) -> li
             continue
         _draw_front(panel, points)
         for one, error in points:
-            _draw_point(panel, one, error)
+            _draw_point(panel, one, error, FIELDS[metric.name])
         heights.append([bound, *(_height(error) for _, error in points)])
         _name(panel, points, recommended)
     return heights
@@ -126,12 +126,15 @@ def _height(error: Measured) -> float:
     return float(np.clip(max(abs(error.value), uncertainty), LOWEST, HIGHEST))
 
 
-def _draw_point(panel: Axes, one: Judged, error: Measured) -> None:
-    """A marker with the reference's uncertainty up and down, and the spread of the repeats to the sides."""
-    look, height = family_of(one.case), _height(error)
-    up = error.uncertainty if error.uncertainty == error.uncertainty else 0.0
+def _draw_point(panel: Axes, one: Judged, error: Measured, field: str) -> None:
+    """A marker with the reference's uncertainty up and down, and the spread of the repeats to the sides. Of several
+    meshes the marker is the median, and the bar goes from the smallest error to the largest."""
+    look, heights = family_of(one.case), [_height(getattr(mesh, field)) for mesh in one.members or (one,)]
+    height = float(np.median(heights))
+    known = error.uncertainty if error.uncertainty == error.uncertainty else 0.0
+    up, down = max(heights) - height + known, height - min(heights) + known
     wide = one.cost.uncertainty if one.cost.uncertainty == one.cost.uncertainty else 0.0
-    down, left = min(up, 0.95 * height), min(wide, 0.95 * one.cost.value)
+    down, left = min(down, 0.95 * height), min(wide, 0.95 * one.cost.value)
     panel.errorbar(
         one.cost.value,
         height,
@@ -190,7 +193,8 @@ def words_of(body: BodyRecipe) -> str:
 def _notes(scenes: dict[str, list[Judged]]) -> list[str]:
     told = [
         "Green: force within 3 % and displacement within 1 % (hollow organs 6 and 3 %) in real time on one core. Bars: "
-        "uncertainty of the reference, and spread of up to five timings. Nothing is drawn below the uncertainty."
+        "uncertainty of the reference, range over five neighbouring meshes where there are five (the marker is their "
+        "median), and spread of up to five timings. Nothing is drawn below the uncertainty."
     ]
     best = {name: cheapest(found, usual_wish(found[0].case.scene)) for name, found in scenes.items()}
     named = [f"{readable(name)}: {words_of(one.case.body)}" for name, one in best.items() if one is not None]

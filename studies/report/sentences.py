@@ -13,7 +13,7 @@ from studies.base.errors import StudyError
 from studies.catalog.accuracy import ACCURACY
 from studies.meshing.bounds import SHAPE
 from studies.metrics.cells import MINUS, plain
-from studies.metrics.judged import Judged, cheapest, nearest
+from studies.metrics.judged import Judged, cheapest, nearest, over_meshes
 from studies.metrics.wish import Wish, usual_wish
 from studies.plots.campaigns.recovery import RETURNED
 from studies.store.record import Status
@@ -178,7 +178,7 @@ def _chosen(published: Path) -> tuple[list[float], list[str]]:
     """Speed of the recommended or closest body of each scene [s/s]; the scenes without an accurate one, with why."""
     speeds, missed = list[float](), list[str]()
     for scene in ACCURACY.scenes:
-        rows = [one for one in published_rows(published, scene) if one.compared]
+        rows = over_meshes(one for one in published_rows(published, scene) if one.compared)
         wish = usual_wish(scene)
         best = cheapest(rows, wish)
         chosen = best or nearest(rows, wish)

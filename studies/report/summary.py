@@ -7,7 +7,7 @@ from typing import Any
 
 from studies.metrics.cells import MISSING, UNRESOLVED_MARK, UNRESOLVED_NOTE, value_cell
 from studies.metrics.distribution import groups
-from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, judged, nearest
+from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, judged, nearest, over_meshes
 from studies.metrics.run import Run
 from studies.metrics.table import UNRESOLVED, study_table
 from studies.metrics.wish import usual_wish
@@ -195,7 +195,7 @@ def _by_scene(runs: Sequence[Run]) -> dict[str, list[Judged]]:
     for one in map(judged, runs):
         if one is not None and one.compared:
             found.setdefault(one.case.scene.name, []).append(one)
-    return found
+    return {name: over_meshes(rows) for name, rows in found.items()}
 
 
 def _is_paper(body: BodyRecipe) -> bool:
@@ -203,7 +203,12 @@ def _is_paper(body: BodyRecipe) -> bool:
 
 
 def _errors(one: Judged) -> list[str]:
-    return [_percent(one.force, signed=True), _percent(one.displacement, signed=False)]
+    """Of a recipe on five meshes "2.3 ± 0.1, median 0.9": the largest, and the median of the sizes."""
+    cells = []
+    for name, error in (("force", one.force), ("displacement", one.displacement)):
+        median = f", median {one.median(name):.2g}" if one.members and error.known else ""
+        cells.append(_percent(error, signed=name == "force") + median)
+    return cells
 
 
 def _shape(one: Judged) -> list[str]:

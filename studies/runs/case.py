@@ -17,6 +17,8 @@ from studies.scene.as_json import _scene_adapter, scene_from_dict
 from studies.scene.scene import Scene
 
 Seconds = float | Literal["auto"]
+ADAPTIVE = "adaptive"
+"""How a body of quadratic elements is graded by one solution of its coarse mesh."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +47,11 @@ class BodyRecipe:
     """Of a surface body: "centre_line" follows a bent organ."""
     weights: tuple[float, float, float, float] | None = None
     """Of a surface body: relative stiffness of structural, bending, inner and axial springs; None for 1, ½, ½, 1."""
-    graded: bool = False
+    graded: bool | Literal["adaptive"] = False
     """Whether elements are halved where the scene holds and touches the body (studies.meshing.graded_mesh), once at
-    outlines and twice at contacts, of a hollow organ once at contacts. Quadratic ones are shaped for outlines too."""
+    outlines and twice at contacts, of a hollow organ once at contacts. Quadratic ones are shaped for outlines too.
+    "adaptive": quadratic elements are halved where one solution by reference elements has its largest errors
+    (studies.reference.adaptive_mesh)."""
     mass: Literal["lumped", "stiffness"] = "lumped"
     """What resists the motion of a quadratic body: its mass, or the same in all, shared in proportion to the stiffness
     at each node, for longer steps where inertia does not matter (studies.scene.inertia)."""
@@ -69,9 +73,19 @@ class BodyRecipe:
             "patches": ", volumes of patches",
             "nodal": ", nodal volumes",
         }
-        words = ("graded " if self.graded else "") + self.kind + chosen[self.volumes]
+        words = {True: "graded ", False: "", ADAPTIVE: "adaptive "}[self.graded] + self.kind + chosen[self.volumes]
         words += ", contact at nodes" if self.contact == "nodes" else ""
         return words if self.mass == "lumped" else words + ", masses by stiffness"
+
+
+NEIGHBOURS = (0.94, 0.97, 1.0, 1.03, 1.06)
+"""Numbers of nodes of neighbouring meshes, over that of a recipe."""
+
+
+def neighbours(body: BodyRecipe) -> tuple[BodyRecipe, ...]:
+    """The recipe on five meshes with nearly as many nodes. One mesh is one draw: errors of neighbours may differ
+    fourfold (docs/accuracy.md)."""
+    return tuple(replace(body, nodes=round(share * body.nodes)) for share in NEIGHBOURS)
 
 
 LATER = {"weights": None, "graded": False, "mass": "lumped", "contact": "facets"}
@@ -118,7 +132,7 @@ class Case:
         if self.body.volumes != "scene":
             parts.append(f"{self.body.regions}regions" if self.body.volumes == "regions" else self.body.volumes)
         if self.body.graded:
-            parts.append("graded")
+            parts.append(ADAPTIVE if self.body.graded == ADAPTIVE else "graded")
         if self.body.mass != "lumped":
             parts.append(f"{self.body.mass}_mass")
         if self.body.contact != "facets":

@@ -18,6 +18,8 @@ def check_recipe(recipe: Any) -> None:
     quadratic = recipe.kind == "quadratic"
     if recipe.graded and not quadratic and recipe.kind != "tetrahedral":
         raise StudyError(f"a {recipe.kind} body cannot be graded; choose kind 'tetrahedral' or 'quadratic'")
+    if recipe.graded not in (True, False) and not quadratic:
+        raise StudyError(f"a {recipe.kind} body is not graded by a solution; choose kind 'quadratic' or graded=True")
     if recipe.mass != "lumped" and not quadratic:
         raise StudyError(f"a {recipe.kind} body has no masses by stiffness; choose kind 'quadratic' or mass 'lumped'")
     if quadratic and recipe.volumes != "scene":

@@ -25,7 +25,7 @@ from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import ADAPTIVE, BodyRecipe, Case
 from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
@@ -46,6 +46,10 @@ class Prepared:
 def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
     """The mesh that a recipe asks for. Raises StudyError."""
     quadratic = recipe.kind == "quadratic"
+    if recipe.graded == ADAPTIVE:
+        from studies.reference.adaptive_mesh import adaptive_mesh
+
+        return adaptive_mesh(scene, recipe.nodes)
     if recipe.graded or quadratic:
         # Loaded where it is asked for: it brings the finite elements.
         from studies.meshing.graded_mesh import graded_mesh, usual_grading

@@ -7,6 +7,14 @@ from studies.geometry.organs.make_shape import make_shape
 from studies.scene.inertia import top_speed
 from studies.scene.scene import Scene
 
+NOT_ADAPTIVE = {
+    "motion": "its load has no static solution",
+    "thin probe": "the reference elements do not know a thin probe",
+    "rest": "nothing loads it",
+    "sag": "small elements at the outline by which it hangs turn inside out",
+}
+"""Loads of a scene -> why no solution by reference elements says where its body needs small elements."""
+
 
 @dataclass(frozen=True)
 class Kind:

@@ -6,8 +6,8 @@ from studies.scene.library import KIDNEY_PROBE, LIVER_PROBE, STOMACH_PROBE
 from studies.scene.scene import ReferencePlan, Scene
 
 Range = tuple[float, float]
-MEMBER = ReferencePlan(variants=(), tolerance=0.01, most=40e3)
-"""Of a member: half a minute of processor time, bars of about a third of the target."""
+MEMBER = ReferencePlan(variants=(), tolerance=0.01, most=90e3)
+"""Of a member: a minute of processor time, bars of about a third of the target."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from studies.plots.style.style import (
     YELLOW,
     method_colour,
 )
-from studies.runs.case import Case
+from studies.runs.case import ADAPTIVE, Case
 
 PAPER = "the paper's body"
 
@@ -36,7 +36,7 @@ class Family:
 SMOOTH = "smooth"
 """In place of its volumes: a body of smoothed springs, one volume per node."""
 
-FAMILIES: dict[tuple[str, bool, str], Family] = {
+FAMILIES: dict[tuple[str, bool | str, str], Family] = {
     ("surface", False, "scene"): Family(PAPER, BLACK, "s"),
     ("tetrahedral", False, "scene"): Family("tetrahedra, one volume", VERMILLION, "o"),
     ("tetrahedral", False, "regions"): Family("tetrahedra, some volumes", ORANGE, "D"),
@@ -44,7 +44,8 @@ FAMILIES: dict[tuple[str, bool, str], Family] = {
     ("tetrahedral", False, SMOOTH): Family("tetrahedra, smoothed over edges", MUTED[0], "d"),
     ("quadratic", False, "scene"): Family("quadratic, even", SKY, "P"),
     ("quadratic", True, "scene"): Family("quadratic, graded", BLUE, "*"),
-    ("tetrahedral", True, "scene"): Family("tetrahedra, graded", GREEN, "v"),
+    ("quadratic", ADAPTIVE, "scene"): Family("quadratic, adaptive", GREEN, "*"),
+    ("tetrahedral", True, "scene"): Family("tetrahedra, graded", MUTED[4], "v"),
 }
 """By kind of body, whether it is graded, and its volumes; colours by Okabe and Ito, no two markers alike."""
 CONTESTANTS: dict[tuple[str, str], Family] = {

@@ -7,7 +7,7 @@ from typing import Any
 from studies.base.counting import counted, readable
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.cells import MISSING, plain, value_cell
-from studies.metrics.judged import Judged, Measured, by_cost, cheapest, judged, nearest
+from studies.metrics.judged import Judged, Measured, by_cost, cheapest, judged, nearest, over_meshes
 from studies.metrics.run import Run, by_scene
 from studies.metrics.wish import usual_wish
 from studies.report.summary import PAPER
@@ -31,7 +31,7 @@ def best_bodies(runs: Sequence[Run], run_id: Callable[[Run], str]) -> list[Best]
     best = []
     for name, group in by_scene(runs).items():
         ids = {run.case.key: run_id(run) for run in group}
-        bodies = [one for one in map(judged, group) if one is not None and one.compared]
+        bodies = over_meshes(one for one in map(judged, group) if one is not None and one.compared)
         wish = usual_wish(group[0].case.scene)
         within = cheapest(bodies, wish)
         chosen = within or nearest(bodies, wish)
@@ -64,7 +64,8 @@ def _row(one: Judged, ids: Mapping[str, str]) -> Best:
         else None
         for name, number in numbers.items()
     }
-    return {"body": f"{body_words(one.case.body)}, {one.case.dt_fraction:g}", "case": ids[one.case.key], **packed}
+    words = f"{body_words(one.case.body)}, {one.case.dt_fraction:g}"
+    return {"body": words, "case": ids[one.case.key], "meshes": max(1, len(one.members)), **packed}
 
 
 def joined_best(parts: Sequence[Sequence[Best]], rows: Sequence[Mapping[str, Any]]) -> list[Best]:
@@ -100,7 +101,7 @@ def answers(best: Sequence[Best], own: Collection[str] = ()) -> dict[str, str]:
     papers = [row["paper"] for row in best if row["paper"]]
     return {
         "Which body?": _which(best),
-        "How wrong?": f"{_capital(_errors(best))}.{_beside(_errors(papers))}",
+        "How wrong?": f"{_capital(_errors(best))}{_meshes(best)}.{_beside(_errors(papers))}",
         "How fast?": f"{_capital(_speed(best) or 'no time is measured')}.{_beside(_speed(papers))}",
     }
 
@@ -135,6 +136,12 @@ def _errors(rows: Sequence[Best]) -> str:
         f"shape off by {shape} % of the organ's size at most": shape,
     }
     return ", ".join(part for part, known in words.items() if known)
+
+
+def _meshes(rows: Sequence[Best]) -> str:
+    """On how many meshes the errors are the largest; parts that are older do not say."""
+    most = max(row.get("meshes", 1) for row in rows)
+    return f", the largest on {most} neighbouring meshes" if most > 1 else ""
 
 
 def _speed(rows: Sequence[Best]) -> str:

@@ -11,7 +11,7 @@ import studies
 from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.accuracy import ACCURACY
-from studies.metrics.judged import DISPLACEMENT, DISTANCE, FORCE, VOLUME, Judged, Measured, judged
+from studies.metrics.judged import DISPLACEMENT, DISTANCE, FORCE, VOLUME, Judged, Measured, judged, over_meshes
 from studies.metrics.metric import Metric
 from studies.runs.case import Case
 from studies.runs.current import case_path
@@ -50,7 +50,7 @@ def stored(results: Path, scenes: Iterable[Scene]) -> Stored:
         own, told = _runs(results, scene)
         others = [one for one in published_rows(published, scene) if one.compared and recipe_text(one.case) not in told]
         if own or others:
-            found[name] = [*own, *others]
+            found[name] = over_meshes([*own, *others])
             origins += [str(results / ACCURACY.name)] * bool(own) + [str(_table(published))] * bool(others)
     if not found:
         raise StudyError(

@@ -115,8 +115,9 @@ def _recipe(answer: Advice, one: Judged) -> list[str]:
     step = f", {1e3 * one.dt:.3g} ms" if one.dt == one.dt else ""
     rows = {
         "recipe": f"{case.body.series}, {case.body.nodes:,} surface nodes, dt = {case.dt_fraction:g} dt_c{step}",
-        "force": _error(one.force, True),
-        "displacement": f"{_error(one.displacement)} (mean over the true surface, of the largest)",
+        "force": _error(one.force, True) + _meshes(one, "force"),
+        "displacement": f"{_error(one.displacement)} (mean over the true surface, of the largest)"
+        + _meshes(one, "displacement"),
         "shape": _shape(one),
         "computing": _computing(answer, one),
         "measured in": answer.stored.where,
@@ -126,6 +127,15 @@ def _recipe(answer: Advice, one: Judged) -> list[str]:
     if answer.unseen is not None:
         rows["others"] = others(answer.unseen)
     return [f"  {name:<{LABEL}}{words}" for name, words in rows.items()]
+
+
+def _meshes(one: Judged, name: str) -> str:
+    """That an error is the largest of several meshes, or of one alone."""
+    if not getattr(one, name).known:
+        return ""
+    if not one.members:
+        return ", on one mesh: neighbouring meshes may differ several times"
+    return f", the largest of {len(one.members)} neighbouring meshes; median {one.median(name):.2g} %"
 
 
 def _error(error: Measured, signed: bool = False) -> str:

@@ -6,13 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
-from studies.meshing.kept_shape import held_area_error, held_facets, tell_shape
+from studies.meshing import kept_shape
+from studies.meshing.kept_shape import held_area_error, held_facets, tell_shape, touched_facets
 from studies.meshing.scene_mesh import mesh_for
 from studies.runs.case import BodyRecipe
 from studies.runs.prepare import mesh_of, prepare
 from studies.scene.library import JUDGED, SCENES
 from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.liver_probe import LIVER_PROBE
 from studies.scene.scene import Held, Organ
 from tests.geometry.boxes import box
 from tests.studies.tiny import SQUEEZE, tiny_case
@@ -51,9 +54,31 @@ def test_a_held_region_that_lost_a_facet_is_told_by_name(kind):
     held = scene.held[0]
     facets, off = held_facets(mesh, held), held_area_error(scene, mesh, held)
     assert abs(off) < 0.03 and not any("held region" in line for line in told(scene, mesh))
-    fewer = replace(mesh, patches=mesh.patches | {held.name: np.setdiff1d(mesh.patches[held.name], facets[0])})
-    (sentence,) = [line for line in told(scene, fewer) if "held region" in line]
-    assert f"area of the held region '{held.name}' -" in sentence
+    points = np.setdiff1d(mesh.patches[held.name], facets[0])
+    fewer = replace(mesh, patches=mesh.patches | {held.name: points})
+    with pytest.raises(StudyError, match=rf"area of the held region '{held.name}' is -\d+ % off .*allowed: 10 %"):
+        tell_shape(scene, fewer, filled=True)
+
+
+@pytest.mark.parametrize(("off", "said"), [(0.02, 0), (0.05, 1), (-0.05, 1), (-0.11, 2), (0.11, 2)])
+def test_the_held_area_is_warned_of_and_then_refused(monkeypatch, off, said):
+    monkeypatch.setattr(kept_shape, "held_area_error", lambda *_: off)
+    scene, mesh = BALL_CLAMPED, mesh_of(BALL_CLAMPED, BodyRecipe("quadratic", 294))
+    if said == 2:
+        with pytest.raises(StudyError, match=r"held region 'bottom' is [-+]11 % off"):
+            tell_shape(scene, mesh, filled=True)
+    else:
+        assert sum("held region" in line for line in told(scene, mesh)) == said
+
+
+def test_few_facets_under_a_probe_are_told_before_the_run():
+    few = mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 394))
+    many = mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 1594, graded="adaptive"))
+    (sentence,) = [line for line in told(LIVER_PROBE, few) if "touch" in line]
+    assert "below 20" in sentence and "graded='adaptive'" in sentence
+    assert touched_facets(LIVER_PROBE, many) > touched_facets(LIVER_PROBE, few) > 0
+    assert not any("touch" in line for line in told(LIVER_PROBE, many))
+    assert touched_facets(BALL_CLAMPED, few) is None  # no probe
 
 
 def test_a_file_that_comes_as_it_is_has_its_own_shape(tmp_path):

@@ -1,0 +1,139 @@
+"""The mesh of a body whose elements are small where its scene needs it: one solution of the coarse body by reference
+elements shows where.
+
+Halvings set by hand leave the error to the luck of a mesh: few facets in a contact turn its force, and over the lever
+to where it is held that turns the whole organ (docs/accuracy.md).
+"""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+
+from massspring.sources import source_fingerprint
+from reference_fem import Checkpoint, NewtonSettings, SolveError, equilibrium_path, nodes
+from reference_fem.estimate import stress_indicator
+from reference_fem.system.saddle_point import System
+from studies.base.errors import StudyError
+from studies.geometry import OrganMesh
+from studies.geometry.mesher.jobs import cached
+from studies.geometry.surface.node_count import FEWEST
+from studies.meshing.bounds import HELD_AREA
+from studies.meshing.graded_mesh import check_number, halved, is_hollow, mesh_at, middles, outer_nodes
+from studies.meshing.held_mesh import HeldMesh
+from studies.meshing.kept_shape import held_area_error
+from studies.meshing.nested_mesh import marked
+from studies.meshing.quadratic_mesh import QuadraticMesh
+from studies.meshing.reference_mesh import on_true_sides
+from studies.meshing.shaping import quadratic_mesh
+from studies.reference.problem import problem_on
+from studies.scene.as_json import scene_to_json
+from studies.scene.kind import NOT_ADAPTIVE, load_of
+from studies.scene.organ_file import remeshed
+from studies.scene.scene import Scene
+
+SOLID, HOLLOW = 0.7, 0.8
+"""Nodes of the coarse body over those of the adapted one (measured: docs/accuracy.md)."""
+FINER, MOST = 1.08, 0.95
+"""Coarse meshes, each finer by the factor, are tried up to a share of the adapted nodes for one that keeps the area of
+all held regions: a mesh may cut off the end where an organ is held, and the next finer one not."""
+LOOSE = NewtonSettings(force_tol=1e-4, penetration_tol=1e-3)
+"""Enough to rank elements."""
+STEP = 1.25
+"""Factor by which the number of elements grows until there are enough surface nodes."""
+
+
+def adaptive_mesh(scene: Scene, wanted: int) -> QuadraticMesh:
+    """The scene's organ in quadratic tetrahedra with `wanted` nodes on its outer surface or a few more, mid-side nodes
+    among them: of a mesh with a share of them, elements are halved, those with the largest error indicator first.
+
+    A mesh file that comes as it is has its own coarse mesh. The wall of a hollow organ has one layer.
+    Raises StudyError for a scene without a static load or without a held region, for a mesh that cannot be made, and
+    where the coarse body has no equilibrium.
+    """
+    reason = why_not(scene)
+    if reason is not None:
+        raise StudyError(f"scene '{scene.name}' has no adaptive bodies: {reason}; choose graded=True")
+    check_number(scene, wanted, quadratic=True)
+    organ_mesh, coarse = coarse_mesh(scene, wanted)
+    few = outer_nodes(coarse, quadratic=True)
+    if few > wanted:
+        raise StudyError(f"scene '{scene.name}': its coarse mesh has {few} surface nodes already; ask for more")
+    recipe = {
+        "kind": "indicator",
+        "name": f"indicator-{scene.name}",
+        "code": source_fingerprint(__name__),
+        "scene": scene_to_json(replace(scene, name="", title="", reference=None)),
+    }
+    shape = {"points": organ_mesh.points, "tetrahedra": organ_mesh.tetrahedra}
+    found = cached(recipe, shape, ("indicator",), lambda: {"indicator": indicator_of(scene, organ_mesh, coarse)})
+    return quadratic_mesh(scene, organ_mesh, coarse, adapted(coarse, found["indicator"], wanted), middles(scene))
+
+
+def coarse_mesh(scene: Scene, wanted: int) -> tuple[OrganMesh, HeldMesh]:
+    """The organ's mesh with a share of the `wanted` nodes on its outer surface, mid-side nodes among them, or a larger
+    share where that loses area of a held region; the best where all do."""
+    share = HOLLOW if is_hollow(scene) else SOLID
+    level, found = max(FEWEST, round((share * wanted + 6) / 4)), list[tuple[float, int]]()
+    while True:
+        lost = lost_area(scene, level)
+        found.append((lost, level))
+        level = max(level + 1, round(FINER * level))
+        if lost <= HELD_AREA or not remeshed(scene.organ) or 4 * level - 6 > MOST * wanted:
+            break
+    organ_mesh, coarse, _ = halved(scene, min(found)[1], 0, 0)
+    return organ_mesh, coarse
+
+
+def lost_area(scene: Scene, level: int) -> float:
+    """The largest error of the area of a held region [%] of quadratic elements on a mesh with `level` vertices on the
+    outer surface; 0 where the true area is not known."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of the mesh that is chosen they come later
+        mesh = mesh_at(scene, level, 0, 0, quadratic=True)
+    errors = [abs(held_area_error(scene, mesh, held)) for held in scene.held]
+    return 100.0 * max((error for error in errors if error == error), default=0.0)
+
+
+def why_not(scene: Scene) -> str | None:
+    """Why a scene has no adaptive bodies; None where it has."""
+    if not scene.held:
+        return "nothing holds the organ, so the reference elements have no unique solution"
+    return NOT_ADAPTIVE.get(load_of(scene))
+
+
+def indicator_of(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh) -> np.ndarray:
+    """The error indicator of the elements of the coarse body at the scene's last checkpoint, (ne,), over the largest.
+
+    Raises StudyError where no equilibrium is found."""
+    try:
+        mesh = on_true_sides(scene, organ_mesh, coarse, coarse)
+        *held, wall = coarse.facets(mesh)
+        middle = nodes(mesh)[wall[:, :3]].mean(axis=1)
+        problem = problem_on(scene, mesh, [np.unique(facets) for facets in held], middle)
+        ends = list[Checkpoint]()
+        equilibrium_path(problem, scene.checkpoints[-1:] or (scene.duration,), LOOSE, on_checkpoint=ends.append)
+    except SolveError as error:
+        raise StudyError(
+            f"scene '{scene.name}': the coarse body has no solution by which to adapt ({error}); choose graded=True"
+        ) from error
+    indicator = stress_indicator(System(problem, LOOSE), ends[-1].state.x)
+    return indicator / indicator.max()
+
+
+def adapted(coarse: HeldMesh, indicator: np.ndarray, wanted: int) -> HeldMesh:
+    """`coarse` with elements halved, largest indicator (ne,) first, until there are `wanted` nodes on the outer
+    surface."""
+    few, many, body = 0, coarse.mesh.nelements, coarse
+    while outer_nodes(body, quadratic=True) < wanted:
+        few, many = many, round(STEP * many)
+        body = marked(coarse, indicator, many)[0]
+    # The fewest elements that do, within one in a hundred.
+    while few and many - few > max(1, many // 100):
+        middle = (few + many) // 2
+        tried = marked(coarse, indicator, middle)[0]
+        if outer_nodes(tried, quadratic=True) < wanted:
+            few = middle
+        else:
+            many, body = middle, tried
+    return body

@@ -1,0 +1,112 @@
+"""Bodies whose elements are small where a solution of their coarse mesh has its errors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from studies.base.errors import StudyError
+from studies.meshing.graded_mesh import outer_nodes
+from studies.meshing.held_mesh import held_mesh
+from studies.meshing.kept_shape import held_area_error
+from studies.meshing.scene_mesh import mesh_for
+from studies.reference import adaptive_mesh as module
+from studies.reference.adaptive_mesh import adapted, adaptive_mesh, coarse_mesh, indicator_of
+from studies.runs.case import BodyRecipe, Case, case_from_json
+from studies.runs.prepare import mesh_of
+from studies.scene.library import BALL_CLAMPED, BALL_RINGING, BALL_SQUEEZE, LIVER_PROBE, SPLEEN_SAG
+
+NODES = 594
+BODY = BodyRecipe("quadratic", NODES, graded="adaptive", mass="stiffness")
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return mesh_of(LIVER_PROBE, BODY)
+
+
+def test_it_has_the_wanted_nodes_and_stands_upright(mesh):
+    assert NODES <= mesh.outer_count <= 1.06 * NODES and mesh.smallest_jacobian > 0.0
+    assert abs(held_area_error(LIVER_PROBE, mesh, LIVER_PROBE.held[0])) < 0.03
+
+
+def test_elements_are_small_under_the_probe_and_at_the_outline(mesh):
+    """Those near the probe or the outline are smaller than the rest by more than one halving."""
+    corners = mesh.points[mesh.cells[:, :4]]
+    size = np.cbrt(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])))
+    middle = corners.mean(axis=1)
+    probe, region = LIVER_PROBE.obstacles[-1], LIVER_PROBE.held[0].region
+    under = probe.gap(middle, LIVER_PROBE.checkpoints[-1]) < 0.01
+    far = ~under & (probe.gap(middle, LIVER_PROBE.checkpoints[-1]) > 0.03) & (np.abs(region.level(middle)) > 0.03)
+    assert under.sum() > 5 and far.sum() > 20
+    assert np.median(size[under]) < 0.75 * np.median(size[far])
+
+
+def test_it_is_solved_once_and_the_same_again(mesh, monkeypatch):
+    monkeypatch.setattr(module, "indicator_of", lambda *_: pytest.fail("solved again"))
+    again = adaptive_mesh(replace(LIVER_PROBE, title="other", reference=None), NODES)
+    assert np.array_equal(again.points, mesh.points) and np.array_equal(again.cells, mesh.cells)
+
+
+def test_the_largest_indicators_are_halved_first():
+    coarse = held_mesh(BALL_CLAMPED, mesh_for(BALL_CLAMPED, 60))
+    marked = np.zeros(coarse.mesh.nelements)
+    marked[7] = 1.0
+    body = adapted(coarse, marked, outer_nodes(coarse, quadratic=True) + 3)
+    middle = coarse.mesh.p[:, coarse.mesh.t].mean(axis=1).T
+    new = body.mesh.p[:, coarse.mesh.nvertices :].T
+    near = np.linalg.norm(middle - middle[7], axis=1) < np.quantile(np.linalg.norm(middle - middle[7], axis=1), 0.5)
+    assert len(new) and np.linalg.norm(new - middle[7], axis=1).max() < np.linalg.norm(middle - middle[7], axis=1).max()
+    assert near.any() and outer_nodes(body, quadratic=True) >= outer_nodes(coarse, quadratic=True) + 3
+
+
+def test_the_indicator_belongs_to_the_elements_of_the_coarse_mesh():
+    organ_mesh, coarse = coarse_mesh(LIVER_PROBE, 300)
+    indicator = indicator_of(LIVER_PROBE, organ_mesh, coarse)
+    assert indicator.shape == (coarse.mesh.nelements,) and indicator.max() == 1.0 and indicator.min() >= 0.0
+    # Half of the error is in few elements, or it would say nothing.
+    assert np.sort(indicator)[::-1][: len(indicator) // 5].sum() > 0.5 * indicator.sum()
+
+
+def test_a_coarse_mesh_that_loses_what_is_held_is_left_for_a_finer_one(monkeypatch):
+    lost = {level: 20.0 for level in range(1000)}
+    first = round((0.7 * NODES + 6) / 4)
+    levels = []
+    monkeypatch.setattr(module, "lost_area", lambda _, level: levels.append(level) or lost[level])
+    lost[round(1.08 * first)] = 1.0
+    coarse_mesh(LIVER_PROBE, NODES)
+    assert levels == [first, round(1.08 * first)]
+
+
+@pytest.mark.parametrize(
+    ("scene", "reason"),
+    [(BALL_SQUEEZE, "nothing holds"), (BALL_RINGING, "nothing holds|no static"), (SPLEEN_SAG, "turn inside out")],
+    ids=lambda one: getattr(one, "name", ""),
+)
+def test_scenes_without_such_a_solution_are_refused_by_name(scene, reason):
+    with pytest.raises(StudyError, match=rf"'{scene.name}' has no adaptive bodies: .*({reason}).*; choose graded=True"):
+        mesh_of(scene, BODY)
+
+
+def test_a_coarse_body_without_an_equilibrium_is_a_sentence(monkeypatch):
+    from reference_fem import SolveError
+
+    def fails(*_, **__):
+        raise SolveError("no step")
+
+    monkeypatch.setattr(module, "equilibrium_path", fails)
+    organ_mesh, coarse = coarse_mesh(LIVER_PROBE, 300)
+    with pytest.raises(StudyError, match=r"no solution by which to adapt \(no step\); choose graded=True"):
+        indicator_of(LIVER_PROBE, organ_mesh, coarse)
+
+
+@pytest.mark.parametrize("kind", ["tetrahedral", "surface"])
+def test_other_bodies_are_not_adapted(kind):
+    with pytest.raises(StudyError, match="graded"):
+        BodyRecipe(kind, graded="adaptive")
+
+
+def test_a_recipe_is_stored_and_named():
+    case = Case(LIVER_PROBE, BODY)
+    assert case_from_json(case.key) == case and case.name.endswith("-adaptive-stiffness_mass")
+    assert BODY.series == "adaptive quadratic, masses by stiffness"
