@@ -52,7 +52,7 @@ def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> N
     if scene.held and few is not None and few < FACETS:
         warnings.warn(
             f"{mesh.name}: only about {few:.0f} facets will touch the probe; below {FACETS} its force may be several "
-            "percent off, to either side; use more nodes, or graded='adaptive'",
+            "percent off, to either side; use more nodes, or a quadratic body with graded='adaptive'",
             stacklevel=2,
         )
 

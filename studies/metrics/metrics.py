@@ -194,7 +194,7 @@ def contact_facets(run: Run) -> float:
 
 
 def contact_turn(run: Run) -> float:
-    """Angle between the force of the probed obstacle and its push at the last checkpoint [degrees].
+    """Angle between the force of the probed obstacle and its push at the last checkpoint [deg].
 
     Too few facets in a contact turn its force; the true one may have an angle of its own. NaN without an obstacle.
     """

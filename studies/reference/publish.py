@@ -29,11 +29,11 @@ MOST, TOLERANCE = 80e3, 0.002
 PROCESSES = 2
 
 
-def finer(scene: Scene) -> Scene:
-    """The scene with the plan of its published reference."""
+def finer(scene: Scene, most: float = MOST) -> Scene:
+    """The scene with the plan of its published reference, of at most `most` unknowns."""
     plan = scene.reference
     assert plan is not None  # scenes without a plan are left out
-    return replace(scene, reference=replace(plan, most=MOST, tolerance=TOLERANCE)) if plan.nested else scene
+    return replace(scene, reference=replace(plan, most=most, tolerance=TOLERANCE)) if plan.nested else scene
 
 
 def judged_scenes() -> dict[str, Scene]:
@@ -41,20 +41,20 @@ def judged_scenes() -> dict[str, Scene]:
     return {scene.name: scene for scene in JUDGED}
 
 
-def solved(work: tuple[str, str]) -> None:
-    """In a process: solves one scene of the catalogue, (name, folder)."""
-    name, root = work
-    solve(Path(root), ReferenceSolve(finer(judged_scenes()[name])))
+def solved(work: tuple[str, str, float]) -> None:
+    """In a process: solves one scene of the catalogue, (name, folder, most unknowns)."""
+    name, root, most = work
+    solve(Path(root), ReferenceSolve(finer(judged_scenes()[name], most)))
 
 
-def publish(name: str, chosen: list[str], root: Path) -> Path:
+def publish(name: str, chosen: list[str], root: Path, most: float = MOST) -> Path:
     """Solves the chosen scenes below `root` and writes them as the set `name`, in which the others keep their files;
     where its index lies. Raises StudyError for a scene that did not converge."""
-    for scene, _, cause in run_each([(scene, str(root)) for scene in chosen], PROCESSES, solved):
+    for scene, _, cause in run_each([(scene, str(root), most) for scene in chosen], PROCESSES, solved):
         if cause is not None:
             raise StudyError(f"{scene[0]} was not solved: {cause}")
         print(f"solved {scene[0]}", flush=True)
-    references = {key: load_reference(root, finer(judged_scenes()[key])) for key in chosen}
+    references = {key: load_reference(root, finer(judged_scenes()[key], most)) for key in chosen}
     return write_published(FOLDER, name, {key: one for key, one in references.items() if one is not None})
 
 
@@ -104,6 +104,7 @@ def main(words: list[str]) -> int:
     parser.add_argument("set", help="name of the set: the year and a number, as 2027.1")
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help="default: all of the catalogue")
     parser.add_argument("--root", type=Path, help="where solutions are kept; default: a folder that is removed")
+    parser.add_argument("--most", type=float, default=MOST, metavar="N", help="unknowns of nested references")
     given = parser.parse_args(words)
     unknown = [scene for scene in given.scenes if scene not in judged_scenes()]
     if unknown:
@@ -111,7 +112,7 @@ def main(words: list[str]) -> int:
         return 2
     with tempfile.TemporaryDirectory() as folder:
         try:
-            path = publish(given.set, given.scenes or list(judged_scenes()), given.root or Path(folder))
+            path = publish(given.set, given.scenes or list(judged_scenes()), given.root or Path(folder), given.most)
         except StudyError as error:
             print(f"organbench: {error}", file=sys.stderr)
             return 1

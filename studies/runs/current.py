@@ -5,7 +5,8 @@ from pathlib import Path
 
 from massspring.sources import source_fingerprint
 from studies.geometry.mesher.jobs import MAKERS
-from studies.runs.case import Case
+from studies.runs.case import ADAPTIVE, Case
+from studies.runs.prepare import ADAPTER
 from studies.runs.user_code import files_of
 from studies.store.paths import record_path
 
@@ -16,11 +17,14 @@ def run_fingerprint() -> str:
 
 
 def case_fingerprint(case: Case) -> str:
-    """Hash of the code that makes the run of a case: that, and the user's files in which its method and law are."""
-    own = files_of(case.method, case.body.law)
-    if not own:
+    """Hash of the code that makes the run of a case: that, the user's files in which its method and law are, and of an
+    adaptive body the code that solves references."""
+    parts = [file.fingerprint for file in files_of(case.method, case.body.law)]
+    if case.body.graded == ADAPTIVE:
+        parts.append(source_fingerprint(ADAPTER))
+    if not parts:
         return run_fingerprint()
-    return hashlib.sha256("\0".join([run_fingerprint(), *(file.fingerprint for file in own)]).encode()).hexdigest()
+    return hashlib.sha256("\0".join([run_fingerprint(), *parts]).encode()).hexdigest()
 
 
 def case_path(root: Path, study: str, case: Case) -> Path:

@@ -1,6 +1,7 @@
 """From a scene to the mass-spring solver: the mesh, the body, the set-up of a run."""
 
 from dataclasses import dataclass
+from importlib import import_module
 
 import numpy as np
 
@@ -31,6 +32,8 @@ from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
 from studies.scene.scene import Scene
 
+ADAPTER = "studies.reference.adaptive_mesh"
+"""Makes the meshes of adaptive bodies by one solution of a reference."""
 LUMEN, WHOLE = "lumen", "whole"
 
 
@@ -47,9 +50,8 @@ def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
     """The mesh that a recipe asks for. Raises StudyError."""
     quadratic = recipe.kind == "quadratic"
     if recipe.graded == ADAPTIVE:
-        from studies.reference.adaptive_mesh import adaptive_mesh
-
-        return adaptive_mesh(scene, recipe.nodes)
+        # No import leads there: what solves a reference makes no other run stale (studies.runs.current).
+        return import_module(ADAPTER).adaptive_mesh(scene, recipe.nodes)
     if recipe.graded or quadratic:
         # Loaded where it is asked for: it brings the finite elements.
         from studies.meshing.graded_mesh import graded_mesh, usual_grading

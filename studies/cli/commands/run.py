@@ -144,7 +144,19 @@ def _bring_up_to_date(
     say(f"{study.name}: {summary(ended)}")
     for sentence in causes(odd):
         say(f"  {sentence}")
+    if study.name not in {known.name for known in STUDIES}:
+        _say_trust(root, study)
     return not odd
+
+
+def _say_trust(root: Path, study: Study) -> None:
+    """Whether two meshes of a scene without a reference agree."""
+    from studies.metrics.trust import verdicts  # with the geometry of surfaces
+    from studies.sweep.load import load_runs
+
+    for verdict in verdicts(load_runs(root, study)[0]):
+        answer = "yes" if verdict.trusted else "no: use more nodes"
+        say(f"{verdict.scene}: trust its best body: {answer}, because {verdict.why}")
 
 
 def _check_again(again: str, others: dict[str, object]) -> None:

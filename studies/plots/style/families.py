@@ -44,7 +44,7 @@ FAMILIES: dict[tuple[str, bool | str, str], Family] = {
     ("tetrahedral", False, SMOOTH): Family("tetrahedra, smoothed over edges", MUTED[0], "d"),
     ("quadratic", False, "scene"): Family("quadratic, even", SKY, "P"),
     ("quadratic", True, "scene"): Family("quadratic, graded", BLUE, "*"),
-    ("quadratic", ADAPTIVE, "scene"): Family("quadratic, adaptive", GREEN, "*"),
+    ("quadratic", ADAPTIVE, "scene"): Family("quadratic, adaptive", GREEN, (5, 1, 36)),
     ("tetrahedral", True, "scene"): Family("tetrahedra, graded", MUTED[4], "v"),
 }
 """By kind of body, whether it is graded, and its volumes; colours by Okabe and Ito, no two markers alike."""

@@ -18,6 +18,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames
 from studies.scene.as_json import scene_from_dict, scene_to_json
+from studies.scene.kind import has_wall
 from studies.scene.library import JUDGED, SCENES, InitialConditions
 from studies.scene.library.stress import STRESS_SCENES
 
@@ -38,7 +39,7 @@ def judged(request):
 
 
 def small(scene, kind="tetrahedral", **changes) -> Case:
-    return Case(scene, BodyRecipe(kind, THIN if scene.lumen else SMALL), frames=20).replaced(**changes)
+    return Case(scene, BodyRecipe(kind, THIN if has_wall(scene) else SMALL), frames=20).replaced(**changes)
 
 
 @cache

@@ -56,14 +56,16 @@ def test_of_several_scenes_a_sentence_asks_which(write):
         find_scene(f"{path}:othr")
 
 
-def test_a_scene_alone_is_a_study_of_three_bodies_with_charts(write):
+def test_a_scene_alone_is_a_study_of_four_bodies_with_charts(write):
     study = find_study(write(SCENE))
     assert study.name == "alone" and study.charts and [scene.name for scene in study.scenes] == ["alone"]
     assert [(case.body.kind, case.method.name, case.recorded) for case in study.cases] == [
         ("tetrahedral", "free", ("surface",)),
         ("tetrahedral", "implicit_volume", ("surface",)),
         ("quadratic", "implicit_volume", ("surface",)),
+        ("quadratic", "implicit_volume", ("surface",)),
     ]
+    assert len({case.body.nodes for case in study.cases[-2:]}) == 2  # whose difference says whether to trust them
     assert {"force_end", "mean_error", "shape_error", "shape_volume"} <= set(study.columns)
 
 

@@ -108,7 +108,7 @@ def test_a_file_may_ask_for_a_new_surface(tmp_path):
 
 
 def test_dt_auto_is_the_fraction_of_the_limit_of_the_held_body():
-    case = tiny_case(scene=CLAMPED)
+    case = tiny_case(scene=CLAMPED, body=BodyRecipe(nodes=100))
     half, tenth = prepare(case), prepare(case.replaced(dt_fraction=0.1))
     for prepared, fraction in ((half, 0.5), (tenth, 0.1)):
         clock = prepared.setup.clock

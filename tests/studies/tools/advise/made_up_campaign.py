@@ -14,8 +14,8 @@ from studies.store.tables.csv_table import write_table
 PAPER = BodyRecipe("surface", 550)
 ONE = BodyRecipe(nodes=300)
 EVEN = BodyRecipe("quadratic", 594, mass="stiffness")
-GRADED = BodyRecipe("quadratic", 794, graded=True, mass="stiffness")
-FINE = BodyRecipe("quadratic", 1194, graded=True, mass="stiffness")
+GRADED = BodyRecipe("quadratic", 794, graded="adaptive", mass="stiffness")
+FINE = BodyRecipe("quadratic", 1194, graded="adaptive", mass="stiffness")
 LADDER = {
     PAPER: (-70.0, 17.0, 0.01),
     ONE: (-31.0, 5.0, 0.02),

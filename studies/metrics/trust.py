@@ -1,0 +1,103 @@
+"""Whether a body can be trusted in a scene without a reference: the same recipe on two meshes, compared.
+
+What both meshes share, a half step or other masses do not show; the error of a body is that of its mesh
+(docs/accuracy.md).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from studies.metrics.metric import PERCENT
+from studies.metrics.metrics import contact_facets
+from studies.metrics.run import Run, by_scene
+from studies.metrics.wish import Wish, usual_wish
+from studies.runs.case import BodyRecipe
+from studies.scene.quantities import allowed
+from studies.store.record import Status
+
+SHARE = 0.5
+"""Of the wished error by which two meshes may differ (calibrated on one half of a population, docs/population.md)."""
+
+
+class Apart(NamedTuple):
+    """How far two bodies of one scene are apart at its last checkpoint; NaN where the scene compares none."""
+
+    force: float
+    """Of the probed force, over that of the finer [%]."""
+    displacement: float
+    """Mean over the surface of the finer body, over its largest displacement [%]."""
+
+
+class Verdict(NamedTuple):
+    """Of the finest of two bodies or more in a scene."""
+
+    scene: str
+    trusted: bool
+    why: str
+    """ "two meshes (994 and 1,194 nodes) differ by 0.4 % in force and 0.2 % in displacement"."""
+
+
+def apart(coarse: Run, fine: Run) -> Apart:
+    """How far the coarse body is from the fine one."""
+    scene = fine.case.scene
+    force = displacement = float("nan")
+    if allowed(scene, "force_end"):
+        force = PERCENT * abs(float(coarse.force[-1] / fine.force[-1]) - 1.0)
+    sides, others = fine.sides, coarse.sides
+    if allowed(scene, "surface_mean") and sides is not None and others is not None and set(sides) == set(others):
+        moved, seen = (run.fields.snapshots[-1] - run.fields.rest for run in (fine, coarse))
+        errors, weights, sizes = [], [], []
+        for name, side in sides.items():
+            nodes = np.unique(side.facets)
+            at = others[name].nearest(side.points[nodes])
+            errors.append(np.linalg.norm(others[name].interpolated(seen, at) - moved[nodes], axis=1))
+            weights.append(side.areas[nodes])
+            sizes.append(np.linalg.norm(moved[nodes], axis=1))
+        mean = np.average(np.concatenate(errors), weights=np.concatenate(weights))
+        displacement = PERCENT * float(mean / np.concatenate(sizes).max())
+    return Apart(force, displacement)
+
+
+def verdicts(runs: Sequence[Run]) -> list[Verdict]:
+    """Of each scene without a reference in which a graded quadratic recipe ran on two meshes or more: of the two
+    finest."""
+    found = []
+    for name, group in by_scene(runs).items():
+        recipes: dict[BodyRecipe, list[Run]] = {}
+        for run in group:
+            body = run.case.body
+            judged = run.reference is not None
+            if body.kind == "quadratic" and body.graded and run.record.status == Status.OK and not judged:
+                recipes.setdefault(_without_nodes(body), []).append(run)
+        for pair in recipes.values():
+            pair.sort(key=lambda run: run.case.body.nodes)
+            if len(pair) > 1 and pair[-2].case.body != pair[-1].case.body:
+                found.append(_verdict(name, pair[-2], pair[-1]))
+    return found
+
+
+def _without_nodes(body: BodyRecipe) -> BodyRecipe:
+    return replace(body, nodes=BodyRecipe().nodes)
+
+
+def _verdict(scene: str, coarse: Run, fine: Run) -> Verdict:
+    between, wish = apart(coarse, fine), usual_wish(fine.case.scene)
+    nodes = f"{coarse.case.body.nodes:,} and {fine.case.body.nodes:,} nodes"
+    parts = [
+        f"{value:.2g} % in {name}"
+        for name, value in (("force", between.force), ("displacement", between.displacement))
+        if value == value
+    ]
+    facets = contact_facets(fine)
+    few = f"; {facets:.0f} facets touch" if facets == facets else ""
+    return Verdict(scene, within(between, wish), f"two meshes ({nodes}) differ by {' and '.join(parts)}{few}")
+
+
+def within(between: Apart, wish: Wish) -> bool:
+    """Whether two meshes agree so well that the error of the finer is likely within the wish."""
+    pairs = ((between.force, wish.force), (between.displacement, wish.displacement))
+    known = [(value, bound) for value, bound in pairs if value == value and bound is not None]
+    return bool(known) and all(value <= SHARE * bound for value, bound in known)

@@ -1,0 +1,78 @@
+"""Two meshes of one scene that agree are trusted; two that differ are not."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.cli.commands.run import _say_trust
+from studies.metrics.trust import SHARE, Apart, apart, verdicts, within
+from studies.metrics.wish import Wish
+from studies.runs.case import BodyRecipe
+from studies.store.record import Status
+from tests.studies import made_up_run
+from tests.studies.tiny import tiny_study
+
+FINE = BodyRecipe("quadratic", 1194, graded="adaptive")
+COARSE = replace(FINE, nodes=994)
+WISH = Wish(3.0, 1.0)
+
+
+def body_run(body, *, force=1.0, shift=1.0, status=Status.OK):
+    """The cube, its force scaled and its displacement a shift."""
+    moved = made_up_run.POINTS + shift * made_up_run.SHIFT
+    values = {"snapshots": np.stack([made_up_run.POINTS, moved])}
+    made = made_up_run.run(force=force * np.array([0.5, 1.0, 1.5, 2.0]), values=values, status=status, reference=None)
+    made = replace(made, case=replace(made.case, body=body))
+    return made
+
+
+@pytest.fixture(autouse=True)
+def flat_facets(monkeypatch):
+    monkeypatch.setattr("studies.metrics.run.six_node_facets", lambda triangles: triangles)
+
+
+def test_how_far_two_bodies_are_apart():
+    between = apart(body_run(COARSE, force=1.02, shift=0.9), body_run(FINE))
+    assert between == pytest.approx(Apart(2.0, 10.0), rel=1e-9)
+    assert apart(body_run(COARSE), body_run(FINE)) == pytest.approx(Apart(0.0, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("between", "trusted"),
+    [
+        (Apart(SHARE * 2.9, SHARE * 0.9), True),
+        (Apart(SHARE * 3.1, SHARE * 0.9), False),
+        (Apart(SHARE * 2.9, SHARE * 1.1), False),
+        (Apart(np.nan, SHARE * 0.9), True),
+        (Apart(np.nan, np.nan), False),
+    ],
+)
+def test_both_must_be_within_a_share_of_the_wish(between, trusted):
+    assert within(between, WISH) == trusted
+
+
+def test_a_verdict_names_both_meshes_and_both_numbers():
+    (verdict,) = verdicts([body_run(FINE), body_run(COARSE, force=1.02, shift=0.9), body_run(BodyRecipe("surface"))])
+    assert not verdict.trusted and verdict.scene == "ball_clamped"
+    assert verdict.why == "two meshes (994 and 1,194 nodes) differ by 2 % in force and 10 % in displacement"
+
+
+def test_where_there_is_a_reference_it_judges():
+    known = [replace(one, reference=made_up_run.reference()) for one in (body_run(FINE), body_run(COARSE))]
+    assert verdicts(known) == []
+
+
+def test_one_mesh_is_no_verdict_and_a_failed_run_none():
+    assert verdicts([body_run(FINE)]) == []
+    assert verdicts([body_run(FINE), body_run(COARSE, status=Status.INVERTED)]) == []
+    assert verdicts([body_run(FINE), body_run(replace(COARSE, graded=True))]) == []
+
+
+@pytest.mark.parametrize(("shift", "answer"), [(0.9999, "yes"), (0.9, "no: use more nodes")])
+def test_a_run_of_a_scene_ends_with_the_verdict(monkeypatch, capsys, shift, answer):
+    runs = [body_run(COARSE, shift=shift), body_run(FINE)]
+    monkeypatch.setattr("studies.sweep.load.load_runs", lambda root, study: (runs, []))
+    _say_trust(Path(), tiny_study())
+    assert f"ball_clamped: trust its best body: {answer}, because two meshes" in capsys.readouterr().out
