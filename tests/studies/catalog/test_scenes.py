@@ -20,10 +20,11 @@ from studies.runs.run import checkpoint_frames
 from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.library import JUDGED, SCENES, InitialConditions
 from studies.scene.library.stress import STRESS_SCENES
+from tests.studies.tiny import bodies_of
 
 SMALL, THIN = 150, 400
 """Surface nodes of a small solid organ, and of a small hollow one: its wall folds on coarser meshes."""
-KINDS = ("tetrahedral", "surface")
+BODIES = pytest.mark.parametrize(("scene", "kind"), bodies_of(SCENES))
 
 
 @pytest.fixture(params=SCENES, ids=lambda scene: scene.name)
@@ -138,7 +139,7 @@ def test_a_skipped_method_is_refused_with_the_reason(scene):
     assert METHODS[0].name == "free"
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@BODIES
 def test_body_weighs_what_the_tissue_weighs(scene, kind):
     prepared = small_setup(scene, kind)
     body = prepared.setup.body
@@ -147,14 +148,14 @@ def test_body_weighs_what_the_tissue_weighs(scene, kind):
     assert body.volume == pytest.approx(prepared.mesh.volume, rel=1e-12)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@BODIES
 def test_obstacles_start_outside(scene, kind):
     body = small_setup(scene, kind).setup.body
     for obstacle in scene.obstacles:
         assert obstacle.gap(body.rest, 0.0).min() >= -1e-9 * body.size
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@BODIES
 def test_something_is_felt(scene, kind):
     """Every obstacle reaches the body, and the probed force is a press at the deepest point, or a lumen swells."""
     case = small(scene, kind)
