@@ -20,8 +20,7 @@ from studies.plots.style.page import (
     grouped,
     has_frames,
     log_axis,
-    page,
-    panels,
+    panel_grid,
     remarks,
     unresolved_mark,
     unresolved_notes,
@@ -52,12 +51,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         return blank(TITLE, "no run has recorded a frame yet")
     metrics = [metric for metric in METRICS if metric.name in QUANTITIES]
     scenes, looks = by_scene(shown), body_looks(shown)
-    columns = min(2, len(scenes))
-    rows = -(-len(scenes) // columns)
-    sheet = page(5.2 * columns, 3.0 * rows + 0.4)
-    axes = panels(sheet, rows, columns, sharey=True)
-    for spare in axes.flat[len(scenes) :]:
-        spare.set_axis_off()
+    sheet, axes = panel_grid(len(scenes), 2, (5.2, 3.0), (0.0, 0.4), sharey=True)
     values = [0.1, 100.0]
     for panel, (name, group) in zip(axes.flat, scenes.items(), strict=False):
         panel.set_title(heading(name) + unresolved_mark(group, metrics))

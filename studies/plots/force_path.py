@@ -22,8 +22,7 @@ from studies.plots.style.page import (
     good_frames,
     grouped,
     has_frames,
-    page,
-    panels,
+    panel_grid,
     reference_handle,
     remarks,
     spread_out,
@@ -50,11 +49,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     if not shown:
         return blank(TITLE, "no run of a scene that asks for a force has recorded a frame yet")
     scenes, looks = by_scene(shown), body_looks(shown)
-    columns = min(2, len(scenes))
-    sheet = page(5.2 * columns, 3.0 * -(-len(scenes) // columns) + 0.4)
-    axes = panels(sheet, -(-len(scenes) // columns), columns)
-    for spare in axes.flat[len(scenes) :]:
-        spare.set_axis_off()
+    sheet, axes = panel_grid(len(scenes), 2, (5.2, 3.0), (0.0, 0.4))
     for panel, group in zip(axes.flat, scenes.values(), strict=False):
         _draw_scene(panel, group, looks)
     reference = reference_handle(linestyle="-", linewidth=1)

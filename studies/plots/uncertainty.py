@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.base.counting import heading, readable
-from studies.plots.style.page import blank, finish, log_axis, page, panels
+from studies.plots.style.page import blank, finish, log_axis, panel_grid
 from studies.plots.style.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, save, styled
 from studies.reference.uncertainty import Uncertainty
 
@@ -35,12 +35,7 @@ def figure(known: Mapping[str, Mapping[str, Uncertainty]]) -> Figure:
     """
     if not known:
         return blank(TITLE, "no reference has been solved on its family of meshes yet")
-    columns = min(2, len(known))
-    rows = -(-len(known) // columns)
-    sheet = page(5.2 * columns, 2.9 * rows + 0.3)
-    axes = panels(sheet, rows, columns, sharex=True, sharey=True)
-    for spare in axes.flat[len(known) :]:
-        spare.set_axis_off()
+    sheet, axes = panel_grid(len(known), 2, (5.2, 2.9), (0.0, 0.3), sharex=True, sharey=True)
     longest_first = sorted(known.values(), key=len, reverse=True)
     names = list(dict.fromkeys(name for quantities in longest_first for name in quantities))
     for panel, (scene, quantities) in zip(axes.flat, known.items(), strict=False):

@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 
 from massspring import METHODS, simulate
-from reference_fem import NewtonSettings
-from reference_fem.system.saddle_point import System
 from studies.base.errors import StudyError
-from studies.meshing.nested_mesh import base_mesh
-from studies.reference.nested import problem_of
-from studies.reference.problem import reference_problem
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames
@@ -50,25 +45,6 @@ def _by_name(name, kind):
 def small_setup(scene, kind="tetrahedral"):
     """The small case of a scene made ready, once for all tests, which only read it."""
     return _by_name(scene.name, kind) if scene in SCENES else prepare(small(scene, kind))
-
-
-@cache
-def _problem_by_name(name):
-    scene = next(scene for scene in JUDGED if scene.name == name)
-    return coarse_problem(scene)
-
-
-def coarsest_problem(scene):
-    """The reference problem of a scene on its coarsest mesh, once for all tests, which only read it."""
-    return _problem_by_name(scene.name) if scene in JUDGED else coarse_problem(scene)
-
-
-def coarse_problem(scene):
-    """The reference problem of a scene on its coarsest mesh."""
-    plan = scene.reference
-    if not plan.nested:
-        return reference_problem(scene, plan.levels[0])
-    return problem_of(base_mesh(scene, plan.base, plan.at_contact))
 
 
 def test_the_name_is_a_word_for_the_command_line_and_the_title_a_line(scene):
@@ -176,12 +152,3 @@ def test_something_is_felt(scene, kind):
         weight = -scene.tissue.density * prepared.mesh.volume * np.asarray(scene.gravity)
         # What is left of the swing after four seconds of damping, with room for twenty coarse frames.
         assert history.held_force[last].sum(axis=0) == pytest.approx(weight, abs=0.01 * np.linalg.norm(weight))
-
-
-def test_reference_can_be_set_up_on_its_coarsest_mesh(judged):
-    problem = coarsest_problem(judged)
-    System(problem, NewtonSettings()).solver.release()
-    assert problem.material.mu == judged.tissue.shear_modulus
-    assert problem.material.kappa == judged.tissue.shear_modulus * judged.tissue.bulk_over_shear
-    assert problem.density == judged.tissue.density
-    assert tuple(problem.gravity) == judged.gravity
