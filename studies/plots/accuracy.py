@@ -1,7 +1,6 @@
 """How far each model is from the reference in four quantities, and how well the reference itself is known."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,13 +18,14 @@ from studies.plots.style.page import (
     finish,
     grouped,
     has_frames,
+    hollow_handle,
     log_axis,
     panel_grid,
     remarks,
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLACK, GREY, SMALL, method_colour, remark, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, drawing, method_colour, remark, styled
 from studies.runs.case import BodyRecipe
 from studies.store.record import Status
 
@@ -115,10 +115,9 @@ def _struck_out(shown: Sequence[Run]) -> list[Line2D]:
 
 
 def _handles(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list:
-    hollow = {"marker": "o", "linestyle": "", "markersize": 7, "markerfacecolor": "white", "color": BLACK}
     return [
         *body_method_handles(shown, looks, markers=True),
-        Line2D([], [], label="hollow: the reference is not ten times better", **hollow),
+        hollow_handle(BLACK),
         band_handle("uncertainty of the reference"),
         *_struck_out(shown),
     ]
@@ -132,6 +131,4 @@ def _notes() -> list[str]:
     ]
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,7 +28,7 @@ from studies.plots.style.page import (
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLACK, GREY, SMALL, method_colour, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, drawing, method_colour, styled
 from studies.runs.case import BodyRecipe
 from studies.scene.library import Scene
 
@@ -133,6 +132,4 @@ def _largest(group: Sequence[Run]) -> float:
     return max((float(force.max()) for force in forces), default=0.0) or 1.0
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

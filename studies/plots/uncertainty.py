@@ -1,7 +1,6 @@
 """How far each quantity of each reference may be from the truth, and what that comes from."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +9,7 @@ from matplotlib.lines import Line2D
 
 from studies.base.counting import heading, readable
 from studies.plots.style.page import blank, finish, log_axis, panel_grid
-from studies.plots.style.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, save, styled
+from studies.plots.style.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, drawing, styled
 from studies.reference.uncertainty import Uncertainty
 
 TITLE = "Uncertainty of the references"
@@ -86,6 +85,4 @@ def _notes(known: Mapping[str, Mapping[str, Uncertainty]]) -> list[str]:
     ]
 
 
-def draw(known: Mapping[str, Mapping[str, Uncertainty]], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(known), path)
+draw = drawing(figure)

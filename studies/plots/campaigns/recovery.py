@@ -1,7 +1,6 @@
 """Whether a body started from an impossible shape comes back: the smallest volume ratio of its tetrahedra over time."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -13,7 +12,7 @@ from studies.metrics.run import Run, by_scene
 from studies.metrics.table import metric
 from studies.plots.style.bodies import BodyLook, body_handle, body_looks
 from studies.plots.style.page import blank, finish, good_frames, grouped, has_frames, log_axis, panel_grid
-from studies.plots.style.style import BLACK, GREY, PURPLE, SMALL, method_colour, save, styled
+from studies.plots.style.style import BLACK, GREY, PURPLE, SMALL, drawing, method_colour, styled
 from studies.runs.case import BodyRecipe, Case, chosen_settings
 
 TITLE = "From which starts a body finds its rest shape again"
@@ -106,6 +105,4 @@ def _ends(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list[str]:
     return sentences
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

@@ -2,7 +2,6 @@
 
 import textwrap
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +13,7 @@ from studies.base.counting import heading, readable
 from studies.metrics.run import Run
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, finish, grouped, log_axis, panel_grid
-from studies.plots.style.style import BLACK, STATUS_LOOKS, method_label, save, styled
+from studies.plots.style.style import BLACK, STATUS_LOOKS, drawing, method_label, styled
 from studies.store.record import Status
 
 TITLE = "Stability: time step × stiffness"
@@ -129,6 +128,4 @@ def _size_of(placed: Sequence[Run]) -> list[str]:
     ]
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

@@ -175,6 +175,20 @@ def band_handle(label: str) -> Patch:
     return Patch(facecolor=GREY, alpha=0.3, linewidth=0, label=label)
 
 
+def hollow_handle(colour: str) -> Line2D:
+    """The legend entry of errors that the reference is too coarse to resolve."""
+    return Line2D(
+        [],
+        [],
+        color=colour,
+        marker="o",
+        linestyle="",
+        markersize=7,
+        markerfacecolor="white",
+        label="hollow: the reference is not ten times better",
+    )
+
+
 def log_axis(axis: Axis) -> None:
     """Plain numbers, not powers: 0.1, 1, 10, and 2 and 5 between them where the axis is short."""
 
