@@ -17,6 +17,8 @@ PATIENCE = 900.0
 """Seconds that a process waits for what another one makes; the longest takes a minute on a busy machine."""
 COSTLY = {"browser", "scheduler", "wheel", "written"}
 """Fixtures that start a browser or a Dask cluster, build a wheel, run a notebook: what asks for one is a campaign."""
+SLOW = 40
+"""A test with the marker `slow` takes as long as so many without."""
 COMPILED = pytest.StashKey[list[Compiled]]()
 
 
@@ -73,10 +75,18 @@ def mesh_cache(run_folder: Path) -> Iterator[Path]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Marks campaigns by the costly fixtures that they use."""
+    """Marks campaigns by the costly fixtures that they use, and begins with the files that take longest.
+
+    A process takes a whole file at a time: a long one at the end would leave the others without work.
+    """
+    weights: dict[Path, int] = {}
     for item in items:
         if COSTLY & set(getattr(item, "fixturenames", ())):
             item.add_marker("campaign")
+        if item.get_closest_marker("campaign") is None:
+            weight = SLOW if item.get_closest_marker("slow") is not None else 1
+            weights[item.path] = weights.get(item.path, 0) + weight
+    items.sort(key=lambda item: -weights.get(item.path, 0))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

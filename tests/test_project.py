@@ -129,4 +129,4 @@ def test_campaigns_run_in_verify():
     command = ["make", "--dry-run", "--silent", "verify"]
     lines = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
     assert any(line.endswith("organbench verify") for line in lines)
-    assert any(line.endswith("pytest -q -n 2 --dist loadfile -m campaign") for line in lines)
+    assert any(line.endswith("pytest -q -n 2 --dist loadfile --no-loadscope-reorder -m campaign") for line in lines)

@@ -12,7 +12,7 @@ from reference_fem.errors import SolveError
 from reference_fem.model.problem import Problem
 from reference_fem.statics.newton import StepFailed, solve_step
 from reference_fem.system import assembly
-from reference_fem.system.checks import check_resumed, check_times
+from reference_fem.system.checks import check_times
 from reference_fem.system.saddle_point import System
 from reference_fem.system.state import NewtonSettings, State
 
@@ -68,10 +68,7 @@ class Equilibrium:
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """A path half-way: what was found at its first times, and all that the next load step starts from.
-
-    state.to_arrays() and State.from_arrays store it without this package's classes.
-    """
+    """A path half-way: what was found at its first times, and all that the next load step starts from."""
 
     path: list[Equilibrium]
     state: State
@@ -83,12 +80,10 @@ def equilibrium_path(
     settings: NewtonSettings | None = None,
     on_step: Callable[[Equilibrium], None] | None = None,
     on_checkpoint: Callable[[Checkpoint], None] | None = None,
-    resume: Checkpoint | None = None,
 ) -> list[Equilibrium]:
     """Equilibria at the given times [s], reached from rest at settings.start; on_step sees each as it is found.
 
-    on_checkpoint gets what `resume` needs to go on from there with the same problem, times and settings: the answers
-    are then those of the uninterrupted path.
+    on_checkpoint sees each with its unknowns.
     Dead loads and cavities that start filled are switched on first, at the start. Raises SolveError for a problem
     that cannot be set up, and when a sub-step below settings.smallest_step still fails: then its `converged` holds
     what was reached.
@@ -96,15 +91,12 @@ def equilibrium_path(
     settings = settings or NewtonSettings()
     times = check_times(times, settings.start)
     system = System(problem, settings)
-    path: list[Equilibrium] = [] if resume is None else list(resume.path)
+    path: list[Equilibrium] = []
     try:
         state, pending = system.rest(), (0, 0)
-        if resume is not None:
-            check_resumed(state, resume.state)
-            state = resume.state
-        elif system.starts_loaded():
+        if system.starts_loaded():
             state, *pending = advance(system, state, settings.start, 1.0, path)
-        for t in times[len(path) :]:
+        for t in times:
             state, iterations, substeps = advance(system, state, t, 1.0, path)
             path.append(describe(system, state, iterations + pending[0], substeps + pending[1]))
             pending = (0, 0)

@@ -9,7 +9,6 @@ from reference_fem.elements.surface import Surface, point_positions
 from reference_fem.errors import SolveError
 from reference_fem.model.obstacles import gaps
 from reference_fem.model.problem import Problem
-from reference_fem.system.state import State
 
 START_DEPTH = 1e-3
 """Depth at the start that is taken as touching, over the size of the body: the sag of a coarse facet."""
@@ -118,20 +117,6 @@ def check_times(times: ArrayLike, start: float):
     if np.any(np.diff(times) <= 0.0) or times[0] < start:
         raise SolveError(f"the times {times} s must increase and not lie before the start, {start:g} s")
     return times
-
-
-def check_resumed(rest: State, state: State):
-    """Refuse a stored state that does not fit the problem, whose state at rest is `rest`: compiled loops do not look at
-    the length of an array."""
-    wanted, given = rest.to_arrays(), state.to_arrays()
-    for name in wanted:
-        one, other = wanted[name], given[name]
-        if one.shape != other.shape or (one.ndim and one.dtype != other.dtype):
-            raise SolveError(
-                f"the load step to go on from has {name} of shape {other.shape} ({other.dtype}), this problem "
-                f"{one.shape} ({one.dtype}): it is of another mesh, element or set of obstacles, solve the path from "
-                f"its start"
-            )
 
 
 def boundary_size(mesh: MeshTet):

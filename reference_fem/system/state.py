@@ -1,17 +1,11 @@
 """What a load step starts from, what acts during it, and how hard to try."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from reference_fem.contact.augmented import NO_GRIP, NO_GUESS, Grip
-from reference_fem.errors import SolveError
-
-PLAIN = ("t", "load", "x", "multiplier", "pressure", "iterations", "stiffness")
-"""Fields of a State that are one number or one array."""
 
 
 @dataclass(frozen=True)
@@ -55,25 +49,6 @@ class State:
     """With which the tractions of stuck points follow from x."""
     hold: Grip = NO_GRIP
     """The grip that the next step starts from."""
-
-    def to_arrays(self) -> dict[str, np.ndarray]:
-        """Everything as plain arrays, to be stored; from_arrays gives the same state, bit for bit."""
-        arrays = {name: np.asarray(getattr(self, name)) for name in PLAIN}
-        for name in ("grip", "hold"):
-            arrays |= {f"{name}_{part}": values for part, values in getattr(self, name)._asdict().items()}
-        return arrays
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, ArrayLike]) -> "State":
-        """The state that to_arrays stored; raises SolveError when a part is missing."""
-        parts = (*PLAIN, *(f"{name}_{part}" for name in ("grip", "hold") for part in Grip._fields))
-        missing = [name for name in parts if name not in arrays]
-        if missing:
-            raise SolveError(f"the stored load step lacks {', '.join(missing)}: solve the path from its start")
-        values: dict[str, Any] = {name: np.asarray(arrays[name])[()] for name in PLAIN}
-        for name in ("grip", "hold"):
-            values[name] = Grip(*(np.asarray(arrays[f"{name}_{part}"]) for part in Grip._fields))
-        return cls(**values)
 
 
 class Loads(NamedTuple):

@@ -1,7 +1,6 @@
 """How far each model is from the reference in four quantities, and how well the reference itself is known."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,14 +18,14 @@ from studies.plots.style.page import (
     finish,
     grouped,
     has_frames,
+    hollow_handle,
     log_axis,
-    page,
-    panels,
+    panel_grid,
     remarks,
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLACK, GREY, SMALL, method_colour, remark, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, drawing, method_colour, remark, styled
 from studies.runs.case import BodyRecipe
 from studies.store.record import Status
 
@@ -52,12 +51,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         return blank(TITLE, "no run has recorded a frame yet")
     metrics = [metric for metric in METRICS if metric.name in QUANTITIES]
     scenes, looks = by_scene(shown), body_looks(shown)
-    columns = min(2, len(scenes))
-    rows = -(-len(scenes) // columns)
-    sheet = page(5.2 * columns, 3.0 * rows + 0.4)
-    axes = panels(sheet, rows, columns, sharey=True)
-    for spare in axes.flat[len(scenes) :]:
-        spare.set_axis_off()
+    sheet, axes = panel_grid(len(scenes), 2, (5.2, 3.0), (0.0, 0.4), sharey=True)
     values = [0.1, 100.0]
     for panel, (name, group) in zip(axes.flat, scenes.items(), strict=False):
         panel.set_title(heading(name) + unresolved_mark(group, metrics))
@@ -121,10 +115,9 @@ def _struck_out(shown: Sequence[Run]) -> list[Line2D]:
 
 
 def _handles(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list:
-    hollow = {"marker": "o", "linestyle": "", "markersize": 7, "markerfacecolor": "white", "color": BLACK}
     return [
         *body_method_handles(shown, looks, markers=True),
-        Line2D([], [], label="hollow: the reference is not ten times better", **hollow),
+        hollow_handle(BLACK),
         band_handle("uncertainty of the reference"),
         *_struck_out(shown),
     ]
@@ -138,6 +131,4 @@ def _notes() -> list[str]:
     ]
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

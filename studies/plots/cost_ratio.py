@@ -1,7 +1,6 @@
 """How much longer a frame takes with the constraint than without, and whether the difference is resolvable."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,7 +12,7 @@ from studies.metrics.run import Run
 from studies.metrics.timing.statistics import Ratio, ratio_with_spread
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import blank, finish, grouped, page
-from studies.plots.style.style import BLACK, GREY, NORMAL, method_colour, method_label, save, styled
+from studies.plots.style.style import BLACK, GREY, NORMAL, drawing, method_colour, method_label, styled
 
 TITLE = "Cost of keeping the volume"
 Row = tuple[str, str, Ratio]
@@ -75,6 +74,4 @@ def _draw_row(axes: Axes, place: int, row: Row) -> None:
     axes.text(1.02, place, words, transform=axes.get_yaxis_transform(), color=colour, va="center", size=NORMAL)
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,15 +21,14 @@ from studies.plots.style.page import (
     good_frames,
     grouped,
     has_frames,
-    page,
-    panels,
+    panel_grid,
     reference_handle,
     remarks,
     spread_out,
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLACK, GREY, SMALL, method_colour, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, drawing, method_colour, styled
 from studies.runs.case import BodyRecipe
 from studies.scene.library import Scene
 
@@ -50,11 +48,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     if not shown:
         return blank(TITLE, "no run of a scene that asks for a force has recorded a frame yet")
     scenes, looks = by_scene(shown), body_looks(shown)
-    columns = min(2, len(scenes))
-    sheet = page(5.2 * columns, 3.0 * -(-len(scenes) // columns) + 0.4)
-    axes = panels(sheet, -(-len(scenes) // columns), columns)
-    for spare in axes.flat[len(scenes) :]:
-        spare.set_axis_off()
+    sheet, axes = panel_grid(len(scenes), 2, (5.2, 3.0), (0.0, 0.4))
     for panel, group in zip(axes.flat, scenes.values(), strict=False):
         _draw_scene(panel, group, looks)
     reference = reference_handle(linestyle="-", linewidth=1)
@@ -138,6 +132,4 @@ def _largest(group: Sequence[Run]) -> float:
     return max((float(force.max()) for force in forces), default=0.0) or 1.0
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

@@ -1,7 +1,6 @@
 """What a frame costs: its history for every body with the constraint on and off, deadlines, percentiles."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +14,7 @@ from studies.metrics.timing.protocol import FrameTiming
 from studies.metrics.timing.statistics import percentiles
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.page import band_handle, blank, finish, grouped, log_axis, page, panels, remarks
-from studies.plots.style.style import BLACK, GREY, SMALL, method_colour, method_label, save, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, drawing, method_colour, method_label, styled
 
 TITLE = "Time of a frame"
 DEADLINES_MS = {33.0: "33 ms", 2.0: "2 ms", 1.0: "1 ms"}
@@ -144,6 +143,4 @@ def _protocol(timings: Sequence[FrameTiming]) -> str:
     )
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

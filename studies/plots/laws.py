@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from itertools import cycle
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -37,8 +36,8 @@ from studies.plots.style.style import (
     SKY,
     SPARE_LOOKS,
     VERMILLION,
+    drawing,
     remark,
-    save,
     styled,
 )
 
@@ -152,6 +151,4 @@ def _face(colour: str, marker: str) -> str:
     return colour if marker == "^" else "white"
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

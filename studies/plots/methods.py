@@ -1,7 +1,6 @@
 """Every method on the same body: one row per method, one panel per quantity, one marker per scene."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,8 +13,18 @@ from studies.metrics.metric import COMPARABLE, Metric
 from studies.metrics.metrics import METRICS, real_time
 from studies.metrics.run import Run, by_scene
 from studies.plots.style.bodies import body_looks
-from studies.plots.style.page import blank, finish, log_axis, page, panels, remarks, unresolved_mark, unresolved_notes
-from studies.plots.style.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, method_label, save, styled
+from studies.plots.style.page import (
+    blank,
+    finish,
+    hollow_handle,
+    log_axis,
+    page,
+    panels,
+    remarks,
+    unresolved_mark,
+    unresolved_notes,
+)
+from studies.plots.style.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, drawing, method_label, styled
 from studies.runs.case import chosen_settings
 
 TITLE = "Ways to keep a volume: same bodies, same fraction of the step limit unless a step is named"
@@ -136,8 +145,7 @@ def _handles(scenes: dict[str, list[Run]], metrics: Sequence[Metric]) -> list:
         label = heading(name) + unresolved_mark(group, metrics)
         entries.append(Line2D([], [], color=colour, marker=marker, linestyle="", markersize=7, label=label))
     dotted = Line2D([], [], color=GREY, linestyle=":", label="the reference's own uncertainty")
-    hollow = {"marker": "o", "linestyle": "", "markerfacecolor": "white", "color": GREY, "markersize": 7}
-    return [*entries, dotted, Line2D([], [], label="hollow: the reference is not ten times better", **hollow)]
+    return [*entries, dotted, hollow_handle(GREY)]
 
 
 def _notes(shown: Sequence[Run], metrics: Sequence[Metric], runs: Sequence[Run]) -> list[str]:
@@ -154,6 +162,4 @@ def _notes(shown: Sequence[Run], metrics: Sequence[Metric], runs: Sequence[Run])
     ]
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

@@ -1,7 +1,6 @@
 """The paper's Figure 2 as a picture: a ball at rest, squeezed without and with the constraint, and the reference."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +15,7 @@ from studies.metrics.metrics import force_end, volume_end, volume_worst
 from studies.metrics.run import Run
 from studies.plots.style.page import blank, finish, page, panels
 from studies.plots.style.render import Camera, draw_surface, frame, scale_bar, uniform
-from studies.plots.style.style import BLACK, GREY, NORMAL, SMALL, method_colour, method_label, save, styled
+from studies.plots.style.style import BLACK, GREY, NORMAL, SMALL, drawing, method_colour, method_label, styled
 
 TITLE = "A soft ball between two planes"
 SCENE, BODY = "ball_squeeze", "tetrahedral"
@@ -146,6 +145,4 @@ def _notes(run: Run, outlined: bool) -> list[str]:
     return [spread + (" Dashed: outline of the reference." if outlined else " There is no reference yet.")]
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the picture as PNG."""
-    save(figure(runs), path, DPI)
+draw = drawing(figure, DPI)

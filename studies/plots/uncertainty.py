@@ -1,7 +1,6 @@
 """How far each quantity of each reference may be from the truth, and what that comes from."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.base.counting import heading, readable
-from studies.plots.style.page import blank, finish, log_axis, page, panels
-from studies.plots.style.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, save, styled
+from studies.plots.style.page import blank, finish, log_axis, panel_grid
+from studies.plots.style.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, drawing, styled
 from studies.reference.uncertainty import Uncertainty
 
 TITLE = "Uncertainty of the references"
@@ -35,12 +34,7 @@ def figure(known: Mapping[str, Mapping[str, Uncertainty]]) -> Figure:
     """
     if not known:
         return blank(TITLE, "no reference has been solved on its family of meshes yet")
-    columns = min(2, len(known))
-    rows = -(-len(known) // columns)
-    sheet = page(5.2 * columns, 2.9 * rows + 0.3)
-    axes = panels(sheet, rows, columns, sharex=True, sharey=True)
-    for spare in axes.flat[len(known) :]:
-        spare.set_axis_off()
+    sheet, axes = panel_grid(len(known), 2, (5.2, 2.9), (0.0, 0.3), sharex=True, sharey=True)
     longest_first = sorted(known.values(), key=len, reverse=True)
     names = list(dict.fromkeys(name for quantities in longest_first for name in quantities))
     for panel, (scene, quantities) in zip(axes.flat, known.items(), strict=False):
@@ -91,6 +85,4 @@ def _notes(known: Mapping[str, Mapping[str, Uncertainty]]) -> list[str]:
     ]
 
 
-def draw(known: Mapping[str, Mapping[str, Uncertainty]], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(known), path)
+draw = drawing(figure)

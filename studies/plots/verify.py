@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from reference_fem.oracles import Curve
 from studies.plots.style.page import blank, finish, page, panels
-from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, save, styled
+from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, drawing, save, styled
 
 TITLE = "The reference against known answers: error over mesh size"
 COLOURS, MARKERS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY), "osD^vP"
@@ -60,9 +60,7 @@ def _log_log(axes: Axes, curves: Sequence[Curve]) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def draw(curves: Sequence[Curve], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(curves), path)
+draw = drawing(figure)
 
 
 @styled

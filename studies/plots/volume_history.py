@@ -1,7 +1,6 @@
 """How much volume each model loses over time: in per cent, and again on a logarithmic axis (the paper's Figure 3)."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,7 +23,7 @@ from studies.plots.style.page import (
     reference_handle,
     remarks,
 )
-from studies.plots.style.style import BLACK, GREY, method_colour, save, styled
+from studies.plots.style.style import BLACK, GREY, drawing, method_colour, styled
 
 TITLE = "How much volume each model loses"
 PERCENT = 100.0
@@ -95,6 +94,4 @@ def _scale(axes: np.ndarray, shown: Sequence[Run]) -> None:
     axes[1, 0].set_ylabel("size |V/V₀ − 1| [%]")
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

@@ -1,7 +1,6 @@
 """What accuracy costs: errors of force and displacement against computing time, from the paper's body on."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +15,7 @@ from studies.metrics.run import Run, by_scene
 from studies.metrics.wish import usual_wish
 from studies.plots.style.families import PAPER, Family, family_of
 from studies.plots.style.page import blank, finish, log_axis, page, panels, remarks, unresolved_mark, unresolved_notes
-from studies.plots.style.style import BLACK, GREEN, GREY, SMALL, remark, save, styled
+from studies.plots.style.style import BLACK, GREEN, GREY, SMALL, drawing, remark, styled
 from studies.runs.case import BodyRecipe
 from studies.scene.scene import Scene
 from studies.store.record import Status
@@ -234,6 +233,4 @@ def _handles(scenes: dict[str, list[Judged]]) -> list[Line2D]:
     ]
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

@@ -13,9 +13,10 @@ from studies.base.errors import StudyError
 from studies.catalog.accuracy import ACCURACY
 from studies.meshing.bounds import SHAPE
 from studies.metrics.cells import MINUS, plain
-from studies.metrics.judged import Judged, cheapest, nearest, over_meshes
-from studies.metrics.wish import Wish, usual_wish
+from studies.metrics.judged import Judged, over_meshes
+from studies.metrics.wish import Wish
 from studies.plots.campaigns.recovery import RETURNED
+from studies.report.summary import choice_of
 from studies.store.record import Status
 from studies.tools.advise.campaign import published_rows
 
@@ -178,13 +179,10 @@ def _chosen(published: Path) -> tuple[list[float], list[str]]:
     """Speed of the recommended or closest body of each scene [s/s]; the scenes without an accurate one, with why."""
     speeds, missed = list[float](), list[str]()
     for scene in ACCURACY.scenes:
-        rows = over_meshes(one for one in published_rows(published, scene) if one.compared)
-        wish = usual_wish(scene)
-        best = cheapest(rows, wish)
-        chosen = best or nearest(rows, wish)
-        if chosen is not None:
-            speeds.append(1.0 / chosen.cost.value)
-            missed += [] if best else [f"{scene.name} {_why_not(chosen, wish)}"]
+        choice = choice_of(scene, over_meshes(one for one in published_rows(published, scene) if one.compared))
+        if choice is not None:
+            speeds.append(1.0 / choice.body.cost.value)
+            missed += [] if choice.meets else [f"{scene.name} {_why_not(choice.body, choice.wish)}"]
     return speeds, missed
 
 

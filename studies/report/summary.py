@@ -3,23 +3,21 @@ ladder of bodies is worth."""
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from studies.metrics.cells import MISSING, UNRESOLVED_MARK, UNRESOLVED_NOTE, value_cell
 from studies.metrics.distribution import groups
 from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, judged, nearest, over_meshes
 from studies.metrics.run import Run
 from studies.metrics.table import UNRESOLVED, study_table
-from studies.metrics.wish import usual_wish
-from studies.runs.case import BodyRecipe
+from studies.metrics.wish import Wish, usual_wish
 from studies.runs.recipe_text import body_words
+from studies.scene.scene import Scene
 
 PAPER = 550
 """Surface nodes of the paper's body where it is compared with others."""
 LADDER_SCENES = ("ball_clamped", "liver_press")
 """Scenes in which every rung has a force and a displacement."""
-
-
 WHY_NONE = "no body meets the target and keeps the shape, or the reference is not accurate enough to decide"
 
 
@@ -44,55 +42,33 @@ class Summary:
 
 def results_of(runs: Sequence[Run]) -> str:
     """Accuracy of each scene, body and method, with the uncertainty of the reference."""
-    rows = study_table(runs, SUMMARY_METRICS)
+    rows = study_table(runs, [column.split(" [")[0] for column in SUMMARY_HEADS])
     if rows.empty:
         return "No results yet: run `make study`."
     rows = rows.loc[~(rows["dt/dt_c"] <= 0.25)]  # a case that failed has no step, and stays
     lines = [
-        "| scene | body | method | " + " | ".join(SUMMARY_HEADS) + " |",
+        "| scene | body | method | " + " | ".join(SUMMARY_HEADS.values()) + " |",
         "|---|---|---|" + "---|" * len(SUMMARY_HEADS),
     ]
     for row in rows.to_dict("records"):
-        cells = [_cell(row, name) for name in SUMMARY_COLUMNS]
+        cells = [_cell(row, name) for name in SUMMARY_HEADS]
         lines.append(f"| {row['scene']} | {row['body']} | {row['method']} | " + " | ".join(cells) + " |")
     if any(UNRESOLVED_MARK in line for line in lines):
-        lines += [
-            "",
-            UNRESOLVED_NOTE,
-        ]
+        lines += ["", UNRESOLVED_NOTE]
     return "\n".join(lines)
 
 
-SUMMARY_METRICS = (
-    "volume_worst",
-    "force_end",
-    "interior_error",
-    "mean_error",
-    "silhouette_error",
-    "shape_error",
-    "shape_volume",
-    "min_j",
-)
-SUMMARY_COLUMNS = (
-    "volume_worst [%]",
-    "force_end [%]",
-    "interior_error [%]",
-    "mean_error [%]",
-    "silhouette_error [%]",
-    "shape_error [%]",
-    "shape_volume [%]",
-    "min_j [1]",
-)
-SUMMARY_HEADS = (
-    "worst \\|V/V0 − 1\\| [%]",
-    "force [%]",
-    "interior rel. L2 [%]",
-    "surface mean / max u [%]",
-    "silhouette / size [%]",
-    "rest shape / size [%]",
-    "rest volume [%]",
-    "min J",
-)
+SUMMARY_HEADS = {
+    "volume_worst [%]": "worst \\|V/V0 − 1\\| [%]",
+    "force_end [%]": "force [%]",
+    "interior_error [%]": "interior rel. L2 [%]",
+    "mean_error [%]": "surface mean / max u [%]",
+    "silhouette_error [%]": "silhouette / size [%]",
+    "shape_error [%]": "rest shape / size [%]",
+    "shape_volume [%]": "rest volume [%]",
+    "min_j [1]": "min J",
+}
+"""Columns of the table of a study, and what they are called."""
 
 
 def _cell(row: Mapping[Hashable, Any], column: str) -> str:
@@ -109,6 +85,40 @@ def _cell(row: Mapping[Hashable, Any], column: str) -> str:
     return value_cell(value, uncertainty, signed=column.startswith(("force", "shape_volume")), unresolved=unresolved)
 
 
+class Choice(NamedTuple):
+    """The body that is recommended for a scene."""
+
+    wish: Wish
+    """The usual target of the scene."""
+    body: Judged
+    """The cheapest that meets it and keeps the shape; where there is none, the closest."""
+    meets: bool
+
+
+def choice_of(scene: Scene, bodies: Sequence[Judged]) -> Choice | None:
+    """The choice among the bodies of a scene; None where no error is known of any that may be recommended."""
+    wish = usual_wish(scene)
+    best = cheapest(bodies, wish)
+    chosen = best or nearest(bodies, wish)
+    return None if chosen is None else Choice(wish, chosen, best is not None)
+
+
+def compared_bodies(runs: Sequence[Run]) -> dict[str, list[Judged]]:
+    """Name of a scene -> its runs that ended well and of which an error is known, in their order; neighbouring meshes of
+    a recipe as one."""
+    scenes: dict[str, list[Judged]] = {}
+    for one in map(judged, runs):
+        if one is not None and one.compared:
+            scenes.setdefault(one.case.scene.name, []).append(one)
+    return {name: over_meshes(bodies) for name, bodies in scenes.items()}
+
+
+def paper_body(bodies: Sequence[Judged]) -> Judged | None:
+    """The paper's body among those of a scene: a surface with one volume."""
+    papers = (one for one in bodies if one.case.body.kind == "surface" and one.case.body.nodes == PAPER)
+    return next((one for one in papers if one.advisable), None)
+
+
 def recommended_of(runs: Sequence[Run]) -> str:
     """Of every scene the paper's body and the body that `organbench advise` chooses for the usual wish: the cheapest
     that meets it and keeps the shape, else the nearest, marked."""
@@ -118,15 +128,13 @@ def recommended_of(runs: Sequence[Run]) -> str:
         "|---|---|---|---|---|---|---|---|---|",
     ]
     marked = False
-    for name, found in _by_scene(runs).items():
-        wish = usual_wish(found[0].case.scene)
-        best = cheapest(found, wish)
-        chosen = best or nearest(found, wish)
-        paper = next((one for one in found if _is_paper(one.case.body)), None)
-        if chosen is None or paper is None:
+    for name, bodies in compared_bodies(runs).items():
+        choice, paper = choice_of(bodies[0].case.scene, bodies), paper_body(bodies)
+        if choice is None or paper is None:
             continue
-        marked |= best is None
-        words = f"{body_words(chosen.case.body)}, {chosen.case.dt_fraction:g}{'' if best else ' ‡'}"
+        marked |= not choice.meets
+        chosen = choice.body
+        words = f"{body_words(chosen.case.body)}, {chosen.case.dt_fraction:g}{'' if choice.meets else ' ‡'}"
         cells = [*_errors(paper), words, *_errors(chosen), *_shape(chosen), _real_time(chosen)]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     if marked:
@@ -142,8 +150,8 @@ def ladder_of(runs: Sequence[Run]) -> str:
         "|---|---|---|---|---|---|---|---|---|",
     ]
     volumes = {run.case.key: int(run.record.attributes.get("volumes", 0)) for run in runs}
-    for name, found in _by_scene(runs).items():
-        for one in found:
+    for name, bodies in compared_bodies(runs).items():
+        for one in bodies:
             if name in LADDER_SCENES and one.advisable:
                 cells = [body_words(one.case.body), str(volumes[one.case.key]), f"{one.case.dt_fraction:g}"]
                 lines.append(f"| {name} | " + " | ".join([*cells, *_errors(one), *_shape(one), _real_time(one)]) + " |")
@@ -187,19 +195,6 @@ SUMMARIES = (
     Summary("accuracy", "accuracy/ladder.md", "docs/paper.md", "ladder", ladder_of),
     Summary("population", "population/population.md", "docs/population.md", "population", population_of),
 )
-
-
-def _by_scene(runs: Sequence[Run]) -> dict[str, list[Judged]]:
-    """Name of a scene -> its runs that ended well and of which an error is known, in their order."""
-    found: dict[str, list[Judged]] = {}
-    for one in map(judged, runs):
-        if one is not None and one.compared:
-            found.setdefault(one.case.scene.name, []).append(one)
-    return {name: over_meshes(rows) for name, rows in found.items()}
-
-
-def _is_paper(body: BodyRecipe) -> bool:
-    return body.kind == "surface" and body.nodes == PAPER
 
 
 def _errors(one: Judged) -> list[str]:

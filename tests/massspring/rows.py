@@ -28,6 +28,10 @@ SUPPORTED = {
 Quadratic bodies have tests of their own (methods/test_quadratic_motion.py), and so have elements (elements)."""
 
 
+COSTLY = {("implicit_springs", "regions"), ("implicit_springs", "nodal")}
+"""Several volumes again, which the hollow body keeps with the same code: a campaign."""
+
+
 def recovers(method: Method) -> bool:
     """Whether a body that is far from its volumes is another one until it is back."""
     return getattr(method, "recovers", False)
@@ -42,7 +46,12 @@ def kinds_of(method: Method) -> tuple[str, ...]:
 def rows(methods: Iterable[str] = CONTESTANTS, kinds: Sequence[str] = KINDS) -> list:
     """(name in CONTESTANTS, kind of body), of all that go together."""
     pairs = [(name, kind) for name in methods for kind in kinds_of(CONTESTANTS[name]) if kind in kinds]
-    return [pytest.param(pair, id="-".join(pair)) for pair in pairs]
+    return [pytest.param(pair, id="-".join(pair), marks=marks_of(pair)) for pair in pairs]
+
+
+def marks_of(row: Sequence[object]) -> tuple[pytest.MarkDecorator, ...]:
+    """Of a row that begins with a method and a kind of body."""
+    return (pytest.mark.campaign,) if tuple(row[:2]) in COSTLY else ()
 
 
 Row = tuple[str, str, str, object]

@@ -37,7 +37,7 @@ def good_runs(studies):
 GOOD = good_runs(STUDIES)
 ODD = {
     "none": list,
-    "no reference": lambda: without_reference([*grid(), *timed_grid()]),
+    "no reference": lambda: without_reference([*grid()[:4], *timed_grid()[:4]]),
     "all diverged": lambda: [run(method=Free(), status=Status.DIVERGED), run(status=Status.DIVERGED)],
     "all failed": lambda: [run(status=Status.FAILED)],
     "each status": lambda: [run(status=status) for status in Status],

@@ -1,8 +1,10 @@
 """The smallest scenes, cases and studies that still do what the real ones do."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from massspring import Free, ImplicitVolume
 from studies.catalog import Study
@@ -58,6 +60,19 @@ def tiny_study(**changes) -> Study:
 def diverging_case() -> Case:
     """Three times the stability limit."""
     return tiny_case(dt_fraction=3.0, beyond_limit=True, timed=True)
+
+
+def bodies_of(scenes: Iterable[Scene], only: Sequence[Scene] = (BALL_SQUEEZE,)) -> list:
+    """Parameters (scene, kind of body): tetrahedra in every scene, the surface where it costs no mesh of its own.
+
+    That is in `only`, and in hollow organs, whose surface body has the mesh of the wall; in others it is a campaign.
+    """
+    rows = []
+    for scene in scenes:
+        rows.append(pytest.param(scene, "tetrahedral", id=f"{scene.name}-tetrahedral"))
+        marks = () if scene in only or scene.lumen else pytest.mark.campaign
+        rows.append(pytest.param(scene, "surface", id=f"{scene.name}-surface", marks=marks))
+    return rows
 
 
 def cube(cells: int = 2, edge: float = 0.1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from studies.metrics.compare.folders import Change, Comparison
 from studies.metrics.compare.folders import compare as compared
 from studies.metrics.compare.labels import labels_of
 from studies.metrics.compare.verdict import Verdict
-from studies.store.tables.csv_table import write_table
+from studies.store.tables import write_table
 
 SHOWN = 40
 """Rows of what moved that are printed."""

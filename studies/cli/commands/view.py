@@ -7,8 +7,8 @@ import typer
 
 from studies.base.counting import counted
 from studies.cli.terminal import Results, busy, say, warn
-from studies.report.view.listing import listing
 from studies.report.view.side_by_side import side_by_side
+from studies.report.view.stored import listing
 from studies.report.view.viewing import view as viewed
 from studies.report.view.vtkhdf import SUFFIX, check_target, write_grid
 from studies.sweep.find_scene import find_scene, split_word

@@ -1,7 +1,6 @@
 """Which method survives what: statuses of the stress campaign, and the share that ends well over the step."""
 
 from itertools import pairwise
-from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -20,8 +19,8 @@ from studies.plots.style.style import (
     SKY,
     VERMILLION,
     YELLOW,
+    drawing,
     method_label,
-    save,
     styled,
 )
 
@@ -111,6 +110,4 @@ def _finish_shares(axes: Axes) -> None:
     axes.grid(visible=False)
 
 
-def draw(table: pd.DataFrame, path: Path) -> None:
-    """The chart as a file."""
-    save(figure(table), path)
+draw = drawing(figure)

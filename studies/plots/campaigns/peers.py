@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -16,7 +15,7 @@ from studies.metrics.run import Run, by_scene
 from studies.metrics.table import metric
 from studies.plots.style.families import FAMILIES, Family, family_of
 from studies.plots.style.page import blank, finish, log_axis, page, panels
-from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, MUTED, ORANGE, PURPLE, remark, save, styled
+from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, MUTED, ORANGE, PURPLE, drawing, remark, styled
 
 TITLE = "Other programs on the same meshes: down and to the left is better"
 VOLUME = metric("volume_worst")
@@ -135,6 +134,4 @@ def _unfinished(runs: Sequence[Run]) -> list[str]:
     return ["Not drawn: " + "; ".join([*named, *more]) + "."] if reasons else []
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

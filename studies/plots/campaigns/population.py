@@ -1,7 +1,6 @@
 """Errors over a population: the share of members that are at most so far off, a line for each body."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +14,7 @@ from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.plots.style.families import family_of
 from studies.plots.style.page import band_handle, blank, finish, log_axis, page, panels
-from studies.plots.style.style import GREY, SMALL, remark, save, styled
+from studies.plots.style.style import GREY, SMALL, drawing, remark, styled
 
 TITLE = "Randomly generated organs: share of a population within an error"
 SHOWN = {"force_end": "error of the force [%]", "mean_error": "mean error / largest u [%]"}
@@ -96,6 +95,4 @@ def _notes(found: Sequence[Group]) -> list[str]:
     return notes
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Draws the chart into a file."""
-    save(figure(runs), path)
+draw = drawing(figure)

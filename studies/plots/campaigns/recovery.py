@@ -1,7 +1,6 @@
 """Whether a body started from an impossible shape comes back: the smallest volume ratio of its tetrahedra over time."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -12,8 +11,8 @@ from studies.base.counting import heading, readable
 from studies.metrics.run import Run, by_scene
 from studies.metrics.table import metric
 from studies.plots.style.bodies import BodyLook, body_handle, body_looks
-from studies.plots.style.page import blank, finish, good_frames, grouped, has_frames, log_axis, page, panels
-from studies.plots.style.style import BLACK, GREY, PURPLE, SMALL, method_colour, save, styled
+from studies.plots.style.page import blank, finish, good_frames, grouped, has_frames, log_axis, panel_grid
+from studies.plots.style.style import BLACK, GREY, PURPLE, SMALL, drawing, method_colour, styled
 from studies.runs.case import BodyRecipe, Case, chosen_settings
 
 TITLE = "From which starts a body finds its rest shape again"
@@ -31,18 +30,13 @@ def figure(runs: Sequence[Run]) -> Figure:
     if not shown:
         return blank(TITLE, "no run of a body with tetrahedra has recorded a frame yet")
     scenes, looks = by_scene(shown), body_looks(shown)
-    columns = min(COLUMNS, len(scenes))
-    rows = -(-len(scenes) // columns)
-    sheet = page(3.1 * columns + 0.6, 2.7 * rows + 0.3)
-    axes = panels(sheet, rows, columns, sharex=True, sharey=True)
-    for spare in axes.flat[len(scenes) :]:
-        spare.set_axis_off()
+    sheet, axes = panel_grid(len(scenes), COLUMNS, (3.1, 2.7), (0.6, 0.3), sharex=True, sharey=True)
     for panel, (name, group) in zip(axes.flat, scenes.items(), strict=False):
         _draw_start(panel, group, looks)
         panel.set_title(heading(name.removeprefix("stress_")))
     for panel in axes[:, 0]:
         panel.set_ylabel("smallest J [1]")
-    for panel in axes.flat[max(0, len(scenes) - columns) : len(scenes)]:
+    for panel in axes.flat[max(0, len(scenes) - axes.shape[1]) : len(scenes)]:
         panel.set_xlabel("time [s]")
         panel.tick_params(labelbottom=True)
     notes = [
@@ -111,6 +105,4 @@ def _ends(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list[str]:
     return sentences
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

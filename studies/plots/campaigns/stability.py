@@ -2,7 +2,6 @@
 
 import textwrap
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,8 +12,8 @@ from matplotlib.patches import Rectangle
 from studies.base.counting import heading, readable
 from studies.metrics.run import Run
 from studies.plots.style.bodies import body_looks
-from studies.plots.style.page import blank, finish, grouped, log_axis, page, panels
-from studies.plots.style.style import BLACK, STATUS_LOOKS, method_label, save, styled
+from studies.plots.style.page import blank, finish, grouped, log_axis, panel_grid
+from studies.plots.style.style import BLACK, STATUS_LOOKS, drawing, method_label, styled
 from studies.store.record import Status
 
 TITLE = "Stability: time step × stiffness"
@@ -31,12 +30,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         return blank(TITLE, "no run yet")
     looks = body_looks(placed, ignored=("stiffness",))
     groups = grouped(placed, lambda run: (run.case.scene.name, looks[run.case.body], run.case.method.name))
-    columns = min(2, len(groups))
-    rows = -(-len(groups) // columns)
-    sheet = page(5.2 * columns + 0.6, 3.5 * rows + 0.3)
-    axes = panels(sheet, rows, columns, sharey=True)
-    for spare in axes.flat[len(groups) :]:
-        spare.set_axis_off()
+    sheet, axes = panel_grid(len(groups), 2, (5.2, 3.5), (0.6, 0.3), sharey=True)
     for panel, group in zip(axes.flat, groups, strict=False):
         _draw_map(panel, group)
         panel.set_title(_title(group[0], looks[group[0].case.body].name))
@@ -134,6 +128,4 @@ def _size_of(placed: Sequence[Run]) -> list[str]:
     ]
 
 
-def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
-    save(figure(runs), path)
+draw = drawing(figure)

@@ -45,6 +45,22 @@ def panels(figure: Figure | SubFigure, rows: int, columns: int, **options: objec
     return figure.subplots(rows, columns, squeeze=False, **options)  # pyright: ignore[reportCallIssue, reportArgumentType]
 
 
+def panel_grid(
+    count: int, columns: int, size: tuple[float, float], margin: tuple[float, float], **options: object
+) -> tuple[Figure, np.ndarray]:
+    """A page of `count` panels of a size, at most `columns` in a row, and a margin, both (width, height) [inch].
+
+    Places that are left over stay empty.
+    """
+    columns = min(columns, count)
+    rows = -(-count // columns)
+    sheet = page(size[0] * columns + margin[0], size[1] * rows + margin[1])
+    axes = panels(sheet, rows, columns, **options)
+    for spare in axes.flat[count:]:
+        spare.set_axis_off()
+    return sheet, axes
+
+
 def finish(
     figure: Figure, title: str, handles: Sequence[Artist], notes: Sequence[str] = (), columns: int = 4
 ) -> Figure:
@@ -157,6 +173,20 @@ def reference_handle(label: str = "reference (finite elements)", **look: object)
 def band_handle(label: str) -> Patch:
     """The legend entry of a grey area."""
     return Patch(facecolor=GREY, alpha=0.3, linewidth=0, label=label)
+
+
+def hollow_handle(colour: str) -> Line2D:
+    """The legend entry of errors that the reference is too coarse to resolve."""
+    return Line2D(
+        [],
+        [],
+        color=colour,
+        marker="o",
+        linestyle="",
+        markersize=7,
+        markerfacecolor="white",
+        label="hollow: the reference is not ten times better",
+    )
 
 
 def log_axis(axis: Axis) -> None:

@@ -132,6 +132,17 @@ def save(figure: Figure, path: Path, dpi: int = DPI) -> None:
         copies[path.name] = _svg(figure, dpi)
 
 
+def drawing(figure: Callable[[R], Figure], dpi: int = DPI) -> Callable[[R, Path], None]:
+    """What a chart is called by: the figure of what is given as a PNG file. Raises StudyError as `save` does."""
+
+    def draw(shown: R, path: Path) -> None:
+        """Writes the chart as PNG."""
+        save(figure(shown), path, dpi)
+
+    draw.__module__ = figure.__module__
+    return draw
+
+
 @contextmanager
 def svg_copies() -> Iterator[dict[str, str]]:
     """Inside, every chart that is saved is also kept as SVG: name of its file -> text, the same for the same figure."""

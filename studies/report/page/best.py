@@ -7,10 +7,9 @@ from typing import Any
 from studies.base.counting import counted, readable
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.cells import MISSING, plain, value_cell
-from studies.metrics.judged import Judged, Measured, by_cost, cheapest, judged, nearest, over_meshes
-from studies.metrics.run import Run, by_scene
-from studies.metrics.wish import usual_wish
-from studies.report.summary import PAPER
+from studies.metrics.judged import Judged, Measured, by_cost
+from studies.metrics.run import Run
+from studies.report.summary import PAPER, choice_of, compared_bodies, paper_body
 from studies.runs.recipe_text import body_words
 from studies.tools.advise.words import wish_words
 
@@ -28,29 +27,17 @@ SPEED, SPEED_FLOOR = "real_time [s/s]", "real_time floor [s/s]"
 def best_bodies(runs: Sequence[Run], run_id: Callable[[Run], str]) -> list[Best]:
     """Of every scene in which an error of a body by implicit_volume is known: the cheapest body within the usual
     target, else the nearest."""
-    best = []
-    for name, group in by_scene(runs).items():
-        ids = {run.case.key: run_id(run) for run in group}
-        bodies = over_meshes(one for one in map(judged, group) if one is not None and one.compared)
-        wish = usual_wish(group[0].case.scene)
-        within = cheapest(bodies, wish)
-        chosen = within or nearest(bodies, wish)
-        if chosen is None:
+    best, ids = [], {run.case.key: run_id(run) for run in runs}
+    for name, bodies in compared_bodies(runs).items():
+        choice, paper = choice_of(bodies[0].case.scene, bodies), paper_body(bodies)
+        if choice is None:
             continue
-        paper = next((one for one in bodies if one.advisable and _is_paper(one)), None)
+        wish, chosen, meets = choice
         # Among studies: bodies within the target by their cost, others by how far they miss it.
-        order = [0.0, *map(float, by_cost(chosen))] if within else [1.0, chosen.worst(wish)]
-        row = _row(chosen, ids) | {
-            "scene": name,
-            "target": f"{wish_words(wish)}, {SHAPE_WORDS}",
-            "meets": within is not None,
-        }
+        order = [0.0, *map(float, by_cost(chosen))] if meets else [1.0, chosen.worst(wish)]
+        row = _row(chosen, ids) | {"scene": name, "target": f"{wish_words(wish)}, {SHAPE_WORDS}", "meets": meets}
         best.append(row | {"order": order, "paper": None if paper is None else _row(paper, ids)})
     return best
-
-
-def _is_paper(one: Judged) -> bool:
-    return one.case.body.kind == "surface" and one.case.body.nodes == PAPER
 
 
 def _row(one: Judged, ids: Mapping[str, str]) -> Best:

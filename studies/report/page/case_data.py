@@ -1,4 +1,5 @@
-"""What the page shows of one case: words, histories, and its surface next to that of the reference."""
+"""What the page shows of one case, or of an entry from outside: words, histories, and its surface next to that of the
+reference."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,6 +9,7 @@ import numpy as np
 
 from massspring import Capsule, Obstacle, Plane
 from studies.base.counting import readable
+from studies.exchange.entry import ENTRY
 from studies.metrics.metric import PERCENT
 from studies.metrics.run import Run
 from studies.report.page.pack import STEP, pack_frames, pack_indices, pack_series
@@ -180,3 +182,27 @@ def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
     both = {**other, **one, "histories": {**other["histories"], **one["histories"]}}
     replays = [view["replay"] for view in (one, other) if "replay" in view]
     return both | {"replay": min(replays, key=lambda replay: replay["straight"])} if replays else both
+
+
+def entry_data(run: Run, scene: str) -> dict[str, Any]:
+    """JSON-able, as `case_data` has it of a case; `entry` holds the name. The replay is that of the checkpoints, which
+    all entries hold on one of the scene's own meshes; one that handed nothing in has none. `scene`: as the command line
+    takes it."""
+    case, record, name = run.case, run.record, run.case.method.name
+    mesh = "curved" if case.body.kind == "quadratic" else "straight"
+    ended = record.status if record.status == Status.OK else f"{record.status} ({record.message})"
+    file = str(record.attributes[ENTRY]).split(" sha256:")[0]
+    found = {
+        "title": f"{readable(case.scene.name)} · entry {name}, {mesh} mesh, {case.body.nodes} nodes",
+        "entry": name,
+        "scene": case.scene.name,
+        "about": f"{case.scene.title}. Computed by another program and judged like our own runs; it ended {ended}.",
+        "again": f"organbench judge {scene} {file if record.fields else 'FILE'} --name {name}",
+        "duration": case.scene.duration,
+        # One number is known of its computing time: it stands in the table.
+        "histories": {what: values for what, values in histories(run).items() if what != "frame"},
+    }
+    if run.reference is not None:
+        found["reference"] = reference_points(run)
+    surface = checkpoint_surface(run)
+    return found | ({"why": why_still(run)} if surface is None else {"replay": replay_of(run, surface)})

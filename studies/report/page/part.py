@@ -17,8 +17,7 @@ from studies.catalog.study import RESERVED, Study, command_line, word_elsewhere
 from studies.exchange.entry import is_entry
 from studies.metrics.run import Run
 from studies.report.page.best import best_bodies
-from studies.report.page.case_data import case_data
-from studies.report.page.entry_data import entry_data
+from studies.report.page.case_data import case_data, entry_data
 from studies.report.page.reference_shape import reference_id, reference_shape
 from studies.runs.current import case_path
 from studies.runs.user_code import files_of

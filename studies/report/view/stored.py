@@ -1,4 +1,4 @@
-"""What is stored and can be viewed: runs, and the reference of their scene."""
+"""What is stored and can be viewed: runs, and the reference of their scene; as a list too."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -7,14 +7,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from studies.base.counting import counted
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import ReferenceSolve
+from studies.scene.as_json import scene_of_key
+from studies.scene.library import SCENES
 from studies.scene.scene import Scene
 from studies.store.paths import record_files
 from studies.store.record import Record, Status, peek
 from studies.store.schema import WITHOUT_FIELDS
+from studies.sweep.load import sentences
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,3 +106,40 @@ def _in_file(word: str) -> list[Stored]:
     if run is None:
         raise StudyError(f"{word} has no run to view; `organbench show` lists its content")
     return [run]
+
+
+def listing(root: Path) -> tuple[list[str], list[str]]:
+    """Lines: each scene with its reference, and below it its cases by their file's name; and a sentence for each file
+    that cannot be read. Raises StudyError where there is no such folder, and where nothing is stored in it."""
+    runs, problems = stored_runs(root)
+    by_scene: dict[str, list[Stored]] = {scene.name: [] for scene in SCENES}
+    for run in runs:
+        by_scene.setdefault(run.scene, []).append(run)
+    lines = []
+    for name, cases in by_scene.items():
+        reference, more = _reference(root, name, cases)
+        problems += more
+        if cases or reference:
+            lines.append(f"{name}: {counted(len(cases), 'case')}, {reference or 'no reference'}")
+            lines += [f"  {_line(case)}" for case in cases]
+    if not lines:
+        raise StudyError(f"nothing to view is stored in {root}; run `organbench run` first")
+    return lines, sentences(problems)
+
+
+def _reference(root: Path, name: str, cases: list[Stored]) -> tuple[str, list[StudyError]]:
+    """The stored reference of a scene, as its cases or this version know it; and what cannot be read."""
+    different = {json.dumps(case.scene_data): case for case in cases}.values()
+    try:
+        scenes = [scene_of_key(case.header.key) for case in different]
+        for scene in scenes or [scene for scene in SCENES if scene.name == name]:
+            path = finest_reference(root, scene)
+            if path is not None:
+                return f"reference {path.stem}", []
+    except StudyError as problem:
+        return "", [problem]
+    return "", []
+
+
+def _line(case: Stored) -> str:
+    return case.path.stem if case.header.status == Status.OK else f"{case.path.stem} ({case.header.status})"

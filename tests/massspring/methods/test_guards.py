@@ -15,7 +15,7 @@ from massspring.world.targets import fastest_filling
 from tests.massspring.conftest import body_of
 from tests.massspring.methods.test_methods import clock_for, squeeze
 from tests.massspring.methods.test_stress import start_of
-from tests.massspring.rows import CONTESTANTS, by_pairs, recovers
+from tests.massspring.rows import CONTESTANTS, by_pairs, marks_of, recovers
 
 FRAMES = 10
 LOST_AFTER = 3.5
@@ -57,7 +57,8 @@ def option(row):
 def guard(options=("",), exclude=(), where=lambda method, kind: True):
     """Runs a test for every pair of method, body, precision and option that goes together."""
     chosen = [row for row in by_pairs(options, exclude) if where(CONTESTANTS[row[0]], row[1])]
-    return pytest.mark.parametrize("row", chosen, ids=["-".join(filter(None, map(str, row))) for row in chosen])
+    named = [pytest.param(row, id="-".join(filter(None, map(str, row))), marks=marks_of(row)) for row in chosen]
+    return pytest.mark.parametrize("row", named)
 
 
 @guard(where=lambda method, kind: not recovers(method))

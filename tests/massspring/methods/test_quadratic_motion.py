@@ -16,6 +16,7 @@ from massspring import (
     Probe,
     Ramp,
     Setup,
+    Trajectory,
     quadratic_body,
     simulate,
     step_limit,
@@ -222,3 +223,20 @@ def test_single_precision_is_refused_with_contact_inside_facets(block):
     plane = Plane((0.0, 0.0, -10.0), (0.0, 0.0, 1.0))
     with pytest.raises(MassSpringError, match=r"float64 only.*contact at its nodes"):
         Setup(block, ImplicitVolume(), clock_for(block, 1, 1), (plane,), precision="float32")
+
+
+SPEED = 0.02
+
+
+@pytest.mark.parametrize("inertia", ["lumped", "stiffness"])
+@pytest.mark.parametrize("damping", [20.0, 40.0])
+def test_a_pushed_body_is_dragged_by_its_mass_and_speed(inertia, damping):
+    """c M U in the mean, however the mass is shared among the nodes."""
+    body = quadratic_body(*curved_block(), SOFT, inertia=inertia)
+    clock = clock_for(body, 60, 40, 0.8)
+    way = ((0.0, 0.0, 0.0), (0.0, 0.0, SPEED * clock.duration))
+    below = Plane((0.0, 0.0, body.rest[:, 2].min()), (0.0, 0.0, 1.0), Trajectory((0.0, clock.duration), way))
+    history = simulate(Setup(body, ImplicitVolume(), clock, (below,), damping=damping))
+    force = history.contact_force[history.t > 0.5 * clock.duration, 0, 2]
+    assert force.mean() == pytest.approx(damping * body.mass.sum() * SPEED, rel=0.02)
+    assert np.abs(history.volume / body.rest_volumes - 1.0).max() < ImplicitVolume.volume_tol

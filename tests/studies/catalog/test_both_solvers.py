@@ -1,17 +1,22 @@
 """Both solvers are given the same scene: loads, obstacles, held regions."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from massspring import Capsule, Plane, Ramp, Trajectory
+from reference_fem import NewtonSettings
 from reference_fem.model.problem import find_held
+from reference_fem.system.saddle_point import System
 from studies.base.errors import StudyError
+from studies.meshing.nested_mesh import base_mesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
-from studies.reference.problem import anchor, kept_obstacles
+from studies.reference.nested import problem_of
+from studies.reference.problem import anchor, kept_obstacles, reference_problem
 from studies.scene.library import JUDGED, SCENES
-from tests.studies.catalog.test_scenes import coarse_problem, coarsest_problem, small_setup
+from tests.studies.catalog.test_scenes import SMALL, THIN, small_setup
 
 
 @pytest.fixture(params=JUDGED, ids=lambda scene: scene.name)
@@ -19,9 +24,33 @@ def judged(request):
     return request.param
 
 
+@cache
+def _problem_by_name(name):
+    scene = next(scene for scene in JUDGED if scene.name == name)
+    return coarse_problem(scene)
+
+
+def known_problem(scene):
+    """The reference problem of a scene on a coarse mesh, once for all tests, which only read it."""
+    return _problem_by_name(scene.name) if scene in JUDGED else coarse_problem(scene)
+
+
+def coarse_problem(scene):
+    """The reference problem of a scene on a coarse mesh: nothing here is solved on it."""
+    plan = scene.reference
+    if not plan.nested:
+        return reference_problem(scene, plan.levels[0])
+    return problem_of(base_mesh(scene, few(scene), 0))
+
+
+def few(scene):
+    """Surface nodes of a small mesh of its organ."""
+    return THIN if scene.lumen else SMALL
+
+
 def load_gap(drive_scene, problem_scene) -> float:
     """Largest distance [m] between where the two solvers put their obstacles and held regions, over the whole clock."""
-    setup, problem = small_setup(drive_scene).setup, coarsest_problem(problem_scene)
+    setup, problem = small_setup(drive_scene).setup, known_problem(problem_scene)
     kept = [drive_scene.obstacles.index(o) for o in kept_obstacles(drive_scene)]
     gaps = []
     for frame in range(setup.clock.frames):
@@ -45,6 +74,15 @@ def moves(scene) -> bool:
     return any(len(path.times) > 1 for path in paths) or (scene.filled and len(scene.lumen.filling.times) > 1)
 
 
+def test_the_reference_problem_can_be_set_up(judged):
+    problem = known_problem(judged)
+    System(problem, NewtonSettings()).solver.release()
+    assert problem.material.mu == judged.tissue.shear_modulus
+    assert problem.material.kappa == judged.tissue.shear_modulus * judged.tissue.bulk_over_shear
+    assert problem.density == judged.tissue.density
+    assert tuple(problem.gravity) == judged.gravity
+
+
 def test_both_solvers_see_the_same_load_at_the_same_time(judged):
     size = float(np.ptp(small_setup(judged).setup.body.rest))
     # Times and positions agree to rounding.
@@ -65,7 +103,7 @@ def _later(scene):
 
 
 def test_both_solvers_see_the_same_obstacles(judged):
-    problem = coarsest_problem(judged)
+    problem = known_problem(judged)
     for obstacle, rigid in zip(kept_obstacles(judged), problem.obstacles, strict=True):
         if isinstance(obstacle, Plane):
             np.testing.assert_allclose(rigid.normal, obstacle.unit_normal, rtol=0, atol=1e-15)
@@ -80,7 +118,7 @@ def test_both_solvers_see_the_same_obstacles(judged):
 def test_both_solvers_hold_the_same_region(judged):
     if judged.symmetric or not judged.held:
         return
-    mesh, problem = mesh_for(judged, judged.reference.base, on_shape=True), coarsest_problem(judged)
+    mesh, problem = mesh_for(judged, few(judged), on_shape=True), known_problem(judged)
     for held, found in zip(judged.held, find_held(problem), strict=True):
         corners = found.nodes[found.nodes < len(mesh.points)]
         patch = patch_nodes(mesh, held.name, held.region)

@@ -88,11 +88,8 @@ def kind(case):
 
 
 def representatives(cases):
-    """Of each kind the first case, which share their meshes, then one case of each scene left out."""
-    chosen = list({kind(case): case for case in reversed(cases)}.values())
-    taken = {case.scene.name for case in chosen}
-    left = {case.scene.name: case for case in reversed(cases) if case.scene.name not in taken}
-    return [*chosen, *left.values()]
+    """Of each kind the first case: they share their meshes. Every scene is made ready in test_scenes.py."""
+    return list({kind(case): case for case in reversed(cases)}.values())
 
 
 def check_prepared(case):
@@ -107,11 +104,10 @@ def check_prepared(case):
     assert prepared.setup.clock.duration == pytest.approx(case.scene.duration, rel=1e-12)
 
 
-def test_representatives_leave_no_kind_and_no_scene_out(study):
+def test_representatives_leave_no_kind_out(study):
     cases = study.smoke().cases
     chosen = representatives(cases)
     assert {kind(case) for case in chosen} == {kind(case) for case in cases}
-    assert {case.scene.name for case in chosen} == {case.scene.name for case in cases}
 
 
 QUICK = [study for study in STUDIES if study.name != "organs"]

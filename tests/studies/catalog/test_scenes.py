@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 
 from massspring import METHODS, simulate
-from reference_fem import NewtonSettings
-from reference_fem.system.saddle_point import System
 from studies.base.errors import StudyError
-from studies.meshing.nested_mesh import base_mesh
-from studies.reference.nested import problem_of
-from studies.reference.problem import reference_problem
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames
@@ -21,10 +16,11 @@ from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.kind import has_wall
 from studies.scene.library import JUDGED, SCENES, InitialConditions
 from studies.scene.library.stress import STRESS_SCENES
+from tests.studies.tiny import bodies_of
 
 SMALL, THIN = 150, 400
 """Surface nodes of a small solid organ, and of a small hollow one: its wall folds on coarser meshes."""
-KINDS = ("tetrahedral", "surface")
+BODIES = pytest.mark.parametrize(("scene", "kind"), bodies_of(SCENES))
 
 
 @pytest.fixture(params=SCENES, ids=lambda scene: scene.name)
@@ -50,25 +46,6 @@ def _by_name(name, kind):
 def small_setup(scene, kind="tetrahedral"):
     """The small case of a scene made ready, once for all tests, which only read it."""
     return _by_name(scene.name, kind) if scene in SCENES else prepare(small(scene, kind))
-
-
-@cache
-def _problem_by_name(name):
-    scene = next(scene for scene in JUDGED if scene.name == name)
-    return coarse_problem(scene)
-
-
-def coarsest_problem(scene):
-    """The reference problem of a scene on its coarsest mesh, once for all tests, which only read it."""
-    return _problem_by_name(scene.name) if scene in JUDGED else coarse_problem(scene)
-
-
-def coarse_problem(scene):
-    """The reference problem of a scene on its coarsest mesh."""
-    plan = scene.reference
-    if not plan.nested:
-        return reference_problem(scene, plan.levels[0])
-    return problem_of(base_mesh(scene, plan.base, plan.at_contact))
 
 
 def test_the_name_is_a_word_for_the_command_line_and_the_title_a_line(scene):
@@ -139,7 +116,7 @@ def test_a_skipped_method_is_refused_with_the_reason(scene):
     assert METHODS[0].name == "free"
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@BODIES
 def test_body_weighs_what_the_tissue_weighs(scene, kind):
     prepared = small_setup(scene, kind)
     body = prepared.setup.body
@@ -148,14 +125,14 @@ def test_body_weighs_what_the_tissue_weighs(scene, kind):
     assert body.volume == pytest.approx(prepared.mesh.volume, rel=1e-12)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@BODIES
 def test_obstacles_start_outside(scene, kind):
     body = small_setup(scene, kind).setup.body
     for obstacle in scene.obstacles:
         assert obstacle.gap(body.rest, 0.0).min() >= -1e-9 * body.size
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@BODIES
 def test_something_is_felt(scene, kind):
     """Every obstacle reaches the body, and the probed force is a press at the deepest point, or a lumen swells."""
     case = small(scene, kind)
@@ -176,12 +153,3 @@ def test_something_is_felt(scene, kind):
         weight = -scene.tissue.density * prepared.mesh.volume * np.asarray(scene.gravity)
         # What is left of the swing after four seconds of damping, with room for twenty coarse frames.
         assert history.held_force[last].sum(axis=0) == pytest.approx(weight, abs=0.01 * np.linalg.norm(weight))
-
-
-def test_reference_can_be_set_up_on_its_coarsest_mesh(judged):
-    problem = coarsest_problem(judged)
-    System(problem, NewtonSettings()).solver.release()
-    assert problem.material.mu == judged.tissue.shear_modulus
-    assert problem.material.kappa == judged.tissue.shear_modulus * judged.tissue.bulk_over_shear
-    assert problem.density == judged.tissue.density
-    assert tuple(problem.gravity) == judged.gravity

@@ -98,7 +98,9 @@ def test_of_one_base_the_linear_mesh_has_the_vertices_of_the_quadratic_one(mesh_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", [True, False], ids=["quadratic", "linear"])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(True, id="quadratic"), pytest.param(False, id="linear", marks=pytest.mark.campaign)]
+)
 @pytest.mark.parametrize("wanted", [300, pytest.param(500, marks=pytest.mark.campaign)])
 def test_the_number_of_surface_nodes_is_the_one_asked_for(mesh_cache, kind, wanted):
     mesh = graded_mesh(BALL_CLAMPED, wanted, 1, 0, kind)

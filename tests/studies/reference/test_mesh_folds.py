@@ -48,7 +48,7 @@ def test_a_mesh_that_only_the_mesher_s_bound_refuses_is_taken():
     assert len(held[0])
 
 
-@pytest.mark.parametrize("number", [16, *(pytest.param(n, marks=pytest.mark.slow) for n in (12, 19, 39))])
+@pytest.mark.parametrize("number", [16, *(pytest.param(n, marks=pytest.mark.campaign) for n in (12, 19, 39))])
 def test_a_side_that_turns_an_element_inside_out_bends_less(number):
     """The middle of one side stays .6 to 1.2 mm off the true shape; 98 of 100 nodes of the surface do not move."""
     scene, level = member("kidney", 0, number), FOLDED[number]

@@ -10,10 +10,10 @@ from studies.report.kept_volume import PROMISED, kept_volumes, promised, worst_v
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import case_path
 from studies.runs.run import measure
-from studies.scene.library import BALL_CLAMPED, JUDGED
+from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, JUDGED, LIVER_PRESS, STOMACH_PRESS
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
-from tests.studies.tiny import SQUEEZE, diverging_case, tiny_case, tiny_study
+from tests.studies.tiny import SQUEEZE, bodies_of, diverging_case, tiny_case, tiny_study
 
 FRAMES = 40
 HELD_NODES = 100
@@ -33,8 +33,7 @@ def worst(record) -> float:
     return worst_volume(record.fields["volume"].values, record.fields["volume_target"].values)
 
 
-@pytest.mark.parametrize("kind", ["tetrahedral", "surface"])
-@pytest.mark.parametrize("scene", JUDGED, ids=lambda scene: scene.name)
+@pytest.mark.parametrize(("scene", "kind"), bodies_of(JUDGED))
 def test_every_scene_keeps_its_volumes(scene, kind):
     record = record_of(scene, "scene", kind)
     # A wall that is as coarse as here may end with a tetrahedron inside out; its volume is kept all the same.
@@ -43,9 +42,16 @@ def test_every_scene_keeps_its_volumes(scene, kind):
     assert record.attributes["capped_steps"] == 0
 
 
+MANY = (BALL_SQUEEZE, BALL_CLAMPED, LIVER_PRESS, STOMACH_PRESS)
+"""Solid and hollow, held and free; the others, some of which take as long as all of these, are a campaign."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("volumes", ["regions", "nodal"])
-@pytest.mark.parametrize("scene", JUDGED, ids=lambda scene: scene.name)
+@pytest.mark.parametrize(
+    "scene",
+    [pytest.param(scene, id=scene.name, marks=() if scene in MANY else pytest.mark.campaign) for scene in JUDGED],
+)
 def test_every_scene_keeps_many_volumes(scene, volumes):
     record = record_of(scene, volumes)
     assert record.status in (Status.OK, Status.INVERTED), record.message

@@ -1,4 +1,4 @@
-"""Pieces that died are stored; two commands may work on one folder."""
+"""What died or cannot be meshed is stored as failed; two commands may work on one folder."""
 
 import os
 import subprocess
@@ -10,12 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studies.base.errors import StudyError
 from studies.metrics.timing.alone import alone
+from studies.reference.reference_solves import reference_solves
 from studies.runs.current import case_path
+from studies.scene.library import BALL_CLAMPED
 from studies.store.ledger import Ledger
-from studies.store.record import Status, read_record, write_record
+from studies.store.record import Status, peek, read_record, write_record
 from studies.sweep.failures import Failures
-from studies.sweep.job import do, jobs_of
+from studies.sweep.job import ReferenceJob, do, jobs_of
 from studies.sweep.load import load_runs
 from studies.sweep.local import environment
 from studies.sweep.standings import failed, standings
@@ -133,3 +136,28 @@ def test_two_commands_on_one_folder_leave_what_one_leaves(finished_sweep, tmp_pa
     for name, field in by_one.fields.items():
         assert np.array_equal(field.values, by_two.fields[name].values, equal_nan=field.values.dtype.kind == "f")
     assert not list(results.rglob("*.part")), "nothing half-written is left"
+
+
+UNPUBLISHED = replace(BALL_CLAMPED, checkpoints=(1.0,))
+"""Nobody published its reference."""
+
+
+def test_a_mesh_that_cannot_be_made_is_stored_as_failed_with_its_reason(tmp_path, monkeypatch):
+    def refuse(root, solve):
+        raise StudyError("ball: use more nodes")
+
+    monkeypatch.setattr("studies.reference.solve.solve", refuse)
+    job = ReferenceJob(tmp_path, "made_up", reference_solves(UNPUBLISHED)[0])
+    stored = peek(do(job))
+    assert (stored.status, stored.message) == (Status.FAILED, "ball: use more nodes")
+    assert Ledger(tmp_path).why(job) is None
+
+
+def test_a_result_that_cannot_be_stored_ends_the_sweep(tmp_path, monkeypatch):
+    def full(*_):
+        raise StudyError("no space is left")
+
+    monkeypatch.setattr("studies.reference.solve.solve", full)
+    monkeypatch.setattr("studies.sweep.job.write_record", full)
+    with pytest.raises(StudyError, match="no space is left"):
+        do(ReferenceJob(tmp_path, "made_up", reference_solves(UNPUBLISHED)[0]))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from massspring import Free
-from studies.report.view.listing import listing
+from studies.report.view.stored import listing
 from studies.scene.library import BALL_CLAMPED, BALL_RINGING
 from studies.store.record import Status, read_record, write_record
 from tests.studies.made_up_run import SCENE
