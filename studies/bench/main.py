@@ -29,7 +29,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE, PRESS_END, RADIUS
 from studies.store.stamps import set_stamp
-from studies.store.tables.csv_table import write_table
+from studies.store.tables import write_table
 
 APPROACHES = (0.10, 0.20, 0.30)
 """Of the planes over the diameter, at which the reference is held against the converged solution."""

@@ -30,7 +30,7 @@ from studies.geometry.mesh.quality import (
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.family import true_volume
 from studies.store.stamps import set_stamp
-from studies.store.tables.csv_table import write_table
+from studies.store.tables import write_table
 
 ORGANS = ("liver", "stomach", "kidney", "spleen", "bladder")
 Row = dict[str, Any]

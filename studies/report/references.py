@@ -15,7 +15,7 @@ from studies.reference.reference_solves import STUDY
 from studies.reference.uncertainty import FACTORS
 from studies.scene.scene import Scene
 from studies.store.paths import study_folder
-from studies.store.tables.csv_table import write_table
+from studies.store.tables import write_table
 from studies.sweep.job import reference_jobs
 from studies.sweep.load import References
 

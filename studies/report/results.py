@@ -26,7 +26,7 @@ from studies.store.ledger import Ledger
 from studies.store.machine import write_machine
 from studies.store.paths import study_folder
 from studies.store.stamps import set_stamp
-from studies.store.tables.csv_table import write_table
+from studies.store.tables import write_table
 from studies.sweep.job import case_jobs, reference_jobs
 from studies.sweep.load import References, load_runs
 

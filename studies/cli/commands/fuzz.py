@@ -13,7 +13,7 @@ from studies.cli.progress import TerminalProgress
 from studies.cli.terminal import Results, console, errors, say
 from studies.plots.campaigns.breaking import draw as draw_chart
 from studies.store.stamps import set_stamp
-from studies.store.tables.csv_table import write_table
+from studies.store.tables import write_table
 from studies.tools.fuzz.campaign import counts, run_trials, table_of
 from studies.tools.fuzz.outcome import UNEXPLAINED, Attempt, Outcome, simplest, tried
 from studies.tools.fuzz.reference.outcome import tried as try_reference

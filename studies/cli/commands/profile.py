@@ -12,7 +12,7 @@ from studies.cli.options import BodyKind, MethodName, SurfaceNodes, chosen_case
 from studies.cli.progress import compiling
 from studies.cli.terminal import SceneName, console, errors
 from studies.metrics.timing.stage_cost import FRAME, SKIPPED, STAGE, cost_table
-from studies.store.tables.csv_table import write_table
+from studies.store.tables import write_table
 
 HEADINGS = {STAGE: "stages of a step", SKIPPED: "left out here; what it would cost", FRAME: "Python between two frames"}
 

@@ -16,8 +16,7 @@ from studies.metrics.table import UNRESOLVED, frame_of, row_of
 from studies.metrics.table import metric as metric_of
 from studies.scene.quantities import ALWAYS
 from studies.store.ledger import Ledger
-from studies.store.tables.csv_table import write_table
-from studies.store.tables.parquet_table import write_parquet
+from studies.store.tables import write_parquet, write_table
 from studies.sweep.find_study import find_study
 from studies.sweep.load import References
 from studies.sweep.rows import table_rows

@@ -1,12 +1,18 @@
 """Packs studies: records, tables, charts and the code that draws them, in a zip file that says what it holds."""
 
 import os
+import platform
 import shutil
 import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, requires
+from importlib.metadata import version as installed_version
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import studies as package
 from massspring.sources import OWN, ROOT
@@ -17,7 +23,6 @@ from studies.exchange.entry import entry_files
 from studies.metrics.timing.cases import timing_file
 from studies.reference.reference_solves import reference_solves
 from studies.report.archive.crate import CITATION, CODE, citation_file, digest, write_crate
-from studies.report.archive.versions import pins
 from studies.report.publish import check_studies
 from studies.report.results import make_folder, refresh, report
 from studies.runs.current import case_path
@@ -149,3 +154,23 @@ def write_zip(stage: Path, files: Sequence[Path], target: Path, day: str) -> Non
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
             with archive.open(entry, "w", force_zip64=True) as written, open(path, "rb") as read:
                 shutil.copyfileobj(read, written, 1 << 20)
+
+
+def pins() -> str:
+    """A line for each package that organbench requires, directly or not, with the version that is installed, as pip's
+    `-c` option reads them."""
+    found: dict[str, str] = {}
+    waiting = [Requirement("organbench")]
+    while waiting:
+        one = waiting.pop()
+        name = canonicalize_name(one.name)
+        if name in found or (one.marker is not None and not one.marker.evaluate({"extra": ""})):
+            continue
+        try:
+            found[name] = installed_version(name)
+        except PackageNotFoundError:  # of another platform, or replaced by its user
+            continue
+        waiting += map(Requirement, requires(name) or [])
+    lines = [f"{name}=={found[name]}" for name in sorted(found) if name != "organbench"]
+    head = f"# organbench {found.get('organbench', 'of the folder code')}, Python {platform.python_version()}"
+    return "\n".join([head, *lines, ""])

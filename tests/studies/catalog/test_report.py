@@ -19,7 +19,7 @@ from studies.runs.current import case_path
 from studies.store.ledger import Ledger
 from studies.store.machine import machine_id
 from studies.store.record import Status
-from studies.store.tables.csv_table import write_table
+from studies.store.tables import write_table
 from studies.sweep import load as sweep_load
 from studies.sweep.load import load_runs
 from tests.studies.tiny import tiny_case, tiny_study

@@ -16,7 +16,7 @@ from studies.metrics.compare.folders import compare, equal_records
 from studies.metrics.compare.verdict import MEANING, ROUND_OFF, Verdict, verdict_of
 from studies.store.paths import record_files
 from studies.store.record import read_record, write_record
-from studies.store.tables.csv_table import write_table
+from studies.store.tables import write_table
 
 PUBLISHED = Path(__file__).parents[4] / "results" / "published"
 NAN = float("nan")

@@ -18,8 +18,7 @@ from studies.exchange.entry import ENTRY, entry_path, outside
 from studies.metrics.timing import cases as timed
 from studies.report.archive import crate
 from studies.report.archive.checking import check
-from studies.report.archive.packing import chosen, pack
-from studies.report.archive.versions import pins
+from studies.report.archive.packing import chosen, pack, pins
 from studies.report.results import draw_charts, refresh
 from studies.runs.current import case_path
 from studies.store import archived, machine

@@ -9,7 +9,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.recipe_text import recipe_text
 from studies.scene.scene import Scene
 from studies.store.machine import machine_id
-from studies.store.tables.csv_table import write_table
+from studies.store.tables import write_table
 
 PAPER = BodyRecipe("surface", 550)
 ONE = BodyRecipe(nodes=300)

@@ -21,7 +21,7 @@ from studies.scene.library import (
     STOMACH_PRESS,
 )
 from studies.store.record import Status
-from studies.store.tables.csv_table import write_table
+from studies.store.tables import write_table
 from studies.tools.advise import answer as answers
 from studies.tools.advise.answer import advise, recommended
 from tests.plots.made_up import run

@@ -1,4 +1,4 @@
-"""Tables for other programs: every digit, with the types of the columns."""
+"""Tables of what is stored: CSV as people and spreadsheets read it, Parquet with every digit and the types."""
 
 import io
 from pathlib import Path
@@ -7,6 +7,12 @@ import pandas as pd
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
+
+
+def write_table(path: Path, table: pd.DataFrame) -> Path:
+    """A table as CSV with six significant digits; whole or not at all."""
+    write_whole(path, table.to_csv(index=False, float_format="%.6g").encode())
+    return path
 
 
 def write_parquet(path: Path, table: pd.DataFrame) -> Path:
