@@ -1,4 +1,4 @@
-"""Tables of what is stored: for people and spreadsheets as CSV, for other programs as Parquet."""
+"""Tables of what is stored: CSV as people and spreadsheets read it, Parquet with every digit and the types."""
 
 import io
 from pathlib import Path

@@ -1,7 +1,8 @@
 """The tables of two results folders, row by row: the same study, scene and recipe, metric by metric."""
 
 import re
-from collections.abc import Hashable
+from collections import defaultdict
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,6 +27,8 @@ METRIC = re.compile(r"^(?P<name>\w+) \[(?P<unit>[^\]]+)\]$")
 STATUS = "status"
 ROW = ("scene", "body", "method", "nodes", "law", "dt/dt_c", "recipe")
 """Columns of a table that say which case a row is."""
+MORE: tuple[tuple[str, ...], ...] = ((), ("law",), ("step",), ("law", "step"), ("recipe",))
+"""What a name holds besides body, nodes and method, in the order in which it is tried."""
 TIMES = tuple(metric.name for metric in METRICS if metric.spread is not None)
 SPEEDS = tuple(metric.name for metric in METRICS if metric.spread is not None and metric.better == "higher")
 """Metrics that depend on the machine; of these the ones that are speeds."""
@@ -212,3 +215,20 @@ def _equal(one: Record, other: Record) -> bool:
         np.array_equal(field.values, other.fields[name].values, equal_nan=field.values.dtype.kind == "f")
         for name, field in one.fields.items()
     )
+
+
+def labels_of(cases: Iterable[Named]) -> dict[Named, str]:
+    """Body, nodes and method of each case, and as much more as tells the cases of a study and scene apart."""
+    alike = defaultdict[tuple[str, ...], set[Named]](set)
+    for case in cases:
+        alike[case.study, case.scene, _case_label(case, ())].add(case)
+    labels = dict[Named, str]()
+    for group in alike.values():
+        more = next(one for one in MORE if len({_case_label(case, one) for case in group}) == len(group))
+        labels |= {case: _case_label(case, more) for case in group}
+    return labels
+
+
+def _case_label(case: Named, more: tuple[str, ...]) -> str:
+    words = {"law": case.law, "step": f"step {case.step}", "recipe": case.recipe}
+    return ", ".join(filter(None, [case.body, case.nodes, case.method, *(words[name] for name in more)]))

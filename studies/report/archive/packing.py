@@ -6,7 +6,8 @@ import shutil
 import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import PackageNotFoundError, requires
+from importlib.metadata import version as installed_version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -156,7 +157,8 @@ def write_zip(stage: Path, files: Sequence[Path], target: Path, day: str) -> Non
 
 
 def pins() -> str:
-    """A line for each package that organbench requires, directly or not, with the version that is installed."""
+    """A line for each package that organbench requires, directly or not, with the version that is installed, as pip's
+    `-c` option reads them."""
     found: dict[str, str] = {}
     waiting = [Requirement("organbench")]
     while waiting:
@@ -165,7 +167,7 @@ def pins() -> str:
         if name in found or (one.marker is not None and not one.marker.evaluate({"extra": ""})):
             continue
         try:
-            found[name] = version(name)
+            found[name] = installed_version(name)
         except PackageNotFoundError:  # of another platform, or replaced by its user
             continue
         waiting += map(Requirement, requires(name) or [])

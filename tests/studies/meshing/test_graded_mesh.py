@@ -113,7 +113,12 @@ def test_the_same_request_gives_the_same_mesh(quadratic):
 
 
 @pytest.mark.parametrize(
-    ("nodes", "told"), [(62, "no graded mesh has 62"), (20, "give a whole number"), ("600", "'600'")]
+    ("nodes", "told"),
+    [
+        pytest.param(62, "no graded mesh has 62", marks=pytest.mark.campaign),  # meshes until no number is left
+        (20, "give a whole number"),
+        ("600", "'600'"),
+    ],
 )
 def test_a_number_of_nodes_that_cannot_be_had_is_one_sentence(mesh_cache, nodes, told):
     with pytest.raises(StudyError, match=told) as caught:
@@ -147,7 +152,7 @@ def test_what_ten_tries_find_within_the_tolerance_is_taken(monkeypatch):
     assert told_nodes(monkeypatch, lambda level: 824 if level > 140 else 794) == 200
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_graded_liver_has_the_nodes_that_were_measured(mesh_cache):
     """200 vertices, outlines halved once and contacts twice: 2,415 nodes, whose error under a probe was measured."""
     mesh = mesh_at(LIVER_PROBE, 200, *usual_grading(LIVER_PROBE), True)
@@ -158,7 +163,7 @@ def test_a_graded_liver_has_the_nodes_that_were_measured(mesh_cache):
     assert touched[0] > 2 * touched[1]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_elements_that_would_fold_take_their_sides_back(mesh_cache):
     """A spleen of 150 vertices cannot be curved; with a few sides less bent it can, and has nearly the true volume."""
     with pytest.raises(StudyError, match="fold when they follow the true shape"):
@@ -171,7 +176,7 @@ def test_elements_that_would_fold_take_their_sides_back(mesh_cache):
     assert abs(mesh.volume / truth - 1) < 0.1 * abs(straight / truth - 1)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_wall_of_a_stomach_has_one_layer_and_its_lumen_is_known(mesh_cache):
     assert is_hollow(STOMACH_PROBE)
     assert usual_grading(STOMACH_PROBE) == (0, 1)

@@ -13,7 +13,7 @@ from studies.runs.case import BodyRecipe
 from studies.runs.prepare import attachments_for, body_for, prepare
 from studies.scene.library import Held
 from studies.scene.library.ball_clamped import BALL_CLAMPED
-from studies.scene.library.stomach_press import STOMACH_PRESS
+from studies.scene.library.bladder_fill import BLADDER_FILL
 from tests.geometry.boxes import box, split
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
 
@@ -51,9 +51,9 @@ def test_the_masses_add_up_to_density_times_volume(ball_mesh, kind):
 
 def test_a_membrane_weighs_as_much_as_wall_and_content(mesh_cache):
     """The content has the tissue's density (wall_for): together the density times all that the outer surface holds."""
-    mesh = mesh_for(STOMACH_PRESS, 200)
-    body = body_for(STOMACH_PRESS, BodyRecipe("membrane", 200, law="delingette"), mesh)
-    assert body.mass.sum() == pytest.approx(STOMACH_PRESS.tissue.density * mesh.outer_volume, rel=1e-9)
+    mesh = mesh_for(BLADDER_FILL, 400)
+    body = body_for(BLADDER_FILL, BodyRecipe("membrane", 400, law="delingette"), mesh)
+    assert body.mass.sum() == pytest.approx(BLADDER_FILL.tissue.density * mesh.outer_volume, rel=1e-9)
 
 
 def test_the_laws_differ_and_match_the_tissue(ball_mesh):

@@ -37,7 +37,7 @@ def test_lloyd_overshoots_on_a_mesh_of_gmsh(mesh):
 
 
 def test_the_cotangent_law_is_built_with_its_volumes_and_recorded(mesh):
-    case = Case(BALL_SQUEEZE, BodyRecipe(nodes=100, law="cotangent", volumes="nodal"), frames=20)
+    case = Case(BALL_SQUEEZE, BodyRecipe(nodes=150, law="cotangent", volumes="nodal"), frames=20)
     prepared = prepare(case)
     assert prepared.setup.body.rest_pressure == BALL_SQUEEZE.tissue.shear_modulus
     record = measure(case.replaced(scene=replace(BALL_SQUEEZE, reference=None)))
@@ -55,7 +55,7 @@ def test_every_law_of_the_solver_can_be_asked_for():
 
 
 def test_without_them_the_run_fails_with_a_sentence():
-    record = measure(Case(BALL_SQUEEZE, BodyRecipe(nodes=100, law="cotangent"), frames=20))
+    record = measure(Case(BALL_SQUEEZE, BodyRecipe(nodes=150, law="cotangent"), frames=20))
     assert record.status == Status.FAILED and "keep one volume per node" in record.message
 
 

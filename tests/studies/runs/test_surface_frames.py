@@ -15,7 +15,7 @@ from studies.runs.case import BodyRecipe, Case, case_from_json
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames, measure, replay, run_case
 from studies.runs.surface_frames import MOMENTS, moments
-from studies.scene.library import STOMACH_PRESS
+from studies.scene.library import BLADDER_FILL
 from studies.scene.library.stress import STRESS_SCENES
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
@@ -99,7 +99,7 @@ def test_an_early_end_is_the_last_frame_and_a_start_of_its_own_the_first():
 
 
 def test_a_lumen_is_not_seen():
-    scene = replace(STOMACH_PRESS, reference=None)
+    scene = replace(BLADDER_FILL, reference=None)
     record = measure(Case(scene, BodyRecipe(nodes=400), frames=1, dt_fraction=0.5, recorded=("surface",)))
     nodes, triangles = record.fields["surface_node"].values, record.fields["triangles"].values
     assert len(nodes) < len(np.unique(triangles))

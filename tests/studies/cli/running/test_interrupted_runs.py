@@ -75,7 +75,7 @@ def finish(tmp_path):
     assert [standing.status for standing in standings(Ledger(tmp_path / "results"), study)] == ["ok"] * total
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_killed_half_way_goes_on_where_it_was(tmp_path):
     process = interrupted(tmp_path, signal.SIGKILL)
     process.communicate(timeout=60)

@@ -82,7 +82,7 @@ def test_progress_is_told(made):
     assert len(progress.done) == 6
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_an_interrupted_calibration_goes_on(made, tmp_path, monkeypatch):
     """What was run is not run again: after half of it is lost, the other half is made, to the same end."""
     folder, found, _ = made
