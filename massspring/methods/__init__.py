@@ -44,5 +44,11 @@ METHODS: tuple[type[Method], ...] = (
 LITERATURE: tuple[type[Method], ...] = (AngularSprings, ChainMail, LinearModes, ElasticResponse)
 """What the literature puts in the place of METHODS; it does not promise what the contract test measures of those."""
 
-VARIANTS: tuple[Method, ...] = (Element(hard=True), Xpbd(volumes="whole"), ImplicitVolume(recovers=True))
+VARIANTS: tuple[Method, ...] = (
+    Element(hard=True),
+    Xpbd(volumes="whole"),
+    ImplicitVolume(recovers=True),
+    ExplicitElements(law="corotated"),
+    ImplicitElements(law="corotated"),
+)
 """Settings with which a method solves other equations than by default, or may; the contract test covers them too."""
