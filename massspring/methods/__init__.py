@@ -8,6 +8,7 @@ from massspring.methods.constraints.shake import Shake
 from massspring.methods.element import Element
 from massspring.methods.elements.explicit_elements import ExplicitElements
 from massspring.methods.elements.implicit_elements import ImplicitElements
+from massspring.methods.elements.xpbd_neo_hookean import XpbdNeoHookean
 from massspring.methods.free import Free
 from massspring.methods.implicit_springs import ImplicitSprings
 from massspring.methods.implicit_volume import ImplicitVolume
@@ -39,6 +40,7 @@ METHODS: tuple[type[Method], ...] = (
     SemiImplicit,
     ExplicitElements,
     ImplicitElements,
+    XpbdNeoHookean,
 )
 
 LITERATURE: tuple[type[Method], ...] = (AngularSprings, ChainMail, LinearModes, ElasticResponse)

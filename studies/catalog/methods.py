@@ -2,7 +2,16 @@
 
 from dataclasses import replace
 
-from massspring import METHODS, Element, ExplicitElements, ImplicitElements, ImplicitSprings, Method, Xpbd
+from massspring import (
+    METHODS,
+    Element,
+    ExplicitElements,
+    ImplicitElements,
+    ImplicitSprings,
+    Method,
+    Xpbd,
+    XpbdNeoHookean,
+)
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
@@ -14,6 +23,7 @@ OTHER_SETTINGS: tuple[Method, ...] = (
     Element(bulk_modulus=1e6, hard=True),
     Xpbd("whole", iterations=2),
     ExplicitElements(law="corotated"),
+    XpbdNeoHookean(iterations=20),
 )
 """Each runs after its method with the default settings."""
 COROTATED = ImplicitElements(law="corotated")
