@@ -32,6 +32,7 @@ from .methods import Pyramid as Pyramid
 from .methods import SemiImplicit as SemiImplicit
 from .methods import Shake as Shake
 from .methods import Xpbd as Xpbd
+from .methods import XpbdNeoHookean as XpbdNeoHookean
 from .run.history import History as History
 from .run.simulation import Setup as Setup
 from .run.simulation import simulate as simulate

@@ -14,6 +14,7 @@ from .errors import SlowSolverWarning as SlowSolverWarning
 from .errors import SolveError as SolveError
 from .model.cavity import Cavity as Cavity
 from .model.loads import BodyForce as BodyForce
+from .model.loads import PointMass as PointMass
 from .model.loads import Traction as Traction
 from .model.material import Material as Material
 from .model.material import MooneyRivlin as MooneyRivlin

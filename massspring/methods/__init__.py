@@ -8,6 +8,7 @@ from massspring.methods.constraints.shake import Shake
 from massspring.methods.element import Element
 from massspring.methods.elements.explicit_elements import ExplicitElements
 from massspring.methods.elements.implicit_elements import ImplicitElements
+from massspring.methods.elements.xpbd_neo_hookean import XpbdNeoHookean
 from massspring.methods.free import Free
 from massspring.methods.implicit_springs import ImplicitSprings
 from massspring.methods.implicit_volume import ImplicitVolume
@@ -39,10 +40,17 @@ METHODS: tuple[type[Method], ...] = (
     SemiImplicit,
     ExplicitElements,
     ImplicitElements,
+    XpbdNeoHookean,
 )
 
 LITERATURE: tuple[type[Method], ...] = (AngularSprings, ChainMail, LinearModes, ElasticResponse)
 """What the literature puts in the place of METHODS; it does not promise what the contract test measures of those."""
 
-VARIANTS: tuple[Method, ...] = (Element(hard=True), Xpbd(volumes="whole"), ImplicitVolume(recovers=True))
+VARIANTS: tuple[Method, ...] = (
+    Element(hard=True),
+    Xpbd(volumes="whole"),
+    ImplicitVolume(recovers=True),
+    ExplicitElements(law="corotated"),
+    ImplicitElements(law="corotated"),
+)
 """Settings with which a method solves other equations than by default, or may; the contract test covers them too."""

@@ -37,6 +37,10 @@ def build_mass(system: System) -> Mass:
     local = element_masses(system.element, elements, problem.density, problem.degree)
     count, width = len(system.nodes), len(elements.sizes.functions)
     table = elements.dofs[:, :width].astype(np.int64) // 3
+    for hung in problem.masses:
+        # As a part of one element around the node, so that both forms have it.
+        element, place = np.argwhere(table == hung.node)[0]
+        local[element, place, place] += hung.mass
     rows, cols = np.repeat(table, width, axis=1).ravel(), np.tile(table, (1, width)).ravel()
     matrix = sp.csr_matrix((local.ravel(), (rows, cols)), shape=(count, count))
     return Mass(matrix, packed(local, system.positions, system.pattern.size, elements.dofs.shape[1]))

@@ -41,6 +41,16 @@ class BodyForce:
     value: Callable
 
 
+@dataclass(frozen=True)
+class PointMass:
+    """What hangs at a node of the P2 mesh: gravity pulls it, and in a motion it is inert."""
+
+    node: int
+    """Row of `reference_fem.nodes(mesh)`."""
+    mass: float
+    """[kg]."""
+
+
 class LoadedPoints(NamedTuple):
     """Quadrature points that a load acts at: k elements or facets, q points each."""
 

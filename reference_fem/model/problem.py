@@ -10,7 +10,7 @@ from reference_fem.elements.shapes import build_facets, displacement_points
 from reference_fem.elements.table import DEFAULT, find_element
 from reference_fem.errors import SolveError
 from reference_fem.model.cavity import Cavity
-from reference_fem.model.loads import BodyForce, Traction
+from reference_fem.model.loads import BodyForce, PointMass, Traction
 from reference_fem.model.material import Material
 from reference_fem.model.obstacles import Obstacle, finite_vector
 
@@ -38,6 +38,7 @@ class Problem:
     cavities: lumens that keep a volume or a pressure; a lumen not named is open. element: a name in ELEMENTS.
     order: degree integrated exactly, None = the element's own (for P2/P1 that is 5, the lowest with positive weights at
     or above what p J needs, 4). loads: dead forces, switched on with gravity at the start, then as their time says.
+    masses: hung at nodes.
     """
 
     mesh: MeshTet
@@ -51,6 +52,7 @@ class Problem:
     cavities: Sequence[Cavity] = ()
     element: str = DEFAULT
     loads: Sequence[Traction | BodyForce] = ()
+    masses: Sequence[PointMass] = ()
 
     @property
     def degree(self) -> int:

@@ -39,6 +39,13 @@ def check_loads(problem: Problem):
         raise SolveError(f"the density is {problem.density} kg/m³: it must be zero or positive and finite")
     if gravity.any() and problem.density == 0.0:
         raise SolveError("gravity acts but the density is 0 kg/m³: give the density, or no gravity")
+    count = len(nodes(problem.mesh))
+    for hung in problem.masses:
+        if not (np.isfinite(hung.mass) and hung.mass > 0.0 and 0 <= hung.node < count):
+            raise SolveError(
+                f"a mass of {hung.mass} kg hangs at node {hung.node}: give a positive mass, and a node from 0 to "
+                f"{count - 1}"
+            )
     for name in ("order", "contact_order"):
         given = getattr(problem, name)
         if given is not None and given < 4:

@@ -97,6 +97,8 @@ class System:
         force = np.zeros(self.field_count)
         for points in self.loaded:
             force[: self.displacement_count] += share * nodal_force(points, t)
+        for hung in self.problem.masses:
+            force[3 * hung.node : 3 * hung.node + 3] += share * hung.mass * np.asarray(self.problem.gravity)
         return force
 
     def rest(self) -> State:

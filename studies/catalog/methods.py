@@ -2,7 +2,16 @@
 
 from dataclasses import replace
 
-from massspring import METHODS, Element, ImplicitSprings, Method, Xpbd
+from massspring import (
+    METHODS,
+    Element,
+    ExplicitElements,
+    ImplicitElements,
+    ImplicitSprings,
+    Method,
+    Xpbd,
+    XpbdNeoHookean,
+)
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
@@ -10,8 +19,14 @@ from studies.scene.library.liver_press import LIVER_PRESS
 
 NODES = 200
 """So coarse that the dearest, a volume for every tetrahedron, is done in seconds; the same for all."""
-OTHER_SETTINGS: tuple[Method, ...] = (Element(bulk_modulus=1e6, hard=True), Xpbd("whole", iterations=2))
+OTHER_SETTINGS: tuple[Method, ...] = (
+    Element(bulk_modulus=1e6, hard=True),
+    Xpbd("whole", iterations=2),
+    ExplicitElements(law="corotated"),
+    XpbdNeoHookean(iterations=20),
+)
 """Each runs after its method with the default settings."""
+COROTATED = ImplicitElements(law="corotated")
 
 
 def contestants() -> tuple[Method, ...]:
@@ -44,6 +59,11 @@ METHODS_STUDY = Study(
             Case(scene, BodyRecipe(nodes=NODES), ImplicitSprings(), dt, frames=round(scene.duration / dt), timed=True)
             for scene in SCENES
             for dt in LONG
+        ),
+        # What other engines take: corotated elements, implicit in time.
+        *(
+            Case(scene, body_for(COROTATED), COROTATED, LONG[0], frames=round(scene.duration / LONG[0]), timed=True)
+            for scene in SCENES
         ),
     ),
     charts=(Chart("methods.png", "studies.plots.methods:draw"),),

@@ -90,7 +90,11 @@ def neighbours(body: BodyRecipe) -> tuple[BodyRecipe, ...]:
 
 LATER = {"weights": None, "graded": False, "mass": "lumped", "contact": "facets"}
 """Settings of a recipe that came after the first records, and what they were before."""
-LATER_SETTINGS = {"implicit_volume": {"recovers": False}}
+LATER_SETTINGS = {
+    "implicit_volume": {"recovers": False},
+    "explicit_elements": {"law": "neo_hookean"},
+    "implicit_elements": {"law": "neo_hookean"},
+}
 """The same of methods, by name."""
 
 

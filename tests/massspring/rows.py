@@ -12,6 +12,8 @@ CONTESTANTS: dict[str, Method] = {
     "element_hard": VARIANTS[0],
     "xpbd_whole": VARIANTS[1],
     "implicit_volume_recovers": VARIANTS[2],
+    "explicit_elements_corotated": VARIANTS[3],
+    "implicit_elements_corotated": VARIANTS[4],
 }
 """Every method by default, and those with a switch the other way round."""
 KINDS = ("block", "ball", "hollow", "regions", "nodal")

@@ -14,14 +14,16 @@ a volume; a large K shortens the step as 1/√K.
 """
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import coo_array, csr_array, diags_array
 
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.constraint.jacobian import rows_into, transposed_rows_times_into
+from massspring.kernels.forces.corotated import corotated_forces_into
+from massspring.kernels.forces.elements import Elements
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.points.arrays import PointRows
@@ -32,6 +34,8 @@ from massspring.kernels.step.end import end_step
 from massspring.layout.allocate import start
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
+from massspring.methods.elements.laws import LawName, supported, why_not_corotated
+from massspring.methods.elements.tangent import elements_of
 from massspring.methods.families.known_pressure import check_modulus
 from massspring.methods.families.points import meet_points
 from massspring.methods.method import Method, begin_frame
@@ -88,14 +92,51 @@ def quadratic_elements_frame(frame, rows, bulk_modulus):
         end_step(frame, step, push, 0.0, None)
 
 
+@njit_inlined
+def follow_targets(elements, rest_volumes, target):
+    """J* of each tetrahedron: the mean of what its nodal volumes want of their rest volumes."""
+    for e in range(elements.node.shape[0]):
+        wanted = 0.0
+        for a in range(4):
+            i = elements.node[e, a]
+            wanted += 0.25 * target[i] / rest_volumes[i]
+        elements.wanted[e, 0] = wanted
+
+
+@njit_lean
+def corotated_elements_frame(frame, elements, rest_volumes, force):
+    """The same with corotated tetrahedra (eq. 13.12), their forces into `force` (n, 3)."""
+    nodes, boundary, diagnostics = frame.nodes, frame.boundary, frame.diagnostics
+    push = Push(force, 1.0)
+    open_frame(frame)
+    for step in range(boundary.position.shape[0]):
+        begin_step(frame, step, False)
+        follow_targets(elements, rest_volumes, boundary.volume_target[step])
+        diagnostics.singular[0] += corotated_forces_into(elements, nodes.x, force)
+        end_stage(diagnostics.stage_times, VOLUME)
+        search_contacts(frame, step, push)
+        end_step(frame, step, push, 0.0, None)
+
+
+class Corotated(NamedTuple):
+    """What a state of corotated elements remembers."""
+
+    body: Body
+    elements: Elements
+
+
 @dataclass(frozen=True)
 class ExplicitElements(Method):
-    """Explicit finite elements (TLED): neo-Hookean tetrahedra with average nodal pressure, linear or quadratic."""
+    """Explicit finite elements (TLED): neo-Hookean tetrahedra with average nodal pressure, or corotated ones."""
 
     bulk_ratio: float = 50.0
     """K over the shear modulus [1]; 50 is a Poisson ratio of 0.49. Against the step of the same body with its volumes
     solved for, 10 takes 18 to 42 % off, 50 takes 60 to 73 %, 1000 takes 91 to 94 % (a ball and a liver, linear and
     quadratic)."""
+    law: LawName = "neo_hookean"
+    """"corotated": linear elasticity in frames that turn with the elements (docs/theory.md, eq. 13.11).
+    Each has a pressure of its own, so that they lock. Reported is that of small strains, (K − mu/3) (1 − V/V0) of each
+    nodal volume."""
 
     name: ClassVar[str] = "explicit_elements"
     order: ClassVar[int] = 1
@@ -111,20 +152,47 @@ class ExplicitElements(Method):
 
     def __post_init__(self) -> None:
         check_modulus(self.name, "bulk_ratio", self.bulk_ratio, "mu")
+        object.__setattr__(self, "capabilities", supported(self.capabilities, self.name, self.law))
+
+    def why_not(self, body: Body) -> str | None:
+        """Why the method cannot advance `body`; None when it can."""
+        reason = self.capabilities.why_not(body)
+        return why_not_corotated(body) if reason is None and self.law == "corotated" else reason
 
     def added_stiffness(self, body: Body) -> csr_array:
-        """Jᵀ diag(K/V0) J, with J at rest (eq. 13.3)."""
+        """Jᵀ diag(K/V0) J, with J at rest (eq. 13.3); of corotated elements with the volumes of tetrahedra."""
+        if self.law == "corotated":
+            elements = elements_of(body, self.bulk_ratio * body.rest_pressure)
+            count = len(elements.node)
+            root = np.sqrt(elements.constants[1] * elements.weight[:, 0])
+            rows = (3 * elements.node[:, :, None] + np.arange(3)).ravel()
+            values = (root[:, None, None] * elements.gradient[:, 0]).ravel()
+            columns = np.repeat(np.arange(count), 12)
+            return csr_array(coo_array((values, (rows, columns)), shape=(3 * body.node_count, count)))
         weight = np.sqrt(self.bulk_ratio * body.rest_pressure / body.rest_volumes)
         return csr_array(body.kept.jacobian(body.rest).T @ diags_array(weight))
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """The body at rest, or with velocities `v` (n, 3) [m/s]; it remembers K [Pa]."""
-        return start(body, attachments, v, memory=self.bulk_ratio * body.rest_pressure)
+        bulk = self.bulk_ratio * body.rest_pressure
+        memory = Corotated(body, elements_of(body, bulk)) if self.law == "corotated" else bulk
+        return start(body, attachments, v, memory=memory)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
         after = begin_frame(state, boundary)
         assert after.rows is not None  # bodies with a single volume are refused
+        if isinstance(after.memory, Corotated):
+            return self._advance_corotated(after, after.memory, boundary)
         frame = quadratic_elements_frame if isinstance(after.rows, PointRows) else linear_elements_frame
         frame(after.frame(boundary), after.rows, float(after.memory))
         return replace(after, lam=after.rows.lam - after.model.rest_lam)
+
+    def _advance_corotated(self, after: State, memory: Corotated, boundary: BoundaryConditions) -> State:
+        """One frame of corotated elements."""
+        body, rows = memory.body, after.rows
+        assert rows is not None  # bodies with a single volume are refused
+        corotated_elements_frame(after.frame(boundary), memory.elements, body.rest_volumes, rows.push)
+        filling = boundary.volume_target[-1] / body.rest_volumes
+        missing = filling - body.kept.measure(after.nodes.x) / body.rest_volumes
+        return replace(after, lam=(self.bulk_ratio - 1.0 / 3.0) * body.rest_pressure * missing)

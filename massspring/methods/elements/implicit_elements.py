@@ -31,6 +31,13 @@ from massspring.kernels.jit.stage_clock import BETWEEN_FRAMES, end_stage
 from massspring.layout.allocate import CORRECTION_LIMIT, start
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
+from massspring.methods.elements.laws import (
+    ELEMENT_LAWS,
+    LawName,
+    has_nodal_volumes,
+    supported,
+    why_not_corotated,
+)
 from massspring.methods.elements.newton import Ending, NewtonStep, Prepared, missing
 from massspring.methods.elements.tangent import Pattern, elements_of
 from massspring.methods.families.known_pressure import check_modulus
@@ -40,7 +47,7 @@ from massspring.world.obstacles import Attachment
 
 @dataclass(frozen=True)
 class ImplicitElements(Method):
-    """Nonlinear finite elements with a volume penalty, linear or quadratic: backward Euler by Newton's method."""
+    """Nonlinear finite elements with a volume penalty, or corotated ones: backward Euler by Newton's method."""
 
     bulk_ratio: float = 50.0
     """K over the shear modulus [1]; 50 is a Poisson ratio of 0.49."""
@@ -48,6 +55,9 @@ class ImplicitElements(Method):
     """Motion of a pass, over the mean length of a spring, after which none is made [1]."""
     most_passes: int = 20
     """In a step, with a factorisation each."""
+    law: LawName = "neo_hookean"
+    """"corotated": linear elasticity in frames that turn with the elements (docs/theory.md, eq. 13.11).
+    Its pressure is reported as that of small strains, (K − mu/3) (1 − V/V0) of each nodal volume."""
 
     name: ClassVar[str] = "implicit_elements"
     order: ClassVar[int] = 1
@@ -65,25 +75,29 @@ class ImplicitElements(Method):
     def __post_init__(self) -> None:
         check_modulus(self.name, "bulk_ratio", self.bulk_ratio, "mu")
         check_modulus(self.name, "tolerance", self.tolerance, "lengths of a spring")
+        object.__setattr__(self, "capabilities", supported(self.capabilities, self.name, self.law))
         if self.most_passes < 1:
             raise MassSpringError(f"{self.name}'s most_passes is {self.most_passes}; it needs at least one")
 
     def why_not(self, body: Body) -> str | None:
         """Why the method cannot advance `body`; None when it can."""
         reason = self.capabilities.why_not(body)
+        if reason is None and self.law == "corotated":
+            reason = why_not_corotated(body)
         if reason is not None:
             return reason
         kept = body.kept
         if isinstance(kept, PointVolumes):
             return None if kept.closed is None else "its elements keep no volume of a lumen; take explicit_elements"
-        own = kept.names == tuple(f"node {i}" for i in range(body.node_count))
-        return None if own else "it keeps nodal volumes only; take explicit_elements"
+        return None if has_nodal_volumes(body) else "it keeps nodal volumes only; take explicit_elements"
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """The body at rest, or with velocities `v` (n, 3) [m/s], with the pattern of its stiffness."""
         state = start(body, attachments, v)
         elements = elements_of(body, self.bulk_ratio * body.rest_pressure)
-        return replace(state, memory=Prepared(body, elements, Pattern(elements, state.model), {}))
+        return replace(
+            state, memory=Prepared(body, elements, Pattern(elements, state.model), {}, ELEMENT_LAWS[self.law])
+        )
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
@@ -94,5 +108,6 @@ class ImplicitElements(Method):
         for step in range(len(boundary.position)):
             NewtonStep(after, boundary, step).take(ending)
         filling = boundary.volume_target[-1] / prepared.body.rest_volumes
-        bulk = self.bulk_ratio * prepared.body.rest_pressure
+        local = 1.0 / 3.0 if self.law == "corotated" else 0.0
+        bulk = (self.bulk_ratio - local) * prepared.body.rest_pressure
         return replace(after, lam=bulk * missing(prepared, after.nodes.x, filling))

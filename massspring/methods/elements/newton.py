@@ -8,12 +8,13 @@ from scipy.linalg import lu_factor, lu_solve
 
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Nodes, Push
-from massspring.kernels.forces.elements import Elements, add_element_stiffness, element_energy, element_forces_into
+from massspring.kernels.forces.elements import Elements
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, REVISION, SPRINGS, end_stage
 from massspring.kernels.step.attachments import add_held_impulse
 from massspring.layout.state import State
 from massspring.methods.elements.friction import RubbedContact
+from massspring.methods.elements.laws import Law
 from massspring.methods.elements.tangent import Pattern, Tangent, wanted_of
 from massspring.methods.implicit.contact import TouchedRows
 
@@ -64,6 +65,7 @@ class Prepared:
     pattern: Pattern
     known: dict[tuple[float, float], np.ndarray]
     """Step and damping -> data of the constant part of the tangent."""
+    law: Law
 
     def constant(self, state: State, boundary: BoundaryConditions) -> np.ndarray:
         """Data of (1 + c dt) M + dt² K [kg]."""
@@ -168,7 +170,8 @@ class NewtonStep:
     def tangent(self, exact: bool) -> Tangent:
         """T at p with what friction resists; not `exact`: without what the pressure turns, so that it is positive."""
         pattern, data = self.prepared.pattern, self.prepared.constant(self.state, self.boundary).copy()
-        add_element_stiffness(self.elements, pattern.places, self.p, self.boundary.dt**2, exact, data)
+        stiffen = self.prepared.law.add_stiffness
+        stiffen(self.elements, pattern.places, self.p, self.boundary.dt**2, exact, data)
         if self.rough:
             pattern.add_at_nodes(data, *self.contact.stiffness(self.p))
         return Tangent(pattern, data)
@@ -186,7 +189,7 @@ class NewtonStep:
         """dt M v + dt² (f(p) + m g) − (1 + c dt) M (p − x) [kg m], (n, 3), 0 where held (eq. 13.6)."""
         model, nodes, dt = self.model, self.nodes, self.boundary.dt
         spring_forces_into(self.p, model.ends, model.rest_length, model.stiffness, nodes.force)
-        self.idle = element_forces_into(self.elements, self.p, self.force)
+        self.idle = self.prepared.law.forces_into(self.elements, self.p, self.force)
         moved = (1.0 + self.boundary.damping * dt) * (self.p - self.nodes.x)
         right = model.mass[:, None] * (dt * nodes.v - moved) + dt * dt * (nodes.force + self.force + self.weight)
         right[model.held_nodes] = 0.0
@@ -199,7 +202,7 @@ class NewtonStep:
         inertia = 0.5 * (1.0 + self.boundary.damping * dt) * float((mass * moved * moved).sum())
         known = float((moved * (dt * mass * self.nodes.v + dt * dt * self.weight)).sum())
         springs = dt * dt * float(spring_energy(p, model.ends, model.rest_length, model.stiffness))
-        volumes = dt * dt * float(element_energy(self.elements, p))
+        volumes = dt * dt * float(self.prepared.law.energy(self.elements, p))
         return inertia - known + springs + volumes, inertia + abs(known) + abs(springs) + abs(volumes)
 
     def part_of(self, change: np.ndarray, given: np.ndarray) -> float:

@@ -1,0 +1,106 @@
+"""The silicone beam: sag, frequency and damping against the tip load, measured and predicted."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from studies.plots.style.page import blank, finish, page, panels
+from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, save, styled
+
+TITLE = "A silicone beam let go: E and damping fitted without a load, the rest predicted"
+LOOKS = tuple(zip((BLUE, SKY, GREEN, ORANGE, PURPLE, GREY, BLACK), "os^vDsX", strict=True))
+MEASURED = "measured"
+REACH = {"sag": 6.0, "frequency": 15.0}
+"""Of the axes, in their units: what is farther off is named in a note."""
+
+
+class Point(NamedTuple):
+    """One row of the table: who says what of a load."""
+
+    who: str
+    newton: float
+    """Tip load [N]."""
+    sag: float
+    """Mean of the three markers [mm]."""
+    frequency: float
+    """[Hz]."""
+    damping: float
+    """Ratio to critical damping [1]."""
+
+
+class Bar(NamedTuple):
+    """A measurement: its mean, and how far it may be off."""
+
+    newton: float
+    value: float
+    uncertainty: float
+
+
+@styled
+def figure(rows: Sequence[Point], bars: Mapping[str, Sequence[Bar]]) -> Figure:
+    """A panel for each quantity in `bars` ("sag" [mm], "frequency" [Hz], "damping" [1]): what was measured is 0, with
+    its uncertainty, and what was predicted is off by so much."""
+    if not rows:
+        return blank(TITLE, "nothing is predicted yet")
+    sheet = page(11, 4.2)
+    labels = {
+        "sag": "sag, off by [mm]",
+        "frequency": "frequency, off by [%]",
+        "damping": "damping ratio [1]",
+    }
+    names = list(dict.fromkeys(row.who for row in rows if row.who != MEASURED))
+    looks = dict(zip(names, LOOKS, strict=False))
+    beyond = list[str]()
+    for axes, (quantity, measured) in zip(panels(sheet, 1, 3)[0], bars.items(), strict=True):
+        beyond += _draw(axes, quantity, rows, measured, looks)
+        axes.set(xlabel="tip load [N]", ylabel=labels[quantity])
+        axes.margins(x=0.12)
+    handles = [
+        Line2D(
+            [], [], color=VERMILLION, marker="_", markersize=11, linestyle="", label="measured, with its uncertainty"
+        ),
+        *(Line2D([], [], color=c, marker=m, markersize=6, label=name) for name, (c, m) in looks.items()),
+    ]
+    return finish(sheet, TITLE, handles, beyond, columns=3)
+
+
+def _draw(
+    axes: Axes, quantity: str, rows: Sequence[Point], bars: Sequence[Bar], looks: Mapping[str, tuple[str, str]]
+) -> list[str]:
+    """Measurement and predictions of one quantity; a note on each prediction that lies outside the axes."""
+    truth = {bar.newton: bar.value for bar in bars}
+
+    def shown(newton: float, value: float) -> float:
+        if quantity == "damping":
+            return value
+        return value - truth[newton] if quantity == "sag" else 100.0 * (value / truth[newton] - 1.0)
+
+    for bar in bars:
+        middle = shown(bar.newton, bar.value)
+        reach = shown(bar.newton, bar.value + bar.uncertainty) - middle
+        axes.errorbar(
+            bar.newton, middle, reach, color=VERMILLION, marker="_", markersize=11, capsize=6, linewidth=2, zorder=3
+        )
+    beyond, limit = [], REACH.get(quantity)
+    for name, (colour, marker) in looks.items():
+        x = [row.newton for row in rows if row.who == name]
+        y = [shown(row.newton, float(getattr(row, quantity))) for row in rows if row.who == name]
+        axes.plot(x, y, color=colour, marker=marker, markersize=6, linewidth=1.0)
+        unit = "mm" if quantity == "sag" else "%"
+        beyond += [
+            f"Outside the axes: {name}, {load:.2g} N, {quantity} {off:+.0f} {unit}."
+            for load, off in zip(x, y, strict=True)
+            if limit is not None and abs(off) > limit
+        ]
+    if limit is not None:
+        axes.set_ylim(-limit, limit)
+    return beyond
+
+
+def draw(rows: Sequence[Point], bars: Mapping[str, Sequence[Bar]], path: Path) -> None:
+    """Writes the chart as PNG."""
+    save(figure(rows, bars), path)

@@ -1,0 +1,73 @@
+"""What both solvers say of the loads that nothing was fitted to."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from massspring import ExplicitElements, ImplicitVolume
+from studies.plots.silicone import Point
+from studies.tools.silicone.beam import SIDE, Beam, Contestant, reference_rest, reference_swing
+from studies.tools.silicone.measured import LOADS, Load
+from studies.tools.silicone.swing import swing_of
+
+DURATION = 2.5
+"""Of a release [s]: six cycles of the slowest swing, and the mean of the last of it."""
+STEP = 0.005
+"""Of the reference [s], a twenty-fifth of the shortest period."""
+FINE, COARSE = Beam(3, 10), Beam(2, 6)
+"""Of the reference; what the second says otherwise is its error bar."""
+FIRST_GUESS = 260_000.0
+"""Of E [Pa]."""
+CLOSE = 1e-4
+"""Share of the sag at which a fit ends."""
+
+CONTESTANTS = (
+    Contestant("quadratic, a volume per vertex", Beam(3, 10), "quadratic", ImplicitVolume()),
+    Contestant("the same, load at mid-height", Beam(3, 10), "quadratic", ImplicitVolume(), height=0.5 * SIDE),
+    Contestant("linear elements, a volume per node", Beam(5, 16), "cotangent", ImplicitVolume(), nodal=True),
+    Contestant("explicit elements (K = 50 mu)", Beam(5, 16), "cotangent", ExplicitElements(), nodal=True),
+    Contestant("springs, one volume", Beam(5, 16), "van_gelder", ImplicitVolume()),
+)
+"""The first is what we recommend."""
+
+
+def measured_row(load: Load) -> Point:
+    """Mean of both runs."""
+    values = (float(np.mean(value)) for value in (load.sag, load.frequency, load.damping))
+    return Point("measured", load.newton, *values)
+
+
+def fitted_youngs(beam: Beam) -> float:
+    """E [Pa] at which the reference on `beam` sags under its weight alone as far as the silicone does.
+
+    The sag of a slender beam is nearly 1/E: E ← E sag/measured, until they are equal. Raises SolveError.
+    """
+    youngs, wanted = FIRST_GUESS, measured_row(LOADS[0]).sag
+    while True:
+        sag = 1e3 * float(reference_rest(beam, youngs, LOADS[0]).mean())
+        if abs(sag / wanted - 1.0) < CLOSE:
+            return youngs
+        youngs *= sag / wanted
+
+
+def fitted_damping() -> float:
+    """c [1/s] of −c M v that damps the unloaded swing as measured: c = 2 ζ ω, ω = 2πf/√(1 − ζ²)."""
+    row = measured_row(LOADS[0])
+    return 4.0 * np.pi * row.damping * row.frequency / np.sqrt(1.0 - row.damping**2)
+
+
+def reference_rows(beam: Beam, who: str, youngs: float) -> Iterator[Point]:
+    """Of every load; the sag is that at rest."""
+    for load in LOADS:
+        t, sag = reference_swing(beam, youngs, load, fitted_damping(), DURATION, STEP)
+        swing = swing_of(t, sag.mean(axis=1))
+        rest = 1e3 * float(reference_rest(beam, youngs, load).mean())
+        yield Point(who, load.newton, rest, swing.frequency, swing.damping)
+
+
+def body_rows(contestant: Contestant, youngs: float) -> Iterator[Point]:
+    """Of every load."""
+    for load in LOADS:
+        t, sag = contestant.swing(youngs, load, fitted_damping(), DURATION)
+        swing = swing_of(t, sag.mean(axis=1))
+        yield Point(contestant.name, load.newton, 1e3 * swing.sag, swing.frequency, swing.damping)
