@@ -104,8 +104,8 @@ def choice_of(scene: Scene, bodies: Sequence[Judged]) -> Choice | None:
 
 
 def compared_bodies(runs: Sequence[Run]) -> dict[str, list[Judged]]:
-    """Name of a scene -> its runs that ended well and of which an error is known, in their order; neighbouring meshes of
-    a recipe as one."""
+    """Name of a scene -> its runs that ended well and of which an error is known, in their order, the neighbouring
+    meshes of a recipe as one."""
     scenes: dict[str, list[Judged]] = {}
     for one in map(judged, runs):
         if one is not None and one.compared:
