@@ -16,7 +16,7 @@ from massspring.errors import MassSpringError
 
 OF_FACE = np.array([[j for j in range(4) if j != k] for k in range(4)])
 """Corners of the face opposite each corner."""
-OF_QUADRATIC_FACE = np.array([[*OF_FACE[k], *(4 + np.flatnonzero((PAIRS != k).all(axis=1)))] for k in range(4)])
+OF_QUADRATIC_FACE = np.array([[*OF_FACE[k], *(4 + np.flatnonzero(~np.equal(PAIRS, k).any(axis=1)))] for k in range(4)])
 """The same with the nodes between them."""
 
 
@@ -30,6 +30,14 @@ class Opening:
     """For each node the one it was, (n',); the first n are themselves."""
     pairs: np.ndarray
     """Nodes that keep their number, behind the faces, and their copies in front of them, (p, 2)."""
+
+
+def parents(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """For each number in `after` (k, c) the one in its place in `before` (k, c), (n',): nodes of cells, or their
+    volumes."""
+    parent = np.empty(int(after.max()) + 1, dtype=np.int64)
+    parent[after.ravel()] = before.ravel()
+    return parent
 
 
 def opened(cells: np.ndarray, faces: np.ndarray, n: int) -> Opening:

@@ -89,7 +89,7 @@ def test_copies_lie_in_front_and_carry_what_the_mirror_carries():
 
 
 def test_nodes_between_corners_open_inside_the_cut_and_not_on_its_front():
-    points, cells, opening = cut_block(HALF, quadratic=True)
+    _, cells, opening = cut_block(HALF, quadratic=True)
     _, _, z = np.unravel_index(np.arange(np.prod(np.add(CELLS, 1))), np.add(CELLS, 1))
     corners = np.unique(cells[:, :4])
     front = [i for i in corners if z[i] == HALF]
