@@ -44,6 +44,8 @@ def test_every_metric_is_a_number_somewhere(entry):
     """A metric that no scene allows would be an empty column for ever."""
     if entry.quantity == "frequency":  # of many checkpoints: tests/studies/runs/test_motion.py
         return
+    if entry.name in ("opening_error", "overlap"):  # of scenes with a cut: tests/studies/runs/test_cutting.py
+        return
     timing = FrameTiming(np.full((2, 4), 1e6))
     kept = {"attributes": {"lumen_column": 0}} if entry.quantity == "lumen" else {}
     values = [
