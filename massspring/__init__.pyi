@@ -33,8 +33,9 @@ from .methods import SemiImplicit as SemiImplicit
 from .methods import Shake as Shake
 from .methods import Xpbd as Xpbd
 from .methods import XpbdNeoHookean as XpbdNeoHookean
+from .run.events import Event as Event
 from .run.history import History as History
-from .run.simulation import Setup as Setup
+from .run.setup import Setup as Setup
 from .run.simulation import simulate as simulate
 from .world.clock import Clock as Clock
 from .world.clock import make_clock as make_clock

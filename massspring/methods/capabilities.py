@@ -56,6 +56,8 @@ class Capabilities:
     threads: Support = No("its steps are not divided among threads")
     float32: Support = No("its claims are measured in float64")
     """A state in single precision."""
+    events: Support = True
+    """Bodies that change during a run, as by a cut: the next frame takes positions, velocities and pressures alone."""
 
     @property
     def targets(self) -> Support:

@@ -188,7 +188,9 @@ class ImplicitVolume(Method):
 
     def __post_init__(self) -> None:
         if self.recovers:
-            limits = dict.fromkeys(("thin_probes", "threads", "float32"), No("it may settle into another shape"))
+            limits = dict.fromkeys(
+                ("thin_probes", "threads", "float32", "events"), No("it may settle into another shape")
+            )
             object.__setattr__(self, "capabilities", replace(self.capabilities, **limits))
 
     def why_not(self, body: Body) -> str | None:

@@ -69,6 +69,21 @@ class History:
     """What thin probes did in each frame, one column for each of kernels.probe_layout.COUNTS, (F, 7) int64."""
 
 
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """Where what is recorded, in the numbers of the last body of a run, is in the body of the moment."""
+
+    nodes: np.ndarray
+    """The node that each node is still a part of, (n,)."""
+    volumes: np.ndarray
+    """The same of the kept volumes, (m,)."""
+
+    def parts(self, volumes: np.ndarray, whole: np.ndarray) -> np.ndarray:
+        """What each of the `volumes` (m,) has of the values `whole` of those that they are still a part of, (m,)."""
+        together = np.bincount(self.volumes, weights=volumes, minlength=len(whole))
+        return volumes * (whole / together)[self.volumes]
+
+
 class Recorder:
     """Fills the arrays of a History; a minimum J is only looked for where there are tetrahedra, and of `EXTRA` only
     what is asked for is computed. Raises MassSpringError for an unknown extra field."""
@@ -112,12 +127,13 @@ class Recorder:
         self.singular = 0
         self.limited = 0
 
-    def record(self, frame: int, state: State, elapsed_ns: int) -> None:
-        """Reads the state after frame number `frame` (0, 1, …)."""
+    def record(self, frame: int, state: State, elapsed_ns: int, numbers: Numbers | None = None) -> None:
+        """Reads the state after frame number `frame` (0, 1, …), which has other `numbers` until the last event."""
         net, x = state.model, state.x.astype(np.float64, copy=False)
+        x = x if numbers is None else x[numbers.nodes]
         inside_x, v = (part.astype(np.float64, copy=False) for part in (state.nodes.x, state.nodes.v))
         self.volume[frame] = self.volumes.measure(x)
-        self.pressure[frame] = state.lam
+        self.pressure[frame] = state.lam if numbers is None else state.lam[numbers.volumes]
         if "kinetic" in self.extra:
             # Not by `@`: a pool of threads that has computed a product waits for the next at the expense of frames.
             self.scalars["kinetic"][frame] = 0.5 * float(np.einsum("i,ij,ij->", net.mass, v, v))
@@ -143,6 +159,11 @@ class Recorder:
         self.final = x
         if frame + 1 in self.keep:
             self.kept[frame + 1] = x
+
+    def record_targets(self, frame: int, targets: np.ndarray, numbers: Numbers | None) -> None:
+        """What the volumes should be after a frame on the way to their targets (m,) [m³]; those that are still one
+        have shares of what that should be."""
+        self.volume_target[frame] = targets if numbers is None else numbers.parts(self.volume[frame], targets)
 
     def finished(self) -> History:
         """All frames ran."""

@@ -1,6 +1,7 @@
 """The studies, one file each. Adding one: a file and a line in STUDIES."""
 
 from studies.catalog.accuracy import ACCURACY
+from studies.catalog.cutting import CUTTING
 from studies.catalog.frame_rate import FRAME_RATE
 from studies.catalog.laws import LAWS_STUDY
 from studies.catalog.literature import LITERATURE_STUDY
@@ -24,6 +25,7 @@ STUDIES: tuple[Study, ...] = (
     METHODS_STUDY,
     LITERATURE_STUDY,
     ACCURACY,
+    CUTTING,
 )
 
 __all__ = ["STUDIES", "Chart", "Study"]

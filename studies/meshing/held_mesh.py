@@ -1,7 +1,8 @@
 """A tetrahedral mesh that knows where it is held, and finer ones of the same straight sides."""
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from skfem import MeshTet, MeshTet2
@@ -9,7 +10,7 @@ from skfem import MeshTet, MeshTet2
 from massspring import Obstacle
 from reference_fem import facet_nodes
 from studies.geometry import OrganMesh
-from studies.geometry.mesh.organ_mesh import boundary_triangles
+from studies.geometry.mesh.organ_mesh import boundary_triangles, triangle_normals, unique_edges
 from studies.geometry.surface.distance import distance_to_surface
 from studies.meshing.scene_mesh import patch_nodes
 from studies.scene.scene import Scene
@@ -27,6 +28,8 @@ class HeldMesh:
     """Vertices before any refinement [m], (n, 3)."""
     patches: list[np.ndarray]
     """Of each held region and last of the lumen: its triangles of `corners`, (f, 3). A finer mesh has parts of them."""
+    cut: np.ndarray = field(default_factory=lambda: np.empty((0, 3), np.int64))
+    """Of the scene's cut its faces between tetrahedra of `corners`, (f, 3), seen from in front of it."""
 
     def facets(self, mesh: MeshTet2) -> list[np.ndarray]:
         """Of each patch the six nodes of its facets (f, 6) in the second-order mesh with the same vertices."""
@@ -37,9 +40,34 @@ class HeldMesh:
             for patch in self.patches
         ]
 
+    @cached_property
+    def cut_faces(self) -> np.ndarray:
+        """The faces of this mesh that are parts of the cut, seen from in front of it, (f, 3)."""
+        if not len(self.cut):
+            return self.cut
+        x, reach = self.mesh.p.T, SAME_POINT * float(np.ptp(self.corners))
+        inner = np.asarray(self.mesh.f2t)[1] >= 0
+        faces = np.asarray(self.mesh.facets).T[inner].astype(np.int64)
+        faces = faces[distance_to_surface(x[faces].mean(axis=1), self.corners, self.cut) < reach]
+        normals = triangle_normals(x, faces)
+        # A sheet is flat: faces that stand across it have their middle beside it.
+        normal = triangle_normals(self.corners, self.cut[:1])[0]
+        return np.where((normals @ normal < 0)[:, None], faces[:, ::-1], faces)
+
+    @cached_property
+    def front(self) -> np.ndarray:
+        """Vertices of the front of the cut, where it ends inside the body: there the stress is singular."""
+        sides = np.sort(self.cut_faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        sides, count = np.unique(sides, axis=0, return_counts=True)
+        sides, count = sides.reshape(-1, 2), np.asarray(count)
+        outer = unique_edges(boundary_triangles(self.mesh.t.T.astype(np.int64)))
+        key = np.array([self.mesh.nvertices, 1])
+        return np.unique(sides[(count == 1) & ~np.isin(sides @ key, outer @ key)])
+
     def at_outlines(self) -> np.ndarray:
-        """Elements with a vertex on an outline: there the stress is singular."""
+        """Elements with a vertex on an outline, or on the front of a cut: there the stress is singular."""
         rims = [rim_sides(facets)[:, :2].ravel() for facets in self.facets(MeshTet2.from_mesh(self.mesh))]
+        rims.append(self.front)
         return np.flatnonzero(np.isin(self.mesh.t, np.concatenate([*rims, []])).any(axis=0))
 
     def inside(self, obstacles: tuple[Obstacle, ...], t: float) -> np.ndarray:
@@ -91,7 +119,8 @@ def held_mesh(scene: Scene, organ_mesh: OrganMesh) -> HeldMesh:
     """The organ's mesh with the scene's held regions and its lumen as patches."""
     patches = [patch_nodes(organ_mesh, held.name, held.region) for held in scene.held]
     lumen = np.arange(organ_mesh.outer_count, organ_mesh.surface_count)
-    return with_patches(straight(organ_mesh), [*patches, lumen])
+    body = with_patches(straight(organ_mesh), [*patches, lumen])
+    return body if scene.cut is None else replace(body, cut=organ_mesh.cuts[scene.cut.name])
 
 
 def straight(organ_mesh: OrganMesh) -> MeshTet:

@@ -12,6 +12,7 @@ from reference_fem.elements.shapes import basis_table, element_nodes
 from studies.geometry.mesh.jacobian import smallest_jacobian
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.meshing.held_mesh import HeldMesh, held_mesh, rim_sides
+from studies.meshing.opened_mesh import opened_elements
 from studies.meshing.outlines import drawn_middles
 from studies.meshing.reference_mesh import on_true_sides
 from studies.meshing.scene_mesh import mesh_for
@@ -53,25 +54,37 @@ class NestedMesh:
 
     @cached_property
     def mesh(self) -> MeshTet2:
-        """The mesh that is solved: middles of sides that leave an outline are drawn to it."""
+        """Middles of sides that leave an outline, or the front of a cut, are drawn to it."""
         flat = MeshTet2.from_mesh(self.body.mesh)
         *held, _ = self.body.facets(flat)
-        outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), []]).astype(int)
+        outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), self.body.front]).astype(int)
         wanted = drawn_middles(self.points, flat, outlines, SHARE)
         points, _ = upright(self.points, wanted, element_nodes(flat), LEAST)
         return replace(flat, doflocs=np.ascontiguousarray(points.T))
 
     @cached_property
+    def _opened(self) -> tuple[MeshTet2, np.ndarray]:
+        return opened_elements(self.mesh, self.body.cut_faces)
+
+    @property
+    def solved(self) -> MeshTet2:
+        """The mesh that is solved: opened along the scene's cut, if it has one."""
+        return self.mesh if self.scene.cut is None else self._opened[0]
+
+    @cached_property
     def patches(self) -> list[np.ndarray]:
-        """Nodes of each held region."""
-        return [np.unique(facets) for facets in self.body.facets(self.mesh)[:-1]]
+        """Nodes of each held region, in the mesh that is solved."""
+        patches = [np.unique(facets) for facets in self.body.facets(self.mesh)[:-1]]
+        if self.scene.cut is None:
+            return patches
+        return [np.flatnonzero(np.isin(self._opened[1], patch)) for patch in patches]
 
     @cached_property
     def small_at_outlines(self) -> np.ndarray:
         """Elements with a vertex on an outline whose halves would be smaller than SMALLEST, (ne,) bool."""
         flat = MeshTet2.from_mesh(self.body.mesh)
         *held, _ = self.body.facets(flat)
-        outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), []])
+        outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), self.body.front])
         corners = self.body.mesh.t.T
         volume = np.abs(tetrahedron_volumes(self.points, corners))
         size = np.cbrt(0.5 * volume / REGULAR)
@@ -99,7 +112,7 @@ class NestedMesh:
         return replace(self, body=body, points=points, off=int(back.sum())), parents
 
 
-def at_nodes(mesh: MeshTet, of_elements: np.ndarray) -> np.ndarray:
+def at_nodes(mesh: MeshTet | MeshTet2, of_elements: np.ndarray) -> np.ndarray:
     """For each P2 node the value (ne,) of one of its elements, (n,)."""
     cells = element_nodes(mesh)
     values = np.empty(int(cells.max()) + 1, dtype=of_elements.dtype)

@@ -35,6 +35,8 @@ class QuadraticMesh:
     """Of each held region all nodes of its facets."""
     recipe: dict[str, Any] = field(default_factory=dict)
     """How to make the mesh again from which it comes, JSON-able."""
+    cuts: dict[str, np.ndarray] = field(default_factory=dict)
+    """Name -> corners of the faces inside the body along which a cut will open it, seen from in front of it, (f, 3)."""
 
     @property
     def hollow(self) -> bool:

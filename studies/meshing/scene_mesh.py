@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.geometry import OrganMesh, fill, organ, read_mesh, scan
 from studies.geometry.organs import SHAPES
@@ -27,7 +28,10 @@ def mesh_for(
     """
     if lookup(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
         sides = None if even else "curved" if on_shape else "straight"
-        return organ(scene.organ.shape, nodes, scene.regions, filled, scene.organ.parameters, layers, sides=sides)
+        given = scene.organ.parameters
+        return organ(scene.organ.shape, nodes, scene.regions, filled, given, layers, sides=sides, cut=scene.cut)
+    if scene.cut is not None:
+        raise StudyError(f"scene '{scene.name}' cuts an organ of a file; only organs of the catalogue are cut so far")
     source, how = scanned(scene.organ, scene.name)
     if remeshed(scene.organ):
         return scan(source, nodes, fill=filled, layers=layers, regions=scene.regions, on_shape=on_shape, **how)

@@ -47,6 +47,7 @@ def linear_mesh(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: Hel
         surface_count=surface_count,
         outer_count=outer_count,
         patches=named_patches(scene, organ_mesh.name, held, new),
+        cuts=named_cuts(scene, fine, new),
     )
 
 
@@ -81,6 +82,7 @@ def quadratic_mesh(
         outer_count=outer_count,
         patches=named_patches(scene, organ_mesh.name, held, new),
         recipe=organ_mesh.recipe,
+        cuts=named_cuts(scene, fine, new),
     )
 
 
@@ -103,7 +105,7 @@ def drawn_points(points: np.ndarray, body: HeldMesh, share: float, name: str) ->
     """Nodes at `points` (n, 3) [m] with the middles of sides that leave an outline at `share` of them, as far as
     no element folds."""
     held, mesh = all_facets(body)[:-2], MeshTet2.from_mesh(body.mesh)
-    outlines = np.concatenate([rim_sides(facets)[:, :2].ravel() for facets in held])
+    outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), body.front])
     cells = upright_cells(body)
     measure = upright_against(nodes(body.mesh), cells)
     return moved(points, drawn_middles(points, mesh, outlines, share), cells, measure, name)
@@ -213,6 +215,11 @@ def named_patches(scene: Scene, name: str, held: list[np.ndarray], new: np.ndarr
             raise StudyError(f"{name}: region {region.name!r} holds no facet; enlarge it, or use more nodes")
         patches[region.name] = np.unique(new[facets])
     return patches
+
+
+def named_cuts(scene: Scene, body: HeldMesh, new: np.ndarray) -> dict[str, np.ndarray]:
+    """The faces of the scene's cut, in their new numbers."""
+    return {} if scene.cut is None else {scene.cut.name: new[body.cut_faces]}
 
 
 def upright_cells(body: HeldMesh) -> np.ndarray:

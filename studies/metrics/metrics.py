@@ -148,6 +148,23 @@ def pressure_error(run: Run) -> float:
     return PERCENT * (lam / float(run.reference.field("pressure")[-1]) - 1) if lam else float("nan")
 
 
+def opening_error(run: Run) -> float:
+    """Area-weighted relative L2 error of the displacement across the cut at the last checkpoint [%]."""
+    assert run.reference is not None
+    truth = run.reference.opening(run.fields.rest[run.cut_pairs[:, 0]])
+    error, size = (run.cut_weights @ (part**2).sum(axis=1) for part in (run.opening - truth, truth))
+    return PERCENT * float(np.sqrt(error / size))
+
+
+def overlap(run: Run) -> float:
+    """Deepest overlap of the faces of the cut at the last checkpoint, along its normal at rest, over the size [%]."""
+    cut = run.case.scene.cut
+    if cut is None:
+        return float("nan")
+    gap = run.opening @ np.asarray(cut.plane.normal) / np.linalg.norm(cut.plane.normal)
+    return PERCENT * max(0.0, -float(gap.min())) / run.size
+
+
 def frequency_error(run: Run) -> float:
     """100 (f/f_ref − 1) of the ringing, both read off the displacement of the same points [%]."""
     assert run.reference is not None
@@ -254,6 +271,8 @@ METRICS: tuple[Metric, ...] = (
     Metric("silhouette_error", "%", "lower", silhouette_error, "silhouette"),
     Metric("shape_error", "%", "lower", shape_error),
     Metric("shape_volume", "%", "-", shape_volume),
+    Metric("opening_error", "%", "lower", opening_error, "opening"),
+    Metric("overlap", "%", "lower", overlap),
     Metric("pressure_error", "%", "-", pressure_error, "pressure"),
     Metric("frequency_error", "%", "-", frequency_error, "frequency"),
     Metric("lumen_pressure_error", "%", "-", lumen_pressure_error, "lumen"),

@@ -14,9 +14,13 @@ from studies.meshing.rest_surface import RestSurface, rest_surfaces, six_node_fa
 from studies.meshing.true_surface import UNKNOWN, ShapeErrors, shape_errors
 from studies.metrics.timing.protocol import FrameTiming
 from studies.reference.load import Reference
+from studies.reference.solution import BESIDE
 from studies.runs.case import Case, case_from_json
 from studies.store.record import Record, read_record
 from studies.store.schema import RunAttributes, RunFields
+
+SAME_PLACE = 1e-9
+"""Of the body's size: far above rounding, far below an edge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +97,40 @@ class Run:
         """Displacements of the material nodes at the last checkpoint and their error [m], both (n, 3)."""
         assert self.reference is not None  # _against checked it
         rest = self.fields.rest[self.material_nodes]
-        truth = self.reference.displacement(rest)
+        truth = self.reference.displacement(self.places[self.material_nodes])
         return truth, self.fields.snapshots[-1][self.material_nodes] - rest - truth
+
+    @cached_property
+    def places(self) -> np.ndarray:
+        """Where the reference is asked for each node [m], (n, 3): at rest, on a cut a little on the node's own side."""
+        rest, scene = self.fields.rest, self.case.scene
+        if scene.cut is None:
+            return rest
+        normal = np.asarray(scene.cut.plane.normal, float)
+        step = BESIDE * self.size * normal / np.linalg.norm(normal)
+        places = rest.copy()
+        places[self.cut_pairs[:, 0]] -= step
+        places[self.cut_pairs[:, 1]] += step
+        return places
+
+    @property
+    def cut_pairs(self) -> np.ndarray:
+        """Nodes behind the cut and in front of it, (p, 2)."""
+        return np.asarray(self.fields.cut_pairs)
+
+    @cached_property
+    def opening(self) -> np.ndarray:
+        """From each node behind the cut to its copy in front of it at the last checkpoint [m], (p, 3)."""
+        behind, front = self.fields.snapshots[-1][self.cut_pairs.T]
+        return front - behind
+
+    @cached_property
+    def cut_weights(self) -> np.ndarray:
+        """What each pair has of the area of the cut at rest [m²], (p,)."""
+        faces = np.asarray(self.fields.cut_faces)
+        area = triangle_areas(self.fields.rest, faces)
+        share = np.bincount(faces.ravel(), weights=np.repeat(area / 3, 3), minlength=len(self.fields.rest))
+        return share[self.cut_pairs[:, 0]]
 
     @cached_property
     def true_surface_error(self) -> tuple[float, float]:
@@ -109,7 +145,7 @@ class Run:
         far = SHAPE / 100.0 * float(np.linalg.norm(np.ptp(truth.points, axis=0)))
         moved = self.fields.snapshots[-1] - self.fields.rest
         errors, weights, sizes = [], [], []
-        for name, side in rest_surfaces(truth.points, truth.facets).items():
+        for name, side in rest_surfaces(truth.points, self._outside(truth.points, truth.facets)).items():
             if name in sides:
                 nodes = np.unique(side.facets)
                 at = sides[name].nearest(truth.points[nodes])
@@ -135,7 +171,15 @@ class Run:
         where the record of one does not tell its facets."""
         triangles = self.fields.triangles
         facets = six_node_facets(triangles) if self.case.body.kind == "quadratic" else triangles
-        return None if facets is None else rest_surfaces(self.fields.rest, facets)
+        return None if facets is None else rest_surfaces(self.fields.rest, self._outside(self.fields.rest, facets))
+
+    def _outside(self, points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+        """Those of the boundary's facets (f, 3 or 6) that are not faces of a cut, which lie on each other at rest."""
+        if self.case.scene.cut is None:
+            return facets
+        middles = np.round(points[facets[:, :3]].mean(axis=1) / (SAME_PLACE * self.size)).astype(np.int64)
+        _, inverse, count = np.unique(middles, axis=0, return_inverse=True, return_counts=True)
+        return facets[count[inverse.reshape(-1)] == 1]
 
     @cached_property
     def shape(self) -> ShapeErrors:

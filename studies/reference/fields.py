@@ -39,11 +39,13 @@ def fields_of(scene: Scene, solution: FamilySolution) -> dict[str, Field]:
     values = {"t": np.array(scene.checkpoints), "nodes": x, "tetrahedra": tetrahedra}
     values |= sample_fields(solution.at, solution.samples, len(scene.checkpoints))
     for name in REFERENCE_FIELDS.keys() - values.keys():
+        if REFERENCE_FIELDS[name].optional:
+            continue
         shape = REFERENCE_FIELDS[name].shape.split()
         values[name] = np.full([lengths[part] if part in lengths else int(part) for part in shape], np.nan)
         for k, reached in enumerate(rows):
             values[name][k] = reached[name]
-    return new_fields(REFERENCE_FIELDS, {name: values[name] for name in REFERENCE_FIELDS})
+    return new_fields(REFERENCE_FIELDS, {name: values[name] for name in REFERENCE_FIELDS if name in values})
 
 
 def _of_motion(equilibrium: Equilibrium, name: str) -> float:

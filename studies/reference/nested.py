@@ -15,6 +15,7 @@ from reference_fem.statics.newton import StepFailed
 from reference_fem.system.saddle_point import System
 from reference_fem.system.state import State
 from reference_fem.uncertainty import MeshError
+from studies.base.errors import StudyError
 from studies.meshing.nested_mesh import NestedMesh, at_nodes, base_mesh
 from studies.reference.problem import problem_on
 from studies.reference.reference_solves import settings_varied
@@ -111,8 +112,14 @@ def varied_sample(scene: Scene, problem: Problem, better: Varied, at: SamplePoin
 
 
 def problem_of(mesh: NestedMesh) -> Problem:
-    """The scene on one of its nested meshes."""
-    return problem_on(mesh.scene, mesh.mesh, mesh.patches, mesh.lumen)
+    """The scene on one of its nested meshes. Raises StudyError for a checkpoint before the cut."""
+    cut, first = mesh.scene.cut, mesh.scene.checkpoints[0]
+    if cut is not None and first <= cut.at:
+        raise StudyError(
+            f"scene '{mesh.scene.name}' has a checkpoint at {first:g} s before its cut at {cut.at:g} s, and the "
+            "reference is of the body after it; move one of them"
+        )
+    return problem_on(mesh.scene, mesh.solved, mesh.patches, mesh.lumen)
 
 
 def targets(first: int, most: float) -> list[float]:
@@ -136,7 +143,7 @@ def refined(solved: MeshSolution, unknowns: float) -> MeshSolution:
     system.solver.release()
     if fine.sticks.any():  # what an obstacle without slip holds depends on its way
         return MeshSolution(finer, fine, from_rest(fine, times))
-    to = transfer(mesh.mesh, at_nodes(finer.body.mesh, parents), nodes(finer.mesh))
+    to = transfer(mesh.solved, at_nodes(finer.solved, parents), nodes(finer.solved))
     try:
         states = from_carried(fine, [carried(system, state, fine, to) for state in solved.states])
     except StepFailed:

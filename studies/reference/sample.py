@@ -1,7 +1,7 @@
 """What one solution of a reference's family says, where it is compared with the others."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,8 @@ from studies.store.record import Record
 
 SERIES = ("force", "volume", "pressure", "lumen_pressure")
 """Numbers of a sample at every checkpoint; NaN where it was not solved."""
+
+NO_PAIRS = np.empty((0, 2), dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +83,8 @@ class Sample:
     """[Pa], (K,)."""
     frequency: float = float("nan")
     """Of the ringing [Hz]; NaN where nothing rings."""
+    opening: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
+    """Displacement in front of a cut less that behind it at the last checkpoint [m], at its sample points, (y, 3)."""
 
 
 def sample_of(
@@ -95,7 +99,8 @@ def sample_of(
     series["pressure"][-len(found) :] = [mean_pressure(problem, e) for e in found]
     if scene.filled:
         series["lumen_pressure"][-len(found) :] = [float(e.cavity_pressure.sum()) for e in found]
-    if np.array_equal(nodes(problem.mesh)[: len(at.points)], at.points):
+    # Vertices come first in all meshes of a family; a place on a cut has two sides, and only numbers tell them apart.
+    if scene.cut is not None or np.array_equal(nodes(problem.mesh)[: len(at.points)], at.points):
         moved = np.array([e.u[: len(at.points)] for e in found])
     else:
         columns = np.concatenate([e.u for e in found], axis=1)  # one field of 3 k components
@@ -105,7 +110,17 @@ def sample_of(
     if allowed(scene, "frequency") and len(found) == len(scene.checkpoints):
         frequency = ringing_frequency(scene, np.array(scene.checkpoints), at.points, moved, at.areas)
     unknowns = 3 * len(nodes(problem.mesh)) + problem.mesh.nvertices
-    return Sample(variant, unknowns, size, moved[-1], **series, frequency=frequency)
+    behind, front = parted(problem.mesh.p.T, len(at.points)).T if scene.cut is not None else NO_PAIRS.T
+    opening = found[-1].u[front] - found[-1].u[behind]
+    return Sample(variant, unknowns, size, moved[-1], **series, frequency=frequency, opening=opening)
+
+
+def parted(points: np.ndarray, count: int) -> np.ndarray:
+    """Pairs of the vertices at `points` (v, 3) that lie at one place, the first of them among `count`, (y, 2)."""
+    order = np.lexsort((np.arange(len(points)), *points.T))
+    same = (points[order][1:] == points[order][:-1]).all(axis=1)
+    pairs = np.column_stack([order[:-1][same], order[1:][same]])
+    return pairs[pairs[:, 0] < count][np.argsort(pairs[pairs[:, 0] < count, 0])]
 
 
 def mean_pressure(problem: Problem, equilibrium: Equilibrium) -> float:
@@ -119,15 +134,22 @@ def sample_fields(at: SamplePoints, samples: Sequence[Sample], checkpoints: int)
     count = len(samples)
     shape = count, checkpoints
     each = {f"sample_{name}": np.array([getattr(one, name) for one in samples]).reshape(shape) for name in SERIES}
-    return each | {
-        "sample_variant": np.array([one.variant for one in samples], dtype=str),
-        "sample_unknowns": np.array([one.unknowns for one in samples], dtype=np.int64),
-        "sample_size": np.array([one.size for one in samples], dtype=float),
-        "sample_frequency": np.array([one.frequency for one in samples], dtype=float),
-        "sample_displacement": np.array([one.u for one in samples]).reshape(count, len(at.points), 3),
-        "sample_points": at.points,
-        "sample_tetrahedra": at.tetrahedra,
-    }
+    opened = (
+        {"sample_opening": np.array([one.opening for one in samples])} if samples and len(samples[0].opening) else {}
+    )
+    return (
+        each
+        | opened
+        | {
+            "sample_variant": np.array([one.variant for one in samples], dtype=str),
+            "sample_unknowns": np.array([one.unknowns for one in samples], dtype=np.int64),
+            "sample_size": np.array([one.size for one in samples], dtype=float),
+            "sample_frequency": np.array([one.frequency for one in samples], dtype=float),
+            "sample_displacement": np.array([one.u for one in samples]).reshape(count, len(at.points), 3),
+            "sample_points": at.points,
+            "sample_tetrahedra": at.tetrahedra,
+        }
+    )
 
 
 def samples_in(scene: Scene, record: Record) -> tuple[SamplePoints, list[Sample]]:
@@ -142,6 +164,7 @@ def samples_in(scene: Scene, record: Record) -> tuple[SamplePoints, list[Sample]
             get("displacement")[k],
             **{name: get(name)[k] for name in SERIES},
             frequency=float(get("frequency")[k]),
+            opening=get("opening")[k] if "sample_opening" in record.fields else np.empty((0, 3)),
         )
         for k, variant in enumerate(get("variant"))
     ]

@@ -35,6 +35,8 @@ _EVALUATORS: WeakValueDictionary[tuple[bytes, bytes], _Remembering] = WeakValueD
 
 OCTANTS = np.array(list(product((1.0, -1.0), repeat=3)))
 """Signs that mirror an octant into the whole body, (8, 3)."""
+BESIDE = 1e-3
+"""Of the body's size: so far from a cut a place is surely on one side of it; curved sides bend its faces by less."""
 TURNED = [0, 2, 1, 5, 4, 3]
 """A six-node facet seen from its other side."""
 
@@ -96,6 +98,15 @@ class Solution:
         Points are found in the mesh once: metrics of all runs on one mesh ask for the same.
         """
         return self._mirrored(self.field("displacement")[[checkpoint]], points)[0]
+
+    def opening(self, points: np.ndarray) -> np.ndarray:
+        """Displacement in front of the scene's cut less that behind it at the last checkpoint [m], (m, 3), at
+        `points` (m, 3) [m] of it."""
+        assert self.scene.cut is not None  # there is one
+        normal = np.asarray(self.scene.cut.plane.normal, float)
+        step = BESIDE * self.size * normal / np.linalg.norm(normal)
+        points = points - np.outer(self.scene.cut.plane.level(points), normal / np.linalg.norm(normal))
+        return self.displacement(points + step) - self.displacement(points - step)
 
     def displacements(self, points: np.ndarray) -> np.ndarray:
         """Displacement [m] of the material points `points` (m, 3) [m] at every checkpoint, (K, m, 3)."""

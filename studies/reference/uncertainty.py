@@ -99,6 +99,11 @@ def frequency(at: SamplePoints, a: Sample, b: Sample) -> float:
     return abs(a.frequency / b.frequency - 1)
 
 
+def opening(at: SamplePoints, a: Sample, b: Sample) -> float:
+    """Relative L2 of the displacement across a cut, over the vertices that it parts."""
+    return float(np.linalg.norm(a.opening - b.opening) / np.linalg.norm(b.opening))
+
+
 def lumen(at: SamplePoints, a: Sample, b: Sample) -> float:
     """|p_a/p_b − 1| of the lumen at the last checkpoint."""
     return float(abs(a.lumen_pressure[-1] / b.lumen_pressure[-1] - 1))
@@ -118,7 +123,7 @@ FIELDS: dict[str, tuple[Measure, Callable[[SamplePoints], np.ndarray]]] = {
     "interior": (interior, lambda at: at.volumes),
 }
 """The displacement, with the weights of its points."""
-ABOUT_SURFACE: dict[str, Measure] = {"surface_mean": surface_mean, "silhouette": silhouette}
+ABOUT_SURFACE: dict[str, Measure] = {"surface_mean": surface_mean, "silhouette": silhouette, "opening": opening}
 """What is read off the displaced surface: on meshes set by hand it has the bar of its change from one mesh to the next,
 times how many times the change of the surface its own bar is."""
 QUANTITIES: dict[str, Measure] = {name: m for name, (m, _) in (NUMBERS | FIELDS).items()} | ABOUT_SURFACE

@@ -62,6 +62,7 @@ OPTIONS: Mapping[str, str] = {
     "thin_probes": "thin probes",
     "threads": "several threads",
     "float32": "float32",
+    "events": "cuts",
 }
 """Name in `Capabilities` -> words of the page."""
 

@@ -13,7 +13,7 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.runs.case_checks import check_recipe, check_settings
 from studies.runs.user_code import law_names, methods_by_name
-from studies.scene.as_json import _scene_adapter, scene_from_dict
+from studies.scene.as_json import scene_from_dict, scene_to_dict
 from studies.scene.scene import Scene
 
 Seconds = float | Literal["auto"]
@@ -188,7 +188,7 @@ def case_to_dict(case: Case) -> dict[str, Any]:
     if case.recorded:
         chosen["recorded"] = list(case.recorded)
     return {
-        "scene": _scene_adapter().dump_python(case.scene, mode="json"),
+        "scene": scene_to_dict(case.scene),
         "body": _without(LATER, case.body),
         "method": {
             "name": case.method.name,

@@ -24,9 +24,11 @@ from massspring.world.surroundings import Surroundings
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
+from studies.meshing.opened_mesh import opened_mesh
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import ADAPTIVE, BodyRecipe, Case
+from studies.runs.cutting import Opening, check_held, event_frame, event_of, keeping_pieces, opening_of
 from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
@@ -44,6 +46,13 @@ class Prepared:
     mesh: OrganMesh
     setup: Setup
     limit: StepLimit
+    opening: Opening | None = None
+    """Where the body is cut, if it is: `mesh` is the one after that."""
+
+    @property
+    def body(self) -> Body:
+        """The last body of the run: what is recorded has its numbers."""
+        return self.setup.events[-1].body if self.setup.events else self.setup.body
 
 
 def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
@@ -83,6 +92,8 @@ def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh) 
     if recipe.stiffness != 1.0:
         body = body.stiffened(recipe.stiffness)
     volumes = volumes_for(scene, recipe, mesh, body)
+    if scene.cut is not None:
+        return keeping_pieces(body, volumes)
     return body if volumes is None else body.keeping(volumes)
 
 
@@ -159,18 +170,29 @@ def prepare(case: Case) -> Prepared:
     from studies.meshing.kept_shape import tell_shape  # with the finite elements
 
     tell_shape(scene, mesh, filled=case.body.kind in ("tetrahedral", "quadratic"))
+    later = None if scene.cut is None else opened_mesh(mesh, scene.cut.name)
     if isinstance(mesh, QuadraticMesh):
         mesh = flat_mesh(mesh, body)
     targets = targets_for(scene, mesh, body)
     check_applies(case, body, bool(targets))
     if case.body.kind in ("surface", "membrane") and mesh.hollow:
         mesh = mesh.outer()
-    attachments = attachments_for(scene, mesh)
-    held = np.concatenate([a.nodes for a in attachments]) if attachments else None
-    limit = step_limit(body, scene.damping, held, case.method.added_stiffness(body))
+    attachments, last, frames = attachments_for(scene, mesh), body, case.frames or scene.frames
+    events, opening = (), None
+    if later is not None:
+        assert scene.cut is not None  # it was opened
+        last, frame = body_for(scene, case.body, later.mesh), event_frame(scene.cut, scene.duration, frames)
+        check_applies(case, last, bool(targets))
+        mesh = flat_mesh(later.mesh, last) if isinstance(later.mesh, QuadraticMesh) else later.mesh
+        after = attachments_for(scene, mesh)
+        check_held(scene.cut, last.tetrahedra.astype(np.int64), last.rest, after)
+        events = (event_of(frame, body, last, later.parent, after),)
+        opening = opening_of(frame, last, later.parent, later.pairs)
+    moved = events[-1].attachments if events else attachments
+    held = np.concatenate([a.nodes for a in moved]) if moved else None
+    limit = step_limit(last, scene.damping, held, case.method.added_stiffness(last))
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
-    frames = case.frames or scene.frames
-    check_size(scene.duration, frames, dt, limit, body, len(scene.obstacles) + len(attachments))
+    check_size(scene.duration, frames, dt, limit, last, len(scene.obstacles) + len(attachments))
     beyond = case.beyond_limit or not case.method.capabilities.conditionally_stable
     clock = make_clock(scene.duration, frames, dt, limit, beyond)
     setup = Setup(
@@ -185,5 +207,6 @@ def prepare(case: Case) -> Prepared:
         velocity=scene.start and scene.start.velocities(body.rest),
         positions=scene.start.positions(body.rest) if scene.start and scene.start.shaped else None,
         precision=case.precision,
+        events=events,
     )
-    return Prepared(mesh, setup, limit)
+    return Prepared(mesh, setup, limit, opening)

@@ -37,4 +37,5 @@ def flat_mesh(mesh: QuadraticMesh, body: Body) -> OrganMesh:
         mesh.patches,
         mesh.recipe,
         mesh.outer_count,
+        cuts=mesh.cuts,
     )

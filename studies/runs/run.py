@@ -62,7 +62,7 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
                 raise
             return _record(case, Status.FAILED, own, {"warnings": _said(caught)}, {})
     status, message = judge(case, prepared, history)
-    found = indicators(case.scene, prepared.setup.body, history, _lumen_column(prepared))
+    found = indicators(case.scene, prepared.body, history, _lumen_column(prepared))
     said = "; ".join(filter(None, [_said(caught), *remarks(found)]))
     attributes = {**_attributes(prepared, history), **found, "warnings": said}
     return _record(case, status, message, attributes, _fields(case, prepared, history))
@@ -117,33 +117,33 @@ def _record(case: Case, status: Status, message: str, attributes: dict, fields: 
 
 
 def _attributes(prepared: Prepared, history: History) -> dict[str, float | int | str]:
-    setup, clock = prepared.setup, prepared.setup.clock
+    clock, body, cut = prepared.setup.clock, prepared.body, prepared.opening
     return {
-        "rest_volume": setup.body.volume,
+        "rest_volume": body.volume,
         "dt": clock.dt,
         "dt_limit": prepared.limit.damped,
         "steps": clock.steps,
         "frame": clock.frame,
         "frames": clock.frames,
         "good_frames": history.good_frames,
-        "nodes": setup.body.node_count,
-        "springs": setup.body.springs.count,
-        "triangles": len(setup.body.triangles),
-        "law": setup.body.law,
+        "nodes": body.node_count,
+        "springs": body.springs.count,
+        "triangles": len(body.triangles),
+        "law": body.law,
         "skipped_steps": history.singular_steps,
         "capped_steps": history.limited_corrections,
-        "volumes": setup.body.kept.count,
+        "volumes": body.kept.count,
         "lumen_column": _lumen_column(prepared),
-    }
+    } | ({} if cut is None else {"cut_frame": cut.frame})
 
 
 def _lumen_column(prepared: Prepared) -> int:
-    names = prepared.setup.body.kept.names
+    names = prepared.body.kept.names
     return names.index(LUMEN) if LUMEN in names else -1
 
 
 def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field]:
-    body = prepared.setup.body
+    body = prepared.body
     at = np.isin(history.snapshot_frames, checkpoint_frames(case, prepared))
     values = {
         "t": history.t,
@@ -162,6 +162,8 @@ def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field
         "triangles": body.triangles,
         "tetrahedra": body.tetrahedra,
     }
+    if prepared.opening is not None:
+        values |= {"cut_faces": prepared.opening.faces, "cut_pairs": prepared.opening.pairs}
     values |= {name: getattr(history, name) for name in case.recorded if name in EXTRA}
     if "surface" in case.recorded:
         values |= surface_fields(prepared, history)

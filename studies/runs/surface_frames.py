@@ -23,7 +23,7 @@ def surface_fields(prepared: Prepared, history: History) -> dict[str, np.ndarray
     """
     setup = prepared.setup
     nodes = np.unique(prepared.mesh.outer_triangles)
-    start = setup.body.rest if setup.positions is None else setup.positions
+    start = prepared.body.rest if setup.positions is None else setup.positions
     frames, seen = [0, *history.snapshot_frames], [start[nodes], *history.snapshots[:, nodes]]
     if frames[-1] < history.good_frames:  # an early end between two moments
         frames.append(history.good_frames)

@@ -13,7 +13,13 @@ from studies.scene.scene import Scene
 
 def scene_to_json(scene: Scene) -> str:
     """Canonical JSON of a scene."""
-    return json.dumps(_scene_adapter().dump_python(scene, mode="json"), sort_keys=True, ensure_ascii=False)
+    return json.dumps(scene_to_dict(scene), sort_keys=True, ensure_ascii=False)
+
+
+def scene_to_dict(scene: Scene) -> dict[str, Any]:
+    """JSON-able form; without cuts where there are none, as before scenes could have any."""
+    data = _scene_adapter().dump_python(scene, mode="json")
+    return data if scene.cuts else {name: value for name, value in data.items() if name != "cuts"}
 
 
 def scene_from_dict(data: Mapping[str, Any]) -> Scene:

@@ -15,5 +15,7 @@ def allowed(scene: Scene, quantity: str) -> bool:
     word = quantity.split("_")[0]
     if word == "lumen" and not scene.filled:
         return False
+    if word == "opening":
+        return scene.cut is not None
     moves = scene.reference is not None and scene.reference.dt is not None
     return word in ALWAYS or word in scene.quantities or (word in GAUGE_FREE and not moves)

@@ -11,6 +11,7 @@ from massspring import Obstacle, Ramp, Trajectory
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace, PaintedRegion
 from studies.geometry.files.units import Source
+from studies.scene.cut import Cut
 from studies.scene.placing import Vector
 from studies.scene.start import InitialConditions
 from studies.scene.tissues import Tissue
@@ -168,8 +169,19 @@ class Scene:
     """What may be compared; a scene that leaves a rigid turn free drops "surface" and "interior" (gauge freedom)."""
     start: InitialConditions | None = None
     """None: at rest."""
+    cuts: tuple[Cut, ...] = ()
+    """One at most."""
     not_for: tuple[tuple[str, str], ...] = ()
     """(method, reason): combinations that make no sense."""
+
+    def __post_init__(self) -> None:
+        if len(self.cuts) > 1:
+            raise StudyError(f"scene '{self.name}' has {len(self.cuts)} cuts; a body is cut once in a scene so far")
+
+    @property
+    def cut(self) -> Cut | None:
+        """The cut of the scene, if it has one."""
+        return self.cuts[0] if self.cuts else None
 
     def skip(self, method: str) -> str | None:
         """Why the method of that name does not apply here; None when it does."""

@@ -60,6 +60,9 @@ LENGTHS: dict[str, str] = {
     "n": "nodes; of a reference, of second order",
     "s": "surface triangles",
     "c": "tetrahedra",
+    "u": "surface triangles on one side of the cut",
+    "p": "pairs of nodes that it parts",
+    "y": "vertices of the coarsest mesh that a cut parts",
     "r": "repeats",
     "q": "stages of a step",
     "f": "solutions of a reference's family",
@@ -88,6 +91,8 @@ class RunFields(Table):
     tetrahedra = array("c 4", INDEX, "1", "nodes of each tetrahedron")
     kinetic = optional_array("F", NUMBER, "J", "kinetic energy")
     elastic = optional_array("F", NUMBER, "J", "energy of the springs")
+    cut_faces = optional_array("u 3", INDEX, "1", "surface triangles behind the cut")
+    cut_pairs = optional_array("p 2", INDEX, "1", "nodes behind the cut and in front of it, at one place at rest")
     surface_frame = optional_array("P", INDEX, "1", "frames before each position of the surface, 0 at the start")
     surface_node = optional_array("v", INDEX, "1", "nodes of the outer surface")
     surface = optional_array("P v 3", NUMBER, "m", "their positions, float32")
@@ -121,6 +126,7 @@ class RunAttributes(Timed):
     capped_steps = value(int, "1", "steps that corrected only part of a volume error")
     volumes = value(int, "1", "kept volumes", "m")
     lumen_column = value(int, "1", "which kept volume is a lumen; -1: none")
+    cut_frame = optional_value(int, "1", "frames before the cut; what it parts is recorded twice from the start")
     unknowns_per_volume = optional_value(float, "1", "coordinates for each kept volume")
     alternation = optional_value(float, "1", "rms of pressure less the mean of its neighbours', over mu")
     sway = optional_value(float, "1", "range of the force at rest about its trend, over its mean")
@@ -160,6 +166,7 @@ class ReferenceFields(Table):
     sample_lumen_pressure = array("f K", NUMBER, "Pa", "pressure of the lumen")
     sample_frequency = array("f", NUMBER, "Hz", "of the ringing; NaN where nothing rings")
     sample_displacement = array("f b 3", NUMBER, "m", "displacement of the sample points at the last checkpoint")
+    sample_opening = optional_array("f y 3", NUMBER, "m", "at the last checkpoint, displacement across the cut")
     sample_points = array("b 3", NUMBER, "m", "vertices of the coarsest mesh at rest")
     sample_tetrahedra = array("d 4", INDEX, "1", "their tetrahedra")
 

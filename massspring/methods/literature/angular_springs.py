@@ -63,6 +63,7 @@ class AngularSprings(Method):
         "none",
         triangle_springs=No("its angles are as stiff as springs between two nodes"),
         thin_probes=No("contact of its angular springs with them is untested"),
+        events=No("its angles are no sums over cells"),
     )
 
     def __post_init__(self) -> None:

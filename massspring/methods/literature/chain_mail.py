@@ -85,6 +85,7 @@ class ChainMail(Method):
         prestress=True,
         point_volumes=True,
         thin_probes=No("obstacles meet its nodes"),
+        events=No("its links are of the body at rest"),
     )
 
     def __post_init__(self) -> None:

@@ -58,6 +58,7 @@ class ElasticResponse(Method):
         prestress=True,
         point_volumes=True,
         thin_probes=No("its columns belong to nodes"),
+        events=No("its columns are those of one body"),
     )
 
     def __post_init__(self) -> None:

@@ -60,6 +60,7 @@ class LinearModes(Method):
         prestress=True,
         point_volumes=True,
         thin_probes=No("its modes move all nodes at once"),
+        events=No("its modes are those of one body"),
     )
 
     def __post_init__(self) -> None:

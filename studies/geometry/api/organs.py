@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,8 +17,28 @@ from studies.geometry.mesh.second_order import CurvedMesh, make_curved
 from studies.geometry.mesher.jobs import TIME_LIMIT, cached, mesh_from, patches_of
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.shape.levelset import Shape
-from studies.geometry.shape.regions import Region, region_to_dict
+from studies.geometry.shape.regions import HalfSpace, Region, region_to_dict
 from studies.geometry.surface.node_count import FEWEST, MOST
+
+
+class PlaneCut(Protocol):
+    """Where a body is cut: the part `within` of a plane, level = 0 of a half space; None: all of it."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        ...
+
+    @property
+    def plane(self) -> HalfSpace:
+        """Its front is where the level is positive."""
+        ...
+
+    @property
+    def within(self) -> Region | None:
+        """The blade: level <= 0. A half space has a straight front, a ball a disc inside the body."""
+        ...
+
 
 SIDES = ("straight", "curved")
 """Sides of elements that follow an organ's shape."""
@@ -33,6 +53,7 @@ def organ(
     layers: int | None = None,
     exact: bool = False,
     sides: str | None = None,
+    cut: "PlaneCut | None" = None,
 ) -> OrganMesh:
     """The organ `name` of SHAPES with `nodes` nodes on its outer surface (exactly or within 2 %).
 
@@ -40,8 +61,8 @@ def organ(
     lumen, in `layers` of prisms (None: as many as make them as high as long); with fill=False only the outer surface
     is made. exact: flat sides enclose exactly the organ's volume, so nodes are a little off its surface, outlines on
     theirs; else the nodes are on it and the volume is 1 to 12 % too small. sides: "straight" or "curved", those that
-    are to follow the organ's shape, for which nodes go where it needs them; None: nodes are evenly spread. Raises
-    StudyError when the mesher cannot.
+    are to follow the organ's shape, for which nodes go where it needs them; None: nodes are evenly spread. cut: lies on
+    faces of the filled mesh, which stays whole. Raises StudyError when the mesher cannot.
     """
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
@@ -58,6 +79,13 @@ def organ(
         "regions": {key: region_to_dict(region) for key, region in own.items()},
         "fill": bool(fill),
     } | ({"exact": True} if exact else {})
+    if cut is not None:
+        if shape.wall is not None or not fill:
+            raise StudyError(
+                f"{name}: cut {cut.name!r} is for a solid organ that is filled; the others are not cut yet"
+            )
+        within = None if cut.within is None else region_to_dict(cut.within)
+        recipe["cut"] = {"name": cut.name, "plane": region_to_dict(cut.plane), "within": within}
     recipe |= {} if sides is None else {"sides": lookup(sides, SIDES, "kind of sides")}
     if layers is not None:
         if shape.wall is None:

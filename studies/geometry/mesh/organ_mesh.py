@@ -22,6 +22,7 @@ class OrganMesh:
     outer_count: number of nodes of the outer surface, which come first of all (0 means all of `surface_count`); in a
         layered wall of which no element was halved node i + outer_count of the lumen faces node i
     losses: of a mesh made from the surface in a file, how near it is to that (studies.geometry.scanned.fidelity)
+    cuts: name -> faces inside the body, shape (f, 3), along which a cut will open it, seen from in front of its plane
     """
 
     name: str
@@ -33,6 +34,7 @@ class OrganMesh:
     recipe: dict[str, Any] = field(default_factory=dict)
     outer_count: int = 0
     losses: dict[str, Any] = field(default_factory=dict)
+    cuts: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """A solid organ: all of its boundary is outer surface."""

@@ -51,6 +51,7 @@ def mesh_from(
     """
     given = arrays or {}
     parts = (*PARTS, "losses") if recipe["kind"] == "scan" else PARTS
+    parts = (*parts, "cut_faces") if "cut" in recipe else parts
     return to_mesh(recipe, cached(recipe, given, parts, lambda: run_worker(recipe, given, limit)))
 
 
@@ -82,6 +83,8 @@ def to_mesh(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> OrganMesh:
     losses = json.loads(str(arrays["losses"])) if "losses" in arrays else {}
     points = arrays["points"]
     mesh = OrganMesh(recipe["name"], points, *cells, count, recipe=recipe, outer_count=outer, losses=losses)
+    if "cut" in recipe:
+        mesh = replace(mesh, cuts={recipe["cut"]["name"]: arrays["cut_faces"]})
     return replace(mesh, patches=patches_of(mesh, recipe.get("regions", {})))
 
 

@@ -12,6 +12,7 @@ from studies.geometry.mesher.fill import fill_surface
 from studies.geometry.mesher.octant import build_octant
 from studies.geometry.mesher.organ_surface import close_surface, even_surface
 from studies.geometry.mesher.progress import stage
+from studies.geometry.mesher.section import check_clear, fill_cut, planes_of, with_front
 from studies.geometry.mesher.worker import Arrays, work
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.shape.levelset import Shape, at_depth
@@ -39,13 +40,18 @@ def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:
 
     sides: "straight" or "curved", those that are to follow the shape; without, nodes are evenly spread.
     """
-    regions = [region_from_dict(data) for data in recipe["regions"].values()]
+    held = [region_from_dict(data) for data in recipe["regions"].values()]
+    regions = held + planes_of(recipe)
+    if "cut" in recipe:
+        check_clear(shape, recipe["cut"], held)
     if "sides" in recipe:
         points, triangles = close_surface(shape, recipe["nodes"], regions, recipe["sides"] == "curved")
     else:
         points, triangles = even_surface(shape, recipe["nodes"], regions)
     if has_exact_volume(recipe):
         points = with_volume(points, triangles, enclosed_volume(shape, 2), shape.level, regions)
+    if "cut" in recipe:
+        points, triangles = with_front(shape, (points, triangles), recipe["cut"])
     return finish(shape, points, triangles, recipe)
 
 
@@ -59,6 +65,10 @@ def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict
         made = fill_wall(shape, points, triangles, recipe.get("layers"))
         all_points = with_lumen_volume(shape, made[0], triangles) if has_exact_volume(recipe) else made[0]
         return arrays_of(all_points, *made[1:], 2 * len(points), len(points))
+    if "cut" in recipe:
+        all_points, tetrahedra, faces = fill_cut(shape, (points, triangles), recipe["cut"])
+        made = arrays_of(all_points, triangles, tetrahedra, len(points), len(points))
+        return made | {"cut_faces": faces}
     all_points, tetrahedra = fill_surface(points, triangles, strict=recipe["kind"] != "scan")
     return arrays_of(all_points, triangles, tetrahedra, len(points), len(points))
 

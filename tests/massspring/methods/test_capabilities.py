@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 from massspring import (
     METHODS,
     Clock,
+    Event,
     MassSpringError,
     Plane,
     Probe,
@@ -123,6 +124,7 @@ ASKED = {
     "targets": ({"targets": {"whole": Ramp((0.0, 1e3), (1.0, 1.1))}}, "which method '{}' does not follow: {};"),
     "threads": ({"threads": 2}, "method '{}' runs on one thread, {};"),
     "float32": ({"precision": "float32"}, "method '{}' runs in float64 only, {};"),
+    "events": ({"events": ()}, "method '{}' supports no body that changes in a run: {}"),
 }
 """Capability -> the options of `Setup` that ask for it, and its refusal."""
 
@@ -135,7 +137,9 @@ def test_an_option_runs_or_is_refused_with_the_sentence_of_the_table(method, opt
     body = block_for(method, request)
     if "targets" in asked:
         asked = {"targets": {body.kept.names[0]: asked["targets"]["whole"]}}
-    clock, supported = clock_for(body, 1, 2, method=method), getattr(method.capabilities, option)
+    if "events" in asked:
+        asked = {"events": (Event(body, np.arange(body.node_count), np.arange(body.kept.count), 1),)}
+    clock, supported = clock_for(body, 2, 2, method=method), getattr(method.capabilities, option)
     if supported:
         assert runs(Setup(body, method, clock, **asked))
     else:

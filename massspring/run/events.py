@@ -1,0 +1,99 @@
+"""Changes of a body during a run, as by a cut: what follows when, and what must stay the same."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from massspring.body.body import Body
+from massspring.body.springs import Springs
+from massspring.errors import MassSpringError
+from massspring.methods.capabilities import No
+from massspring.methods.method import Method
+from massspring.world.obstacles import Attachment
+
+SAME = 1e-9
+"""Relative: masses and springs before and after are sums over the same cells, up to round-off."""
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """Another body takes over between two frames, in the places and with the velocities of the one before."""
+
+    body: Body
+    parent: np.ndarray
+    """For each of its nodes the one it was before, (n',)."""
+    volume_parent: np.ndarray
+    """For each of its kept volumes the one it was a part of before, (m',)."""
+    frame: int
+    """How many frames come before it."""
+    attachments: tuple[Attachment, ...] = ()
+    """As many as before, in the same order, by the nodes of the new body."""
+
+
+@dataclass(frozen=True, eq=False)
+class Easing:
+    """Volumes that an event found off their targets, on the way there: all on one clock, so that their sum is kept."""
+
+    at: float
+    """Time of the event [s]."""
+    off: np.ndarray
+    """By how much each kept volume was off then [m³], (m,)."""
+    time: float
+    """Until they are there [s]."""
+
+    def left(self, t: np.ndarray) -> np.ndarray:
+        """How far off each volume should still be at times `t` (q,) [s], (q, m) [m³]."""
+        share = np.clip(1.0 - (t - self.at) / self.time, 0.0, 1.0) if self.time > 0 else np.zeros(len(t))
+        return share[:, None] * self.off
+
+
+def check_events(
+    events: tuple[Event, ...], frames: int, method: Method, precision: str, threads: int, probes: bool
+) -> None:
+    """Raises MassSpringError for events that this run cannot have."""
+    supported = method.capabilities.events
+    if isinstance(supported, No):
+        raise MassSpringError(f"method '{method.name}' supports no body that changes in a run: {supported.because}")
+    if precision != "float64" or threads != 1 or probes:
+        raise MassSpringError(
+            "a body that changes in a run is advanced in float64, by one thread and without thin probes; "
+            "leave these out"
+        )
+    at = [event.frame for event in events]
+    if at[0] < 1 or at[-1] >= frames or (np.diff(at) <= 0).any():
+        raise MassSpringError(
+            f"the body changes after {', '.join(map(str, at))} of {frames} frames; give rising numbers from 1 to "
+            f"{frames - 1}"
+        )
+
+
+def check_event(event: Event, before: Body) -> None:
+    """Raises MassSpringError for a body that does not take over mass and springs of the one before."""
+    parent, volumes = np.asarray(event.parent), np.asarray(event.volume_parent)
+    for what, rows, count, known in (
+        ("nodes", parent, event.body.node_count, before.node_count),
+        ("kept volumes", volumes, event.body.kept.count, before.kept.count),
+    ):
+        if rows.shape != (count,) or not np.array_equal(np.unique(rows), np.arange(known)):
+            raise MassSpringError(
+                f"the {count} {what} after an event do not name all {known} before it; give each its parent"
+            )
+    if not np.array_equal(event.body.rest, before.rest[parent]):
+        raise MassSpringError("a node lies elsewhere at rest after an event; a change of the body moves no node")
+    mass = np.bincount(parent, weights=event.body.mass, minlength=before.node_count)
+    if np.abs(mass - before.mass).max() > SAME * before.mass.max():
+        raise MassSpringError("the masses of a node's copies do not add up to its mass; make both of the same cells")
+    was, now = _network(before.springs, before.node_count), _network(event.body.springs, before.node_count, parent)
+    if abs(was - now).max() > SAME * abs(was).max():
+        raise MassSpringError(
+            f"springs of law '{before.law}' do not add up to those before an event, for they are no sums over cells; "
+            "take law van_gelder or cotangent, or a quadratic body"
+        )
+
+
+def _network(springs: Springs, n: int, parent: np.ndarray | None = None) -> csr_array:
+    """Sum of the stiffnesses between each two nodes, (n, n)."""
+    ends = springs.ends.astype(np.int64) if parent is None else parent[springs.ends.astype(np.int64)]
+    ends = np.sort(ends, axis=1)
+    return csr_array(coo_array((springs.stiffness, (ends[:, 0], ends[:, 1])), shape=(n, n)))

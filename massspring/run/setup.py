@@ -1,0 +1,200 @@
+"""What a run is given: a body in its surroundings, checked."""
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from massspring.body.body import Body
+from massspring.kernels.arrays.layout import BoundaryConditions, Tips
+from massspring.layout.probe_arrays import new_probing
+from massspring.layout.state import State
+from massspring.layout.threads import shared
+from massspring.methods.method import Method
+from massspring.run.checks import (
+    check_among,
+    check_body,
+    check_facets,
+    check_nodal,
+    check_probe,
+    check_solid,
+    check_surroundings,
+    check_targets,
+    check_threads,
+)
+from massspring.run.events import Easing, Event, check_event, check_events
+from massspring.run.precision import Precision, check_precision, in_precision
+from massspring.run.renumber import Numbered, numbered
+from massspring.world.clock import Clock
+from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
+from massspring.world.surroundings import Surroundings
+from massspring.world.targets import fastest_filling, followed
+from massspring.world.trajectories import Ramp
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """A body in its surroundings."""
+
+    body: Body
+    method: Method
+    clock: Clock
+    obstacles: tuple[Obstacle, ...] = ()
+    attachments: tuple[Attachment, ...] = ()
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """[m/s²]."""
+    damping: float = 0.0
+    """Mass-proportional damping [1/s]."""
+    velocity: np.ndarray | None = None
+    """Initial velocities [m/s], (n, 3); None: at rest."""
+    targets: Mapping[str, Ramp] = field(default_factory=dict)
+    """Name of a kept volume -> its target over time as a factor of its rest volume; unnamed ones stay at 1.
+    What is faster than the body can follow without being thrown apart is ramped, with a warning."""
+    positions: np.ndarray | None = None
+    """Initial positions [m], (n, 3); None: those at rest."""
+    precision: Precision = "float64"
+    """Of the state; "float32" is faster and meets volumes to 1e-5 wherever the body lies, for methods that claim it."""
+    threads: int = 1
+    """That share a step; the result is the same to the last bit. Pays for bodies of some thousand nodes."""
+    events: tuple[Event, ...] = ()
+    """Changes of the body between frames, such as cuts."""
+
+    def __post_init__(self) -> None:
+        check_body(self.body, self.method)
+        moved = self.velocity is not None or self.positions is not None
+        around = Surroundings(self.obstacles, len(self.attachments), self.gravity, bool(self.targets), moved)
+        check_among(around, self.method)
+        check_precision(self.precision, self.method)
+        check_facets(self.precision, self.body, self.solids)
+        check_threads(self.threads, self.method)
+        limited = self.method.capabilities.conditionally_stable
+        check_surroundings(self.gravity, self.damping, self.clock.dt if limited else 0.0)
+        check_nodal("initial velocities", self.velocity, self.body)
+        check_nodal("initial positions", self.positions, self.body)
+        x = self.body.rest if self.positions is None else self.positions
+        for number, obstacle in enumerate(self.obstacles):
+            if isinstance(obstacle, Probe):
+                check_probe(number, obstacle, self.method, self.body, x)
+            else:
+                check_solid(number, obstacle, self.body, x)
+        check_targets(self.targets, self.body, self.method)
+        rate = fastest_filling(self.body)
+        for name in self.ramped:
+            warnings.warn(
+                f"the target of volume '{name}' moves faster than {rate:.3g} of its rest volume per second, which would"
+                " tear the body apart; the target is limited to that rate",
+                stacklevel=3,
+            )
+        if self.events:
+            check_events(self.events, self.clock.frames, self.method, self.precision, self.threads, bool(self.probes))
+            self.later  # noqa: B018 — each later set-up is checked too
+
+    @cached_property
+    def later(self) -> tuple["Setup", ...]:
+        """The set-up after each event, without events. Raises MassSpringError for one that cannot follow."""
+        setups, body, x = [], self.body, self.positions
+        for event in self.events:
+            check_event(event, body)
+            x, body = None if x is None else x[event.parent], event.body
+            setups.append(
+                replace(self, body=body, attachments=event.attachments, velocity=None, positions=x, events=())
+            )
+        return tuple(setups)
+
+    @property
+    def probes(self) -> tuple[Probe, ...]:
+        """The thin ones among the obstacles; they have a stage of their own."""
+        return tuple(o for o in self.obstacles if isinstance(o, Probe))
+
+    @property
+    def solids(self) -> tuple[Plane | Sphere | Capsule, ...]:
+        """The obstacles that nodes touch."""
+        return tuple(o for o in self.obstacles if not isinstance(o, Probe))
+
+    @cached_property
+    def followed(self) -> dict[str, Ramp]:
+        """The targets as they are followed (massspring.world.targets)."""
+        rate = fastest_filling(self.body) if self.targets else 0.0
+        return {name: followed(ramp, rate) for name, ramp in self.targets.items()}
+
+    @property
+    def ramped(self) -> list[str]:
+        """Names of the volumes whose target is too fast to be followed as it is."""
+        return [name for name, ramp in self.followed.items() if ramp is not self.targets[name]]
+
+    @cached_property
+    def inside(self) -> Numbered:
+        """The body with the numbers its nodes have during a run."""
+        return numbered(self.body)
+
+    @cached_property
+    def origin(self) -> np.ndarray:
+        """What positions are relative to during the run [m], (3,): in single precision the middle of the body at the
+        start, for its digits are those of the largest coordinate; else 0."""
+        if self.precision == "float64":
+            return np.zeros(3)
+        x = self.body.rest if self.positions is None else self.positions
+        return 0.5 * (x.min(axis=0) + x.max(axis=0))
+
+    def start(self) -> State:
+        """The state at t = 0."""
+        state = self.inside.start(self.method, self.attachments, self.velocity)
+        if self.probes:
+            probing = new_probing(self.inside.body, state.model.triangles, self.probes, state.diagnostics)
+            state = replace(state, probing=probing)
+        if self.positions is not None:
+            state = state.moved_to(self.positions)
+        if self.precision == "float32":
+            state = in_precision(state.relative_to(self.origin), self.precision)
+        if self.threads == 1:
+            return state
+        return shared(state, self.threads)
+
+    @cached_property
+    def _unmoved(self) -> dict[str, Any]:
+        """What is the same in the drives of all frames."""
+        solids = self.solids
+        return {
+            "dt": self.clock.dt,
+            "damping": float(self.damping),
+            "gravity": np.asarray(self.gravity, dtype=np.float64),
+            "is_plane": np.array([isinstance(o, Plane) for o in solids], dtype=np.bool_),
+            "plane_normal": _rows([o.unit_normal if isinstance(o, Plane) else np.zeros(3) for o in solids]),
+            "radius": np.array([0.0 if isinstance(o, Plane) else o.radius for o in solids]),
+            "span": _rows([o.span if isinstance(o, Capsule) else np.zeros(3) for o in solids]),
+            "friction": np.array([np.inf if o.friction == "no_slip" else float(o.friction) for o in solids]),
+            "rough": any(o.friction != 0 for o in solids),
+        }
+
+    def boundary(self, frame: int, easing: Easing | None = None) -> BoundaryConditions:
+        """The outside world during frame number `frame` (0, 1, …): positions at the end of each of its steps, relative
+        to `origin`."""
+        dt = self.clock.dt
+        t = frame * self.clock.frame + dt * np.arange(1, self.clock.steps + 1)
+        solids, probes = self.solids, self.probes
+        return BoundaryConditions(
+            **self._unmoved,
+            position=_tracks([o.anchor + o.path(t) for o in solids], len(t)) - self.origin,
+            velocity=_tracks([(o.path(t) - o.path(t - dt)) / dt for o in solids], len(t)),
+            held_displacement=_tracks([a.path(t) for a in self.attachments], len(t)),
+            volume_target=self.volume_targets(t, easing),
+            tips=Tips(*(_tracks([p.anchor + p.path(u) for p in probes], len(t)) - self.origin for u in (t - dt, t))),
+        )
+
+    def volume_targets(self, t: np.ndarray, easing: Easing | None = None) -> np.ndarray:
+        """What each kept volume should be at times `t` (q,) [s], (q, m) [m³]; after an event on the way there."""
+        factors = [self.followed[name](t) if name in self.targets else np.ones(len(t)) for name in self.body.kept.names]
+        targets = np.column_stack(factors) * self.body.rest_volumes
+        return targets if easing is None else targets + easing.left(t)
+
+
+def _rows(vectors: list[np.ndarray]) -> np.ndarray:
+    return np.array(vectors, dtype=np.float64).reshape(-1, 3)
+
+
+def _tracks(tracks: list[np.ndarray], steps: int) -> np.ndarray:
+    """(q, o, 3), contiguous, also when there is nothing to track."""
+    return np.ascontiguousarray(np.array(tracks, dtype=np.float64).reshape(-1, steps, 3).transpose(1, 0, 2))

@@ -1,0 +1,249 @@
+"""A surface filled on either side of a plane, the section meshed in the plane: the blade of a cut lies on faces."""
+
+from itertools import pairwise
+from typing import Any
+
+import gmsh
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import signed_volume
+from studies.geometry.mesher.fill import fill_surface
+from studies.geometry.mesher.gmsh_calls import TRIANGLE, fresh_model
+from studies.geometry.shape.levelset import Shape, project
+from studies.geometry.shape.regions import ON_CURVE, BallRegion, HalfSpace, Region, region_from_dict
+from studies.geometry.surface.first_surface import first_surface
+
+ROUND = 16
+"""Sides of the polygon that stands for the edge of a disc, at least: of fewer it loses more than 3 % of its area."""
+LEAST_PIECE, FEWEST_CELLS = 0.01, 30
+"""Share of the volume, and tetrahedra, below which a piece is no body of its own."""
+Surface = tuple[np.ndarray, np.ndarray]
+
+
+def planes_of(recipe: dict[str, Any]) -> list[Region]:
+    """The plane of the recipe's cut, if it has one, as a region: its outline on a surface is the trace of the cut."""
+    return [region_from_dict(recipe["cut"]["plane"])] if "cut" in recipe else []
+
+
+def check_clear(shape: Shape, cut: dict[str, Any], held: list[Region]) -> None:
+    """Raises StudyError for a plane that misses the body, or whose trace meets the outline of a held region."""
+    points, triangles = first_surface(shape)
+    crossed = _crossed(region_from_dict(cut["plane"]), points, triangles)
+    if not crossed.any():
+        raise StudyError(f"{shape.name}: the plane of cut {cut['name']!r} misses the body; move it")
+    for region in held:
+        if (crossed & _crossed(region, points, triangles)).any():
+            raise StudyError(
+                f"{shape.name}: cut {cut['name']!r} crosses the outline of a held region; move one of them away"
+            )
+
+
+def _crossed(region: Region, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Triangles with corners on either side of level = 0."""
+    return (region.level(points)[triangles] > 0).sum(axis=1) % 3 > 0
+
+
+def with_front(shape: Shape, surface: Surface, cut: dict[str, Any]) -> Surface:
+    """The surface, whose trace of the plane lies on edges, with the nodes of the trace nearest to a straight front
+    exactly on it. Raises StudyError."""
+    points, triangles = surface
+    plane, within = region_from_dict(cut["plane"]), _within(cut)
+    edges = trace(plane, points, triangles, shape.size, cut["name"])
+    if within is None or isinstance(within, BallRegion):
+        return surface
+    level = within.level(points)
+    crossing = edges[(level[edges] <= 0).sum(axis=1) == 1]
+    if len(crossing) != 2:
+        known = within.level(points[np.unique(edges)])
+        if (known > 0).all() or (known <= 0).all():
+            what = "holds nothing of the section; move it" if (known > 0).all() else "is all of it; leave out within"
+            raise StudyError(f"{shape.name}: the blade of cut {cut['name']!r} {what}")
+        raise StudyError(
+            f"{shape.name}: the front of cut {cut['name']!r} meets the trace {len(crossing)} times and not twice; "
+            "move it, or cut the whole section"
+        )
+    ends = crossing[np.arange(2), np.abs(level[crossing]).argmin(axis=1)]
+    if ends[0] == ends[1]:
+        raise StudyError(
+            f"{shape.name}: the blade of cut {cut['name']!r} holds no face; use more nodes or a larger one"
+        )
+    points = points.copy()
+    points[ends] = project(shape, points[ends], (plane.level, within.level))
+    return points, triangles
+
+
+def _within(cut: dict[str, Any]) -> Region | None:
+    return None if cut["within"] is None else region_from_dict(cut["within"])
+
+
+def trace(plane: Region, points: np.ndarray, triangles: np.ndarray, size: float, name: str) -> np.ndarray:
+    """Edges (e, 2) of a surface that lie in the plane, between triangles on either side of it. Raises StudyError."""
+    on, side = _on(plane, points, size), _side(plane, points, triangles)
+    half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    keys, inverse = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True)
+    sides = np.bincount(inverse.reshape(-1), weights=np.repeat(side, 3))
+    edges = keys[on[keys].all(axis=1) & (sides == 0)]
+    if (np.bincount(edges.ravel())[np.unique(edges)] != 2).any():
+        raise StudyError(f"the trace of cut {name!r} touches itself; move the plane, or use more nodes")
+    return edges
+
+
+def _on(plane: Region, points: np.ndarray, size: float) -> np.ndarray:
+    return np.abs(plane.level(points)) <= 10 * ON_CURVE * size
+
+
+def _side(plane: Region, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """−1 behind the plane and 1 in front of it, of each triangle."""
+    return np.where(plane.level(points[triangles].mean(axis=1)) > 0, 1, -1)
+
+
+def fill_cut(shape: Shape, surface: Surface, cut: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All points [m], the surface's first, tetrahedra inside, and the faces of the blade (f, 3), seen anticlockwise
+    from in front of the plane. Raises StudyError."""
+    points, triangles = surface
+    plane, name = region_from_dict(cut["plane"]), f"cut {cut['name']!r}"
+    edges = trace(plane, points, triangles, shape.size, cut["name"])
+    new, faces, blade = section(plane, points, edges, _within(cut), name)
+    points = np.concatenate([points, new])
+    side = _side(plane, points, triangles)
+    cells = np.empty((0, 4), np.int64)
+    for sign, caps in ((-1, faces), (1, faces[:, ::-1])):
+        for piece in _pieces(np.concatenate([triangles[side == sign], caps]), len(points)):
+            share = signed_volume(points, piece) / signed_volume(*surface)
+            if not share > LEAST_PIECE:
+                raise StudyError(
+                    f"{shape.name}: {name} leaves a piece of {100 * share:.2g} % of the volume; move the plane"
+                )
+            used, local = np.unique(piece, return_inverse=True)
+            filled, inside = fill_surface(points[used], local.reshape(-1, 3))
+            if len(inside) < FEWEST_CELLS:
+                raise StudyError(f"{shape.name}: {name} leaves a piece of {len(inside)} tetrahedra; use more nodes")
+            number = np.concatenate([used, len(points) + np.arange(len(filled) - len(used))])
+            points = np.concatenate([points, filled[len(used) :]])
+            cells = np.concatenate([cells, number[inside]])
+    return points, cells, faces[blade]
+
+
+def _pieces(triangles: np.ndarray, count: int) -> list[np.ndarray]:
+    """The closed surfaces among triangles (t, 3), each by itself."""
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]])
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    label = connected_components(graph, directed=False)[1][triangles[:, 0]]
+    return [triangles[label == k] for k in np.unique(label)]
+
+
+def section(
+    plane: Region, points: np.ndarray, edges: np.ndarray, within: Region | None, name: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """New points (n, 3) [m] in the plane, the triangles of its section by all points, seen from in front, and which of
+    them are the blade's. Raises StudyError."""
+    assert isinstance(plane, HalfSpace)  # a cut has no other
+    normal = np.asarray(plane.normal, float) / np.linalg.norm(plane.normal)
+    one = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    axes = np.stack([one / np.linalg.norm(one), np.cross(normal, one / np.linalg.norm(one))])
+    step = float(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).mean())
+    nodes = np.unique(edges)
+    outlines, tiny = [np.searchsorted(nodes, loop) for loop in loops(edges)], 10 * ON_CURVE * float(np.ptp(points))
+    if within is None:
+        front, chain = np.empty((0, 3)), np.empty(0, np.int64)
+    elif isinstance(within, BallRegion):
+        front = _rim(plane, within, normal, axes, step, name)
+        chain = len(nodes) + np.arange(len(front) + 1) % len(front)
+        if (within.level(points[nodes]) <= tiny).any():
+            raise StudyError(f"{name}: its disc reaches the surface; give a smaller one, or a half space")
+    else:
+        ends = np.flatnonzero(np.abs(within.level(points[nodes])) <= tiny)
+        if len(ends) != 2:
+            raise StudyError(f"{name}: its front meets the trace {len(ends)} times and not twice; move it")
+        front = _straight(points[nodes[ends[0]]], points[nodes[ends[1]]], step)
+        chain = np.concatenate([ends[:1], len(nodes) + np.arange(len(front)), ends[1:]])
+    given = np.concatenate([points[nodes], front])
+    flat, triangles = meshed((given - plane.point) @ axes.T, outlines, chain)
+    new = np.asarray(plane.point) + flat[len(given) :] @ axes
+    number = np.concatenate([nodes, len(points) + np.arange(len(flat) - len(nodes))])
+    centre = np.concatenate([given, new])[triangles].mean(axis=1)
+    blade = np.ones(len(triangles), bool) if within is None else within.level(centre) < 0
+    if not blade.any():
+        raise StudyError(f"{name}: its blade holds no face; use more nodes or a larger one")
+    return np.concatenate([front, new]), number[triangles], blade
+
+
+def loops(edges: np.ndarray) -> list[np.ndarray]:
+    """The closed loops of edges (e, 2), each node of which has two, as nodes in turn."""
+    neighbours: dict[int, list[int]] = {}
+    for a, b in edges.tolist():
+        neighbours.setdefault(a, []).append(b)
+        neighbours.setdefault(b, []).append(a)
+    found, left = [], sorted(neighbours)
+    while left:
+        loop = [left[0], neighbours[left[0]][0]]
+        while loop[-1] != loop[0]:
+            one, other = neighbours[loop[-1]]
+            loop.append(other if one == loop[-2] else one)
+        found.append(np.array(loop[:-1]))
+        left = [node for node in left if node not in loop]
+    return found
+
+
+def _straight(start: np.ndarray, end: np.ndarray, step: float) -> np.ndarray:
+    """Points about `step` [m] apart between two others, (f, 3) [m]."""
+    count = max(2, round(float(np.linalg.norm(end - start)) / step))
+    share = np.arange(1, count)[:, None] / count
+    return (1 - share) * start + share * end
+
+
+def _rim(
+    plane: HalfSpace, within: BallRegion, normal: np.ndarray, axes: np.ndarray, step: float, name: str
+) -> np.ndarray:
+    """Points on the edge of a disc, (f, 3) [m]."""
+    away = float(plane.level(np.array([within.center]))[0])
+    if abs(away) >= within.radius:
+        raise StudyError(f"{name}: its blade holds nothing of the plane; move the ball onto it")
+    radius = np.sqrt(within.radius**2 - away**2)
+    count = max(ROUND, round(2 * np.pi * radius / step))
+    turn = 2 * np.pi * np.arange(count)[:, None] / count
+    return np.asarray(within.center) - away * normal + radius * (np.cos(turn) * axes[0] + np.sin(turn) * axes[1])
+
+
+def meshed(flat: np.ndarray, outlines: list[np.ndarray], chain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (m, 2), those given first, and triangles of the plane inside the outlines, loops of points.
+
+    The chain of points (c,) lies on edges: from outline to outline, or a ring whose first point is also its last.
+    """
+    size, add = float(np.ptp(flat)), gmsh.model.geo
+    closed = len(chain) > 0 and chain[0] == chain[-1]
+    with fresh_model(Mesh_Algorithm=6):
+        # Unit size inside gmsh: its tolerances are absolute.
+        for k, (x, y) in enumerate(flat / size):
+            add.addPoint(x, y, 0.0, tag=k + 1)
+        front = [add.addLine(int(a) + 1, int(b) + 1) for a, b in pairwise(chain)]
+        faces = [add.addPlaneSurface([add.addCurveLoop(front)])] if closed else []
+        for loop in outlines:
+            ends = [int(np.flatnonzero(loop == end)[0]) for end in chain[[0, -1]] if end in loop] if len(chain) else []
+            loop = np.roll(loop, -ends[0]) if ends else loop
+            lines = [add.addLine(int(a) + 1, int(b) + 1) for a, b in zip(loop, np.roll(loop, -1), strict=True)]
+            if ends:
+                half = (ends[1] - ends[0]) % len(loop)
+                back = [-line for line in front[::-1]]
+                rings = [[*lines[:half], *back], [*front, *lines[half:]]]
+                faces += [add.addPlaneSurface([add.addCurveLoop(ring)]) for ring in rings]
+            else:
+                inner = [add.addCurveLoop([-line for line in front[::-1]])] if closed else []
+                faces.append(add.addPlaneSurface([add.addCurveLoop(lines), *inner]))
+        add.synchronize()
+        for _, line in gmsh.model.getEntities(1):
+            gmsh.model.mesh.setTransfiniteCurve(line, 2)
+        gmsh.model.mesh.generate(2)
+        tags, coordinates, _ = gmsh.model.mesh.getNodes()
+        corners = [gmsh.model.mesh.getElementsByType(TRIANGLE, face)[1] for face in faces]
+    order = np.argsort(tags)
+    x = size * np.asarray(coordinates).reshape(-1, 3)[order, :2]
+    triangles = np.searchsorted(tags[order], np.concatenate(corners)).reshape(-1, 3).astype(np.int64)
+    x[: len(flat)] = flat
+    a, b, c = x[triangles].transpose(1, 0, 2)
+    turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    triangles[turned] = triangles[turned][:, ::-1]
+    return x, triangles

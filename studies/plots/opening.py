@@ -1,0 +1,92 @@
+"""How far an incision gapes, from its front to its mouth, next to the reference."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from studies.base.counting import heading
+from studies.metrics.metric import COMPARABLE
+from studies.metrics.metrics import METRICS
+from studies.metrics.run import Run, by_scene
+from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
+from studies.plots.style.page import (
+    band_handle,
+    blank,
+    finish,
+    grouped,
+    page,
+    panels,
+    reference_handle,
+    remarks,
+    unresolved_notes,
+)
+from studies.plots.style.style import BLACK, GREY, method_colour, save, styled
+from studies.runs.case import BodyRecipe
+
+TITLE = "Opening of the incision against the reference"
+OPENINGS = [metric for metric in METRICS if metric.name == "opening_error"]
+BINS = 8
+"""Stretches between front and mouth over which the opening is averaged by area."""
+MM = 1e3
+
+
+def gapes(run: Run) -> bool:
+    """Whether the run has an incision with a front, and its end."""
+    cut = run.case.scene.cut
+    return cut is not None and cut.within is not None and run.record.status in COMPARABLE
+
+
+@styled
+def figure(runs: Sequence[Run]) -> Figure:
+    """One panel per scene."""
+    shown = [run for run in runs if gapes(run)]
+    if not shown:
+        return blank(TITLE, "no run of a scene with an incision has ended yet")
+    scenes, looks = by_scene(shown), body_looks(shown)
+    sheet = page(6.4 * len(scenes), 3.8)
+    for panel, group in zip(panels(sheet, 1, len(scenes)).flat, scenes.values(), strict=True):
+        _draw_scene(panel, group, looks)
+    handles = [*body_method_handles(shown, looks), reference_handle(linestyle="-", linewidth=1)]
+    handles.append(band_handle("± its uncertainty"))
+    notes = ["Across the cut along its normal, at the last checkpoint, averaged over stretches of equal depth."]
+    return finish(sheet, TITLE, handles, [*notes, *unresolved_notes(shown, OPENINGS), *remarks(runs)], columns=3)
+
+
+def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> None:
+    scene = group[0].case.scene
+    assert scene.cut is not None  # gapes() asked
+    finest = max(group, key=lambda run: len(run.cut_pairs))
+    for same in grouped(group, lambda run: (run.case.body, run.case.method.name)):
+        run = same[0]
+        colour, line = method_colour(run.case.method.name), looks[run.case.body].line
+        axes.plot(*_profile(run, run.opening), color=colour, linestyle=line)
+    if finest.reference is not None:
+        truth = finest.reference.opening(finest.fields.rest[finest.cut_pairs[:, 0]])
+        depth, opening = _profile(finest, truth)
+        spread = finest.reference.total_uncertainty["opening"] * opening
+        axes.fill_between(depth, opening - spread, opening + spread, color=GREY, alpha=0.3, linewidth=0)
+        axes.plot(depth, opening, color=BLACK, linewidth=1, marker="o", markeredgecolor="white")
+    axes.set(xlim=(0, None), ylim=(0, None), xlabel="distance from the front [mm]", ylabel="opening [mm]")
+    axes.set_title(heading(scene.name))
+
+
+def _profile(run: Run, opening: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distances from the front [mm] and the mean opening there [mm], of the stretches that hold nodes."""
+    cut = run.case.scene.cut
+    assert cut is not None and cut.within is not None  # gapes() asked
+    depth = -cut.within.level(run.fields.rest[run.cut_pairs[:, 0]])
+    gap = opening @ np.asarray(cut.plane.normal) / np.linalg.norm(cut.plane.normal)
+    place = np.minimum((BINS * depth / depth.max()).astype(int), BINS - 1)
+    share, moment, sums = (
+        np.bincount(place, weights=run.cut_weights * values, minlength=BINS) for values in (1.0, depth, gap)
+    )
+    used = share > 0
+    return MM * moment[used] / share[used], MM * sums[used] / share[used]
+
+
+def draw(runs: Sequence[Run], path: Path) -> None:
+    """Writes the chart as PNG."""
+    save(figure(runs), path)

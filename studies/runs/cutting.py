@@ -1,0 +1,89 @@
+"""The body of a scene after its cut, and the event that brings it into a run."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from massspring import Attachment, Body, Event
+from massspring.body.opening import parents
+from massspring.body.points import PointVolumes
+from massspring.body.volumes import Volumes
+from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import boundary_triangles
+from studies.meshing.opened_mesh import cut_triangles
+from studies.scene.cut import Cut
+
+
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """Where the body of a record was cut, in its own numbers."""
+
+    frame: int
+    """Frames before it."""
+    faces: np.ndarray
+    """Triangles of the surface behind the cut, (u, 3)."""
+    pairs: np.ndarray
+    """Nodes behind it and in front of it, (p, 2)."""
+
+
+def event_frame(cut: Cut, duration: float, frames: int) -> int:
+    """Frames before the cut. Raises StudyError for one before the first frame ends, or after the last begins."""
+    frame = round(cut.at * frames / duration)
+    if not 1 <= frame < frames:
+        raise StudyError(
+            f"cut '{cut.name}' at {cut.at:g} s is not between two of the {frames} frames of {duration:g} s; "
+            "move it, or ask for more frames"
+        )
+    return frame
+
+
+def pieces_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """The connected piece of each cell (k, c), (k,): cells are connected by their nodes."""
+    ends = np.repeat(cells[:, :1], cells.shape[1], axis=1).ravel(), cells.ravel()
+    graph = coo_array((np.ones(cells.size), ends), shape=(len(points), len(points)))
+    label = connected_components(graph, directed=False)[1][cells[:, 0]]
+    return np.unique(label, return_inverse=True)[1]
+
+
+def keeping_pieces(body: Body, volumes: Volumes | PointVolumes | None) -> Body:
+    """The body that keeps `volumes`; where these are the whole and it is in pieces, the volume of each."""
+    if volumes is not None:
+        return body.keeping(volumes)
+    cells = body.tetrahedra.astype(np.int64)
+    piece = pieces_of(body.rest, cells)
+    if piece.max() == 0:
+        return body
+    surfaces = {f"piece {k}": boundary_triangles(cells[piece == k]) for k in range(piece.max() + 1)}
+    return body.keeping(Volumes.closed_surfaces(body, surfaces))
+
+
+def check_held(cut: Cut, cells: np.ndarray, points: np.ndarray, attachments: tuple[Attachment, ...]) -> None:
+    """Raises StudyError for a piece that nothing holds, unless it may go."""
+    held = np.concatenate([np.empty(0, np.int64), *(np.asarray(a.nodes) for a in attachments)])
+    piece = pieces_of(points, cells)
+    loose = [k for k in range(piece.max() + 1) if not np.isin(cells[piece == k], held).any()]
+    if loose and not cut.free:
+        raise StudyError(f"cut '{cut.name}' leaves a piece that nothing holds; hold it, or let it go: free=True")
+
+
+def event_of(frame: int, before: Body, after: Body, parent: np.ndarray, attachments: tuple[Attachment, ...]) -> Event:
+    """The event at which one body becomes the other, whose nodes had the numbers `parent` (n',)."""
+    was, now = before.kept, after.kept
+    if isinstance(was, PointVolumes) and isinstance(now, PointVolumes):
+        volumes = parents(was.corner_volume, now.corner_volume)
+    elif was.count == 1:
+        volumes = np.zeros(now.count, dtype=np.int64)
+    elif was.count == before.node_count and now.count == after.node_count:
+        volumes = parent
+    else:
+        raise StudyError(
+            f"a body that is cut keeps one volume, or one per node or vertex, not {was.count}; change its volumes"
+        )
+    return Event(after, parent, volumes, frame, attachments)
+
+
+def opening_of(frame: int, after: Body, parent: np.ndarray, pairs: np.ndarray) -> Opening:
+    """Where the body after an event was cut."""
+    return Opening(frame, cut_triangles(after.triangles, parent, pairs[:, 1]).astype(np.int64), pairs)

@@ -1,0 +1,106 @@
+"""Scenes with a cut from the mesh to the chart: the incised ball next to its reference, and one cut in two."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import ImplicitVolume, Shake
+from studies.base.errors import DoesNotApply, StudyError
+from studies.metrics.metrics import METRICS
+from studies.metrics.run import Run
+from studies.plots import opening
+from studies.reference.load import load_reference
+from studies.reference.reference_solves import ReferenceSolve
+from studies.reference.solve import solve
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.prepare import prepare
+from studies.runs.run import measure
+from studies.scene.library.ball_bisected import BALL_BISECTED
+from studies.scene.library.ball_incised import BALL_INCISED
+
+pytestmark = pytest.mark.slow
+METRIC = {metric.name: metric for metric in METRICS}
+ONE, QUADRATIC = BodyRecipe(nodes=200), BodyRecipe("quadratic", nodes=600)
+
+
+@pytest.fixture(scope="module")
+def incised(tmp_path_factory) -> dict[str, Run]:
+    scene = replace(BALL_INCISED, reference=BALL_INCISED.reference.smaller())
+    root = tmp_path_factory.mktemp("incised")
+    solve(root, ReferenceSolve(scene))
+    reference = load_reference(root, scene)
+    cases = {body.kind: Case(scene, body, ImplicitVolume(), dt_fraction=0.8) for body in (ONE, QUADRATIC)}
+    return {kind: Run(case, measure(case), reference) for kind, case in cases.items()}
+
+
+def test_the_incision_gapes_as_in_the_reference(incised):
+    for kind, most in (("tetrahedral", 12.0), ("quadratic", 6.0)):
+        run = incised[kind]
+        assert run.record.status == "ok", run.record.message
+        assert METRIC["opening_error"](run) < most
+        assert METRIC["mean_error"](run) < most
+        assert abs(METRIC["force_end"](run)) < 10.0
+        assert METRIC["overlap"](run) == 0.0
+        assert METRIC["volume_worst"](run) < 0.05
+
+
+def test_before_the_cut_copies_lie_on_each_other_and_after_it_they_part(incised):
+    run = incised["quadratic"]
+    scene, frame = run.case.scene, int(run.record.attributes["cut_frame"])
+    assert frame == round(scene.cut.at * scene.frames / scene.duration)
+    rest = run.fields.rest
+    np.testing.assert_array_equal(*rest[run.cut_pairs.T])
+    assert np.abs(scene.cut.plane.level(rest[run.cut_pairs[:, 0]])).max() < 1e-4  # m: curved sides
+    assert run.opening[:, 2].min() > 1e-3
+    corners = rest[run.record.fields["cut_faces"].values]
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    assert area == pytest.approx(0.5 * np.pi * 0.05**2, rel=0.03)
+    assert 0.8 * area < run.cut_weights.sum() < area  # without the shares of the front's nodes, which stay single
+
+
+def test_the_chart_shows_both(incised, tmp_path):
+    figure = opening.figure(list(incised.values()))
+    (axes,) = figure.axes
+    assert axes.get_ylabel() == "opening [mm]"
+    *bodies, truth = (line.get_ydata() for line in axes.lines)
+    assert len(bodies) == 2 and truth[-1] == pytest.approx(13.2, rel=0.05)
+    assert all(line[-1] == pytest.approx(truth[-1], rel=0.1) for line in bodies)
+
+
+@pytest.mark.parametrize("body", [ONE, QUADRATIC, BodyRecipe(nodes=200, law="cotangent", volumes="nodal")])
+def test_the_halves_of_a_ball_go_back_to_their_shape_and_volume(body):
+    record = measure(Case(BALL_BISECTED, body, ImplicitVolume(), dt_fraction=0.8, recorded=("elastic", "kinetic")))
+    assert record.status == "ok", record.message
+    values = {name: field.values for name, field in record.fields.items()}
+    moved = values["snapshots"][-1] - values["rest"]
+    # The lower half is back where it was, the upper one has gone with its cap.
+    assert np.abs(moved[values["cut_pairs"][:, 0]]).max() < 2e-5
+    np.testing.assert_allclose(moved[values["cut_pairs"][:, 1]], [[0, 0, 0.01]] * len(values["cut_pairs"]), atol=2e-5)
+    np.testing.assert_allclose(values["volume"][-1], values["volume_target"][-1], rtol=1e-6)
+    whole = values["volume_target"][-1].sum()
+    assert values["volume"].sum(axis=1) == pytest.approx(np.full(len(values["t"]), whole), rel=1e-4)
+    assert values["elastic"][-1] < 1e-3 * values["elastic"].max()
+
+
+def test_what_cannot_be_cut_is_refused():
+    with pytest.raises(DoesNotApply, match="it keeps one volume, the body keeps 2"):
+        prepare(Case(BALL_BISECTED, ONE, Shake()))
+    loose = replace(BALL_BISECTED, held=BALL_BISECTED.held[:1])
+    with pytest.raises(StudyError, match="leaves a piece that nothing holds"):
+        prepare(Case(loose, ONE))
+    late = replace(BALL_INCISED, cuts=(replace(BALL_INCISED.cut, at=4.0),))
+    with pytest.raises(StudyError, match="is not between two of the 200 frames"):
+        prepare(Case(late, ONE))
+    early = replace(BALL_INCISED, checkpoints=(0.5, 4.0))
+    with pytest.raises(StudyError, match=r"checkpoint at 0\.5 s before its cut"):
+        solve_nothing(early)
+    with pytest.raises(StudyError, match="is for a solid organ that is filled"):
+        prepare(Case(BALL_INCISED, BodyRecipe("surface", nodes=200)))
+
+
+def solve_nothing(scene):
+    from studies.meshing.nested_mesh import base_mesh
+    from studies.reference.nested import problem_of
+
+    return problem_of(base_mesh(scene, 150, 0))
