@@ -17,8 +17,8 @@ from studies.scene.as_json import scene_from_dict, scene_to_dict
 from studies.scene.scene import Scene
 
 Seconds = float | Literal["auto"]
-ADAPTIVE = "adaptive"
-"""How a body of quadratic elements is graded by one solution of its coarse mesh."""
+ADAPTIVE, ADAPTER = "adaptive", "studies.reference.adaptive_mesh"
+"""How a body of quadratic elements is graded by one solution of its coarse mesh, and the module that does it."""
 
 
 @dataclass(frozen=True)

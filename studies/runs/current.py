@@ -5,8 +5,7 @@ from pathlib import Path
 
 from massspring.sources import source_fingerprint
 from studies.geometry.mesher.jobs import MAKERS
-from studies.runs.case import ADAPTIVE, Case
-from studies.runs.prepare import ADAPTER
+from studies.runs.case import ADAPTER, ADAPTIVE, Case
 from studies.runs.user_code import files_of
 from studies.store.paths import record_path
 

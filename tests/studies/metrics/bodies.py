@@ -13,7 +13,7 @@ from studies.scene.library.liver_press import LIVER_PRESS
 from studies.scene.scene import Organ, Scene
 from tests.studies import made_up_run
 
-LIVER = BodyRecipe("quadratic", 794, graded="adaptive", mass="stiffness")
+LIVER = BodyRecipe("quadratic", 794, graded=True, mass="stiffness")
 """The body that was recommended for liver_press when it lacked 26 mm of the left lobe."""
 
 

@@ -22,7 +22,7 @@ from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.quadratic import RADIUS, ball_mesh
 from tests.studies.metrics.bodies import LIVER, ball_run, liver_runs
 from tests.studies.tiny import cube, file_scene, write_obj
-from tests.studies.tools.advise.made_up_campaign import LADDER, publish, row
+from tests.studies.tools.advise.made_up_campaign import GRADED, LADDER, publish, row
 
 DIAGONAL = 2.0 * RADIUS * 3.0**0.5
 SHAPES = ("shape_error", "shape_volume")
@@ -141,10 +141,10 @@ def test_a_liver_that_is_five_per_cent_shorter_is_caught_by_metric_table_and_adv
     table = study_table([whole, short], SHAPES)
     assert list(table["shape_error [%]"]) == pytest.approx([shape_of(whole)[0], distance])
     assert list(table["shape_volume [%]"]) == pytest.approx([shape_of(whole)[1], volume])
-    kept = [row(LIVER_PRESS, body, numbers) for body, numbers in LADDER.items() if body != LIVER]
+    kept = [row(LIVER_PRESS, body, numbers) for body, numbers in LADDER.items() if body != GRADED]
     shown = {"shape_error [%]": distance, "shape_volume [%]": volume}
     found = advise(
-        LIVER_PRESS, results=publish(tmp_path, [*kept, row(LIVER_PRESS, LIVER, LADDER[LIVER]) | shown]), timing=False
+        LIVER_PRESS, results=publish(tmp_path, [*kept, row(LIVER_PRESS, LIVER, LADDER[GRADED]) | shown]), timing=False
     )
     assert found.meets and found.chosen is not None and found.chosen.case.body.nodes == 1194
     assert found.misshapen is not None and found.misshapen.case.body == LIVER

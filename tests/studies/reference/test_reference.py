@@ -45,9 +45,10 @@ def test_pressure_is_the_one_that_balances_the_planes(found):
 
 
 def test_every_quantity_has_a_positive_floor_in_shares(found):
-    # A ball has no lumen and does not ring, and this one may turn; what is not compared is not listed.
+    # A ball has no lumen and no cut, does not ring, and this one may turn; what is not compared is not listed.
     assert set(found.total_uncertainty) == set(QUANTITIES) - {
         "lumen",
+        "opening",
         "frequency",
         "surface",
         "surface_mean",

@@ -119,7 +119,7 @@ def test_settings_are_compared_with_the_coarsest_mesh_and_add_to_the_bar():
 
 
 def test_every_quantity_that_is_compared_has_a_bar():
-    assert set(uncertainties_of(family())) == set(QUANTITIES) - {"lumen", "frequency"}
+    assert set(uncertainties_of(family())) == set(QUANTITIES) - {"lumen", "frequency", "opening"}
     with pytest.raises(StudyError, match="one mesh only"):
         uncertainties_of(family()[:1])
 

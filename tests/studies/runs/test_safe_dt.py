@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from massspring import METHODS, StepLimit, Xpbd
+from massspring import METHODS, StepLimit, Xpbd, XpbdNeoHookean
 from studies.base.errors import StudyError
 from studies.runs import safe_dt as module
 from studies.runs.case import BodyRecipe, Case
@@ -27,6 +27,9 @@ def recipe_for(method):
 @pytest.mark.parametrize("method", [m for m in METHODS if m not in UNLIMITED], ids=lambda method: method.name)
 def test_below_holds_and_above_breaks(method):
     found = safe_step(Case(SHORT, recipe_for(method), method()))
+    if method is XpbdNeoHookean:  # its springs are replaced by constraints: nothing tried broke it
+        assert {status for _, status in found.tried} == {Status.OK} and found.tried[-1][0] > 2 * found.limit.damped
+        return
     if method is Xpbd:
         # The volumes of all cells take the stiffest modes away: the limit is longer than that of the springs.
         assert found.bracket is not None and found.limit.damped < found.bracket[1] and found.tried[0][1] == Status.OK

@@ -62,6 +62,7 @@ def test_what_a_run_writes_is_what_its_tables_list(finished_sweep):
         OWN_FILES,
         ENTRY,
         SECONDS,
+        "cut_frame",
         "portable",
         "restamped",
     }  # where asked for
