@@ -32,7 +32,7 @@ ROOM, BELOW, SIDE = 1.6, 3.0, 2.0
 """Ends of the axes over the outermost values: above, below, where a name stands, and at the sides."""
 MOST_NAMED = 3
 """Runs that a note names."""
-STARS = ("*", (4, 1, 0))
+STARS = ("*", (4, 1, 0), (5, 1, 36))
 """Markers that have little area."""
 LOWEST, HIGHEST = 1e-3, 1e3
 """Errors outside are drawn at the edge [%]."""
