@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from studies.base.counting import heading
 from studies.metrics.metric import COMPARABLE
-from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run, by_scene
+from studies.metrics.table import metric
 from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
     band_handle,
@@ -27,7 +27,7 @@ from studies.plots.style.style import BLACK, GREY, method_colour, save, styled
 from studies.runs.case import BodyRecipe
 
 TITLE = "Opening of the incision against the reference"
-OPENINGS = [metric for metric in METRICS if metric.name == "opening_error"]
+OPENING = metric("opening_error")
 BINS = 8
 """Stretches between front and mouth over which the opening is averaged by area."""
 MM = 1e3
@@ -52,7 +52,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     handles = [*body_method_handles(shown, looks), reference_handle(linestyle="-", linewidth=1)]
     handles.append(band_handle("± its uncertainty"))
     notes = ["Across the cut along its normal, at the last checkpoint, averaged over stretches of equal depth."]
-    return finish(sheet, TITLE, handles, [*notes, *unresolved_notes(shown, OPENINGS), *remarks(runs)], columns=3)
+    return finish(sheet, TITLE, handles, [*notes, *unresolved_notes(shown, (OPENING,)), *remarks(runs)], columns=3)
 
 
 def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> None:

@@ -61,7 +61,7 @@ def adaptive_mesh(scene: Scene, wanted: int) -> QuadraticMesh:
         raise StudyError(f"scene '{scene.name}': its coarse mesh has {few} surface nodes already; ask for more")
     recipe = {
         "kind": "indicator",
-        "name": f"indicator-{scene.name}",
+        "name": f"indicator-{scene.organ.shape}",
         "code": source_fingerprint(__name__),
         "scene": scene_to_json(replace(scene, name="", title="", reference=None)),
     }

@@ -3,18 +3,9 @@
 import math
 
 from massspring.kernels.constraint.tetrahedra import moved_by
+from massspring.kernels.forces.corotated import cofactors
 from massspring.kernels.forces.elements import deformation
 from massspring.kernels.jit.decorators import compiled, njit_inlined
-
-
-@njit_inlined
-def cofactor(f):
-    """cof F, row by row, nine numbers."""
-    f00, f01, f02, f10, f11, f12, f20, f21, f22 = f
-    c00, c01, c02 = f11 * f22 - f12 * f21, f12 * f20 - f10 * f22, f10 * f21 - f11 * f20
-    c10, c11, c12 = f21 * f02 - f22 * f01, f22 * f00 - f20 * f02, f20 * f01 - f21 * f00
-    c20, c21, c22 = f01 * f12 - f02 * f11, f02 * f10 - f00 * f12, f00 * f11 - f01 * f10
-    return c00, c01, c02, c10, c11, c12, c20, c21, c22
 
 
 @njit_inlined
@@ -55,7 +46,7 @@ def relax_elements(contacts, inverse_mass, elements, y, scale, multiplier, push)
     for e in range(elements.node.shape[0]):
         mu, bulk, volume = elements.constants[0], elements.constants[1], elements.weight[e, 0]
         f = deformation(elements, y, e, 0)
-        c = cofactor(f)
+        c = cofactors(f)
         squares = f[0] * f[0] + f[1] * f[1] + f[2] * f[2] + f[3] * f[3] + f[4] * f[4] + f[5] * f[5]
         shear = math.sqrt(squares + f[6] * f[6] + f[7] * f[7] + f[8] * f[8])
         if not shear > 0.0:

@@ -44,7 +44,7 @@ def test_elements_are_small_under_the_probe_and_at_the_outline(mesh):
 
 def test_it_is_solved_once_and_the_same_again(mesh, monkeypatch):
     monkeypatch.setattr(module, "indicator_of", lambda *_: pytest.fail("solved again"))
-    again = adaptive_mesh(replace(LIVER_PROBE, title="other", reference=None), NODES)
+    again = adaptive_mesh(replace(LIVER_PROBE, name="other", title="other", reference=None), NODES)
     assert np.array_equal(again.points, mesh.points) and np.array_equal(again.cells, mesh.cells)
 
 
