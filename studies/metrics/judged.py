@@ -110,8 +110,8 @@ def judged(run: Run) -> Judged | None:
 def over_meshes(found: Iterable[Judged]) -> list[Judged]:
     """Rows of one scene, those of neighbouring meshes as one, with the largest errors, at the place of the middle one.
 
-    Where any quadratic recipe ran on all five, one that did not is left out: on one mesh it may be right by luck, and
-    of five where one ended badly it is not reliable."""
+    Where any quadratic recipe ran on all five, one of implicit_volume that did not is left out: on one mesh it may be
+    right by luck, and of five where one ended badly it is not reliable."""
     rows = {(one.case.body, _setting(one)): one for one in found}
     families = dict[tuple[BodyRecipe, str], Judged]()
     for (body, setting), one in rows.items():
@@ -120,7 +120,8 @@ def over_meshes(found: Iterable[Judged]) -> list[Judged]:
             families[body, setting] = _largest(one, tuple(member for member in members if member is not None))
     if not families:
         return list(rows.values())
-    return [families.get(key, one) for key, one in rows.items() if key in families or key[0].kind != "quadratic"]
+    alone = lambda one: one.advisable and one.case.body.kind == "quadratic"  # noqa: E731
+    return [families.get(key, one) for key, one in rows.items() if key in families or not alone(one)]
 
 
 def _setting(one: Judged) -> str:

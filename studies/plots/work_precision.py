@@ -213,7 +213,8 @@ def _left_out(runs: Sequence[Run]) -> list[str]:
     if ended:
         more = f" and {len(ended) - MOST_NAMED} more" if len(ended) > MOST_NAMED else ""
         told.append(f"Not drawn, because they failed: {', '.join(ended[:MOST_NAMED])}{more}.")
-    untimed = sum(run.timing is None for run in well)
+    rows = [one for group in by_scene(well).values() for one in over_meshes(filter(None, map(judged, group)))]
+    untimed = sum(not one.cost.known for one in rows)  # of neighbouring meshes one is timed
     if untimed:
         told.append(f"Not drawn (no frame times for this machine and code version): {untimed}.")
     return told

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import ImplicitVolume
+from massspring import ImplicitElements, ImplicitVolume
 from studies.metrics.judged import Judged, Measured, cheapest, over_meshes
 from studies.metrics.wish import Wish
 from studies.runs.case import BodyRecipe, Case, neighbours
@@ -50,6 +50,13 @@ def test_a_quadratic_recipe_on_one_mesh_is_no_answer_where_others_ran_on_five():
     found = over_meshes([*five(), single, linear])
     assert [one.case.body for one in found] == [BODY, linear.case.body]
     assert over_meshes([single, linear]) == [single, linear]  # alone it counts, and says so
+
+
+def test_other_methods_on_quadratic_elements_stay():
+    """They are there for comparison, and run on one mesh."""
+    other = row(replace(BODY, nodes=294), 2.0, 0.5)
+    other = replace(other, case=replace(other.case, method=ImplicitElements(), dt=0.01))
+    assert [one.case.method.name for one in over_meshes([*five(), other])] == ["implicit_volume", "implicit_elements"]
 
 
 def test_of_five_meshes_none_may_be_missing():
