@@ -16,8 +16,8 @@ SECONDS_PER_UNKNOWN = 2e-3
 cores of an AMD EPYC (family 25, model 17) that did other work too; each is within a factor of seven of it."""
 SECONDS_PER_UNKNOWN_STEP = 4e-4
 """Of a motion, for each time step [s]: a fifth of a load path, which has five checkpoints; not measured."""
-OCTANT = 28.5
-"""Unknowns of an octant, times the cube of its element size over the radius: 16,482 at 0.12."""
+OCTANT, OCTANT_ORDER = 176.5, 2.14
+"""Unknowns of an octant times this power of its element size over the radius: 3,153 at 0.26 and 16,482 at 0.12."""
 STEP = {"surface": 0.40, "membrane": 0.40, "tetrahedral": 0.30, "quadratic": 0.23}
 """Stability limit over size √(rho/mu) / √n of a body with n surface nodes: medians of results/published, as are all
 numbers from here on (426 cases; the organ's size is the diagonal of its box)."""
@@ -67,7 +67,7 @@ def unknowns(solve: ReferenceSolve) -> float:
     if plan.nested:
         return plan.most
     finest = plan.levels[-1]
-    return OCTANT / finest**3 if plan.mesh == "octant" else MOST_PER_NODE * finest**1.5
+    return OCTANT / finest**OCTANT_ORDER if plan.mesh == "octant" else MOST_PER_NODE * finest**1.5
 
 
 def solve_seconds(solve: ReferenceSolve) -> float:
