@@ -185,8 +185,10 @@ class Fit:
         ring = unique_edges(around)
         ring = ring[[(row != count).all() and not self.is_outline(row) for row in ring]]
         triangles = flip_edges(points, triangles, ring, lambda k, m: True, 1.0)
+        # None is left where all four were turned; those that a turn made are better than the ones before it.
         around = np.isin(triangles, around).sum(axis=1) == 3
-        if triangle_radius_ratio(points, triangles[around]).min() < FLOOR or folds(points, triangles, count):
+        worst = triangle_radius_ratio(points, triangles[around]).min(initial=np.inf)
+        if worst < FLOOR or folds(points, triangles, count):
             return False
         self.points, self.triangles = points, triangles
         if on_outline:

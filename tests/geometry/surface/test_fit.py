@@ -118,3 +118,17 @@ def test_a_node_that_folds_the_surface_is_refused():
 def test_an_outline_that_cannot_be_laid_is_refused(truth, coarse):
     with pytest.raises(StudyError, match="no length"):
         fitted(SHAPE, coarse, len(coarse[0]) + 10, [HalfSpace((0, 0, 0), (0, 0, 0))], truth, True)
+
+
+def test_all_four_sides_around_a_new_node_may_turn(truth):
+    """A square whose outer neighbours are slivers: each side is better turned to the new node in its middle."""
+    corners = [[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0]]
+    outside = [[-0.6, -0.6, 0], [0.6, -0.6, 0], [0.6, 0.6, 0], [-0.6, 0.6, 0]]
+    points = np.array([*corners, *outside, [0, 0, -3]], float)
+    square = [[0, 1, 2], [2, 3, 0]]
+    slivers = [[k, 4 + k, (k + 1) % 4] for k in range(4)]
+    ring = [node for k in range(4) for node in (k, 4 + k)]
+    below = [[8, ring[(k + 1) % 8], ring[k]] for k in range(8)]
+    fit = Fit(SHAPE, (points, np.array([*square, *slivers, *below])), [], truth, False)
+    assert fit.split(np.array([0, 2]), np.zeros(3), False)
+    assert (fit.triangles == 9).sum() == 8
