@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from massspring.kernels.arrays.face_pairs import FacePairs
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Model, Nodes, Workspace
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.jit.stage_clock import UNTIMED, StageTimes
@@ -33,6 +34,8 @@ class State:
     """Arrays that only the method knows, made by its `start`."""
     probing: Probing | None = None
     """Of thin probes; None where there are none: the frame is then compiled without their stage."""
+    pairs: FacePairs | None = None
+    """Faces of a cut that may touch; None where there are none: the frame is then compiled without them."""
     permutation: np.ndarray | None = None
     """Where each node is in `model` and `nodes`, (n,); None where they have the numbers of the body."""
 

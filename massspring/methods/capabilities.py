@@ -53,6 +53,8 @@ class Capabilities:
     """Bodies that obstacles touch at points inside facets."""
     thin_probes: Support = No("its steps have no stage for them")
     """Thin probes, met in continuous time."""
+    face_contact: Support = No("its steps do not keep the faces of a cut apart")
+    """Faces of a cut that touch each other."""
     threads: Support = No("its steps are not divided among threads")
     float32: Support = No("its claims are measured in float64")
     """A state in single precision."""

@@ -31,6 +31,7 @@ from massspring.kernels.constraint.jacobian import (
 from massspring.kernels.constraint.one_volume import limited_error, multiplier_of_sums, steepest, surely_short
 from massspring.kernels.constraint.schur import dense_into, solve_dense, solve_iteratively
 from massspring.kernels.contact.active_set import pressure_reach
+from massspring.kernels.contact.face_pairs import less_of_pairs, less_of_pairs_in, part_faces, press_pairs
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.points.arrays import PointRows
@@ -38,11 +39,11 @@ from massspring.kernels.step.begin import (
     begin_step,
     begin_summed_step,
     count_iterations,
-    multiplier_stands,
     open_frame,
     search_contacts,
 )
 from massspring.kernels.step.end import end_step
+from massspring.kernels.step.touching_faces import contacts_stand, search_pairs
 from massspring.layout.allocate import start
 from massspring.layout.block_jacobi import clusters_at_rest
 from massspring.layout.state import State
@@ -54,8 +55,11 @@ from massspring.world.obstacles import Attachment
 
 
 @njit_lean
-def implicit_volume_frame(frame, lam):
-    """One frame of HCJ05 with contact inside the multiplier (eq. 3.1–3.8); returns the last lam [Pa]."""
+def implicit_volume_frame(frame, lam, pairs):
+    """One frame of HCJ05 with contact inside the multiplier (eq. 3.1–3.8); returns the last lam [Pa].
+
+    `pairs`: faces of a cut that may touch, or None.
+    """
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
     gradient, dt = nodes.gradient, boundary.dt
     open_frame(frame)
@@ -64,16 +68,19 @@ def implicit_volume_frame(frame, lam):
         error = boundary.volume_target[step, 0] - volume
         predicted, left = lam, 0.0
         passes = search_contacts(frame, step, Push(gradient, predicted))
+        passes = search_pairs(frame, Push(gradient, predicted), passes, pairs)
         for sweep in range(passes):
+            through, mobile = less_of_pairs(pairs, model, frame.nodes, frame.contacts, flow, mobility, dt)
             lam, left, limited = limited_multiplier(
-                model, frame.nodes, frame.contacts, error, boundary.dt, flow, mobility
+                model, frame.nodes, frame.contacts, error, boundary.dt, through, mobile
             )
             diagnostics.limited[0] += limited and sweep == 0
             reach = pressure_reach(lam - predicted, left, model.largest_inverse_mass, dt)
-            if multiplier_stands(frame, step, Push(gradient, lam), reach, sweep + 1 == passes):
+            if contacts_stand(frame, step, Push(gradient, lam), reach, sweep + 1 == passes, pairs):
                 break
         if not left > 0.0:
             diagnostics.singular[0] += 1
+        press_pairs(pairs, model, frame.nodes, frame.contacts, Push(gradient, lam), dt)
         lam = end_step(frame, step, Push(gradient, lam), left, None)
     return lam
 
@@ -93,12 +100,13 @@ def limited_multiplier(model, nodes, contacts, error, dt, flow, mobility):
 
 
 @compiled
-def set_right_side(model, rows, nodes, contacts, target, dt, tolerance):
+def set_right_side(model, rows, nodes, contacts, target, dt, tolerance, pairs=None):
     """rhs_r = (V0_r − V_r)/dt² − (J u)_r/dt [m³/s²] with capped errors (eq. 8.3, 8.5), u = ṽ + dt W̃ Jᵀ lam.
 
     Returns whether a volume was capped, and whether a wrong one had nothing to push on.
     """
     pushed_velocity_into(nodes, contacts, model.inverse_mass, rows.push, dt, rows.node_vector)
+    part_faces(pairs, contacts, model.inverse_mass, rows.node_vector, dt, True)
     padded_rows_times_into(rows, rows.node_vector, rows.right)
     diagonal_into(rows, contacts, model.inverse_mass, rows.diagonal)
     lightest, per_second = model.largest_inverse_mass, 1.0 / dt
@@ -118,15 +126,17 @@ def set_right_side(model, rows, nodes, contacts, target, dt, tolerance):
 
 
 @compiled
-def solve_multipliers(model, rows, contacts, diagnostics, accuracy):
+def solve_multipliers(model, rows, contacts, diagnostics, accuracy, pairs=None):
     """lam += S⁻¹ rhs for the contacts of the moment (eq. 8.3, 8.4); then Jᵀ lam [N] into `rows.push`."""
     if rows.matrix.shape[0] > 0:
         dense_into(rows, contacts, model.inverse_mass, rows.matrix)
+        less_of_pairs_in(rows.matrix, pairs, rows, contacts, model.inverse_mass)
         solve_dense(rows.matrix, rows.right, rows.search)
         for r in range(rows.lam.shape[0]):
             rows.lam[r] += rows.search[r]
     else:
-        count = solve_iteratively(rows, contacts, model.inverse_mass, rows.lam, rows.allowed, accuracy.most_iterations)
+        most = accuracy.most_iterations
+        count = solve_iteratively(rows, contacts, model.inverse_mass, rows.lam, rows.allowed, most, pairs)
         count_iterations(diagnostics, count)
         if count == 0:
             return
@@ -134,8 +144,11 @@ def solve_multipliers(model, rows, contacts, diagnostics, accuracy):
 
 
 @njit_lean
-def implicit_volumes_frame(frame, rows, accuracy):
-    """One frame of HCJ05 with several volumes (eq. 3.1–3.8, 8.2–8.5); `rows.lam` [Pa] comes in and goes out."""
+def implicit_volumes_frame(frame, rows, accuracy, pairs):
+    """One frame of HCJ05 with several volumes (eq. 3.1–3.8, 8.2–8.5); `rows.lam` [Pa] comes in and goes out.
+
+    `pairs`: faces of a cut that may touch, or None.
+    """
     model, nodes, contacts, boundary, diagnostics = (
         frame.model,
         frame.nodes,
@@ -151,13 +164,15 @@ def implicit_volumes_frame(frame, rows, accuracy):
         transposed_rows_times_into(rows, rows.lam, rows.push)
         end_stage(diagnostics.stage_times, VOLUME)
         target, passes = boundary.volume_target[step], search_contacts(frame, step, push)
+        passes = search_pairs(frame, push, passes, pairs)
         for sweep in range(passes):
-            limited, idle = set_right_side(model, rows, nodes, contacts, target, boundary.dt, accuracy.tolerance)
-            solve_multipliers(model, rows, contacts, diagnostics, accuracy)
-            if multiplier_stands(frame, step, push, math.inf, sweep + 1 == passes):
+            limited, idle = set_right_side(model, rows, nodes, contacts, target, boundary.dt, accuracy.tolerance, pairs)
+            solve_multipliers(model, rows, contacts, diagnostics, accuracy, pairs)
+            if contacts_stand(frame, step, push, math.inf, sweep + 1 == passes, pairs):
                 break
         diagnostics.limited[0] += limited
         diagnostics.singular[0] += idle
+        press_pairs(pairs, model, nodes, contacts, push, boundary.dt)
         end_step(frame, step, push, 0.0, rows)
 
 
@@ -182,6 +197,7 @@ class ImplicitVolume(Method):
         point_volumes=True,
         facet_contact=True,
         thin_probes=True,
+        face_contact=True,
         threads=True,
         float32=True,
     )
@@ -189,7 +205,7 @@ class ImplicitVolume(Method):
     def __post_init__(self) -> None:
         if self.recovers:
             limits = dict.fromkeys(
-                ("thin_probes", "threads", "float32", "events"), No("it may settle into another shape")
+                ("thin_probes", "threads", "float32", "events", "face_contact"), No("it may settle into another shape")
             )
             object.__setattr__(self, "capabilities", replace(self.capabilities, **limits))
 
@@ -216,12 +232,12 @@ class ImplicitVolume(Method):
             state = replace(state, memory=None, lam=np.zeros_like(state.lam))
         with threaded_frame(state, boundary) as after:
             if after.rows is None:
-                lam = implicit_volume_frame(after.frame(boundary), float(after.lam[0]))
+                lam = implicit_volume_frame(after.frame(boundary), float(after.lam[0]), after.pairs)
                 return replace(after, lam=np.array([lam]))
             after.rows.lam[:] = after.lam + after.model.rest_lam
             accuracy = Accuracy(self.tolerance, self.most_iterations)
             if isinstance(after.rows, PointRows):
-                point_volumes_frame(after.frame(boundary), after.rows, None, accuracy)
+                point_volumes_frame(after.frame(boundary), after.rows, None, accuracy, after.pairs)
             else:
-                implicit_volumes_frame(after.frame(boundary), after.rows, accuracy)
+                implicit_volumes_frame(after.frame(boundary), after.rows, accuracy, after.pairs)
             return replace(after, lam=after.rows.lam - after.model.rest_lam)

@@ -59,7 +59,7 @@ class SemiImplicit(Method):
         assert isinstance(after.rows, PointRows)  # other bodies are refused
         implicit, rows = after.memory.at(after.model, after.rows, boundary.dt, boundary.damping)
         rows.lam[:] = after.lam + after.model.rest_lam
-        point_volumes_frame(after.frame(boundary), rows, implicit, Accuracy(self.tolerance, self.most_iterations))
+        point_volumes_frame(after.frame(boundary), rows, implicit, Accuracy(self.tolerance, self.most_iterations), None)
         return replace(after, rows=rows, lam=rows.lam - after.model.rest_lam)
 
 

@@ -1,5 +1,6 @@
 """What a set-up is checked for before it runs, and its surroundings in each frame; each complaint is one sentence."""
 
+import warnings
 from collections.abc import Collection, Mapping
 
 import numpy as np
@@ -16,7 +17,7 @@ from massspring.layout.state import State
 from massspring.layout.threads import cores
 from massspring.methods.capabilities import No
 from massspring.methods.method import Method
-from massspring.world.obstacles import Capsule, Obstacle, Plane, Probe, Sphere
+from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
 from massspring.world.surroundings import Surroundings
 from massspring.world.trajectories import Ramp
 
@@ -159,6 +160,44 @@ def check_threads(threads: int, method: Method) -> None:
     supported = method.capabilities.threads
     if threads > 1 and isinstance(supported, No):
         raise MassSpringError(f"method '{method.name}' runs on one thread, {supported.because}; leave threads at 1")
+
+
+def check_face_pairs(
+    pairs: np.ndarray,
+    method: Method,
+    attachments: Collection[Attachment],
+    precision: str,
+    threads: int,
+    probes: bool,
+) -> None:
+    """Raises MassSpringError for faces of a cut that may touch in a run that cannot keep them apart."""
+    supported = method.capabilities.face_contact
+    if isinstance(supported, No):
+        raise MassSpringError(
+            f"method '{method.name}' does not support contact between the faces of a cut: {supported.because}; "
+            "take implicit_volume, or leave the pairs out"
+        )
+    if precision != "float64" or threads != 1 or probes:
+        raise MassSpringError(
+            "faces of a cut that may touch are advanced in float64, by one thread and without thin probes; "
+            "leave these out"
+        )
+    held = np.isin(np.asarray(pairs), np.concatenate([[], *(np.asarray(a.nodes) for a in attachments)]))
+    alone = int((held.sum(axis=1) == 1).sum())
+    if alone:
+        raise MassSpringError(
+            f"{alone} nodes on a cut are attached and their copies are not; attach both, or leave these pairs out"
+        )
+
+
+def check_slip(lost: int, pairs: int) -> None:
+    """Warns of pairs on a cut that touched and slid over each other by more than an edge."""
+    if lost:
+        warnings.warn(
+            f"{lost} of {pairs} pairs of nodes on the cut slid over each other by more than an edge while they touched;"
+            " from there on nothing keeps them apart",
+            stacklevel=3,
+        )
 
 
 def check_probes(state: State, obstacles: tuple[Obstacle, ...]) -> str | None:

@@ -29,6 +29,8 @@ class Event:
     """How many frames come before it."""
     attachments: tuple[Attachment, ...] = ()
     """As many as before, in the same order, by the nodes of the new body."""
+    pairs: np.ndarray | None = None
+    """Nodes behind a cut and their copies in front of it, (p, 2), if its faces touch from then on (`Setup.pairs`)."""
 
 
 @dataclass(frozen=True, eq=False)

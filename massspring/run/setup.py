@@ -10,6 +10,7 @@ import numpy as np
 
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import BoundaryConditions, Tips
+from massspring.layout.face_pairs import face_pairs
 from massspring.layout.probe_arrays import new_probing
 from massspring.layout.state import State
 from massspring.layout.threads import shared
@@ -17,6 +18,7 @@ from massspring.methods.method import Method
 from massspring.run.checks import (
     check_among,
     check_body,
+    check_face_pairs,
     check_facets,
     check_nodal,
     check_probe,
@@ -61,6 +63,9 @@ class Setup:
     """That share a step; the result is the same to the last bit. Pays for bodies of some thousand nodes."""
     events: tuple[Event, ...] = ()
     """Changes of the body between frames, such as cuts."""
+    pairs: np.ndarray | None = None
+    """Nodes behind a cut and their copies in front of it, (p, 2), whose faces touch without friction where it closes;
+    None: none do."""
 
     def __post_init__(self) -> None:
         check_body(self.body, self.method)
@@ -70,6 +75,8 @@ class Setup:
         check_precision(self.precision, self.method)
         check_facets(self.precision, self.body, self.solids)
         check_threads(self.threads, self.method)
+        if self.pairs is not None:
+            check_face_pairs(self.pairs, self.method, self.attachments, self.precision, self.threads, bool(self.probes))
         limited = self.method.capabilities.conditionally_stable
         check_surroundings(self.gravity, self.damping, self.clock.dt if limited else 0.0)
         check_nodal("initial velocities", self.velocity, self.body)
@@ -100,7 +107,15 @@ class Setup:
             check_event(event, body)
             x, body = None if x is None else x[event.parent], event.body
             setups.append(
-                replace(self, body=body, attachments=event.attachments, velocity=None, positions=x, events=())
+                replace(
+                    self,
+                    body=body,
+                    attachments=event.attachments,
+                    velocity=None,
+                    positions=x,
+                    events=(),
+                    pairs=event.pairs,
+                )
             )
         return tuple(setups)
 
@@ -145,6 +160,10 @@ class Setup:
         if self.probes:
             probing = new_probing(self.inside.body, state.model.triangles, self.probes, state.diagnostics)
             state = replace(state, probing=probing)
+        if self.pairs is not None:
+            number = self.inside.permutation
+            pairs = self.pairs if number is None else number[np.asarray(self.pairs)]
+            state = replace(state, pairs=face_pairs(self.inside.body, pairs))
         if self.positions is not None:
             state = state.moved_to(self.positions)
         if self.precision == "float32":

@@ -8,7 +8,7 @@ import numpy as np
 
 from massspring.body.body import Body
 from massspring.layout.state import State
-from massspring.run.checks import check_loads, check_probes
+from massspring.run.checks import check_loads, check_probes, check_slip
 from massspring.run.history import EXTRA, History, Recorder
 from massspring.run.setup import Setup
 from massspring.run.stages import stages_of
@@ -71,4 +71,6 @@ def simulate(
             on_frame(frame + 1)
         if thread_time_ns() - begun > 1e9 * time_limit and frame + 1 < setup.clock.frames:
             return recorder.stopped(frame + 1, "timed-out", f"the time limit of {time_limit:g} s was reached")
+    if state.pairs is not None:
+        check_slip(int(state.pairs.lost[0]), len(state.pairs.node))
     return recorder.finished()

@@ -95,7 +95,11 @@ def motion_path(
 
 
 def check_element(problem: Problem):
-    """Refuse elements whose displacement is not given at the P2 nodes, where a motion starts."""
+    """Refuse elements whose displacement is not given at the P2 nodes, where a motion starts, and touching faces."""
+    if problem.faces_touch:
+        raise SolveError(
+            "a motion in which the faces of a cut touch is asked for: follow a load path, or let them pass"
+        )
     if not isinstance(find_element(problem.element).displacement, ElementTetP2):
         raise SolveError(f"a motion with the element {problem.element!r} is asked for: use 'P2/P1' or 'P2/P0'")
 

@@ -219,6 +219,11 @@ def build_facets(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAULT]
     return Facets(table[:, : values.shape[1]], values, area * w)
 
 
+def facet_slopes(order: int, element: Element) -> np.ndarray:
+    """The two derivatives of a facet's functions at the points of `build_facets`, (nq, 2, 6)."""
+    return basis_table(element.facet, get_quadrature(RefTri, order)[0])[1]
+
+
 def surface_triangles(mesh: MeshTet) -> np.ndarray:
     """Boundary as linear triangles, outward, four to a facet, (4 nf, 3) indices into nodes(mesh)."""
     table = facet_nodes(mesh)

@@ -38,7 +38,8 @@ class Problem:
     cavities: lumens that keep a volume or a pressure; a lumen not named is open. element: a name in ELEMENTS.
     order: degree integrated exactly, None = the element's own (for P2/P1 that is 5, the lowest with positive weights at
     or above what p J needs, 4). loads: dead forces, switched on with gravity at the start, then as their time says.
-    masses: hung at nodes.
+    masses: hung at nodes. faces_touch: boundary facets that lie on each other at rest, those of a cut, may not overlap;
+    they slide on each other without friction, by less than a facet.
     """
 
     mesh: MeshTet
@@ -53,6 +54,7 @@ class Problem:
     element: str = DEFAULT
     loads: Sequence[Traction | BodyForce] = ()
     masses: Sequence[PointMass] = ()
+    faces_touch: bool = False
 
     @property
     def degree(self) -> int:

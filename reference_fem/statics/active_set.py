@@ -14,6 +14,7 @@ import scipy.sparse as sp
 
 from reference_fem.compiled import compiled
 from reference_fem.contact.augmented import Touch
+from reference_fem.contact.faces import FaceTouch, gaps_and_slopes
 from reference_fem.elements.surface import point_positions
 from reference_fem.model.obstacles import gap_into
 from reference_fem.statics.tangent import Tangent
@@ -47,7 +48,7 @@ class Points(NamedTuple):
     excess: np.ndarray
     """Pressure that the tangent counts with and the residual lacks [Pa]."""
     place: tuple
-    """Obstacle, facet and point of each."""
+    """Obstacle, facet and point of each; on the faces of a cut facet and point."""
 
 
 @compiled()
@@ -85,6 +86,29 @@ def points_near(system: System, touch: Touch, x: np.ndarray, change: np.ndarray)
     return Points(directions, ahead, m, eps, surface.weights[f, q], touching, excess, place)
 
 
+def points_between(system: System, touch: FaceTouch, x: np.ndarray, change: np.ndarray) -> Points:
+    """The same for the faces of a cut: b = dg/dx."""
+    faces, counted = system.faces, touch.guess if len(touch.guess) else touch.pressure
+    gap, slopes = gaps_and_slopes(x, faces)
+    after = gap + np.einsum("fqr,fr->fq", slopes, change[faces.dofs])
+    reach = np.sqrt(faces.weights.sum(axis=1))[:, None]
+    near = ((np.minimum(gap, after) < reach) | (counted > 0.0)).any(axis=1)
+    place = f, _ = np.nonzero(np.repeat(near[:, None], gap.shape[1], axis=1))
+    start = faces.dofs.shape[1] * np.arange(len(f) + 1)
+    dofs = faces.dofs[f].ravel().astype(np.int64)
+    directions = sp.csr_matrix((slopes[place].ravel(), dofs, start), shape=(len(f), system.total))
+    m, eps, touching = touch.multiplier[place], touch.penalty[f], counted[place] > 0.0
+    excess = np.where(touching, m - eps * gap[place], 0.0) - touch.pressure[place]
+    return Points(directions, gap[place], m, eps, faces.weights[place], touching, excess, place)
+
+
+def together(one: Points, other: Points) -> Points:
+    """Points of both; their places are left to them."""
+    directions = sp.csr_matrix(sp.vstack([one.directions, other.directions]))
+    gap, m, eps, area, touching, excess = (np.concatenate(both) for both in zip(one[1:-1], other[1:-1], strict=True))
+    return Points(directions, gap, m, eps, area, touching, excess, ())
+
+
 class Influence:
     """How all points move when one of them is pushed; found when first asked for.
 
@@ -112,12 +136,14 @@ class Influence:
 
 
 def settled(system: System, tangent: Tangent, x: np.ndarray, change: np.ndarray):
-    """Newton's change (total,) of x with the contact of the linearised problem settled, and its pressures (no, nf, nq).
+    """Newton's change (total,) of x with the contact of the linearised problem settled, and its pressures at obstacles
+    (no, nf, nq) and between faces (nf, nq).
 
     The next tangent counts with those: they tell better than the gaps which points are going to touch.
     """
-    touch = tangent.found.touch
-    points = points_near(system, touch, x, change)
+    touch, faces = tangent.found.touch, tangent.found.faces
+    parts = points_near(system, touch, x, change), points_between(system, faces, x, change)
+    points = together(*parts)
     influence = Influence(system, tangent, points)
     change = change + tangent.respond(influence.forces(points.area * points.excess))
     plain = gap = points.gap + points.directions @ change
@@ -134,9 +160,10 @@ def settled(system: System, tangent: Tangent, x: np.ndarray, change: np.ndarray)
             break
         share = share_of(points, push, goal - push, gap, there - gap)
         push, gap = push + share * (goal - push), gap + share * (there - gap)
-    guess = np.zeros_like(touch.multiplier)
-    guess[points.place] = pressures(points, gap)
-    return (change + tangent.respond(influence.forces(push)) if push.any() else change), guess
+    guesses, counted = (np.zeros_like(touch.multiplier), np.zeros_like(faces.multiplier)), pressures(points, gap)
+    for guess, part, values in zip(guesses, parts, np.split(counted, [len(parts[0].gap)]), strict=True):
+        guess[part.place] = values
+    return (change + tangent.respond(influence.forces(push)) if push.any() else change), *guesses
 
 
 def pressures(points: Points, gap: np.ndarray):

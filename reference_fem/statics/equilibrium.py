@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reference_fem.contact import augmented as contact
+from reference_fem.contact.faces import farthest_slip, overlap
 from reference_fem.elements.shapes import at_nodes, forces_at_nodes
 from reference_fem.errors import SolveError
 from reference_fem.model.problem import Problem
@@ -42,7 +43,7 @@ class Equilibrium:
     weights: np.ndarray
     """Rest volume of the quadrature points, (ne, nq) [m³]."""
     penetration: float
-    """Deepest quadrature point inside an obstacle [m]."""
+    """Deepest quadrature point inside an obstacle, or on a cut in the other face [m]."""
     slippage: float
     """Farthest that a point stuck to a no-slip obstacle has slipped [m]."""
     newton_iterations: int
@@ -143,6 +144,12 @@ def describe(system: System, state: State, iterations: int, substeps: int) -> Eq
     """Everything worth knowing about a converged state."""
     n, elements = system.displacement_count, system.elements
     found = system.evaluate(state.x, system.loads_of(state), tangent=False)
+    slip = farthest_slip(state.x, system.faces, found.faces)
+    if slip > 1.0:
+        raise SolveError(
+            f"faces of the cut that touch have slid over each other by {slip:.2g} facets at t = {state.t:g} s, and"
+            " points find each other within one: press them with less shear, or take a coarser mesh"
+        )
     mesh, material = system.problem.mesh, system.problem.material
     J = np.linalg.det(assembly.deformation(state.x, elements, material.kappa)[0])
     reaction, held = np.zeros(n), system.pattern.held
@@ -160,7 +167,7 @@ def describe(system: System, state: State, iterations: int, substeps: int) -> Eq
         volume0=system.volume,
         J=J,
         weights=elements.weights,
-        penetration=contact.penetration(found.touch),
+        penetration=max(contact.penetration(found.touch), overlap(found.faces)),
         slippage=contact.slippage(found.touch),
         newton_iterations=iterations,
         substeps=substeps,

@@ -73,7 +73,8 @@ def carried(coarse: System, state: State, fine: System, to: Transfer) -> State:
     x = np.concatenate((u.ravel(), p, state.x[m:]))
     x[fine.pattern.held] = fine.held_at(state.t)
     pressure = carried_contact(coarse, state.pressure, fine)
-    carried_over = replace(state, x=x, multiplier=pressure, pressure=pressure)
+    faces = carried_between_faces(coarse, state.face_pressure, fine)
+    carried_over = replace(state, x=x, multiplier=pressure, pressure=pressure, faces=faces, face_pressure=faces)
     return replace(carried_over, stiffness=1.0, grip=NO_GRIP, hold=NO_GRIP)
 
 
@@ -84,6 +85,18 @@ def carried_contact(coarse: System, pressure: np.ndarray, fine: System) -> np.nd
     rest = [point_positions(np.zeros(len(s.surface.rest)), s.surface) for s in (coarse, fine)]
     near = KDTree(rest[0].reshape(-1, 3)).query(rest[1].reshape(-1, 3))[1]
     return pressure.reshape(len(pressure), -1)[:, near].reshape(len(pressure), *rest[1].shape[:2])
+
+
+def carried_between_faces(coarse: System, pressure: np.ndarray, fine: System) -> np.ndarray:
+    """Pressures (nf, nq) [Pa] between the faces of the coarser cut at the points of the finer one."""
+    if not pressure.size:
+        return np.zeros(fine.faces.weights.shape)
+    rest = []
+    for faces in (coarse.faces, fine.faces):
+        nodes = faces.rest[faces.dofs].reshape(len(faces.dofs), 2, 3, -1)[:, 0]
+        rest.append(np.einsum("qa,fia->fqi", faces.values, nodes).reshape(-1, 3))
+    near = KDTree(rest[0]).query(rest[1])[1]
+    return pressure.ravel()[near].reshape(fine.faces.weights.shape)
 
 
 def continued(system: System, state: State) -> State:

@@ -6,6 +6,7 @@ import numpy as np
 
 from reference_fem.contact import augmented as contact
 from reference_fem.contact.augmented import NO_GUESS
+from reference_fem.contact.faces import gaps_and_slopes, misplacement_of_faces
 from reference_fem.errors import SingularTangent
 from reference_fem.statics import active_set
 from reference_fem.statics.tangent import Tangent
@@ -28,6 +29,12 @@ HESITATION = 8
 step. Held, some points are not pressed, and let go, they are: without this they would come and go for ever."""
 
 
+SHUT = 1e-6
+"""Gap between the faces of a cut, over the root of their area, below which they lie on each other: round-off."""
+FAINT = 1e-9
+"""A pressure [Pa] that tells such points from others and is none."""
+
+
 class StepFailed(Exception):
     """A load step did not converge; the path tries a smaller one."""
 
@@ -42,11 +49,12 @@ def solve_step(system: System, state: State, t: float, load: float, more: np.nda
     """
     target, stiffness = system.held_at(t), 1.0
     force, filling = system.force_at(t, load) + more, system.filling_at(t, load)
-    loads = Loads(force, system.obstacles_at(t), state.pressure, filling, grip=state.hold)
+    loads = Loads(force, system.obstacles_at(t), state.pressure, filling, grip=state.hold, faces=state.face_pressure)
     x, found, before = state.x, first_guess(system, state, loads), None
     for iteration in range(1, system.settings.max_iterations + 1):
-        change, guess = direction(system, found, x, target)
-        loads = loads._replace(guess=guess, grip=let_go(loads.grip, guess) if iteration > HESITATION else loads.grip)
+        change, guess, face_guess = direction(system, found, x, target)
+        grip = let_go(loads.grip, guess) if iteration > HESITATION else loads.grip
+        loads = loads._replace(guess=guess, face_guess=face_guess, grip=grip)
         x, found = search(system, x, change, loads, before)
         arrived = np.array_equal(x[system.pattern.held], target)
         off = misplaced(system, x, found)
@@ -54,10 +62,12 @@ def solve_step(system: System, state: State, t: float, load: float, more: np.nda
             if not off:
                 hold = contact.renewed_grip(found.touch, system.sticks, system.surface, x)
                 settled_in = State(t, load, x, loads.multiplier, found.touch.pressure, iteration)
+                settled_in = replace(settled_in, faces=loads.faces, face_pressure=found.faces.pressure)
                 return replace(settled_in, stiffness=stiffness, grip=loads.grip, hold=hold)
             stiffness *= PENALTY_GROWTH
             grip = loads.grip._replace(traction=found.touch.traction)
             loads = loads._replace(multiplier=found.touch.pressure, stiffness=stiffness, grip=grip)
+            loads = loads._replace(faces=found.faces.pressure)
             found = system.evaluate(x, loads)
         before = found
     raise StepFailed(
@@ -69,7 +79,12 @@ def first_guess(system: System, state: State, loads: Loads):
     """The evaluation that the first direction is taken from: where the body is, with the move of the obstacles
     linearised."""
     old = system.obstacles_at(state.t)
-    return system.evaluate(state.x, loads._replace(rows=old, shift=loads.rows[:, 1:4] - old[:, 1:4]))
+    loads = loads._replace(rows=old, shift=loads.rows[:, 1:4] - old[:, 1:4])
+    if len(system.faces.dofs):
+        # Faces that lie on each other are counted as touching: those that part are easier to find than those that meet.
+        shut = gaps_and_slopes(state.x, system.faces)[0] <= SHUT * np.sqrt(system.faces.weights.sum())
+        loads = loads._replace(face_guess=np.where(shut, np.maximum(loads.faces, FAINT), loads.faces))
+    return system.evaluate(state.x, loads)
 
 
 def let_go(grip: contact.Grip, guess: np.ndarray):
@@ -85,7 +100,9 @@ def direction(system: System, found: Evaluation, x: np.ndarray, target: np.ndarr
     try:
         tangent = Tangent(system, found)
         change = tangent.newton(target - x[system.pattern.held])
-        return active_set.settled(system, tangent, x, change) if len(system.rows) else (change, NO_GUESS)
+        if len(system.rows) or len(system.faces.dofs):
+            return active_set.settled(system, tangent, x, change)
+        return change, NO_GUESS, found.faces.guess
     except SingularTangent as singular:
         raise StepFailed(str(singular)) from singular
 
@@ -101,7 +118,10 @@ def misplaced(system: System, x: np.ndarray, found: Evaluation):
     """Whether contact acts farther from an obstacle's surface, or from where it stuck, than its share of the largest
     displacement."""
     allowed = system.settings.penetration_tol * np.abs(x[: system.displacement_count]).max()
-    return max(contact.misplacement(found.touch), contact.slippage(found.touch)) > allowed
+    return (
+        max(contact.misplacement(found.touch), contact.slippage(found.touch), misplacement_of_faces(found.faces))
+        > allowed
+    )
 
 
 def search(system: System, x: np.ndarray, direction: np.ndarray, loads: Loads, before: Evaluation | None):

@@ -73,8 +73,9 @@ def find_slots(local: np.ndarray, n: int, upper: tuple, lift: tuple, slots: np.n
                 slot += 1
 
 
-def build_pattern(dofs: np.ndarray, held_mask: np.ndarray) -> Pattern:
-    """Pattern of all element matrices on dofs (ne, l); held_mask (total,) marks prescribed unknowns.
+def build_pattern(dofs: np.ndarray, held_mask: np.ndarray, *more: np.ndarray) -> Pattern:
+    """Pattern of all element matrices on dofs (ne, l), and on more such tables; held_mask (total,) marks prescribed
+    unknowns.
 
     With E (ne, total), 1 where an element has an unknown, EᵀE is not zero where two unknowns share an element.
     """
@@ -82,9 +83,10 @@ def build_pattern(dofs: np.ndarray, held_mask: np.ndarray) -> Pattern:
     n, m = len(free), len(held)
     rank = np.empty(len(held_mask), dtype=np.int32)
     rank[free], rank[held] = np.arange(n), n + np.arange(m)
-    count, width = dofs.shape
-    starts = width * np.arange(count + 1)
-    members = sp.csr_matrix((np.ones(dofs.size, dtype=np.int32), rank[dofs].ravel(), starts), shape=(count, n + m))
+    tables = [dofs, *more]
+    widths = np.concatenate([np.full(*table.shape) for table in tables])
+    starts, members = np.concatenate([[0], np.cumsum(widths)]), np.concatenate([rank[t].ravel() for t in tables])
+    members = sp.csr_matrix((np.ones(len(members), dtype=np.int32), members, starts), shape=(len(widths), n + m))
     shared = (members.T[:n] @ members).tocsr()
     upper, lift = sp.csr_matrix(sp.triu(shared[:, :n])), sp.csr_matrix(shared[:, n:])
     upper.sort_indices()

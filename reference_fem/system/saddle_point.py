@@ -1,11 +1,12 @@
 """The discrete system of one problem: residual, tangent and Newton's direction under given loads."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from reference_fem.contact import augmented as contact
-from reference_fem.elements.shapes import Facets, build_elements, build_facets, displacement_points
+from reference_fem.contact.faces import Faces, FaceTouch, add_faces, coincident, no_faces
+from reference_fem.elements.shapes import Facets, build_elements, build_facets, displacement_points, facet_slopes
 from reference_fem.elements.surface import Surface
 from reference_fem.elements.table import find_element
 from reference_fem.errors import SolveError
@@ -35,6 +36,8 @@ class Evaluation:
     """Of the cavities, (nc,) [m³]."""
     gradients: np.ndarray
     """dV/dx of the cavities, (nc, field_count) [m²]."""
+    faces: FaceTouch
+    """Contact between the faces of a cut."""
 
     @property
     def usable(self):
@@ -61,10 +64,13 @@ class System:
         for held in self.held:
             mask[held.dofs] = True
         self.check_freedom(np.flatnonzero(mask))
-        self.pattern = build_pattern(self.elements.dofs, mask)
-        self.positions = self.pattern.positions(self.elements.dofs)
         facets = build_facets(mesh, problem.contact_order, self.element)
+        pairs = coincident(facets, self.nodes) if problem.faces_touch else np.zeros((0, 2, facets.nodes.shape[1]), int)
+        apart = (3 * pairs[:, :, None] + np.arange(3)[:, None]).reshape(len(pairs), 6 * pairs.shape[2])
+        self.pattern = build_pattern(self.elements.dofs, mask, *([apart] if len(apart) else []))
+        self.positions = self.pattern.positions(self.elements.dofs)
         self.surface = self.build_surface(facets)
+        self.faces = self.build_faces(facets, pairs[:, 0], apart)
         self.lumens = cavity.find_lumens(problem, self.pattern, self.element.facet, facets.nodes, self.held)
         self.rows = np.array([obstacle.row() for obstacle in problem.obstacles]).reshape(-1, 8)
         self.sticks = obstacles.sticky(problem.obstacles)
@@ -84,6 +90,17 @@ class System:
         positions = self.pattern.positions(dofs)
         rest = self.nodes.ravel()
         return Surface(dofs.astype(np.uint32), positions, rest, facets.values, facets.weights, penalty)
+
+    def build_faces(self, facets: Facets, behind: np.ndarray, dofs: np.ndarray) -> Faces:
+        """Tables of the faces of a cut, `behind` (nf, 6) the nodes behind it, `dofs` (nf, 36) the unknowns of both."""
+        if not len(dofs):
+            return no_faces(*facets.values.shape)
+        place = {tuple(row): k for k, row in enumerate(facets.nodes)}
+        at = np.array([place[tuple(row)] for row in behind])
+        slopes = facet_slopes(self.problem.contact_order, self.element)
+        tables = dofs.astype(np.uint32), self.pattern.positions(dofs)
+        shapes = facets.values, slopes, facets.weights[at], self.surface.penalty[at]
+        return Faces(*tables, self.nodes.ravel(), *shapes)
 
     def find_loads(self):
         """The dead loads at their quadrature points, weight among them."""
@@ -106,7 +123,9 @@ class System:
         shape = (len(self.rows), *self.surface.weights.shape)
         x, start = np.zeros(self.total), self.settings.start
         grip = contact.first_grip(self.obstacles_at(start), self.sticks, self.surface, x, TOUCHING * np.ptp(self.nodes))
-        return State(start, 0.0, x, np.zeros(shape), np.zeros(shape), grip=grip, hold=grip)
+        faces = np.zeros(self.faces.weights.shape)
+        rest = State(start, 0.0, x, np.zeros(shape), np.zeros(shape), grip=grip, hold=grip)
+        return replace(rest, faces=faces, face_pressure=faces)
 
     def obstacles_at(self, t: float):
         """Rows of the obstacles at time t, (no, 8)."""
@@ -125,7 +144,7 @@ class System:
         """What acts in a converged state."""
         rows, filling = self.obstacles_at(state.t), self.filling_at(state.t, state.load)
         force = self.force_at(state.t, state.load)
-        return Loads(force, rows, state.multiplier, filling, state.stiffness, grip=state.grip)
+        return Loads(force, rows, state.multiplier, filling, state.stiffness, grip=state.grip, faces=state.faces)
 
     def held_at(self, t: float):
         """Prescribed values of the held unknowns at time t; refuses regions that contradict each other."""
@@ -149,19 +168,23 @@ class System:
         shift = np.zeros((len(loads.rows), 3)) if loads.shift is None else loads.shift
         penalty = loads.stiffness * self.surface.penalty
         touch = contact.touch(loads.rows, shift, loads.multiplier, penalty, loads.grip, loads.guess)
+        faces = loads.faces if loads.faces.size else np.zeros(self.faces.weights.shape)
+        between = FaceTouch(faces, loads.stiffness * self.faces.penalty, loads.face_guess, np.zeros_like(faces))
         parameters = self.problem.material.parameters
         J = assembly.add_elements(x, self.elements, parameters, self.positions, values, residual, tangent)
         volumes, gradients = np.zeros(len(self.lumens)), np.zeros((len(self.lumens), self.field_count))
         if J > 0.0:
             if len(loads.rows):
                 contact.add_contact(x, self.surface, touch, values, residual, tangent)
+            if len(self.faces.dofs):
+                add_faces(x, self.faces, between, values, residual, tangent)
             for k, (lumen, wanted) in enumerate(zip(self.lumens, loads.filling, strict=True)):
                 pressure = x[self.field_count + k]
                 volumes[k] = lumen.add(x, pressure, gradients[k], values, tangent)
                 residual[: self.field_count] -= pressure * gradients[k]
                 residual[self.field_count + k] = (pressure if lumen.by_pressure else volumes[k]) - wanted
         errors = self.relative_errors(x, residual, touch, loads.force, gradients)
-        return Evaluation(residual, values, J, touch, errors, volumes, gradients)
+        return Evaluation(residual, values, J, touch, errors, volumes, gradients, between)
 
     def relative_errors(
         self,

@@ -1,11 +1,13 @@
 """What a load step starts from, what acts during it, and how hard to try."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from reference_fem.contact.augmented import NO_GRIP, NO_GUESS, Grip
+
+NO_FACES = np.zeros((0, 0))
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,10 @@ class State:
     """With which the tractions of stuck points follow from x."""
     hold: Grip = NO_GRIP
     """The grip that the next step starts from."""
+    faces: np.ndarray = field(default_factory=lambda: NO_FACES)
+    """As `multiplier`, between the faces of a cut, (nf, nq) [Pa]; of length 0 without any."""
+    face_pressure: np.ndarray = field(default_factory=lambda: NO_FACES)
+    """As `pressure`, between them."""
 
 
 class Loads(NamedTuple):
@@ -56,7 +62,8 @@ class Loads(NamedTuple):
     factor.
 
     filling (nc,): wanted volumes [m³] of the cavities, or pressures [Pa] where those are prescribed. shift (no, 3) [m]:
-    a further move of the obstacles to be linearised, None = none.
+    a further move of the obstacles to be linearised, None = none. faces, face_guess (nf, nq): as multiplier and guess,
+    between the faces of a cut.
     """
 
     force: np.ndarray | float
@@ -67,3 +74,5 @@ class Loads(NamedTuple):
     shift: np.ndarray | None = None
     grip: Grip = NO_GRIP
     guess: np.ndarray = NO_GUESS
+    faces: np.ndarray = NO_FACES
+    face_guess: np.ndarray = NO_FACES

@@ -60,6 +60,7 @@ OPTIONS: Mapping[str, str] = {
     "point_volumes": "quadratic bodies",
     "facet_contact": "contact inside facets",
     "thin_probes": "thin probes",
+    "face_contact": "faces of a cut that touch",
     "threads": "several threads",
     "float32": "float32",
     "events": "cuts",

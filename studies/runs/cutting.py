@@ -68,8 +68,16 @@ def check_held(cut: Cut, cells: np.ndarray, points: np.ndarray, attachments: tup
         raise StudyError(f"cut '{cut.name}' leaves a piece that nothing holds; hold it, or let it go: free=True")
 
 
-def event_of(frame: int, before: Body, after: Body, parent: np.ndarray, attachments: tuple[Attachment, ...]) -> Event:
-    """The event at which one body becomes the other, whose nodes had the numbers `parent` (n',)."""
+def event_of(
+    frame: int,
+    before: Body,
+    after: Body,
+    parent: np.ndarray,
+    attachments: tuple[Attachment, ...],
+    pairs: np.ndarray | None = None,
+) -> Event:
+    """The event at which one body becomes the other, whose nodes had the numbers `parent` (n',); `pairs`: whose faces
+    touch."""
     was, now = before.kept, after.kept
     if isinstance(was, PointVolumes) and isinstance(now, PointVolumes):
         volumes = parents(was.corner_volume, now.corner_volume)
@@ -81,7 +89,7 @@ def event_of(frame: int, before: Body, after: Body, parent: np.ndarray, attachme
         raise StudyError(
             f"a body that is cut keeps one volume, or one per node or vertex, not {was.count}; change its volumes"
         )
-    return Event(after, parent, volumes, frame, attachments)
+    return Event(after, parent, volumes, frame, attachments, pairs)
 
 
 def opening_of(frame: int, after: Body, parent: np.ndarray, pairs: np.ndarray) -> Opening:

@@ -20,6 +20,7 @@ from massspring import (
 )
 from massspring.body.membranes import MEMBRANE_LAWS
 from massspring.body.volumes import Volumes
+from massspring.methods.capabilities import No
 from massspring.world.surroundings import Surroundings
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh
@@ -150,6 +151,12 @@ def check_applies(case: Case, body: Body, targets: bool) -> None:
     reason = method.why_not(body)
     if reason is not None:
         raise DoesNotApply(f"method '{method.name}' does not apply to the {case.body.kind} body: {reason}")
+    touching = method.capabilities.face_contact
+    if scene.cut is not None and scene.cut.contact and isinstance(touching, No):
+        raise DoesNotApply(
+            f"method '{method.name}' does not apply to scene '{scene.name}', whose faces of the cut touch: "
+            f"{touching.because}; take implicit_volume"
+        )
     around = Surroundings(scene.obstacles, len(scene.held), scene.gravity, targets, scene.start is not None)
     reason = method.why_not_among(around)
     if reason is not None:
@@ -184,7 +191,7 @@ def prepare(case: Case) -> Prepared:
         mesh = flat_mesh(later.mesh, last) if isinstance(later.mesh, QuadraticMesh) else later.mesh
         after = attachments_for(scene, mesh)
         check_held(scene.cut, last.tetrahedra.astype(np.int64), last.rest, after)
-        events = (event_of(frame, body, last, later.parent, after),)
+        events = (event_of(frame, body, last, later.parent, after, later.pairs if scene.cut.contact else None),)
         opening = opening_of(frame, last, later.parent, later.pairs)
     moved = events[-1].attachments if events else attachments
     held = np.concatenate([a.nodes for a in moved]) if moved else None

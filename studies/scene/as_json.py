@@ -17,8 +17,10 @@ def scene_to_json(scene: Scene) -> str:
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """JSON-able form; without cuts where there are none, as before scenes could have any."""
+    """JSON-able form; without cuts where there are none, as before scenes could have any, nor contact where faces have
+    none."""
     data = _scene_adapter().dump_python(scene, mode="json")
+    data["cuts"] = [cut if cut["contact"] else {k: v for k, v in cut.items() if k != "contact"} for cut in data["cuts"]]
     return data if scene.cuts else {name: value for name, value in data.items() if name != "cuts"}
 
 

@@ -18,6 +18,8 @@ class Cut:
     section."""
     at: float = 0.0
     """When [s]."""
+    contact: bool = False
+    """Whether its faces touch, without friction, where they close; else they pass through each other."""
     free: bool = False
     """Whether a piece that nothing holds may go where it will."""
 

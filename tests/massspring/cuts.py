@@ -40,3 +40,21 @@ def body_of_cells(points: np.ndarray, cells: np.ndarray, law: str = "van_gelder"
         return quadratic_body(points, cells, material)
     body = tetrahedral_body(points, boundary(cells), cells, material, law)
     return body.keeping(Volumes.nodal(body)) if body.rest_pressure else body
+
+
+def mirrored_block() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points and cells of a distorted block that is its own mirror image, 0.04 m on both sides of its middle plane, and
+    the faces in that plane, fronts to +x."""
+    points, _, cells = block((2, 3, 3))
+    flat = np.unravel_index(np.arange(len(points)), (3, 4, 4))[0] == 2
+    points[flat, 0] = 0.04
+    other = np.where(flat, np.arange(len(points)), len(points) + np.cumsum(~flat) - 1)
+    cells = np.vstack([cells, other[cells][:, [0, 2, 1, 3]]])
+    points = np.vstack([points, points[~flat] * [-1, 1, 1] + [0.08, 0, 0]])
+    known, _, second = tetrahedron_faces(cells)
+    faces = known.astype(np.int64)[second >= 0]
+    faces = faces[(points[faces][:, :, 0] == 0.04).all(axis=1)]
+    a, b, c = points[faces].transpose(1, 0, 2)
+    turned = np.cross(b - a, c - a)[:, 0] < 0
+    faces[turned] = faces[turned][:, ::-1]
+    return points, cells, faces

@@ -4,6 +4,7 @@ import math
 
 from massspring.kernels.constraint.block_jacobi import precondition_into, scale_into
 from massspring.kernels.constraint.jacobian import NEGLIGIBLE_DIAGONAL, mobilised_into, padded_rows_times_into
+from massspring.kernels.contact.face_pairs import part_faces
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean, njit_reassociated
@@ -80,9 +81,10 @@ def substitute(factor, right, change):
 
 
 @njit_lean
-def apply_schur(rows, contacts, inverse_mass, p, product):
-    """S p = J (W̃ (Jᵀ p)), (m,) (eq. 8.3)."""
+def apply_schur(rows, contacts, inverse_mass, p, product, pairs=None):
+    """S p = J (W̃ (Jᵀ p)), (m,) (eq. 8.3), Ŵ in place of W̃ where faces of a cut touch (eq. 9.10)."""
     mobilised_into(rows, contacts, inverse_mass, p, rows.node_vector)
+    part_faces(pairs, contacts, inverse_mass, rows.node_vector, 1.0, False)
     padded_rows_times_into(rows, rows.node_vector, product)
 
 
@@ -113,7 +115,7 @@ def along(search, image, alpha, lam, residual):
 
 
 @njit_lean
-def solve_iteratively(rows, contacts, inverse_mass, lam, allowed, most):
+def solve_iteratively(rows, contacts, inverse_mass, lam, allowed, most, pairs=None):
     """lam += S⁻¹ rhs by conjugate gradients with clusters of S at rest as preconditioner (eq. 8.4, 8.7).
 
     Ends when |rhs − S Δlam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number. A volume
@@ -132,7 +134,7 @@ def solve_iteratively(rows, contacts, inverse_mass, lam, allowed, most):
         keep = rho / before
         for r in range(search.shape[0]):
             search[r] = image[r] + keep * search[r]
-        apply_schur(rows, contacts, inverse_mass, search, image)
+        apply_schur(rows, contacts, inverse_mass, search, image, pairs)
         curvature = dot(search, image)
         if not curvature > 0.0:
             break

@@ -6,6 +6,7 @@ import math
 from massspring.kernels.constraint.ldl_solve import respond_into
 from massspring.kernels.constraint.one_volume import limited_error, surely_short
 from massspring.kernels.constraint.schur import along, beyond, dot
+from massspring.kernels.contact.face_pairs import part_faces
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlined, njit_lean, njit_reassociated
@@ -53,13 +54,14 @@ def pushed_velocity_into(model, nodes, contacts, rows, implicit, dt):
 
 
 @njit_lean
-def set_right_side(frame, rows, implicit, target, tolerance):
+def set_right_side(frame, rows, implicit, target, tolerance, pairs=None):
     """rhs_r = (V0_r − V_r)/dt² − (J u)_r/dt [m³/s²], errors capped by the bound of eq. 8.5, u = ṽ + dt W̃ F.
 
     Returns whether a volume was capped, and whether a wrong one had nothing to push on.
     """
     model, dt = frame.model, frame.boundary.dt
     pushed_velocity_into(model, frame.nodes, frame.contacts, rows, implicit, dt)
+    part_faces(pairs, frame.contacts, model.inverse_mass, rows.node_vector, dt, True)
     times_into(rows, rows.node_vector, rows.right)
     lightest, longest, per_second = model.largest_inverse_mass, model.correction_limit, 1.0 / dt
     limited, idle = False, False
@@ -77,8 +79,9 @@ def set_right_side(frame, rows, implicit, target, tolerance):
 
 
 @njit_lean
-def apply_schur(frame, rows, implicit, p, product):
-    """S p = J (W̃ (Jᵀ p)), (m,): no motion of a held node, none into an obstacle (eq. 3.4, 8.3)."""
+def apply_schur(frame, rows, implicit, p, product, pairs=None):
+    """S p = J (W̃ (Jᵀ p)), (m,): no motion of a held node, none into an obstacle (eq. 3.4, 8.3) or, of faces of a cut
+    that touch, into each other (eq. 9.10)."""
     push_elements(rows, p, False)
     force, u, contacts = flat(rows.element_push, 0, rows.element_push.shape[0]), rows.node_vector, frame.contacts
     field, moved = rows.field, rows.moved
@@ -91,6 +94,7 @@ def apply_schur(frame, rows, implicit, p, product):
             d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
             u0, u1, u2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
         u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+    part_faces(pairs, contacts, frame.model.inverse_mass, u, 1.0, False)
     times_into(rows, u, product)
 
 
@@ -129,7 +133,7 @@ def precondition_into(rows, residual, product):
 
 
 @njit_lean
-def solve_iteratively(frame, rows, implicit, most):
+def solve_iteratively(frame, rows, implicit, most, pairs=None):
     """lam += S⁻¹ rhs by conjugate gradients (eq. 8.4).
 
     Ends when |rhs − S Δlam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number. A volume
@@ -146,7 +150,7 @@ def solve_iteratively(frame, rows, implicit, most):
         keep = rho / before
         for r in range(search.shape[0]):
             search[r] = image[r] + keep * search[r]
-        apply_schur(frame, rows, implicit, search, image)
+        apply_schur(frame, rows, implicit, search, image, pairs)
         curvature = dot(search, image)
         if not curvature > 0.0:
             break

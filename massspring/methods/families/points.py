@@ -7,6 +7,7 @@ import numpy as np
 
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.constraint.ldl_solve import Triangular, respond_into
+from massspring.kernels.contact.face_pairs import press_pairs
 from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, SEARCH, SPRINGS, VOLUME, end_stage
@@ -25,11 +26,11 @@ from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.begin import (
     begin_step,
     count_iterations,
-    multiplier_stands,
     open_frame,
     search_contacts,
 )
 from massspring.kernels.step.end import end_step
+from massspring.kernels.step.touching_faces import contacts_stand, search_pairs
 
 
 @by_address
@@ -88,10 +89,10 @@ def meet_points(frame, step, push, rows, implicit):
 
 
 @njit_lean
-def point_volumes_frame(frame, rows, implicit, accuracy):
+def point_volumes_frame(frame, rows, implicit, accuracy, pairs):
     """One frame with one volume per vertex (eq. 3.1–3.8, 8.3–8.5, 8.8–8.13); `rows.lam` [Pa] comes in and goes out.
 
-    `implicit`: springs taken at the end of the step, or None.
+    `implicit`: springs taken at the end of the step, or None. `pairs`: faces of a cut that may touch, or None.
     """
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
     push, limited, idle = Push(rows.push, 1.0), False, False
@@ -105,16 +106,18 @@ def point_volumes_frame(frame, rows, implicit, accuracy):
         push_into(rows, rows.lam)
         end_stage(diagnostics.stage_times, VOLUME)
         target, passes = boundary.volume_target[step], meet_points(frame, step, push, rows, implicit)
+        passes = search_pairs(frame, push, passes, pairs)
         for sweep in range(passes):
-            limited, idle = set_right_side(frame, rows, implicit, target, accuracy.tolerance)
-            count = solve_iteratively(frame, rows, implicit, accuracy.most_iterations)
+            limited, idle = set_right_side(frame, rows, implicit, target, accuracy.tolerance, pairs)
+            count = solve_iteratively(frame, rows, implicit, accuracy.most_iterations, pairs)
             count_iterations(diagnostics, count)
             if count > 0:
                 push_into(rows, rows.lam)
-            if multiplier_stands(frame, step, push, math.inf, sweep + 1 == passes):
+            if contacts_stand(frame, step, push, math.inf, sweep + 1 == passes, pairs):
                 break
         diagnostics.limited[0] += limited
         diagnostics.singular[0] += idle
+        press_pairs(pairs, model, nodes, frame.contacts, push, boundary.dt)
         if implicit is None:
             end_step(frame, step, push, 0.0, None)
         else:

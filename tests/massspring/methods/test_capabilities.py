@@ -122,6 +122,10 @@ ASKED = {
         r"method '{}' does not support thin probes \(obstacle 0\): {};",
     ),
     "targets": ({"targets": {"whole": Ramp((0.0, 1e3), (1.0, 1.1))}}, "which method '{}' does not follow: {};"),
+    "face_contact": (
+        {"pairs": np.zeros((0, 2), dtype=int)},
+        "method '{}' does not support contact between the faces of a cut: {};",
+    ),
     "threads": ({"threads": 2}, "method '{}' runs on one thread, {};"),
     "float32": ({"precision": "float32"}, "method '{}' runs in float64 only, {};"),
     "events": ({"events": ()}, "method '{}' supports no body that changes in a run: {}"),

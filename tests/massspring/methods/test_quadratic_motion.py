@@ -73,7 +73,7 @@ def with_pressures_that_stay(state, boundary):
     """One frame without a solve: the springs, the local term and mu in every volume, as `stiffness_at_rest` has it."""
     with threaded_frame(state, boundary) as after:
         after.rows.lam[:] = after.model.rest_lam
-        point_volumes_frame(after.frame(boundary), after.rows, None, Accuracy(1e-6, 0))
+        point_volumes_frame(after.frame(boundary), after.rows, None, Accuracy(1e-6, 0), None)
     return after
 
 

@@ -1,0 +1,31 @@
+"""When the faces of a cut touch: with the search for obstacles, and after each solve for the multipliers."""
+
+from massspring.kernels.contact.active_set import CONTACT_PASSES
+from massspring.kernels.contact.face_pairs import measure_pairs, revise_pairs
+from massspring.kernels.jit.decorators import njit_inlined
+from massspring.kernels.jit.stage_clock import REVISION, SEARCH, end_stage
+from massspring.kernels.step.begin import multiplier_stands
+
+
+@njit_inlined
+def search_pairs(frame, push, passes, pairs):
+    """Finds the pairs that touch while the last known push acts (eq. 9.9); how many passes the active set may take."""
+    if pairs is None:
+        return passes
+    measure_pairs(pairs, frame.nodes.x, frame.model.inverse_mass)
+    revise_pairs(pairs, frame.model, frame.nodes, frame.contacts, push, frame.boundary.dt)
+    end_stage(frame.diagnostics.stage_times, SEARCH)
+    return CONTACT_PASSES
+
+
+@njit_inlined
+def contacts_stand(frame, step, push, reach, last, pairs):
+    """`multiplier_stands`, and whether the push leaves the touching pairs as they are (eq. 9.9)."""
+    if pairs is None:
+        return multiplier_stands(frame, step, push, reach, last)
+    stands = multiplier_stands(frame, step, push, reach, last or frame.boundary.radius.shape[0] == 0)
+    if last:
+        return True
+    changes = revise_pairs(pairs, frame.model, frame.nodes, frame.contacts, push, frame.boundary.dt)
+    end_stage(frame.diagnostics.stage_times, REVISION)
+    return stands and changes == 0

@@ -1,0 +1,248 @@
+"""Faces of a cut that touch: what presses shut is as if it had not been cut, nothing is lost, nothing overlaps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import (
+    Attachment,
+    Body,
+    ImplicitVolume,
+    MassSpringError,
+    Plane,
+    Setup,
+    Trajectory,
+    Volumes,
+    make_clock,
+    simulate,
+    step_limit,
+)
+from massspring.body.opening import opened
+from massspring.kernels.contact.face_pairs import normals_into
+from massspring.layout.face_pairs import face_pairs
+from massspring.methods.method import begin_frame
+from tests.massspring.conftest import boundary
+from tests.massspring.cuts import body_of_cells, mirrored_block
+from tests.massspring.quadratic import second_order
+
+KINDS = ("one", "van_gelder nodal", "cotangent", "quadratic")
+MIDDLE, PRESS = 0.04, 0.004  # m
+
+
+class Halves:
+    """A block in two halves that are held at both ends along x and move towards each other, and the same uncut."""
+
+    def __init__(self, kind: str, height: float = np.inf):
+        points, cells, faces = mirrored_block()
+        faces = faces[points[faces][:, :, 2].max(axis=1) < height]
+        if kind == "quadratic":
+            points, cells = second_order(points, cells)
+        opening = opened(cells, faces, len(points))
+        self.kind, self.parent, self.pairs = kind, opening.parent, opening.pairs
+        self.whole = self.body(points, cells)
+        self.cut = self.body(points[opening.parent], opening.cells)
+        if kind == "one" and height == np.inf:
+            self.cut = in_pieces(self.cut)
+        limit = step_limit(self.cut)
+        self.clock = make_clock(1.0, 40, 0.7 * limit.damped, limit)
+
+    def body(self, points: np.ndarray, cells: np.ndarray) -> Body:
+        body = body_of_cells(points, cells, "cotangent" if self.kind == "cotangent" else "van_gelder")
+        return body.keeping(Volumes.nodal(body)) if self.kind == "van_gelder nodal" else body
+
+    def setup(self, body: Body, touching: bool = False, way: float = PRESS, **options) -> Setup:
+        held = tuple(
+            Attachment(
+                np.flatnonzero(side * (body.rest[:, 0] - MIDDLE) > 0.034),
+                Trajectory((0.0, 0.5), ((0.0, 0.0, 0.0), (-side * way, 0.0, 0.0))),
+            )
+            for side in (-1, 1)
+        )
+        options = {"attachments": held, "damping": 20.0, "pairs": self.pairs if touching else None, **options}
+        return Setup(body, ImplicitVolume(tolerance=1e-9), options.pop("clock", self.clock), **options)
+
+    def gaps(self, x: np.ndarray) -> np.ndarray:
+        return (x[self.pairs[:, 1]] - x[self.pairs[:, 0]])[:, 0]
+
+
+def in_pieces(body: Body) -> Body:
+    cells = body.tetrahedra.astype(int)
+    front = body.rest[cells].mean(axis=1)[:, 0] > MIDDLE
+    return body.keeping(
+        Volumes.closed_surfaces(body, {name: boundary(cells[front == k]) for k, name in enumerate("ab")})
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "height", "most"),
+    [
+        ("one", np.inf, 1e-9),
+        ("one", 0.045, 1e-9),
+        ("quadratic", np.inf, 1e-6),
+        ("quadratic", 0.045, 1e-6),
+        ("cotangent", 0.045, 1e-6),
+        # Uncut, the rim is in tension here; a cut opens there, as it must.
+        ("cotangent", np.inf, 1e-2),
+        ("van_gelder nodal", np.inf, 2e-2),
+    ],
+)
+def test_a_cut_in_a_plane_of_symmetry_pressed_shut_is_as_if_it_were_not(kind, height, most):
+    halves = Halves(kind, height)
+    whole = simulate(halves.setup(halves.whole))
+    cut = simulate(halves.setup(halves.cut, touching=True))
+    assert cut.outcome == "finished"
+    force = np.abs(whole.held_force[:, 1, 0])
+    assert force[-1] > 2.0
+    # Waves on the way there may open the rim for a moment.
+    np.testing.assert_allclose(np.abs(cut.held_force[-10:, 1, 0]), force[-10:], atol=most * force[-1])
+    moved, truth = cut.final - halves.cut.rest, (whole.final - halves.whole.rest)[halves.parent]
+    assert np.linalg.norm(moved - truth, axis=1).mean() < most * np.linalg.norm(truth, axis=1).max()
+    assert halves.gaps(cut.final).min() > -1e-12
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_faces_do_not_overlap_and_volumes_are_kept_as_without_contact(kind):
+    halves = Halves(kind)
+    apart, touching = (simulate(halves.setup(halves.cut, t), snapshots=range(1, 41)) for t in (False, True))
+    assert halves.gaps(apart.final).min() < -1.9 * PRESS
+    worst = [np.abs(h.volume / halves.cut.rest_volumes - 1.0).max() for h in (apart, touching)]
+    assert worst[1] < 1e-5 and worst[1] < 5.0 * max(worst[0], 1e-6)
+    assert min(halves.gaps(x).min() for x in touching.snapshots) > -1e-4 * halves.cut.size
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_halves_that_meet_in_flight_keep_their_momentum(kind):
+    halves = Halves(kind)
+    body = halves.cut
+    front = body.rest[:, 0] > MIDDLE
+    front[halves.pairs[:, 1]] = True
+    v = np.where(front[:, None], [-0.3, 0.0, 0.1], [0.1, 0.05, 0.0])
+    clock = make_clock(0.04, 10, 0.7 * step_limit(body).damped, step_limit(body))
+    setup = halves.setup(body, True, attachments=(), damping=0.0, velocity=v, clock=clock)
+    state, before = setup.start(), body.mass @ v
+    pushed = 0.0
+    for frame in range(clock.frames):
+        state = setup.method.advance(state, setup.boundary(frame))
+        assert state.pairs is not None
+        pushed = max(pushed, state.pairs.impulse.max())
+        np.testing.assert_allclose(body.mass @ state.v, before, atol=1e-13 * np.abs(body.mass @ np.abs(v)).max())
+    assert pushed > 0.0
+    speed = [body.mass[s] @ state.v[s, 0] / body.mass[s].sum() for s in (front, ~front)]
+    assert speed[0] - speed[1] > -0.05  # of -0.4 m/s
+
+
+def one_step(setup: Setup):
+    """(state before, state after) the first step in which some pairs touch."""
+    state = setup.start()
+    for frame in range(setup.clock.frames):
+        boundary = setup.boundary(frame)
+        for step in range(len(boundary.position)):
+            rows = {
+                name: getattr(boundary, name)[step : step + 1]
+                for name in ("position", "velocity", "held_displacement", "volume_target")
+            }
+            before = begin_frame(state, boundary)
+            state = setup.method.advance(state, boundary._replace(**rows))
+            if frame > 4:
+                return before, state, boundary
+    raise AssertionError
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("plane", [False, True])
+def test_a_step_solves_volumes_pairs_and_obstacles_together(kind, plane):
+    """All conditions of eq. 9.9 and 9.10 hold at its end at once, to round-off and the tolerance of volumes."""
+    halves = Halves(kind)
+    top = float(halves.cut.rest[:, 2].max())
+    sinks = Trajectory((0.0, 0.5), ((0, 0, 0), (0, 0, -0.01)))
+    setup = halves.setup(halves.cut, True, obstacles=(Plane((0, 0, top), (0, 0, -1), sinks),) if plane else ())
+    before, after, boundary = one_step(setup)
+    pairs = after.pairs
+    assert pairs is not None
+    i, j = pairs.node.T.astype(int)
+    along = np.einsum("pi,pi->p", pairs.normal, after.nodes.x[j] - after.nodes.x[i])
+    touching = pairs.touches > 0
+    assert touching.sum() > 5
+    assert np.abs(along[touching]).max() < 1e-15
+    assert (pairs.impulse[touching] > -1e-12 * pairs.impulse.max()).all() or kind == "quadratic"
+    assert (along[~touching] > -1e-12).all() and (pairs.impulse[~touching] == 0.0).all()
+    target = setup.body.kept.jacobian(before.x) @ (after.x - before.x).ravel()
+    wanted = boundary.volume_target[0] - setup.body.kept.measure(before.x)
+    np.testing.assert_allclose(target, wanted, atol=3e-9 * setup.body.rest_volumes.max())
+    if plane and kind != "quadratic":
+        both = after.contacts.mode[pairs.node[touching]] > 0
+        assert both.any()
+        on = np.flatnonzero(after.contacts.mode)
+        assert np.ptp(after.nodes.x[on, 2]) < 1e-15
+
+
+@pytest.mark.parametrize("kind", ["one", "cotangent", "quadratic"])
+def test_pairs_that_do_not_touch_change_nothing(kind):
+    """From a little apart, for waves shake faces that lie on each other."""
+    halves = Halves(kind)
+    rest, pulled = halves.cut.rest, []
+    side = np.where(rest[:, 0] > MIDDLE, 1.0, -1.0)
+    side[halves.pairs] = [-1.0, 1.0]
+    for touching in (False, True):
+        setup = halves.setup(halves.cut, touching, positions=rest + 1e-3 * side[:, None] * [1.0, 0.0, 0.0])
+        held = [
+            replace(a, path=Trajectory((0.0, 0.5), ((s * 1e-3, 0, 0), (s * 4e-3, 0, 0))))
+            for a, s in zip(setup.attachments, (-1, 1), strict=True)
+        ]
+        pulled.append(simulate(replace(setup, attachments=tuple(held))))
+    np.testing.assert_array_equal(pulled[0].final, pulled[1].final)
+    np.testing.assert_array_equal(pulled[0].pressure, pulled[1].pressure)
+
+
+def test_the_mean_normal_is_the_slope_of_the_gap_where_faces_touch():
+    """Finite differences of n(x)·(x_front − x_behind), the normal moving with the nodes (eq. 9.8)."""
+    halves = Halves("cotangent")
+    pairs = face_pairs(halves.cut, halves.pairs)
+    random = np.random.default_rng(3)
+    x = halves.cut.rest + 2e-3 * random.normal(size=(halves.whole.node_count, 3))[halves.parent]
+    i, j = halves.pairs.T
+
+    def gap(x: np.ndarray) -> np.ndarray:
+        normals_into(pairs, x)
+        return np.einsum("pi,pi->p", pairs.normal, x[j] - x[i])
+
+    way = random.normal(size=x.shape)
+    slope = (gap(x + 1e-7 * way) - gap(x - 1e-7 * way)) / 2e-7
+    normals_into(pairs, x)
+    np.testing.assert_allclose(slope, np.einsum("pi,pi->p", pairs.normal, way[j] - way[i]), rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(np.linalg.norm(pairs.normal, axis=1), 1.0)
+    # Both sides count alike: seen from the other side it is the same direction.
+    shifted = x.copy()
+    shifted[j] += 1e-3 * random.normal(size=(len(j), 3))
+    normals_into(pairs, shifted)
+    ahead = pairs.normal.copy()
+    turned = pairs._replace(corner=np.ascontiguousarray(pairs.corner[:, [3, 4, 5, 0, 1, 2]]))
+    normals_into(turned, shifted)
+    np.testing.assert_allclose(ahead, turned.normal, atol=1e-12)
+
+
+def test_faces_that_slide_by_more_than_an_edge_are_told_and_let_go():
+    halves = Halves("one")
+    setup = halves.setup(halves.cut, True)
+    away = Trajectory((0.0, 0.2, 0.8), ((0, 0, 0), (-0.002, 0, 0), (-0.002, 0.03, 0)))
+    slides = replace(setup, attachments=(setup.attachments[0], replace(setup.attachments[1], path=away)))
+    with pytest.warns(UserWarning, match="slid over each other by more than an edge"):
+        simulate(slides)
+
+
+def test_pairs_that_cannot_be_are_refused():
+    halves = Halves("one")
+    body, pairs = halves.cut, halves.pairs
+    setup = halves.setup(body, True)
+    with pytest.raises(MassSpringError, match="2 nodes on a cut are attached and their copies are not"):
+        replace(setup, attachments=(Attachment(pairs[:2, 0]),))
+    with pytest.raises(MassSpringError, match="float64, by one thread"):
+        replace(setup, precision="float32")
+    for wrong, sentence in (
+        (pairs[:, [0, 0]], "name a node twice"),
+        (pairs + len(body.rest), "beyond the 96 of the body"),
+        (pairs[::-1] * [1, 0] + pairs * [0, 1], "lie apart at rest"),
+    ):
+        with pytest.raises(MassSpringError, match=sentence):
+            replace(setup, pairs=wrong).start()
