@@ -3,9 +3,7 @@
 from massspring import ImplicitVolume
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
-from studies.scene.library.ball_bisected import BALL_BISECTED
-from studies.scene.library.ball_incised import BALL_INCISED
-from studies.scene.library.liver_incised import LIVER_INCISED
+from studies.scene.library import CUT
 
 BODIES = (
     BodyRecipe(nodes=350),
@@ -22,7 +20,7 @@ CUTTING = Study(
     question=__doc__ or "",
     cases=tuple(
         Case(scene, body, ImplicitVolume(), dt_fraction=LONG, timed=scene.reference is not None)
-        for scene in (BALL_INCISED, LIVER_INCISED, BALL_BISECTED)
+        for scene in CUT
         for body in BODIES
     ),
     charts=(
