@@ -9,8 +9,9 @@ BODIES = (
     BodyRecipe(nodes=350),
     BodyRecipe(nodes=350, law="cotangent", volumes="nodal"),
     BodyRecipe(nodes=700),
-    BodyRecipe("quadratic", nodes=600),
-    BodyRecipe("quadratic", nodes=994, graded="adaptive"),
+    BodyRecipe("quadratic", nodes=594, mass="stiffness"),
+    BodyRecipe("quadratic", nodes=794, graded="adaptive", mass="stiffness"),
+    BodyRecipe("quadratic", nodes=994, graded="adaptive", mass="stiffness"),
 )
 LONG = 0.8
 """Of the stability limit."""
@@ -24,6 +25,7 @@ CUTTING = Study(
         for body in BODIES
     ),
     charts=(
+        Chart("cut_open.png", "studies.plots.cut_open:draw"),
         Chart("opening.png", "studies.plots.opening:draw"),
         Chart("force.png", "studies.plots.force_path:draw"),
         Chart("pieces.png", "studies.plots.pieces:draw"),
