@@ -67,6 +67,20 @@ class History:
     """For the multipliers of each frame: their sum over its steps, and the most in one step, (F, 2) int64."""
     probe_counts: np.ndarray
     """What thin probes did in each frame, one column for each of kernels.probe_layout.COUNTS, (F, 7) int64."""
+    passages: tuple["Passage", ...] = ()
+    """Of each event that came."""
+
+
+@dataclass(frozen=True)
+class Passage:
+    """What an event changed at the moment at which it came, and what it cost."""
+
+    energy: float
+    """Change of kinetic and elastic energy over their sum before [1]."""
+    momentum: float
+    """Size of the change of momentum over the sum of its sizes in all nodes before [1]."""
+    ns: int
+    """Wall time [ns]; all that can be made before the run is made there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +96,36 @@ class Numbers:
         """What each of the `volumes` (m,) has of the values `whole` of those that they are still a part of, (m,)."""
         together = np.bincount(self.volumes, weights=volumes, minlength=len(whole))
         return volumes * (whole / together)[self.volumes]
+
+
+def kinetic_energy(state: State) -> float:
+    """[J]."""
+    v = state.nodes.v.astype(np.float64, copy=False)
+    # Not by `@`: a pool of threads that has computed a product waits for the next at the expense of frames.
+    return 0.5 * float(np.einsum("i,ij,ij->", state.model.mass, v, v))
+
+
+def elastic_energy(state: State) -> float:
+    """Of springs and membrane [J], with what taut springs have at rest."""
+    net, x = state.model, state.nodes.x.astype(np.float64, copy=False)
+    taut = spring_energy(x, net.ends, net.rest_length, net.stiffness)
+    return taut + membrane_energy(x, net.membrane)
+
+
+def passage(before: State, was: Body, after: State, now: Body, ns: int) -> Passage:
+    """Of an event at which one body became the other, in their states before and after it."""
+    energy, changed = (
+        kinetic_energy(state) + elastic_energy(state) - body.rest_energy + body.local_energy(state.x)
+        for state, body in ((before, was), (after, now))
+    )
+    momentum, pushed = (state.model.mass[:, None] * state.nodes.v for state in (before, after))
+    size = float(np.linalg.norm(momentum, axis=1).sum())
+    push = float(np.linalg.norm(pushed.sum(axis=0) - momentum.sum(axis=0)))
+    return Passage(_over(abs(changed - energy), energy), _over(push, size), ns)
+
+
+def _over(part: float, whole: float) -> float:
+    return part / whole if whole > 0.0 else 0.0
 
 
 class Recorder:
@@ -126,20 +170,18 @@ class Recorder:
         self.final = body.rest
         self.singular = 0
         self.limited = 0
+        self.passages: list[Passage] = []
 
     def record(self, frame: int, state: State, elapsed_ns: int, numbers: Numbers | None = None) -> None:
         """Reads the state after frame number `frame` (0, 1, …), which has other `numbers` until the last event."""
-        net, x = state.model, state.x.astype(np.float64, copy=False)
+        x = state.x.astype(np.float64, copy=False)
         x = x if numbers is None else x[numbers.nodes]
-        inside_x, v = (part.astype(np.float64, copy=False) for part in (state.nodes.x, state.nodes.v))
         self.volume[frame] = self.volumes.measure(x)
         self.pressure[frame] = state.lam if numbers is None else state.lam[numbers.volumes]
         if "kinetic" in self.extra:
-            # Not by `@`: a pool of threads that has computed a product waits for the next at the expense of frames.
-            self.scalars["kinetic"][frame] = 0.5 * float(np.einsum("i,ij,ij->", net.mass, v, v))
+            self.scalars["kinetic"][frame] = kinetic_energy(state)
         if "elastic" in self.extra:
-            taut = spring_energy(inside_x, net.ends, net.rest_length, net.stiffness) - self.rest_energy
-            self.scalars["elastic"][frame] = taut + membrane_energy(inside_x, net.membrane) + self.body.local_energy(x)
+            self.scalars["elastic"][frame] = elastic_energy(state) - self.rest_energy + self.body.local_energy(x)
         self.scalars["min_j"][frame] = self.body.smallest_ratio(x)
         self.contact_force[frame, self.rank] = state.diagnostics.contact_impulse / self.clock.frame
         for o, obstacle in enumerate(self.obstacles):
@@ -198,4 +240,5 @@ class Recorder:
             limited_corrections=self.limited,
             iterations=self.iterations,
             probe_counts=self.probe_counts,
+            passages=tuple(self.passages),
         )

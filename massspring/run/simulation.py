@@ -9,7 +9,7 @@ import numpy as np
 from massspring.body.body import Body
 from massspring.layout.state import State
 from massspring.run.checks import check_loads, check_probes, check_slip
-from massspring.run.history import EXTRA, History, Recorder
+from massspring.run.history import EXTRA, History, Recorder, passage
 from massspring.run.setup import Setup
 from massspring.run.stages import stages_of
 
@@ -49,8 +49,10 @@ def simulate(
     begun = thread_time_ns()
     for frame in range(setup.clock.frames):
         if later and frame == later[0].frame:
+            begin, before, was = perf_counter_ns(), state, now.setup.body
             now = later.pop(0).entered(state)
             state = now.start
+            recorder.passages.append(passage(before, was, state, now.setup.body, perf_counter_ns() - begin))
         boundary = now.boundary(frame)
         reason = check_loads(boundary)
         if reason is not None:

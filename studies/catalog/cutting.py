@@ -3,15 +3,15 @@
 from massspring import ImplicitVolume
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
-from studies.scene.library.ball_bisected import BALL_BISECTED
-from studies.scene.library.ball_incised import BALL_INCISED
+from studies.scene.library import CUT
 
 BODIES = (
     BodyRecipe(nodes=350),
     BodyRecipe(nodes=350, law="cotangent", volumes="nodal"),
     BodyRecipe(nodes=700),
-    BodyRecipe("quadratic", nodes=600),
-    BodyRecipe("quadratic", nodes=1400, graded=True),
+    BodyRecipe("quadratic", nodes=594, mass="stiffness"),
+    BodyRecipe("quadratic", nodes=794, graded="adaptive", mass="stiffness"),
+    BodyRecipe("quadratic", nodes=994, graded="adaptive", mass="stiffness"),
 )
 LONG = 0.8
 """Of the stability limit."""
@@ -20,22 +20,31 @@ CUTTING = Study(
     name="cutting",
     question=__doc__ or "",
     cases=tuple(
-        Case(scene, body, ImplicitVolume(), dt_fraction=LONG)
-        for scene in (BALL_INCISED, BALL_BISECTED)
+        Case(scene, body, ImplicitVolume(), dt_fraction=LONG, timed=scene.reference is not None)
+        for scene in CUT
         for body in BODIES
     ),
     charts=(
+        Chart("cut_open.png", "studies.plots.cut_open:draw"),
         Chart("opening.png", "studies.plots.opening:draw"),
         Chart("force.png", "studies.plots.force_path:draw"),
+        Chart("pieces.png", "studies.plots.pieces:draw"),
         Chart("volume.png", "studies.plots.volume_history:draw"),
+        Chart("cost.png", "studies.plots.work_precision:draw"),
     ),
     columns=(
         "opening_error",
+        "force_error",
         "force_end",
         "mean_error",
         "overlap",
-        "volume_worst",
-        "volume_end",
+        "piece_worst",
+        "piece_sum_worst",
+        "cut_energy",
+        "cut_momentum",
+        "cut_limit",
+        "cut_ms",
         "min_j",
+        "real_time",
     ),
 )

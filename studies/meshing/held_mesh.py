@@ -54,15 +54,27 @@ class HeldMesh:
         normal = triangle_normals(self.corners, self.cut[:1])[0]
         return np.where((normals @ normal < 0)[:, None], faces[:, ::-1], faces)
 
-    @cached_property
+    @property
     def front(self) -> np.ndarray:
         """Vertices of the front of the cut, where it ends inside the body: there the stress is singular."""
+        return np.unique(self._rim[0])
+
+    @property
+    def trace(self) -> np.ndarray:
+        """Sides of faces of the cut in the outer surface, (t, 2)."""
+        return self._rim[1]
+
+    @cached_property
+    def _rim(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sides of the cut's front and of its trace, (s, 2) and (t, 2)."""
         sides = np.sort(self.cut_faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         sides, count = np.unique(sides, axis=0, return_counts=True)
         sides, count = sides.reshape(-1, 2), np.asarray(count)
         outer = unique_edges(boundary_triangles(self.mesh.t.T.astype(np.int64)))
         key = np.array([self.mesh.nvertices, 1])
-        return np.unique(sides[(count == 1) & ~np.isin(sides @ key, outer @ key)])
+        rim = sides[count == 1]
+        outside = np.isin(rim @ key, outer @ key)
+        return rim[~outside], rim[outside]
 
     def at_outlines(self) -> np.ndarray:
         """Elements with a vertex on an outline, or on the front of a cut: there the stress is singular."""

@@ -71,13 +71,20 @@ class NestedMesh:
         """The mesh that is solved: opened along the scene's cut, if it has one."""
         return self.mesh if self.scene.cut is None else self._opened[0]
 
+    @property
+    def parent(self) -> np.ndarray:
+        """For each node of the mesh that is solved the one of `mesh` that it was, (n',)."""
+        return np.arange(len(nodes(self.mesh))) if self.scene.cut is None else self._opened[1]
+
+    @cached_property
+    def held(self) -> list[np.ndarray]:
+        """Nodes of each held region, in `mesh`."""
+        return [np.unique(facets) for facets in self.body.facets(self.mesh)[:-1]]
+
     @cached_property
     def patches(self) -> list[np.ndarray]:
-        """Nodes of each held region, in the mesh that is solved."""
-        patches = [np.unique(facets) for facets in self.body.facets(self.mesh)[:-1]]
-        if self.scene.cut is None:
-            return patches
-        return [np.flatnonzero(np.isin(self._opened[1], patch)) for patch in patches]
+        """The same in the mesh that is solved."""
+        return [np.flatnonzero(np.isin(self.parent, held)) for held in self.held]
 
     @cached_property
     def small_at_outlines(self) -> np.ndarray:

@@ -46,7 +46,8 @@ def on_true_sides(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, body: H
     if shape is None:
         return mesh
     if scene.organ.shape != "file":
-        bent = as_curved(body, coarse, on_true_shape(curved(organ_mesh, may_fold=True), coarse, shape, scene.held))
+        smooth = curved(organ_mesh, may_fold=True)
+        bent = as_curved(body, coarse, on_true_shape(smooth, coarse, shape, scene.held, scene.cut))
         if not _folds(bent):
             return bent
     points = laid_out(scene, organ_mesh, coarse, body, shape)

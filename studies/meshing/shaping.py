@@ -18,7 +18,7 @@ from studies.meshing.held_mesh import HeldMesh, rim_sides
 from studies.meshing.outlines import drawn_middles
 from studies.meshing.quadratic_mesh import TURNED, QuadraticMesh, uprightness
 from studies.meshing.retreat import Measure, retreat
-from studies.meshing.true_shape import as_curved, on_true_shape, true_shape
+from studies.meshing.true_shape import as_curved, in_cut_plane, on_true_shape, true_shape
 from studies.scene.scene import Scene
 
 OFF = 1e-3
@@ -139,7 +139,7 @@ def laid_out(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMe
     """Nodes of the finer mesh [m], (n, 3), as curved as the coarse one, whose sides follow the true shape as far as
     that folds none of its elements. Raises StudyError."""
     plain = MeshTet2.from_mesh(coarse.mesh)
-    bent = on_true_shape(curved(organ_mesh, may_fold=True, shape=shape), coarse, shape, scene.held)
+    bent = on_true_shape(curved(organ_mesh, may_fold=True, shape=shape), coarse, shape, scene.held, scene.cut)
     cells, straight = upright_cells(coarse), nodes(plain)
     points = moved(straight, nodes(bent), cells, upright_against(straight, cells), organ_mesh.name)
     return nodes(as_curved(fine, coarse, replace(plain, doflocs=np.ascontiguousarray(points.T))))
@@ -171,8 +171,8 @@ def tell(name: str, points: np.ndarray, aim: np.ndarray) -> None:
 
 
 def aimed(scene: Scene, fine: HeldMesh, shape: Shape, points: np.ndarray) -> np.ndarray:
-    """Where the nodes at `points` (n, 3) [m] belong: boundary nodes on the true surface, those of rims on the true
-    outline, the others where they are."""
+    """Where the nodes at `points` (n, 3) [m] belong: boundary nodes on the true surface, those of rims and of the trace
+    of a cut on the true outline, the others where they are."""
     *held, outer, lumen = all_facets(fine)
     points = points.copy()
     for facets, surface in ((outer, shape), (lumen, at_depth(shape, shape.wall or 0.0))):
@@ -181,7 +181,7 @@ def aimed(scene: Scene, fine: HeldMesh, shape: Shape, points: np.ndarray) -> np.
     for region, facets in zip((h.region for h in scene.held), held, strict=True):
         rim = np.unique(rim_sides(facets))
         points[rim] = project(shape, points[rim], (region.level,))
-    return points
+    return in_cut_plane(points, fine, shape, scene.cut)
 
 
 def all_facets(body: HeldMesh) -> list[np.ndarray]:

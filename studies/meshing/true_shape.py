@@ -13,6 +13,7 @@ from studies.geometry.mesh.jacobian import PAIRS
 from studies.geometry.organs import SHAPES
 from studies.geometry.shape.levelset import Shape, project
 from studies.meshing.held_mesh import HeldMesh, rim_sides
+from studies.scene.cut import Cut
 from studies.scene.organ_file import remeshed, scanned
 from studies.scene.scene import Held, Organ
 
@@ -30,8 +31,11 @@ def true_shape(organ: Organ) -> Shape | None:
     return true_shape_of(source, **how)
 
 
-def on_true_shape(smooth: CurvedMesh, body: HeldMesh, shape: Shape, helds: tuple[Held, ...]) -> MeshTet2:
-    """The mesh with the nodes of its boundary on the true surfaces, those of outlines on the true outlines.
+def on_true_shape(
+    smooth: CurvedMesh, body: HeldMesh, shape: Shape, helds: tuple[Held, ...], cut: Cut | None = None
+) -> MeshTet2:
+    """The mesh with the nodes of its boundary on the true surfaces, those of outlines and of the trace of a cut on the
+    true ones.
 
     smooth: `studies.geometry.curved` of the same vertices and tetrahedra.
     A polygon instead would hold the body h²/8r too little or too much, of first order in the force.
@@ -44,7 +48,25 @@ def on_true_shape(smooth: CurvedMesh, body: HeldMesh, shape: Shape, helds: tuple
     for held, facets in zip(helds, body.facets(mesh)[: len(helds)], strict=True):
         rim = np.unique(rim_sides(facets))
         points[rim] = project(shape, points[rim], (held.region.level,))
+    points = in_cut_plane(points, body, shape, cut)
     return replace(mesh, doflocs=np.ascontiguousarray(points.T))
+
+
+def in_cut_plane(points: np.ndarray, body: HeldMesh, shape: Shape, cut: Cut | None) -> np.ndarray:
+    """P2 nodes at `points` (n, 3) [m] with those of the faces of a cut in its plane, those of its trace also on the
+    true surface: a side that follows the surface alone leaves the plane, and so do those that smoothing bends."""
+    if cut is None:
+        return points
+    mesh, points, faces = MeshTet2.from_mesh(body.mesh), points.copy(), body.cut_faces
+    sides = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0).reshape(-1, 2)
+    flat, trace = (
+        np.concatenate([np.unique(vertices), mesh.nvertices + edge_index(mesh, ends)])
+        for vertices, ends in ((faces, sides), (body.trace, body.trace))
+    )
+    normal = np.asarray(cut.plane.normal, float)
+    points[flat] -= np.outer(cut.plane.level(points[flat]), normal / np.linalg.norm(normal))
+    points[trace] = project(shape, points[trace], (cut.plane.level,))
+    return points
 
 
 def as_curved(body: HeldMesh, coarse: HeldMesh, curved_coarse: MeshTet2) -> MeshTet2:

@@ -9,6 +9,7 @@ from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.geometry.surface.distance import hausdorff
 from studies.geometry.surface.sides import along_facets
 from studies.meshing.rest_surface import OUTER
+from studies.metrics import cutting
 from studies.metrics.metric import PERCENT, Metric
 from studies.metrics.run import Run
 from studies.reference.ringing import ringing_frequency
@@ -273,6 +274,12 @@ METRICS: tuple[Metric, ...] = (
     Metric("shape_volume", "%", "-", shape_volume),
     Metric("opening_error", "%", "lower", opening_error, "opening"),
     Metric("overlap", "%", "lower", overlap),
+    Metric("piece_worst", "%", "lower", cutting.piece_worst),
+    Metric("piece_sum_worst", "%", "lower", cutting.piece_sum_worst),
+    Metric("cut_energy", "%", "lower", cutting.cut_energy),
+    Metric("cut_momentum", "%", "lower", cutting.cut_momentum),
+    Metric("cut_limit", "1", "higher", cutting.cut_limit),
+    Metric("cut_ms", "ms", "lower", cutting.cut_ms),
     Metric("pressure_error", "%", "-", pressure_error, "pressure"),
     Metric("frequency_error", "%", "-", frequency_error, "frequency"),
     Metric("lumen_pressure_error", "%", "-", lumen_pressure_error, "lumen"),

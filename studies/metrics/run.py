@@ -106,12 +106,17 @@ class Run:
         rest, scene = self.fields.rest, self.case.scene
         if scene.cut is None:
             return rest
-        normal = np.asarray(scene.cut.plane.normal, float)
-        step = BESIDE * self.size * normal / np.linalg.norm(normal)
         places = rest.copy()
-        places[self.cut_pairs[:, 0]] -= step
-        places[self.cut_pairs[:, 1]] += step
+        places[self.cut_pairs[:, 0]] -= self._step_beside
+        places[self.cut_pairs[:, 1]] += self._step_beside
         return places
+
+    @cached_property
+    def part_volumes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Volumes of the pieces of a body that is cut, and what each should be [m³], both (F, r)."""
+        pieces = self.field("cut_parts")
+        of = (pieces[:, None] == np.unique(pieces)).astype(float)
+        return self.fields.volume @ of, self.fields.volume_target @ of
 
     @property
     def cut_pairs(self) -> np.ndarray:
@@ -145,10 +150,12 @@ class Run:
         far = SHAPE / 100.0 * float(np.linalg.norm(np.ptp(truth.points, axis=0)))
         moved = self.fields.snapshots[-1] - self.fields.rest
         errors, weights, sizes = [], [], []
-        for name, side in rest_surfaces(truth.points, self._outside(truth.points, truth.facets)).items():
+        facets = self._outside(truth.points, truth.facets)
+        places = self._on_own_side(truth.points, facets)
+        for name, side in rest_surfaces(truth.points, facets).items():
             if name in sides:
                 nodes = np.unique(side.facets)
-                at = sides[name].nearest(truth.points[nodes])
+                at = sides[name].nearest(places[nodes])
                 wrong = np.linalg.norm(sides[name].interpolated(moved, at) - truth.displacement[nodes], axis=1)
                 errors.append(wrong + np.maximum(0.0, at.distance - far))
                 weights.append(side.areas[nodes])
@@ -180,6 +187,28 @@ class Run:
         middles = np.round(points[facets[:, :3]].mean(axis=1) / (SAME_PLACE * self.size)).astype(np.int64)
         _, inverse, count = np.unique(middles, axis=0, return_inverse=True, return_counts=True)
         return facets[count[inverse.reshape(-1)] == 1]
+
+    def _on_own_side(self, points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+        """Nodes at `points` (n, 3) [m] of boundary `facets` (f, 3 or 6), those at the mouth of a cut a little on the
+        side of their facets: the nearest place on a body is on both sides of its own mouth, which a cut parts."""
+        cut = self.case.scene.cut
+        if cut is None:
+            return points
+        sides = np.sign(cut.plane.level(points[facets[:, :3]].mean(axis=1)))
+        nodes = facets.ravel()
+        side, count = (
+            np.bincount(nodes, np.repeat(weights, facets.shape[1]), minlength=len(points))
+            for weights in (sides, np.ones(len(facets)))
+        )
+        near = (np.abs(cut.plane.level(points)) < BESIDE * self.size) & (np.abs(side) == count)
+        return points + np.outer(np.where(near, np.sign(side), 0.0), self._step_beside)
+
+    @property
+    def _step_beside(self) -> np.ndarray:
+        """From a place on the cut to one that is surely in front of it [m], (3,)."""
+        assert self.case.scene.cut is not None  # there is one
+        normal = np.asarray(self.case.scene.cut.plane.normal, float)
+        return BESIDE * self.size * normal / np.linalg.norm(normal)
 
     @cached_property
     def shape(self) -> ShapeErrors:

@@ -1,5 +1,6 @@
 """The probed force while a scene is pressed and then held, next to the reference at its checkpoints."""
 
+import math
 from collections.abc import Sequence
 from itertools import product
 
@@ -33,6 +34,7 @@ from studies.runs.case import BodyRecipe
 from studies.scene.library import Scene
 
 TITLE = "Force of the press against the reference"
+CUT_TITLE = "Force of what holds and pulls a body that is cut, against the reference"
 FORCES = [metric for metric in METRICS if metric.name == "force_end"]
 """What is written at the ends of the lines."""
 ROOM = 1.06
@@ -53,8 +55,16 @@ def figure(runs: Sequence[Run]) -> Figure:
         _draw_scene(panel, group, looks)
     reference = reference_handle(linestyle="-", linewidth=1)
     handles = [*body_method_handles(shown, looks), reference, band_handle("± its uncertainty")]
-    notes = ["At the end of each line: its error there, once everything is at rest. Dotted: the press stops."]
-    return finish(sheet, TITLE, handles, [*notes, *unresolved_notes(shown, FORCES), *remarks(runs)], columns=3)
+    cut = any(run.case.scene.cut is not None for run in shown)
+    dotted = "the cut, and the end of the motion" if cut else "the press stops"
+    notes = [f"At the end of each line: its error there, once everything is at rest. Dotted: {dotted}."]
+    return finish(
+        sheet,
+        CUT_TITLE if cut else TITLE,
+        handles,
+        [*notes, *unresolved_notes(shown, FORCES), *remarks(runs)],
+        columns=3,
+    )
 
 
 def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> None:
@@ -67,8 +77,10 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
         ends.append((float(run.force[good][-1]), _error(run), colour))
     top = ROOM * _largest(group)
     motion = _motion(group[0].case.scene)
-    _draw_reference(axes, group[0], motion.times[-1])
-    axes.axvline(motion.times[-1], color=GREY, linewidth=1, linestyle=":")
+    cut, stop = group[0].case.scene.cut, motion.times[-1]
+    _draw_reference(axes, group[0], stop, math.inf if cut is None else cut.at)
+    for at in (stop,) if cut is None else (cut.at, stop):
+        axes.axvline(at, color=GREY, linewidth=1, linestyle=":")
     _label(axes, ends, top)
     axes.set(xlim=(0, 1.015 * group[0].case.scene.duration), ylim=(0, top), xlabel="time [s]", ylabel="force [N]")
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
@@ -111,8 +123,9 @@ def _label(axes: Axes, ends: Sequence[tuple[float, str, str]], top: float) -> No
         axes.text(1.015, at, text, transform=axes.transAxes, color=colour, size=SMALL, va="center", ha="left")
 
 
-def _draw_reference(axes: Axes, run: Run, stop: float) -> None:
-    """The path of equilibria: as the press rests from `stop` on, so does the last of them."""
+def _draw_reference(axes: Axes, run: Run, stop: float, cut: float) -> None:
+    """The path of equilibria, in two where a `cut` comes between: as the press rests from `stop` on, so does the last
+    of them."""
     if run.reference is None:
         return
     t, force = run.reference.field("t"), run.reference.force
@@ -120,8 +133,11 @@ def _draw_reference(axes: Axes, run: Run, stop: float) -> None:
     path = np.append(force[t < stop], (force[-1], force[-1]))
     # The floor is relative to the norm over all checkpoints, so one of them carries this much of it.
     spread = run.reference.total_uncertainty["force"] * np.linalg.norm(force) / np.sqrt(len(force))
-    axes.fill_between(path_t, path - spread, path + spread, color=GREY, alpha=0.3, linewidth=0)
-    axes.plot(path_t, path, color=BLACK, linewidth=1)
+    for side in (path_t <= cut, path_t > cut):
+        axes.fill_between(
+            path_t[side], (path - spread)[side], (path + spread)[side], color=GREY, alpha=0.3, linewidth=0
+        )
+        axes.plot(path_t[side], path[side], color=BLACK, linewidth=1)
     axes.plot(t, force, color=BLACK, marker="o", linestyle="", markersize=5.5, markeredgecolor="white", zorder=5)
 
 

@@ -23,6 +23,7 @@ from studies.meshing.graded_mesh import check_number, halved, is_hollow, mesh_at
 from studies.meshing.held_mesh import HeldMesh
 from studies.meshing.kept_shape import held_area_error
 from studies.meshing.nested_mesh import marked
+from studies.meshing.opened_mesh import opened_elements
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.reference_mesh import on_true_sides
 from studies.meshing.shaping import quadratic_mesh
@@ -103,14 +104,19 @@ def why_not(scene: Scene) -> str | None:
 
 
 def indicator_of(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh) -> np.ndarray:
-    """The error indicator of the elements of the coarse body at the scene's last checkpoint, (ne,), over the largest.
+    """The error indicator of the elements of the coarse body, opened along the scene's cut, at its last checkpoint,
+    (ne,), over the largest.
 
     Raises StudyError where no equilibrium is found."""
     try:
         mesh = on_true_sides(scene, organ_mesh, coarse, coarse)
         *held, wall = coarse.facets(mesh)
         middle = nodes(mesh)[wall[:, :3]].mean(axis=1)
-        problem = problem_on(scene, mesh, [np.unique(facets) for facets in held], middle)
+        patches = [np.unique(facets) for facets in held]
+        if scene.cut is not None:  # the front of the cut strains what is around it
+            mesh, parent = opened_elements(mesh, coarse.cut_faces)
+            patches = [np.flatnonzero(np.isin(parent, patch)) for patch in patches]
+        problem = problem_on(scene, mesh, patches, middle)
         ends = list[Checkpoint]()
         equilibrium_path(problem, scene.checkpoints[-1:] or (scene.duration,), LOOSE, on_checkpoint=ends.append)
     except SolveError as error:

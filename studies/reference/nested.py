@@ -3,11 +3,12 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
-from reference_fem import Equilibrium, NewtonSettings, Problem, SolveError, equilibrium_path, nodes
+from reference_fem import Checkpoint, Equilibrium, NewtonSettings, Problem, SolveError, equilibrium_path, nodes
 from reference_fem.estimate import stress_indicator
 from reference_fem.statics.equilibrium import advance, describe
 from reference_fem.statics.nested import carried, continued, transfer
@@ -34,17 +35,34 @@ DISPLACEMENT = 2.5
 """Bar of the mean displacement that weighs as much as one of the force: it falls faster, so less is allowed."""
 
 
+Work = tuple[Problem, tuple[float, ...], NewtonSettings]
+"""A problem, the checkpoints at which it is solved [s], and how."""
+
+
+class Part(NamedTuple):
+    """A problem, solved at its checkpoints."""
+
+    system: System
+    states: Sequence[State]
+
+
 class MeshSolution(NamedTuple):
     """One mesh, solved at every checkpoint."""
 
     mesh: NestedMesh
-    system: System
-    states: Sequence[State]
+    parts: Sequence[Part]
+    """As `problems_of` the mesh."""
+
+    @property
+    def system(self) -> System:
+        """Of the last checkpoint."""
+        return self.parts[-1].system
 
     @property
     def equilibria(self) -> list[Equilibrium]:
-        """At every checkpoint."""
-        return [describe(self.system, state, state.iterations, 1) for state in self.states]
+        """At every checkpoint, by the nodes of the mesh that is solved last."""
+        found = [describe(part.system, state, state.iterations, 1) for part in self.parts for state in part.states]
+        return in_last_mesh(self.mesh, found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,15 +95,20 @@ def solve_nested(scene: Scene, variants: Mapping[str, Varied]) -> FamilySolution
     plan, times = scene.reference, scene.checkpoints
     assert plan is not None  # the scene has a reference
     base = base_mesh(scene, plan.base, plan.at_contact)
-    problem, states = problem_of(base), list[State]()
+    work, ends = problems_of(base), list[Checkpoint]()
+    problem = work[-1][0]
     at = SamplePoints(nodes(base.mesh)[: base.mesh.nvertices], base.mesh.t[:4].T.astype(np.int64))
     try:
-        equilibria = equilibrium_path(problem, times, on_checkpoint=lambda checkpoint: states.append(checkpoint.state))
-        varied = [varied_sample(scene, problem, variants[name], at, name) for name in settings_varied(scene)]
+        equilibria = path_of(base, work, ends.append)
+        varied = [
+            sample_of(scene, problem, path_of(base, work, better=variants[name]), at, math.nan, name)
+            for name in settings_varied(scene)
+        ]
     except SolveError as error:
         reached = [e for e in error.converged if e.t in times]
         return FamilySolution(problem, reached, at, [], base.off, failure=str(error))
-    latest = MeshSolution(base, System(problem, LOOSE), states)
+    states = iter([end.state for end in ends])
+    latest = MeshSolution(base, [Part(System(one, LOOSE), list(islice(states, len(some)))) for one, some, _ in work])
     samples, stopped = [sample_of(scene, problem, equilibria, at, math.nan)], ""
     for target in targets(latest.system.total, plan.most):
         try:
@@ -100,26 +123,56 @@ def solve_nested(scene: Scene, variants: Mapping[str, Varied]) -> FamilySolution
         samples.insert(0, sample_of(scene, latest.system.problem, equilibria, at, math.nan))
         if len(samples) > 2 and fine_enough(scene, at, samples, plan.tolerance):
             break
-    latest.system.solver.release()
+    for part in latest.parts:
+        part.system.solver.release()
     return FamilySolution(latest.system.problem, equilibria, at, [*samples, *varied], latest.mesh.off, stopped)
 
 
-def varied_sample(scene: Scene, problem: Problem, better: Varied, at: SamplePoints, name: str) -> Sample:
-    """The coarsest mesh with a setting made better. Raises SolveError."""
-    work = better(problem, scene.checkpoints, NewtonSettings())
-    path = [e for e in equilibrium_path(*work) if e.t in scene.checkpoints]
-    return sample_of(scene, work[0], path, at, math.nan, name)
+def path_of(
+    mesh: NestedMesh,
+    work: Sequence[Work],
+    on_checkpoint: Callable[[Checkpoint], None] | None = None,
+    better: Varied | None = None,
+) -> list[Equilibrium]:
+    """Equilibria of problems on one of the nested meshes, one after the other, by the nodes of the last; with a setting
+    made `better`. Raises SolveError with what was reached."""
+    found = list[Equilibrium]()
+    for one in work:
+        try:
+            path = equilibrium_path(*(one if better is None else better(*one)), on_checkpoint=on_checkpoint)
+        except SolveError as error:
+            raise SolveError(str(error), converged=[*found, *in_last_mesh(mesh, error.converged)]) from error
+        found += in_last_mesh(mesh, [e for e in path if e.t in one[1]])
+    return found
 
 
 def problem_of(mesh: NestedMesh) -> Problem:
-    """The scene on one of its nested meshes. Raises StudyError for a checkpoint before the cut."""
-    cut, first = mesh.scene.cut, mesh.scene.checkpoints[0]
-    if cut is not None and first <= cut.at:
+    """The scene on one of its nested meshes, opened if it is cut. Raises StudyError where the cut comes last."""
+    cut, last = mesh.scene.cut, mesh.scene.checkpoints[-1]
+    if cut is not None and last <= cut.at:
         raise StudyError(
-            f"scene '{mesh.scene.name}' has a checkpoint at {first:g} s before its cut at {cut.at:g} s, and the "
-            "reference is of the body after it; move one of them"
+            f"scene '{mesh.scene.name}' has its last checkpoint at {last:g} s and its cut at {cut.at:g} s, so nothing "
+            "would judge what is cut; move one of them"
         )
     return problem_on(mesh.scene, mesh.solved, mesh.patches, mesh.lumen)
+
+
+def problems_of(mesh: NestedMesh) -> list[Work]:
+    """The scene on one of its nested meshes with its checkpoints: the uncut body up to its cut, if there are any then,
+    and the opened one after it. Each has a path from rest: the tissue has no memory. Raises StudyError."""
+    scene, after = mesh.scene, problem_of(mesh)
+    early = tuple(t for t in scene.checkpoints if scene.cut is not None and t <= scene.cut.at)
+    if not early:
+        return [(after, scene.checkpoints, NewtonSettings())]
+    before, late = problem_on(scene, mesh.mesh, mesh.held, mesh.lumen), scene.checkpoints[len(early) :]
+    return [(before, early, NewtonSettings()), (after, late, NewtonSettings())]
+
+
+def in_last_mesh(mesh: NestedMesh, found: Sequence[Equilibrium]) -> list[Equilibrium]:
+    """Equilibria of one of its problems by the nodes of the mesh that is solved last: copies of a node are together
+    until the cut."""
+    parent, vertices = mesh.parent, mesh.parent[: mesh.solved.nvertices]
+    return [one if len(one.u) == len(parent) else replace(one, u=one.u[parent], p=one.p[vertices]) for one in found]
 
 
 def targets(first: int, most: float) -> list[float]:
@@ -136,19 +189,26 @@ def refined(solved: MeshSolution, unknowns: float) -> MeshSolution:
     Where Newton finds no equilibrium from the carried states, a path from rest is tried. Raises SolveError where that
     breaks off.
     """
-    mesh, system, times = solved.mesh, solved.system, solved.mesh.scene.checkpoints
-    indicator = stress_indicator(system, solved.states[-1].x)
-    finer, parents = mesh.finer(indicator, round(mesh.mesh.nelements * unknowns / system.total))
-    fine = System(problem_of(finer), LOOSE)
-    system.solver.release()
+    mesh, last = solved.mesh, solved.parts[-1]
+    indicator = stress_indicator(last.system, last.states[-1].x)
+    finer, parents = mesh.finer(indicator, round(mesh.mesh.nelements * unknowns / last.system.total))
+    work = problems_of(finer)
+    return MeshSolution(finer, [on_finer(old, new, parents) for old, new in zip(solved.parts, work, strict=True)])
+
+
+def on_finer(part: Part, work: Work, parents: np.ndarray) -> Part:
+    """What is solved on a mesh, on the finer one whose elements are parts of the elements `parents` (ne,) of it.
+    Raises SolveError."""
+    fine = System(work[0], LOOSE)
+    part.system.solver.release()
     if fine.sticks.any():  # what an obstacle without slip holds depends on its way
-        return MeshSolution(finer, fine, from_rest(fine, times))
-    to = transfer(mesh.solved, at_nodes(finer.solved, parents), nodes(finer.solved))
+        return Part(fine, from_rest(fine, work[1]))
+    coarse, mesh = part.system.problem.mesh, work[0].mesh
+    to = transfer(coarse, at_nodes(mesh, parents), nodes(mesh))
     try:
-        states = from_carried(fine, [carried(system, state, fine, to) for state in solved.states])
+        return Part(fine, from_carried(fine, [carried(part.system, state, fine, to) for state in part.states]))
     except StepFailed:
-        states = from_rest(fine, times)
-    return MeshSolution(finer, fine, states)
+        return Part(fine, from_rest(fine, work[1]))
 
 
 def from_carried(system: System, starts: Sequence[State]) -> list[State]:

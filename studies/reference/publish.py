@@ -21,7 +21,7 @@ from studies.reference.load import Reference, load_reference
 from studies.reference.published import FOLDER, INDEX, LENGTHS, PRECISION, index, physics
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
-from studies.scene.library import JUDGED
+from studies.scene.library import CUT, JUDGED
 from studies.scene.scene import Scene
 
 MOST, TOLERANCE = 80e3, 0.002
@@ -38,7 +38,7 @@ def finer(scene: Scene, most: float = MOST) -> Scene:
 
 def judged_scenes() -> dict[str, Scene]:
     """Scenes of the catalogue that have a reference, by name."""
-    return {scene.name: scene for scene in JUDGED}
+    return {scene.name: scene for scene in (*JUDGED, *CUT) if scene.reference is not None}
 
 
 def solved(work: tuple[str, str, float]) -> None:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from weakref import WeakValueDictionary
 
 import numpy as np
+from scipy.spatial import KDTree
 from skfem import MeshTet2
 
 from reference_fem import Evaluator, facet_nodes, surface_triangles
@@ -17,8 +18,12 @@ from studies.store.record import Record
 class _Remembering(Evaluator):
     """Finds the same points in its mesh once: all runs on a mesh, and several quantities of each, ask for them."""
 
-    def __init__(self, mesh: MeshTet2) -> None:
+    def __init__(self, mesh: MeshTet2, among: np.ndarray | None = None) -> None:
+        """among: the elements that are searched, (ne,) bool."""
         super().__init__(mesh)
+        if among is not None:
+            self.table, self.corners = self.table[among], self.corners[among]
+            self.tree = KDTree(self.corners.mean(axis=1))
         self.located: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -29,14 +34,15 @@ class _Remembering(Evaluator):
         return self.located[key]
 
 
-_EVALUATORS: WeakValueDictionary[tuple[bytes, bytes], _Remembering] = WeakValueDictionary()
-"""By nodes and tetrahedra: solutions that differ by a setting have one mesh, and several may be loaded twice."""
+_EVALUATORS: WeakValueDictionary[tuple[bytes, ...], _Remembering] = WeakValueDictionary()
+"""By nodes, tetrahedra and the part of them that is searched: solutions that differ by a setting have one mesh, and
+several may be loaded twice."""
 
 
 OCTANTS = np.array(list(product((1.0, -1.0), repeat=3)))
 """Signs that mirror an octant into the whole body, (8, 3)."""
 BESIDE = 1e-3
-"""Of the body's size: so far from a cut a place is surely on one side of it; curved sides bend its faces by less."""
+"""Of the body's size: so far from a cut a place is surely on one side of it."""
 TURNED = [0, 2, 1, 5, 4, 3]
 """A six-node facet seen from its other side."""
 
@@ -80,11 +86,21 @@ class Solution:
         return (2.0 if self.scene.symmetric else 1.0) * float(np.linalg.norm(np.ptp(self.field("nodes"), axis=0)))
 
     @cached_property
-    def _evaluator(self) -> Evaluator:
-        key = self.field("nodes").tobytes(), self.field("tetrahedra").tobytes()
+    def _evaluators(self) -> list[Evaluator]:
+        """One for the whole body; of a body that is cut one for what is behind the plane and one for what is in front:
+        a place on the cut is in both, and next to its mouth the nearest element may be of the wrong one."""
+        cut, sides = self.scene.cut, [None]
+        if cut is not None:
+            middles = self.field("nodes")[self.field("tetrahedra")[:, :4]].mean(axis=1)
+            sides = [cut.plane.level(middles) <= 0, cut.plane.level(middles) > 0]
+        return [self._evaluator(among) for among in sides]
+
+    def _evaluator(self, among: np.ndarray | None) -> Evaluator:
+        part = b"" if among is None else among.tobytes()
+        key = self.field("nodes").tobytes(), self.field("tetrahedra").tobytes(), part
         found = _EVALUATORS.get(key)
         if found is None:
-            found = _EVALUATORS[key] = _Remembering(self.mesh)
+            found = _EVALUATORS[key] = _Remembering(self.mesh, among)
         return found
 
     @cached_property
@@ -118,8 +134,12 @@ class Solution:
         count, nodes, _ = nodal.shape
         # One field of 3 k components: the evaluator takes any number of them.
         columns = nodal.transpose(1, 0, 2).reshape(nodes, 3 * count)
-        found = self._evaluator.displacement(columns, sign * points).reshape(len(points), count, 3)
-        return sign * found.transpose(1, 0, 2)
+        found, cut = np.empty((len(points), 3 * count)), self.scene.cut
+        chosen = [slice(None)] if cut is None else [cut.plane.level(points) <= 0, cut.plane.level(points) > 0]
+        for evaluator, some in zip(self._evaluators, chosen, strict=True):
+            if len(points[some]):
+                found[some] = evaluator.displacement(columns, (sign * points)[some])
+        return sign * found.reshape(len(points), count, 3).transpose(1, 0, 2)
 
     def outside(self, triangles: np.ndarray) -> np.ndarray:
         """Those of the boundary triangles or facets (s, 3 or 6) that do not lie in a plane of symmetry."""

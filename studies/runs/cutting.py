@@ -14,6 +14,7 @@ from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import boundary_triangles
 from studies.meshing.opened_mesh import cut_triangles
 from studies.scene.cut import Cut
+from studies.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,15 +27,25 @@ class Opening:
     """Triangles of the surface behind the cut, (u, 3)."""
     pairs: np.ndarray
     """Nodes behind it and in front of it, (p, 2)."""
+    parts: np.ndarray
+    """The piece of the body that each kept volume is in, (m,)."""
 
 
-def event_frame(cut: Cut, duration: float, frames: int) -> int:
-    """Frames before the cut. Raises StudyError for one before the first frame ends, or after the last begins."""
+def event_frame(scene: Scene, cut: Cut, frames: int) -> int:
+    """Frames before the cut. Raises StudyError for one before the first frame ends, or after the last begins, and for a
+    checkpoint after it in its frame."""
+    duration = scene.duration
     frame = round(cut.at * frames / duration)
     if not 1 <= frame < frames:
         raise StudyError(
             f"cut '{cut.name}' at {cut.at:g} s is not between two of the {frames} frames of {duration:g} s; "
             "move it, or ask for more frames"
+        )
+    early = [t for t in scene.checkpoints if t > cut.at and round(t * frames / duration) <= frame]
+    if early:
+        raise StudyError(
+            f"the checkpoint at {early[0]:g} s and cut '{cut.name}' before it at {cut.at:g} s are in one of {frames} "
+            "frames; move one, or ask for more frames"
         )
     return frame
 
@@ -94,4 +105,19 @@ def event_of(
 
 def opening_of(frame: int, after: Body, parent: np.ndarray, pairs: np.ndarray) -> Opening:
     """Where the body after an event was cut."""
-    return Opening(frame, cut_triangles(after.triangles, parent, pairs[:, 1]).astype(np.int64), pairs)
+    faces = cut_triangles(after.triangles, parent, pairs[:, 1]).astype(np.int64)
+    return Opening(frame, faces, pairs, parts_of(after))
+
+
+def parts_of(body: Body) -> np.ndarray:
+    """The piece of the body that each kept volume is in, (m,)."""
+    kept, cells = body.kept, body.tetrahedra.astype(np.int64)
+    if isinstance(kept, PointVolumes):
+        piece, owner = pieces_of(body.rest, kept.cells.astype(np.int64)), kept.corner_volume
+    elif kept.count == body.node_count:
+        piece, owner = pieces_of(body.rest, cells), cells
+    else:  # the whole, or as `keeping_pieces` has them
+        return np.arange(kept.count)
+    parts = np.zeros(kept.count, np.int64)
+    parts[owner] = piece[:, None]
+    return parts

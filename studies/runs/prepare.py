@@ -47,6 +47,8 @@ class Prepared:
     limit: StepLimit
     opening: Opening | None = None
     """Where the body is cut, if it is: `mesh` is the one after that."""
+    limit_before: StepLimit | None = None
+    """Of the step before that; `limit` is that of the whole run."""
 
     @property
     def body(self) -> Body:
@@ -183,19 +185,18 @@ def prepare(case: Case) -> Prepared:
     if case.body.kind in ("surface", "membrane") and mesh.hollow:
         mesh = mesh.outer()
     attachments, last, frames = attachments_for(scene, mesh), body, case.frames or scene.frames
-    events, opening = (), None
+    events, opening, limit_before = (), None, None
     if later is not None:
         assert scene.cut is not None  # it was opened
-        last, frame = body_for(scene, case.body, later.mesh), event_frame(scene.cut, scene.duration, frames)
+        last, frame = body_for(scene, case.body, later.mesh), event_frame(scene, scene.cut, frames)
         check_applies(case, last, bool(targets))
         mesh = flat_mesh(later.mesh, last) if isinstance(later.mesh, QuadraticMesh) else later.mesh
         after = attachments_for(scene, mesh)
         check_held(scene.cut, last.tetrahedra.astype(np.int64), last.rest, after)
         events = (event_of(frame, body, last, later.parent, after, later.pairs if scene.cut.contact else None),)
         opening = opening_of(frame, last, later.parent, later.pairs)
-    moved = events[-1].attachments if events else attachments
-    held = np.concatenate([a.nodes for a in moved]) if moved else None
-    limit = step_limit(last, scene.damping, held, case.method.added_stiffness(last))
+        limit_before = limit_of(case, body, attachments)
+    limit = limit_of(case, last, events[-1].attachments if events else attachments)
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
     check_size(scene.duration, frames, dt, limit, last, len(scene.obstacles) + len(attachments))
     beyond = case.beyond_limit or not case.method.capabilities.conditionally_stable
@@ -214,4 +215,10 @@ def prepare(case: Case) -> Prepared:
         precision=case.precision,
         events=events,
     )
-    return Prepared(mesh, setup, limit, opening)
+    return Prepared(mesh, setup, limit, opening, limit_before)
+
+
+def limit_of(case: Case, body: Body, attachments: tuple[Attachment, ...]) -> StepLimit:
+    """The step limit of a case with a body held so. Raises MassSpringError."""
+    held = np.concatenate([a.nodes for a in attachments]) if attachments else None
+    return step_limit(body, case.scene.damping, held, case.method.added_stiffness(body))

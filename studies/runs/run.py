@@ -134,7 +134,17 @@ def _attributes(prepared: Prepared, history: History) -> dict[str, float | int |
         "capped_steps": history.limited_corrections,
         "volumes": body.kept.count,
         "lumen_column": _lumen_column(prepared),
-    } | ({} if cut is None else {"cut_frame": cut.frame})
+    } | ({} if cut is None else {"cut_frame": cut.frame, **_event_attributes(prepared, history)})
+
+
+def _event_attributes(prepared: Prepared, history: History) -> dict[str, float]:
+    """What a cut did; of a run that ended before it what it would do to the step alone."""
+    before = prepared.limit_before
+    assert before is not None  # it is cut
+    found = {"cut_limit_ratio": prepared.limit.damped / before.damped}
+    for one in history.passages:
+        found |= {"cut_energy": one.energy, "cut_momentum": one.momentum, "cut_seconds": 1e-9 * one.ns}
+    return found
 
 
 def _lumen_column(prepared: Prepared) -> int:
@@ -163,7 +173,8 @@ def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field
         "tetrahedra": body.tetrahedra,
     }
     if prepared.opening is not None:
-        values |= {"cut_faces": prepared.opening.faces, "cut_pairs": prepared.opening.pairs}
+        opening = prepared.opening
+        values |= {"cut_faces": opening.faces, "cut_pairs": opening.pairs, "cut_parts": opening.parts}
     values |= {name: getattr(history, name) for name in case.recorded if name in EXTRA}
     if "surface" in case.recorded:
         values |= surface_fields(prepared, history)

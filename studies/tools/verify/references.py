@@ -10,13 +10,13 @@ from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.sample import Sample, SamplePoints
 from studies.reference.solve import solve
 from studies.reference.uncertainty import QUANTITIES
-from studies.scene.library import JUDGED
+from studies.scene.library import CUT, JUDGED
 from studies.scene.scene import Scene
 
 
 def published_scenes() -> dict[str, Scene]:
     """Scenes of the catalogue that have a published reference, by name."""
-    return {scene.name: scene for scene in JUDGED if published(scene) is not None}
+    return {scene.name: scene for scene in (*JUDGED, *CUT) if published(scene) is not None}
 
 
 def solved_again(scene: Scene) -> list[Check]:

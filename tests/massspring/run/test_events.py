@@ -22,6 +22,7 @@ from massspring import (
 from massspring.body.opening import opened, parents
 from massspring.body.points import PointVolumes
 from massspring.run.events import Easing
+from massspring.run.history import passage
 from massspring.run.stages import stages_of
 from tests.massspring.conftest import block, boundary
 from tests.massspring.cuts import CELLS, body_of_cells, layer_faces
@@ -250,3 +251,24 @@ def test_events_that_cannot_be_are_refused():
         body=uniform[0],
         events=(replace(event, body=uniform[1]),),
     )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_history_says_that_an_event_keeps_energy_and_momentum_and_what_it_cost(kind):
+    (passed,) = simulate(Cut(kind).setup).passages
+    assert passed.energy < 1e-12 and passed.momentum < 1e-12
+    assert 0 < passed.ns < 1e9
+
+
+def test_an_event_that_pushes_would_be_seen():
+    """All nodes at one speed that doubles: four times the energy, twice the momentum."""
+    cut = Cut("one")
+    start = stages_of(cut.setup)[0].start
+
+    def moving(speed):
+        return replace(start, nodes=start.nodes._replace(v=np.tile([0.0, speed, 0.0], (len(start.nodes.v), 1))))
+
+    pushed = passage(moving(0.1), cut.before, moving(0.2), cut.before, 7)
+    assert (pushed.energy, pushed.momentum, pushed.ns) == pytest.approx((3.0, 1.0, 7), rel=1e-9)
+    lost = replace(start, nodes=start.nodes._replace(x=1.01 * start.nodes.x))
+    assert passage(lost, cut.before, start, cut.before, 7).energy == pytest.approx(1.0, rel=1e-9)

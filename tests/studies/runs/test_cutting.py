@@ -11,7 +11,9 @@ from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
 from studies.plots import opening
 from studies.reference.load import load_reference
+from studies.reference.nested import solve_nested
 from studies.reference.reference_solves import ReferenceSolve
+from studies.reference.sample import parted
 from studies.reference.solve import solve
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare
@@ -43,6 +45,28 @@ def test_the_incision_gapes_as_in_the_reference(incised):
         assert abs(METRIC["force_end"](run)) < 10.0
         assert METRIC["overlap"](run) == 0.0
         assert METRIC["volume_worst"](run) < 0.05
+        assert METRIC["piece_worst"](run) < 1e-2 and METRIC["piece_sum_worst"](run) < 5e-3
+        assert METRIC["cut_energy"](run) < 1e-8 and METRIC["cut_momentum"](run) < 1e-10
+        assert 0.8 < METRIC["cut_limit"](run) <= 1.0 + 1e-9  # copies are free to move apart: Rayleigh
+        assert METRIC["cut_ms"](run) > 0.0
+
+
+def test_the_body_is_judged_before_the_cut_too(incised):
+    """The reference is then the uncut ball: solved without a cut, it has the same force within the bars of both."""
+    reference = incised["quadratic"].reference
+    scene = reference.scene
+    assert scene.checkpoints[0] == scene.cut.at < scene.checkpoints[1]
+    behind, front = parted(reference.mesh.p.T, len(reference.at.points)).T
+    gaps = [np.abs(u[front] - u[behind]).max() for u in reference.field("displacement")]
+    assert gaps[0] == 0.0 and min(gaps[1:]) > 1e-3
+    whole = replace(scene, cuts=(), checkpoints=scene.checkpoints[:1])
+    force = [one.force[0] for one in solve_nested(whole, {}).samples]
+    assert reference.force[0] == pytest.approx(force[0], rel=0.02)
+    # Cut to half its section, the ball is softer by far.
+    ends = replace(scene, cuts=(), checkpoints=scene.checkpoints[-1:])
+    assert reference.force[-1] < 0.7 * solve_nested(ends, {}).samples[0].force[0]
+    for run in incised.values():
+        assert abs(run.force[run.checkpoint_frames[0]] / reference.force[0] - 1) < 0.08
 
 
 def test_before_the_cut_copies_lie_on_each_other_and_after_it_they_part(incised):
@@ -92,9 +116,12 @@ def test_what_cannot_be_cut_is_refused():
     late = replace(BALL_INCISED, cuts=(replace(BALL_INCISED.cut, at=4.0),))
     with pytest.raises(StudyError, match="is not between two of the 200 frames"):
         prepare(Case(late, ONE))
-    early = replace(BALL_INCISED, checkpoints=(0.5, 4.0))
-    with pytest.raises(StudyError, match=r"checkpoint at 0\.5 s before its cut"):
+    early = replace(BALL_INCISED, checkpoints=(0.5, 1.0))
+    with pytest.raises(StudyError, match=r"has its last checkpoint at 1 s and its cut at 1 s"):
         solve_nothing(early)
+    same = replace(BALL_INCISED, checkpoints=(1.001, 4.0))
+    with pytest.raises(StudyError, match=r"at 1\.001 s and cut 'incision' before it at 1 s are in one of 200 frames"):
+        prepare(Case(same, ONE))
     with pytest.raises(StudyError, match="is for a solid organ that is filled"):
         prepare(Case(BALL_INCISED, BodyRecipe("surface", nodes=200)))
 

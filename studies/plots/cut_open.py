@@ -1,0 +1,97 @@
+"""A body before its incision, after it and next to the reference: how it gapes, as a picture."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from studies.base.counting import heading
+from studies.metrics.metric import COMPARABLE
+from studies.metrics.metrics import force_end, opening_error
+from studies.metrics.run import Run, by_scene
+from studies.plots.style.page import blank, finish, page, panels
+from studies.plots.style.render import Camera, draw_surface, frame, scale_bar
+from studies.plots.style.style import NORMAL, SMALL, drawing, styled
+
+TITLE = "Incised organs"
+CAMERAS = {
+    "ball_incised": Camera(azimuth=-152.0, elevation=16.0),
+    "liver_incised": Camera(azimuth=-60.0, elevation=38.0),
+}
+OTHER = Camera(azimuth=-72.0, elevation=25.0)
+TISSUE, STEEL, INSIDE = "#D9B3A6", "#A9A9A9", "#8C2F39"
+SIZE = (3.5, 3.0)
+"""Of a panel [inch]."""
+DPI = 150
+
+
+def incised(run: Run) -> bool:
+    """Whether the run has an incision with a front, its end, a checkpoint before the cut, and a reference."""
+    cut = run.case.scene.cut
+    whole = cut is not None and cut.within is not None and run.case.scene.checkpoints[0] <= cut.at
+    return whole and run.reference is not None and run.record.status in COMPARABLE
+
+
+@styled
+def figure(runs: Sequence[Run]) -> Figure:
+    """One row for each scene: its body with the smallest error of the opening."""
+    scenes = by_scene([run for run in runs if incised(run)])
+    if not scenes:
+        return blank(TITLE, "no run of a scene with an incision and a reference has ended yet")
+    sheet = page(3 * SIZE[0], SIZE[1] * len(scenes))
+    notes = []
+    for row, (name, group) in zip(panels(sheet, len(scenes), 3), scenes.items(), strict=True):
+        best = min(group, key=opening_error)
+        _draw_row(row, best, CAMERAS.get(name, OTHER))
+        words = f"{heading(name)}: {best.case.body.series}, {best.record.attributes['nodes']:,} nodes"
+        notes.append(f"{words}; {best.case.scene.title}.")
+    return finish(sheet, TITLE, [Patch(color=INSIDE, label="faces of the cut")], notes)
+
+
+def _draw_row(row: Sequence[Axes], run: Run, camera: Camera) -> None:
+    reference, cut = run.reference, run.case.scene.cut
+    assert reference is not None and cut is not None  # incised() asked
+    normal = np.asarray(cut.plane.normal) / np.linalg.norm(cut.plane.normal)
+    rest, triangles = run.fields.rest, run.fields.triangles.astype(np.int64)
+    nodes, facets = reference.field("nodes"), reference.triangles
+    seen = [
+        (run.fields.snapshots[0], triangles, _inside(run, rest, triangles), TISSUE),
+        (run.fields.snapshots[-1], triangles, _inside(run, rest, triangles), TISSUE),
+        (reference.surface()[0], facets, _inside(run, nodes, facets), STEEL),
+    ]
+    box = np.concatenate([camera.see(points)[:, :2] for points, *_ in seen])
+    low, high = box.min(axis=0), box.max(axis=0)
+    room = 0.06 * (high - low)
+    for axes, (points, faces, inside, colour) in zip(row, seen, strict=True):
+        colours = np.where(inside[:, None], to_rgb(INSIDE), to_rgb(colour))
+        draw_surface(axes, points, faces, colours, camera, edges=0.12)
+        frame(axes, low - room, high + room)
+    at, force = run.checkpoint_frames, reference.force
+    gap, truth = (
+        1e3 * float((each @ normal).max()) for each in (run.opening, reference.opening(rest[run.cut_pairs[:, 0]]))
+    )
+    off = f"{force_end(run):+.1f} %".replace("-", "−")
+    words = (
+        (f"{heading(run.case.scene.name)}, before", f"force {run.force[at[0]]:.2f} N"),
+        ("cut and pulled", f"gapes {gap:.1f} mm, force {run.force[at[-1]]:.2f} N ({off})"),
+        ("reference", f"gapes {truth:.1f} mm, force {force[-1]:.2f} N"),
+    )
+    for axes, (title, line) in zip(row, words, strict=True):
+        axes.set_title(title, size=NORMAL)
+        axes.text(0.5, -0.02, line, transform=axes.transAxes, ha="center", va="top", size=NORMAL)
+    scale_bar(row[0], *(low - 0.5 * room), 0.05, "50 mm", size=SMALL)
+
+
+def _inside(run: Run, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Whether each of the boundary's triangles is a face of the cut, (s,) bool."""
+    cut = run.case.scene.cut
+    assert cut is not None and cut.within is not None  # incised() asked
+    middles = points[triangles].mean(axis=1)
+    flat = np.abs(cut.plane.level(points[triangles].reshape(-1, 3))).reshape(-1, 3).max(axis=1)
+    return (flat < 1e-5 * run.size) & (cut.within.level(middles) < 0)
+
+
+draw = drawing(figure, DPI)
