@@ -25,7 +25,18 @@ SMOKE_NODES, SMOKE_NODES_HOLLOW = 150, 400
 """A wall folds on a coarser surface."""
 SMOKE_QUADRATIC = (594, 794)
 """Of 150 and 200 vertices: fewer hold no node of a small region."""
-RESERVED = ("cache", "calibration", "entries", "figures", "main", "reference", "report-cases", "smoke", "verify")
+RESERVED = (
+    "cache",
+    "calibration",
+    "entries",
+    "figures",
+    "league",
+    "main",
+    "reference",
+    "report-cases",
+    "smoke",
+    "verify",
+)
 """Folders of the results that are no study's, and the word for the main studies."""
 SMOKE_FRAMES = 20
 

@@ -93,6 +93,7 @@ def mesh_entry(mesh: GivenMesh) -> dict[str, Any]:
         "nodes": len(mesh.points),
         "outer_nodes": int(mesh.mesh.outer_count),
         "tetrahedra": len(mesh.cells),
+        "sha256": mesh.digest,
         "volumes": dict(zip(mesh.volumes.names, mesh.volumes.measure(mesh.points).tolist(), strict=True)),
     }
 

@@ -1,5 +1,6 @@
 """The meshes on which positions are handed in: the straight and the curved one of a scene's organ."""
 
+import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,6 +20,8 @@ from studies.scene.scene import Scene
 STRAIGHT, CURVED = "straight", "curved"
 NODES = 550
 """Vertices on the outer surface where nobody says how many."""
+GRAIN = 1e-7
+"""To which rest positions are rounded before they are hashed [m]: far above rounding errors, far below an edge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +42,12 @@ class GivenMesh:
     def cells(self) -> np.ndarray:
         """Nodes of the tetrahedra in VTK's order, (k, 4) or (k, 10)."""
         return self.mesh.cells if isinstance(self.mesh, QuadraticMesh) else self.mesh.tetrahedra
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of rest positions, rounded to GRAIN, and cells."""
+        points = np.round(self.points / GRAIN).astype("<i8")
+        return hashlib.sha256(points.tobytes() + self.cells.astype("<i8").tobytes()).hexdigest()
 
     @cached_property
     def recipe(self) -> BodyRecipe:

@@ -15,6 +15,7 @@ from studies.geometry import SHAPES, organ
 from studies.metrics.run import Run
 from studies.metrics.table import metric, study_table
 from studies.report.kept_volume import kept_volumes
+from studies.report.league.page import league_cards, write_league
 from studies.report.page.part import read_part, write_part
 from studies.report.page.write import write_page
 from studies.report.references import refresh_uncertainty, state_of
@@ -68,12 +69,13 @@ def make_folder(folder: Path) -> None:
 
 
 def report(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
-    """Charts and tables of all studies, the summaries, machine.json, and report.html, which shows all of it in one
-    page; paths, and what is missing in sentences.
+    """Charts and tables of all studies, the summaries, machine.json, the league where somebody entered it, and
+    report.html, which shows all of it in one page; paths, and what is missing in sentences.
     """
     written, remarks = charts_and_tables(ledger, studies)
-    page, left_out = write_page(ledger.root, studies)
-    return [*written, *([page] if page else [])], [*remarks, *left_out]
+    league, unread = write_league(ledger.root)
+    page, left_out = write_page(ledger.root, studies, league_cards(ledger.root))
+    return [*written, *league, *([page] if page else [])], [*remarks, *unread, *left_out]
 
 
 def charts_and_tables(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:

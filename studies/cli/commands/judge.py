@@ -11,6 +11,8 @@ from studies.cli.terminal import Results, SceneName, busy, say, warn
 from studies.exchange.description import judged_metrics
 from studies.exchange.entry import entry_path, run_of_entry
 from studies.exchange.judge import entry_record
+from studies.exchange.league import FOLDER
+from studies.exchange.league.entry_file import check_entry, check_mesh_here, judged_file, read_entry_file
 from studies.exchange.meshes import NODES
 from studies.metrics.cells import UNRESOLVED_NOTE, plain, value_cell
 from studies.metrics.judged import FORCE
@@ -27,7 +29,12 @@ REVERSED = -100.0
 
 def judge(
     scene: SceneName,
-    file: Annotated[Path, typer.Argument(help="npz, CSV, VTKHDF or PVD file, a folder of VTU files, or a pattern")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="npz, CSV, VTKHDF or PVD file, a folder of VTU files, a pattern, or an entry of the league (JSON)"
+        ),
+    ],
     name: Annotated[str, typer.Option(help="name of the entry in tables and charts; default: the file's name")] = "",
     force: Annotated[Path | None, typer.Option(help="CSV file with the columns t [s] and force [N]")] = None,
     seconds: Annotated[float | None, typer.Option(help="computing time for one simulated second")] = None,
@@ -35,11 +42,20 @@ def judge(
     results: Results = Path("results"),
 ) -> None:
     """Judge the results of another program like our own: positions, forces, times. Keep them with our results."""
+    entry = read_entry_file(file) if file.suffix.lower() == ".json" else None
+    if entry is not None:
+        if name or force is not None or seconds is not None:
+            raise StudyError(f"{file.name} says all about the entry itself; leave out --name, --force and --seconds")
+        check_entry(entry, scene)
     found = find_scene(scene)
     with busy(f"judging {file.name}"):
-        record = entry_record(found, file, name or file.stem, nodes, force, seconds)
+        if entry is None:
+            record = entry_record(found, file, name or file.stem, nodes, force, seconds)
+        else:
+            check_mesh_here(entry, found)
+            record = judged_file(found, entry, file.parent)
         run = run_of_entry(record, reference_of(results, found))
-    path = entry_path(results, run.case)
+    path = entry_path(results if entry is None else results / FOLDER, run.case)
     write_record(path, record)
     mesh = "the curved mesh" if run.case.body.kind == "quadratic" else "the straight mesh"
     steps = record.attributes["frames"]
@@ -48,7 +64,8 @@ def judge(
         say(line)
     warn(hints_of(run))
     beside = [study.name for study in STUDIES if found.name in [each.name for each in study.scenes]]
-    shown = f", shown next to our methods by `organbench table {beside[-1]}`" if beside else ""
+    command = "report" if entry is not None else f"table {beside[-1]}" if beside else ""
+    shown = f", shown next to our methods by `organbench {command}`" if command else ""
     say(f"stored in {path}{shown}")
 
 

@@ -1,4 +1,5 @@
-"""Runs other programs on exported scenes, each in a process of its own, and judges what they hand in.
+"""Runs other programs on exported scenes, each in a process and an environment of its own, and judges what they hand
+in.
 
 Whatever happens is an entry: a program that cannot do a scene is skipped with its reason, one that crashes or hangs has
 a row that says so, and the rest goes on.
@@ -7,16 +8,18 @@ a row that says so, and the rest goes on.
 import json
 import os
 import subprocess
-import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from studies.base.errors import StudyError
 from studies.exchange.entry import HALF_STEP, entry_path, outside
 from studies.exchange.export import export
-from studies.exchange.judge import entry_record, unfinished_record
+from studies.exchange.judge import unfinished_record
+from studies.exchange.league.entry_file import LEAGUE, EntryFile, judged_file, write_entry_file
+from studies.exchange.league.frozen import SET
 from studies.exchange.meshes import given_mesh
+from studies.exchange.peers.environment import python_of
 from studies.exchange.peers.scene_folder import CANNOT, MISSING
 from studies.runs.case import Case
 from studies.scene.scene import Scene
@@ -33,16 +36,39 @@ class Peer:
     name: str
     module: str = ""
     mesh: str = "straight"
+    packages: tuple[str, ...] = ()
+    """What pip installs into its environment, the program itself first; without any it runs in that of organbench."""
+    settings: Mapping[str, object] = field(default_factory=dict)
+    """Keywords of its adapter: the best of the sweep (studies.exchange.peers.sweep)."""
+    ours: bool = False
     absent: str = ""
     """The reason with which it is skipped."""
 
+    @property
+    def version(self) -> str:
+        """Of the program, as it is asked for."""
+        return self.packages[0].partition("==")[2] if self.packages else ""
 
+
+ADAPTERS = "studies.exchange.peers."
 PEERS: tuple[Peer, ...] = (
-    Peer("mujoco", "studies.exchange.peers.mujoco_flex"),
-    Peer("felupe", "studies.exchange.peers.felupe_quadratic", "curved"),
-    Peer("newton", "studies.exchange.peers.newton_vbd"),
-    Peer("bullet", "studies.exchange.peers.bullet"),
-    Peer("sofa", absent="no wheel on PyPI, from which the extra installs; it comes as binaries of its own or by conda"),
+    Peer("mujoco", ADAPTERS + "mujoco_flex", packages=("mujoco-core==4.0.1",)),
+    Peer("felupe", ADAPTERS + "felupe_quadratic", "curved", packages=("felupe==11.3.0", "pypardiso")),
+    Peer("newton", ADAPTERS + "newton_vbd", packages=("newton==1.8.0", "warp-lang==1.19.0")),
+    Peer("bullet", ADAPTERS + "bullet", packages=("pybullet==3.2.7",)),
+    Peer("drake", ADAPTERS + "drake_deformable", packages=("drake==1.51.1",)),
+    Peer("sfepy", ADAPTERS + "sfepy_mixed", packages=("sfepy==2026.3",)),
+    Peer("sofa", absent="no wheel on PyPI; it comes as binaries of its own or by conda"),
+)
+OURS: tuple[Peer, ...] = (
+    Peer("ours-quadratic", ADAPTERS + "own", "curved", settings={"method": "implicit_volume"}, ours=True),
+    Peer(
+        "ours-corotated",
+        ADAPTERS + "own",
+        settings={"method": "implicit_elements", "law": "corotated", "dt": 0.02},
+        ours=True,
+    ),
+    Peer("ours-xpbd", ADAPTERS + "own", settings={"method": "xpbd_neo_hookean"}, ours=True),
 )
 
 
@@ -60,56 +86,96 @@ class Attempt:
         """Of the entry."""
         return self.peer.name if self.shorter == 1.0 else self.peer.name + HALF_STEP
 
+    @property
+    def words(self) -> list[str]:
+        """After the module: what its adapter is called with, besides the folders."""
+        return [self.peer.mesh, repr(self.shorter), json.dumps(dict(self.peer.settings))]
 
-def contest(root: Path, attempts: Sequence[Attempt], folder: Path, limit: float = TIME_LIMIT) -> Iterator[Record]:
+
+def contest(
+    root: Path, attempts: Sequence[Attempt], folder: Path, limit: float = TIME_LIMIT, environments: Path | None = None
+) -> Iterator[Record]:
     """Makes all attempts, in a `folder` for exported scenes and what is handed in, and stores each below `root`.
 
-    Raises StudyError where a scene cannot be exported or a record cannot be written.
+    environments: where those of the programs are kept; default: in the cache below `root`. Raises StudyError where a
+    scene cannot be exported or a record cannot be written.
     """
     for attempt in attempts:
         given = folder / f"{attempt.scene.name}-{attempt.nodes}"
         if not given.exists():
             export(attempt.scene, given, attempt.nodes)
-        record = judged(attempt, given, limit)
+        record = judged(attempt, given, limit, environments or root / "cache" / "environments")
         recipe = given_mesh(attempt.scene, attempt.nodes, attempt.peer.mesh).recipe
         write_record(entry_path(root, Case(attempt.scene, recipe, outside(attempt.name))), record)
         yield record
 
 
-def judged(attempt: Attempt, given: Path, limit: float) -> Record:
+def judged(attempt: Attempt, given: Path, limit: float, environments: Path) -> Record:
     """What came of an attempt on an exported scene."""
     out = given / f"{attempt.name}.npz"
-    status, message = hand_over(attempt, given, out, limit)
+    status, message = hand_over(attempt, given, out, limit, environments)
+    mesh = given_mesh(attempt.scene, attempt.nodes, attempt.peer.mesh)
+    entry = entry_of(attempt, out, mesh.digest)
     if status == Status.OK:
-        seconds = float(json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["seconds"])
         try:
-            return entry_record(attempt.scene, out, attempt.name, attempt.nodes, seconds=seconds)
+            write_entry_file(out.with_suffix(".entry.json"), entry)
+            return judged_file(attempt.scene, entry, out.parent)
         except StudyError as problem:
             status, message = Status.FAILED, str(problem)
-    recipe = given_mesh(attempt.scene, attempt.nodes, attempt.peer.mesh).recipe
-    return unfinished_record(Case(attempt.scene, recipe, outside(attempt.name)), status, message)
+    record = unfinished_record(Case(attempt.scene, mesh.recipe, outside(attempt.name)), status, message)
+    return replace(record, attributes=record.attributes | {LEAGUE: entry.model_dump_json()})
 
 
-def hand_over(attempt: Attempt, given: Path, out: Path, limit: float) -> tuple[Status, str]:
+def entry_of(attempt: Attempt, out: Path, digest: str) -> EntryFile:
+    """The attempt as an entry by file, with what its adapter wrote of itself, where it did."""
+    told_by = out.with_suffix(".json")
+    told = json.loads(told_by.read_text(encoding="utf-8")) if told_by.is_file() else {}
+    peer = attempt.peer
+    return EntryFile(
+        set=SET,
+        scene=attempt.scene.name,
+        engine=attempt.name,
+        version=peer.version,
+        mesh=peer.mesh,
+        nodes=attempt.nodes,
+        mesh_sha256=digest,
+        result=out.name,
+        seconds=told.pop("seconds", None),
+        evaluations=told.pop("evaluations", None),
+        settings=dict(peer.settings),
+        environment=told,
+        command=" ".join(["python -m studies.exchange.peers.run", peer.module, "SCENE OUT", *attempt.words]),
+        ours=peer.ours,
+    )
+
+
+def hand_over(
+    attempt: Attempt, given: Path, out: Path, limit: float, environments: Path = Path("environments")
+) -> tuple[Status, str]:
     """Runs the adapter in a process of its own, in the folder, where programs leave their logs; how it ended."""
-    if attempt.peer.absent:
-        return Status.SKIPPED, f"{attempt.peer.name}: {attempt.peer.absent}"
-    words = [attempt.peer.module, str(given.resolve()), str(out.resolve()), attempt.peer.mesh, repr(attempt.shorter)]
-    surroundings = os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
+    peer = attempt.peer
+    if peer.absent:
+        return Status.SKIPPED, f"{peer.name}: {peer.absent}"
+    try:
+        python, path = python_of(peer.name, peer.packages, environments)
+    except StudyError as problem:
+        return Status.SKIPPED, f"{peer.name}: {problem}"
+    out.with_suffix(".json").unlink(missing_ok=True)
+    words = [peer.module, str(given.resolve()), str(out.resolve()), *attempt.words]
     try:
         ended = subprocess.run(
-            [sys.executable, "-m", "studies.exchange.peers.run", *words],
+            [python, "-m", "studies.exchange.peers.run", *words],
             capture_output=True,
             text=True,
             timeout=limit,
             cwd=given,
-            env=surroundings,
+            env=os.environ | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1"},
         )
     except subprocess.TimeoutExpired:
-        return Status.FAILED, f"{attempt.peer.name} took longer than {limit:g} s"
+        return Status.FAILED, f"{peer.name} took longer than {limit:g} s"
     if ended.returncode == 0:
         return Status.OK, ""
     last = ([line for line in ended.stderr.splitlines() if line.strip()] or ["without a message"])[-1]
     if ended.returncode in (CANNOT, MISSING):
-        return Status.SKIPPED, f"{attempt.peer.name}: {last}"
-    return Status.FAILED, f"{attempt.peer.name} ended with exit code {ended.returncode}: {last}"
+        return Status.SKIPPED, f"{peer.name}: {last}"
+    return Status.FAILED, f"{peer.name} ended with exit code {ended.returncode}: {last}"

@@ -21,48 +21,55 @@ PENALTY = 10.0
 """Of the stiffness of the body: depths of 1 % of what the planes move."""
 
 
-def run(scene: SceneFolder, out: Path, shorter: float = 1.0) -> None:
-    """Runs the scene with INCREMENTS / shorter load steps to a checkpoint and hands it in."""
-    scene.check_simple()
+def run(
+    scene: SceneFolder, out: Path, shorter: float = 1.0, *, increments: int = INCREMENTS, penalty: float = PENALTY
+) -> None:
+    """Runs the scene with `increments` / shorter load steps to a checkpoint and hands it in."""
+    scene.check_simple(moving_holds=True)
     if np.any(scene.data["gravity"]):
         raise CannotDo("its adapter knows no weight")
     started = time.process_time()
-    count, planes = len(scene.points), scene.planes
+    count, planes = len(scene.points), scene.obstacles("plane")
     mesh = felupe.Mesh(np.vstack([scene.points, *([p["point"]] for p in planes)]), scene.cells, "tetra10")
     mesh.points_without_cells = np.empty(0, np.int64)  # the planes' own points are moved by hand
     displacement = felupe.Field(felupe.RegionQuadraticTetra(mesh), dim=3)
     field = felupe.FieldContainer([displacement])
     bulk = scene.data["material"]["bulk_modulus"]
     body = felupe.SolidBodyNearlyIncompressible(felupe.NeoHooke(mu=scene.mu), field, bulk=bulk)
-    contacts = [_contact(scene, field, body, k) for k in range(len(planes))]
-    tied = _tied(scene, displacement)
-    driven = {(k, axis): _fixed(displacement, [count + k], axis) for k in range(len(planes)) for axis in range(3)}
-    boundaries = tied | {f"plane{k}{axis}": boundary for (k, axis), boundary in driven.items()}
-    positions, forces, increments = [scene.points], [0.0], round(INCREMENTS / shorter)
+    contacts = [_contact(scene, field, body, k, penalty) for k in range(len(planes))]
+    paths = [(one["path"], [count + k]) for k, one in enumerate(planes)]
+    paths += [(held["path"], scene.marked(held["point_data"])) for held in scene.data["held"]]
+    driven = [(path, axis, _fixed(displacement, nodes, axis)) for path, nodes in paths for axis in range(3)]
+    tied = {} if scene.data["held"] else _tied(scene, displacement)
+    boundaries = tied | {f"driven{number}": boundary for number, (_, _, boundary) in enumerate(driven)}
+    positions, forces, many = [scene.points], [0.0], round(increments / shorter)
     for before, now in zip(scene.times[:-1], scene.times[1:], strict=True):
-        ways = [np.linspace(moved(p["path"], before), moved(p["path"], now), increments + 1)[1:] for p in planes]
-        ramp = {boundary: ways[k][:, axis] for (k, axis), boundary in driven.items()}
+        ends = [(moved(path, before)[axis], moved(path, now)[axis], boundary) for path, axis, boundary in driven]
+        ramp = {boundary: np.linspace(*way, many + 1)[1:] for *way, boundary in ends}
         step = felupe.Step(items=[body, *contacts], ramp=ramp, boundaries=boundaries)
         for _ in step.generate(x0=field, verbose=0, solver=spsolve):
             pass
         positions.append(scene.points + displacement.values[:count])
-        forces.append(_force(scene, contacts, count))
+        forces.append(_force(scene, body, contacts, count))
     spent = time.process_time() - started
     hand_in(out, scene.times, np.array(positions), np.array(forces), spent / scene.data["duration"])
 
 
-def _contact(scene: SceneFolder, field: Any, body: Any, number: int) -> Any:
-    normal = np.array(scene.planes[number]["normal"])
+def _contact(scene: SceneFolder, field: Any, body: Any, number: int, penalty: float) -> Any:
+    normal = np.array(scene.data["obstacles"][number]["normal"])
     point = len(scene.points) + number
-    options = {"centerpoint": point, "normal": normal, "items": [body], "multiplier": PENALTY}
+    options = {"centerpoint": point, "normal": normal, "items": [body], "multiplier": penalty}
     return felupe.ContactRigidPlane(field, points=scene.outer, **options)
 
 
-def _force(scene: SceneFolder, contacts: list[Any], count: int) -> float:
-    """The probed force [N]: what the plane's own point feels, turned round."""
-    number = scene.data["force"]["number"]
-    of_points = np.asarray(contacts[number].results.force.todense()).ravel()[: 3 * (count + len(contacts))]
-    return float(of_points.reshape(-1, 3)[count + number] @ scene.data["force"]["direction"])
+def _force(scene: SceneFolder, body: Any, contacts: list[Any], count: int) -> float:
+    """The probed force [N]: what the plane's own point feels, turned round, or what moves the held region."""
+    asked, direction = scene.data["force"], np.array(scene.data["force"]["direction"])
+    at_plane = asked["of"] == "obstacle"
+    result = (contacts[asked["number"]] if at_plane else body).results.force
+    of_points = np.asarray(result.todense()).ravel()[: 3 * (count + len(contacts))].reshape(-1, 3)
+    nodes = [count + asked["number"]] if at_plane else scene.marked(scene.data["held"][asked["number"]]["point_data"])
+    return float(of_points[nodes].sum(axis=0) @ direction)
 
 
 def _fixed(displacement: Any, nodes: Any, *axes: int) -> Any:
@@ -72,9 +79,7 @@ def _fixed(displacement: Any, nodes: Any, *axes: int) -> Any:
 
 
 def _tied(scene: SceneFolder, displacement: Any) -> dict[str, Any]:
-    """What does not move: held nodes, or of a free body a node, a direction from it, and a plane through both."""
-    if len(scene.held):
-        return {"held": _fixed(displacement, scene.held, 0, 1, 2)}
+    """What does not move of a free body: a node, a direction from it, and a plane through both."""
     x = scene.points - scene.points.mean(axis=0)
     reach = np.abs(x).max()
     middle, one, other = (

@@ -1,36 +1,64 @@
-"""`python -m studies.exchange.peers.main`: every other program on the ball and the liver, also with half its step."""
+"""`python -m studies.exchange.peers.main`: every other program on the ball and the liver, also with half its step.
+
+With `--league` each of them, and ours, on the open scenes of the frozen set; with `--sweep` their settings on one.
+"""
 
 import sys
 import tempfile
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import pandas as pd
 import typer
 
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.exchange.peers.contest import PEERS, TIME_LIMIT, Attempt, contest
+from studies.exchange.league import FOLDER
+from studies.exchange.league.frozen import frozen
+from studies.exchange.peers.contest import OURS, PEERS, TIME_LIMIT, Attempt, contest
 from studies.exchange.peers.study import NODES, SCENES
+from studies.exchange.peers.sweep import swept
+from studies.scene.library import SCENES as LIBRARY
+
+TABLE = "sweep.csv"
 
 
 def main(
     results: Annotated[Path, typer.Option(help="folder of the results")] = Path("results"),
     only: Annotated[str, typer.Option(help="one program by its name")] = "",
     limit: Annotated[float, typer.Option(min=1.0, help="seconds after which a run is ended")] = TIME_LIMIT,
+    league: Annotated[
+        bool, typer.Option("--league", help="on the open scenes of the frozen set, and ours too")
+    ] = False,
+    sweep: Annotated[bool, typer.Option("--sweep", help="several settings of each on one scene, as a table")] = False,
+    environments: Annotated[Path | None, typer.Option(help="folder of the programs' environments")] = None,
 ) -> None:
     """Exports the scenes, runs the programs, judges and stores what they hand in as entries."""
+    peers = (*PEERS, *(OURS if league else ()))
     if only:
-        lookup(only, [peer.name for peer in PEERS], "program (--only)")
-    attempts = [
-        Attempt(peer, scene, nodes, shorter)
-        for peer in PEERS
-        if only in ("", peer.name)
-        for scene in SCENES
-        for nodes in NODES
-        for shorter in ((1.0, 0.5) if nodes == NODES[0] and not peer.absent else (1.0,))
-    ]
+        lookup(only, [peer.name for peer in peers], "program (--only)")
+    chosen = [peer for peer in peers if only in ("", peer.name)]
+    homes = environments or results / "cache" / "environments"
     with tempfile.TemporaryDirectory() as folder:
-        for record in contest(results, attempts, Path(folder), limit):
+        if sweep:
+            rows: list[dict[str, Any]] = []
+            table = results / FOLDER / TABLE
+            table.parent.mkdir(parents=True, exist_ok=True)
+            for peer in chosen:
+                for row in () if peer.absent else swept(peer, Path(folder), limit, homes):
+                    rows.append(row)
+                    pd.DataFrame(rows).to_csv(table, index=False, float_format="%.6g")
+                    print(row, flush=True)
+            return
+        scenes = [scene for scene in LIBRARY if scene.name in frozen()] if league else SCENES
+        attempts = [
+            Attempt(peer, scene, nodes, shorter)
+            for peer in chosen
+            for scene in scenes
+            for nodes in NODES
+            for shorter in ((1.0, 0.5) if nodes == NODES[0] and not peer.absent and not league else (1.0,))
+        ]
+        for record in contest(results / FOLDER if league else results, attempts, Path(folder), limit, homes):
             print(f"{record.name}: {record.status}" + (f", {record.message}" if record.message else ""), flush=True)
 
 

@@ -1,7 +1,7 @@
 """MuJoCo: flexible bodies ("flex") of linear tetrahedra, Saint Venant-Kirchhoff, with contact by its own solver.
 
 Volume is kept as its documentation has it, by a Poisson ratio near ½; the shear modulus is that of the tissue. Damping
-is that of the scene, on every degree of freedom. Planes are bodies that are moved by hand ("mocap").
+is that of the scene, on every degree of freedom. Obstacles are bodies that are moved by hand ("mocap").
 """
 
 # Checked alike where the package is not installed.
@@ -9,11 +9,12 @@ is that of the scene, on every degree of freedom. Planes are bodies that are mov
 
 import time
 from pathlib import Path
+from typing import Any
 
 import mujoco  # pyright: ignore[reportMissingImports]
 import numpy as np
 
-from studies.exchange.peers.scene_folder import SceneFolder, hand_in, moved
+from studies.exchange.peers.scene_folder import SceneFolder, hand_in, place
 
 POISSON = 0.49
 """kappa is 50 mu. Nearer to ½ the force of a ball gains some percent, its volume nothing."""
@@ -26,7 +27,7 @@ XML = """<mujoco>
 <option timestep="{dt}" gravity="{gravity}" integrator="discrete" cone="elliptic"/>
 <size memory="512M"/>
 <worldbody>
-{planes}
+{shapes}
 <flexcomp name="organ" type="direct" dim="3" mass="{mass}" radius="1e-6" point="{points}" element="{cells}">
 <contact condim="1" selfcollide="none" solref="{solref}"/>
 <elasticity young="{young}" poisson="{poisson}"/>
@@ -36,13 +37,13 @@ XML = """<mujoco>
 </mujoco>"""
 
 
-def model_of(scene: SceneFolder, dt: float) -> mujoco.MjModel:
+def model_of(scene: SceneFolder, dt: float, poisson: float, stiff: float) -> mujoco.MjModel:
     """The scene as MuJoCo's model. Raises CannotDo."""
     scene.check_simple()
-    planes = "\n".join(
-        f'<body name="plane{k}" mocap="true" pos="{_text(o["point"])}"><geom name="plane{k}" type="plane" size="1 1 1" '
-        f'zaxis="{_text(o["normal"])}" condim="1" friction="0 0 0" solref="{2 * dt} 1"/></body>'
-        for k, o in enumerate(scene.planes)
+    contact = f'condim="1" friction="0 0 0" solref="{stiff * dt} 1"'
+    shapes = "\n".join(
+        f'<body name="obstacle{k}" mocap="true" pos="{_text(place(o, 0.0))}"><geom {_shape(o)} {contact}/></body>'
+        for k, o in enumerate(scene.obstacles("plane", "sphere"))
     )
     pins = f'<pin id="{_text(scene.held)}"/>' if len(scene.held) else ""
     corners = scene.points[scene.cells]
@@ -51,13 +52,13 @@ def model_of(scene: SceneFolder, dt: float) -> mujoco.MjModel:
         XML.format(
             dt=dt,
             gravity=_text(scene.data["gravity"]),
-            planes=planes,
+            shapes=shapes,
             mass=scene.density * volumes.sum(),
             points=_text(scene.points.ravel()),
             cells=_text(scene.cells.ravel()),
-            solref=f"{2 * dt} 1",
-            young=2.0 * scene.mu * (1.0 + POISSON),
-            poisson=POISSON,
+            solref=f"{stiff * dt} 1",
+            young=2.0 * scene.mu * (1.0 + poisson),
+            poisson=poisson,
             pins=pins,
         )
     )
@@ -77,40 +78,53 @@ def _set_masses(model: mujoco.MjModel, scene: SceneFolder, volumes: np.ndarray) 
         model.dof_damping[first : first + count] = scene.data["damping"]["rate"] * mass[node]
 
 
-def run(scene: SceneFolder, out: Path, shorter: float = 1.0) -> None:
-    """Runs the scene with steps of STEP × shorter and hands it in."""
-    dt = STEP * shorter
-    model = model_of(scene, dt)
+def run(
+    scene: SceneFolder,
+    out: Path,
+    shorter: float = 1.0,
+    *,
+    step: float = STEP,
+    poisson: float = POISSON,
+    stiff: float = 2.0,
+) -> None:
+    """Runs the scene with steps of `step` × shorter and hands it in; stiff: time constant of contacts over the step."""
+    dt, asked = step * shorter, scene.probed
+    model = model_of(scene, dt, poisson, stiff)
     data = mujoco.MjData(model)
-    planes = scene.planes
     positions, forces, spent = [scene.points], [0.0], 0.0
     sampled: list[float] = []
     begin, steps = 0, np.round(scene.times / dt).astype(int)
     mujoco.mj_forward(model, data)
     for end in steps[1:]:
         started = time.process_time()
-        for step in range(begin + 1, end + 1):
-            for k, plane in enumerate(planes):
-                data.mocap_pos[k] = np.array(plane["point"]) + moved(plane["path"], step * dt)
+        for number in range(begin + 1, end + 1):
+            for k, obstacle in enumerate(scene.data["obstacles"]):
+                data.mocap_pos[k] = place(obstacle, number * dt)
             mujoco.mj_step(model, data)
-            if end - step < FORCES:
-                sampled.append(_force(model, data, scene))
+            if end - number < FORCES:
+                sampled.append(_force(model, data, asked, scene.data["force"]["direction"]))
         spent += time.process_time() - started
         begin = end
         positions.append(data.flexvert_xpos.copy())
         forces.append(float(np.mean(sampled[-FORCES:])))
-    hand_in(out, scene.times, np.array(positions), np.array(forces), spent / scene.data["duration"])
+    hand_in(out, scene.times, np.array(positions), np.array(forces), spent / scene.data["duration"], int(steps[-1]))
 
 
-def _force(model: mujoco.MjModel, data: mujoco.MjData, scene: SceneFolder) -> float:
-    """The probed force [N]: the sum of the normal forces at the plane that is asked for."""
-    asked, total, found = scene.data["force"]["number"], 0.0, np.zeros(6)
+def _force(model: mujoco.MjModel, data: mujoco.MjData, asked: int, direction: list[float]) -> float:
+    """The probed force [N]: the sum of the contact forces at the obstacle that is asked for, along its direction."""
+    total, found = np.zeros(3), np.zeros(6)
     for number in range(data.ncon):
         contact = data.contact[number]
         if asked in (model.geom_bodyid[contact.geom[0]] - 1, model.geom_bodyid[contact.geom[1]] - 1):
             mujoco.mj_contactForce(model, data, number, found)
-            total += found[0]
-    return total
+            total += found[0] * contact.frame[:3]
+    return abs(float(total @ np.array(direction)))
+
+
+def _shape(obstacle: dict[str, Any]) -> str:
+    if obstacle["kind"] == "sphere":
+        return f'type="sphere" size="{obstacle["radius"]!r}"'
+    return f'type="plane" size="1 1 1" zaxis="{_text(obstacle["normal"])}"'
 
 
 def _cross(corners: np.ndarray) -> np.ndarray:

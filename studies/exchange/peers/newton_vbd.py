@@ -1,8 +1,8 @@
 """Newton (Warp on the CPU): vertex block descent on linear tetrahedra, stable neo-Hookean, single precision.
 
 Volume is kept as its documentation has it, by the second Lame constant; here 49 mu, for stiffer ones need more sweeps.
-Planes are static shapes that are moved by hand and push by a penalty; the force is read off its depth. Damping is that
-of the scene, on every velocity after a step.
+Obstacles are static shapes that are moved by hand and push by a penalty, on nodes, edges and whole facets; the force is
+the sum of the contact forces that it reports. Damping is that of the scene, on every velocity after a step.
 """
 
 # Checked alike where the package is not installed.
@@ -17,27 +17,31 @@ import newton  # pyright: ignore[reportMissingImports]
 import numpy as np
 import warp as wp  # pyright: ignore[reportMissingImports]
 
-from studies.exchange.peers.scene_folder import SceneFolder, hand_in, moved, turn_to
+from studies.exchange.peers.scene_folder import SceneFolder, hand_in, place, turn_to
 
 STEP, SWEEPS = 5e-3, 10
 """[s]; sweeps over all vertices in a step."""
 LAME = 49.0
 """lambda over mu: a Poisson ratio of 0.49."""
 PENALTY = 2e3
-"""Of a plane on a particle [N/m]."""
+"""Of an obstacle on a contact [N/m]."""
 RADIUS = 1e-4
-"""Of a particle [m]: the surface is so far off the planes."""
+"""Of a particle [m]: the surface is so far off the obstacles."""
 FORCES = 20
 """Forces are means over so many steps before a checkpoint."""
 
 
-def model_of(scene: SceneFolder) -> tuple[Any, list[int]]:
-    """The scene as Newton's model, and the numbers of its planes. Raises CannotDo."""
+def model_of(scene: SceneFolder, lame: float, penalty: float) -> tuple[Any, list[int]]:
+    """The scene as Newton's model, and the numbers of its obstacles. Raises CannotDo."""
     scene.check_simple()
     builder = newton.ModelBuilder(gravity=tuple(scene.data["gravity"]))
-    config = newton.ModelBuilder.ShapeConfig(ke=PENALTY, kd=0.0, mu=0.0)
-    planes = [builder.add_shape_plane(plane=None, xform=_placed(plane, 0.0), width=0.0, length=0.0, cfg=config)
-              for plane in scene.planes]  # fmt: skip
+    config = newton.ModelBuilder.ShapeConfig(ke=penalty, kd=0.0, mu=0.0)
+    shapes = [
+        builder.add_shape_plane(plane=None, xform=_placed(one, 0.0), width=0.0, length=0.0, cfg=config)
+        if one["kind"] == "plane"
+        else builder.add_shape_sphere(-1, xform=_placed(one, 0.0), radius=one["radius"], cfg=config)
+        for one in scene.obstacles("plane", "sphere")
+    ]
     builder.add_soft_mesh(
         pos=wp.vec3(0.0, 0.0, 0.0),
         rot=wp.quat_identity(),
@@ -47,7 +51,7 @@ def model_of(scene: SceneFolder) -> tuple[Any, list[int]]:
         indices=scene.cells.ravel().tolist(),
         density=scene.density,
         k_mu=scene.mu,
-        k_lambda=LAME * scene.mu,
+        k_lambda=lame * scene.mu,
         k_damp=0.0,
         particle_radius=RADIUS,
     )
@@ -56,58 +60,73 @@ def model_of(scene: SceneFolder) -> tuple[Any, list[int]]:
         builder.particle_flags[node] &= ~int(newton.ParticleFlags.ACTIVE)
     builder.color()
     model = builder.finalize(device="cpu")
-    model.soft_contact_ke, model.soft_contact_kd, model.soft_contact_mu = PENALTY, 0.0, 0.0
-    return model, planes
+    model.soft_contact_ke, model.soft_contact_kd, model.soft_contact_mu = penalty, 0.0, 0.0
+    return model, shapes
 
 
-def run(scene: SceneFolder, out: Path, shorter: float = 1.0) -> None:
-    """Runs the scene with steps of STEP × shorter and hands it in."""
+def run(
+    scene: SceneFolder,
+    out: Path,
+    shorter: float = 1.0,
+    *,
+    step: float = STEP,
+    sweeps: int = SWEEPS,
+    lame: float = LAME,
+    penalty: float = PENALTY,
+    facets: bool = True,
+) -> None:
+    """Runs the scene with steps of `step` × shorter and hands it in; facets: whole facets touch, not nodes alone."""
     wp.config.quiet = True
-    dt = STEP * shorter
-    model, planes = model_of(scene)
-    solver = newton.solvers.SolverVBD(model, iterations=SWEEPS, particle_enable_tile_solve=False)
-    pipeline = newton.CollisionPipeline(model)
+    dt, asked = step * shorter, scene.probed
+    model, shapes = model_of(scene, lame, penalty)
+    solver = newton.solvers.SolverVBD(model, iterations=sweeps, particle_enable_tile_solve=False)
+    pipeline = newton.CollisionPipeline(model, enable_rigid_soft_full_surface_contact=facets)
     contacts, now, after, control = pipeline.contacts(), model.state(), model.state(), model.control()
+    told = solver.observables({solver.ObservableKind.CONTACT_F}, contacts=contacts)
     kept = 1.0 / (1.0 + dt * scene.data["damping"]["rate"])
     positions, forces, sampled, spent = [scene.points], [0.0], [], 0.0
     steps = np.round(scene.times / dt).astype(int)
-    _step(solver, pipeline, contacts, now, after, control, dt)  # compiles; the body is at rest
+    _step(solver, pipeline, contacts, now, after, control, dt, told)  # compiles; the body is at rest
     for begin, end in pairwise(steps):
         started = time.process_time()
-        for step in range(begin + 1, end + 1):
-            _place(model, planes, scene, step * dt)
-            _step(solver, pipeline, contacts, now, after, control, dt)
+        for step_number in range(begin + 1, end + 1):
+            _place(model, shapes, scene, step_number * dt)
+            watched = end - step_number < FORCES
+            _step(solver, pipeline, contacts, now, after, control, dt, told if watched else None)
             after.particle_qd.numpy()[:] *= kept
             now, after = after, now
-            if end - step < FORCES:
-                sampled.append(_force(scene, now.particle_q.numpy(), step * dt))
+            if watched:
+                sampled.append(_force(scene, contacts, told, shapes[asked]))
         spent += time.process_time() - started
         positions.append(now.particle_q.numpy().astype(np.float64))
         forces.append(float(np.mean(sampled[-FORCES:])))
-    hand_in(out, scene.times, np.array(positions), np.array(forces), spent / scene.data["duration"])
+    cost = int(steps[-1]) * sweeps
+    hand_in(out, scene.times, np.array(positions), np.array(forces), spent / scene.data["duration"], cost)
 
 
-def _step(solver: Any, pipeline: Any, contacts: Any, now: Any, after: Any, control: Any, dt: float) -> None:
+def _step(solver: Any, pipeline: Any, contacts: Any, now: Any, after: Any, control: Any, dt: float, told: Any) -> None:
     now.clear_forces()
     pipeline.collide(now, contacts)
-    solver.step(now, after, control, contacts, dt)
+    solver.step(now, after, control, contacts, dt, observables=told)
 
 
-def _placed(plane: dict[str, Any], t: float) -> Any:
-    """A plane's place and turn at time t [s]: Newton's has its normal along z."""
-    place = np.array(plane["point"]) + moved(plane["path"], t)
-    return wp.transform(wp.vec3(*place.tolist()), wp.quat(*turn_to(plane["normal"]).tolist()))
+def _placed(obstacle: dict[str, Any], t: float) -> Any:
+    """An obstacle's place and turn at time t [s]: Newton's planes have their normal along z."""
+    turn = turn_to(obstacle["normal"]) if obstacle["kind"] == "plane" else np.array([0.0, 0.0, 0.0, 1.0])
+    return wp.transform(wp.vec3(*place(obstacle, t).tolist()), wp.quat(*turn.tolist()))
 
 
-def _place(model: Any, planes: list[int], scene: SceneFolder, t: float) -> None:
+def _place(model: Any, shapes: list[int], scene: SceneFolder, t: float) -> None:
     transforms = model.shape_transform.numpy()
-    for number, plane in zip(planes, scene.planes, strict=True):
-        transforms[number] = np.array(_placed(plane, t))
+    for number, obstacle in zip(shapes, scene.data["obstacles"], strict=True):
+        transforms[number] = np.array(_placed(obstacle, t))
     model.shape_transform.assign(transforms)
 
 
-def _force(scene: SceneFolder, x: np.ndarray, t: float) -> float:
-    """The probed force [N]: the penalty times the depths of all particles in the plane that is asked for."""
-    plane = scene.planes[scene.data["force"]["number"]]
-    gap = (x - np.array(plane["point"]) - moved(plane["path"], t)) @ np.array(plane["normal"])
-    return PENALTY * float(np.maximum(0.0, RADIUS - gap).sum())
+def _force(scene: SceneFolder, contacts: Any, told: Any, shape: int) -> float:
+    """The probed force [N]: the sum of the contact forces between the body and the obstacle that is asked for."""
+    count = int(contacts.soft_contact_count.numpy()[0])
+    first = contacts.rigid_contact_max
+    wrenches = told.contact_f.numpy()[first : first + count, :3]
+    asked = contacts.soft_contact_shape.numpy()[:count] == shape
+    return abs(float(wrenches[asked].sum(axis=0) @ np.array(scene.data["force"]["direction"])))

@@ -1,25 +1,44 @@
-"""`python -m studies.exchange.peers.run MODULE FOLDER OUT MESH SHORTER`: one adapter on one exported scene."""
+"""`python -m studies.exchange.peers.run MODULE FOLDER OUT MESH SHORTER SETTINGS`: one adapter on one exported scene.
 
+The interpreter is that of the program's own environment. What it handed in gets the versions of all that is installed
+there.
+"""
+
+import json
+import platform
 import sys
 from importlib import import_module
+from importlib.metadata import distributions
 from pathlib import Path
 
 from studies.exchange.peers.scene_folder import CANNOT, MISSING, CannotDo, SceneFolder
 
 
-def main(module: str, folder: str, out: str, mesh: str, shorter: str) -> int:
+def main(module: str, folder: str, out: str, mesh: str, shorter: str, settings: str) -> int:
     """Exit code 0, CANNOT or MISSING with a sentence on standard error; anything else is the adapter's own error."""
     try:
         adapter = import_module(module)
     except ModuleNotFoundError as error:
-        print(f"{error.name} is not installed; pip install 'organbench[peers]'", file=sys.stderr)
+        print(f"{error.name} is not installed", file=sys.stderr)
         return MISSING
     try:
-        adapter.run(SceneFolder(Path(folder), mesh), Path(out), float(shorter))
+        adapter.run(SceneFolder(Path(folder), mesh), Path(out), float(shorter), **json.loads(settings))
     except CannotDo as reason:
         print(reason, file=sys.stderr)
         return CANNOT
+    told = Path(out).with_suffix(".json")
+    told.write_text(json.dumps(json.loads(told.read_text(encoding="utf-8")) | surroundings()), encoding="utf-8")
     return 0
+
+
+def surroundings() -> dict[str, str | dict[str, str]]:
+    """Python, the machine, and all installed packages with their versions."""
+    packages = {one.metadata["Name"].lower(): one.version for one in distributions()}
+    return {
+        "python": platform.python_version(),
+        "machine": platform.platform(),
+        "packages": dict(sorted(packages.items())),
+    }
 
 
 if __name__ == "__main__":

@@ -1,4 +1,7 @@
-"""What an adapter knows of a scene: the exported folder, and nothing else of this program."""
+"""What an adapter knows of a scene: the exported folder, and nothing else of this program.
+
+It runs where that program is installed, and there numpy and meshio are all that it may count on.
+"""
 
 import json
 from dataclasses import dataclass
@@ -6,10 +9,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.files.grids import read_cells, read_points
 
 CANNOT, MISSING = 3, 4
 """Exit codes of studies.exchange.peers.run: a program has no means for the scene; its package is not installed."""
@@ -33,26 +36,22 @@ class SceneFolder:
         return json.loads((self.folder / "scene.json").read_text(encoding="utf-8"))
 
     @cached_property
-    def _grid(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        return read_points(self._file)
-
-    @property
-    def _file(self) -> Path:
-        return self.folder / self.data["meshes"][self.mesh]["file"]
+    def _grid(self) -> meshio.Mesh:
+        return meshio.read(self.folder / self.data["meshes"][self.mesh]["file"])
 
     @property
     def points(self) -> np.ndarray:
         """Rest positions [m], (n, 3)."""
-        return self._grid[0]
+        return np.asarray(self._grid.points, np.float64)
 
     @cached_property
     def cells(self) -> np.ndarray:
         """Tetrahedra in VTK's order, (k, 4) or (k, 10)."""
-        return read_cells(self._file, CELLS[self.mesh])
+        return self._grid.cells_dict[CELLS[self.mesh]].astype(np.int64)
 
     def marked(self, name: str) -> np.ndarray:
         """The nodes whose point data `name` is 1."""
-        return np.flatnonzero(self._grid[1][name] == 1)
+        return np.flatnonzero(self._grid.point_data[name] == 1)
 
     @property
     def outer(self) -> np.ndarray:
@@ -74,21 +73,28 @@ class SceneFolder:
         """Rest and checkpoints [s], (K + 1,)."""
         return np.array([0.0, *self.data["checkpoints"]])
 
-    @property
-    def planes(self) -> list[dict[str, Any]]:
-        """The obstacles. Raises CannotDo for one that is no frictionless plane, which is all that adapters know."""
+    def obstacles(self, *kinds: str) -> list[dict[str, Any]]:
+        """All of them. Raises CannotDo for one that is none of these kinds, and for one with friction."""
         for obstacle in self.data["obstacles"]:
-            if obstacle["kind"] != "plane" or obstacle["friction"] != 0:
-                raise CannotDo(f"its adapter knows frictionless planes, not: {obstacle['words']}")
+            if obstacle["kind"] not in kinds or obstacle["friction"] != 0:
+                known = " and ".join(f"{kind}s" for kind in kinds)
+                raise CannotDo(f"its adapter knows frictionless {known}, not: {obstacle['words']}")
         return self.data["obstacles"]
 
-    def check_simple(self) -> None:
-        """Raises CannotDo for a lumen, a start in motion and held regions that move."""
+    @property
+    def probed(self) -> int:
+        """Number of the obstacle whose force is asked for. Raises CannotDo where it is that of a held region."""
+        if self.data["force"]["of"] != "obstacle":
+            raise CannotDo("its adapter reads the force of an obstacle, not that of a held region")
+        return int(self.data["force"]["number"])
+
+    def check_simple(self, moving_holds: bool = False) -> None:
+        """Raises CannotDo for a lumen, a start in motion and, unless `moving_holds`, held regions that move."""
         if self.data["lumen"] is not None:
             raise CannotDo("its adapter knows solid organs, not a wall round a lumen")
         if self.data["start"]["speed"] is not None:
             raise CannotDo("its adapter starts at rest")
-        if any(np.any(held["path"]["displacements"]) for held in self.data["held"]):
+        if not moving_holds and any(np.any(held["path"]["displacements"]) for held in self.data["held"]):
             raise CannotDo("its adapter knows held regions that do not move")
 
     @property
@@ -103,6 +109,21 @@ def moved(path: dict[str, Any], t: float) -> np.ndarray:
     return np.array([np.interp(t, path["times"], axis) for axis in np.array(path["displacements"]).T])
 
 
+def place(obstacle: dict[str, Any], t: float) -> np.ndarray:
+    """A point of a plane, or the centre of a sphere, at time t [s] [m], (3,)."""
+    return np.array(obstacle["point" if obstacle["kind"] == "plane" else "centre"]) + moved(obstacle["path"], t)
+
+
+def gap(obstacle: dict[str, Any], x: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of points x (n, 3) at time t [s]: signed distance [m], (n,), and the direction away from the obstacle, (n, 3)."""
+    away = x - place(obstacle, t)
+    if obstacle["kind"] == "plane":
+        normal = np.array(obstacle["normal"])
+        return away @ normal, np.broadcast_to(normal, x.shape)
+    distance = np.linalg.norm(away, axis=1)
+    return distance - obstacle["radius"], away / np.maximum(distance, 1e-12)[:, None]
+
+
 def turn_to(normal: list[float]) -> np.ndarray:
     """Quaternion (x, y, z, w) that turns the z axis to a unit normal, (4,)."""
     x, y, z = normal
@@ -111,7 +132,10 @@ def turn_to(normal: list[float]) -> np.ndarray:
     return turn / np.linalg.norm(turn)
 
 
-def hand_in(out: Path, t: np.ndarray, positions: np.ndarray, force: np.ndarray, seconds: float) -> None:
-    """Writes what `organbench judge` reads, and the computing time for a simulated second."""
+def hand_in(
+    out: Path, t: np.ndarray, positions: np.ndarray, force: np.ndarray, seconds: float, evaluations: int | None = None
+) -> None:
+    """Writes what `organbench judge` reads, and what it cost: the computing time for a simulated second, and how often
+    the forces of all elements were evaluated in the whole run, where that is known."""
     np.savez(out, t=t, positions=positions, force=force)
-    out.with_suffix(".json").write_text(json.dumps({"seconds": seconds}), encoding="utf-8")
+    out.with_suffix(".json").write_text(json.dumps({"seconds": seconds, "evaluations": evaluations}), encoding="utf-8")

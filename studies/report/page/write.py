@@ -53,10 +53,12 @@ class Page:
     files: dict[str, bytes]
 
 
-def write_page(root: Path, studies: Sequence[Study]) -> tuple[Path | None, list[str]]:
+def write_page(
+    root: Path, studies: Sequence[Study], league: Sequence[Mapping[str, Any]] = ()
+) -> tuple[Path | None, list[str]]:
     """Writes the page of what is kept of `studies` and of others in `root` (studies.report.page.part), and its folder;
-    None where nothing is. And what could not be drawn or is older, in sentences. Raises StudyError when something
-    cannot be written."""
+    None where nothing is. And what could not be drawn or is older, in sentences. league: the cards of its engines.
+    Raises StudyError when something cannot be written."""
     others, remarks = other_studies(root, studies)
     parts = []
     for study in (*studies, *others):
@@ -68,7 +70,7 @@ def write_page(root: Path, studies: Sequence[Study]) -> tuple[Path | None, list[
             remarks += [f"report.html: {remark}" for remark in part["remarks"]]
     if not parts:
         return None, remarks
-    page, more = fitting(parts, _machine(root))
+    page, more = fitting(parts, _machine(root), league)
     for name, content in page.files.items():
         write_whole(root / FOLDER / name, content)
     write_whole(root / NAME, page.content)
@@ -111,13 +113,13 @@ def joined_rows(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return list(found.values())
 
 
-def fitting(parts: Parts, machine: dict[str, Any]) -> tuple[Page, list[str]]:
+def fitting(parts: Parts, machine: dict[str, Any], league: Sequence[Mapping[str, Any]] = ()) -> tuple[Page, list[str]]:
     """The page with as many cases as LIMIT has room for, the first one and those with the most to see before others;
     a sentence where even without cases it is larger."""
     cases = joined_cases([part for _, part in parts])
     first = first_case(cases)
     given = {"cases": _heads(cases), "first": first, "folder": FOLDER, "pieces": {}}
-    room, files = LIMIT - len(page(parts, given, machine)), {}
+    room, files = LIMIT - len(page(parts, given, machine, league)), {}
     for name, piece in _pieces(parts, cases, first).items():
         text = script_json(piece)
         size = len(text.encode()) + len(name) + len('"":,')
@@ -126,7 +128,7 @@ def fitting(parts: Parts, machine: dict[str, Any]) -> tuple[Page, list[str]]:
             room -= size
         else:
             files[f"{name}.js"] = f"keepPiece({json.dumps(name)}, {text});\n".encode()
-    content = page(parts, given, machine)
+    content = page(parts, given, machine, league)
     large = f"report.html has {len(content):,} bytes, more than {LIMIT:,}: its charts and its table are large"
     return Page(content, files), [large] if len(content) > LIMIT else []
 
@@ -157,7 +159,9 @@ def _rank(case: dict[str, Any]) -> int:
     return 2 if "replay" not in case else int(case["replay"]["straight"])
 
 
-def page(parts: Parts, given: Mapping[str, Any], machine: dict[str, Any]) -> bytes:
+def page(
+    parts: Parts, given: Mapping[str, Any], machine: dict[str, Any], league: Sequence[Mapping[str, Any]] = ()
+) -> bytes:
     """The file. given: what its script reads."""
     rows = [{"study": study.name, **row} for study, part in parts for row in part["rows"]]
     shown = joined_rows(rows)
@@ -188,6 +192,7 @@ def page(parts: Parts, given: Mapping[str, Any], machine: dict[str, Any]) -> byt
             command_line("report", [study for study in studies if study.word], elsewhere=True),
         ],
         machine=machine_words(machine),
+        league=league,
         data=Markup(script_json(given)),
         script=Markup(script),
         digest=base64.b64encode(sha256(script.encode()).digest()).decode("ascii"),

@@ -325,7 +325,7 @@ def test_pictures_are_as_without_copies(kept, tmp_path):
 
 def test_scripts_and_style_are_small_and_belong_to_the_package():
     files = sorted(path.name for path in ASSETS.iterdir())
-    assert files == sorted([*SCRIPTS, "page.css", "page.html"])
+    assert files == sorted([*SCRIPTS, "league.html", "page.css", "page.html"])
     assert all(len(path.read_text(encoding="utf-8").splitlines()) <= 250 for path in ASSETS.iterdir())
     settings = (ASSETS.parents[3] / "pyproject.toml").read_text(encoding="utf-8")
     assert "report/page/assets/*" in settings

@@ -1,0 +1,64 @@
+"""The profiles of the league: what share of all (scene, quantity) pairs an engine solves within a budget."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from studies.plots.campaigns.peers import SPARE
+from studies.plots.style.page import blank, finish, log_axis, page, panels
+from studies.plots.style.style import BLACK, drawing, styled
+
+TITLE = "What an engine solves within a budget: up and to the left is better"
+Steps = Sequence[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Profiles:
+    """(budget, share) of every engine, for each tolerance."""
+
+    tolerances: tuple[str, ...]
+    """In words, a column each."""
+    budgets: tuple[str, ...]
+    """Names of the axes, a row each."""
+    of: Mapping[str, Mapping[tuple[int, int], Steps]]
+    """Engine -> (row, column) -> steps."""
+    notes: tuple[str, ...] = ()
+
+
+@styled
+def figure(shown: Profiles) -> Figure:
+    """A row for each budget, a column for each tolerance."""
+    if not any(steps for parts in shown.of.values() for steps in parts.values()):
+        return blank(TITLE, "no entry is within a tolerance yet")
+    sheet = page(3.6 * len(shown.tolerances) + 0.6, 3.1 * len(shown.budgets))
+    axes = panels(sheet, len(shown.budgets), len(shown.tolerances), sharey=True, sharex="row")
+    looks = {name: SPARE[number % len(SPARE)] for number, name in enumerate(shown.of)}
+    for (name, parts), number in zip(shown.of.items(), range(len(shown.of)), strict=True):
+        colour, marker = looks[name]
+        line = "-" if number < len(SPARE) else "--"
+        for (row, column), steps in parts.items():
+            if steps:
+                x, y = zip(*steps, strict=True)
+                axes[row, column].step(x, y, where="post", color=colour, linestyle=line)
+                axes[row, column].plot(x[-1], y[-1], color=colour, marker=marker)
+    for row, words in enumerate(shown.budgets):
+        for column, tolerance in enumerate(shown.tolerances):
+            axes[row, column].set_xscale("log")
+            axes[row, column].set_xlabel(words)
+            if row == 0:
+                axes[row, column].axvline(1.0, color=BLACK, linewidth=1.2)
+                axes[row, column].set_title(tolerance)
+        axes[row, 0].set_ylim(0.0, 1.05)
+        axes[row, 0].set_ylabel("share of the pairs")
+        log_axis(axes[row, 0].xaxis)
+    handles = [
+        Line2D([], [], color=colour, marker=marker, linestyle="-" if n < len(SPARE) else "--", label=name)
+        for n, (name, (colour, marker)) in enumerate(looks.items())
+    ]
+    handles.append(Line2D([], [], color=BLACK, linewidth=1.2, label="real time"))
+    return finish(sheet, TITLE, handles, shown.notes, columns=4)
+
+
+draw = drawing(figure)

@@ -1,0 +1,144 @@
+"""The table of the league: a row for each engine, scene and mesh, read off the stored entries."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from studies.base.errors import StudyError
+from studies.exchange.entry import entry_files, run_of_entry
+from studies.exchange.league import FOLDER
+from studies.exchange.league.entry_file import LEAGUE
+from studies.exchange.league.frozen import frozen
+from studies.metrics.judged import cost_of
+from studies.metrics.metric import COMPARABLE
+from studies.metrics.table import metric
+from studies.reference.load import reference_for
+from studies.store.record import read_record
+
+TABLE = "league.csv"
+COLUMNS = ("force_end", "mean_error", "volume_worst", "penetration")
+PROFILED = {"force_end": 3.0, "mean_error": 1.0}
+"""Quantities of profiles -> what is usually enough [%] (studies.metrics.wish.SOLID)."""
+COST, COUNT = "cost [s/s]", "evaluations [1/s]"
+"""Computing time, and evaluations of all forces, for a simulated second."""
+Row = Mapping[str, Any]
+
+
+def league_rows(root: Path) -> tuple[list[dict[str, Any]], list[str]]:
+    """All entries of the league below the results folder `root` by engine, scene and nodes, and what cannot be read, a
+    sentence each."""
+    rows, problems = [], []
+    for path in entry_files(root / FOLDER):
+        try:
+            rows.append(_row(path))
+        except StudyError as problem:
+            problems.append(str(problem))
+    order = list(frozen())
+    return sorted(rows, key=lambda row: (row["engine"], order.index(row["scene"]), row["nodes"])), problems
+
+
+def _row(path: Path) -> dict[str, Any]:
+    """Raises StudyError for a record that cannot be read or is no entry of the set."""
+    record = read_record(path)
+    entry = json.loads(str(record.attributes.get(LEAGUE) or "{}"))
+    if entry.get("scene") not in frozen():
+        raise StudyError(f"{path} is no entry of the league; delete it")
+    run = run_of_entry(record, None)
+    scene = run.case.scene
+    run = run_of_entry(record, reference_for(path, scene))
+    known = record.status in COMPARABLE
+    row = {
+        "engine": entry["engine"],
+        "version": entry["version"],
+        "ours": entry["ours"],
+        "scene": scene.name,
+        "mesh": entry["mesh"],
+        "nodes": entry["nodes"],
+        "status": str(record.status),
+        "message": record.message,
+        "settings": json.dumps(entry["settings"]),
+        "reference": "" if run.reference is None else run.reference.source,
+    }
+    for name in COLUMNS:
+        one = metric(name)
+        row[f"{name} [%]"] = one(run) if known else float("nan")
+        row[f"{name} floor [%]"] = one.uncertainty(run) if known else float("nan")
+    count = entry["evaluations"]
+    cost = cost_of(run) if known else None
+    return row | {COST: cost.value if cost else float("nan"), COUNT: count / scene.duration if count else float("nan")}
+
+
+def pairs(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
+    """(scene, quantity) -> bar of the reference [%], of all that any entry could be judged by."""
+    found: dict[tuple[str, str], float] = {}
+    for row in rows:
+        for name in PROFILED:
+            bar = row[f"{name} floor [%]"]
+            if row[f"{name} [%]"] == row[f"{name} [%]"] and bar == bar:
+                found[row["scene"], name] = bar
+    return found
+
+
+def tolerance(name: str, factor: float, bar: float) -> float:
+    """`factor` of what is usually enough, and never finer than the reference is known [%]."""
+    return max(factor * PROFILED[name], bar)
+
+
+def profile(
+    rows: Sequence[Row], engine: str, factor: float, asked: Mapping[tuple[str, str], float], budget: str = COST
+) -> list[tuple[float, float]]:
+    """(budget, share of the pairs that are solved within the tolerance for at most this budget), ascending; a pair
+    counts from its cheapest entry that is good enough on."""
+    cheapest: dict[tuple[str, str], float] = {}
+    for row in rows:
+        for name in PROFILED:
+            pair, cost = (row["scene"], name), row[budget]
+            if row["engine"] != engine or pair not in asked or cost != cost:
+                continue
+            if abs(row[f"{name} [%]"]) <= tolerance(name, factor, asked[pair]):
+                cheapest[pair] = min(cheapest.get(pair, cost), cost)
+    costs = sorted(cheapest.values())
+    return [(cost, (number + 1) / len(asked)) for number, cost in enumerate(costs)]
+
+
+def engines(rows: Sequence[Row]) -> list[str]:
+    """By name, those of others first."""
+    ours = {row["engine"]: bool(row["ours"]) for row in rows}
+    return sorted(ours, key=lambda name: (ours[name], name))
+
+
+def cards(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """One for each engine: the range of the sizes of its errors, its cost, and what it cannot do."""
+    asked = pairs(rows)
+    return [_card(name, [row for row in rows if row["engine"] == name], asked) for name in engines(rows)]
+
+
+def _card(name: str, rows: Sequence[Row], asked: Mapping[tuple[str, str], float]) -> dict[str, Any]:
+    judged = [row for row in rows if row["status"] in COMPARABLE]
+    cannot: dict[str, list[str]] = {}
+    for row in rows:
+        if row["message"]:
+            scenes = cannot.setdefault(row["message"].removeprefix(f"{name}: "), [])
+            scenes += [row["scene"]] if row["scene"] not in scenes else []
+    best = profile(rows, name, 1.0, asked)
+    return {
+        "engine": name,
+        "version": rows[0]["version"],
+        "ours": bool(rows[0]["ours"]),
+        "scenes": len({row["scene"] for row in judged}),
+        "ranges": {column: _range(judged, f"{column} [%]") for column in COLUMNS},
+        "cost": _range(judged, COST),
+        "count": _range(judged, COUNT),
+        "solved": f"{round(best[-1][1] * len(asked)) if best else 0} of {len(asked)}",
+        "cannot": [f"{', '.join(scenes)}: {reason}" for reason, scenes in cannot.items()],
+    }
+
+
+def _range(rows: Sequence[Row], column: str) -> str:
+    """ "1.2 to 41": smallest and largest size; a dash where nothing is known."""
+    values = [abs(row[column]) for row in rows if row[column] == row[column]]
+    if not values:
+        return "–"
+    low, high = (f"{value:.2g}" if value < 100 else f"{value:.0f}" for value in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"

@@ -1,0 +1,1 @@
+"""Makes the frozen set of the league."""
