@@ -1,4 +1,4 @@
-"""A ball that is cut to half its section and then pressed together at both caps: the faces of the cut carry the press."""
+"""A ball that is cut to half its section, then pressed at both caps: the faces of the cut carry the press."""
 
 from dataclasses import replace
 
