@@ -12,7 +12,7 @@ from studies.scene.library import JUDGED
 from studies.scene.scene import Scene
 from studies.store.schema import Status
 
-BUDGETS = (594, 794, 994, 1194)
+BUDGETS = (594, 994, 1194)
 """Nodes on the outer surface of a quadratic body, mid-side nodes among them: 4 v − 6 with v vertices (Euler)."""
 SHORT, LONG = 0.5, 0.8
 """Steps over the stability limit: of linear bodies, and of quadratic ones."""
@@ -58,8 +58,9 @@ def headline_case(scene: Scene) -> Case:
 
 
 def even(scene: Scene) -> tuple[BodyRecipe, ...]:
-    """Quadratic bodies with elements of one size: those that are fast."""
-    return tuple(BodyRecipe("quadratic", nodes, mass=_mass(scene)) for nodes in BUDGETS[:2])
+    """Quadratic bodies with elements of one size: the smallest, which is fast, and all where grading changes nothing."""
+    sizes = BUDGETS[:1] if graded(scene) else BUDGETS
+    return tuple(BodyRecipe("quadratic", nodes, mass=_mass(scene)) for nodes in sizes)
 
 
 def graded(scene: Scene) -> tuple[BodyRecipe, ...]:

@@ -37,7 +37,7 @@ def told(organbench, tmp_path):
 def test_an_answer_holds_recipe_errors_cost_source_and_commands(told, tmp_path):
     out = told("liver_press")
     assert "liver_press: force within 3 %, displacement within 1 % (default target" in out
-    assert "adaptive quadratic, masses by stiffness, 794 surface nodes, dt = 0.8 dt_c, 2 ms" in out
+    assert "adaptive quadratic, masses by stiffness, 994 surface nodes, dt = 0.8 dt_c, 2 ms" in out
     assert "−1.2 ± 0.5 %" in out and "0.8 ± 0.1 %" in out
     assert "0.5 ms per 1 ms of simulated time, 2 times real time, on this machine" in out
     assert str(tmp_path / "published" / "accuracy" / "accuracy.csv") in out.replace("\n", "")
@@ -113,7 +113,7 @@ def test_in_an_empty_folder_the_tables_of_the_program_count(organbench, tmp_path
     assert (code, err) == (0, "") and "nodes=994" in out and "published/accuracy/accuracy.csv" in out
     # A table of one's own comes first.
     publish(Path("results"), rows_of(LIVER_PRESS))
-    assert "nodes=794" in organbench("advise", "liver_press", "--no-timing")[1]
+    assert "nodes=994" in organbench("advise", "liver_press", "--no-timing")[1]
 
 
 def test_a_file_of_two_scenes_is_one_sentence(refused, tmp_path):

@@ -14,7 +14,7 @@ from studies.store.tables import write_table
 PAPER = BodyRecipe("surface", 550)
 ONE = BodyRecipe(nodes=300)
 EVEN = BodyRecipe("quadratic", 594, mass="stiffness")
-GRADED = BodyRecipe("quadratic", 794, graded="adaptive", mass="stiffness")
+GRADED = BodyRecipe("quadratic", 994, graded="adaptive", mass="stiffness")
 FINE = BodyRecipe("quadratic", 1194, graded="adaptive", mass="stiffness")
 LADDER = {
     PAPER: (-70.0, 17.0, 0.01),
