@@ -1,10 +1,12 @@
-"""Does an incision gape as in the reference, and do the volumes of a body that is cut follow?"""
+"""Does an incision gape as in the reference, does a cut that closes bear a press, and do volumes follow?"""
 
 from massspring import ImplicitVolume
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.library.ball_bisected import BALL_BISECTED
+from studies.scene.library.ball_cut_pressed import BALL_CUT_PRESSED
 from studies.scene.library.ball_incised import BALL_INCISED
+from studies.scene.library.kidney_bisected import KIDNEY_BISECTED
 
 BODIES = (
     BodyRecipe(nodes=350),
@@ -21,7 +23,7 @@ CUTTING = Study(
     question=__doc__ or "",
     cases=tuple(
         Case(scene, body, ImplicitVolume(), dt_fraction=LONG)
-        for scene in (BALL_INCISED, BALL_BISECTED)
+        for scene in (BALL_INCISED, BALL_BISECTED, BALL_CUT_PRESSED, KIDNEY_BISECTED)
         for body in BODIES
     ),
     charts=(

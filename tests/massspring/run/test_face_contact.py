@@ -198,9 +198,9 @@ def test_a_step_solves_volumes_pairs_and_obstacles_together(kind, plane, enterin
 @pytest.mark.parametrize("kind", ["one", "cotangent", "quadratic"])
 def test_pairs_that_do_not_touch_change_nothing(kind):
     """From a little apart, for waves shake faces that lie on each other."""
-    halves, pulled = Halves(kind), []
-    for touching in (False, True):
-        pulled.append(simulate(begun_apart(halves, halves.setup(halves.cut, touching), 2e-3, PRESS)))
+    halves = Halves(kind)
+    setups = [begun_apart(halves, halves.setup(halves.cut, touching), 2e-3, PRESS) for touching in (False, True)]
+    pulled = [simulate(setup) for setup in setups]
     np.testing.assert_array_equal(pulled[0].final, pulled[1].final)
     np.testing.assert_array_equal(pulled[0].pressure, pulled[1].pressure)
 
