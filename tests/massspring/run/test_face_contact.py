@@ -132,23 +132,39 @@ def test_halves_that_meet_in_flight_keep_their_momentum(kind):
     assert speed[0] - speed[1] > -0.05  # of -0.4 m/s
 
 
-def one_step(setup: Setup, entering: bool):
-    """(state before, state after, boundary) of the first step in which pairs close a gap, or of one of the press."""
+def steps(setup: Setup):
+    """Step by step: frame, state before, state after, its pairs and the boundary with the row of that step."""
     state = setup.start()
     for frame in range(setup.clock.frames):
         boundary = setup.boundary(frame)
         for step in range(len(boundary.position)):
-            rows = {
+            row = {
                 name: getattr(boundary, name)[step : step + 1]
                 for name in ("position", "velocity", "held_displacement", "volume_target")
             }
             before = begin_frame(state, boundary)
-            state = setup.method.advance(state, boundary._replace(**rows))
+            state = setup.method.advance(state, boundary._replace(**row))
             assert state.pairs is not None
-            closes = (state.pairs.touches > 0) & (state.pairs.gap > 1e-9)
-            if closes.any() if entering else frame > 4:
-                return before, state, boundary
-    raise AssertionError
+            yield frame, before, state, state.pairs, boundary._replace(**row)
+
+
+@pytest.mark.parametrize("kind", ["one", "cotangent"])
+def test_faces_never_pull_while_halves_are_torn_apart(kind):
+    halves = Halves(kind)
+    setup = halves.setup(halves.cut, True)
+    back = [
+        replace(a, path=Trajectory((0.0, 0.3, 0.35), ((0, 0, 0), (-side * PRESS, 0, 0), (side * PRESS, 0, 0))))
+        for a, side in zip(setup.attachments, (-1, 1), strict=True)
+    ]
+    pressed, released = 0.0, 0
+    for frame, _, _, pairs, _ in steps(replace(setup, attachments=tuple(back))):
+        pressed = max(pressed, pairs.impulse.max())
+        if frame >= 12:
+            assert pairs.impulse.min() > -1e-9 * pressed
+            released = int((pairs.touches == 0).sum())
+        if frame == 14:
+            break
+    assert pressed > 0.0 and released == len(halves.pairs)
 
 
 def begun_apart(halves: Halves, setup: Setup, gap: float = 2e-4, way: float = -PRESS) -> Setup:
@@ -173,9 +189,11 @@ def test_a_step_solves_volumes_pairs_and_obstacles_together(kind, plane, enterin
     setup = halves.setup(halves.cut, True, obstacles=(Plane((0, 0, top), (0, 0, -1), sinks),) if plane else ())
     if entering:
         setup = begun_apart(halves, setup)
-    before, after, boundary = one_step(setup, entering)
-    pairs = after.pairs
-    assert pairs is not None
+    before, after, pairs, boundary = next(
+        (before, after, pairs, boundary)
+        for frame, before, after, pairs, boundary in steps(setup)
+        if (((pairs.touches > 0) & (pairs.gap > 1e-9)).any() if entering else frame > 4)
+    )
     i, j = pairs.node.T.astype(int)
     along = np.einsum("pi,pi->p", pairs.normal, after.nodes.x[j] - after.nodes.x[i])
     touching = pairs.touches > 0
