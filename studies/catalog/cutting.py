@@ -1,4 +1,4 @@
-"""Does an incision gape as in the reference, and do the volumes of a body that is cut follow?"""
+"""Does an incision gape as in the reference, does a cut that closes bear a press, and do volumes follow?"""
 
 from massspring import ImplicitVolume
 from studies.catalog.study import Chart, Study

@@ -31,12 +31,16 @@ OPENING = metric("opening_error")
 BINS = 8
 """Stretches between front and mouth over which the opening is averaged by area."""
 MM = 1e3
+SHUT = 1e-3
+"""An opening below this part of the size is none."""
 
 
 def gapes(run: Run) -> bool:
-    """Whether the run has an incision with a front, and its end."""
+    """Whether the run has an incision with a front that opens, and its end."""
     cut = run.case.scene.cut
-    return cut is not None and cut.within is not None and run.record.status in COMPARABLE
+    if cut is None or cut.within is None or run.record.status not in COMPARABLE:
+        return False
+    return float((run.opening @ cut.plane.normal).max()) > SHUT * run.size
 
 
 @styled

@@ -2,10 +2,12 @@
 
 from studies.scene.library.ball_bisected import BALL_BISECTED
 from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.ball_cut_pressed import BALL_CUT_PRESSED
 from studies.scene.library.ball_incised import BALL_INCISED
 from studies.scene.library.ball_ringing import BALL_RINGING
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.bladder_fill import BLADDER_FILL
+from studies.scene.library.kidney_bisected import KIDNEY_BISECTED
 from studies.scene.library.kidney_probe import KIDNEY_PROBE
 from studies.scene.library.liver_incised import LIVER_INCISED
 from studies.scene.library.liver_press import LIVER_PRESS
@@ -35,18 +37,20 @@ SCENES: tuple[Scene, ...] = (
 JUDGED: tuple[Scene, ...] = tuple(scene for scene in SCENES if scene.reference is not None)
 """Scenes with a reference: a study may ask how accurate a run of theirs is."""
 
-CUT: tuple[Scene, ...] = (BALL_INCISED, LIVER_INCISED, BALL_BISECTED)
+CUT: tuple[Scene, ...] = (BALL_INCISED, LIVER_INCISED, BALL_BISECTED, BALL_CUT_PRESSED, KIDNEY_BISECTED)
 """Scenes that cut their organ. They are not in SCENES: surface bodies and half of the methods cannot run them."""
 
 __all__ = [
     "BALL_BISECTED",
     "BALL_CLAMPED",
+    "BALL_CUT_PRESSED",
     "BALL_INCISED",
     "BALL_RINGING",
     "BALL_SQUEEZE",
     "BLADDER_FILL",
     "CUT",
     "JUDGED",
+    "KIDNEY_BISECTED",
     "KIDNEY_PROBE",
     "LIVER_INCISED",
     "LIVER_PRESS",

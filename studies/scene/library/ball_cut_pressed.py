@@ -1,4 +1,4 @@
-"""A ball that is cut to half its section, then pressed at both caps: the faces of the cut carry the press."""
+"""A ball that is pressed together at both caps while it is cut to half its section: the faces of the cut carry it."""
 
 from dataclasses import replace
 

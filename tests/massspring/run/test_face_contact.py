@@ -132,41 +132,77 @@ def test_halves_that_meet_in_flight_keep_their_momentum(kind):
     assert speed[0] - speed[1] > -0.05  # of -0.4 m/s
 
 
-def one_step(setup: Setup):
-    """(state before, state after) the first step in which some pairs touch."""
+def steps(setup: Setup):
+    """Step by step: frame, state before, state after, its pairs and the boundary with the row of that step."""
     state = setup.start()
     for frame in range(setup.clock.frames):
         boundary = setup.boundary(frame)
         for step in range(len(boundary.position)):
-            rows = {
+            row = {
                 name: getattr(boundary, name)[step : step + 1]
                 for name in ("position", "velocity", "held_displacement", "volume_target")
             }
             before = begin_frame(state, boundary)
-            state = setup.method.advance(state, boundary._replace(**rows))
-            if frame > 4:
-                return before, state, boundary
-    raise AssertionError
+            state = setup.method.advance(state, boundary._replace(**row))
+            assert state.pairs is not None
+            yield frame, before, state, state.pairs, boundary._replace(**row)
+
+
+@pytest.mark.parametrize("kind", ["one", "cotangent"])
+def test_faces_never_pull_while_halves_are_torn_apart(kind):
+    halves = Halves(kind)
+    setup = halves.setup(halves.cut, True)
+    back = [
+        replace(a, path=Trajectory((0.0, 0.3, 0.35), ((0, 0, 0), (-side * PRESS, 0, 0), (side * PRESS, 0, 0))))
+        for a, side in zip(setup.attachments, (-1, 1), strict=True)
+    ]
+    pressed, released = 0.0, 0
+    for frame, _, _, pairs, _ in steps(replace(setup, attachments=tuple(back))):
+        pressed = max(pressed, pairs.impulse.max())
+        if frame >= 12:
+            assert pairs.impulse.min() > -1e-9 * pressed
+            released = int((pairs.touches == 0).sum())
+        if frame == 14:
+            break
+    assert pressed > 0.0 and released == len(halves.pairs)
+
+
+def begun_apart(halves: Halves, setup: Setup, gap: float = 2e-4, way: float = -PRESS) -> Setup:
+    """The same from faces that are `gap` [m] apart; each end moves outwards by `way` [m]."""
+    rest = setup.body.rest
+    side = np.where(rest[:, 0] > MIDDLE, 1.0, -1.0)
+    side[halves.pairs] = [-1.0, 1.0]
+    held = [
+        replace(a, path=Trajectory((0.0, 0.5), ((s * gap / 2, 0, 0), (s * (gap / 2 + way), 0, 0))))
+        for a, s in zip(setup.attachments, (-1, 1), strict=True)
+    ]
+    return replace(setup, attachments=tuple(held), positions=rest + gap / 2 * side[:, None] * [1.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("plane", [False, True])
-def test_a_step_solves_volumes_pairs_and_obstacles_together(kind, plane):
+@pytest.mark.parametrize(("plane", "entering"), [(False, False), (True, False), (False, True)])
+def test_a_step_solves_volumes_pairs_and_obstacles_together(kind, plane, entering):
     """All conditions of eq. 9.9 and 9.10 hold at its end at once, to round-off and the tolerance of volumes."""
     halves = Halves(kind)
     top = float(halves.cut.rest[:, 2].max())
     sinks = Trajectory((0.0, 0.5), ((0, 0, 0), (0, 0, -0.01)))
     setup = halves.setup(halves.cut, True, obstacles=(Plane((0, 0, top), (0, 0, -1), sinks),) if plane else ())
-    before, after, boundary = one_step(setup)
-    pairs = after.pairs
-    assert pairs is not None
+    if entering:
+        setup = begun_apart(halves, setup)
+    before, after, pairs, boundary = next(
+        (before, after, pairs, boundary)
+        for frame, before, after, pairs, boundary in steps(setup)
+        if (((pairs.touches > 0) & (pairs.gap > 1e-9)).any() if entering else frame > 4)
+    )
     i, j = pairs.node.T.astype(int)
     along = np.einsum("pi,pi->p", pairs.normal, after.nodes.x[j] - after.nodes.x[i])
     touching = pairs.touches > 0
-    assert touching.sum() > 5
+    assert touching.sum() > (0 if entering else 5)
     assert np.abs(along[touching]).max() < 1e-15
-    assert (pairs.impulse[touching] > -1e-12 * pairs.impulse.max()).all() or kind == "quadratic"
-    assert (along[~touching] > -1e-12).all() and (pairs.impulse[~touching] == 0.0).all()
+    # The first meeting may ask for more passes of the active set than a step has.
+    assert entering or (pairs.impulse[touching] > -1e-12 * pairs.impulse.max()).all() or kind == "quadratic"
+    assert entering or (along[~touching] > -1e-12).all()
+    assert (pairs.impulse[~touching] == 0.0).all()
     target = setup.body.kept.jacobian(before.x) @ (after.x - before.x).ravel()
     wanted = boundary.volume_target[0] - setup.body.kept.measure(before.x)
     np.testing.assert_allclose(target, wanted, atol=3e-9 * setup.body.rest_volumes.max())
@@ -181,16 +217,8 @@ def test_a_step_solves_volumes_pairs_and_obstacles_together(kind, plane):
 def test_pairs_that_do_not_touch_change_nothing(kind):
     """From a little apart, for waves shake faces that lie on each other."""
     halves = Halves(kind)
-    rest, pulled = halves.cut.rest, []
-    side = np.where(rest[:, 0] > MIDDLE, 1.0, -1.0)
-    side[halves.pairs] = [-1.0, 1.0]
-    for touching in (False, True):
-        setup = halves.setup(halves.cut, touching, positions=rest + 1e-3 * side[:, None] * [1.0, 0.0, 0.0])
-        held = [
-            replace(a, path=Trajectory((0.0, 0.5), ((s * 1e-3, 0, 0), (s * 4e-3, 0, 0))))
-            for a, s in zip(setup.attachments, (-1, 1), strict=True)
-        ]
-        pulled.append(simulate(replace(setup, attachments=tuple(held))))
+    setups = [begun_apart(halves, halves.setup(halves.cut, touching), 2e-3, PRESS) for touching in (False, True)]
+    pulled = [simulate(setup) for setup in setups]
     np.testing.assert_array_equal(pulled[0].final, pulled[1].final)
     np.testing.assert_array_equal(pulled[0].pressure, pulled[1].pressure)
 
