@@ -183,11 +183,7 @@ class Run:
 
     def _outside(self, points: np.ndarray, facets: np.ndarray) -> np.ndarray:
         """Those of the boundary's facets (f, 3 or 6) that are not faces of a cut, which lie on each other at rest."""
-        if self.case.scene.cut is None:
-            return facets
-        middles = points[facets[:, :3]].mean(axis=1)
-        distance, _ = KDTree(middles).query(middles, k=2)
-        return facets[distance[:, 1] > SAME_PLACE * self.size]
+        return facets if self.case.scene.cut is None else facets[~doubled(points, facets, self.size)]
 
     def _on_own_side(self, points: np.ndarray, facets: np.ndarray) -> np.ndarray:
         """Nodes at `points` (n, 3) [m] of boundary `facets` (f, 3 or 6), those at the mouth of a cut a little on the
@@ -231,6 +227,14 @@ class Run:
         area = triangle_areas(self.fields.rest, triangles)
         share = np.bincount(triangles.ravel(), weights=np.repeat(area / 3, 3), minlength=len(self.fields.rest))
         return share[self.material_nodes]
+
+
+def doubled(points: np.ndarray, facets: np.ndarray, size: float) -> np.ndarray:
+    """Whether each of the facets (f, 3 or 6) of a body of a size [m] at rest lies at the place of another one, as the
+    faces of a cut do, (f,) bool."""
+    middles = points[facets[:, :3]].mean(axis=1)
+    distance, _ = KDTree(middles).query(middles, k=2)
+    return distance[:, 1] < SAME_PLACE * size
 
 
 def by_scene(runs: Sequence[Run]) -> dict[str, list[Run]]:
