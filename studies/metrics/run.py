@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import triangle_areas
@@ -19,8 +20,8 @@ from studies.runs.case import Case, case_from_json
 from studies.store.record import Record, read_record
 from studies.store.schema import RunAttributes, RunFields
 
-SAME_PLACE = 1e-9
-"""Of the body's size: far above rounding, far below an edge."""
+SAME_PLACE = 1e-5
+"""Of the body's size: far above what a published reference rounds, far below an edge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,11 +183,7 @@ class Run:
 
     def _outside(self, points: np.ndarray, facets: np.ndarray) -> np.ndarray:
         """Those of the boundary's facets (f, 3 or 6) that are not faces of a cut, which lie on each other at rest."""
-        if self.case.scene.cut is None:
-            return facets
-        middles = np.round(points[facets[:, :3]].mean(axis=1) / (SAME_PLACE * self.size)).astype(np.int64)
-        _, inverse, count = np.unique(middles, axis=0, return_inverse=True, return_counts=True)
-        return facets[count[inverse.reshape(-1)] == 1]
+        return facets if self.case.scene.cut is None else facets[~doubled(points, facets, self.size)]
 
     def _on_own_side(self, points: np.ndarray, facets: np.ndarray) -> np.ndarray:
         """Nodes at `points` (n, 3) [m] of boundary `facets` (f, 3 or 6), those at the mouth of a cut a little on the
@@ -230,6 +227,14 @@ class Run:
         area = triangle_areas(self.fields.rest, triangles)
         share = np.bincount(triangles.ravel(), weights=np.repeat(area / 3, 3), minlength=len(self.fields.rest))
         return share[self.material_nodes]
+
+
+def doubled(points: np.ndarray, facets: np.ndarray, size: float) -> np.ndarray:
+    """Whether each of the facets (f, 3 or 6) of a body of a size [m] at rest lies at the place of another one, as the
+    faces of a cut do, (f,) bool."""
+    middles = points[facets[:, :3]].mean(axis=1)
+    distance, _ = KDTree(middles).query(middles, k=2)
+    return distance[:, 1] < SAME_PLACE * size
 
 
 def by_scene(runs: Sequence[Run]) -> dict[str, list[Run]]:

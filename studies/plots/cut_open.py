@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from studies.base.counting import heading
 from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import force_end, opening_error
-from studies.metrics.run import Run, by_scene
+from studies.metrics.run import Run, by_scene, doubled
 from studies.plots.style.page import blank, finish, page, panels
 from studies.plots.style.render import Camera, draw_surface, frame, scale_bar
 from studies.plots.style.style import NORMAL, SMALL, drawing, styled
@@ -58,9 +58,9 @@ def _draw_row(row: Sequence[Axes], run: Run, camera: Camera) -> None:
     rest, triangles = run.fields.rest, run.fields.triangles.astype(np.int64)
     nodes, facets = reference.field("nodes"), reference.triangles
     seen = [
-        (run.fields.snapshots[0], triangles, _inside(run, rest, triangles), TISSUE),
-        (run.fields.snapshots[-1], triangles, _inside(run, rest, triangles), TISSUE),
-        (reference.surface()[0], facets, _inside(run, nodes, facets), STEEL),
+        (run.fields.snapshots[0], triangles, doubled(rest, triangles, run.size), TISSUE),
+        (run.fields.snapshots[-1], triangles, doubled(rest, triangles, run.size), TISSUE),
+        (reference.surface()[0], facets, doubled(nodes, facets, run.size), STEEL),
     ]
     box = np.concatenate([camera.see(points)[:, :2] for points, *_ in seen])
     low, high = box.min(axis=0), box.max(axis=0)
@@ -80,18 +80,9 @@ def _draw_row(row: Sequence[Axes], run: Run, camera: Camera) -> None:
         ("reference", f"gapes {truth:.1f} mm, force {force[-1]:.2f} N"),
     )
     for axes, (title, line) in zip(row, words, strict=True):
-        axes.set_title(title, size=NORMAL)
-        axes.text(0.5, -0.02, line, transform=axes.transAxes, ha="center", va="top", size=NORMAL)
-    scale_bar(row[0], *(low - 0.5 * room), 0.05, "50 mm", size=SMALL)
-
-
-def _inside(run: Run, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Whether each of the boundary's triangles is a face of the cut, (s,) bool."""
-    cut = run.case.scene.cut
-    assert cut is not None and cut.within is not None  # incised() asked
-    middles = points[triangles].mean(axis=1)
-    flat = np.abs(cut.plane.level(points[triangles].reshape(-1, 3))).reshape(-1, 3).max(axis=1)
-    return (flat < 1e-5 * run.size) & (cut.within.level(middles) < 0)
+        axes.set_title(f"{title}\n{line}", size=NORMAL, weight="normal")
+    left, below = low - 0.5 * room
+    scale_bar(row[0], left, below, 0.05, "50 mm", size=SMALL)
 
 
 draw = drawing(figure, DPI)

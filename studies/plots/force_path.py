@@ -34,7 +34,7 @@ from studies.runs.case import BodyRecipe
 from studies.scene.library import Scene
 
 TITLE = "Force of the press against the reference"
-CUT_TITLE = "Force of what holds and pulls a body that is cut, against the reference"
+CUT_TITLE = "Force on the pulled end of a body that is cut, against the reference"
 FORCES = [metric for metric in METRICS if metric.name == "force_end"]
 """What is written at the ends of the lines."""
 ROOM = 1.06

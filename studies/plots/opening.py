@@ -21,6 +21,7 @@ from studies.plots.style.page import (
     panels,
     reference_handle,
     remarks,
+    unresolved_mark,
     unresolved_notes,
 )
 from studies.plots.style.style import BLACK, GREY, method_colour, save, styled
@@ -74,7 +75,7 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
         axes.fill_between(depth, opening - spread, opening + spread, color=GREY, alpha=0.3, linewidth=0)
         axes.plot(depth, opening, color=BLACK, linewidth=1, marker="o", markeredgecolor="white")
     axes.set(xlim=(0, None), ylim=(0, None), xlabel="distance from the front [mm]", ylabel="opening [mm]")
-    axes.set_title(heading(scene.name))
+    axes.set_title(heading(scene.name) + unresolved_mark(group, (OPENING,)))
 
 
 def _profile(run: Run, opening: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -2,14 +2,16 @@
 
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 
 from massspring import ImplicitVolume, Shake
 from studies.base.errors import DoesNotApply, StudyError
+from studies.geometry.mesh.organ_mesh import boundary_triangles, triangle_areas
 from studies.metrics.metrics import METRICS
-from studies.metrics.run import Run
-from studies.plots import opening
+from studies.metrics.run import Run, doubled
+from studies.plots import cut_open, opening, pieces
 from studies.reference.load import load_reference
 from studies.reference.nested import solve_nested
 from studies.reference.reference_solves import ReferenceSolve
@@ -20,6 +22,7 @@ from studies.runs.prepare import prepare
 from studies.runs.run import measure
 from studies.scene.library.ball_bisected import BALL_BISECTED
 from studies.scene.library.ball_incised import BALL_INCISED
+from studies.store.record import write_record
 
 pytestmark = pytest.mark.slow
 METRIC = {metric.name: metric for metric in METRICS}
@@ -90,6 +93,51 @@ def test_the_chart_shows_both(incised, tmp_path):
     *bodies, truth = (line.get_ydata() for line in axes.lines)
     assert len(bodies) == 2 and truth[-1] == pytest.approx(13.2, rel=0.05)
     assert all(line[-1] == pytest.approx(truth[-1], rel=0.1) for line in bodies)
+
+
+def test_the_picture_shows_the_faces_of_the_cut_and_how_wide_they_gape(incised):
+    """Of body and reference alike: as much of the surface as twice the half disc."""
+    run = incised["quadratic"]
+    figure = cut_open.figure([run])
+    assert ["gapes 13" in axes.get_title() for axes in figure.axes] == [False, True, True]
+    for points, triangles in (
+        (run.fields.rest, run.fields.triangles.astype(np.int64)),
+        (run.reference.field("nodes"), run.reference.triangles),
+    ):
+        inside = doubled(points, triangles, run.size)
+        assert triangle_areas(points, triangles[inside]).sum() == pytest.approx(np.pi * 0.05**2, rel=0.03)
+
+
+def test_the_chart_of_pieces_shows_each_and_their_sum():
+    run = Run(case := Case(BALL_BISECTED, ONE, ImplicitVolume(), dt_fraction=0.8), measure(case))
+    (axes,) = pieces.figure([run]).axes
+    *parts, whole, cut = (np.asarray(line.get_ydata()) for line in axes.lines)
+    assert len(parts) == 2 and len(cut) == 2
+    first = run.record.attributes["cut_frame"]
+    # A half has no volume of its own before the cut; their sum always had.
+    assert min(part[:first].max() for part in parts) > 10 * whole[:first].max()
+    assert METRIC["piece_worst"](run) == pytest.approx(max(part[-1] for part in parts), abs=1e-3)
+    assert METRIC["piece_sum_worst"](run) == pytest.approx(whole.max(), rel=1e-6)
+
+
+def test_paraview_sees_the_cut_shut_before_and_open_after_it(incised, tmp_path):
+    """The group VTKHDF of the file: cells on either side have nodes of their own, which part after the cut."""
+    for run in incised.values():
+        write_record(tmp_path / "run.h5", run.record)
+        with h5py.File(tmp_path / "run.h5") as file:
+            group = file["VTKHDF"]
+            nodes, steps = int(group["NumberOfPoints"][0]), int(group["Steps"].attrs["NSteps"])
+            points = group["Points"][()].reshape(steps, nodes, 3)
+            cells = group["Connectivity"][()].reshape(-1, 4)
+        outside = {frozenset(face) for face in boundary_triangles(cells.astype(np.int64)).tolist()}
+        behind, front = run.cut_pairs.T
+        other = np.arange(nodes)
+        other[behind] = front
+        faces = run.fields.cut_faces
+        assert all(frozenset(face) in outside for face in faces.tolist())
+        assert all(frozenset(face) in outside for face in other[faces].tolist())
+        gap = np.linalg.norm(points[:, front] - points[:, behind], axis=2)
+        assert gap[0].max() == 0.0 and gap[-1].min() > 1e-4 and gap[-1].max() > 0.01
 
 
 @pytest.mark.parametrize("body", [ONE, QUADRATIC, BodyRecipe(nodes=200, law="cotangent", volumes="nodal")])
