@@ -15,12 +15,12 @@ from reference_fem.statics.newton import StepFailed
 from reference_fem.system.saddle_point import System
 from reference_fem.system.state import State
 from reference_fem.uncertainty import MeshError
-from studies.base.errors import StudyError
 from studies.meshing.nested_mesh import NestedMesh, at_nodes, base_mesh
 from studies.reference.problem import problem_on
 from studies.reference.reference_solves import settings_varied
 from studies.reference.sample import Sample, SamplePoints, sample_of
 from studies.reference.uncertainty import uncertainty_of_meshes
+from studies.scene.clock import check_after_cut
 from studies.scene.quantities import allowed
 from studies.scene.scene import Scene
 
@@ -113,12 +113,7 @@ def varied_sample(scene: Scene, problem: Problem, better: Varied, at: SamplePoin
 
 def problem_of(mesh: NestedMesh) -> Problem:
     """The scene on one of its nested meshes. Raises StudyError for a checkpoint before the cut."""
-    cut, first = mesh.scene.cut, mesh.scene.checkpoints[0]
-    if cut is not None and first <= cut.at:
-        raise StudyError(
-            f"scene '{mesh.scene.name}' has a checkpoint at {first:g} s before its cut at {cut.at:g} s, and the "
-            "reference is of the body after it; move one of them"
-        )
+    check_after_cut(mesh.scene)
     return problem_on(mesh.scene, mesh.solved, mesh.patches, mesh.lumen)
 
 

@@ -28,17 +28,6 @@ class Opening:
     """Nodes behind it and in front of it, (p, 2)."""
 
 
-def event_frame(cut: Cut, duration: float, frames: int) -> int:
-    """Frames before the cut. Raises StudyError for one before the first frame ends, or after the last begins."""
-    frame = round(cut.at * frames / duration)
-    if not 1 <= frame < frames:
-        raise StudyError(
-            f"cut '{cut.name}' at {cut.at:g} s is not between two of the {frames} frames of {duration:g} s; "
-            "move it, or ask for more frames"
-        )
-    return frame
-
-
 def pieces_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """The connected piece of each cell (k, c), (k,): cells are connected by their nodes."""
     ends = np.repeat(cells[:, :1], cells.shape[1], axis=1).ravel(), cells.ravel()

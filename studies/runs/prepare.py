@@ -28,10 +28,11 @@ from studies.meshing.opened_mesh import opened_mesh
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import ADAPTER, ADAPTIVE, BodyRecipe, Case
-from studies.runs.cutting import Opening, check_held, event_frame, event_of, keeping_pieces, opening_of
+from studies.runs.cutting import Opening, check_held, event_of, keeping_pieces, opening_of
 from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
+from studies.scene.clock import event_frame
 from studies.scene.scene import Scene
 
 LUMEN, WHOLE = "lumen", "whole"

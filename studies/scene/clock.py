@@ -3,6 +3,7 @@
 import math
 
 from studies.base.errors import StudyError
+from studies.scene.cut import Cut
 from studies.scene.scene import Scene
 
 
@@ -22,6 +23,27 @@ def check_clock(scene: Scene, file: str = "") -> None:
         raise StudyError(
             f"{file}scene '{scene.name}': its checkpoints end at {times[-1] if times else None} s and the scene at "
             f"{scene.duration:g} s; a run is compared with its reference at times within the scene"
+        )
+
+
+def event_frame(cut: Cut, duration: float, frames: int) -> int:
+    """Frames before the cut. Raises StudyError for one before the first frame ends, or after the last begins."""
+    frame = round(cut.at * frames / duration)
+    if not 1 <= frame < frames:
+        raise StudyError(
+            f"cut '{cut.name}' at {cut.at:g} s is not between two of the {frames} frames of {duration:g} s; "
+            "move it, or ask for more frames"
+        )
+    return frame
+
+
+def check_after_cut(scene: Scene) -> None:
+    """Raises StudyError for a checkpoint of a reference before the cut of its scene: it is of the body after it."""
+    cut, first = scene.cut, scene.checkpoints[0]
+    if cut is not None and scene.reference is not None and first <= cut.at:
+        raise StudyError(
+            f"scene '{scene.name}' has a checkpoint at {first:g} s before its cut at {cut.at:g} s, and the "
+            "reference is of the body after it; move one of them"
         )
 
 

@@ -93,6 +93,15 @@ def test_random_sections_of_organs(seed):
     assert tetrahedron_volumes(mesh.points, mesh.tetrahedra).sum() == pytest.approx(mesh.volume, rel=1e-12)
 
 
+def test_a_triangle_of_the_surface_that_lies_in_the_plane_belongs_to_the_body_next_to_it():
+    """Three nodes of the trace make one here; counted to the other side, it lies on a face of the section."""
+    plane = HalfSpace((0.00403777, 0.00666823, 0.00125052), (-0.51142751, -0.84460292, -0.15839131))
+    mesh = organ("liver", 350, {}, cut=Cut(plane))
+    on = np.abs(plane.level(mesh.points)) < 1e-9
+    assert on[mesh.triangles].all(axis=1).any()
+    assert len(opened(mesh.tetrahedra, mesh.cuts["cut"], len(mesh.points)).pairs) > 30
+
+
 @pytest.mark.parametrize(
     ("cut", "regions", "sentence"),
     [
@@ -100,8 +109,8 @@ def test_random_sections_of_organs(seed):
         (Cut(HalfSpace((0.0, 0.0, 0.0495), (0.0, 0.0, 1.0))), {}, "leaves a piece of .* % of the volume"),
         (Cut(within=HalfSpace((0.1, 0.0, 0.0), (-1.0, 0.0, 0.0))), {}, "holds nothing of the section"),
         (Cut(within=HalfSpace((0.1, 0.0, 0.0), (1.0, 0.0, 0.0))), {}, "is all of it; leave out within"),
-        (Cut(within=BallRegion((0.0, 0.0, 0.0), 0.06)), {}, "its disc reaches the surface"),
-        (Cut(within=BallRegion((0.0, 0.0, 0.03), 0.02)), {}, "its blade holds nothing of the plane"),
+        (Cut(within=BallRegion((0.0, 0.0, 0.0), 0.06)), {}, "the disc of cut 'cut' reaches the surface"),
+        (Cut(within=BallRegion((0.0, 0.0, 0.03), 0.02)), {}, "holds nothing of the plane"),
         (Cut(), {"side": HalfSpace((-0.02, 0.0, 0.0), (1.0, 0.0, 0.0))}, "crosses the outline of a held region"),
     ],
 )

@@ -135,7 +135,6 @@ def test_plane_strain_along_a_slit_keeps_it_shut(kind):
     np.testing.assert_allclose(history.final - after.rest, after.rest @ strain, atol=1e-9 * after.size)
 
 
-@pytest.mark.campaign
 @pytest.mark.parametrize("kind", ["one", "cotangent", "quadratic"])
 def test_twenty_events_end_where_one_does(kind):
     """A cut that goes on row by row, and all of it at once."""

@@ -21,7 +21,7 @@ from tests.massspring.conftest import boundary
 from tests.massspring.quadratic import second_order
 from tests.studies.meshing.penny import BALL, EDGE, area, penny
 
-pytestmark = pytest.mark.campaign
+pytestmark = pytest.mark.slow
 A = np.sqrt(area() / np.pi)
 BALL_ADDS = 1.0 + 1.7 * (A / BALL) ** 3
 MU = 1800.0
