@@ -165,10 +165,16 @@ def prepare(case: Case) -> Prepared:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
     check_masses(scene, case.body)
     mesh = mesh_of(scene, case.body)
-    body = body_for(scene, case.body, mesh)
     from studies.meshing.kept_shape import tell_shape  # with the finite elements
 
     tell_shape(scene, mesh, filled=case.body.kind in ("tetrahedral", "quadratic"))
+    return prepared_on(case, mesh)
+
+
+def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
+    """The same on a mesh that is there. Raises StudyError, MassSpringError."""
+    scene = case.scene
+    body = body_for(scene, case.body, mesh)
     later = None if scene.cut is None else opened_mesh(mesh, scene.cut.name)
     if isinstance(mesh, QuadraticMesh):
         mesh = flat_mesh(mesh, body)
