@@ -111,6 +111,7 @@ def test_a_triangle_of_the_surface_that_lies_in_the_plane_belongs_to_the_body_ne
         (Cut(within=HalfSpace((0.1, 0.0, 0.0), (1.0, 0.0, 0.0))), {}, "is all of it; leave out within"),
         (Cut(within=BallRegion((0.0, 0.0, 0.0), 0.06)), {}, "the disc of cut 'cut' reaches the surface"),
         (Cut(within=BallRegion((0.0, 0.0, 0.03), 0.02)), {}, "holds nothing of the plane"),
+        (Cut(within=BallRegion((0.0, 0.0, 0.0), 0.0492)), {}, "has its front so near to the surface that an angle"),
         (Cut(), {"side": HalfSpace((-0.02, 0.0, 0.0), (1.0, 0.0, 0.0))}, "crosses the outline of a held region"),
     ],
 )

@@ -19,6 +19,8 @@ from studies.geometry.surface.sheet import LEAST_PIECE, check_sheet
 
 ROUND = 16
 """Sides of the polygon that stands for the edge of a disc, at least: of fewer it loses more than 3 % of its area."""
+SHARP = 15.0
+"""Degrees in a triangle of the section below which it keeps the body next to it from being filled."""
 FEWEST_CELLS = 30
 """Tetrahedra below which a piece is no body of its own."""
 Surface = tuple[np.ndarray, np.ndarray]
@@ -107,13 +109,31 @@ def fill_cut(shape: Shape, surface: Surface, cut: dict[str, Any]) -> tuple[np.nd
                     f"{shape.name}: {name} leaves a piece of {100 * share:.2g} % of the volume; move the plane"
                 )
             used, local = np.unique(piece, return_inverse=True)
-            filled, inside = fill_surface(points[used], local.reshape(-1, 3))
+            try:
+                filled, inside = fill_surface(points[used], local.reshape(-1, 3))
+            except StudyError as error:
+                raise StudyError(f"{shape.name}: {name} {why_not_filled(points, faces, error)}") from error
             if len(inside) < FEWEST_CELLS:
                 raise StudyError(f"{shape.name}: {name} leaves a piece of {len(inside)} tetrahedra; use more nodes")
             number = np.concatenate([used, len(points) + np.arange(len(filled) - len(used))])
             points = np.concatenate([points, filled[len(used) :]])
             cells = np.concatenate([cells, number[inside]])
     return points, cells, faces[blade]
+
+
+def why_not_filled(points: np.ndarray, faces: np.ndarray, error: StudyError) -> str:
+    """What is wrong with a cut, one of whose sides could not be filled: a front next to the outline of the section
+    leaves `faces` (f, 3) too sharp for that."""
+    a, b, c = points[faces].transpose(1, 0, 2)
+    sides = np.stack([b - a, c - b, a - c])
+    sides /= np.linalg.norm(sides, axis=2)[:, :, None]
+    angles = np.degrees(np.arccos(np.clip(-np.einsum("kfi,kfi->kf", sides, np.roll(sides, 1, axis=0)), -1.0, 1.0)))
+    if angles.min() < SHARP:
+        return (
+            f"has its front so near to the surface that an angle of {angles.min():.2g} degrees is left between them; "
+            "move it, or use more nodes"
+        )
+    return f"leaves a piece that cannot be filled: {error}"
 
 
 def _pieces(triangles: np.ndarray, count: int) -> list[np.ndarray]:
