@@ -63,6 +63,7 @@ links: setup-dev ## the same site in a minute, without running the notebooks
 fuzz: setup-run ## ten thousand random trials that try to break every method (minutes)
 	$(BIN)/organbench fuzz --cases 10000
 	$(BIN)/organbench fuzz --reference --cases 300
+	$(BIN)/organbench fuzz --cuts --cases 100
 
 stress: # its name until version 0.2
 	@echo "make stress is now make fuzz" >&2; exit 2

@@ -205,8 +205,10 @@ class Setup:
 
     def volume_targets(self, t: np.ndarray, easing: Easing | None = None) -> np.ndarray:
         """What each kept volume should be at times `t` (q,) [s], (q, m) [m³]; after an event on the way there."""
-        factors = [self.followed[name](t) if name in self.targets else np.ones(len(t)) for name in self.body.kept.names]
-        targets = np.column_stack(factors) * self.body.rest_volumes
+        factors = np.ones((len(t), self.body.kept.count))
+        for name, ramp in self.followed.items():
+            factors[:, self.body.kept.names.index(name)] = ramp(t)
+        targets = factors * self.body.rest_volumes
         return targets if easing is None else targets + easing.left(t)
 
 

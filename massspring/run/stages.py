@@ -26,6 +26,8 @@ class Stage:
     last: Numbers | None = None
     """What the nodes and volumes of the last stage are in it; None for themselves."""
     easing: Easing | None = None
+    filling: float = 0.0
+    """Share of its volume by which a body can be led in a second; of a stage that follows an event."""
 
     def boundary(self, frame: int) -> BoundaryConditions:
         """The outside world during frame number `frame` of the run."""
@@ -45,7 +47,7 @@ class Stage:
         start = replace(self.start, nodes=nodes, lam=state.lam[self.before.volumes])
         body = self.setup.body
         off = body.kept.measure(x) - self.targets_after(self.frame - 1)
-        time = float(np.abs(off / body.rest_volumes).max()) / fastest_filling(body)
+        time = float(np.abs(off / body.rest_volumes).max()) / self.filling
         return replace(self, start=start, easing=Easing(self.frame * self.setup.clock.frame, off, time))
 
 
@@ -54,7 +56,7 @@ def stages_of(setup: Setup) -> list[Stage]:
     stages = [Stage(replace(setup, events=()) if setup.events else setup, setup.start())]
     for event, later in zip(setup.events, setup.later, strict=True):
         before = Numbers(np.asarray(event.parent), np.asarray(event.volume_parent))
-        stages.append(Stage(later, later.start(), event.frame, before))
+        stages.append(Stage(later, later.start(), event.frame, before, filling=fastest_filling(later.body)))
     for k in range(len(stages) - 2, -1, -1):
         before, after = stages[k + 1].before, stages[k + 1].last
         assert before is not None  # it is not the first

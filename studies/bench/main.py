@@ -17,6 +17,7 @@ from reference_fem import crosscheck, equilibrium_path
 from reference_fem.crosscheck.bench import iteration_ratio
 from reference_fem.exact import BALL_BETWEEN_PLANES
 from studies.bench import meshes as geometry_bench
+from studies.bench.cut import cut_lines
 from studies.bench.elements import element_lines
 from studies.bench.line import BenchLine
 from studies.bench.plain import plain_lines
@@ -123,6 +124,7 @@ def main() -> None:
         threads_lines,
         slide_lines,
         element_lines,
+        cut_lines,
         growth_lines,
         volumes_lines,
         volume_lines,

@@ -58,7 +58,7 @@ def headline_case(scene: Scene) -> Case:
 
 
 def even(scene: Scene) -> tuple[BodyRecipe, ...]:
-    """Quadratic bodies with elements of one size: the smallest, which is fast, and all where grading changes nothing."""
+    """Quadratic bodies with elements of one size: the smallest, which is fast; all where grading changes nothing."""
     sizes = BUDGETS[:1] if graded(scene) else BUDGETS
     return tuple(BodyRecipe("quadratic", nodes, mass=_mass(scene)) for nodes in sizes)
 

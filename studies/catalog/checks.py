@@ -3,6 +3,7 @@
 from studies.catalog.study import Study
 from studies.metrics.table import check_columns
 from studies.scene.checks import check_scene
+from studies.scene.clock import event_frame
 from studies.store.schema import Status
 
 
@@ -17,4 +18,7 @@ def check_study(study: Study, drawn: bool = True) -> list[str]:
         _ = chart.draw
     if study.accepts(Status.FAILED):
         return []
+    for case in study.cases:
+        if case.scene.cut is not None and case.frames:
+            event_frame(case.scene, case.scene.cut, case.frames)
     return [sentence for scene in study.scenes for sentence in check_scene(scene)]

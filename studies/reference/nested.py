@@ -16,12 +16,12 @@ from reference_fem.statics.newton import StepFailed
 from reference_fem.system.saddle_point import System
 from reference_fem.system.state import State
 from reference_fem.uncertainty import MeshError
-from studies.base.errors import StudyError
 from studies.meshing.nested_mesh import NestedMesh, at_nodes, base_mesh
 from studies.reference.problem import problem_on
 from studies.reference.reference_solves import settings_varied
 from studies.reference.sample import Sample, SamplePoints, sample_of
 from studies.reference.uncertainty import uncertainty_of_meshes
+from studies.scene.clock import check_judged_after_cut
 from studies.scene.quantities import allowed
 from studies.scene.scene import Scene
 
@@ -148,12 +148,7 @@ def path_of(
 
 def problem_of(mesh: NestedMesh) -> Problem:
     """The scene on one of its nested meshes, opened if it is cut. Raises StudyError where the cut comes last."""
-    cut, last = mesh.scene.cut, mesh.scene.checkpoints[-1]
-    if cut is not None and last <= cut.at:
-        raise StudyError(
-            f"scene '{mesh.scene.name}' has its last checkpoint at {last:g} s and its cut at {cut.at:g} s, so nothing "
-            "would judge what is cut; move one of them"
-        )
+    check_judged_after_cut(mesh.scene)
     return problem_on(mesh.scene, mesh.solved, mesh.patches, mesh.lumen)
 
 

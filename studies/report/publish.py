@@ -26,6 +26,7 @@ EXTRAS = {
     "bench.csv": "make bench",
     "breaking": "make fuzz",
     "breaking_reference": "make fuzz",
+    "breaking_cuts": "make fuzz",
     "geometry.csv": "python -m studies.bench.meshes",
 }
 """Results that belong to no study, and the command that makes each. What was not made again stays as published."""

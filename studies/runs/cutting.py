@@ -14,7 +14,6 @@ from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import boundary_triangles
 from studies.meshing.opened_mesh import cut_triangles
 from studies.scene.cut import Cut
-from studies.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,25 +28,6 @@ class Opening:
     """Nodes behind it and in front of it, (p, 2)."""
     parts: np.ndarray
     """The piece of the body that each kept volume is in, (m,)."""
-
-
-def event_frame(scene: Scene, cut: Cut, frames: int) -> int:
-    """Frames before the cut. Raises StudyError for one before the first frame ends, or after the last begins, and for a
-    checkpoint after it in its frame."""
-    duration = scene.duration
-    frame = round(cut.at * frames / duration)
-    if not 1 <= frame < frames:
-        raise StudyError(
-            f"cut '{cut.name}' at {cut.at:g} s is not between two of the {frames} frames of {duration:g} s; "
-            "move it, or ask for more frames"
-        )
-    early = [t for t in scene.checkpoints if t > cut.at and round(t * frames / duration) <= frame]
-    if early:
-        raise StudyError(
-            f"the checkpoint at {early[0]:g} s and cut '{cut.name}' before it at {cut.at:g} s are in one of {frames} "
-            "frames; move one, or ask for more frames"
-        )
-    return frame
 
 
 def pieces_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:

@@ -29,10 +29,11 @@ from studies.meshing.opened_mesh import opened_mesh
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import ADAPTER, ADAPTIVE, BodyRecipe, Case
-from studies.runs.cutting import Opening, check_held, event_frame, event_of, keeping_pieces, opening_of
+from studies.runs.cutting import Opening, check_held, event_of, keeping_pieces, opening_of
 from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
+from studies.scene.clock import event_frame
 from studies.scene.scene import Scene
 
 LUMEN, WHOLE = "lumen", "whole"
@@ -173,10 +174,16 @@ def prepare(case: Case) -> Prepared:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
     check_masses(scene, case.body)
     mesh = mesh_of(scene, case.body)
-    body = body_for(scene, case.body, mesh)
     from studies.meshing.kept_shape import tell_shape  # with the finite elements
 
     tell_shape(scene, mesh, filled=case.body.kind in ("tetrahedral", "quadratic"))
+    return prepared_on(case, mesh)
+
+
+def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
+    """The same on a mesh that is there. Raises StudyError, MassSpringError."""
+    scene = case.scene
+    body = body_for(scene, case.body, mesh)
     later = None if scene.cut is None else opened_mesh(mesh, scene.cut.name)
     if isinstance(mesh, QuadraticMesh):
         mesh = flat_mesh(mesh, body)

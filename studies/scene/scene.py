@@ -177,6 +177,11 @@ class Scene:
     def __post_init__(self) -> None:
         if len(self.cuts) > 1:
             raise StudyError(f"scene '{self.name}' has {len(self.cuts)} cuts; a body is cut once in a scene so far")
+        if self.cuts and self.reference is not None and not self.reference.nested:
+            raise StudyError(
+                f"scene '{self.name}' is cut, and its reference is of an octant or a motion, which are not cut; "
+                "give it a 'solid' mesh without dt, or no reference"
+            )
 
     @property
     def cut(self) -> Cut | None:

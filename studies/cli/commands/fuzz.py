@@ -1,4 +1,4 @@
-"""`organbench fuzz`: random trials that try to break every method, or the reference, and what came of each."""
+"""`organbench fuzz`: random trials that try to break every method, the reference or cuts, and what came of each."""
 
 import gzip
 from collections.abc import Callable, Mapping, Sequence
@@ -9,25 +9,29 @@ import pandas as pd
 import typer
 
 from studies.base.atomic import write_whole
+from studies.base.errors import StudyError
 from studies.cli.progress import TerminalProgress
 from studies.cli.terminal import Results, console, errors, say
 from studies.plots.campaigns.breaking import draw as draw_chart
 from studies.store.stamps import set_stamp
 from studies.store.tables import write_table
 from studies.tools.fuzz.campaign import counts, run_trials, table_of
+from studies.tools.fuzz.cuts import draw as draw_cut
+from studies.tools.fuzz.cuts import tried as try_cut
 from studies.tools.fuzz.outcome import UNEXPLAINED, Attempt, Outcome, simplest, tried
 from studies.tools.fuzz.reference.outcome import tried as try_reference
 from studies.tools.fuzz.reference.table import counts_by_choice, last_states
 from studies.tools.fuzz.reference.trial import draw as draw_reference
 from studies.tools.fuzz.trial import draw
 
-FOLDER, REFERENCE, TRIALS, LAST = "breaking", "breaking_reference", "trials.csv.gz", "last.npz"
+FOLDER, REFERENCE, CUTS, TRIALS, LAST = "breaking", "breaking_reference", "breaking_cuts", "trials.csv.gz", "last.npz"
 WHAT = "trials"
-CAMPAIGNS: Mapping[bool, tuple[Callable[[int, int], Any], Attempt]] = {
-    False: (draw, tried),
-    True: (draw_reference, try_reference),
+CAMPAIGNS: Mapping[str, tuple[Callable[[int, int], Any], Attempt]] = {
+    FOLDER: (draw, tried),
+    REFERENCE: (draw_reference, try_reference),
+    CUTS: (draw_cut, try_cut),
 }
-"""Whether the reference is tried: how a trial is drawn and tried."""
+"""Of each, by the folder of its results: how a trial is drawn and tried."""
 
 
 def fuzz(
@@ -35,11 +39,15 @@ def fuzz(
     seed: Annotated[int, typer.Option(min=0, help="seed of the random trials")] = 0,
     trial: Annotated[int | None, typer.Option(min=0, help="repeat this trial and simplify it")] = None,
     reference: Annotated[bool, typer.Option("--reference", help="test the finite-element reference instead")] = False,
+    cuts: Annotated[bool, typer.Option("--cuts", help="cut random organs instead")] = False,
     jobs: Annotated[int, typer.Option(min=1, help="processes")] = 2,
     results: Results = Path("results"),
 ) -> None:
     """Try to break every method with random trials of bodies and surroundings. Exit code 1: an unclassified failure."""
-    make, attempt = CAMPAIGNS[reference]
+    if reference and cuts:
+        raise StudyError("--reference and --cuts are two campaigns; give one of them")
+    campaign = REFERENCE if reference else CUTS if cuts else FOLDER
+    make, attempt = CAMPAIGNS[campaign]
     if trial is not None:
         found = [attempt(make(seed, trial))]
         tell(found[0])
@@ -49,7 +57,7 @@ def fuzz(
             progress.begin(WHAT, cases)
             trials = [make(seed, number) for number in range(cases)]
             found = run_trials(trials, jobs, lambda outcome: progress.advance(WHAT, outcome.status), attempt)
-        (store_reference if reference else store)(results, found)
+        {FOLDER: store, REFERENCE: store_reference, CUTS: store_cuts}[campaign](results, found)
         for outcome in found:
             if outcome.status == UNEXPLAINED:
                 tell(outcome)
@@ -69,6 +77,12 @@ def store_reference(results: Path, found: Sequence[Outcome]) -> None:
     table = table_of(found)
     write_whole(results / REFERENCE / LAST, last_states(found))
     write(results, REFERENCE, table, counts_by_choice(table))
+
+
+def store_cuts(results: Path, found: Sequence[Outcome]) -> None:
+    """The same of cuts, counted by organ."""
+    table = table_of(found)
+    write(results, CUTS, table, counts(table, "organ").reset_index())
 
 
 def write(results: Path, folder: str, table: pd.DataFrame, counted: pd.DataFrame) -> None:

@@ -9,17 +9,20 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import signed_volume
+from studies.geometry.mesh.organ_mesh import signed_volume, triangle_normals
 from studies.geometry.mesher.fill import fill_surface
 from studies.geometry.mesher.gmsh_calls import TRIANGLE, fresh_model
 from studies.geometry.shape.levelset import Shape, project
 from studies.geometry.shape.regions import ON_CURVE, BallRegion, HalfSpace, Region, region_from_dict
 from studies.geometry.surface.first_surface import first_surface
+from studies.geometry.surface.sheet import LEAST_PIECE, check_sheet
 
 ROUND = 16
 """Sides of the polygon that stands for the edge of a disc, at least: of fewer it loses more than 3 % of its area."""
-LEAST_PIECE, FEWEST_CELLS = 0.01, 30
-"""Share of the volume, and tetrahedra, below which a piece is no body of its own."""
+SHARP = 15.0
+"""Degrees in a triangle of the section below which it keeps the body next to it from being filled."""
+FEWEST_CELLS = 30
+"""Tetrahedra below which a piece is no body of its own."""
 Surface = tuple[np.ndarray, np.ndarray]
 
 
@@ -29,21 +32,10 @@ def planes_of(recipe: dict[str, Any]) -> list[Region]:
 
 
 def check_clear(shape: Shape, cut: dict[str, Any], held: list[Region]) -> None:
-    """Raises StudyError for a plane that misses the body, or whose trace meets the outline of a held region."""
-    points, triangles = first_surface(shape)
-    crossed = _crossed(region_from_dict(cut["plane"]), points, triangles)
-    if not crossed.any():
-        raise StudyError(f"{shape.name}: the plane of cut {cut['name']!r} misses the body; move it")
-    for region in held:
-        if (crossed & _crossed(region, points, triangles)).any():
-            raise StudyError(
-                f"{shape.name}: cut {cut['name']!r} crosses the outline of a held region; move one of them away"
-            )
-
-
-def _crossed(region: Region, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Triangles with corners on either side of level = 0."""
-    return (region.level(points)[triangles] > 0).sum(axis=1) % 3 > 0
+    """Raises StudyError for a cut that no mesh of the shape can have (studies.geometry.surface.sheet)."""
+    plane = region_from_dict(cut["plane"])
+    assert isinstance(plane, HalfSpace)  # a cut has no other
+    check_sheet(shape.name, cut["name"], first_surface(shape), plane, _within(cut), held)
 
 
 def with_front(shape: Shape, surface: Surface, cut: dict[str, Any]) -> Surface:
@@ -57,10 +49,6 @@ def with_front(shape: Shape, surface: Surface, cut: dict[str, Any]) -> Surface:
     level = within.level(points)
     crossing = edges[(level[edges] <= 0).sum(axis=1) == 1]
     if len(crossing) != 2:
-        known = within.level(points[np.unique(edges)])
-        if (known > 0).all() or (known <= 0).all():
-            what = "holds nothing of the section; move it" if (known > 0).all() else "is all of it; leave out within"
-            raise StudyError(f"{shape.name}: the blade of cut {cut['name']!r} {what}")
         raise StudyError(
             f"{shape.name}: the front of cut {cut['name']!r} meets the trace {len(crossing)} times and not twice; "
             "move it, or cut the whole section"
@@ -81,7 +69,7 @@ def _within(cut: dict[str, Any]) -> Region | None:
 
 def trace(plane: Region, points: np.ndarray, triangles: np.ndarray, size: float, name: str) -> np.ndarray:
     """Edges (e, 2) of a surface that lie in the plane, between triangles on either side of it. Raises StudyError."""
-    on, side = _on(plane, points, size), _side(plane, points, triangles)
+    on, side = _on(plane, points, size), _side(plane, points, triangles, size)
     half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     keys, inverse = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True)
     sides = np.bincount(inverse.reshape(-1), weights=np.repeat(side, 3))
@@ -95,9 +83,12 @@ def _on(plane: Region, points: np.ndarray, size: float) -> np.ndarray:
     return np.abs(plane.level(points)) <= 10 * ON_CURVE * size
 
 
-def _side(plane: Region, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """−1 behind the plane and 1 in front of it, of each triangle."""
-    return np.where(plane.level(points[triangles].mean(axis=1)) > 0, 1, -1)
+def _side(plane: Region, points: np.ndarray, triangles: np.ndarray, size: float) -> np.ndarray:
+    """−1 behind the plane and 1 in front of it, of each triangle; of one in the plane, that of the body next to it."""
+    assert isinstance(plane, HalfSpace)  # a cut has no other
+    flat = _on(plane, points, size)[triangles].all(axis=1)
+    outward = triangle_normals(points, triangles) @ np.asarray(plane.normal, float)
+    return np.where(np.where(flat, outward < 0, plane.level(points[triangles].mean(axis=1)) > 0), 1, -1)
 
 
 def fill_cut(shape: Shape, surface: Surface, cut: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -108,7 +99,7 @@ def fill_cut(shape: Shape, surface: Surface, cut: dict[str, Any]) -> tuple[np.nd
     edges = trace(plane, points, triangles, shape.size, cut["name"])
     new, faces, blade = section(plane, points, edges, _within(cut), name)
     points = np.concatenate([points, new])
-    side = _side(plane, points, triangles)
+    side = _side(plane, points, triangles, shape.size)
     cells = np.empty((0, 4), np.int64)
     for sign, caps in ((-1, faces), (1, faces[:, ::-1])):
         for piece in _pieces(np.concatenate([triangles[side == sign], caps]), len(points)):
@@ -118,13 +109,31 @@ def fill_cut(shape: Shape, surface: Surface, cut: dict[str, Any]) -> tuple[np.nd
                     f"{shape.name}: {name} leaves a piece of {100 * share:.2g} % of the volume; move the plane"
                 )
             used, local = np.unique(piece, return_inverse=True)
-            filled, inside = fill_surface(points[used], local.reshape(-1, 3))
+            try:
+                filled, inside = fill_surface(points[used], local.reshape(-1, 3))
+            except StudyError as error:
+                raise StudyError(f"{shape.name}: {name} {why_not_filled(points, faces, error)}") from error
             if len(inside) < FEWEST_CELLS:
                 raise StudyError(f"{shape.name}: {name} leaves a piece of {len(inside)} tetrahedra; use more nodes")
             number = np.concatenate([used, len(points) + np.arange(len(filled) - len(used))])
             points = np.concatenate([points, filled[len(used) :]])
             cells = np.concatenate([cells, number[inside]])
     return points, cells, faces[blade]
+
+
+def why_not_filled(points: np.ndarray, faces: np.ndarray, error: StudyError) -> str:
+    """What is wrong with a cut, one of whose sides could not be filled: a front next to the outline of the section
+    leaves `faces` (f, 3) too sharp for that."""
+    a, b, c = points[faces].transpose(1, 0, 2)
+    sides = np.stack([b - a, c - b, a - c])
+    sides /= np.linalg.norm(sides, axis=2)[:, :, None]
+    angles = np.degrees(np.arccos(np.clip(-np.einsum("kfi,kfi->kf", sides, np.roll(sides, 1, axis=0)), -1.0, 1.0)))
+    if angles.min() < SHARP:
+        return (
+            f"has its front so near to the surface that an angle of {angles.min():.2g} degrees is left between them; "
+            "move it, or use more nodes"
+        )
+    return f"leaves a piece that cannot be filled: {error}"
 
 
 def _pieces(triangles: np.ndarray, count: int) -> list[np.ndarray]:
@@ -150,7 +159,7 @@ def section(
     if within is None:
         front, chain = np.empty((0, 3)), np.empty(0, np.int64)
     elif isinstance(within, BallRegion):
-        front = _rim(plane, within, normal, axes, step, name)
+        front = _rim(plane, within, normal, axes, step)
         chain = len(nodes) + np.arange(len(front) + 1) % len(front)
         if (within.level(points[nodes]) <= tiny).any():
             raise StudyError(f"{name}: its disc reaches the surface; give a smaller one, or a half space")
@@ -195,13 +204,9 @@ def _straight(start: np.ndarray, end: np.ndarray, step: float) -> np.ndarray:
     return (1 - share) * start + share * end
 
 
-def _rim(
-    plane: HalfSpace, within: BallRegion, normal: np.ndarray, axes: np.ndarray, step: float, name: str
-) -> np.ndarray:
+def _rim(plane: HalfSpace, within: BallRegion, normal: np.ndarray, axes: np.ndarray, step: float) -> np.ndarray:
     """Points on the edge of a disc, (f, 3) [m]."""
     away = float(plane.level(np.array([within.center]))[0])
-    if abs(away) >= within.radius:
-        raise StudyError(f"{name}: its blade holds nothing of the plane; move the ball onto it")
     radius = np.sqrt(within.radius**2 - away**2)
     count = max(ROUND, round(2 * np.pi * radius / step))
     turn = 2 * np.pi * np.arange(count)[:, None] / count

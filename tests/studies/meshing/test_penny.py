@@ -21,7 +21,7 @@ from tests.massspring.conftest import boundary
 from tests.massspring.quadratic import second_order
 from tests.studies.meshing.penny import BALL, EDGE, area, penny
 
-pytestmark = pytest.mark.campaign
+pytestmark = pytest.mark.slow
 A = np.sqrt(area() / np.pi)
 BALL_ADDS = 1.0 + 1.7 * (A / BALL) ** 3
 MU = 1800.0
@@ -122,13 +122,15 @@ def test_the_quadratic_body_opens_a_penny_as_sneddon_says(body):
     u, _ = body.moved(body.pull())
     r, gap = body.gap(u)
     assert fitted(r, gap) == pytest.approx(1.0, abs=TOLERANCE)
-    assert 4 * np.vdot(body.content(), u) == pytest.approx(4 * TENSION * A**3 / (3 * MU) * BALL_ADDS, rel=TOLERANCE)
+    assert 4 * np.vdot(body.content(), u) == pytest.approx(
+        4 * TENSION * A**3 / (3 * MU) * BALL_ADDS, rel=TOLERANCE, abs=0
+    )
 
 
 def test_the_quadratic_body_with_a_filled_penny_has_its_pressure_and_its_gap(body):
     content = 1e-3 * A**3
     u, (pressure,) = body.moved(np.zeros_like(body.x), (body.content(),), (content / 4,))
-    assert 4 * np.vdot(body.content(), u) == pytest.approx(content, rel=1e-6)
+    assert 4 * np.vdot(body.content(), u) == pytest.approx(content, rel=1e-6, abs=0)
     assert pressure == pytest.approx(pressure_of(content), rel=TOLERANCE)
     r, gap = body.gap(u)
     assert gap[r.argmin()] == pytest.approx(3 * content / (2 * np.pi * A**2), rel=TOLERANCE)

@@ -18,7 +18,9 @@ STUDY = """from dataclasses import replace
 from massspring import Capsule, Plane, Probe, Sphere, Trajectory
 from studies.catalog import Chart
 from studies.geometry import BallRegion, HalfSpace
+from studies.scene.cut import Cut
 from studies.scene.library import ForceOutput, Held, Organ, ReferencePlan
+from studies.scene.scene import Lumen
 from tests.studies.tiny import SQUEEZE, tiny_case, tiny_study
 
 PLAN = ReferencePlan("octant", (0.9, 0.5))
@@ -92,6 +94,85 @@ BROKEN = {
     "unknown parameter": ("organ=Organ('ball', {'radios': 0.05})", "unknown parameter of the ball 'radios'"),
     "ball without a size": ("organ=Organ('ball', {'radius': 0.0})", "a ball of radius 0.0 m cannot be meshed"),
 }
+MIDDLE = "HalfSpace((0, 0, 0), (0, 0, 1))"
+ENDS = "tuple(Held(f'{z}', HalfSpace((0, 0, z), (0, 0, -z))) for z in (-0.04, 0.04))"
+CUTS = {
+    "cut at the start": (f"cuts=(Cut('slit', {MIDDLE}, at=0.0),)", "cut 'slit' is made at 0.0 s; give a time after"),
+    "cut before the first frame ends": (
+        f"frames=10, cuts=(Cut('slit', {MIDDLE}, at=1e-3),)",
+        "cut 'slit' at 0.001 s is not between two of the 5 frames",
+    ),
+    "cut after the last frame": (
+        f"cuts=(Cut('slit', {MIDDLE}, at=100.0),)",
+        "cut 'slit' at 100 s is not between two of the",
+    ),
+    "plane off the body": (
+        "cuts=(Cut('slit', HalfSpace((0, 0, 0.051), (0, 0, 1)), at=1.0),)",
+        "the plane of cut 'slit' misses the body; move it",
+    ),
+    "blade off the section": (
+        f"cuts=(Cut('slit', {MIDDLE}, HalfSpace((-0.06, 0, 0), (1, 0, 0)), at=1.0),)",
+        "the blade of cut 'slit' holds nothing of the section; move it",
+    ),
+    "blade round the section": (
+        f"cuts=(Cut('slit', {MIDDLE}, HalfSpace((0.06, 0, 0), (1, 0, 0)), at=1.0),)",
+        "the blade of cut 'slit' is all of it; leave out within",
+    ),
+    "ball off the plane": (
+        f"cuts=(Cut('slit', {MIDDLE}, BallRegion((0, 0, 0.02), 0.01), at=1.0),)",
+        "the blade of cut 'slit' holds nothing of the plane; move the ball onto it",
+    ),
+    "disc through the surface": (
+        f"cuts=(Cut('slit', {MIDDLE}, BallRegion((0.045, 0, 0), 0.01), at=1.0),)",
+        "the disc of cut 'slit' reaches the surface; give a smaller one, or a half space",
+    ),
+    "disc outside": (
+        f"cuts=(Cut('slit', {MIDDLE}, BallRegion((0.07, 0, 0), 0.01), at=1.0),)",
+        "the disc of cut 'slit' lies outside the body; move it",
+    ),
+    "piece that nothing holds": (
+        f"held={ENDS}[:1], cuts=(Cut('slit', {MIDDLE}, at=1.0),)",
+        "cut 'slit' leaves a piece that nothing holds; hold it, or let it go: free=True",
+    ),
+    "crumb": (
+        "cuts=(Cut('slit', HalfSpace((0, 0, 0.047), (0, 0, 1)), at=1.0, free=True),)",
+        "cut 'slit' leaves a piece of 0.25 % of the volume; move the plane",
+    ),
+    "grazing plane": (
+        "organ=Organ('spleen'), obstacles=(), cuts=(Cut('slit', "
+        "HalfSpace((-0.01657, -0.00652, 0.00174), (0.9262, 0.3643, -0.0971)), at=1.0, free=True),)",
+        "cut 'slit' grazes the surface, at",
+    ),
+    "across a held outline": (
+        f"held={ENDS}, cuts=(Cut('slit', HalfSpace((0, 0, 0), (1, 0, 0)), at=1.0),)",
+        "cut 'slit' crosses the outline of a held region; move one of them away",
+    ),
+    "hollow organ": (
+        f"organ=Organ('stomach'), obstacles=(), cuts=(Cut('slit', {MIDDLE}, at=1.0),)",
+        "cut 'slit' is for a solid organ; hollow ones are not cut yet",
+    ),
+    "filled lumen": (
+        f"organ=Organ('bladder'), obstacles=(), lumen=Lumen(), cuts=(Cut('slit', {MIDDLE}, at=1.0),)",
+        "cut 'slit' is for a solid organ; hollow ones are not cut yet",
+    ),
+    "organ of a file": (
+        f"organ=Organ('file', {{'path': 'no.stl'}}), cuts=(Cut('slit', {MIDDLE}, at=1.0),)",
+        "cuts an organ of a file; only organs of the catalogue are cut so far",
+    ),
+    "thin probe": (
+        f"obstacles=(Probe((0, 0, 0.06)),), cuts=(Cut('slit', {MIDDLE}, at=1.0),)",
+        "has a thin probe, which feels no cut; leave one of them out",
+    ),
+    "reference before the cut": (
+        f"reference=ReferencePlan(), checkpoints=(1.0,), cuts=(Cut('slit', {MIDDLE}, at=2.0),)",
+        "has its last checkpoint at 1 s and its cut at 2 s, so nothing would judge what is cut",
+    ),
+    "reference of an octant": (
+        f"reference=PLAN, cuts=(Cut('slit', {MIDDLE}, at=1.0),)",
+        "is cut, and its reference is of an octant or a motion, which are not cut",
+    ),
+    "two cuts": (f"cuts=2 * (Cut('slit', {MIDDLE}, at=1.0),)", "has 2 cuts; a body is cut once"),
+}
 CHARTS = {
     "no module": ("nowhere.at_all:draw", "there is no function 'nowhere.at_all:draw' (ModuleNotFoundError"),
     "no function": ("studies.plots.volume_history:drow", "there is no function 'studies.plots.volume_history:drow'"),
@@ -114,9 +195,9 @@ def check_refused(refused, tmp_path, text: str, sentence: str) -> None:
 
 
 @pytest.mark.usefixtures("nothing_runs")
-@pytest.mark.parametrize("fault", BROKEN)
+@pytest.mark.parametrize("fault", [*BROKEN, *CUTS])
 def test_a_scene_that_cannot_be_meant_is_one_sentence_before_any_mesh(refused, tmp_path, fault):
-    changes, sentence = BROKEN[fault]
+    changes, sentence = (BROKEN | CUTS)[fault]
     check_refused(refused, tmp_path, STUDY.format(changes=changes, charts="()"), sentence)
 
 

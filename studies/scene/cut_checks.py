@@ -1,0 +1,37 @@
+"""Checks of a scene's cut before there is a mesh: when it is made, of what, and what holds the pieces."""
+
+import numpy as np
+
+from massspring import Probe
+from studies.base.errors import StudyError
+from studies.geometry.surface.sheet import check_sheet
+from studies.scene.clock import check_judged_after_cut, event_frame
+from studies.scene.cut import Cut
+from studies.scene.kind import has_wall
+from studies.scene.scene import Scene
+
+
+def check_cuttable(scene: Scene, cut: Cut) -> None:
+    """Raises StudyError for a time at which nothing can be cut, and for what cannot be cut."""
+    event_frame(scene, cut, scene.frames)
+    check_judged_after_cut(scene)
+    if scene.organ.shape == "file":
+        raise StudyError(f"scene '{scene.name}' cuts an organ of a file; only organs of the catalogue are cut so far")
+    if has_wall(scene):
+        raise StudyError(f"scene '{scene.name}': cut '{cut.name}' is for a solid organ; hollow ones are not cut yet")
+    if any(isinstance(obstacle, Probe) for obstacle in scene.obstacles):
+        raise StudyError(f"scene '{scene.name}' has a thin probe, which feels no cut; leave one of them out")
+
+
+def check_cut(scene: Scene, cut: Cut, surface: tuple[np.ndarray, np.ndarray]) -> None:
+    """Raises StudyError for a cut through the true `surface` of the organ, points (n, 3) [m] and triangles (t, 3), that
+    no mesh can have, and for a piece that nothing holds."""
+    name, regions = f"scene '{scene.name}'", [held.region for held in scene.held]
+    sheet = check_sheet(name, cut.name, surface, cut.plane, cut.within, regions)
+    if cut.within is not None or cut.free:
+        return
+    for piece in sheet.pieces:
+        if not any((region.level(piece.surface) <= 0).any() for region in regions):
+            raise StudyError(
+                f"{name}: cut '{cut.name}' leaves a piece that nothing holds; hold it, or let it go: free=True"
+            )

@@ -1,0 +1,117 @@
+"""Trials of cuts: each end has its name, and a cut that changes the body does not pass."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies.runs.prepare import prepared_on
+from studies.tools.fuzz import cuts as module
+from studies.tools.fuzz.cuts import (
+    CHOICES,
+    CutTrial,
+    case_of,
+    draw,
+    mesh_of,
+    parted_early,
+    parts_differ,
+    scene_of,
+    tried,
+)
+from studies.tools.fuzz.outcome import UNEXPLAINED
+
+CALM = CutTrial(seed=0, number=0, nodes=80)
+
+
+def test_a_trial_is_its_seed_and_number():
+    assert draw(3, 7) == draw(3, 7) != draw(3, 8) and draw(4, 7) != draw(3, 7)
+    assert "fuzz --cuts --seed 3 --trial 7" in draw(3, 7).line
+
+
+def test_everything_is_drawn():
+    trials = [draw(1, number) for number in range(600)]
+    for name, values in CHOICES.items():
+        assert {getattr(trial, name) for trial in trials} >= set(values)
+    assert {trial.organ for trial in trials} > {"stomach"} and len({trial.method for trial in trials}) > 5
+    assert min(trial.height for trial in trials) < 0 and max(trial.height for trial in trials) > 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"height": 1.03}, "misses the body"),
+        ({"height": 0.03}, "crosses the outline|leaves a piece"),
+        ({"organ": "stomach"}, "hollow ones are not cut yet"),
+        ({"held": "one end"}, "a piece that nothing holds"),
+        ({"held": "across"}, "crosses the outline of a held region"),
+        ({"blade": "ball", "reach": 1.1}, "reaches the surface"),
+        ({"when": 0.01}, "is not between two of the 20 frames"),
+    ],
+)
+def test_what_cannot_be_cut_is_refused_before_it_is_meshed(changes, words, monkeypatch):
+    monkeypatch.setattr(module, "mesh_of", lambda trial, scene: 1 // 0)
+    found = tried(replace(CALM, **changes))
+    assert found.status == "refused"
+    assert any(part in found.message for part in words.split("|")), found.message
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "changes", [{}, {"blade": "half space", "pull": 0.1}, {"held": "one end", "free": True, "gravity": 9.81}]
+)
+def test_cuts_that_can_be_run(changes):
+    found = tried(replace(CALM, **changes))
+    assert (found.status, found.message) == ("ok", "")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(3))
+def test_random_cuts_end_by_name(number):
+    found = tried(draw(7, number))
+    assert found.status != UNEXPLAINED, found.message
+
+
+def test_an_error_that_is_not_ours_and_a_mesher_that_dies_are_findings(monkeypatch):
+    monkeypatch.setattr(module, "mesh_of", lambda trial, scene: 1 // 0)
+    assert (tried(CALM).status, tried(CALM).message.split(":")[0]) == (UNEXPLAINED, "ZeroDivisionError")
+
+    def dies(trial, scene):
+        raise module.StudyError("ball: the mesher ended with code -11 at: filling")
+
+    monkeypatch.setattr(module, "mesh_of", dies)
+    assert tried(CALM).status == UNEXPLAINED
+
+
+@pytest.mark.slow
+def test_a_cut_that_changes_the_body_is_a_finding():
+    scene = scene_of(CALM)
+    with module._own_meshes():
+        mesh = mesh_of(CALM, scene)
+    prepared = prepared_on(case_of(CALM, scene), mesh)
+    assert parts_differ(prepared, mesh) is None
+    event = prepared.setup.events[0]
+    heavier = replace(event, body=replace(event.body, mass=event.body.mass * (1 + 1e-10)))
+    assert "mass changes" in str(
+        parts_differ(replace(prepared, setup=replace(prepared.setup, events=(heavier,))), mesh)
+    )
+    assert prepared.opening is not None
+    places = np.stack([prepared.body.rest, prepared.body.rest])
+    places[0, prepared.opening.pairs[0, 1]] += 1e-9
+    assert "before the cut" in str(parted_early(prepared, _History(places)))
+    places = np.stack([prepared.body.rest, prepared.body.rest + 1e-3])
+    assert parted_early(prepared, _History(places)) == "nothing opens"
+
+
+class _History:
+    def __init__(self, snapshots: np.ndarray):
+        self.snapshots = snapshots
+
+
+@pytest.mark.slow
+def test_the_command_tells_and_writes(organbench, tmp_path):
+    code, out, err = organbench("fuzz", "--cuts", "--cases", 2, "--seed", 11, "--jobs", 1, "--results", tmp_path)
+    assert code == 0, out + err
+    assert len(pd.read_csv(tmp_path / "breaking_cuts" / "trials.csv.gz")) == 2 and "all" in out
+    code, out, err = organbench("fuzz", "--cuts", "--reference", "--results", tmp_path)
+    assert code == 2 and "give one of them" in err
