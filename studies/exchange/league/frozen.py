@@ -19,7 +19,7 @@ class FrozenScene:
     """A scene of the set."""
 
     reference: str
-    """SHA-256 of the file of its reference."""
+    """SHA-256 of the file of its reference; empty for one that is held back and not solved yet."""
     physics: str
     """SHA-256 of what that depends on (studies.reference.published)."""
     meshes: dict[str, str]

@@ -91,7 +91,7 @@ def page(rows: Sequence[Row], svg: str) -> bytes:
             style=Markup((ASSETS / "page.css").read_text(encoding="utf-8")),
             set=SET,
             scenes=[name for name, one in frozen().items() if not one.held_back],
-            held=[(name, one.reference) for name, one in frozen().items() if one.held_back],
+            held=[(name, one) for name, one in frozen().items() if one.held_back],
             chart=Markup(inline(svg, "profiles", "Share of the pairs within a tolerance over the budget")),
             heads=HEADS,
             cards=cards(rows),
