@@ -18,7 +18,7 @@ from studies.exchange.league.frozen import FILE, SET, mesh_key
 from studies.exchange.meshes import given_meshes
 from studies.reference.load import load_reference
 from studies.reference.publish import write_file
-from studies.reference.published import physics, published
+from studies.reference.published import FOLDER, INDEX, physics, published
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.scene.as_json import scene_to_json
@@ -32,6 +32,8 @@ NODES = (150, 300)
 """Vertices on the outer surface of the meshes on which results are handed in."""
 LEAST = {"stomach": 400}
 """Of organs that cannot be meshed with fewer."""
+JUDGED_BY = {"force_end": "force_end", "mean_error": "surface_mean"}
+"""Metric of the profiles -> quantity of the reference."""
 SEED_BITS = 64
 
 
@@ -46,7 +48,9 @@ def open_scene(scene: Scene) -> dict[str, Any]:
     known = published(scene)
     if known is None:
         raise StudyError(f"{scene.name} has no published reference")
-    return {"reference": known.sha256, "physics": physics(scene), "meshes": meshes_of(scene)}
+    told = json.loads((FOLDER / INDEX).read_text(encoding="utf-8"))["references"][scene.name]["relative bars"]
+    bars = {name: round(100.0 * told[quantity], 6) for name, quantity in JUDGED_BY.items() if quantity in told}
+    return {"reference": known.sha256, "physics": physics(scene), "bars": bars, "meshes": meshes_of(scene)}
 
 
 def held_back(organ: str, folder: Path, solved: bool) -> dict[str, Any]:

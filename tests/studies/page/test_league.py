@@ -1,5 +1,6 @@
 """Profiles count what a reader would count by hand; the page shows every engine, every number and every reason."""
 
+import json
 import re
 
 import numpy as np
@@ -7,9 +8,11 @@ import pytest
 
 from studies.exchange.league.frozen import SET, frozen
 from studies.plots.campaigns.league import figure
+from studies.reference.published import published
 from studies.report.league.page import page, profiles
 from studies.report.league.rows import COLUMNS, COST, COUNT, cards, engines, pairs, profile, tolerance
 from studies.report.page.write import write_page
+from studies.scene.library import LIVER_PRESS
 from tests.studies.page.made_up_page import made_up_parts
 
 NAN = float("nan")
@@ -41,38 +44,43 @@ ROWS = [
 ]
 
 
-def test_pairs_are_what_can_be_judged():
-    asked = pairs(ROWS)
-    assert asked == {
-        ("ball_squeeze", "force_end"): 0.5,
-        ("liver_press", "force_end"): 0.5,
-        ("liver_press", "mean_error"): 0.1,
-    }
+ASKED = {("ball_squeeze", "force_end"): 0.5, ("liver_press", "force_end"): 0.5, ("liver_press", "mean_error"): 0.1}
+
+
+def test_pairs_are_those_of_the_open_scenes_with_the_bars_of_their_references():
+    """A ball between planes may turn: its displacement is no pair."""
+    asked = pairs()
+    assert len(asked) == 9 and ("ball_squeeze", "mean_error") not in asked
+    known = published(LIVER_PRESS)
+    assert known is not None
+    told = json.loads((known.file.parent / "set.json").read_text())["references"]["liver_press"]["relative bars"]
+    assert asked["liver_press", "force_end"] == pytest.approx(100 * told["force_end"])
+    assert asked["liver_press", "mean_error"] == pytest.approx(100 * told["surface_mean"])
 
 
 def test_a_profile_is_counted_by_hand():
     """Of three pairs, a has the force of the ball for 0.5, the displacement for 2, the force of the liver for 20."""
-    asked = pairs(ROWS)
-    assert profile(ROWS, "a", 1.0, asked) == [(0.5, 1 / 3), (2.0, 2 / 3), (20.0, 1.0)]
-    assert profile(ROWS, "a", 3.0, asked) == [(0.5, 1 / 3), (2.0, 2 / 3), (2.0, 1.0)]
-    assert profile(ROWS, "b", 3.0, asked) == []
-    assert profile(ROWS, "mine", 1.0, asked) == [(1.0, 1 / 3)] and profile(ROWS, "mine", 3.0, asked)[-1] == (1.0, 2 / 3)
-    assert profile(ROWS, "a", 1.0, asked, COUNT) == []
+    assert profile(ROWS, "a", 1.0, ASKED) == [(0.5, 1 / 3), (2.0, 2 / 3), (20.0, 1.0)]
+    assert profile(ROWS, "a", 3.0, ASKED) == [(0.5, 1 / 3), (2.0, 2 / 3), (2.0, 1.0)]
+    assert profile(ROWS, "b", 3.0, ASKED) == []
+    assert profile(ROWS, "mine", 1.0, ASKED) == [(1.0, 1 / 3)] and profile(ROWS, "mine", 3.0, ASKED)[-1] == (1.0, 2 / 3)
+    assert profile(ROWS, "a", 1.0, ASKED, COUNT) == []
 
 
 def test_no_tolerance_is_finer_than_the_reference():
     """A force within 0.01 of 3 % cannot be told where the reference is known to 0.5 %."""
     assert tolerance("force_end", 0.01, 0.5) == 0.5 and tolerance("force_end", 1.0, 0.5) == 3.0
-    assert profile(ROWS, "mine", 0.01, pairs(ROWS)) == [(1.0, 1 / 3)]
+    assert profile(ROWS, "mine", 0.01, ASKED) == [(1.0, 1 / 3)]
 
 
 def test_cards_say_the_range_and_the_reasons():
     a, b, mine = cards(ROWS)
     assert engines(ROWS) == ["a", "b", "mine"] == [one["engine"] for one in (a, b, mine)]
-    assert a["ranges"]["force_end"] == "2 to 8" and a["cost"] == "0.5 to 20" and a["solved"] == "3 of 3"
+    assert a["ranges"]["force_end"] == "2 to 8" and a["cost"] == "0.5 to 20" and a["solved"] == "3 of 9"
     assert a["count"] == "–" and a["cannot"] == [] and a["scenes"] == 2
-    assert b["cannot"] == ["liver_press: no <planes>"] and b["solved"] == "0 of 3" and b["scenes"] == 1
+    assert b["cannot"] == ["liver_press: no <planes>"] and b["solved"] == "0 of 9" and b["scenes"] == 1
     assert mine["ours"] and not a["ours"]
+    assert a["missing"] == ["ball_clamped", "liver_probe", "kidney_probe"]
 
 
 def made_page() -> str:
@@ -104,7 +112,10 @@ def test_the_chart_has_a_line_for_each_engine_with_a_pair():
     first = sheet.axes[0]
     assert first.get_title().startswith("force within 3 %")
     steps = [line for line in first.get_lines() if len(line.get_xdata()) > 1 and line.get_drawstyle() == "steps-post"]
-    assert [tuple(np.round(line.get_ydata(), 9)) for line in steps] == [pytest.approx((1 / 3, 2 / 3, 1.0))]
+    assert [tuple(np.round(line.get_ydata(), 9)) for line in steps] == [
+        pytest.approx((0.0, 1 / 9, 2 / 9, 3 / 9)),
+        pytest.approx((0.0, 1 / 9)),
+    ]
     labels = [text.get_text() for legend in sheet.legends for text in legend.get_texts()]
     assert labels == ["a", "b", "mine", "real time"]
 
