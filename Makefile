@@ -5,7 +5,7 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo study study-peers report verify smoke test check lint docs links figures fuzz stress bench speeds \
+.PHONY: help demo study study-peers study-league report verify smoke test check lint docs links figures fuzz stress bench speeds \
 	coverage clean distclean compiled \
 	compiled-essential setup-run \
 	setup-test setup-verify setup-dev FORCE
@@ -28,11 +28,14 @@ study-%: setup-run ## run one study and draw it: make study-volume_loss
 report: setup-run ## charts, tables and report.html, one page that opens anywhere, from the stored results
 	$(BIN)/organbench report
 
-study-peers: setup-run ## other programs and ours on the same ball and liver: the extra `peers` (minutes)
-	$(BIN)/python -m pip install -q -c constraints.txt --no-build-isolation -e ".[peers]"
+study-peers: setup-run ## other programs, in environments of their own, and ours on the same ball and liver (minutes)
 	$(BIN)/organbench run studies/exchange/peers/study.py
 	$(BIN)/python -m studies.exchange.peers.main
 	$(BIN)/organbench plot studies/exchange/peers/study.py
+
+study-league: setup-run ## all programs and ours on the open scenes of the league (an hour)
+	$(BIN)/python -m studies.exchange.peers.main --league
+	$(BIN)/organbench report
 
 verify: setup-verify docs ## before a release: oracles, campaigns, browsers, clusters, wheels, notebooks (half an hour)
 	$(BIN)/organbench verify

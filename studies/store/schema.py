@@ -138,6 +138,7 @@ class RunAttributes(Timed):
     warnings = value(str, "", "what preparing the case warned of, and what its indicators report")
     entry = optional_value(str, "", "of an entry from outside: its file, with the SHA-256 of its positions")
     entry_seconds = optional_value(float, "s/s", "of an entry from outside: computing time for a simulated second")
+    league = optional_value(str, "", "of an entry of the league: what its file says, as JSON")
     own_files = optional_value(str, "", "files of the user with the method and the law: JSON, path to SHA-256")
     portable = optional_value(str, "", "settings of a result that is equal on every x86-64 processor")
     restamped = optional_value(str, "", "former code, and replays by which the result was kept for this code")

@@ -19,11 +19,13 @@ class FrozenScene:
     """A scene of the set."""
 
     reference: str
-    """SHA-256 of the file of its reference."""
+    """SHA-256 of the file of its reference; empty for one that is held back and not solved yet."""
     physics: str
     """SHA-256 of what that depends on (studies.reference.published)."""
     meshes: dict[str, str]
     """ "straight-150" -> GivenMesh.digest."""
+    bars: dict[str, float]
+    """Uncertainty of its reference [%] by metric, of the pairs of scene and quantity that are judged."""
     held_back: bool
 
 
@@ -33,7 +35,7 @@ def frozen(file: Path = FILE) -> dict[str, FrozenScene]:
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         return {
-            name: FrozenScene(one["reference"], one["physics"], one["meshes"], held_back)
+            name: FrozenScene(one["reference"], one["physics"], one["meshes"], one.get("bars", {}), held_back)
             for held_back, part in ((False, "open"), (True, "held back"))
             for name, one in data[part].items()
         }

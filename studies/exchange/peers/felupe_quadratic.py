@@ -45,7 +45,7 @@ def run(
     positions, forces, many = [scene.points], [0.0], round(increments / shorter)
     for before, now in zip(scene.times[:-1], scene.times[1:], strict=True):
         ends = [(moved(path, before)[axis], moved(path, now)[axis], boundary) for path, axis, boundary in driven]
-        ramp = {boundary: np.linspace(*way, many + 1)[1:] for *way, boundary in ends}
+        ramp = {boundary: np.linspace(begin, end, many + 1)[1:] for begin, end, boundary in ends}
         step = felupe.Step(items=[body, *contacts], ramp=ramp, boundaries=boundaries)
         for _ in step.generate(x0=field, verbose=0, solver=spsolve):
             pass

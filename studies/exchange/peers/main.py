@@ -31,6 +31,7 @@ def main(
         bool, typer.Option("--league", help="on the open scenes of the frozen set, and ours too")
     ] = False,
     sweep: Annotated[bool, typer.Option("--sweep", help="several settings of each on one scene, as a table")] = False,
+    nodes: Annotated[int | None, typer.Option(help="vertices on the outer surface; default: 150, then 300")] = None,
     environments: Annotated[Path | None, typer.Option(help="folder of the programs' environments")] = None,
 ) -> None:
     """Exports the scenes, runs the programs, judges and stores what they hand in as entries."""
@@ -52,11 +53,11 @@ def main(
             return
         scenes = [scene for scene in LIBRARY if scene.name in frozen()] if league else SCENES
         attempts = [
-            Attempt(peer, scene, nodes, shorter)
+            Attempt(peer, scene, count, shorter)
             for peer in chosen
             for scene in scenes
-            for nodes in NODES
-            for shorter in ((1.0, 0.5) if nodes == NODES[0] and not peer.absent and not league else (1.0,))
+            for count in (NODES if nodes is None else (nodes,))
+            for shorter in ((1.0, 0.5) if count == NODES[0] and not peer.absent and not league else (1.0,))
         ]
         for record in contest(results / FOLDER if league else results, attempts, Path(folder), limit, homes):
             print(f"{record.name}: {record.status}" + (f", {record.message}" if record.message else ""), flush=True)

@@ -23,11 +23,11 @@ SCENE, NODES = LIVER_PRESS, 150
 SHARE = "share of the target [1]"
 """The larger of the errors of force and displacement, over what is usually enough."""
 GRIDS: dict[str, tuple[dict[str, Any], ...]] = {
-    "drake": ({}, {"poisson": 0.45}, {"law": "kCorotated"}),
+    "drake": ({}, {"poisson": 0.45}, {"poisson": 0.4}, {"law": "kCorotated"}),
     "mujoco": ({}, {"poisson": 0.45}, {"poisson": 0.4}),
-    "newton": ({}, {"facets": False}, {"lame": 9.0}),
+    "newton": ({}, {"facets": False}, {"lame": 9.0}, {"lame": 4.0}),
     "felupe": ({}, {"penalty": 100.0}),
-    "bullet": ({}, {"lame": 9.0}),
+    "bullet": ({}, {"lame": 9.0}, {"lame": 4.0}),
     "sfepy": ({}, {"increments": 1}),
 }
 """What is tried of each; {} are the settings with which its adapter is written."""

@@ -41,7 +41,7 @@ def figure(shown: Profiles) -> Figure:
         for (row, column), steps in parts.items():
             if steps:
                 x, y = zip(*steps, strict=True)
-                axes[row, column].step(x, y, where="post", color=colour, linestyle=line)
+                axes[row, column].step((x[0], *x), (0.0, *y), where="post", color=colour, linestyle=line)
                 axes[row, column].plot(x[-1], y[-1], color=colour, marker=marker)
     for row, words in enumerate(shown.budgets):
         for column, tolerance in enumerate(shown.tolerances):

@@ -11,7 +11,8 @@ from markupsafe import Markup
 from studies.base.atomic import write_whole
 from studies.exchange.league import FOLDER
 from studies.exchange.league.frozen import SET, frozen
-from studies.metrics.cells import MISSING, value_cell
+from studies.metrics.cells import MISSING, plain, value_cell
+from studies.metrics.metric import COMPARABLE
 from studies.report.league.rows import (
     COLUMNS,
     COST,
@@ -32,7 +33,7 @@ from studies.store.tables import write_table
 NAME, CHART = "league.html", "profiles.png"
 FACTORS = (1.0, 3.0, 10.0)
 """Of what is usually enough: a column of the chart each."""
-BUDGETS = {COST: "computing time / simulated time [s/s]", COUNT: "evaluations of all forces / simulated second [1/s]"}
+BUDGETS = {COST: "computing / simulated time [s/s]", COUNT: "force evaluations / time [1/s]"}
 HEADS = {
     "force_end": "force",
     "mean_error": "displacement, mean",
@@ -63,7 +64,7 @@ def profiles(rows: Sequence[Row]) -> Any:
     """What the chart shows."""
     from studies.plots.campaigns.league import Profiles
 
-    asked = pairs(rows)
+    asked = pairs()
     words = tuple(
         f"force within {factor * PROFILED['force_end']:g} %,\ndisplacement within {factor * PROFILED['mean_error']:g} %"
         for factor in FACTORS
@@ -74,7 +75,7 @@ def profiles(rows: Sequence[Row]) -> Any:
             for row, budget in enumerate(BUDGETS)
             for column, factor in enumerate(FACTORS)
         }
-        for name in engines(rows)
+        for name in engines([row for row in rows if row["status"] in COMPARABLE])
     }
     note = (
         f"{len(asked)} pairs of scene and quantity (force, mean displacement) of {SET}. No tolerance is below the "
@@ -91,7 +92,7 @@ def page(rows: Sequence[Row], svg: str) -> bytes:
             style=Markup((ASSETS / "page.css").read_text(encoding="utf-8")),
             set=SET,
             scenes=[name for name, one in frozen().items() if not one.held_back],
-            held=[(name, one.reference) for name, one in frozen().items() if one.held_back],
+            held=[(name, one) for name, one in frozen().items() if one.held_back],
             chart=Markup(inline(svg, "profiles", "Share of the pairs within a tolerance over the budget")),
             heads=HEADS,
             cards=cards(rows),
@@ -135,4 +136,4 @@ def _shown(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plain(value: float) -> str:
-    return MISSING if value != value else f"{value:.3g}"
+    return MISSING if value != value else plain(value)

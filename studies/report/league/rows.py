@@ -69,15 +69,9 @@ def _row(path: Path) -> dict[str, Any]:
     return row | {COST: cost.value if cost else float("nan"), COUNT: count / scene.duration if count else float("nan")}
 
 
-def pairs(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
-    """(scene, quantity) -> bar of the reference [%], of all that any entry could be judged by."""
-    found: dict[tuple[str, str], float] = {}
-    for row in rows:
-        for name in PROFILED:
-            bar = row[f"{name} floor [%]"]
-            if row[f"{name} [%]"] == row[f"{name} [%]"] and bar == bar:
-                found[row["scene"], name] = bar
-    return found
+def pairs() -> dict[tuple[str, str], float]:
+    """(scene, quantity) of the open scenes -> bar of the reference [%]."""
+    return {(scene, name): bar for scene, one in frozen().items() for name, bar in one.bars.items()}
 
 
 def tolerance(name: str, factor: float, bar: float) -> float:
@@ -110,12 +104,15 @@ def engines(rows: Sequence[Row]) -> list[str]:
 
 def cards(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """One for each engine: the range of the sizes of its errors, its cost, and what it cannot do."""
-    asked = pairs(rows)
+    asked = pairs()
     return [_card(name, [row for row in rows if row["engine"] == name], asked) for name in engines(rows)]
 
 
 def _card(name: str, rows: Sequence[Row], asked: Mapping[tuple[str, str], float]) -> dict[str, Any]:
     judged = [row for row in rows if row["status"] in COMPARABLE]
+    missing = [
+        scene for scene, one in frozen().items() if not one.held_back and scene not in {r["scene"] for r in rows}
+    ]
     cannot: dict[str, list[str]] = {}
     for row in rows:
         if row["message"]:
@@ -131,6 +128,7 @@ def _card(name: str, rows: Sequence[Row], asked: Mapping[tuple[str, str], float]
         "cost": _range(judged, COST),
         "count": _range(judged, COUNT),
         "solved": f"{round(best[-1][1] * len(asked)) if best else 0} of {len(asked)}",
+        "missing": missing,
         "cannot": [f"{', '.join(scenes)}: {reason}" for reason, scenes in cannot.items()],
     }
 
@@ -140,5 +138,5 @@ def _range(rows: Sequence[Row], column: str) -> str:
     values = [abs(row[column]) for row in rows if row[column] == row[column]]
     if not values:
         return "–"
-    low, high = (f"{value:.2g}" if value < 100 else f"{value:.0f}" for value in (min(values), max(values)))
+    low, high = (f"{value:.2g}" if value < 100 else f"{value:,.0f}" for value in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"

@@ -8,7 +8,7 @@ import hashlib
 import json
 import secrets
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
@@ -18,7 +18,7 @@ from studies.exchange.league.frozen import FILE, SET, mesh_key
 from studies.exchange.meshes import given_meshes
 from studies.reference.load import load_reference
 from studies.reference.publish import write_file
-from studies.reference.published import physics, published
+from studies.reference.published import FOLDER, INDEX, physics, published
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.scene.as_json import scene_to_json
@@ -32,6 +32,8 @@ NODES = (150, 300)
 """Vertices on the outer surface of the meshes on which results are handed in."""
 LEAST = {"stomach": 400}
 """Of organs that cannot be meshed with fewer."""
+JUDGED_BY = {"force_end": "force_end", "mean_error": "surface_mean"}
+"""Metric of the profiles -> quantity of the reference."""
 SEED_BITS = 64
 
 
@@ -46,11 +48,13 @@ def open_scene(scene: Scene) -> dict[str, Any]:
     known = published(scene)
     if known is None:
         raise StudyError(f"{scene.name} has no published reference")
-    return {"reference": known.sha256, "physics": physics(scene), "meshes": meshes_of(scene)}
+    told = json.loads((FOLDER / INDEX).read_text(encoding="utf-8"))["references"][scene.name]["relative bars"]
+    bars = {name: round(100.0 * told[quantity], 6) for name, quantity in JUDGED_BY.items() if quantity in told}
+    return {"reference": known.sha256, "physics": physics(scene), "bars": bars, "meshes": meshes_of(scene)}
 
 
-def held_back(organ: str, folder: Path) -> dict[str, Any]:
-    """Draws and solves the scene below `folder`, where that was not done; what the set tells of it."""
+def held_back(organ: str, folder: Path, solved: bool) -> dict[str, Any]:
+    """Draws and, if `solved`, solves the scene below `folder`, where that was not done; what the set tells of it."""
     place = folder / organ
     place.mkdir(parents=True, exist_ok=True)
     seed, file = place / "seed.txt", place / "reference.h5"
@@ -58,22 +62,25 @@ def held_back(organ: str, folder: Path) -> dict[str, Any]:
         seed.write_text(str(secrets.randbits(SEED_BITS)), encoding="utf-8")
     scene = member(organ, int(seed.read_text(encoding="utf-8")), 0)
     (place / "scene.json").write_text(scene_to_json(scene), encoding="utf-8")
-    if not file.exists():
+    if solved and not file.exists():
         solve(place / "solved", ReferenceSolve(scene))
         reference = load_reference(place / "solved", scene)
         assert reference is not None  # members have a plan
         write_file(file, reference)
-    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    digest = hashlib.sha256(file.read_bytes()).hexdigest() if file.exists() else ""
     nodes = tuple(max(count, LEAST.get(organ, 0)) for count in NODES)
     return {"reference": digest, "physics": physics(scene), "meshes": meshes_of(scene, nodes)}
 
 
-def main(secret: Path) -> None:
-    """Writes the set into the package."""
+def main(
+    secret: Path,
+    solved: Annotated[bool, typer.Option(help="solve the references that are missing, minutes each")] = True,
+) -> None:
+    """Writes the set into the package; a reference that is not solved has no hash in it."""
     data = {
         "set": SET,
         "open": {scene.name: open_scene(scene) for scene in OPEN},
-        "held back": {f"held_{organ}": held_back(organ, secret) for organ in HELD_BACK},
+        "held back": {f"held_{organ}": held_back(organ, secret, solved) for organ in HELD_BACK},
     }
     FILE.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     typer.echo(f"{FILE}: {len(OPEN)} open scenes, {len(HELD_BACK)} held back")

@@ -2,16 +2,18 @@
 
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from massspring import Free, ImplicitVolume, Plane, Xpbd
+from studies.exchange.description import obstacle_entry
 from studies.exchange.entry import HALF_STEP, entries_beside, outside
 from studies.exchange.export import export
 from studies.exchange.judge import unfinished_record
-from studies.exchange.peers.contest import PEERS, Attempt, Peer, contest, hand_over
-from studies.exchange.peers.scene_folder import CannotDo, SceneFolder, moved, turn_to
+from studies.exchange.peers.contest import OURS, PEERS, Attempt, Peer, contest
+from studies.exchange.peers.scene_folder import CannotDo, SceneFolder, gap, moved, turn_to
 from studies.metrics.run import Run
 from studies.metrics.table import study_table
 from studies.metrics.timing.protocol import FrameTiming
@@ -28,7 +30,7 @@ NODES = 100
 ENDS = {
     "squeezed": (Status.OK, ""),
     "unable": (Status.SKIPPED, "unable: it knows no frictionless planes"),
-    "missing": (Status.SKIPPED, "missing: a_program_that_is_not_installed is not installed; pip install"),
+    "missing": (Status.SKIPPED, "missing: a_program_that_is_not_installed is not installed"),
     "crashed": (Status.FAILED, "crashed ended with exit code 1: ZeroDivisionError: in its solver"),
     "hung": (Status.FAILED, "hung took longer than 3 s"),
     "shifted": (Status.FAILED, "the positions at t = 0 are up to 1.73 m from those of straight.vtu"),
@@ -97,21 +99,22 @@ def test_the_chart_without_a_run_says_so(tmp_path):
     assert (tmp_path / "none.png").exists() and (tmp_path / "ours.png").exists()
 
 
-def test_a_program_without_an_adapter_is_a_row_with_its_reason(tmp_path, mesh_cache):
-    (absent,) = [peer for peer in PEERS if peer.absent]
+@pytest.mark.parametrize("absent", [peer for peer in PEERS if peer.absent], ids=lambda peer: peer.name)
+def test_a_program_without_an_adapter_is_a_row_with_its_reason(tmp_path, mesh_cache, absent):
     (record,) = contest(tmp_path / "r", [Attempt(absent, replace(SCENE, reference=None), NODES)], tmp_path / "g")
-    assert record.status == Status.SKIPPED and record.message == f"sofa: {absent.absent}"
-    assert "no wheel on PyPI" in record.message and all(bool(peer.absent) != bool(peer.module) for peer in PEERS)
+    assert record.status == Status.SKIPPED and record.message == f"{absent.name}: {absent.absent}"
+    assert all(bool(peer.absent) != bool(peer.module) for peer in PEERS)
 
 
 def test_no_two_contestants_have_one_colour_or_marker():
     """As many as there are, ours and theirs; half a step changes nothing, and all but ours have no grey."""
     recipe, times = BodyRecipe("tetrahedral", 150), FrameTiming(np.full((2, 4), 1e6))
-    names = [name for peer in PEERS for name in (peer.name, peer.name + HALF_STEP)]
+    drawn = [peer for peer in PEERS if not peer.absent]
+    names = [name for peer in drawn for name in (peer.name, peer.name + HALF_STEP)]
     methods = [ImplicitVolume(), Free(), Xpbd(), *map(outside, names)]
     made = made_up(timing=times)
     looks = looks_of([replace(made, case=Case(SCENE, recipe, method)) for method in methods])
-    assert len(looks) == 3 + len(PEERS)
+    assert len(looks) == 3 + len(drawn)
     assert len({look.colour for look in looks.values()}) == len({look.marker for look in looks.values()}) == len(looks)
     assert looks["tetrahedra, one volume"].colour == VERMILLION and GREY not in [one.colour for one in looks.values()]
 
@@ -138,35 +141,54 @@ def test_a_scene_beyond_the_adapters_is_refused_with_its_reason(tmp_path, mesh_c
     given = SceneFolder(tmp_path / "scene")
     with pytest.raises(CannotDo, match=told):
         given.check_simple()
-        _ = given.planes
+        given.obstacles("plane")
 
 
 def test_a_path_is_read_as_the_scene_means_it(tmp_path, mesh_cache):
     export(SCENE, tmp_path / "scene", NODES)
     given = SceneFolder(tmp_path / "scene")
     for t in (0.0, 1.3, 3.0, 4.0):
-        for plane, obstacle in zip(given.planes, SCENE.obstacles, strict=True):
+        for plane, obstacle in zip(given.obstacles("plane"), SCENE.obstacles, strict=True):
             assert moved(plane["path"], t) == pytest.approx(obstacle.path(t), abs=1e-15)
 
 
+@pytest.mark.parametrize("scene", [SCENE, LIVER_PROBE], ids=lambda scene: scene.name)
+def test_adapters_see_the_gap_that_judges_see(scene):
+    """Distances to planes and spheres are those of our own obstacles, and their directions the slopes of these."""
+    x = np.random.default_rng(5).normal(scale=0.1, size=(40, 3))
+    for obstacle in scene.obstacles:
+        for t in (0.0, 2.5, scene.duration):
+            distance, away = gap(obstacle_entry(obstacle), x, t)
+            assert distance == pytest.approx(obstacle.gap(x, t), abs=1e-15)
+            slopes = [(obstacle.gap(x + h, t) - obstacle.gap(x - h, t)) / 2e-6 for h in 1e-6 * np.eye(3)]
+            assert away == pytest.approx(np.stack(slopes, axis=1), abs=1e-6)
+
+
+ENVIRONMENTS = Path("results/cache/environments")
+"""Where `make study-peers` keeps the environments of the programs."""
 LIMITS = {
     "mujoco": (60.0, 10.0, 0.5),
     "felupe": (10.0, 0.2, 0.1),
     "newton": (60.0, 5.0, 0.5),
     "bullet": (60.0, 2.0, 0.5),
+    "drake": (40.0, 5.0, 0.5),
+    "sfepy": (15.0, 0.5, 0.5),
+    "ours-quadratic": (10.0, 0.1, 0.5),
+    "ours-corotated": (60.0, 5.0, 0.5),
+    "ours-xpbd": (60.0, 5.0, 0.5),
 }
 """Most [%] that its force, volume and penetration are off on a ball of 100 vertices."""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("peer", [peer for peer in PEERS if not peer.absent], ids=lambda peer: peer.name)
-def test_each_program_squeezes_the_ball(ended, found, tmp_path, peer):
-    """Where it is installed: what it hands in is a squeezed ball, and half the step changes little."""
-    scene = replace(SCENE, reference=None)
-    export(scene, tmp_path / "scene", NODES)
-    if hand_over(Attempt(peer, scene, NODES), tmp_path / "scene", tmp_path / "a.npz", 300.0)[0] == Status.SKIPPED:
-        pytest.skip(f"{peer.name} is not installed here")
-    records = list(contest(tmp_path / "r", [Attempt(peer, scene, NODES, s) for s in (1.0, 0.5)], tmp_path / "g"))
+@pytest.mark.parametrize("peer", [peer for peer in (*PEERS, *OURS) if not peer.absent], ids=lambda peer: peer.name)
+def test_each_program_squeezes_the_ball(found, tmp_path, mesh_cache, peer):
+    """Where its environment is made: what it hands in is a squeezed ball, and half the step changes little."""
+    if peer.packages and not (ENVIRONMENTS / peer.name / "packages.txt").is_file():
+        pytest.skip(f"{peer.name} is not installed here: `make study-peers`")
+    scene = replace(BALL_SQUEEZE, checkpoints=SCENE.checkpoints)
+    attempts = [Attempt(peer, scene, NODES, shorter) for shorter in (1.0, 0.5)]
+    records = list(contest(tmp_path / "r", attempts, tmp_path / "g", environments=ENVIRONMENTS))
     assert [record.status for record in records] == [Status.OK] * 2, records[0].message
     runs, _ = entries_beside(tmp_path / "r", [scene], lambda scene: None)
     table = study_table([replace(run, reference=found) for run in runs], ("force_end", "volume_worst", "penetration"))
@@ -174,3 +196,12 @@ def test_each_program_squeezes_the_ball(ended, found, tmp_path, peer):
     assert (table["force_end [%]"].abs() < force).all() and (table["volume_worst [%]"] < volume).all()
     assert (table["penetration [%]"] < depth).all()
     assert np.ptp(table["force_end [%]"]) < 5.0
+
+
+def test_an_environment_that_cannot_be_made_is_a_reason(tmp_path, mesh_cache):
+    """pip is asked for a package that no index can have; the row says so, and the rest would go on."""
+    peer = Peer("nowhere", "tests.studies.exchange.peers.dummy_unable", packages=("./not-a-folder-of-any-package",))
+    attempt = Attempt(peer, replace(SCENE, reference=None), NODES)
+    (record,) = contest(tmp_path / "r", [attempt], tmp_path / "g", environments=tmp_path / "e")
+    assert record.status == Status.SKIPPED
+    assert record.message.startswith("nowhere: pip cannot install ./not-a-folder-of-any-package (")

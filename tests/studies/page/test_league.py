@@ -1,0 +1,136 @@
+"""Profiles count what a reader would count by hand; the page shows every engine, every number and every reason."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from studies.exchange.league.frozen import SET, frozen
+from studies.plots.campaigns.league import figure
+from studies.reference.published import published
+from studies.report.league.page import page, profiles
+from studies.report.league.rows import COLUMNS, COST, COUNT, cards, engines, pairs, profile, tolerance
+from studies.report.page.write import write_page
+from studies.scene.library import LIVER_PRESS
+from tests.studies.page.made_up_page import made_up_parts
+
+NAN = float("nan")
+
+
+def row(engine, scene, force, mean, cost, **more):
+    """Of an engine whose force is known to 0.5 %, and its displacement to 0.1 %."""
+    values = {
+        "force_end": (force, 0.5),
+        "mean_error": (mean, 0.1),
+        "volume_worst": (0.2, NAN),
+        "penetration": (0.0, NAN),
+    }
+    made = {"engine": engine, "version": "1.0", "ours": engine == "mine", "scene": scene, "mesh": "straight"}
+    made |= {"nodes": 150, "status": "ok", "message": "", "settings": "{}", COST: cost, COUNT: NAN}
+    for name, (value, floor) in values.items():
+        made |= {f"{name} [%]": value, f"{name} floor [%]": floor}
+    return made | more
+
+
+LOST = {f"{name} {kind}[%]": NAN for name in COLUMNS for kind in ("", "floor ")}
+ROWS = [
+    row("a", "ball_squeeze", -2.0, NAN, 0.5),
+    row("a", "liver_press", 8.0, 0.9, 2.0),
+    row("a", "liver_press", 2.9, 0.8, 20.0, nodes=300),
+    row("b", "ball_squeeze", 40.0, NAN, 0.1),
+    row("b", "liver_press", NAN, NAN, NAN, status="skipped", message="b: no <planes>", **LOST),
+    row("mine", "liver_press", 0.4, 3.0, 1.0),
+]
+
+
+ASKED = {("ball_squeeze", "force_end"): 0.5, ("liver_press", "force_end"): 0.5, ("liver_press", "mean_error"): 0.1}
+
+
+def test_pairs_are_those_of_the_open_scenes_with_the_bars_of_their_references():
+    """A ball between planes may turn: its displacement is no pair."""
+    asked = pairs()
+    assert len(asked) == 9 and ("ball_squeeze", "mean_error") not in asked
+    known = published(LIVER_PRESS)
+    assert known is not None
+    told = json.loads((known.file.parent / "set.json").read_text())["references"]["liver_press"]["relative bars"]
+    assert asked["liver_press", "force_end"] == pytest.approx(100 * told["force_end"])
+    assert asked["liver_press", "mean_error"] == pytest.approx(100 * told["surface_mean"])
+
+
+def test_a_profile_is_counted_by_hand():
+    """Of three pairs, a has the force of the ball for 0.5, the displacement for 2, the force of the liver for 20."""
+    assert profile(ROWS, "a", 1.0, ASKED) == [(0.5, 1 / 3), (2.0, 2 / 3), (20.0, 1.0)]
+    assert profile(ROWS, "a", 3.0, ASKED) == [(0.5, 1 / 3), (2.0, 2 / 3), (2.0, 1.0)]
+    assert profile(ROWS, "b", 3.0, ASKED) == []
+    assert profile(ROWS, "mine", 1.0, ASKED) == [(1.0, 1 / 3)] and profile(ROWS, "mine", 3.0, ASKED)[-1] == (1.0, 2 / 3)
+    assert profile(ROWS, "a", 1.0, ASKED, COUNT) == []
+
+
+def test_no_tolerance_is_finer_than_the_reference():
+    """A force within 0.01 of 3 % cannot be told where the reference is known to 0.5 %."""
+    assert tolerance("force_end", 0.01, 0.5) == 0.5 and tolerance("force_end", 1.0, 0.5) == 3.0
+    assert profile(ROWS, "mine", 0.01, ASKED) == [(1.0, 1 / 3)]
+
+
+def test_cards_say_the_range_and_the_reasons():
+    a, b, mine = cards(ROWS)
+    assert engines(ROWS) == ["a", "b", "mine"] == [one["engine"] for one in (a, b, mine)]
+    assert a["ranges"]["force_end"] == "2 to 8" and a["cost"] == "0.5 to 20" and a["solved"] == "3 of 9"
+    assert a["count"] == "–" and a["cannot"] == [] and a["scenes"] == 2
+    assert b["cannot"] == ["liver_press: no <planes>"] and b["solved"] == "0 of 9" and b["scenes"] == 1
+    assert mine["ours"] and not a["ours"]
+    assert a["missing"] == ["ball_clamped", "liver_probe", "kidney_probe"]
+
+
+def made_page() -> str:
+    return page(ROWS, '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><g/></svg>').decode()
+
+
+def test_the_page_shows_every_row_and_every_hash_of_what_is_held_back():
+    text = made_page()
+    assert text.count('<th scope="row">') == len(ROWS) and text.count("<li><h3>") == 3
+    assert "no &lt;planes&gt;" in text and "+2.9\u00a0±\u00a00.5" in text and SET in text
+    for name, one in frozen().items():
+        assert (one.physics in text) == one.held_back and name in text
+        assert not one.held_back or (one.reference or "reference not solved yet") in text
+    assert "://" not in re.sub(r"http://www.w3.org/\S+", "", text) and "<script" not in text
+
+
+def test_the_report_has_a_section_for_it(tmp_path):
+    studies = made_up_parts(tmp_path)
+    plain, _ = write_page(tmp_path, studies)
+    assert plain is not None and 'id="league"' not in plain.read_text(encoding="utf-8")
+    path, _ = write_page(tmp_path, studies, cards(ROWS))
+    assert path is not None
+    section = path.read_text(encoding="utf-8").split('<section id="league"')[1].split("</section>")[0]
+    assert section.count('<th scope="row">') == 3 and 'href="league.html"' in section and "0.5 to 20" in section
+
+
+def test_the_chart_has_a_line_for_each_engine_with_a_pair():
+    sheet = figure(profiles(ROWS))
+    first = sheet.axes[0]
+    assert first.get_title().startswith("force within 3 %")
+    steps = [line for line in first.get_lines() if len(line.get_xdata()) > 1 and line.get_drawstyle() == "steps-post"]
+    assert [tuple(np.round(line.get_ydata(), 9)) for line in steps] == [
+        pytest.approx((0.0, 1 / 9, 2 / 9, 3 / 9)),
+        pytest.approx((0.0, 1 / 9)),
+    ]
+    labels = [text.get_text() for legend in sheet.legends for text in legend.get_texts()]
+    assert labels == ["a", "b", "mine", "real time"]
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("width", [360, 1280])
+def test_the_page_fits_a_window_and_asks_for_nothing(browser, tmp_path, width):
+    file = tmp_path / "league.html"
+    file.write_text(made_page(), encoding="utf-8")
+    context = browser.new_context(offline=True, viewport={"width": width, "height": 900})
+    shown, asked, complaints = context.new_page(), [], []
+    shown.on("request", lambda request: asked.append(request.url))
+    shown.on("console", lambda message: complaints.append(message.text))
+    shown.goto(file.as_uri())
+    assert shown.evaluate("document.documentElement.scrollWidth") <= width
+    assert shown.locator(".cards > li").count() == 3 and shown.locator(".cards .entry").all_inner_texts() == ["ours"]
+    assert asked == [file.as_uri()] and complaints == []
+    context.close()
