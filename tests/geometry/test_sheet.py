@@ -5,7 +5,6 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, HalfSpace
-from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.first_surface import first_surface
 from studies.geometry.surface.sheet import check_sheet, sheet_of
@@ -32,18 +31,15 @@ def test_caps_of_a_ball_have_their_volumes_and_angles(height):
 
 
 def test_a_dent_is_missing_in_the_piece_round_it():
-    """A ball with a smaller one scooped out of its top: a level plane leaves a ring with a hole above and one below."""
+    """A ball whose top, from half its radius on, is turned in: a level plane below meets the dent."""
     points, triangles = icosphere(5, RADIUS)
-    high = points[:, 2] > 0.8 * RADIUS
-    # The pole is turned in at the plane z = 0.8 R.
-    points[high, 2] = 1.6 * RADIUS - points[high, 2]
-    whole = signed_volume(points, triangles)
-    below, above = sheet_of(plane(0.7 * RADIUS), points, triangles).pieces
+    high = points[:, 2] > 0.5 * RADIUS
+    points[high, 2] = RADIUS - points[high, 2]
+    below, above = sheet_of(plane(0.2 * RADIUS), points, triangles).pieces
+    turned, over, dent = (np.pi * height**2 * (3 - height) / 3 for height in (0.5, 0.8, 0.2))
+    whole = 4 * np.pi / 3 - 2 * turned
     assert below.share + above.share == pytest.approx(1.0, rel=1e-12, abs=0)
-    cap = np.pi * RADIUS**3 * np.array([0.2**2 * (3 - 0.2), 0.3**2 * (3 - 0.3)]) / 3
-    scooped_below = np.pi * RADIUS**3 * 0.1**2 * (3 - 0.1) / 3
-    ring = cap[1] - cap[0] - (cap[0] - scooped_below)
-    assert above.share * whole == pytest.approx(ring, rel=0.02)
+    assert above.share == pytest.approx((over - 2 * turned + dent) / whole, rel=0.02)
 
 
 def test_pieces_of_a_bent_organ_are_told_apart():
