@@ -13,7 +13,7 @@ from studies.exchange.entry import run_of_entry
 from studies.exchange.export import export
 from studies.exchange.peers.contest import Attempt, Peer, judged
 from studies.metrics.judged import judged as judged_run
-from studies.metrics.wish import usual_wish
+from studies.metrics.wish import SOLID
 from studies.reference.load import reference_for
 from studies.scene.library import LIVER_PRESS
 from studies.store.record import Record, Status
@@ -52,7 +52,7 @@ def _numbers(record: Record) -> dict[str, Any]:
         "force_end [%]": found.force.value,
         "mean_error [%]": found.displacement.value,
         "cost [s/s]": found.cost.value,
-        SHARE: found.worst(usual_wish(SCENE)),
+        SHARE: max(abs(found.force.value) / SOLID[0], found.displacement.value / SOLID[1]),
     }
 
 
