@@ -203,8 +203,9 @@ def test_a_step_solves_volumes_pairs_and_obstacles_together(kind, plane, enterin
     assert np.abs(along[touching]).max() < 1e-15
     # The first meeting may ask for more passes of the active set than a step has.
     assert entering or (pairs.impulse[touching] > -1e-12 * pairs.impulse.max()).all() or kind == "quadratic"
-    # A plane that sinks fast may also bring corners of quadratic faces in with the last pass.
-    assert entering or (along[~touching] > (-1e-6 if plane else -1e-12)).all()
+    # The plane squeezes quadratic faces past each other; pairs that slipped beyond their reach are none.
+    able = ~touching & np.isfinite(pairs.gap)
+    assert entering or (along[able] > -1e-12).all(), along[able].min()
     assert (pairs.impulse[~touching] == 0.0).all()
     target = setup.body.kept.jacobian(before.x) @ (after.x - before.x).ravel()
     wanted = boundary.volume_target[0] - setup.body.kept.measure(before.x)
