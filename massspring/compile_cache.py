@@ -19,6 +19,7 @@ COMPILED = ("massspring.kernels", "massspring.methods", "reference_fem")
 
 ARGUMENTS = (
     "massspring.kernels.arrays.volume_rows",
+    "massspring.kernels.arrays.face_pairs",
     "massspring.kernels.constraint.exact_volume",
     "massspring.kernels.constraint.ldl_solve",
     "massspring.kernels.forces.elements",

@@ -28,10 +28,18 @@ def methods() -> Rows:
 
 
 def metrics() -> Rows:
-    """(name, description) of each of METRICS: calls of a name, a unit, a direction and a function."""
-    tree = _parsed("studies.metrics.metrics")
+    """(name, description) of each of METRICS: calls of a name, a unit, a direction and a function, which is of the same
+    module or, as cutting.cut_ms, of one next to it."""
+    package = "studies.metrics"
+    tree = _parsed(f"{package}.metrics")
     calls = [item.args for item in _assigned(tree, "METRICS").elts]
-    return [(name.value, _first_line(_defined(tree, function.id))) for name, _, _, function, *_ in calls]
+
+    def documented(function: Any) -> str:
+        if isinstance(function, ast.Attribute):
+            return _first_line(_defined(_parsed(f"{package}.{ast.unparse(function.value)}"), function.attr))
+        return _first_line(_defined(tree, function.id))
+
+    return [(name.value, documented(function)) for name, _, _, function, *_ in calls]
 
 
 def _registered(module: str, registry: str) -> list[tuple[str, str]]:

@@ -24,6 +24,7 @@ def run(
     dt: length of steps and frames [s]; default: the usual share of the stability limit.
     """
     known = lookup(scene.data["name"], {one.name: one for one in SCENES}, "scene")
+    known = replace(known, checkpoints=tuple(float(t) for t in scene.times[1:]))
     kind = lookup(method, {one.name: one for one in METHODS}, "method")(**settings)
     recipe = given_mesh(known, int(scene.data["meshes"]["straight"]["outer_nodes"]), scene.mesh).recipe
     if kind.capabilities.keeps == "elements":

@@ -150,7 +150,7 @@ def scene_of(trial: CutTrial) -> Scene:
         within = BallRegion(_vector(middle), trial.reach * half)
     elif trial.blade == "half space":
         within = HalfSpace(_vector(middle + (2 * trial.reach - 1) * half * side), _vector(side))
-    cut = Cut("cut", HalfSpace(_vector(middle), _vector(normal)), within, trial.when * DURATION, trial.free)
+    cut = Cut("cut", HalfSpace(_vector(middle), _vector(normal)), within, trial.when * DURATION, free=trial.free)
     axis = side if trial.held == "across" else normal
     return Scene(
         name="cut",

@@ -14,7 +14,7 @@ from studies.meshing.true_shape import true_shape
 from studies.metrics.run import doubled
 from studies.reference import published as module
 from studies.reference.load import Reference, reference_for
-from studies.reference.publish import write_published
+from studies.reference.publish import judged_scenes, write_published
 from studies.reference.published import (
     FOLDER,
     INDEX,
@@ -26,7 +26,7 @@ from studies.reference.published import (
     record_of,
 )
 from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint
-from studies.scene.library import BALL_SQUEEZE, CUT, JUDGED, LIVER_PRESS
+from studies.scene.library import BALL_SQUEEZE, JUDGED, LIVER_PRESS
 from studies.store.ledger import Ledger
 from studies.store.record import read_record
 from studies.sweep.job import do, reference_jobs
@@ -34,7 +34,7 @@ from studies.tools.verify.references import checks_of, solved_again
 from tests.studies.octant import SCENE
 
 MEGABYTES = 20
-PUBLISHED = [*JUDGED, *(scene for scene in CUT if scene.reference is not None)]
+PUBLISHED = list(judged_scenes().values())
 
 
 @pytest.fixture

@@ -63,6 +63,7 @@ def test_what_a_run_writes_is_what_its_tables_list(finished_sweep):
         ENTRY,
         SECONDS,
         *(name for name in LAYOUTS["run"][1] if name.startswith("cut_")),
+        "league",
         "portable",
         "restamped",
     }  # where asked for

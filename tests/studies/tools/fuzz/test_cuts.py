@@ -58,7 +58,8 @@ def test_what_cannot_be_cut_is_refused_before_it_is_meshed(changes, words, monke
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "changes", [{}, {"blade": "half space", "pull": 0.1}, {"held": "one end", "free": True, "gravity": 9.81}]
+    "changes",
+    [{}, {"blade": "half space", "body": "cotangent", "pull": 0.1}, {"held": "one end", "free": True, "gravity": 9.81}],
 )
 def test_cuts_that_can_be_run(changes):
     found = tried(replace(CALM, **changes))
