@@ -72,11 +72,3 @@ def opened_elements(mesh: MeshTet2, faces: np.ndarray) -> tuple[MeshTet2, np.nda
     flat = MeshTet2.from_mesh(MeshTet(np.ascontiguousarray(x[vertex].T), np.ascontiguousarray(opening.cells.T)))
     parent = np.concatenate([vertex, mesh.nvertices + edge_index(mesh, vertex[np.asarray(flat.edges).T])])
     return replace(flat, doflocs=np.ascontiguousarray(x[parent].T)), parent
-
-
-def cut_triangles(triangles: np.ndarray, parent: np.ndarray, front: np.ndarray) -> np.ndarray:
-    """Those of the surface `triangles` (s, 3) of a body that are behind its cut, (f, 3); `front`: nodes before it."""
-    rows = np.sort(parent[triangles.astype(np.int64)], axis=1)
-    _, inverse, count = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
-    twice = count[inverse.reshape(-1)] == 2
-    return triangles[twice & ~np.isin(triangles, front).any(axis=1)]

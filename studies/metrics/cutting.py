@@ -12,12 +12,14 @@ THERE = 1e-12
 def piece_worst(run: Run) -> float:
     """100 max |V/V0 − 1| of a piece over all frames after the cut and the clock that leads volumes back [%].
 
-    NaN without a cut."""
+    NaN without a cut, and for a run that ended before it."""
     if run.case.scene.cut is None:
         return float("nan")
     volume, target = run.part_volumes
     arrived = (np.abs(target / target[-1] - 1) < THERE).all(axis=1)
     arrived[: run.record.attributes["cut_frame"]] = False
+    if not arrived.any():
+        return float("nan")
     return PERCENT * float(np.abs(volume[arrived] / target[-1] - 1).max())
 
 

@@ -10,9 +10,9 @@ from massspring import Attachment, Body, Event
 from massspring.body.opening import parents
 from massspring.body.points import PointVolumes
 from massspring.body.volumes import Volumes
+from massspring.layout.face_pairs import faces_behind
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import boundary_triangles
-from studies.meshing.opened_mesh import cut_triangles
 from studies.scene.cut import Cut
 
 
@@ -83,9 +83,9 @@ def event_of(
     return Event(after, parent, volumes, frame, attachments, pairs)
 
 
-def opening_of(frame: int, after: Body, parent: np.ndarray, pairs: np.ndarray) -> Opening:
+def opening_of(frame: int, after: Body, pairs: np.ndarray) -> Opening:
     """Where the body after an event was cut."""
-    faces = cut_triangles(after.triangles, parent, pairs[:, 1]).astype(np.int64)
+    faces = faces_behind(after.triangles.astype(np.int64), pairs, after.node_count)
     return Opening(frame, faces, pairs, parts_of(after))
 
 

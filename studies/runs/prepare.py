@@ -201,7 +201,7 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
         after = attachments_for(scene, mesh)
         check_held(scene.cut, last.tetrahedra.astype(np.int64), last.rest, after)
         events = (event_of(frame, body, last, later.parent, after, later.pairs if scene.cut.contact else None),)
-        opening = opening_of(frame, last, later.parent, later.pairs)
+        opening = opening_of(frame, last, later.pairs)
         limit_before = limit_of(case, body, attachments)
     limit = limit_of(case, last, events[-1].attachments if events else attachments)
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)

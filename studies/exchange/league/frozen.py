@@ -1,6 +1,6 @@
 """The frozen set: eight scenes, five open and three held back, with the hashes of their meshes and references.
 
-`python -m studies.tools.freeze` makes one; a reference that changes needs a new set.
+`python -m studies.tools.league.freeze FOLDER` makes one; a reference that changes needs a new set.
 """
 
 import json

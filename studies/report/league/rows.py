@@ -1,7 +1,7 @@
 """The table of the league: a row for each engine, scene and mesh, read off the stored entries."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,14 @@ from studies.exchange.league.frozen import frozen
 from studies.metrics.judged import cost_of
 from studies.metrics.metric import COMPARABLE
 from studies.metrics.table import metric
+from studies.metrics.wish import SOLID
 from studies.reference.load import reference_for
 from studies.store.record import read_record
 
 TABLE = "league.csv"
 COLUMNS = ("force_end", "mean_error", "volume_worst", "penetration")
-PROFILED = {"force_end": 3.0, "mean_error": 1.0}
-"""Quantities of profiles -> what is usually enough [%] (studies.metrics.wish.SOLID)."""
+PROFILED = dict(zip(("force_end", "mean_error"), SOLID, strict=True))
+"""Quantities of profiles -> what is usually enough [%]; all scenes of the set are of solid organs."""
 COST, COUNT = "cost [s/s]", "evaluations [1/s]"
 """Computing time, and evaluations of all forces, for a simulated second."""
 Row = Mapping[str, Any]
@@ -79,19 +80,28 @@ def tolerance(name: str, factor: float, bar: float) -> float:
     return max(factor * PROFILED[name], bar)
 
 
+def solutions(
+    rows: Sequence[Row], engine: str, factor: float, asked: Mapping[tuple[str, str], float]
+) -> Iterator[tuple[tuple[str, str], Row]]:
+    """Each pair that an engine solves within the tolerance, with the row in which it does."""
+    for row in rows:
+        for name in PROFILED:
+            pair = (row["scene"], name)
+            if row["engine"] != engine or pair not in asked:
+                continue
+            if abs(row[f"{name} [%]"]) <= tolerance(name, factor, asked[pair]):
+                yield pair, row
+
+
 def profile(
     rows: Sequence[Row], engine: str, factor: float, asked: Mapping[tuple[str, str], float], budget: str = COST
 ) -> list[tuple[float, float]]:
     """(budget, share of the pairs that are solved within the tolerance for at most this budget), ascending; a pair
-    counts from its cheapest entry that is good enough on."""
+    counts from its cheapest entry that is good enough on, and not at all where no cost is known."""
     cheapest: dict[tuple[str, str], float] = {}
-    for row in rows:
-        for name in PROFILED:
-            pair, cost = (row["scene"], name), row[budget]
-            if row["engine"] != engine or pair not in asked or cost != cost:
-                continue
-            if abs(row[f"{name} [%]"]) <= tolerance(name, factor, asked[pair]):
-                cheapest[pair] = min(cheapest.get(pair, cost), cost)
+    for pair, row in solutions(rows, engine, factor, asked):
+        if row[budget] == row[budget]:
+            cheapest[pair] = min(cheapest.get(pair, row[budget]), row[budget])
     costs = sorted(cheapest.values())
     return [(cost, (number + 1) / len(asked)) for number, cost in enumerate(costs)]
 
@@ -118,7 +128,7 @@ def _card(name: str, rows: Sequence[Row], asked: Mapping[tuple[str, str], float]
         if row["message"]:
             scenes = cannot.setdefault(row["message"].removeprefix(f"{name}: "), [])
             scenes += [row["scene"]] if row["scene"] not in scenes else []
-    best = profile(rows, name, 1.0, asked)
+    solved = {pair for pair, _ in solutions(rows, name, 1.0, asked)}
     return {
         "engine": name,
         "version": rows[0]["version"],
@@ -127,7 +137,7 @@ def _card(name: str, rows: Sequence[Row], asked: Mapping[tuple[str, str], float]
         "ranges": {column: _range(judged, f"{column} [%]") for column in COLUMNS},
         "cost": _range(judged, COST),
         "count": _range(judged, COUNT),
-        "solved": f"{round(best[-1][1] * len(asked)) if best else 0} of {len(asked)}",
+        "solved": f"{len(solved)} of {len(asked)}",
         "missing": missing,
         "cannot": [f"{', '.join(scenes)}: {reason}" for reason, scenes in cannot.items()],
     }

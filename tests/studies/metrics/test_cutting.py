@@ -41,6 +41,14 @@ def test_a_piece_is_judged_once_its_clock_has_run_out_even_if_the_sum_is_right(f
     assert of("piece_sum_worst", **cut_run(volume)) == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_run_that_ended_before_its_cut_has_no_worst_piece():
+    """From there on its record holds no numbers."""
+    nothing = np.where(np.arange(4)[:, None] < 1, TARGET, np.nan)
+    run = cut_run(nothing)
+    run["values"]["volume_target"] = np.full((4, 3), np.nan)
+    assert np.isnan(of("piece_worst", **run))
+
+
 @pytest.mark.parametrize("frame", range(4))
 def test_the_sum_is_judged_in_every_frame(frame):
     volume = TARGET.copy()

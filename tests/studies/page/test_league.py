@@ -80,6 +80,8 @@ def test_cards_say_the_range_and_the_reasons():
     assert a["count"] == "–" and a["cannot"] == [] and a["scenes"] == 2
     assert b["cannot"] == ["liver_press: no <planes>"] and b["solved"] == "0 of 9" and b["scenes"] == 1
     assert mine["ours"] and not a["ours"]
+    free = cards([row("free", "liver_press", 1.0, 0.5, NAN)])[0]
+    assert free["solved"] == "2 of 9" and free["cost"] == "–"
     assert a["missing"] == ["ball_clamped", "liver_probe", "kidney_probe"]
 
 
