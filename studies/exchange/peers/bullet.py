@@ -9,14 +9,13 @@ elements push back there. Damping is its own, on rates of strain; masses are equ
 # pyright: reportAttributeAccessIssue=false
 
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pybullet  # pyright: ignore[reportMissingImports]
 
-from studies.exchange.peers.scene_folder import CannotDo, SceneFolder, gap, hand_in, place, turn_to
+from studies.exchange.peers.scene_folder import CannotDo, SceneFolder, gap, march, place, turn_to
 from studies.exchange.peers.stable_neo_hookean import StableNeoHookean
 from studies.exchange.peers.vtk_text import vtk_text
 
@@ -30,8 +29,6 @@ MARGIN = 1e-4
 """Of collisions [m]: the surface is so far off the obstacles."""
 BOX = 0.5
 """Half the edge of what stands for a plane [m]."""
-FORCES = 20
-"""Forces are means over so many steps before a checkpoint."""
 
 
 class Deformable:
@@ -117,17 +114,4 @@ def run(
     """Runs the scene with steps of `step` × shorter and hands it in."""
     dt = step * shorter
     body = Deformable(scene, dt, lame, damping)
-    positions, forces, spent = [scene.points], [0.0], 0.0
-    begin, steps = 0, np.round(scene.times / dt).astype(int)
-    for end in steps[1:]:
-        sampled: list[float] = []
-        started = time.process_time()
-        for number in range(begin + 1, end + 1):
-            body.step(number * dt)
-            if end - number < FORCES:
-                sampled.append(body.force(number * dt))
-        spent += time.process_time() - started
-        begin = end
-        positions.append(body.positions())
-        forces.append(float(np.mean(sampled)))
-    hand_in(out, scene.times, np.array(positions), np.array(forces), spent / scene.data["duration"], int(steps[-1]))
+    march(scene, out, dt, body.step, body.force, body.positions)

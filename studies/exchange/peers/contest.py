@@ -130,8 +130,8 @@ def judged(attempt: Attempt, given: Path, limit: float, environments: Path) -> R
 
 def entry_of(attempt: Attempt, out: Path, digest: str) -> EntryFile:
     """The attempt as an entry by file, with what its adapter wrote of itself, where it did."""
-    told_by = out.with_suffix(".json")
-    told = json.loads(told_by.read_text(encoding="utf-8")) if told_by.is_file() else {}
+    report = out.with_suffix(".json")
+    reported = json.loads(report.read_text(encoding="utf-8")) if report.is_file() else {}
     peer = attempt.peer
     return EntryFile(
         set=SET,
@@ -142,10 +142,10 @@ def entry_of(attempt: Attempt, out: Path, digest: str) -> EntryFile:
         nodes=attempt.nodes,
         mesh_sha256=digest,
         result=out.name,
-        seconds=told.pop("seconds", None),
-        evaluations=told.pop("evaluations", None),
+        seconds=reported.pop("seconds", None),
+        evaluations=reported.pop("evaluations", None),
         settings=dict(peer.settings),
-        environment=told,
+        environment=reported,
         command=" ".join(["python -m studies.exchange.peers.run", peer.module, "SCENE OUT", *attempt.words]),
         ours=peer.ours,
     )

@@ -9,7 +9,6 @@ body with a half-space. The force is the sum of the contact forces that it repor
 # pyright: reportAttributeAccessIssue=false, reportMissingImports=false
 
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from pydrake.multibody.tree import QuaternionFloatingJoint, SpatialInertia, Unit
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from studies.exchange.peers.scene_folder import SceneFolder, hand_in, place, turn_to
+from studies.exchange.peers.scene_folder import SceneFolder, march, place, turn_to
 from studies.exchange.peers.vtk_text import vtk_text
 
 STEP = 1e-2
@@ -132,17 +131,4 @@ def run(
     """Runs the scene with steps of `step` × shorter and hands it in."""
     dt = step * shorter
     body = Deformable(scene, dt, poisson, law, finest)
-    positions, forces, spent = [scene.points], [0.0], 0.0
-    begin, steps = 0, np.round(scene.times / dt).astype(int)
-    for end in steps[1:]:
-        sampled: list[float] = []
-        started = time.process_time()
-        for number in range(begin + 1, end + 1):
-            body.step(number * dt)
-            if end - number < FORCES:
-                sampled.append(body.force())
-        spent += time.process_time() - started
-        begin = end
-        positions.append(body.positions())
-        forces.append(float(np.mean(sampled)))
-    hand_in(out, scene.times, np.array(positions), np.array(forces), spent / scene.data["duration"])
+    march(scene, out, dt, body.step, lambda t: body.force(), body.positions, None, FORCES)

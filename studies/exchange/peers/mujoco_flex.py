@@ -7,21 +7,18 @@ is that of the scene, on every degree of freedom. Obstacles are bodies that are 
 # Checked alike where the package is not installed.
 # pyright: reportAttributeAccessIssue=false
 
-import time
 from pathlib import Path
 from typing import Any
 
 import mujoco  # pyright: ignore[reportMissingImports]
 import numpy as np
 
-from studies.exchange.peers.scene_folder import SceneFolder, hand_in, place
+from studies.exchange.peers.scene_folder import SceneFolder, march, place
 
 POISSON = 0.49
 """kappa is 50 mu. Nearer to ½ the force of a ball gains some percent, its volume nothing."""
 STEP = 2e-3
 """[s]; implicit in positions (integrator "discrete")."""
-FORCES = 20
-"""Forces are means over so many samples before a checkpoint."""
 
 XML = """<mujoco>
 <option timestep="{dt}" gravity="{gravity}" integrator="discrete" cone="elliptic"/>
@@ -91,23 +88,15 @@ def run(
     dt, asked = step * shorter, scene.probed
     model = model_of(scene, dt, poisson, stiff)
     data = mujoco.MjData(model)
-    positions, forces, spent = [scene.points], [0.0], 0.0
-    sampled: list[float] = []
-    begin, steps = 0, np.round(scene.times / dt).astype(int)
     mujoco.mj_forward(model, data)
-    for end in steps[1:]:
-        started = time.process_time()
-        for number in range(begin + 1, end + 1):
-            for k, obstacle in enumerate(scene.data["obstacles"]):
-                data.mocap_pos[k] = place(obstacle, number * dt)
-            mujoco.mj_step(model, data)
-            if end - number < FORCES:
-                sampled.append(_force(model, data, asked, scene.data["force"]["direction"]))
-        spent += time.process_time() - started
-        begin = end
-        positions.append(data.flexvert_xpos.copy())
-        forces.append(float(np.mean(sampled[-FORCES:])))
-    hand_in(out, scene.times, np.array(positions), np.array(forces), spent / scene.data["duration"], int(steps[-1]))
+
+    def advance(t: float) -> None:
+        for k, obstacle in enumerate(scene.data["obstacles"]):
+            data.mocap_pos[k] = place(obstacle, t)
+        mujoco.mj_step(model, data)
+
+    direction = scene.data["force"]["direction"]
+    march(scene, out, dt, advance, lambda t: _force(model, data, asked, direction), lambda: data.flexvert_xpos.copy())
 
 
 def _force(model: mujoco.MjModel, data: mujoco.MjData, asked: int, direction: list[float]) -> float:

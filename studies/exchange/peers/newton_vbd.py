@@ -82,21 +82,21 @@ def run(
     solver = newton.solvers.SolverVBD(model, iterations=sweeps, particle_enable_tile_solve=False)
     pipeline = newton.CollisionPipeline(model, enable_rigid_soft_full_surface_contact=facets)
     contacts, now, after, control = pipeline.contacts(), model.state(), model.state(), model.control()
-    told = solver.observables({solver.ObservableKind.CONTACT_F}, contacts=contacts)
+    observed = solver.observables({solver.ObservableKind.CONTACT_F}, contacts=contacts)
     kept = 1.0 / (1.0 + dt * scene.data["damping"]["rate"])
     positions, forces, sampled, spent = [scene.points], [0.0], [], 0.0
     steps = np.round(scene.times / dt).astype(int)
-    _step(solver, pipeline, contacts, now, after, control, dt, told)  # compiles; the body is at rest
+    _step(solver, pipeline, contacts, now, after, control, dt, observed)  # compiles; the body is at rest
     for begin, end in pairwise(steps):
         started = time.process_time()
         for step_number in range(begin + 1, end + 1):
             _place(model, shapes, scene, step_number * dt)
             watched = end - step_number < FORCES
-            _step(solver, pipeline, contacts, now, after, control, dt, told if watched else None)
+            _step(solver, pipeline, contacts, now, after, control, dt, observed if watched else None)
             after.particle_qd.numpy()[:] *= kept
             now, after = after, now
             if watched:
-                sampled.append(_force(scene, contacts, told, shapes[asked]))
+                sampled.append(_force(scene, contacts, observed, shapes[asked]))
         spent += time.process_time() - started
         positions.append(now.particle_q.numpy().astype(np.float64))
         forces.append(float(np.mean(sampled[-FORCES:])))
@@ -104,10 +104,12 @@ def run(
     hand_in(out, scene.times, np.array(positions), np.array(forces), spent / scene.data["duration"], cost)
 
 
-def _step(solver: Any, pipeline: Any, contacts: Any, now: Any, after: Any, control: Any, dt: float, told: Any) -> None:
+def _step(
+    solver: Any, pipeline: Any, contacts: Any, now: Any, after: Any, control: Any, dt: float, observed: Any
+) -> None:
     now.clear_forces()
     pipeline.collide(now, contacts)
-    solver.step(now, after, control, contacts, dt, observables=told)
+    solver.step(now, after, control, contacts, dt, observables=observed)
 
 
 def _placed(obstacle: dict[str, Any], t: float) -> Any:
@@ -123,10 +125,10 @@ def _place(model: Any, shapes: list[int], scene: SceneFolder, t: float) -> None:
     model.shape_transform.assign(transforms)
 
 
-def _force(scene: SceneFolder, contacts: Any, told: Any, shape: int) -> float:
+def _force(scene: SceneFolder, contacts: Any, observed: Any, shape: int) -> float:
     """The probed force [N]: the sum of the contact forces between the body and the obstacle that is asked for."""
     count = int(contacts.soft_contact_count.numpy()[0])
     first = contacts.rigid_contact_max
-    wrenches = told.contact_f.numpy()[first : first + count, :3]
+    wrenches = observed.contact_f.numpy()[first : first + count, :3]
     asked = contacts.soft_contact_shape.numpy()[:count] == shape
     return abs(float(wrenches[asked].sum(axis=0) @ np.array(scene.data["force"]["direction"])))

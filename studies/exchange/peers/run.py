@@ -26,8 +26,8 @@ def main(module: str, folder: str, out: str, mesh: str, shorter: str, settings: 
     except CannotDo as reason:
         print(reason, file=sys.stderr)
         return CANNOT
-    told = Path(out).with_suffix(".json")
-    told.write_text(json.dumps(json.loads(told.read_text(encoding="utf-8")) | surroundings()), encoding="utf-8")
+    report = Path(out).with_suffix(".json")
+    report.write_text(json.dumps(json.loads(report.read_text(encoding="utf-8")) | surroundings()), encoding="utf-8")
     return 0
 
 

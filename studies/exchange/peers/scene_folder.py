@@ -4,6 +4,8 @@ It runs where that program is installed, and there numpy and meshio are all that
 """
 
 import json
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +16,8 @@ import numpy as np
 
 from studies.base.errors import StudyError
 
+FORCES = 20
+"""Forces are means over so many steps before a checkpoint."""
 CANNOT, MISSING = 3, 4
 """Exit codes of studies.exchange.peers.run: a program has no means for the scene; its package is not installed."""
 CELLS = {"straight": "tetra", "curved": "tetra10"}
@@ -130,6 +134,37 @@ def turn_to(normal: list[float]) -> np.ndarray:
     # Half-way between both; from one end to the other half a turn about x.
     turn = np.array([-y, x, 0.0, 1.0 + z]) if z > -1.0 + 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
     return turn / np.linalg.norm(turn)
+
+
+def march(
+    scene: SceneFolder,
+    out: Path,
+    dt: float,
+    step: Callable[[float], None],
+    force: Callable[[float], float],
+    positions: Callable[[], np.ndarray],
+    evaluations: int | None = 1,
+    averaged: int = FORCES,
+) -> None:
+    """Steps a program through the scene and hands it in: step(t) advances it by `dt` to time t [s], force(t) is the
+    probed force then [N], of which the mean of the last `averaged` steps before each checkpoint counts.
+
+    evaluations: of all elements' forces in a step, where that is known."""
+    found, forces, spent, begin = [scene.points], [0.0], 0.0, 0
+    steps = np.round(scene.times / dt).astype(int)
+    for end in steps[1:]:
+        sampled: list[float] = []
+        started = time.process_time()
+        for number in range(begin + 1, end + 1):
+            step(number * dt)
+            if end - number < averaged:
+                sampled.append(force(number * dt))
+        spent += time.process_time() - started
+        begin = end
+        found.append(positions())
+        forces.append(float(np.mean(sampled)))
+    count = None if evaluations is None else int(steps[-1]) * evaluations
+    hand_in(out, scene.times, np.array(found), np.array(forces), spent / scene.data["duration"], count)
 
 
 def hand_in(

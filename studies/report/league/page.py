@@ -79,8 +79,8 @@ def profiles(rows: Sequence[Row]) -> Any:
     }
     note = (
         f"{len(asked)} pairs of scene and quantity (force, mean displacement) of {SET}. No tolerance is below the "
-        "uncertainty of the reference. A pair counts from the cheapest mesh that is good enough on; one on which an engine was not run is not solved. "
-        "Times: one core."
+        "uncertainty of the reference. A pair counts from the cheapest mesh that is good enough on; one that an engine "
+        "was not run on is not solved. Times: one core."
     )
     return Profiles(words, tuple(BUDGETS.values()), of, (note,))
 
