@@ -19,7 +19,7 @@ from studies.store.record import read_record
 
 TABLE = "league.csv"
 COLUMNS = ("force_end", "mean_error", "volume_worst", "penetration")
-PROFILED = dict(zip(("force_end", "mean_error"), SOLID, strict=True))
+PROFILED = {"force_end": SOLID[0], "mean_error": SOLID[1]}
 """Quantities of profiles -> what is usually enough [%]; all scenes of the set are of solid organs."""
 COST, COUNT = "cost [s/s]", "evaluations [1/s]"
 """Computing time, and evaluations of all forces, for a simulated second."""
