@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -22,6 +23,21 @@ from studies.store.schema import RunAttributes, RunFields
 
 SAME_PLACE = 1e-5
 """Of the body's size: far above what a published reference rounds, far below an edge."""
+
+
+class BoundaryErrors(NamedTuple):
+    """At n boundary nodes of a reference."""
+
+    places: np.ndarray
+    """At rest, (n, 3) [m]."""
+    wrong: np.ndarray
+    """Displacement of the body minus that of the reference, (n, 3) [m]."""
+    distance: np.ndarray
+    """To the nearest point of the body at rest, (n,) [m]."""
+    areas: np.ndarray
+    """(n,) [m²]."""
+    truth: np.ndarray
+    """Displacement of the reference, (n, 3) [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,32 +155,36 @@ class Run:
         return share[self.cut_pairs[:, 0]]
 
     @cached_property
-    def true_surface_error(self) -> tuple[float, float]:
-        """Mean error of the displacement over the true surface at the last checkpoint, and the largest true
-        displacement there [m]; NaN where `sides` is None.
-
-        Each boundary node of the reference, weighted by its area, is compared with the nearest point of the body at
-        rest and the displacement interpolated there. A distance beyond SHAPE of the size counts as an error.
-        """
+    def boundary_errors(self) -> BoundaryErrors | None:
+        """Of each boundary node of the reference, on the sides that the body has, at the last checkpoint: the nearest
+        point of the body at rest is compared, with the displacement interpolated there. None where `sides` is None."""
         assert self.reference is not None  # Metric checked it
         truth, sides = self.reference.boundary, self.sides or {}
-        far = SHAPE / 100.0 * float(np.linalg.norm(np.ptp(truth.points, axis=0)))
         moved = self.fields.snapshots[-1] - self.fields.rest
-        errors, weights, sizes = [], [], []
         facets = self._outside(truth.points, truth.facets)
         places = self._on_own_side(truth.points, facets)
+        parts = []
         for name, side in rest_surfaces(truth.points, facets).items():
             if name in sides:
                 nodes = np.unique(side.facets)
                 at = sides[name].nearest(places[nodes])
-                wrong = np.linalg.norm(sides[name].interpolated(moved, at) - truth.displacement[nodes], axis=1)
-                errors.append(wrong + np.maximum(0.0, at.distance - far))
-                weights.append(side.areas[nodes])
-                sizes.append(np.linalg.norm(truth.displacement[nodes], axis=1))
-        if not errors:
+                wrong = sides[name].interpolated(moved, at) - truth.displacement[nodes]
+                parts.append((places[nodes], wrong, at.distance, side.areas[nodes], truth.displacement[nodes]))
+        return BoundaryErrors(*map(np.concatenate, zip(*parts, strict=True))) if parts else None
+
+    @cached_property
+    def true_surface_error(self) -> tuple[float, float]:
+        """Mean error of the displacement over the true surface at the last checkpoint, weighted by area, and the
+        largest true displacement there [m]; NaN where `sides` is None. A distance beyond SHAPE of the size counts as an
+        error."""
+        found = self.boundary_errors
+        if found is None:
             return float("nan"), float("nan")
-        mean = np.average(np.concatenate(errors), weights=np.concatenate(weights))
-        return float(mean), float(np.concatenate(sizes).max())
+        assert self.reference is not None  # boundary_errors checked it
+        far = SHAPE / 100.0 * float(np.linalg.norm(np.ptp(self.reference.boundary.points, axis=0)))
+        errors = np.linalg.norm(found.wrong, axis=1) + np.maximum(0.0, found.distance - far)
+        mean = np.average(errors, weights=found.areas)
+        return float(mean), float(np.linalg.norm(found.truth, axis=1).max())
 
     @cached_property
     def material_nodes(self) -> np.ndarray:

@@ -6,10 +6,12 @@ What both meshes share, a half step or other masses do not show; the error of a 
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.metric import PERCENT
 from studies.metrics.metrics import contact_facets
 from studies.metrics.run import Run, by_scene
@@ -64,19 +66,72 @@ def apart(coarse: Run, fine: Run) -> Apart:
 def verdicts(runs: Sequence[Run]) -> list[Verdict]:
     """Of each scene without a reference in which a graded quadratic recipe ran on two meshes or more: of the two
     finest."""
+    pairs = _pairs([run for run in runs if run.reference is None])
+    finest = {(coarse.case.scene.name, _without_nodes(coarse.case.body)): (coarse, fine) for coarse, fine in pairs}
+    return [_verdict(scene, *pair) for (scene, _), pair in finest.items()]
+
+
+class Judgement(NamedTuple):
+    """What the comparison of two meshes said of a scene, and what its reference says."""
+
+    scene: str
+    nodes: tuple[int, int]
+    """Asked for, of both bodies."""
+    apart: Apart
+    trusted: bool
+    within: bool
+    """Whether the errors of the finer body are within the wish."""
+
+
+def judgements(runs: Sequence[Run], share: float = SHARE) -> list[Judgement]:
+    """Of each scene with a reference and of each two neighbouring sizes of a graded quadratic recipe.
+
+    share: of the wished error by which two meshes may differ.
+    """
     found = []
-    for name, group in by_scene(runs).items():
+    for coarse, fine in _pairs([run for run in runs if run.reference is not None]):
+        scene, between = fine.case.scene, apart(coarse, fine)
+        wish = usual_wish(scene)
+        errors = ((FORCE, wish.force), (DISPLACEMENT, wish.displacement))
+        values = [(abs(entry(fine)), bound) for entry, bound in errors if bound is not None]
+        good = all(value <= bound for value, bound in values if value == value)
+        nodes = (coarse.case.body.nodes, fine.case.body.nodes)
+        found.append(Judgement(scene.name, nodes, between, within(between, wish, share), good))
+    return found
+
+
+class Tally(NamedTuple):
+    """Of judgements."""
+
+    beyond: int
+    """Scenes whose error is beyond the wish."""
+    named: int
+    """Of these those that are not trusted."""
+    within: int
+    """Scenes whose error is within the wish."""
+    doubted: int
+    """Of these those that are not trusted."""
+
+
+def tally(found: Sequence[Judgement]) -> Tally:
+    """How many of the bad are named and how many of the good are doubted."""
+    bad, good = [one for one in found if not one.within], [one for one in found if one.within]
+    return Tally(len(bad), sum(not one.trusted for one in bad), len(good), sum(not one.trusted for one in good))
+
+
+def _pairs(runs: Sequence[Run]) -> list[tuple[Run, Run]]:
+    """Runs of neighbouring sizes of a graded quadratic recipe in a scene that both ended well, coarse one first."""
+    pairs = []
+    for group in by_scene(runs).values():
         recipes: dict[BodyRecipe, list[Run]] = {}
         for run in group:
             body = run.case.body
-            judged = run.reference is not None
-            if body.kind == "quadratic" and body.graded and run.record.status == Status.OK and not judged:
+            if body.kind == "quadratic" and body.graded and run.record.status == Status.OK:
                 recipes.setdefault(_without_nodes(body), []).append(run)
-        for pair in recipes.values():
-            pair.sort(key=lambda run: run.case.body.nodes)
-            if len(pair) > 1 and pair[-2].case.body != pair[-1].case.body:
-                found.append(_verdict(name, pair[-2], pair[-1]))
-    return found
+        for sizes in recipes.values():
+            sizes.sort(key=lambda run: run.case.body.nodes)
+            pairs += [pair for pair in pairwise(sizes) if pair[0].case.body != pair[1].case.body]
+    return pairs
 
 
 def _without_nodes(body: BodyRecipe) -> BodyRecipe:
@@ -96,8 +151,8 @@ def _verdict(scene: str, coarse: Run, fine: Run) -> Verdict:
     return Verdict(scene, within(between, wish), f"two meshes ({nodes}) differ by {' and '.join(parts)}{few}")
 
 
-def within(between: Apart, wish: Wish) -> bool:
-    """Whether two meshes agree so well that the error of the finer is likely within the wish."""
+def within(between: Apart, wish: Wish, share: float = SHARE) -> bool:
+    """Whether two meshes agree to `share` of the wished errors: the error of the finer is likely within them."""
     pairs = ((between.force, wish.force), (between.displacement, wish.displacement))
     known = [(value, bound) for value, bound in pairs if value == value and bound is not None]
-    return bool(known) and all(value <= SHARE * bound for value, bound in known)
+    return bool(known) and all(value <= share * bound for value, bound in known)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from studies.metrics.cells import MISSING, UNRESOLVED_MARK, UNRESOLVED_NOTE, value_cell
-from studies.metrics.distribution import groups
-from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, judged, nearest, over_meshes
+from studies.metrics.judged import Judged, Measured, cheapest, judged, nearest, over_meshes
 from studies.metrics.run import Run
 from studies.metrics.table import UNRESOLVED, study_table
 from studies.metrics.wish import Wish, usual_wish
+from studies.report.population import members_of, trust_of, worst_of
 from studies.runs.recipe_text import body_words
 from studies.scene.scene import Scene
 
@@ -158,42 +158,13 @@ def ladder_of(runs: Sequence[Run]) -> str:
     return "\n".join(lines)
 
 
-def population_of(runs: Sequence[Run]) -> str:
-    """Every body on the members of every organ: the median, what 95 of 100 stay below, and the worst."""
-    lines = [
-        "| organ | body, surface nodes | members, failed | force: median [%] | 95 of 100 [%] | worst [%] "
-        "| mean: median [%] | 95 of 100 [%] | largest reference uncertainty, force / mean [%] |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
-    for group in groups(runs):
-        force, mean = group.of(FORCE), group.of(DISPLACEMENT)
-        if not force.count:
-            continue
-        cells = [
-            f"{force.count}, {force.lost}",
-            _with_interval(force.median, force.median_interval, signed=True),
-            _with_interval(force.bound, force.bound_interval),
-            f"{force.worst:+.2g} ({force.worst_member})",
-            _with_interval(mean.median, mean.median_interval),
-            _with_interval(mean.bound, mean.bound_interval),
-            f"{force.floor:.2g} / {mean.floor:.2g}",
-        ]
-        lines.append(f"| {group.organ} | {group.body} | " + " | ".join(cells) + " |")
-    return "\n".join(lines) if len(lines) > 2 else "No results yet: run `make study-population`."
-
-
-def _with_interval(value: float, interval: tuple[float, float], signed: bool = False) -> str:
-    """A number with the two ends of its 95 % interval in brackets."""
-    sign = "+" if signed else ""
-    low, high = (f"{end:{sign}.2g}" for end in interval)
-    return f"{value:{sign}.2g} ({low} to {high})"
-
-
 SUMMARIES = (
     Summary("volume_loss", "summary.md", "docs/findings.md", "results", results_of),
     Summary("accuracy", "accuracy/recommended.md", "docs/findings.md", "recommended", recommended_of),
     Summary("accuracy", "accuracy/ladder.md", "docs/paper.md", "ladder", ladder_of),
-    Summary("population", "population/population.md", "docs/population.md", "population", population_of),
+    Summary("population", "population/population.md", "docs/population.md", "population", members_of),
+    Summary("population", "population/worst.md", "docs/population.md", "worst", worst_of),
+    Summary("population", "population/trust.md", "docs/population.md", "trust", trust_of),
 )
 
 

@@ -1,19 +1,19 @@
-"""A member of a population: an organ of its own, palpated at a place of its own by a probe of its own."""
+"""A member of a population: an organ of its own under a load of its own: palpated, filled, or hanging."""
 
 import zlib
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from massspring import Plane, Sphere, Trajectory
+from massspring import Plane, Ramp, Sphere, Trajectory
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.catalog.population.ranges import RANGES, Ranges
+from studies.catalog.population.ranges import RANGES, Filling, Palpation, Sagging
 from studies.geometry import SHAPES, vary
 from studies.geometry.organs.millimetres import probe_near
 from studies.geometry.shape.levelset import PalpationPoint, Shape, normals
 from studies.scene.placing import Vector, along, press_times, probe_of, scaled
-from studies.scene.scene import Organ, Scene
+from studies.scene.scene import Lumen, Organ, Scene
 
 NAME = "{organ}_{seed}_{number:03d}"
 """Of a member's scene."""
@@ -64,28 +64,65 @@ def member(organ: str, seed: int, number: int) -> Scene:
     parameters = vary(organ, int(rng.integers(2**32)), ranges.spread)
     if ranges.wall is not None:
         parameters["wall"] = 1e3 * float(rng.uniform(*ranges.wall))  # shapes take millimetres
-    modulus, radius, depth = (float(rng.uniform(*ends)) for ends in (ranges.shear_modulus, ranges.radius, ranges.depth))
+    modulus = float(rng.uniform(*ranges.shear_modulus))
     shape = SHAPES[organ](**parameters)
-    name = NAME.format(organ=organ, seed=seed, number=number)
-    point = _palpated(shape, ranges, rng, radius, depth)
-    if point is None:
-        raise StudyError(f"member {name}: no place for a probe of {1e3 * radius:.1f} mm in {TRIES} tries")
-    inward = scaled(point.normal, -1.0)
-    base, end = ranges.scene, PRESSED * ranges.scene.duration
-    path = Trajectory((0.0, end), ((0.0, 0.0, 0.0), scaled(inward, depth + GAP)))
-    probe = Sphere(along(point.point, point.normal, radius + GAP), radius, path)
-    return replace(
+    base = ranges.scene
+    scene = replace(
         base,
-        name=name,
-        title=f"A {organ} of a population, a probe of {1e3 * radius:.1f} mm radius pushed in by {1e3 * depth:.1f} mm",
+        name=NAME.format(organ=organ, seed=seed, number=number),
         organ=Organ(organ, parameters),
         tissue=replace(base.tissue, shear_modulus=modulus, source=ranges.sources[-1]),
         frames=FRAMES,
-        checkpoints=press_times(0.0, end, CHECKPOINTS, base.duration),
-        obstacles=(probe, *(_wall_behind(shape) for obstacle in base.obstacles if isinstance(obstacle, Plane))),
         held=tuple(replace(held, region=shape.regions[held.name]) for held in base.held),
-        probed=replace(base.probed, direction=inward),
         reference=ranges.plan,
+    )
+    match ranges.load:
+        case Palpation() as palpation:
+            return _pressed(scene, shape, palpation, rng)
+        case Filling(share):
+            return _filled(scene, float(rng.uniform(*share)))
+        case Sagging(acceleration):
+            return _hanging(scene, float(rng.uniform(*acceleration)))
+
+
+def _pressed(scene: Scene, shape: Shape, palpation: Palpation, rng: np.random.Generator) -> Scene:
+    """A member with a probe. Raises StudyError where no place is found for it."""
+    radius, depth = (float(rng.uniform(*ends)) for ends in (palpation.radius, palpation.depth))
+    point = _palpated(shape, palpation.shift, rng, radius, depth)
+    if point is None:
+        raise StudyError(f"member {scene.name}: no place for a probe of {1e3 * radius:.1f} mm in {TRIES} tries")
+    inward = scaled(point.normal, -1.0)
+    end = PRESSED * scene.duration
+    path = Trajectory((0.0, end), ((0.0, 0.0, 0.0), scaled(inward, depth + GAP)))
+    probe = Sphere(along(point.point, point.normal, radius + GAP), radius, path)
+    what = f"a probe of {1e3 * radius:.1f} mm radius pushed in by {1e3 * depth:.1f} mm"
+    return replace(
+        scene,
+        title=f"A {scene.organ.shape} of a population, {what}",
+        checkpoints=press_times(0.0, end, CHECKPOINTS, scene.duration),
+        obstacles=(probe, *(_wall_behind(shape) for obstacle in scene.obstacles if isinstance(obstacle, Plane))),
+        probed=replace(scene.probed, direction=inward),
+    )
+
+
+def _filled(scene: Scene, share: float) -> Scene:
+    """A member whose lumen grows to `share` of its volume at rest."""
+    end = PRESSED * scene.duration
+    return replace(
+        scene,
+        title=f"A {scene.organ.shape} of a population, its content grows by {100 * (share - 1):.0f} %",
+        checkpoints=press_times(0.0, end, CHECKPOINTS, scene.duration),
+        lumen=Lumen(filling=Ramp((0.0, end), (1.0, share))),
+    )
+
+
+def _hanging(scene: Scene, acceleration: float) -> Scene:
+    """A member that hangs under `acceleration` [m/s²], in the direction of the gravity of its scene."""
+    pull = scaled(scene.gravity, acceleration / float(np.linalg.norm(scene.gravity)))
+    return replace(
+        scene,
+        title=f"A {scene.organ.shape} of a population, hanging under {acceleration:.1f} m/s²",
+        gravity=pull,
     )
 
 
@@ -96,13 +133,13 @@ def organ_of(name: str) -> str | None:
 
 
 def _palpated(
-    shape: Shape, ranges: Ranges, rng: np.random.Generator, radius: float, depth: float
+    shape: Shape, shift: float, rng: np.random.Generator, radius: float, depth: float
 ) -> PalpationPoint | None:
     """A place within `shift` of the default one that is flat under the probe, freely reachable, and not held."""
     middle = probe_of(shape)
     across = np.linalg.svd(np.asarray(middle.normal)[None])[2][1:]
     for _ in range(TRIES):
-        angle, far = rng.uniform(0.0, 2.0 * np.pi), ranges.shift * np.sqrt(rng.uniform())
+        angle, far = rng.uniform(0.0, 2.0 * np.pi), shift * np.sqrt(rng.uniform())
         beside = np.asarray(middle.point) + far * (np.cos(angle) * across[0] + np.sin(angle) * across[1])
         try:
             point = probe_near(shape, (float(beside[0]), float(beside[1]), float(beside[2])))

@@ -96,7 +96,8 @@ def placed_scene(name: str, source: Source, found: Proposal, tissue: Tissue = LI
 
 
 def study_on(study: Study, folder: Path, unit: str | None = None) -> tuple[Study, list[Placed]]:
-    """What a study asks of solid organs, asked of those in a folder instead; and what became of each file.
+    """What a study asks of solid organs that something presses, asked of those in a folder instead; and what became of
+    each file. A study that presses none asks what it asks of its solid organs.
 
     Raises StudyError for a unit or folder that is none, one whose every file is refused, and a study without a solid
     organ.
@@ -110,7 +111,8 @@ def study_on(study: Study, folder: Path, unit: str | None = None) -> tuple[Study
     scenes = [one.scene for one in placed if one.scene is not None]
     if not scenes:
         raise StudyError(f"no file in {folder} can be used; the first: {placed[0].words[0]}")
-    recipes = {case.replaced(scene=scenes[0], frames=None).key: case for case in solid}
+    pressed = [case for case in solid if case.scene.obstacles] or solid  # as the organs in the folder are
+    recipes = {case.replaced(scene=scenes[0], frames=None).key: case for case in pressed}
     cases = tuple(case.replaced(scene=scene, frames=None) for scene in scenes for case in recipes.values())
     name = readable(f"{study.name}-{folder.resolve().name}")
     return replace(study, name=name, cases=cases, main=False), placed

@@ -1,6 +1,7 @@
 """How accurate is each body on organs nobody has seen: the median, and the worst of twenty?"""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from massspring import ImplicitVolume
 from studies.catalog.accuracy import LONG, SHORT, even, graded
@@ -12,39 +13,55 @@ from studies.scene.scene import Scene
 
 POPULATION = "population"
 """The study that `organbench run population` brings up to date."""
-MEMBERS = (Population("liver", 20), Population("kidney", 20), Population("stomach", 20))
+MEMBERS = (
+    Population("liver", 14),
+    Population("kidney", 10),
+    Population("stomach", 8),
+    Population("spleen", 6),
+    Population("bladder", 6),
+)
 NODES = 550
 """Surface nodes of the linear bodies, of a hollow organ as many again on its lumen."""
+
+FINER = 1594
+"""Nodes of the finest graded body; the accuracy study ends at three quarters of it."""
 
 
 def recipes_for(scene: Scene) -> tuple[tuple[BodyRecipe, float], ...]:
     """The bodies that every member gets, and their step over the limit: the paper's; one volume; one volume per node;
-    the fastest even quadratic body, and the graded ones of the accuracy study."""
+    the fastest even quadratic body; the graded ones of the accuracy study, and a finer one, which shows what a larger
+    budget of computing time is worth."""
     axis = "centre_line" if has_wall(scene) else "straight"
+    budgets = (*graded(scene), *(replace(body, nodes=FINER) for body in graded(scene)[-1:]))
     return (
         (BodyRecipe("surface", NODES, axis=axis), SHORT),
         (BodyRecipe(nodes=NODES), SHORT),
         (BodyRecipe(nodes=NODES, law="cotangent", volumes="nodal"), SHORT),
-        *((body, LONG) for body in (even(scene)[0], *graded(scene))),
+        *((body, LONG) for body in (even(scene)[0], *budgets)),
     )
 
 
 def population_study(populations: Sequence[Population] = MEMBERS, name: str = POPULATION) -> Study:
     """Every recipe on every member; members of different organs take turns, so that a study cut short knows them all.
+    The first member of each organ is timed.
 
     Raises StudyError for a member that cannot be drawn.
     """
     drawn = [population.scenes() for population in populations]
+    first = [scenes[0] for scenes in drawn]
     turns = [scenes[at] for at in range(max(map(len, drawn), default=0)) for scenes in drawn if at < len(scenes)]
     return Study(
         name=name,
         question=__doc__ or "",
         cases=tuple(
-            Case(scene, body, ImplicitVolume(), dt_fraction=fraction)
+            Case(scene, body, ImplicitVolume(), dt_fraction=fraction, timed=scene in first)
             for scene in turns
             for body, fraction in recipes_for(scene)
         ),
-        charts=(Chart("distributions.png", "studies.plots.campaigns.population:draw"),),
+        charts=(
+            Chart("distributions.png", "studies.plots.campaigns.population:draw"),
+            Chart("front.png", "studies.plots.campaigns.population:draw_front"),
+        ),
         counts_losses=True,
         columns=(
             "force_end",

@@ -1,4 +1,5 @@
-"""Errors over a population: the share of members that are at most so far off, a line for each body."""
+"""Errors over a population: the share of members that are at most so far off, a line for each body; and what the error
+of 95 of 100 members costs in computing time."""
 
 from collections.abc import Sequence
 
@@ -12,10 +13,12 @@ from studies.metrics.distribution import BOUND, ENOUGH, Group, groups
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run
 from studies.metrics.table import metric
+from studies.metrics.wish import usual_wish
 from studies.plots.style.families import family_of
 from studies.plots.style.page import band_handle, blank, finish, log_axis, page, panels
-from studies.plots.style.style import GREY, SMALL, drawing, remark, styled
+from studies.plots.style.style import GREEN, GREY, SMALL, drawing, remark, styled
 
+FRONT = "What the error of 95 of 100 random organs costs in computing time"
 TITLE = "Randomly generated organs: share of a population within an error"
 SHOWN = {"force_end": "error of the force [%]", "mean_error": "mean error / largest u [%]"}
 LOWEST = 0.02
@@ -27,7 +30,7 @@ STYLES = ("-", (0, (4, 1.6)), (0, (1, 1.2)))
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
     """A column for each organ, a row for each metric."""
-    found = [group for group in groups(runs) if _errors(group, metric("force_end"))]
+    found = _judged(runs)
     organs = list(dict.fromkeys(group.organ for group in found))
     if not organs:
         return blank(TITLE, "no member has been judged yet")
@@ -47,6 +50,10 @@ def figure(runs: Sequence[Run]) -> Figure:
         panel.set_ylabel("share of the members")
     legend = [*handles.values(), band_handle("uncertainty of the references, smallest to largest")]
     return finish(sheet, TITLE, legend, _notes(found), columns=3)
+
+
+def _judged(runs: Sequence[Run]) -> list[Group]:
+    return [group for group in groups(runs) if _errors(group, metric("mean_error"))]
 
 
 def _errors(group: Group, entry: Metric) -> list[float]:
@@ -83,7 +90,7 @@ def _draw(panel: Axes, mine: Sequence[Group], entry: Metric) -> dict[str, Line2D
 def _notes(found: Sequence[Group]) -> list[str]:
     notes = []
     for organ in dict.fromkeys(group.organ for group in found):
-        mine = [group.of(metric("force_end")) for group in found if group.organ == organ]
+        mine = [group.of(metric("mean_error")) for group in found if group.organ == organ]
         count, lost = max(d.count for d in mine), max(d.lost for d in mine)
         words = f"{heading(organ)}: {count} members judged"
         words += f", up to {lost} failed runs per body (its line ends below 1)" if lost else ""
@@ -95,4 +102,67 @@ def _notes(found: Sequence[Group]) -> list[str]:
     return notes
 
 
+@styled
+def front(runs: Sequence[Run]) -> Figure:
+    """Error of 95 of 100 members against computing time; a column for each organ, a row for each metric."""
+    costs = {group: cost for group in _judged(runs) if (cost := _cost(group)) == cost}
+    found = list(costs)
+    organs = list(dict.fromkeys(group.organ for group in found))
+    if not organs:
+        return blank(FRONT, "no frame times from this machine and this code yet")
+    sheet = page(3.4 * len(organs) + 0.8, 6.4)
+    axes = panels(sheet, len(SHOWN), len(organs), sharey="row", sharex=True)
+    handles: dict[str, Line2D] = {}
+    for column, organ in zip(axes.T, organs, strict=True):
+        mine = [group for group in found if group.organ == organ]
+        column[0].set_title(f"{heading(organ)} ({max(len(group.runs) for group in mine)})")
+        for panel, name in zip(column, SHOWN, strict=True):
+            handles |= _draw_front(panel, [(costs[group], group) for group in mine], metric(name))
+    for panel, label in zip(axes[:, 0], SHOWN.values(), strict=True):
+        panel.set_ylabel(f"95 of 100 members:\n{label}")
+        log_axis(panel.yaxis)
+    for row, name in zip(axes, SHOWN, strict=True):
+        bounds = [bound for group in found if (bound := group.of(metric(name)).bound) == bound]
+        row[0].set_ylim(min(bounds) / 3.0, 3.0 * max(bounds))
+    for panel in axes[-1]:
+        panel.set_xlabel("computing time / simulated time [s/s]")
+    axes[-1, 0].set_xlim(min(costs.values()) / 2.0, 2.0 * max(1.0, *costs.values()))
+    log_axis(axes[-1, 0].xaxis)
+    notes = [
+        "Bars: 95 % confidence from resampling the members. Numbers: surface nodes. Green: within the target in real "
+        "time. Computing time is that of the first member of each organ."
+    ]
+    return finish(sheet, FRONT, list(handles.values()), notes, columns=3)
+
+
+def _cost(group: Group) -> float:
+    """Median computing time over simulated time of the members that were timed; NaN where none was."""
+    speeds = [speed for run in group.runs if (speed := metric("real_time")(run)) == speed]
+    return 1.0 / float(np.median(speeds)) if speeds else float("nan")
+
+
+def _draw_front(panel: Axes, bodies: Sequence[tuple[float, Group]], entry: Metric) -> dict[str, Line2D]:
+    """The points of one panel; a handle for each kind of body."""
+    wish = usual_wish(bodies[0][1].runs[0].case.scene)
+    bound = wish.force if entry.name == "force_end" else wish.displacement
+    panel.axvline(1.0, color=GREY, linewidth=1.2)
+    handles = {}
+    for cost, group in bodies:
+        error, look = group.of(entry), family_of(group.runs[0].case)
+        if not error.count:
+            continue
+        low, high = (abs(end - error.bound) for end in error.bound_interval)
+        bar = [[low], [high]] if low == low else None
+        panel.errorbar(cost, error.bound, yerr=bar, marker=look.marker, color=look.colour, capsize=2, linestyle="none")
+        nodes = str(group.runs[0].case.body.nodes)
+        panel.annotate(nodes, (cost, error.bound), (4, 4), textcoords="offset points", size=SMALL, color=GREY)
+        handles[look.name] = Line2D([], [], marker=look.marker, color=look.colour, linestyle="none", label=look.name)
+    if not handles:
+        remark(panel, "the scenes compare no force")
+    elif bound is not None:
+        panel.fill_between([1e-9, 1.0], 1e-12, bound, color=GREEN, alpha=0.12, linewidth=0)
+    return handles
+
+
 draw = drawing(figure)
+draw_front = drawing(front)

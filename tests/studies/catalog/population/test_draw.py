@@ -10,6 +10,7 @@ from reference_fem import facet_nodes, nodes
 from reference_fem.system.checks import START_DEPTH, boundary_size
 from studies.base.errors import StudyError
 from studies.catalog.population import RANGES, Population, member, population_study
+from studies.catalog.population.ranges import Filling, Palpation, Sagging
 from studies.geometry import organ
 from studies.geometry.shape.levelset import project
 from studies.meshing.nested_mesh import base_mesh
@@ -28,17 +29,22 @@ def test_a_larger_population_begins_with_the_smaller_one(name):
 @pytest.mark.parametrize("name", RANGES)
 def test_what_is_drawn_lies_within_its_range_and_uses_it(name):
     ranges, scenes = RANGES[name], Population(name, 25).scenes()
-    radii = np.array([scene.obstacles[0].radius for scene in scenes])
-    depths = np.array([_depth(scene) for scene in scenes])
-    moduli = np.array([scene.tissue.shear_modulus for scene in scenes])
-    for drawn, (low, high) in ((radii, ranges.radius), (depths, ranges.depth), (moduli, ranges.shear_modulus)):
-        assert low - 1e-9 <= drawn.min() and drawn.max() <= high + 1e-9
-        assert np.ptp(drawn) >= 0.7 * (high - low)
+    drawn = [([scene.tissue.shear_modulus for scene in scenes], ranges.shear_modulus)]
+    match ranges.load:
+        case Palpation(radius, depth, shift):
+            drawn += [([scene.obstacles[0].radius for scene in scenes], radius), (list(map(_depth, scenes)), depth)]
+            places = np.array([scene.obstacles[0].centre for scene in scenes])
+            assert np.linalg.norm(places.std(axis=0)) > 0.3 * shift
+        case Filling(share):
+            drawn.append(([scene.lumen.filling.values[-1] for scene in scenes], share))
+        case Sagging(acceleration):
+            drawn.append(([-scene.gravity[2] for scene in scenes], acceleration))
+    for values, (low, high) in drawn:
+        assert low - 1e-9 <= min(values) and max(values) <= high + 1e-9
+        assert np.ptp(values) >= 0.7 * (high - low)
     if ranges.wall is not None:
         walls = np.array([scene.organ.parameters["wall"] for scene in scenes])
         assert 1e3 * ranges.wall[0] <= walls.min() and walls.max() <= 1e3 * ranges.wall[1]
-    places = np.array([scene.obstacles[0].centre for scene in scenes])
-    assert np.linalg.norm(places.std(axis=0)) > 0.3 * ranges.shift
 
 
 def _depth(scene):
@@ -82,6 +88,11 @@ def test_the_wall_behind_a_stomach_is_clear_of_it_and_near():
 def test_a_member_survives_being_stored(name):
     scene = member(name, 0, 5)
     assert scene_from_dict(json.loads(scene_to_json(scene))) == scene
+
+
+@pytest.mark.parametrize("name", [name for name, ranges in RANGES.items() if isinstance(ranges.load, Palpation)])
+def test_a_probe_is_pushed_along_a_unit_vector(name):
+    scene = member(name, 0, 5)
     shown = [scene.obstacles[0].centre, scene.probed.direction]
     assert np.abs(np.linalg.norm(scene.probed.direction) - 1) < 1e-8
     assert all(abs(value) < 1 for row in shown for value in row)
@@ -90,7 +101,8 @@ def test_a_member_survives_being_stored(name):
 def test_organs_take_turns_so_that_a_study_cut_short_knows_them_all():
     study = population_study((Population("liver", 3), Population("kidney", 1)), "turns")
     assert [scene.name for scene in study.scenes] == ["liver_0_000", "kidney_0_000", "liver_0_001", "liver_0_002"]
-    assert len(study.cases) == 4 * 6 and len({case.name for case in study.cases}) == 24
+    assert len(study.cases) == 4 * 7 and len({case.name for case in study.cases}) == 28
+    assert {case.scene.name for case in study.cases if case.timed} == {"liver_0_000", "kidney_0_000"}
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ def test_it_has_a_name_that_every_command_understands(folder):
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         study = find_study(f"population@{folder}:mm")
-    assert {case.scene.name for case in study.cases} == {"whole"} and len(study.cases) == 6
+    assert {case.scene.name for case in study.cases} == {"whole"} and len(study.cases) == 7
     assert sum("is refused" in str(warning.message) for warning in told) == 2
 
 

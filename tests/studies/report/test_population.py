@@ -1,0 +1,100 @@
+"""Tables of a population: what is rigid in an error, the worst members, and how often two meshes name a bad one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from studies.metrics.trust import judgements, tally
+from studies.report.population import members_of, rigid_share, trust_of, worst_of
+from studies.runs.case import BodyRecipe, Case
+from studies.store.record import Status
+from tests.studies.made_up_run import POINTS, SCENE, bend, run
+
+FINE = BodyRecipe("quadratic", 1194, graded="adaptive")
+COARSE = replace(FINE, nodes=994)
+
+
+@pytest.fixture(autouse=True)
+def flat_facets(monkeypatch):
+    monkeypatch.setattr("studies.metrics.run.six_node_facets", lambda triangles: triangles)
+
+
+def member(number, body, motion, force=2.0, status=Status.OK):
+    """A member of a population; the force of its reference is 2 N."""
+    values = {"snapshots": np.stack([POINTS, POINTS + motion(POINTS)])}
+    made = run(force=force * np.array([0.25, 0.5, 0.75, 1.0]), values=values, status=status)
+    return replace(made, case=Case(replace(SCENE, name=f"liver_0_{number:03d}"), body))
+
+
+def shifted(x):
+    return bend(x) + np.array([0.0, 6e-3, 0.0])
+
+
+def turned(x):
+    return bend(x) + np.cross([0.0, 1e-3, 2e-3], x - x.mean(axis=0))
+
+
+def squeezed(x):
+    return bend(x) + 2e-3 * (x - x.mean(axis=0)) * [1.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("motion", "share"), [(shifted, 100.0), (turned, 100.0), (squeezed, 0.0)])
+def test_a_rigid_motion_explains_itself_and_nothing_of_a_strain(motion, share):
+    assert rigid_share(member(0, FINE, motion)) == pytest.approx(share, abs=0.2)  # triangles lean one way
+
+
+def test_half_of_a_mixed_error_is_rigid():
+    """A shift and a strain that are orthogonal and of equal square mean."""
+    alone = member(0, FINE, squeezed).boundary_errors
+    size = np.sqrt(np.average((alone.wrong**2).sum(axis=1), weights=alone.areas))
+    both = member(0, FINE, lambda x: squeezed(x) + np.array([0.0, 0.0, size]))
+    assert rigid_share(both) == pytest.approx(50.0, abs=0.2)
+
+
+def bad_and_good():
+    """Members 0 and 1: both meshes right; 2: far apart and wrong; 3: alike and wrong; 4: apart, the finer right."""
+    pairs = [(2.0, 2.0), (2.0, 2.0), (2.6, 2.3), (2.3, 2.3), (2.3, 2.0)]
+    return [
+        member(number, body, bend, force)
+        for number, forces in enumerate(pairs)
+        for body, force in zip((COARSE, FINE), forces, strict=True)
+    ]
+
+
+def test_judgements_are_held_against_the_reference():
+    found = judgements(bad_and_good())
+    assert [one.within for one in found] == [True, True, False, False, True]
+    assert [one.trusted for one in found] == [True, True, False, True, False]
+    assert tally(found) == (2, 1, 3, 1)
+
+
+def test_a_wider_share_trusts_more():
+    found = judgements(bad_and_good(), share=100.0)
+    assert all(one.trusted for one in found) and tally(found) == (2, 0, 3, 0)
+
+
+def test_even_members_set_the_threshold_and_odd_ones_judge_it():
+    rows = trust_of(bad_and_good()).splitlines()[2:]
+    assert rows == [
+        "| 994 and 1,194 nodes, members that judge it | 2 | 1 | 0 | 1 | 0 |",
+        "| 994 and 1,194 nodes, members that set the threshold | 3 | 1 | 1 | 2 | 1 |",
+    ]
+    assert "No results" in trust_of([])
+
+
+def test_the_worst_come_first_and_the_lost_are_named():
+    runs = [member(0, FINE, bend), member(1, FINE, shifted), member(2, FINE, bend, status=Status.INVERTED)]
+    rows = worst_of(runs).splitlines()[2:]
+    assert [row.split(" | ")[0] for row in rows] == ["| liver_0_001", "| liver_0_000", "| liver_0_002"]
+    assert "| inverted |" in rows[2]
+
+
+def test_an_organ_without_a_force_has_dashes():
+    runs = [member(number, FINE, shifted) for number in range(2)]
+    still = [
+        replace(one, case=replace(one.case, scene=replace(one.case.scene, quantities=("surface", "volume"))))
+        for one in runs
+    ]
+    (row,) = members_of(still).splitlines()[2:]
+    assert "| 2, 0 | – | – | – | 20 (" in row
