@@ -196,8 +196,9 @@ def _masses(
     together = np.bincount(was[surface], outer[surface], minlength=body.node_count)
     split[surface] *= outer[surface] / together[was[surface]]
     mass, of = split.copy(), piece[:count]
-    whole, mine = np.bincount(of, split[:count]), np.bincount(of, inner) / np.bincount(of, inner + outer)
-    mass[:count] = (1.0 - mine)[of] * split[:count] + (mine * whole / np.bincount(of, inner))[of] * inner
+    around = np.bincount(of, inner + outer)
+    mine, per_area = np.bincount(of, inner) / around, np.bincount(of, split[:count]) / around
+    mass[:count] = (1.0 - mine)[of] * split[:count] + per_area[of] * inner
     for k in np.unique(piece[~old & (np.arange(len(was)) >= count)]):
         nodes = np.flatnonzero(of == k)
         mass += np.bincount(to[nodes], AXIS_MASS_SHARE * mass[nodes], minlength=len(mass))

@@ -21,7 +21,7 @@ from massspring import (
     tetrahedral_body,
 )
 from massspring.body.bisection import affine, cut_surface, harmonic
-from massspring.body.opening import opened
+from massspring.body.opening import Opening, opened
 from massspring.body.springs import SpringKind
 from massspring.kernels.forces.springs import spring_forces_into
 from massspring.kernels.forces.volume import enclosed_volume
@@ -37,6 +37,23 @@ ACROSS, ALONG = ((6, 3, 3), 3), ((3, 3, 6), 1)
 next to it, so that one piece has no node on it."""
 
 
+def surface_of(points: np.ndarray, tetrahedra: np.ndarray) -> Body:
+    """The paper's body on the boundary of tetrahedra."""
+    outer, triangles = np.unique(boundary(tetrahedra), return_inverse=True)
+    return surface_body(points[outer], triangles.reshape(-1, 3), SOFT)
+
+
+def surfaces_after(points: np.ndarray, tetrahedra: np.ndarray, opening: Opening) -> tuple[np.ndarray, ...]:
+    """Nodes, triangles and parents of the boundary after an opening, as `cut_surface` takes them, and what the nodes
+    are called in the opened mesh."""
+    outer = np.unique(boundary(tetrahedra))
+    number = np.full(len(points), -1)
+    number[np.concatenate([outer, np.setdiff1d(np.arange(len(points)), outer)])] = np.arange(len(points))
+    used, after = np.unique(boundary(opening.cells.astype(np.int64)), return_inverse=True)
+    parent = opening.parent[used]
+    return points[parent], after.reshape(-1, 3), number[parent], used
+
+
 class Cut:
     """A block's surface that is held at one end along x, pulled at the other and cut in two on the way."""
 
@@ -47,13 +64,8 @@ class Cut:
         self.level = 0.02 * layer
         points[on, 0] = self.level
         opening = opened(tetrahedra, layer_faces(tetrahedra, cells, layer), len(points))
-        outer, triangles = np.unique(boundary(tetrahedra), return_inverse=True)
-        number = np.full(len(points), -1)
-        number[np.concatenate([outer, np.setdiff1d(np.arange(len(points)), outer)])] = np.arange(len(points))
-        self.before = surface_body(points[outer], triangles.reshape(-1, 3), SOFT)
-        used, after = np.unique(boundary(opening.cells.astype(np.int64)), return_inverse=True)
-        self.parent, self.points = number[opening.parent[used]], points[opening.parent[used]]
-        self.triangles = after.reshape(-1, 3)
+        self.before = surface_of(points, tetrahedra)
+        self.points, self.triangles, self.parent, used = surfaces_after(points, tetrahedra, opening)
         self.pieces = cut_surface(self.before, self.points, self.triangles, self.parent)
         self.pairs = np.searchsorted(used, opening.pairs[np.isin(opening.pairs, used).all(axis=1)])
         self.after, self.growth, self.free, self.end = self.pieces.body, self.pieces.growth, free, 0.02 * cells[0]
@@ -278,6 +290,41 @@ def test_numbers_over_two_events_are_carried_through_both():
     grown = replace(grown, carry=csr_array(weights))
     np.testing.assert_allclose(grown.after(first).carried(x), weights @ x[first.nodes], rtol=1e-15)
     np.testing.assert_allclose(first.after(first).nodes, first.nodes[first.nodes])
+
+
+def test_a_piece_is_cut_again():
+    """Two parallel cuts, one after the other: three bodies, and what is new at the second is carried through both."""
+    cells, held = (6, 3, 3), Cut.held
+    points, _, tetrahedra = block(cells)
+    layer = np.unravel_index(np.arange(len(points)), np.add(cells, 1))[0]
+    for at in (2, 4):
+        points[layer == at, 0] = 0.02 * at
+    one = opened(tetrahedra, layer_faces(tetrahedra, cells, 2), len(points))
+    two = opened(one.cells, layer_faces(tetrahedra, cells, 4), len(one.parent))
+    body = surface_of(points, tetrahedra)
+    first = cut_surface(body, *surfaces_after(points, tetrahedra, one)[:3])
+    later = surfaces_after(points[one.parent], one.cells.astype(np.int64), two)
+    second = cut_surface(first.body, *later[:3])
+    of = [first.growth.piece[second.parent[second.growth.piece == k][0]] for k in range(3)]
+    assert sorted(of) in ([0, 0, 1], [0, 1, 1])
+    limit = step_limit(second.body)
+    cut = Cut()
+    events = tuple(
+        Event(pieces.body, pieces.parent, np.array(volumes), at, held(cut, pieces.body), growth=pieces.growth)
+        for pieces, volumes, at in ((first, [0, 0], 4), (second, of, 8))
+    )
+    clock = make_clock(0.24, 12, 0.5 * limit.damped, limit)
+    setup = Setup(body, ImplicitVolume(), clock, attachments=held(cut, body), damping=5.0, events=events)
+    history = simulate(setup, snapshots=(3, 7, 12))
+    assert history.outcome == "finished"
+    np.testing.assert_allclose(history.volume.sum(axis=1), body.volume, rtol=1e-3)
+    assert second.body.rest_volumes.sum() == pytest.approx(body.volume, rel=1e-13, abs=0)
+    pairs = np.searchsorted(later[3], two.pairs)
+    gaps = np.linalg.norm(np.subtract(*history.snapshots[:, pairs.T].transpose(1, 0, 2, 3)), axis=2)
+    assert gaps[:2].max() == 0.0 and gaps[2].min() > 1e-5
+    known = history.snapshots[0][np.isin(second.body.rest[:, 0], 0.08) & (second.growth.mass > 0)]
+    born = history.snapshots[0][np.intersect1d(pairs, np.flatnonzero(second.growth.mass == 0))]
+    assert (born > known.min(axis=0)).all() and (born < known.max(axis=0)).all()
 
 
 def test_what_cannot_be_cut_so_is_refused():
