@@ -1,10 +1,11 @@
 """Changes of a body during a run, as by a cut: what follows when, and what must stay the same."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
+from massspring.body.bisection import Growth
 from massspring.body.body import Body
 from massspring.body.springs import Springs
 from massspring.errors import MassSpringError
@@ -31,6 +32,12 @@ class Event:
     """As many as before, in the same order, by the nodes of the new body."""
     pairs: np.ndarray | None = None
     """Nodes behind a cut and their copies in front of it, (p, 2), if its faces touch from then on (`Setup.pairs`)."""
+    growth: Growth | None = None
+    """What it has beyond copies of nodes and springs; None: nothing."""
+
+    def carried(self, values: np.ndarray) -> np.ndarray:
+        """Places or velocities (n', 3) of its nodes by those of the nodes before, (n, 3)."""
+        return values[self.parent] if self.growth is None else self.growth.carry @ values
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +55,46 @@ class Easing:
         """How far off each volume should still be at times `t` (q,) [s], (q, m) [m³]."""
         share = np.clip(1.0 - (t - self.at) / self.time, 0.0, 1.0) if self.time > 0 else np.zeros(len(t))
         return share[:, None] * self.off
+
+
+@dataclass(frozen=True, eq=False)
+class LettingIn:
+    """New springs, which begin without force: their rest lengths are led to those at rest as a wave of shear passes
+    the body."""
+
+    springs: np.ndarray
+    """Their numbers, (q,)."""
+    begin: np.ndarray
+    """Their lengths at the event [m], (q,)."""
+    at: float
+    """Time of the event [s]."""
+    time: float
+    """Until they have their rest lengths [s]."""
+
+    def done(self, t: float) -> bool:
+        """Whether they have them at time t [s]."""
+        return t - self.at >= self.time
+
+    def lengths(self, rest_length: np.ndarray, t: float) -> np.ndarray:
+        """The rest lengths of all springs at time t [s], in the end `rest_length` (s,) [m]."""
+        found, share = rest_length.copy(), 1.0 if self.done(t) else (t - self.at) / self.time
+        found[self.springs] = self.begin + share * (rest_length[self.springs] - self.begin)
+        return found
+
+
+def kept_momentum(v: np.ndarray, x: np.ndarray, mass: np.ndarray, growth: Growth) -> np.ndarray:
+    """Velocities (n', 3) [m/s] at places `x` (n', 3) [m] with a rigid motion of each piece by which its momentum and
+    angular momentum with `mass` (n',) [kg] are those that it had with the mass before."""
+    kept = v.copy()
+    for k in np.unique(growth.piece):
+        of = np.flatnonzero(growth.piece == k)
+        m, before, u = mass[of, None], growth.mass[of, None], v[of]
+        r = x[of] - (m * x[of]).sum(axis=0) / m.sum()
+        u = u + (before * v[of] - m * u).sum(axis=0) / m.sum()
+        turn = (before * np.cross(r, v[of]) - m * np.cross(r, u)).sum(axis=0)
+        inertia = (m * r**2).sum() * np.eye(3) - (m * r).T @ r
+        kept[of] = u + np.cross(np.linalg.solve(inertia, turn), r)
+    return kept
 
 
 def check_events(
@@ -81,17 +128,40 @@ def check_event(event: Event, before: Body) -> None:
             raise MassSpringError(
                 f"the {count} {what} after an event do not name all {known} before it; give each its parent"
             )
-    if not np.array_equal(event.body.rest, before.rest[parent]):
+    grown = event.growth
+    old = np.ones(len(parent), dtype=bool) if grown is None else grown.mass > 0.0
+    if not np.array_equal(event.body.rest[old], before.rest[parent[old]]):
         raise MassSpringError("a node lies elsewhere at rest after an event; a change of the body moves no node")
-    mass = np.bincount(parent, weights=event.body.mass, minlength=before.node_count)
+    kept = event.body.mass if grown is None else grown.mass
+    mass = np.bincount(parent, weights=kept, minlength=before.node_count)
     if np.abs(mass - before.mass).max() > SAME * before.mass.max():
         raise MassSpringError("the masses of a node's copies do not add up to its mass; make both of the same cells")
+    if grown is not None:
+        return _check_growth(event, grown, before)
     was, now = _network(before.springs, before.node_count), _network(event.body.springs, before.node_count, parent)
     if abs(was - now).max() > SAME * abs(was).max():
         raise MassSpringError(
             f"springs of law '{before.law}' do not add up to those before an event, for they are no sums over cells; "
             "take law van_gelder or cotangent, or a quadratic body"
         )
+
+
+def _check_growth(event: Event, growth: Growth, before: Body) -> None:
+    """Raises MassSpringError for new nodes out of place, a piece that gains or loses mass, and springs that are not new
+    and stiffer than before."""
+    body = event.body
+    if np.abs(event.carried(before.rest) - body.rest).max() > SAME * before.size:
+        raise MassSpringError("a new node is not carried to its place at rest; give it weights that meet it")
+    was, now = (np.bincount(growth.piece, mass) for mass in (growth.mass, body.mass))
+    if np.abs(was - now).max() > SAME * was.max():
+        raise MassSpringError("a piece gains or loses mass at an event; new nodes take theirs from their piece")
+    kept = np.ones(body.springs.count, dtype=bool)
+    kept[growth.springs] = False
+    springs = body.springs
+    springs = replace(springs, ends=springs.ends[kept], stiffness=springs.stiffness[kept])
+    was, now = _network(before.springs, before.node_count), _network(springs, before.node_count, event.parent)
+    if csr_array(now - was).max() > SAME * before.springs.stiffness.max():
+        raise MassSpringError("springs that are not new are stiffer after an event; share what they had among copies")
 
 
 def _network(springs: Springs, n: int, parent: np.ndarray | None = None) -> csr_array:

@@ -4,6 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from massspring.body.body import Body
 from massspring.errors import MassSpringError
@@ -91,6 +92,23 @@ class Numbers:
     """The node that each node is still a part of, (n,)."""
     volumes: np.ndarray
     """The same of the kept volumes, (m,)."""
+    carry: csr_array | None = None
+    """Where nodes are by those of the moment, (n, k), where some are not there yet; None: at `nodes`."""
+
+    @property
+    def matrix(self) -> csr_array:
+        """`carry`, or what stands for it, (n, k)."""
+        rows = np.arange(len(self.nodes))
+        return csr_array((np.ones(len(rows)), (rows, self.nodes))) if self.carry is None else self.carry
+
+    def carried(self, values: np.ndarray) -> np.ndarray:
+        """Places or velocities (n, 3) by those of the moment, (k, 3)."""
+        return values[self.nodes] if self.carry is None else self.carry @ values
+
+    def after(self, before: "Numbers") -> "Numbers":
+        """These where the body of the moment is not yet the one before the last, of which `before` says the same."""
+        carry = None if before.carry is None and self.carry is None else self.matrix @ before.matrix
+        return Numbers(before.nodes[self.nodes], before.volumes[self.volumes], carry)
 
     def parts(self, volumes: np.ndarray, whole: np.ndarray) -> np.ndarray:
         """What each of the `volumes` (m,) has of the values `whole` of those that they are still a part of, (m,)."""
@@ -175,7 +193,7 @@ class Recorder:
     def record(self, frame: int, state: State, elapsed_ns: int, numbers: Numbers | None = None) -> None:
         """Reads the state after frame number `frame` (0, 1, …), which has other `numbers` until the last event."""
         x = state.x.astype(np.float64, copy=False)
-        x = x if numbers is None else x[numbers.nodes]
+        x = x if numbers is None else numbers.carried(x)
         self.volume[frame] = self.volumes.measure(x)
         self.pressure[frame] = state.lam if numbers is None else state.lam[numbers.volumes]
         if "kinetic" in self.extra:

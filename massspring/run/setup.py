@@ -105,7 +105,7 @@ class Setup:
         setups, body, x = [], self.body, self.positions
         for event in self.events:
             check_event(event, body)
-            x, body = None if x is None else x[event.parent], event.body
+            x, body = None if x is None else event.carried(x), event.body
             setups.append(
                 replace(
                     self,

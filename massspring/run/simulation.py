@@ -53,6 +53,7 @@ def simulate(
             now = later.pop(0).entered(state)
             state = now.start
             recorder.passages.append(passage(before, was, state, now.setup.body, perf_counter_ns() - begin))
+        state = now.let_in(state, frame)
         boundary = now.boundary(frame)
         reason = check_loads(boundary)
         if reason is not None:

@@ -4,9 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from massspring.body.bisection import Growth
+from massspring.body.body import Body
+from massspring.body.springs import lengths
 from massspring.kernels.arrays.layout import BoundaryConditions
+from massspring.layout.sell_chunks import aligned, slices_of
 from massspring.layout.state import State
-from massspring.run.events import Easing
+from massspring.run.events import Easing, LettingIn, kept_momentum
 from massspring.run.history import Numbers
 from massspring.run.setup import Setup
 from massspring.world.targets import fastest_filling
@@ -28,6 +32,11 @@ class Stage:
     easing: Easing | None = None
     filling: float = 0.0
     """Share of its volume by which a body can be led in a second; of a stage that follows an event."""
+    growth: Growth | None = None
+    """What its body has that no copy is."""
+    lanes: np.ndarray | None = None
+    """Of a body with new springs: the number of the one in each lane of its slices, −1 for none."""
+    letting_in: LettingIn | None = None
 
     def boundary(self, frame: int) -> BoundaryConditions:
         """The outside world during frame number `frame` of the run."""
@@ -40,26 +49,55 @@ class Stage:
     def entered(self, state: State) -> "Stage":
         """The stage as it begins where the one before it ended: every copy of a node in its place, with its speed."""
         assert self.before is not None  # the first stage is entered at rest
-        x, v = state.x[self.before.nodes], state.v[self.before.nodes]
+        body = self.setup.body
+        x, v = self.before.carried(state.x), self.before.carried(state.v)
+        if self.growth is not None:
+            v = kept_momentum(v, x, body.mass, self.growth)
         nodes = self.start.nodes._replace(x=self.start.nodes.x.copy(), v=self.start.nodes.v.copy())
         place = slice(None) if self.start.permutation is None else self.start.permutation
         nodes.x[place], nodes.v[place] = x, v
         start = replace(self.start, nodes=nodes, lam=state.lam[self.before.volumes])
-        body = self.setup.body
         off = body.kept.measure(x) - self.targets_after(self.frame - 1)
         time = float(np.abs(off / body.rest_volumes).max()) / self.filling
-        return replace(self, start=start, easing=Easing(self.frame * self.setup.clock.frame, off, time))
+        at = self.frame * self.setup.clock.frame
+        stage = replace(self, start=start, easing=Easing(at, off, time))
+        if self.growth is None:
+            return stage
+        begin = lengths(x, body.springs.ends[self.growth.springs])
+        stage = replace(stage, letting_in=LettingIn(self.growth.springs, begin, at, 1.0 / self.filling))
+        return replace(stage, start=stage.let_in(start, self.frame))
+
+    def let_in(self, state: State, frame: int) -> State:
+        """The state at the beginning of that frame of the run, with the rest lengths that new springs then have."""
+        clock = self.setup.clock
+        if self.letting_in is None or self.letting_in.done((frame - 1) * clock.frame):
+            return state
+        rest_length = self.letting_in.lengths(self.setup.body.springs.rest_length, frame * clock.frame)
+        slices = state.model.slices
+        in_lanes = aligned(slices.rest_length.shape, slices.rest_length.dtype)
+        in_lanes[...] = np.append(rest_length, 0.0)[self.lanes]
+        slices = slices._replace(rest_length=in_lanes)
+        return replace(state, model=state.model._replace(rest_length=rest_length, slices=slices))
 
 
 def stages_of(setup: Setup) -> list[Stage]:
     """The stages of a run, the states of all made: entering one is a copy of positions and velocities."""
     stages = [Stage(replace(setup, events=()) if setup.events else setup, setup.start())]
     for event, later in zip(setup.events, setup.later, strict=True):
-        before = Numbers(np.asarray(event.parent), np.asarray(event.volume_parent))
-        stages.append(Stage(later, later.start(), event.frame, before, filling=fastest_filling(later.body)))
+        grown = event.growth
+        before = Numbers(np.asarray(event.parent), np.asarray(event.volume_parent), grown and grown.carry)
+        start, filling = later.start(), fastest_filling(later.body)
+        lanes = None if grown is None else _lanes(later.inside.body, start)
+        stages.append(Stage(later, start, event.frame, before, filling=filling, growth=grown, lanes=lanes))
     for k in range(len(stages) - 2, -1, -1):
         before, after = stages[k + 1].before, stages[k + 1].last
         assert before is not None  # it is not the first
-        last = before if after is None else Numbers(before.nodes[after.nodes], before.volumes[after.volumes])
-        stages[k] = replace(stages[k], last=last)
+        stages[k] = replace(stages[k], last=before if after is None else after.after(before))
     return stages
+
+
+def _lanes(body: Body, state: State) -> np.ndarray:
+    """Number of the spring in each lane of the slices of a body with the numbers of a run, −1 for none."""
+    numbered = replace(body.springs, rest_length=np.arange(1.0, body.springs.count + 1))
+    slices = slices_of(numbered, state.model.triangles, state.model.inverse_mass, body.rest)
+    return slices.rest_length.astype(np.int64) - 1

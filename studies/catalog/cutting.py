@@ -13,6 +13,8 @@ BODIES = (
     BodyRecipe("quadratic", nodes=794, graded="adaptive", mass="stiffness"),
     BodyRecipe("quadratic", nodes=994, graded="adaptive", mass="stiffness"),
 )
+PAPER = BodyRecipe("surface", nodes=350)
+"""The paper's body, which is cut in pieces alone."""
 LONG = 0.8
 """Of the stability limit."""
 
@@ -22,7 +24,7 @@ CUTTING = Study(
     cases=tuple(
         Case(scene, body, ImplicitVolume(), dt_fraction=LONG, timed=scene.reference is not None)
         for scene in CUT
-        for body in BODIES
+        for body in (BODIES if scene.cut is not None and scene.cut.within else (PAPER, *BODIES))
     ),
     charts=(
         Chart("cut_open.png", "studies.plots.cut_open:draw"),

@@ -7,12 +7,14 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from massspring import Attachment, Body, Event
+from massspring.body.bisection import Growth, Pieces, cut_surface
 from massspring.body.opening import parents
 from massspring.body.points import PointVolumes
 from massspring.body.volumes import Volumes
 from massspring.layout.face_pairs import faces_behind
-from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import boundary_triangles
+from studies.base.errors import DoesNotApply, StudyError
+from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
+from studies.meshing.opened_mesh import Opened
 from studies.scene.cut import Cut
 
 
@@ -38,20 +40,37 @@ def pieces_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return np.unique(label, return_inverse=True)[1]
 
 
+def check_blade(cut: Cut, scene: str, kind: str) -> None:
+    """Raises DoesNotApply where the cut of the scene of that name ends inside a body of a `kind` that is a surface."""
+    if kind == "surface" and cut.within is not None:
+        raise DoesNotApply(
+            f"the surface body does not apply to scene '{scene}': cut '{cut.name}' ends inside the organ, where this "
+            "body has no tissue; cut the whole section (within=None), or take a tetrahedral body"
+        )
+
+
+def surface_pieces(body: Body, later: Opened, axis: str) -> Pieces:
+    """The paper's body after a cut that opened the filled mesh on whose surface it was made."""
+    count = later.mesh.surface_count
+    assert isinstance(later.mesh, OrganMesh)  # that of a quadratic body has no surface body
+    return cut_surface(body, later.mesh.points[:count], later.mesh.triangles, later.parent[:count], axis)
+
+
 def keeping_pieces(body: Body, volumes: Volumes | PointVolumes | None) -> Body:
     """The body that keeps `volumes`; where these are the whole and it is in pieces, the volume of each."""
     if volumes is not None:
         return body.keeping(volumes)
     cells = body.tetrahedra.astype(np.int64)
     piece = pieces_of(body.rest, cells)
-    if piece.max() == 0:
+    if piece.max(initial=0) == 0:
         return body
     surfaces = {f"piece {k}": boundary_triangles(cells[piece == k]) for k in range(piece.max() + 1)}
     return body.keeping(Volumes.closed_surfaces(body, surfaces))
 
 
-def check_held(cut: Cut, cells: np.ndarray, points: np.ndarray, attachments: tuple[Attachment, ...]) -> None:
-    """Raises StudyError for a piece that nothing holds, unless it may go."""
+def check_held(cut: Cut, body: Body, attachments: tuple[Attachment, ...]) -> None:
+    """Raises StudyError for a piece of the cut body that nothing holds, unless it may go."""
+    cells, points = (body.tetrahedra if len(body.tetrahedra) else body.triangles).astype(np.int64), body.rest
     held = np.concatenate([np.empty(0, np.int64), *(np.asarray(a.nodes) for a in attachments)])
     piece = pieces_of(points, cells)
     loose = [k for k in range(piece.max() + 1) if not np.isin(cells[piece == k], held).any()]
@@ -66,9 +85,10 @@ def event_of(
     parent: np.ndarray,
     attachments: tuple[Attachment, ...],
     pairs: np.ndarray | None = None,
+    growth: Growth | None = None,
 ) -> Event:
     """The event at which one body becomes the other, whose nodes had the numbers `parent` (n',); `pairs`: whose faces
-    touch."""
+    touch; `growth`: what it has beyond copies."""
     was, now = before.kept, after.kept
     if isinstance(was, PointVolumes) and isinstance(now, PointVolumes):
         volumes = parents(was.corner_volume, now.corner_volume)
@@ -80,7 +100,7 @@ def event_of(
         raise StudyError(
             f"a body that is cut keeps one volume, or one per node or vertex, not {was.count}; change its volumes"
         )
-    return Event(after, parent, volumes, frame, attachments, pairs)
+    return Event(after, parent, volumes, frame, attachments, pairs, growth)
 
 
 def opening_of(frame: int, after: Body, pairs: np.ndarray) -> Opening:

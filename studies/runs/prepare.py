@@ -29,7 +29,15 @@ from studies.meshing.opened_mesh import opened_mesh
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import ADAPTER, ADAPTIVE, BodyRecipe, Case
-from studies.runs.cutting import Opening, check_held, event_of, keeping_pieces, opening_of
+from studies.runs.cutting import (
+    Opening,
+    check_blade,
+    check_held,
+    event_of,
+    keeping_pieces,
+    opening_of,
+    surface_pieces,
+)
 from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
@@ -68,8 +76,10 @@ def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
         from studies.meshing.graded_mesh import graded_mesh, usual_grading
 
         return graded_mesh(scene, recipe.nodes, *(usual_grading(scene) if recipe.graded else (0, 0)), quadratic)
-    # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells.
-    return mesh_for(scene, recipe.nodes, filled=recipe.kind == "tetrahedral" or scene.lumen is not None)
+    # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells. A cut is meshed
+    # with the tissue on either side.
+    inside = scene.lumen is not None or scene.cut is not None
+    return mesh_for(scene, recipe.nodes, filled=recipe.kind == "tetrahedral" or inside)
 
 
 def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh) -> Body:
@@ -173,6 +183,8 @@ def prepare(case: Case) -> Prepared:
     if reason is not None:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
     check_masses(scene, case.body)
+    if scene.cut is not None:
+        check_blade(scene.cut, scene.name, case.body.kind)
     mesh = mesh_of(scene, case.body)
     from studies.meshing.kept_shape import tell_shape  # with the finite elements
 
@@ -195,12 +207,17 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
     events, opening, limit_before = (), None, None
     if later is not None:
         assert scene.cut is not None  # it was opened
-        last, frame = body_for(scene, case.body, later.mesh), event_frame(scene, scene.cut, frames)
+        pieces = surface_pieces(body, later, case.body.axis) if case.body.kind == "surface" else None
+        last = body_for(scene, case.body, later.mesh) if pieces is None else pieces.body
+        parent, growth = (later.parent, None) if pieces is None else (pieces.parent, pieces.growth)
+        frame = event_frame(scene, scene.cut, frames)
         check_applies(case, last, bool(targets))
         mesh = flat_mesh(later.mesh, last) if isinstance(later.mesh, QuadraticMesh) else later.mesh
+        mesh = mesh if pieces is None else mesh.outer()
         after = attachments_for(scene, mesh)
-        check_held(scene.cut, last.tetrahedra.astype(np.int64), last.rest, after)
-        events = (event_of(frame, body, last, later.parent, after, later.pairs if scene.cut.contact else None),)
+        check_held(scene.cut, last, after)
+        touching = later.pairs if scene.cut.contact else None
+        events = (event_of(frame, body, last, parent, after, touching, growth),)
         opening = opening_of(frame, last, later.pairs)
         limit_before = limit_of(case, body, attachments)
     limit = limit_of(case, last, events[-1].attachments if events else attachments)

@@ -38,7 +38,8 @@ JUDGED: tuple[Scene, ...] = tuple(scene for scene in SCENES if scene.reference i
 """Scenes with a reference: a study may ask how accurate a run of theirs is."""
 
 CUT: tuple[Scene, ...] = (BALL_INCISED, LIVER_INCISED, BALL_BISECTED, BALL_CUT_PRESSED, KIDNEY_BISECTED)
-"""Scenes that cut their organ. They are not in SCENES: surface bodies and half of the methods cannot run them."""
+"""Scenes that cut their organ. They are not in SCENES: surface bodies cannot run those with a front
+inside the organ, and half of the methods none of them."""
 
 __all__ = [
     "BALL_BISECTED",

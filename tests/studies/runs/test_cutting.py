@@ -22,11 +22,12 @@ from studies.runs.prepare import prepare
 from studies.runs.run import measure
 from studies.scene.library.ball_bisected import BALL_BISECTED
 from studies.scene.library.ball_incised import BALL_INCISED
+from studies.scene.library.kidney_bisected import KIDNEY_BISECTED
 from studies.store.record import write_record
 
 pytestmark = pytest.mark.slow
 METRIC = {metric.name: metric for metric in METRICS}
-ONE, QUADRATIC = BodyRecipe(nodes=200), BodyRecipe("quadratic", nodes=600)
+ONE, QUADRATIC, SURFACE = BodyRecipe(nodes=200), BodyRecipe("quadratic", nodes=600), BodyRecipe("surface", nodes=200)
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +141,7 @@ def test_paraview_sees_the_cut_shut_before_and_open_after_it(incised, tmp_path):
         assert gap[0].max() == 0.0 and gap[-1].min() > 1e-4 and gap[-1].max() > 0.01
 
 
-@pytest.mark.parametrize("body", [ONE, QUADRATIC, BodyRecipe(nodes=200, law="cotangent", volumes="nodal")])
+@pytest.mark.parametrize("body", [ONE, QUADRATIC, SURFACE, BodyRecipe(nodes=200, law="cotangent", volumes="nodal")])
 def test_the_halves_of_a_ball_go_back_to_their_shape_and_volume(body):
     record = measure(Case(BALL_BISECTED, body, ImplicitVolume(), dt_fraction=0.8, recorded=("elastic", "kinetic")))
     assert record.status == "ok", record.message
@@ -170,8 +171,59 @@ def test_what_cannot_be_cut_is_refused():
     same = replace(BALL_INCISED, checkpoints=(1.001, 4.0))
     with pytest.raises(StudyError, match=r"at 1\.001 s and cut 'incision' before it at 1 s are in one of 200 frames"):
         prepare(Case(same, ONE))
-    with pytest.raises(StudyError, match="is for a solid organ that is filled"):
-        prepare(Case(BALL_INCISED, BodyRecipe("surface", nodes=200)))
+    with pytest.raises(DoesNotApply, match="cut 'incision' ends inside the organ, where this body has no tissue"):
+        prepare(Case(BALL_INCISED, SURFACE))
+    with pytest.raises(StudyError, match="leaves a piece that nothing holds"):
+        prepare(Case(loose, SURFACE))
+
+
+def test_a_surface_body_is_cut_in_two_closed_surfaces():
+    """The paper's body: the same trace as the tetrahedral one has, one section for both sides, two volumes."""
+    prepared, filled = (prepare(Case(BALL_BISECTED, body, ImplicitVolume())) for body in (SURFACE, ONE))
+    before, after, opening = prepared.setup.body, prepared.body, prepared.opening
+    np.testing.assert_array_equal(opening.parts, [0, 1])
+    assert after.rest_volumes.sum() == pytest.approx(before.volume, rel=1e-13, abs=0)
+    assert after.mass.sum() == pytest.approx(before.mass.sum(), rel=1e-12)
+    behind, front = (after.rest[opening.pairs[:, side]] for side in range(2))
+    np.testing.assert_array_equal(behind, front)
+    assert np.abs(behind[:, 2]).max() < 1e-9
+    np.testing.assert_array_equal(behind, filled.body.rest[filled.opening.pairs[:, 0]])
+    born = opening.pairs[after.mass[opening.pairs].all(axis=1)]
+    assert len(born) == len(opening.pairs) and len(opening.faces) == len(filled.opening.faces)
+    assert prepared.mesh.surface_count == len(prepared.mesh.points) == len(after.surface_nodes)
+    held = [np.isin(a.nodes, after.surface_nodes).all() for a in prepared.setup.events[0].attachments]
+    assert held == [True, True]
+
+
+def test_a_surface_body_is_recorded_and_measured_like_the_others(tmp_path):
+    case = Case(BALL_BISECTED, SURFACE, ImplicitVolume(), dt_fraction=0.8, recorded=("elastic", "kinetic"))
+    run = Run(case, measure(case))
+    assert run.record.status == "ok", run.record.message
+    first = run.record.attributes["cut_frame"]
+    assert METRIC["piece_worst"](run) < 1e-3 and METRIC["piece_sum_worst"](run) < 1e-3
+    assert METRIC["cut_momentum"](run) < 1e-10
+    assert 0.1 < METRIC["cut_energy"](run) < 10.0  # that of the springs across
+    assert 0.5 < METRIC["cut_limit"](run) < 1.0 and METRIC["cut_ms"](run) > 0.0
+    # No spring that is new drives it: energy goes down from the cut to the next pull.
+    total = run.field("elastic") + run.field("kinetic")
+    assert (np.diff(total[first - 1 : first + 3]) < 0).all()
+    (axes,) = pieces.figure([run]).axes
+    assert len(axes.lines) == 4
+    write_record(tmp_path / "run.h5", run.record)
+    with h5py.File(tmp_path / "run.h5") as file:
+        group = file["VTKHDF"]
+        nodes, steps = int(group["NumberOfPoints"][0]), int(group["Steps"].attrs["NSteps"])
+        points = group["Points"][()].reshape(steps, nodes, 3)
+    gap = np.linalg.norm(np.subtract(*points[:, run.cut_pairs.T].transpose(1, 0, 2, 3)), axis=2)
+    assert gap[0].max() == 0.0 and gap[-1].min() > 0.005
+
+
+def test_a_piece_next_to_the_axis_gets_one_of_its_own_and_touches_the_rest():
+    """The axis of a kidney is on one side of its cut, and the other side is pressed against it."""
+    run = Run(case := Case(KIDNEY_BISECTED, SURFACE, ImplicitVolume(), dt_fraction=0.8), measure(case))
+    assert run.record.status == "ok", run.record.message
+    assert METRIC["overlap"](run) < 0.1 and METRIC["piece_worst"](run) < 1e-3
+    assert run.force[run.checkpoint_frames[-1]] > run.force[run.checkpoint_frames[0]] > 0.0
 
 
 def solve_nothing(scene):
