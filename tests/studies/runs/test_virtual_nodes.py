@@ -16,6 +16,7 @@ from studies.runs.run import measure
 from studies.scene.library.ball_bisected import BALL_BISECTED
 from studies.scene.library.ball_cut_pressed import BALL_CUT_PRESSED
 from studies.scene.library.ball_incised import BALL_INCISED
+from studies.store.record import write_record
 
 pytestmark = pytest.mark.slow
 METRIC = {metric.name: metric for metric in METRICS}
@@ -56,6 +57,9 @@ def test_a_section_leaves_pieces_with_their_volumes(body, tmp_path):
     assert min(below, above) > 0.49 * whole
     assert METRIC["piece_worst"](run) < 1e-2 and METRIC["piece_sum_worst"](run) < 5e-3
     assert METRIC["cut_energy"](run) < 1e-8 and METRIC["cut_momentum"](run) < 1e-10
+    # The file takes it: its fields fit together.
+    write_record(tmp_path / "run.h5", run.record)
+    assert Run.load(tmp_path / "run.h5").case == run.case
     # Each half is as it was, but for the shift of the cap that is pulled.
     behind, front = run.cut_pairs.T
     last = run.fields.snapshots[-1]
