@@ -5,6 +5,7 @@ from scipy.sparse import coo_array, csr_array
 
 from massspring.body.body import Body
 from massspring.body.points import PointVolumes
+from massspring.body.volumes import Volumes
 
 AXIS = np.arange(3)
 
@@ -35,8 +36,10 @@ def spring_stiffness(body: Body, x: np.ndarray) -> csr_array:
     return edge_blocks(ends, springs.stiffness[:, None, None] * block, body.node_count)
 
 
-def volume_hessian(triangles: np.ndarray, x: np.ndarray) -> csr_array:
+def volume_hessian(triangles: np.ndarray, x: np.ndarray, share: np.ndarray | float = 1.0) -> csr_array:
     """∂²V/∂x² [m] of the volume inside closed `triangles` (f, 3) at `x` (n, 3) [m], symmetric, (3n, 3n).
+
+    `share` (f,): how often each triangle counts.
 
     V = Σ x_i · (x_j × x_k)/6 is linear in each node: the block of i and j is −[x_k]×/6, from a node close by.
     """
@@ -46,6 +49,7 @@ def volume_hessian(triangles: np.ndarray, x: np.ndarray) -> csr_array:
         i, j, k = (triangles[:, (a + b) % 3] for b in range(3))
         block = np.zeros((len(triangles), 3, 3))
         block[:, [2, 0, 1], [1, 2, 0]] = -x[k] / 6.0
+        block *= np.reshape(share, (-1, 1, 1))
         block -= block.transpose(0, 2, 1)
         rows += [i, j]
         columns += [j, i]
@@ -111,4 +115,6 @@ def stiffness_at_rest(body: Body) -> csr_array:
         return csr_array(springs + local - point_hessian(volumes, body.rest, pressure))
     if not body.rest_pressure:
         return springs
-    return csr_array(springs - body.rest_pressure * volume_hessian(body.triangles, body.rest))
+    whole = Volumes.whole(body)
+    hessian = volume_hessian(whole.triangles, body.rest, whole.share.toarray()[0])
+    return csr_array(springs - body.rest_pressure * hessian)

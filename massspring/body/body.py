@@ -76,6 +76,9 @@ class Body:
     """Quadratic facets at whose points obstacles touch a body of `PointVolumes`, (f, 6); of none: at its nodes."""
     inertia: np.ndarray | None = None
     """What resists motion [kg], (n,), where that is not `mass`: weight is always that of `mass`."""
+    share: np.ndarray | None = None
+    """Part of each tetrahedron that is tissue [1], (k,), where copies of cells share it (`virtual_nodes`); `triangles`
+    are then the surface before the cut, on the nodes that were there. None: all of each."""
 
     def __post_init__(self) -> None:
         check_finite("rest positions", self.rest)
@@ -93,7 +96,7 @@ class Body:
         self._check_volumes()
 
     def _check_volumes(self) -> None:
-        filled = float(self.tetrahedron_volumes.sum())
+        filled = float(self.tissue_volumes.sum())
         if len(self.tetrahedra) and abs(filled - self.volume) > SAME_VOLUME * filled:
             raise MassSpringError(
                 f"the surface encloses {self.volume:.6g} m³ but the tetrahedra fill {filled:.6g} m³; "
@@ -133,7 +136,7 @@ class Body:
         """Springs that are taut at rest are held apart by the rest pressure, at every node."""
         springs, pull, push = self.springs, np.empty_like(self.rest), np.empty_like(self.rest)
         spring_forces_into(self.rest, springs.ends, springs.rest_length, springs.stiffness, pull)
-        if isinstance(self.kept, PointVolumes):
+        if isinstance(self.kept, PointVolumes) or self.share is not None:
             push = (self.kept.jacobian(self.rest).T @ self.rest_lam).reshape(-1, 3)
         else:
             volume_gradient_into(self.rest, self.triangles, push)
@@ -174,6 +177,8 @@ class Body:
         """What each kept volume takes of the rest pressure [Pa], (m,): Jᵀ rest_lam = rest_pressure · dV/dx."""
         if not self.rest_pressure:
             return np.zeros(self.kept.count)
+        if self.share is not None:  # nodal ones, or those of the pieces; `_check_balance` holds them to it
+            return np.full(self.kept.count, self.rest_pressure)
         return self.rest_pressure * self.kept.parts_of(self.triangles)
 
     @property
@@ -197,6 +202,11 @@ class Body:
     def tetrahedron_volumes(self) -> np.ndarray:
         """Rest volumes [m³], (k,)."""
         return tetrahedron_volumes(self.rest, self.tetrahedra)
+
+    @property
+    def tissue_volumes(self) -> np.ndarray:
+        """Of the tissue in each tetrahedron at rest [m³], (k,)."""
+        return self.tetrahedron_volumes if self.share is None else self.tetrahedron_volumes * self.share
 
     def smallest_ratio(self, x: np.ndarray) -> float:
         """Smallest J [1] at positions `x` (n, 3) [m]: of quadratic elements det F at their points (eq. 8.9), as in a

@@ -28,25 +28,30 @@ SURFACE_WEIGHTS = {SpringKind.STRUCTURAL: 1.0, SpringKind.BENDING: 0.5, SpringKi
 
 
 def tetrahedral_body(
-    points: np.ndarray, triangles: np.ndarray, tetrahedra: np.ndarray, material: Material, law: str = "van_gelder"
+    points: np.ndarray,
+    triangles: np.ndarray,
+    tetrahedra: np.ndarray,
+    material: Material,
+    law: str = "van_gelder",
+    share: np.ndarray | None = None,
 ) -> Body:
     """Springs on the edges of a tetrahedral mesh.
 
     `points` (n, 3) [m]; `triangles` (f, 3), its boundary, outward; `tetrahedra` (k, 4), positive; `law` one of
     `massspring.body.laws.LAWS` or of `smoothed.SMOOTHED`. Those without rest length need one volume per node:
-    `body.keeping(Volumes.nodal(body))`.
+    `body.keeping(Volumes.nodal(body))`. `share` (k,): part of each cell that is tissue (`virtual_nodes`); None: all.
     Raises MassSpringError.
     """
     tetrahedra = np.ascontiguousarray(tetrahedra, dtype=np.uint32)
     triangles = np.ascontiguousarray(triangles, dtype=np.uint32)
     points = np.ascontiguousarray(points, dtype=np.float64)
-    edges = Edges(points, tetrahedra)
+    edges = Edges(points, tetrahedra, share)
     check_positive(edges.volumes)
     springs, taut = _springs_of(law, edges, material.shear_modulus)
     corner = np.repeat(edges.volumes, 4)
     mass = np.bincount(tetrahedra.ravel(), weights=corner, minlength=len(points)) * material.density / 4.0
     pressure = material.shear_modulus if taut else 0.0
-    return Body(points, mass, springs, triangles, tetrahedra, law, rest_pressure=pressure)
+    return Body(points, mass, springs, triangles, tetrahedra, law, rest_pressure=pressure, share=share)
 
 
 def _springs_of(law: str, edges: Edges, mu: float) -> tuple[Springs, bool]:

@@ -25,13 +25,15 @@ class Edges:
     """[m], (n, 3)."""
     tetrahedra: np.ndarray
     """Positive, (k, 4)."""
+    share: np.ndarray | None = None
+    """Part of each cell that is tissue, (k,); None: all of it."""
 
     @cached_property
     def volumes(self) -> np.ndarray:
-        """[m³], (k,)."""
+        """Of the tissue in each cell [m³], (k,)."""
         volumes = np.empty(len(self.tetrahedra))
         tetrahedron_volumes_into(self.points, self.tetrahedra, volumes)
-        return volumes
+        return volumes if self.share is None else volumes * self.share
 
     @cached_property
     def ends(self) -> np.ndarray:

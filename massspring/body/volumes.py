@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, vstack
 from scipy.sparse.linalg import lsqr
 
-from massspring.body.partition import node_patches, partition, tetrahedron_faces
+from massspring.body.partition import FACES_OF_TETRAHEDRON, node_patches, partition, tetrahedron_faces
 from massspring.body.surface import check_surface
 from massspring.errors import MassSpringError
 from massspring.kernels.forces.tetrahedra import tetrahedron_volumes_into
@@ -42,6 +42,11 @@ class Solid(Protocol):
     @property
     def tetrahedra(self) -> np.ndarray:
         """(k, 4) uint32, positive; (0, 4) where there are none."""
+        ...
+
+    @property
+    def share(self) -> np.ndarray | None:
+        """Part of each tetrahedron that is tissue, (k,); None: all of each."""
         ...
 
 
@@ -117,8 +122,23 @@ class Volumes:
 
     @staticmethod
     def whole(body: Solid) -> "Volumes":
-        """The tissue inside the body's surface."""
+        """The tissue inside the body's surface; where copies of cells share it, of all copies together."""
+        if body.share is not None:
+            return Volumes.of_cells(("whole",), body.tetrahedra, csr_array(body.share[None]))
         return Volumes(("whole",), body.triangles, csr_array(np.ones((1, len(body.triangles)))))
+
+    @staticmethod
+    def of_cells(names: tuple[str, ...], cells: np.ndarray, weight: csr_array) -> "Volumes":
+        """Sums over tetrahedra `cells` (k, 4), of which two or more may have the same face: V_r = Σ_t w_rt V_t with
+        `weight` (m, k)."""
+        outer = cells[:, FACES_OF_TETRAHEDRON].reshape(-1, 3)
+        faces, place = _united(outer, outer[:0])
+        column, sense = place[0]
+        row = np.repeat(np.arange(len(cells)), len(FACES_OF_TETRAHEDRON))
+        bounded = csr_array(weight @ coo_array((sense, (row, column)), shape=(len(cells), len(faces))).tocsr())
+        bounded.eliminate_zeros()
+        used = np.unique(bounded.indices)
+        return Volumes(names, faces[used], csr_array(bounded[:, used]))
 
     @staticmethod
     def closed_surfaces(body: Solid, surfaces: Mapping[str, np.ndarray]) -> "Volumes":
@@ -184,6 +204,10 @@ class Volumes:
         """One volume per node: a quarter of every tetrahedron around it."""
         _need_tetrahedra(body, "nodal volumes")
         cells = body.tetrahedra.astype(np.int64)
+        if body.share is not None:
+            of, quarter = np.repeat(np.arange(len(cells)), 4), np.repeat(body.share / 4.0, 4)
+            weight = coo_array((quarter, (cells.ravel(), of)), shape=(len(body.rest), len(cells))).tocsr()
+            return Volumes.of_cells(tuple(f"node {i}" for i in range(len(body.rest))), cells, weight)
         triangles, first, second = tetrahedron_faces(cells)
         face, inner, outer = np.arange(len(triangles)), np.flatnonzero(second >= 0), np.flatnonzero(second < 0)
         around = triangles[outer].astype(np.int64)

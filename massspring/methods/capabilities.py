@@ -79,6 +79,8 @@ class Capabilities:
             return f"it supports no quadratic body, {self.point_volumes.because}; take implicit_volume"
         if len(body.contact_facets) and isinstance(self.facet_contact, No):
             return f"it supports no contact inside facets, {self.facet_contact.because}; take contact 'nodes'"
+        if body.share is not None and self.keeps != "several":
+            return "it knows no cells of which a part alone is tissue, as virtual nodes make them; take implicit_volume"
         if self.keeps == "elements":
             return _why_not_elements(body)
         if self.keeps == "points":

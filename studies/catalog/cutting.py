@@ -1,9 +1,13 @@
 """Does an incision gape as in the reference, does a cut that closes bear a press, and do volumes follow?"""
 
+from dataclasses import replace
+
 from massspring import ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import VIRTUAL, BodyRecipe, Case
 from studies.scene.library import CUT
+from studies.scene.library.ball_bisected import BALL_BISECTED
+from studies.scene.library.ball_incised import BALL_INCISED
 
 BODIES = (
     BodyRecipe(nodes=350),
@@ -15,6 +19,8 @@ BODIES = (
 )
 PAPER = BodyRecipe("surface", nodes=350)
 """The paper's body, which is cut in pieces alone."""
+UNFORESEEN = tuple(replace(body, cut=VIRTUAL) for body in BODIES if body.kind == "tetrahedral")
+"""The same on meshes that do not know the cut."""
 LONG = 0.8
 """Of the stability limit."""
 
@@ -23,8 +29,12 @@ CUTTING = Study(
     question=__doc__ or "",
     cases=tuple(
         Case(scene, body, ImplicitVolume(), dt_fraction=LONG, timed=scene.reference is not None)
-        for scene in CUT
-        for body in (BODIES if scene.cut is not None and scene.cut.within else (PAPER, *BODIES))
+        for scene, bodies in (
+            *((scene, BODIES if scene.cut is not None and scene.cut.within else (PAPER, *BODIES)) for scene in CUT),
+            (BALL_INCISED, UNFORESEEN),
+            (BALL_BISECTED, UNFORESEEN),
+        )
+        for body in bodies
     ),
     charts=(
         Chart("cut_open.png", "studies.plots.cut_open:draw"),

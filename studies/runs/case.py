@@ -20,6 +20,9 @@ Seconds = float | Literal["auto"]
 ADAPTIVE, ADAPTER = "adaptive", "studies.reference.adaptive_mesh"
 """How a body of quadratic elements is graded by one solution of its coarse mesh, and the module that does it."""
 
+VIRTUAL = "virtual"
+"""How a body is cut through its cells."""
+
 
 @dataclass(frozen=True)
 class BodyRecipe:
@@ -57,6 +60,9 @@ class BodyRecipe:
     at each node, for longer steps where inertia does not matter (studies.scene.inertia)."""
     contact: Literal["facets", "nodes"] = "facets"
     """Where obstacles touch a quadratic body: at points inside its facets, or at its nodes, which is cheaper."""
+    cut: Literal["conforming", "virtual"] = "conforming"
+    """How the body of a scene with a cut is cut: along faces of a mesh that was made for it, or through the cells of
+    any mesh, by virtual nodes (studies.meshing.virtual_mesh); the latter for tetrahedral bodies."""
 
     def __post_init__(self) -> None:
         lookup(self.law, law_names(), "stiffness law")
@@ -75,6 +81,7 @@ class BodyRecipe:
         }
         words = {True: "graded ", False: "", ADAPTIVE: "adaptive "}[self.graded] + self.kind + chosen[self.volumes]
         words += ", contact at nodes" if self.contact == "nodes" else ""
+        words += ", virtual nodes" if self.cut == VIRTUAL else ""
         return words if self.mass == "lumped" else words + ", masses by stiffness"
 
 
@@ -88,7 +95,7 @@ def neighbours(body: BodyRecipe) -> tuple[BodyRecipe, ...]:
     return tuple(replace(body, nodes=round(share * body.nodes)) for share in NEIGHBOURS)
 
 
-LATER = {"weights": None, "graded": False, "mass": "lumped", "contact": "facets"}
+LATER = {"weights": None, "graded": False, "mass": "lumped", "contact": "facets", "cut": "conforming"}
 """Settings of a recipe that came after the first records, and what they were before."""
 LATER_SETTINGS = {
     "implicit_volume": {"recovers": False},
@@ -141,6 +148,8 @@ class Case:
             parts.append(f"{self.body.mass}_mass")
         if self.body.contact != "facets":
             parts.append(f"{self.body.contact}_contact")
+        if self.body.cut == VIRTUAL:
+            parts.append("virtual_nodes")
         if self.body.axis != "straight":
             parts.append(self.body.axis)
         if self.body.stiffness != 1.0:

@@ -22,6 +22,10 @@ def check_recipe(recipe: Any) -> None:
         raise StudyError(f"a {recipe.kind} body is not graded by a solution; choose kind 'quadratic' or graded=True")
     if recipe.mass != "lumped" and not quadratic:
         raise StudyError(f"a {recipe.kind} body has no masses by stiffness; choose kind 'quadratic' or mass 'lumped'")
+    if recipe.cut != "conforming" and recipe.kind != "tetrahedral":
+        raise StudyError(
+            f"a {recipe.kind} body is not cut by virtual nodes; choose kind 'tetrahedral', or leave cut out"
+        )
     if quadratic and recipe.volumes != "scene":
         raise StudyError(
             f"a quadratic body keeps one volume per vertex, not volumes '{recipe.volumes}'; leave them at 'scene'"

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from massspring import Attachment, Body, Event
@@ -16,11 +16,12 @@ from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
 from studies.meshing.opened_mesh import Opened
 from studies.scene.cut import Cut
+from studies.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
 class Opening:
-    """Where the body of a record was cut, in its own numbers."""
+    """Where the body of a record was cut, in the numbers of the record."""
 
     frame: int
     """Frames before it."""
@@ -64,6 +65,9 @@ def keeping_pieces(body: Body, volumes: Volumes | PointVolumes | None) -> Body:
     piece = pieces_of(body.rest, cells)
     if piece.max(initial=0) == 0:
         return body
+    if body.share is not None:
+        weight = csr_array((piece == np.arange(piece.max() + 1)[:, None]) * body.share)
+        return body.keeping(Volumes.of_cells(tuple(f"piece {k}" for k in range(len(weight.indptr) - 1)), cells, weight))
     surfaces = {f"piece {k}": boundary_triangles(cells[piece == k]) for k in range(piece.max() + 1)}
     return body.keeping(Volumes.closed_surfaces(body, surfaces))
 
@@ -103,9 +107,20 @@ def event_of(
     return Event(after, parent, volumes, frame, attachments, pairs, growth)
 
 
-def opening_of(frame: int, after: Body, pairs: np.ndarray) -> Opening:
-    """Where the body after an event was cut."""
-    faces = faces_behind(after.triangles.astype(np.int64), pairs, after.node_count)
+def check_virtual(scene: Scene) -> None:
+    """Raises DoesNotApply for a scene in which there is nothing that virtual nodes could cut."""
+    if scene.cut is None:
+        raise DoesNotApply(f"virtual nodes do not apply to scene '{scene.name}': it has no cut; leave cut out")
+    if scene.cut.contact:
+        raise DoesNotApply(
+            f"virtual nodes do not apply to scene '{scene.name}', whose faces of the cut touch: no node lies on them; "
+            "take cut 'conforming'"
+        )
+
+
+def opening_of(frame: int, after: Body, triangles: np.ndarray, pairs: np.ndarray) -> Opening:
+    """Where the body after an event was cut; surface `triangles` (f, 3) and `pairs` as they are recorded."""
+    faces = faces_behind(triangles.astype(np.int64), pairs, int(triangles.max()) + 1)
     return Opening(frame, faces, pairs, parts_of(after))
 
 

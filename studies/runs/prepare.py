@@ -1,6 +1,6 @@
 """From a scene to the mass-spring solver: the mesh, the body, the set-up of a run."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 
 import numpy as np
@@ -25,14 +25,16 @@ from massspring.world.surroundings import Surroundings
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
-from studies.meshing.opened_mesh import opened_mesh
+from studies.meshing.opened_mesh import Opened, opened_mesh
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
-from studies.runs.case import ADAPTER, ADAPTIVE, BodyRecipe, Case
+from studies.meshing.virtual_mesh import Tissue, VirtualMesh, virtual_mesh
+from studies.runs.case import ADAPTER, ADAPTIVE, VIRTUAL, BodyRecipe, Case
 from studies.runs.cutting import (
     Opening,
     check_blade,
     check_held,
+    check_virtual,
     event_of,
     keeping_pieces,
     opening_of,
@@ -42,6 +44,7 @@ from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
 from studies.scene.clock import event_frame
+from studies.scene.cut import Cut
 from studies.scene.scene import Scene
 
 LUMEN, WHOLE = "lumen", "whole"
@@ -58,6 +61,8 @@ class Prepared:
     """Where the body is cut, if it is: `mesh` is the one after that."""
     limit_before: StepLimit | None = None
     """Of the step before that; `limit` is that of the whole run."""
+    tissue: Tissue | None = None
+    """What is recorded of a body with virtual nodes: `mesh` is its mesh; None: the body itself."""
 
     @property
     def body(self) -> Body:
@@ -68,6 +73,8 @@ class Prepared:
 def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
     """The mesh that a recipe asks for. Raises StudyError."""
     quadratic = recipe.kind == "quadratic"
+    if recipe.cut == VIRTUAL:
+        scene = replace(scene, cuts=())  # the mesh does not know it
     if recipe.graded == ADAPTIVE:
         # No import leads there: what solves a reference makes no other run stale (studies.runs.current).
         return import_module(ADAPTER).adaptive_mesh(scene, recipe.nodes)
@@ -82,8 +89,12 @@ def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
     return mesh_for(scene, recipe.nodes, filled=recipe.kind == "tetrahedral" or inside)
 
 
-def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh) -> Body:
-    """The mass-spring body of the scene's tissue on a mesh. Raises StudyError or MassSpringError."""
+def body_for(
+    scene: Scene, recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh, share: np.ndarray | None = None
+) -> Body:
+    """The mass-spring body of the scene's tissue on a mesh; `share` (k,): part of each tetrahedron that is tissue.
+
+    Raises StudyError or MassSpringError."""
     if not recipe.stiffness > 0:
         raise StudyError(f"the stiffness factor is {recipe.stiffness}; it must be positive")
     if isinstance(mesh, QuadraticMesh):
@@ -97,10 +108,10 @@ def body_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh) 
             outside.points[: outside.outer_count], outside.triangles, material, recipe.axis, recipe.weights
         )
     elif recipe.law in own_laws():
-        body = tetrahedral_body(mesh.points, mesh.triangles, mesh.tetrahedra, material)
+        body = tetrahedral_body(mesh.points, mesh.triangles, mesh.tetrahedra, material, share=share)
         body = sprung_by(body, own_laws()[recipe.law], material.shear_modulus)
     else:
-        body = tetrahedral_body(mesh.points, mesh.triangles, mesh.tetrahedra, material, recipe.law)
+        body = tetrahedral_body(mesh.points, mesh.triangles, mesh.tetrahedra, material, recipe.law, share)
     if recipe.stiffness != 1.0:
         body = body.stiffened(recipe.stiffness)
     volumes = volumes_for(scene, recipe, mesh, body)
@@ -195,8 +206,10 @@ def prepare(case: Case) -> Prepared:
 def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
     """The same on a mesh that is there. Raises StudyError, MassSpringError."""
     scene = case.scene
+    if case.body.cut == VIRTUAL:
+        check_virtual(scene)
     body = body_for(scene, case.body, mesh)
-    later = None if scene.cut is None else opened_mesh(mesh, scene.cut.name)
+    later = None if scene.cut is None else _later(case.body, mesh, scene.cut)
     if isinstance(mesh, QuadraticMesh):
         mesh = flat_mesh(mesh, body)
     targets = targets_for(scene, mesh, body)
@@ -204,11 +217,12 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
     if case.body.kind in ("surface", "membrane") and mesh.hollow:
         mesh = mesh.outer()
     attachments, last, frames = attachments_for(scene, mesh), body, case.frames or scene.frames
-    events, opening, limit_before = (), None, None
+    events, opening, limit_before, tissue = (), None, None, None
     if later is not None:
         assert scene.cut is not None  # it was opened
+        tissue, share = (later.tissue, later.share) if isinstance(later, VirtualMesh) else (None, None)
         pieces = surface_pieces(body, later, case.body.axis) if case.body.kind == "surface" else None
-        last = body_for(scene, case.body, later.mesh) if pieces is None else pieces.body
+        last = body_for(scene, case.body, later.mesh, share) if pieces is None else pieces.body
         parent, growth = (later.parent, None) if pieces is None else (pieces.parent, pieces.growth)
         frame = event_frame(scene, scene.cut, frames)
         check_applies(case, last, bool(targets))
@@ -218,7 +232,8 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
         check_held(scene.cut, last, after)
         touching = later.pairs if scene.cut.contact else None
         events = (event_of(frame, body, last, parent, after, touching, growth),)
-        opening = opening_of(frame, last, later.pairs)
+        mesh = mesh if tissue is None else tissue.mesh
+        opening = opening_of(frame, last, last.triangles if tissue is None else mesh.triangles, later.pairs)
         limit_before = limit_of(case, body, attachments)
     limit = limit_of(case, last, events[-1].attachments if events else attachments)
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
@@ -239,7 +254,15 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
         precision=case.precision,
         events=events,
     )
-    return Prepared(mesh, setup, limit, opening, limit_before)
+    return Prepared(mesh, setup, limit, opening, limit_before, tissue)
+
+
+def _later(recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh, cut: Cut) -> Opened | VirtualMesh:
+    """The mesh after its cut, along its faces or through its cells. Raises StudyError."""
+    if recipe.cut == VIRTUAL:
+        assert isinstance(mesh, OrganMesh)  # of a tetrahedral body
+        return virtual_mesh(mesh, cut)
+    return opened_mesh(mesh, cut.name)
 
 
 def limit_of(case: Case, body: Body, attachments: tuple[Attachment, ...]) -> StepLimit:

@@ -13,6 +13,7 @@ from massspring import History, MassSpringError, simulate
 from massspring.run.history import EXTRA
 from studies.base.compile_watch import watching
 from studies.base.errors import DoesNotApply, StudyError
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.runs.case import Case, case_from_json
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.indicators import indicators, remarks
@@ -118,6 +119,7 @@ def _record(case: Case, status: Status, message: str, attributes: dict, fields: 
 
 def _attributes(prepared: Prepared, history: History) -> dict[str, float | int | str]:
     clock, body, cut = prepared.setup.clock, prepared.body, prepared.opening
+    shown = None if prepared.tissue is None else prepared.tissue.mesh
     return {
         "rest_volume": body.volume,
         "dt": clock.dt,
@@ -126,9 +128,9 @@ def _attributes(prepared: Prepared, history: History) -> dict[str, float | int |
         "frame": clock.frame,
         "frames": clock.frames,
         "good_frames": history.good_frames,
-        "nodes": body.node_count,
+        "nodes": body.node_count if shown is None else len(shown.points),
         "springs": body.springs.count,
-        "triangles": len(body.triangles),
+        "triangles": len(body.triangles if shown is None else shown.triangles),
         "law": body.law,
         "skipped_steps": history.singular_steps,
         "capped_steps": history.limited_corrections,
@@ -153,7 +155,6 @@ def _lumen_column(prepared: Prepared) -> int:
 
 
 def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field]:
-    body = prepared.body
     at = np.isin(history.snapshot_frames, checkpoint_frames(case, prepared))
     values = {
         "t": history.t,
@@ -166,11 +167,7 @@ def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field
         "iterations": history.iterations,
         "min_j": history.min_j,
         "snapshot_frame": history.snapshot_frames[at],
-        "snapshots": history.snapshots[at],
-        "rest": body.rest,
-        "mass": body.mass,
-        "triangles": body.triangles,
-        "tetrahedra": body.tetrahedra,
+        **_shown(prepared, history.snapshots[at]),
     }
     if prepared.opening is not None:
         opening = prepared.opening
@@ -179,6 +176,24 @@ def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field
     if "surface" in case.recorded:
         values |= surface_fields(prepared, history)
     return new_fields(RUN_FIELDS, values)
+
+
+def _shown(prepared: Prepared, x: np.ndarray) -> dict[str, np.ndarray]:
+    """The nodes of a body with positions `x` (K, n, 3) [m]; of one with virtual nodes the places of its tissue."""
+    body, tissue = prepared.body, prepared.tissue
+    if tissue is None:
+        names = ("rest", "mass", "triangles", "tetrahedra")
+        return {"snapshots": x} | {name: getattr(body, name) for name in names}
+    mesh = tissue.mesh
+    volumes = tetrahedron_volumes(mesh.points, mesh.tetrahedra)
+    weight = np.bincount(mesh.tetrahedra.ravel(), np.repeat(volumes / 4, 4))
+    return {
+        "snapshots": tissue.places(x),
+        "rest": mesh.points,
+        "mass": weight * body.mass.sum() / volumes.sum(),
+        "triangles": mesh.triangles,
+        "tetrahedra": mesh.tetrahedra,
+    }
 
 
 def own_files_of(record: Record) -> dict[str, str]:

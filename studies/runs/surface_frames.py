@@ -24,9 +24,10 @@ def surface_fields(prepared: Prepared, history: History) -> dict[str, np.ndarray
     setup = prepared.setup
     nodes = np.unique(prepared.mesh.outer_triangles)
     start = prepared.body.rest if setup.positions is None else setup.positions
-    frames, seen = [0, *history.snapshot_frames], [start[nodes], *history.snapshots[:, nodes]]
+    frames, seen = [0, *history.snapshot_frames], [start, *history.snapshots]
     if frames[-1] < history.good_frames:  # an early end between two moments
         frames.append(history.good_frames)
-        seen.append(history.final[nodes])
-    values = np.array(frames, dtype=np.int64), nodes.astype(np.int64), np.array(seen).astype(np.float32)
+        seen.append(history.final)
+    places = np.array(seen) if prepared.tissue is None else prepared.tissue.places(np.array(seen))
+    values = np.array(frames, dtype=np.int64), nodes.astype(np.int64), places[:, nodes].astype(np.float32)
     return dict(zip(SURFACE, values, strict=True))

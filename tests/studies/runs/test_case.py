@@ -26,6 +26,7 @@ CHANGES = {
     "quadratic": {"body": BodyRecipe("quadratic")},
     "graded": {"body": BodyRecipe(graded=True)},
     "mass": {"body": BodyRecipe("quadratic", graded=True, mass="stiffness")},
+    "cut": {"body": BodyRecipe(cut="virtual")},
     "method": {"method": Free()},
     "dt": {"dt": 1e-4},
     "dt_fraction": {"dt_fraction": 0.51},
@@ -97,7 +98,7 @@ def test_a_setting_that_is_not_chosen_leaves_old_keys_as_they_were():
     """The key of the first scene's default case as it was before surface weights could be chosen."""
     assert "weights" not in json.loads(Case(SCENES[0]).key)["body"]
     assert "precision" not in json.loads(Case(SCENES[0]).key)
-    assert not {"graded", "mass"} & set(json.loads(Case(SCENES[0]).key)["body"])
+    assert not {"graded", "mass", "cut"} & set(json.loads(Case(SCENES[0]).key)["body"])
     assert set(json.loads(Case(SCENES[0]).key)["method"]["settings"]) == {"tolerance", "most_iterations"}
     assert json.loads(Case(SCENES[0], method=ImplicitVolume(recovers=True)).key)["method"]["settings"]["recovers"]
 
@@ -108,6 +109,9 @@ def test_grading_and_masses_stand_in_names_and_series():
     assert Case(SCENES[0], body).name == "ball_squeeze-quadratic-800-implicit_volume-dt0.5-graded-stiffness_mass"
     assert body.series == "graded quadratic, masses by stiffness"
     assert BodyRecipe(volumes="nodal", graded=True).series == "graded tetrahedral, nodal volumes"
+    virtual = Case(SCENES[0], BodyRecipe(cut="virtual"))
+    assert virtual.name == "ball_squeeze-tetrahedral-550-implicit_volume-dt0.5-virtual_nodes"
+    assert virtual.body.series == "tetrahedral, virtual nodes"
 
 
 @pytest.mark.parametrize(
@@ -116,6 +120,7 @@ def test_grading_and_masses_stand_in_names_and_series():
         ({"kind": "surface", "graded": True}, "a surface body cannot be graded; choose kind 'tetrahedral' or"),
         ({"kind": "membrane", "law": "delingette", "graded": True}, "a membrane body cannot be graded"),
         ({"mass": "stiffness"}, "a tetrahedral body has no masses by stiffness; choose kind 'quadratic'"),
+        ({"kind": "quadratic", "cut": "virtual"}, "a quadratic body is not cut by virtual nodes; choose kind"),
         ({"kind": "quadratic", "volumes": "regions"}, "one volume per vertex, not volumes 'regions'; leave"),
         ({"kind": "quadratic", "law": "uniform"}, "follow no law, not 'uniform' either; leave the law out"),
     ],

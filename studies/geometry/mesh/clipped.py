@@ -1,0 +1,119 @@
+"""Cells that a sheet crosses, divided at it into tetrahedra, and how much of each section a blade covers."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes, triangle_areas
+
+SUBDIVIDED = 8
+"""Parts of a side of a section's triangles: 64 places are asked whether the blade covers them."""
+SECTIONS = (
+    (1, ((0, 1), (0, 2), (0, 3))),
+    (2, ((0, 2), (0, 3), (1, 3))),
+    (2, ((0, 2), (1, 3), (1, 2))),
+    (3, ((0, 3), (1, 3), (2, 3))),
+)
+"""Corners in front, and the edges that make a triangle of the section, with the corners from front to back."""
+
+
+def _middles(parts: int) -> np.ndarray:
+    """Barycentric coordinates of the middles of the parts² equal parts of a triangle, (parts², 3)."""
+    i, j = (grid.ravel() for grid in np.mgrid[:parts, :parts])
+    up, down = i + j < parts, i + j < parts - 1
+    first, second = (np.concatenate([k[up] + 1 / 3, k[down] + 2 / 3]) / parts for k in (i, j))
+    return np.stack([first, second, 1.0 - first - second], axis=1)
+
+
+PLACES = _middles(SUBDIVIDED)
+
+
+def crossing_edges(cells: np.ndarray, level: np.ndarray) -> np.ndarray:
+    """Edges of `cells` (k, 4) between nodes in front of a sheet, where `level` (n,) > 0, and behind it, in this order,
+    each once, (e, 2)."""
+    ends = cells[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]].reshape(-1, 2)
+    ends = ends[(level[ends] > 0).sum(axis=1) == 1]
+    ends = np.where((level[ends[:, :1]] > 0), ends, ends[:, ::-1])
+    return np.unique(ends, axis=0)
+
+
+def crossings(points: np.ndarray, level: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where `edges` (e, 2) cross the sheet, as the share of their second end, (e,), and the places [m], (e, 3)."""
+    first, second = level[edges].T
+    share = first / (first - second)
+    return share, points[edges[:, 0]] + share[:, None] * (points[edges[:, 1]] - points[edges[:, 0]])
+
+
+def divided(
+    points: np.ndarray, cells: np.ndarray, level: np.ndarray, edges: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The cells that a sheet crosses as tetrahedra on either side of it, positive, (t, 4), and their side, ±1 (t,).
+
+    Node n + e is the place where edge e of `crossing_edges` crosses it. Neighbours and both sides divide a common face
+    alike: a quadrilateral from its smallest number (Dompierre, Labbé, Vallet, Camarero 1999).
+    """
+    n = len(points)
+    places = np.concatenate([points, crossings(points, level, edges)[1]])
+    key = edges @ [n, 1]
+    rows = cells[np.ptp(np.sign(level[cells]), axis=1) > 0]
+    rows = np.take_along_axis(rows, np.argsort(-level[rows], axis=1), axis=1)
+    count = (level[rows] > 0).sum(axis=1)
+    found, sides = [], []
+
+    def add(tetrahedra: np.ndarray, side: int) -> None:
+        found.append(tetrahedra)
+        sides.append(np.full(len(tetrahedra), side))
+
+    for few in (1, 2, 3):
+        a, b, c, d = rows[count == few].T
+
+        def at(front: np.ndarray, behind: np.ndarray) -> np.ndarray:
+            return n + np.searchsorted(key, front * n + behind)
+
+        if few == 1:
+            add(np.stack([a, at(a, b), at(a, c), at(a, d)], axis=1), 1)
+            add(_of_wedges(np.stack([b, c, d, at(a, b), at(a, c), at(a, d)], axis=1)), -1)
+        elif few == 2:
+            add(_of_wedges(np.stack([a, at(a, c), at(a, d), b, at(b, c), at(b, d)], axis=1)), 1)
+            add(_of_wedges(np.stack([c, at(a, c), at(b, c), d, at(a, d), at(b, d)], axis=1)), -1)
+        else:
+            add(_of_wedges(np.stack([a, b, c, at(a, d), at(b, d), at(c, d)], axis=1)), 1)
+            add(np.stack([d, at(a, d), at(b, d), at(c, d)], axis=1), -1)
+    tetrahedra = np.concatenate(found)
+    turned = tetrahedron_volumes(places, tetrahedra) < 0
+    tetrahedra[turned] = tetrahedra[turned][:, [0, 2, 1, 3]]
+    return tetrahedra, np.concatenate(sides)
+
+
+def _of_wedges(wedges: np.ndarray) -> np.ndarray:
+    """Wedges (w, 6), whose node i faces node i + 3, as three tetrahedra each, (3 w, 4)."""
+    # Turned so that the smallest number comes first: both faces at it are divided from there.
+    first = np.argmin(wedges, axis=1)
+    order = np.array([[0, 1, 2, 3, 4, 5], [1, 2, 0, 4, 5, 3], [2, 0, 1, 5, 3, 4]])
+    order = np.concatenate([order, order[:, [3, 4, 5, 0, 1, 2]]])
+    w = np.take_along_axis(wedges, order[first], axis=1)
+    straight = np.minimum(w[:, 1], w[:, 5]) < np.minimum(w[:, 2], w[:, 4])
+    one = w[:, [[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]]]
+    other = w[:, [[0, 1, 2, 4], [0, 4, 2, 5], [0, 4, 5, 3]]]
+    return np.where(straight[:, None, None], one, other).reshape(-1, 4)
+
+
+def covered_part(
+    points: np.ndarray, cells: np.ndarray, level: np.ndarray, covers: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
+    """The part of each cell's section that a blade covers [1], to about 1 %, (k,); 0 where there is no section.
+
+    `covers`: places (q, 3) [m] on the sheet -> bool (q,)."""
+    covered, whole = np.zeros(len(cells)), np.zeros(len(cells))
+    order = np.argsort(-level[cells], axis=1)
+    count = (level[cells] > 0).sum(axis=1)
+    for few, corners in SECTIONS:
+        here = np.flatnonzero(count == few)
+        rows = np.take_along_axis(cells[here], order[here], axis=1)
+        triangle = np.stack([crossings(points, level, rows[:, list(ends)])[1] for ends in corners], axis=1)  # (c, 3, 3)
+        area = triangle_areas(triangle.reshape(-1, 3), np.arange(3 * len(here)).reshape(-1, 3))
+        places = np.einsum("qa,cai->cqi", PLACES, triangle)
+        inside = covers(places.reshape(-1, 3)).reshape(len(here), len(PLACES)).mean(axis=1)
+        covered[here] += area * inside
+        whole[here] += area
+    return np.divide(covered, whole, out=np.zeros(len(cells)), where=whole > 0)

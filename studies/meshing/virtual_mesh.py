@@ -1,0 +1,132 @@
+"""The mesh of an organ cut by virtual nodes: copies of cells that move, and the tissue in them that is shown."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from massspring import MassSpringError
+from massspring.body.springs import EDGES_OF_TETRAHEDRON
+from massspring.body.virtual_nodes import VirtualNodes, virtual_nodes
+from studies.base.errors import StudyError
+from studies.geometry import OrganMesh
+from studies.geometry.mesh.clipped import covered_part, crossing_edges, crossings, divided
+from studies.geometry.mesh.organ_mesh import surface_first, unique_edges
+from studies.scene.cut import Cut
+
+NEAR = 1e-4
+"""Of the mean edge: the sheet of a cut keeps this distance from every node, and bends a little where one is nearer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tissue:
+    """What there is of the copies: the cells divided at the sheet, with places between the nodes of a body."""
+
+    mesh: OrganMesh
+    """At rest; nodes on the two faces of the cut lie on each other."""
+    between: csr_array
+    """Shares of the nodes of the body in each place, (p, n')."""
+    pairs: np.ndarray
+    """Places behind the cut and in front of it, (q, 2)."""
+
+    def places(self, x: np.ndarray) -> np.ndarray:
+        """Where its nodes are with the body at `x` (…, n', 3) [m], (…, p, 3)."""
+        return np.array([self.between @ one for one in x]) if x.ndim == 3 else self.between @ x
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualMesh:
+    """A mesh that was cut along a sheet that no face of it follows."""
+
+    mesh: OrganMesh
+    """The copies as cells; triangles and patches are those before the cut, on the nodes that were there."""
+    share: np.ndarray
+    """Part of each cell that is tissue, (k,)."""
+    parent: np.ndarray
+    """For each node the one it was, (n',)."""
+    tissue: Tissue
+
+    @property
+    def pairs(self) -> np.ndarray:
+        """Places of the tissue behind the cut and in front of it, (q, 2): no node of the body lies there."""
+        return self.tissue.pairs
+
+
+def virtual_mesh(mesh: OrganMesh, cut: Cut) -> VirtualMesh:
+    """A solid organ's mesh, which need not know the cut, cut with virtual nodes. Raises StudyError where it cannot."""
+    cells, points = mesh.tetrahedra.astype(np.int64), mesh.points
+    level, normal = cut.plane.level(points), np.asarray(cut.plane.normal, float) / np.linalg.norm(cut.plane.normal)
+    edges = unique_edges(mesh.triangles)
+    least = NEAR * float(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).mean())
+    level = np.where(np.abs(level) < least, np.where(level < 0, -least, least), level)
+
+    def covers(places: np.ndarray) -> np.ndarray:
+        return np.ones(len(places), bool) if cut.within is None else cut.within.level(places) < 0
+
+    parted = covers(points - level[:, None] * normal)
+    try:
+        copies = virtual_nodes(cells, level, parted, covered_part(points, cells, level, covers))
+    except MassSpringError as error:
+        raise StudyError(f"{mesh.name}: cut '{cut.name}' does not open it: {error}") from error
+    after = replace(mesh, points=points[copies.parent], tetrahedra=copies.cells.astype(np.int64))
+    return VirtualMesh(after, copies.share, copies.parent, _tissue(mesh, level, copies))
+
+
+def _tissue(mesh: OrganMesh, level: np.ndarray, copies: VirtualNodes) -> Tissue:
+    """The cells of `mesh` divided at the sheet, where `level` (n,) is 0: on each side the places on crossing edges
+    move with the copies on that side."""
+    cells, points, n = mesh.tetrahedra.astype(np.int64), mesh.points, len(mesh.points)
+    edges = crossing_edges(cells, level)
+    along, at = crossings(points, level, edges)
+    front, behind = (_ends_on(side, cells, level, edges, copies) for side in (1, -1))
+    parted = (front != behind).any(axis=1)
+    pieces, side = divided(points, cells, level, edges)
+    of_side = np.array([n + np.arange(len(edges)), n + np.arange(len(edges))])
+    of_side[1, parted] = n + len(edges) + np.arange(int(parted.sum()))
+    on_edge = pieces >= n
+    pieces[on_edge] = of_side[np.where(side > 0, 1, 0)[:, None].repeat(4, axis=1)[on_edge], pieces[on_edge] - n]
+    whole = cells[np.ptp(np.sign(level[cells]), axis=1) == 0]
+    places = np.concatenate([points, at, at[parted]])
+    ends, share = np.concatenate([behind, front[parted]]), np.concatenate([along, along[parted]])
+    rows = np.concatenate([np.arange(n), n + np.arange(len(ends)), n + np.arange(len(ends))])
+    values = np.concatenate([np.ones(n), 1.0 - share, share])
+    columns = np.concatenate([np.arange(n), ends[:, 0], ends[:, 1]])
+    between = coo_array((values, (rows, columns)), shape=(len(places), len(copies.parent))).tocsr()
+    _, triangles, tetrahedra, count = surface_first(places, np.concatenate([whole, pieces]))
+    order = _order(np.concatenate([whole, pieces]), tetrahedra, len(places))
+    number = np.argsort(order)
+    shown = replace(
+        mesh,
+        points=places[order],
+        triangles=triangles,
+        tetrahedra=tetrahedra,
+        surface_count=count,
+        outer_count=count,
+        patches={held: number[nodes] for held, nodes in mesh.patches.items()},
+    )
+    pairs = number[of_side[:, parted].T]
+    return Tissue(shown, csr_array(between[order]), pairs)
+
+
+def _order(before: np.ndarray, after: np.ndarray, n: int) -> np.ndarray:
+    """The old number of each node, (n,), from cells (k, 4) in old and new numbers."""
+    order = np.empty(n, np.int64)
+    order[after.ravel()] = before.ravel()
+    return order
+
+
+def _ends_on(side: int, cells: np.ndarray, level: np.ndarray, edges: np.ndarray, copies: VirtualNodes) -> np.ndarray:
+    """The nodes between which the place on each crossing edge moves on one side, (e, 2): the edge's own, or those of
+    the copies around it."""
+    ends, n = edges.copy(), len(level)
+    own = copies.side == side
+    before = cells[copies.cell[own]][:, EDGES_OF_TETRAHEDRON].reshape(-1, 2)
+    after = copies.cells[own].astype(np.int64)[:, EDGES_OF_TETRAHEDRON].reshape(-1, 2)
+    crossing = (level[before] > 0).sum(axis=1) == 1
+    before, after = before[crossing], after[crossing]
+    turned = level[before[:, 0]] < 0
+    before[turned], after[turned] = before[turned][:, ::-1], after[turned][:, ::-1]
+    place = np.searchsorted(edges @ [n, 1], before @ [n, 1])
+    first, at = np.unique(place, return_index=True)
+    ends[first] = after[at]
+    return ends
