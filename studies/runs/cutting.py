@@ -21,7 +21,7 @@ class Opening:
     """Where the body of a record was cut, in its own numbers."""
 
     frame: int
-    """Frames before it."""
+    """Frames before it, or before it begins to advance."""
     faces: np.ndarray
     """Triangles of the surface behind the cut, (u, 3)."""
     pairs: np.ndarray
@@ -70,12 +70,13 @@ def event_of(
     """The event at which one body becomes the other, whose nodes had the numbers `parent` (n',); `pairs`: whose faces
     touch."""
     was, now = before.kept, after.kept
+    pieces = [pieces_of(body.rest, body.tetrahedra.astype(np.int64))[:, None] for body in (before, after)]
     if isinstance(was, PointVolumes) and isinstance(now, PointVolumes):
         volumes = parents(was.corner_volume, now.corner_volume)
-    elif was.count == 1:
-        volumes = np.zeros(now.count, dtype=np.int64)
     elif was.count == before.node_count and now.count == after.node_count:
         volumes = parent
+    elif [was.count, now.count] == [int(piece.max()) + 1 for piece in pieces]:  # as `keeping_pieces` has them
+        volumes = parents(*pieces)
     else:
         raise StudyError(
             f"a body that is cut keeps one volume, or one per node or vertex, not {was.count}; change its volumes"

@@ -8,6 +8,7 @@ import numpy as np
 from massspring import (
     Attachment,
     Body,
+    Event,
     Material,
     Ramp,
     Setup,
@@ -19,13 +20,14 @@ from massspring import (
     tetrahedral_body,
 )
 from massspring.body.membranes import MEMBRANE_LAWS
+from massspring.body.opening import parents
 from massspring.body.volumes import Volumes
 from massspring.methods.capabilities import No
 from massspring.world.surroundings import Surroundings
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
-from studies.meshing.opened_mesh import opened_mesh
+from studies.meshing.opened_mesh import cells_of, opened_in_stages
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import ADAPTER, ADAPTIVE, BodyRecipe, Case
@@ -33,7 +35,8 @@ from studies.runs.cutting import Opening, check_held, event_of, keeping_pieces, 
 from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
-from studies.scene.clock import event_frame
+from studies.scene.clock import event_frames
+from studies.scene.cut import Cut
 from studies.scene.scene import Scene
 
 LUMEN, WHOLE = "lumen", "whole"
@@ -183,26 +186,17 @@ def prepare(case: Case) -> Prepared:
 def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
     """The same on a mesh that is there. Raises StudyError, MassSpringError."""
     scene = case.scene
-    body = body_for(scene, case.body, mesh)
-    later = None if scene.cut is None else opened_mesh(mesh, scene.cut.name)
-    if isinstance(mesh, QuadraticMesh):
-        mesh = flat_mesh(mesh, body)
+    given, body = mesh, body_for(scene, case.body, mesh)
+    mesh = flat_mesh(mesh, body)
     targets = targets_for(scene, mesh, body)
     check_applies(case, body, bool(targets))
     if case.body.kind in ("surface", "membrane") and mesh.hollow:
         mesh = mesh.outer()
     attachments, last, frames = attachments_for(scene, mesh), body, case.frames or scene.frames
     events, opening, limit_before = (), None, None
-    if later is not None:
-        assert scene.cut is not None  # it was opened
-        last, frame = body_for(scene, case.body, later.mesh), event_frame(scene, scene.cut, frames)
-        check_applies(case, last, bool(targets))
-        mesh = flat_mesh(later.mesh, last) if isinstance(later.mesh, QuadraticMesh) else later.mesh
-        after = attachments_for(scene, mesh)
-        check_held(scene.cut, last.tetrahedra.astype(np.int64), last.rest, after)
-        events = (event_of(frame, body, last, later.parent, after, later.pairs if scene.cut.contact else None),)
-        opening = opening_of(frame, last, later.pairs)
-        limit_before = limit_of(case, body, attachments)
+    if scene.cut is not None:
+        events, opening, mesh = cut_of(case, scene.cut, given, body, bool(targets))
+        last, limit_before = events[-1].body, limit_of(case, body, attachments)
     limit = limit_of(case, last, events[-1].attachments if events else attachments)
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
     check_size(scene.duration, frames, dt, limit, last, len(scene.obstacles) + len(attachments))
@@ -223,6 +217,29 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
         events=events,
     )
     return Prepared(mesh, setup, limit, opening, limit_before)
+
+
+def cut_of(
+    case: Case, cut: Cut, mesh: OrganMesh | QuadraticMesh, body: Body, targets: bool
+) -> tuple[tuple[Event, ...], Opening, OrganMesh]:
+    """The events at which the cut opens a body on its mesh, where it was cut in the end, and the mesh then. Raises
+    StudyError, MassSpringError."""
+    scene = case.scene
+    frames = event_frames(scene, cut, case.frames or scene.frames)
+    shares = [(frame - frames[0]) / max(1, frames[-1] - frames[0]) for frame in frames]
+    stages = opened_in_stages(mesh, cut, shares)
+    events, last, cells = [], body, cells_of(mesh)
+    for frame, stage in zip(frames, stages, strict=True):
+        if stage is None:
+            continue
+        before, last = last, body_for(scene, case.body, stage.mesh)
+        check_applies(case, last, targets)
+        held = attachments_for(scene, flat_mesh(stage.mesh, last))
+        parent, cells = parents(cells, cells_of(stage.mesh)), cells_of(stage.mesh)
+        events.append(event_of(frame, before, last, parent, held, stage.pairs if cut.contact else None))
+    check_held(cut, last.tetrahedra.astype(np.int64), last.rest, events[-1].attachments)
+    whole = next(stage for stage in reversed(stages) if stage is not None)
+    return tuple(events), opening_of(events[0].frame, last, whole.pairs), flat_mesh(whole.mesh, last)
 
 
 def limit_of(case: Case, body: Body, attachments: tuple[Attachment, ...]) -> StepLimit:

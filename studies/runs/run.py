@@ -138,12 +138,16 @@ def _attributes(prepared: Prepared, history: History) -> dict[str, float | int |
 
 
 def _event_attributes(prepared: Prepared, history: History) -> dict[str, float]:
-    """What a cut did; of a run that ended before it what it would do to the step alone."""
+    """What a cut did, at the worst of its events; of a run that ended before it what it would do to the step alone."""
     before = prepared.limit_before
     assert before is not None  # it is cut
-    found = {"cut_limit_ratio": prepared.limit.damped / before.damped}
-    for one in history.passages:
-        found |= {"cut_energy": one.energy, "cut_momentum": one.momentum, "cut_seconds": 1e-9 * one.ns}
+    found = {"cut_limit_ratio": prepared.limit.damped / before.damped, "cut_events": len(prepared.setup.events)}
+    if history.passages:
+        found |= {
+            "cut_energy": max(one.energy for one in history.passages),
+            "cut_momentum": max(one.momentum for one in history.passages),
+            "cut_seconds": 1e-9 * max(one.ns for one in history.passages),
+        }
     return found
 
 

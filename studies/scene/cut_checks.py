@@ -5,7 +5,7 @@ import numpy as np
 from massspring import Probe
 from studies.base.errors import StudyError
 from studies.geometry.surface.sheet import check_sheet
-from studies.scene.clock import check_judged_after_cut, event_frame
+from studies.scene.clock import check_judged_after_cut, event_frames
 from studies.scene.cut import Cut
 from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
@@ -13,7 +13,7 @@ from studies.scene.scene import Scene
 
 def check_cuttable(scene: Scene, cut: Cut) -> None:
     """Raises StudyError for a time at which nothing can be cut, and for what cannot be cut."""
-    event_frame(scene, cut, scene.frames)
+    event_frames(scene, cut, scene.frames)
     check_judged_after_cut(scene)
     if scene.organ.shape == "file":
         raise StudyError(f"scene '{scene.name}' cuts an organ of a file; only organs of the catalogue are cut so far")
