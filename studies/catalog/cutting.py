@@ -4,6 +4,7 @@ from massspring import ImplicitVolume
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
 from studies.scene.library import CUT
+from studies.scene.scene import Scene
 
 BODIES = (
     BodyRecipe(nodes=350),
@@ -15,8 +16,18 @@ BODIES = (
 )
 ADVANCING = BODIES[1], BODIES[3]
 """Of scenes whose cut advances: with one volume elements turn over next to the tip."""
+WALLS = BodyRecipe(nodes=400), BodyRecipe(nodes=400, law="cotangent", volumes="nodal")
+"""Of hollow organs."""
 LONG = 0.8
 """Of the stability limit."""
+
+
+def bodies_of(scene: Scene) -> tuple[BodyRecipe, ...]:
+    """The bodies that run a scene with a cut."""
+    if scene.lumen is not None:
+        return WALLS
+    return BODIES if scene.cut is None or scene.cut.until is None else ADVANCING
+
 
 CUTTING = Study(
     name="cutting",
@@ -24,7 +35,7 @@ CUTTING = Study(
     cases=tuple(
         Case(scene, body, ImplicitVolume(), dt_fraction=LONG, timed=scene.reference is not None)
         for scene in CUT
-        for body in (BODIES if scene.cut is None or scene.cut.until is None else ADVANCING)
+        for body in bodies_of(scene)
     ),
     charts=(
         Chart("cut_open.png", "studies.plots.cut_open:draw"),

@@ -41,7 +41,7 @@ def cells_of(mesh: OrganMesh | QuadraticMesh) -> np.ndarray:
 
 
 def opened_in_stages(mesh: OrganMesh | QuadraticMesh, cut: Cut, shares: Sequence[float]) -> list[Opened | None]:
-    """A solid organ's mesh opened as far as its cut has come after each of the ascending `shares` of its way, the last
+    """An organ's mesh opened as far as its cut has come after each of the ascending `shares` of its way, the last
     of which is 1; None where no face opened since the share before. Raises StudyError for a cut that does not open it.
     """
     whole = opened_mesh(mesh, cut.name)
@@ -60,8 +60,8 @@ def opened_in_stages(mesh: OrganMesh | QuadraticMesh, cut: Cut, shares: Sequence
 
 
 def opened_mesh(mesh: OrganMesh | QuadraticMesh, name: str, chosen: np.ndarray | None = None) -> Opened:
-    """A solid organ's mesh opened along its cut `name`, or the `chosen` of its faces (f,) bool. Raises StudyError for a
-    cut that does not open it."""
+    """An organ's mesh opened along its cut `name`, or the `chosen` of its faces (f,) bool; of a hollow one the surface
+    of the lumen is then a part of the outer one. Raises StudyError for a cut that does not open it."""
     quadratic, faces = isinstance(mesh, QuadraticMesh), mesh.cuts[name]
     cells = cells_of(mesh)
     try:

@@ -13,7 +13,12 @@ from massspring.body.volumes import Volumes
 from massspring.layout.face_pairs import faces_behind
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import boundary_triangles
+from studies.runs.case import BodyRecipe
 from studies.scene.cut import Cut
+from studies.scene.scene import Scene
+
+LUMEN = "lumen"
+"""Name of the kept volume of what fills a hollow organ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +55,22 @@ def keeping_pieces(body: Body, volumes: Volumes | PointVolumes | None) -> Body:
     return body.keeping(Volumes.closed_surfaces(body, surfaces))
 
 
+def check_opens(scene: Scene, recipe: BodyRecipe) -> None:
+    """Raises StudyError for a body whose lumen no cut opens."""
+    if scene.cut is None or not scene.cut.opens_lumen:
+        return
+    if recipe.kind != "tetrahedral" or recipe.graded:
+        kind = "graded" if recipe.graded else recipe.kind
+        raise StudyError(
+            f"cut '{scene.cut.name}' opens a lumen, which a {kind} body cannot do yet; take an even tetrahedral one"
+        )
+    if scene.filled and recipe.volumes == "whole":
+        raise StudyError(
+            f"cut '{scene.cut.name}' opens a lumen, and the body keeps wall and content as one volume; keep them "
+            'apart: volumes="scene" or "nodal"'
+        )
+
+
 def check_held(cut: Cut, cells: np.ndarray, points: np.ndarray, attachments: tuple[Attachment, ...]) -> None:
     """Raises StudyError for a piece that nothing holds, unless it may go."""
     held = np.concatenate([np.empty(0, np.int64), *(np.asarray(a.nodes) for a in attachments)])
@@ -70,18 +91,20 @@ def event_of(
     """The event at which one body becomes the other, whose nodes had the numbers `parent` (n',); `pairs`: whose faces
     touch."""
     was, now = before.kept, after.kept
+    ended = (was.names.index(LUMEN),) if LUMEN in was.names and LUMEN not in now.names else ()
+    whole = was.count - len(ended)
     pieces = [pieces_of(body.rest, body.tetrahedra.astype(np.int64))[:, None] for body in (before, after)]
     if isinstance(was, PointVolumes) and isinstance(now, PointVolumes):
         volumes = parents(was.corner_volume, now.corner_volume)
-    elif was.count == before.node_count and now.count == after.node_count:
+    elif whole == before.node_count and now.count == after.node_count:
         volumes = parent
-    elif [was.count, now.count] == [int(piece.max()) + 1 for piece in pieces]:  # as `keeping_pieces` has them
+    elif [whole, now.count] == [int(piece.max()) + 1 for piece in pieces]:  # as `keeping_pieces` has them
         volumes = parents(*pieces)
     else:
         raise StudyError(
             f"a body that is cut keeps one volume, or one per node or vertex, not {was.count}; change its volumes"
         )
-    return Event(after, parent, volumes, frame, attachments, pairs)
+    return Event(after, parent, volumes, frame, attachments, ended, pairs)
 
 
 def opening_of(frame: int, after: Body, pairs: np.ndarray) -> Opening:

@@ -31,7 +31,7 @@ from studies.meshing.opened_mesh import cells_of, opened_in_stages
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import ADAPTER, ADAPTIVE, BodyRecipe, Case
-from studies.runs.cutting import Opening, check_held, event_of, keeping_pieces, opening_of
+from studies.runs.cutting import LUMEN, Opening, check_held, check_opens, event_of, keeping_pieces, opening_of
 from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
@@ -39,7 +39,7 @@ from studies.scene.clock import event_frames
 from studies.scene.cut import Cut
 from studies.scene.scene import Scene
 
-LUMEN, WHOLE = "lumen", "whole"
+WHOLE = "whole"
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +176,7 @@ def prepare(case: Case) -> Prepared:
     if reason is not None:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
     check_masses(scene, case.body)
+    check_opens(scene, case.body)
     mesh = mesh_of(scene, case.body)
     from studies.meshing.kept_shape import tell_shape  # with the finite elements
 

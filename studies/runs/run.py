@@ -15,9 +15,10 @@ from studies.base.compile_watch import watching
 from studies.base.errors import DoesNotApply, StudyError
 from studies.runs.case import Case, case_from_json
 from studies.runs.current import case_fingerprint, case_path
+from studies.runs.cutting import LUMEN
 from studies.runs.indicators import indicators, remarks
 from studies.runs.limits import TIME_LIMIT
-from studies.runs.prepare import LUMEN, Prepared, prepare
+from studies.runs.prepare import Prepared, prepare
 from studies.runs.surface_frames import moments, surface_fields
 from studies.runs.user_code import fault_of, files_of
 from studies.store.new_record import new_fields, new_record

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 from studies.base.errors import StudyError
 from studies.scene.scene import Scene
 
-LATER = ("contact", "until", "along")
+LATER = ("contact", "until", "along", "opens_lumen")
 """What cuts have had since there were stored scenes with cuts; none of it is in the keys of those."""
 
 

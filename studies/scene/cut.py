@@ -31,6 +31,8 @@ class Cut:
     """Direction in which it advances, at an even speed; of any length."""
     contact: bool = False
     """Whether its faces touch, without friction, where they close; else they pass through each other."""
+    opens_lumen: bool = False
+    """Of a hollow organ, whose wall it cuts through: what fills its lumen goes, and nothing keeps its volume then."""
     free: bool = False
     """Whether a piece that nothing holds may go where it will."""
 

@@ -13,6 +13,7 @@ from studies.scene.library.liver_cut_live import LIVER_CUT_LIVE
 from studies.scene.library.liver_incised import LIVER_INCISED
 from studies.scene.library.liver_press import LIVER_PRESS
 from studies.scene.library.liver_probe import LIVER_PROBE
+from studies.scene.library.shell_opened import SHELL_OPENED
 from studies.scene.library.spleen_sag import SPLEEN_SAG
 from studies.scene.library.stomach_press import STOMACH_PRESS
 from studies.scene.library.stomach_probe import STOMACH_PROBE
@@ -45,6 +46,7 @@ CUT: tuple[Scene, ...] = (
     BALL_BISECTED,
     BALL_CUT_PRESSED,
     KIDNEY_BISECTED,
+    SHELL_OPENED,
 )
 """Scenes that cut their organ. They are not in SCENES: surface bodies and half of the methods cannot run them."""
 
@@ -65,6 +67,7 @@ __all__ = [
     "LIVER_PRESS",
     "LIVER_PROBE",
     "SCENES",
+    "SHELL_OPENED",
     "SPLEEN_SAG",
     "STOMACH_PRESS",
     "STOMACH_PROBE",

@@ -170,7 +170,7 @@ def test_what_cannot_be_cut_is_refused():
     same = replace(BALL_INCISED, checkpoints=(1.001, 4.0))
     with pytest.raises(StudyError, match=r"at 1\.001 s and cut 'incision' before it at 1 s are in one of 200 frames"):
         prepare(Case(same, ONE))
-    with pytest.raises(StudyError, match="is for a solid organ that is filled"):
+    with pytest.raises(StudyError, match="is for an organ that is filled"):
         prepare(Case(BALL_INCISED, BodyRecipe("surface", nodes=200)))
 
 
