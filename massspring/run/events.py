@@ -30,6 +30,8 @@ class Event:
     """How many frames come before it."""
     attachments: tuple[Attachment, ...] = ()
     """As many as before, in the same order, by the nodes of the new body."""
+    ended: tuple[int, ...] = ()
+    """Kept volumes before it that nothing keeps any more, as that of a lumen that is opened."""
     pairs: np.ndarray | None = None
     """Nodes behind a cut and their copies in front of it, (p, 2), if its faces touch from then on (`Setup.pairs`)."""
     growth: Growth | None = None
@@ -120,13 +122,19 @@ def check_events(
 def check_event(event: Event, before: Body) -> None:
     """Raises MassSpringError for a body that does not take over mass and springs of the one before."""
     parent, volumes = np.asarray(event.parent), np.asarray(event.volume_parent)
+    kept = np.setdiff1d(np.arange(before.kept.count), event.ended)
+    if before.kept.count - len(kept) != len(event.ended):
+        raise MassSpringError(
+            f"the volumes {event.ended} that end at an event are not among the {before.kept.count} before it, or one "
+            "is given twice"
+        )
     for what, rows, count, known in (
-        ("nodes", parent, event.body.node_count, before.node_count),
-        ("kept volumes", volumes, event.body.kept.count, before.kept.count),
+        ("nodes", parent, event.body.node_count, np.arange(before.node_count)),
+        ("kept volumes", volumes, event.body.kept.count, kept),
     ):
-        if rows.shape != (count,) or not np.array_equal(np.unique(rows), np.arange(known)):
+        if rows.shape != (count,) or not np.array_equal(np.unique(rows), known):
             raise MassSpringError(
-                f"the {count} {what} after an event do not name all {known} before it; give each its parent"
+                f"the {count} {what} after an event do not name all {len(known)} before it; give each its parent"
             )
     grown = event.growth
     old = np.ones(len(parent), dtype=bool) if grown is None else grown.mass > 0.0

@@ -113,7 +113,7 @@ class Numbers:
     def parts(self, volumes: np.ndarray, whole: np.ndarray) -> np.ndarray:
         """What each of the `volumes` (m,) has of the values `whole` of those that they are still a part of, (m,)."""
         together = np.bincount(self.volumes, weights=volumes, minlength=len(whole))
-        return volumes * (whole / together)[self.volumes]
+        return volumes * (whole[self.volumes] / together[self.volumes])
 
 
 def kinetic_energy(state: State) -> float:

@@ -102,15 +102,18 @@ class Setup:
     @cached_property
     def later(self) -> tuple["Setup", ...]:
         """The set-up after each event, without events. Raises MassSpringError for one that cannot follow."""
-        setups, body, x = [], self.body, self.positions
+        setups, body, x, targets = [], self.body, self.positions, dict(self.targets)
         for event in self.events:
             check_event(event, body)
+            for volume in event.ended:
+                targets.pop(body.kept.names[volume], None)
             x, body = None if x is None else event.carried(x), event.body
             setups.append(
                 replace(
                     self,
                     body=body,
                     attachments=event.attachments,
+                    targets=dict(targets),
                     velocity=None,
                     positions=x,
                     events=(),

@@ -57,6 +57,8 @@ class Stage:
         place = slice(None) if self.start.permutation is None else self.start.permutation
         nodes.x[place], nodes.v[place] = x, v
         start = replace(self.start, nodes=nodes, lam=state.lam[self.before.volumes])
+        if start.pairs is not None and state.pairs is not None:
+            start = replace(start, pairs=start.pairs._replace(lost=state.pairs.lost.copy()))
         off = body.kept.measure(x) - self.targets_after(self.frame - 1)
         time = float(np.abs(off / body.rest_volumes).max()) / self.filling
         at = self.frame * self.setup.clock.frame

@@ -3,7 +3,7 @@
 from studies.catalog.study import Study
 from studies.metrics.table import check_columns
 from studies.scene.checks import check_scene
-from studies.scene.clock import event_frame
+from studies.scene.clock import event_frames
 from studies.store.schema import Status
 
 
@@ -20,5 +20,5 @@ def check_study(study: Study, drawn: bool = True) -> list[str]:
         return []
     for case in study.cases:
         if case.scene.cut is not None and case.frames:
-            event_frame(case.scene, case.scene.cut, case.frames)
+            event_frames(case.scene, case.scene.cut, case.frames)
     return [sentence for scene in study.scenes for sentence in check_scene(scene)]

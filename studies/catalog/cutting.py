@@ -8,6 +8,7 @@ from studies.runs.case import VIRTUAL, BodyRecipe, Case
 from studies.scene.library import CUT
 from studies.scene.library.ball_bisected import BALL_BISECTED
 from studies.scene.library.ball_incised import BALL_INCISED
+from studies.scene.scene import Scene
 
 BODIES = (
     BodyRecipe(nodes=350),
@@ -21,8 +22,22 @@ PAPER = BodyRecipe("surface", nodes=350)
 """The paper's body, which is cut in pieces alone."""
 UNFORESEEN = tuple(replace(body, cut=VIRTUAL) for body in BODIES if body.kind == "tetrahedral")
 """The same on meshes that do not know the cut."""
+ADVANCING = BODIES[1], BODIES[3]
+"""Of scenes whose cut advances: with one volume elements turn over next to the tip."""
+WALLS = BodyRecipe(nodes=400), BodyRecipe(nodes=400, law="cotangent", volumes="nodal")
+"""Of hollow organs."""
 LONG = 0.8
 """Of the stability limit."""
+
+
+def bodies_of(scene: Scene) -> tuple[BodyRecipe, ...]:
+    """The bodies that run a scene with a cut."""
+    if scene.lumen is not None:
+        return WALLS
+    if scene.cut is not None and scene.cut.until is not None:
+        return ADVANCING
+    return BODIES if scene.cut is not None and scene.cut.within is not None else (PAPER, *BODIES)
+
 
 CUTTING = Study(
     name="cutting",
@@ -30,7 +45,7 @@ CUTTING = Study(
     cases=tuple(
         Case(scene, body, ImplicitVolume(), dt_fraction=LONG, timed=scene.reference is not None)
         for scene, bodies in (
-            *((scene, BODIES if scene.cut is not None and scene.cut.within else (PAPER, *BODIES)) for scene in CUT),
+            *((scene, bodies_of(scene)) for scene in CUT),
             (BALL_INCISED, UNFORESEEN),
             (BALL_BISECTED, UNFORESEEN),
         )

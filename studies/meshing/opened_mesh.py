@@ -1,6 +1,8 @@
 """The mesh of an organ after its cut: the same cells, their faces on the cut part of the boundary."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -14,7 +16,9 @@ from reference_fem.elements.shapes import edge_index
 from studies.base.errors import StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import boundary_triangles
+from studies.meshing.advancing_cut import faces_in_stages
 from studies.meshing.quadratic_mesh import QuadraticMesh
+from studies.scene.cut import Cut
 
 Mesh = TypeVar("Mesh", OrganMesh, QuadraticMesh)
 
@@ -31,12 +35,37 @@ class Opened:
     """Nodes behind the cut and their copies in front of it, (p, 2)."""
 
 
-def opened_mesh(mesh: OrganMesh | QuadraticMesh, name: str) -> Opened:
-    """A solid organ's mesh opened along its cut `name`. Raises StudyError for a cut that does not open it."""
-    quadratic = isinstance(mesh, QuadraticMesh)
-    cells = mesh.cells if quadratic else mesh.tetrahedra
+def cells_of(mesh: OrganMesh | QuadraticMesh) -> np.ndarray:
+    """Its tetrahedra, (k, 4) or (k, 10)."""
+    return mesh.cells if isinstance(mesh, QuadraticMesh) else mesh.tetrahedra
+
+
+def opened_in_stages(mesh: OrganMesh | QuadraticMesh, cut: Cut, shares: Sequence[float]) -> list[Opened | None]:
+    """An organ's mesh opened as far as its cut has come after each of the ascending `shares` of its way, the last
+    of which is 1; None where no face opened since the share before. Raises StudyError for a cut that does not open it.
+    """
+    whole = opened_mesh(mesh, cut.name)
+    if cut.along is None:
+        return [whole]
+    faces, parting = mesh.cuts[cut.name], np.zeros(len(mesh.points), dtype=bool)
+    parting[whole.parent[whole.pairs[:, 0]]] = True
+    parting &= np.bincount(faces.ravel(), minlength=len(parting)) > 0  # without the nodes between corners
+    stages = faces_in_stages(faces, parting, mesh.points @ np.asarray(cut.along, float), shares[:-1])
+    stages.append(np.ones(len(faces), dtype=bool))
+    counts = [0, *(int(chosen.sum()) for chosen in stages)]
+    return [
+        None if now == was else opened_mesh(mesh, cut.name, chosen)
+        for chosen, (was, now) in zip(stages, pairwise(counts), strict=True)
+    ]
+
+
+def opened_mesh(mesh: OrganMesh | QuadraticMesh, name: str, chosen: np.ndarray | None = None) -> Opened:
+    """An organ's mesh opened along its cut `name`, or the `chosen` of its faces (f,) bool; of a hollow one the surface
+    of the lumen is then a part of the outer one. Raises StudyError for a cut that does not open it."""
+    quadratic, faces = isinstance(mesh, QuadraticMesh), mesh.cuts[name]
+    cells = cells_of(mesh)
     try:
-        opening = opened(cells, mesh.cuts[name], len(mesh.points))
+        opening = opened(cells, faces if chosen is None else faces[chosen], len(mesh.points))
     except MassSpringError as error:
         raise StudyError(f"{mesh.name}: cut '{name}' does not open it: {error}") from error
     after = opening.cells.astype(np.int64)

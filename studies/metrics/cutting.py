@@ -36,12 +36,14 @@ def _of_event(run: Run, name: str) -> float:
 
 
 def cut_energy(run: Run) -> float:
-    """100 × change of the energy over the energy when the body is replaced by the cut one [%]; NaN without a cut."""
+    """100 × change of the energy over the energy when the body is replaced by the cut one [%], the largest of all
+    events; NaN without a cut."""
     return PERCENT * _of_event(run, "cut_energy")
 
 
 def cut_momentum(run: Run) -> float:
-    """100 × change of the momentum over the sum of its sizes in all nodes at the cut [%]; NaN without a cut."""
+    """100 × change of the momentum over the sum of its sizes in all nodes at the cut [%], the largest of all events;
+    NaN without a cut."""
     return PERCENT * _of_event(run, "cut_momentum")
 
 
@@ -51,5 +53,6 @@ def cut_limit(run: Run) -> float:
 
 
 def cut_ms(run: Run) -> float:
-    """Wall time of the cut, for which the bodies are made before the run [ms]; NaN without a cut."""
+    """Wall time of the cut, for which the bodies are made before the run [ms], the longest of all events; NaN without
+    a cut."""
     return 1e3 * _of_event(run, "cut_seconds")

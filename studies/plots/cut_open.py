@@ -20,6 +20,7 @@ TITLE = "Incised organs"
 CAMERAS = {
     "ball_incised": Camera(azimuth=-152.0, elevation=16.0),
     "liver_incised": Camera(azimuth=-60.0, elevation=38.0),
+    "liver_cut_live": Camera(azimuth=-60.0, elevation=38.0),
 }
 OTHER = Camera(azimuth=-72.0, elevation=25.0)
 TISSUE, STEEL, INSIDE = "#D9B3A6", "#A9A9A9", "#8C2F39"

@@ -79,7 +79,7 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
     motion = _motion(group[0].case.scene)
     cut, stop = group[0].case.scene.cut, motion.times[-1]
     _draw_reference(axes, group[0], stop, math.inf if cut is None else cut.at)
-    for at in (stop,) if cut is None else (cut.at, stop):
+    for at in sorted({stop} if cut is None else {cut.at, cut.ends, stop}):
         axes.axvline(at, color=GREY, linewidth=1, linestyle=":")
     _label(axes, ends, top)
     axes.set(xlim=(0, 1.015 * group[0].case.scene.duration), ylim=(0, top), xlabel="time [s]", ylabel="force [N]")

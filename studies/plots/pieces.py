@@ -63,7 +63,8 @@ def _draw_run(axes: Axes, run: Run) -> None:
     for (colour, line), of_piece, rest in zip(_looks(volume.shape[1]), volume.T, target[-1], strict=True):
         axes.plot(run.fields.t[good], _off(of_piece[good], rest), color=colour, linestyle=line)
     axes.plot(run.fields.t[good], _off(volume[good].sum(axis=1), target[-1].sum()), color=BLACK, linewidth=1.0)
-    axes.axvline(cut.at, color=GREY, linewidth=1, linestyle=":")
+    for at in sorted({cut.at, cut.ends}):
+        axes.axvline(at, color=GREY, linewidth=1, linestyle=":")
     axes.set_yscale("log")
     axes.set(xlim=(0, run.case.scene.duration), ylim=(SMALLEST, PERCENT))
 

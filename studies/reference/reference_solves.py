@@ -44,7 +44,8 @@ class ReferenceSolve:
 def physics_of(scene: Scene) -> Scene:
     """The scene without what its reference does not depend on."""
     assert scene.reference is not None  # a reference solve belongs to a plan
-    plain = replace(scene, title="", duration=0.0, frames=0, quantities=(), not_for=())
+    cuts = tuple(cut.at_once for cut in scene.cuts)
+    plain = replace(scene, title="", duration=0.0, frames=0, quantities=(), not_for=(), cuts=cuts)
     return plain if scene.reference.dt is not None else replace(plain, damping=0.0, start=None)
 
 

@@ -15,8 +15,12 @@ from massspring.layout.face_pairs import faces_behind
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
 from studies.meshing.opened_mesh import Opened
+from studies.runs.case import BodyRecipe
 from studies.scene.cut import Cut
 from studies.scene.scene import Scene
+
+LUMEN = "lumen"
+"""Name of the kept volume of what fills a hollow organ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +28,7 @@ class Opening:
     """Where the body of a record was cut, in the numbers of the record."""
 
     frame: int
-    """Frames before it."""
+    """Frames before it, or before it begins to advance."""
     faces: np.ndarray
     """Triangles of the surface behind the cut, (u, 3)."""
     pairs: np.ndarray
@@ -42,7 +46,13 @@ def pieces_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 
 def check_blade(cut: Cut, scene: str, kind: str) -> None:
-    """Raises DoesNotApply where the cut of the scene of that name ends inside a body of a `kind` that is a surface."""
+    """Raises DoesNotApply where the cut of the scene of that name ends inside a body of a `kind` that is a surface, or
+    advances over it."""
+    if kind == "surface" and cut.until is not None:
+        raise DoesNotApply(
+            f"the surface body does not apply to scene '{scene}': cut '{cut.name}' advances, and this body is cut in "
+            "pieces at once; leave until out, or take a tetrahedral body"
+        )
     if kind == "surface" and cut.within is not None:
         raise DoesNotApply(
             f"the surface body does not apply to scene '{scene}': cut '{cut.name}' ends inside the organ, where this "
@@ -72,6 +82,22 @@ def keeping_pieces(body: Body, volumes: Volumes | PointVolumes | None) -> Body:
     return body.keeping(Volumes.closed_surfaces(body, surfaces))
 
 
+def check_opens(scene: Scene, recipe: BodyRecipe) -> None:
+    """Raises StudyError for a body whose lumen no cut opens."""
+    if scene.cut is None or not scene.cut.opens_lumen:
+        return
+    if recipe.kind != "tetrahedral" or recipe.graded:
+        kind = "graded" if recipe.graded else recipe.kind
+        raise StudyError(
+            f"cut '{scene.cut.name}' opens a lumen, which a {kind} body cannot do yet; take an even tetrahedral one"
+        )
+    if scene.filled and recipe.volumes == "whole":
+        raise StudyError(
+            f"cut '{scene.cut.name}' opens a lumen, and the body keeps wall and content as one volume; keep them "
+            'apart: volumes="scene" or "nodal"'
+        )
+
+
 def check_held(cut: Cut, body: Body, attachments: tuple[Attachment, ...]) -> None:
     """Raises StudyError for a piece of the cut body that nothing holds, unless it may go."""
     cells, points = (body.tetrahedra if len(body.tetrahedra) else body.triangles).astype(np.int64), body.rest
@@ -94,23 +120,34 @@ def event_of(
     """The event at which one body becomes the other, whose nodes had the numbers `parent` (n',); `pairs`: whose faces
     touch; `growth`: what it has beyond copies."""
     was, now = before.kept, after.kept
+    ended = (was.names.index(LUMEN),) if LUMEN in was.names and LUMEN not in now.names else ()
+    whole = was.count - len(ended)
     if isinstance(was, PointVolumes) and isinstance(now, PointVolumes):
         volumes = parents(was.corner_volume, now.corner_volume)
-    elif was.count == 1:
+    elif whole == 1:
         volumes = np.zeros(now.count, dtype=np.int64)
-    elif was.count == before.node_count and now.count == after.node_count:
+    elif whole == before.node_count and now.count == after.node_count:
         volumes = parent
     else:
-        raise StudyError(
-            f"a body that is cut keeps one volume, or one per node or vertex, not {was.count}; change its volumes"
-        )
-    return Event(after, parent, volumes, frame, attachments, pairs, growth)
+        pieces = [pieces_of(body.rest, body.tetrahedra.astype(np.int64))[:, None] for body in (before, after)]
+        if [whole, now.count] == [int(piece.max(initial=-1)) + 1 for piece in pieces]:  # as `keeping_pieces` has them
+            volumes = parents(*pieces)
+        else:
+            raise StudyError(
+                f"a body that is cut keeps one volume, or one per node or vertex, not {was.count}; change its volumes"
+            )
+    return Event(after, parent, volumes, frame, attachments, ended, pairs, growth)
 
 
 def check_virtual(scene: Scene) -> None:
     """Raises DoesNotApply for a scene in which there is nothing that virtual nodes could cut."""
     if scene.cut is None:
         raise DoesNotApply(f"virtual nodes do not apply to scene '{scene.name}': it has no cut; leave cut out")
+    if scene.cut.until is not None:
+        raise DoesNotApply(
+            f"virtual nodes do not apply to scene '{scene.name}', whose cut advances; leave until out, or take cut "
+            "'conforming'"
+        )
     if scene.cut.contact:
         raise DoesNotApply(
             f"virtual nodes do not apply to scene '{scene.name}', whose faces of the cut touch: no node lies on them; "

@@ -1,5 +1,6 @@
 """From a scene to the mass-spring solver: the mesh, the body, the set-up of a run."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 
@@ -8,6 +9,7 @@ import numpy as np
 from massspring import (
     Attachment,
     Body,
+    Event,
     Material,
     Ramp,
     Setup,
@@ -19,21 +21,24 @@ from massspring import (
     tetrahedral_body,
 )
 from massspring.body.membranes import MEMBRANE_LAWS
+from massspring.body.opening import parents
 from massspring.body.volumes import Volumes
 from massspring.methods.capabilities import No
 from massspring.world.surroundings import Surroundings
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
-from studies.meshing.opened_mesh import Opened, opened_mesh
+from studies.meshing.opened_mesh import Opened, cells_of, opened_in_stages
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.meshing.virtual_mesh import Tissue, VirtualMesh, virtual_mesh
 from studies.runs.case import ADAPTER, ADAPTIVE, VIRTUAL, BodyRecipe, Case
 from studies.runs.cutting import (
+    LUMEN,
     Opening,
     check_blade,
     check_held,
+    check_opens,
     check_virtual,
     event_of,
     keeping_pieces,
@@ -43,11 +48,11 @@ from studies.runs.cutting import (
 from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
-from studies.scene.clock import event_frame
+from studies.scene.clock import event_frames
 from studies.scene.cut import Cut
 from studies.scene.scene import Scene
 
-LUMEN, WHOLE = "lumen", "whole"
+WHOLE = "whole"
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +201,7 @@ def prepare(case: Case) -> Prepared:
     check_masses(scene, case.body)
     if scene.cut is not None:
         check_blade(scene.cut, scene.name, case.body.kind)
+    check_opens(scene, case.body)
     mesh = mesh_of(scene, case.body)
     from studies.meshing.kept_shape import tell_shape  # with the finite elements
 
@@ -208,33 +214,17 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
     scene = case.scene
     if case.body.cut == VIRTUAL:
         check_virtual(scene)
-    body = body_for(scene, case.body, mesh)
-    later = None if scene.cut is None else _later(case.body, mesh, scene.cut)
-    if isinstance(mesh, QuadraticMesh):
-        mesh = flat_mesh(mesh, body)
+    given, body = mesh, body_for(scene, case.body, mesh)
+    mesh = flat_mesh(mesh, body)
     targets = targets_for(scene, mesh, body)
     check_applies(case, body, bool(targets))
     if case.body.kind in ("surface", "membrane") and mesh.hollow:
         mesh = mesh.outer()
     attachments, last, frames = attachments_for(scene, mesh), body, case.frames or scene.frames
     events, opening, limit_before, tissue = (), None, None, None
-    if later is not None:
-        assert scene.cut is not None  # it was opened
-        tissue, share = (later.tissue, later.share) if isinstance(later, VirtualMesh) else (None, None)
-        pieces = surface_pieces(body, later, case.body.axis) if case.body.kind == "surface" else None
-        last = body_for(scene, case.body, later.mesh, share) if pieces is None else pieces.body
-        parent, growth = (later.parent, None) if pieces is None else (pieces.parent, pieces.growth)
-        frame = event_frame(scene, scene.cut, frames)
-        check_applies(case, last, bool(targets))
-        mesh = flat_mesh(later.mesh, last) if isinstance(later.mesh, QuadraticMesh) else later.mesh
-        mesh = mesh if pieces is None else mesh.outer()
-        after = attachments_for(scene, mesh)
-        check_held(scene.cut, last, after)
-        touching = later.pairs if scene.cut.contact else None
-        events = (event_of(frame, body, last, parent, after, touching, growth),)
-        mesh = mesh if tissue is None else tissue.mesh
-        opening = opening_of(frame, last, last.triangles if tissue is None else mesh.triangles, later.pairs)
-        limit_before = limit_of(case, body, attachments)
+    if scene.cut is not None:
+        events, opening, mesh, tissue = cut_of(case, scene.cut, given, body, bool(targets))
+        last, limit_before = events[-1].body, limit_of(case, body, attachments)
     limit = limit_of(case, last, events[-1].attachments if events else attachments)
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
     check_size(scene.duration, frames, dt, limit, last, len(scene.obstacles) + len(attachments))
@@ -257,12 +247,52 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
     return Prepared(mesh, setup, limit, opening, limit_before, tissue)
 
 
-def _later(recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh, cut: Cut) -> Opened | VirtualMesh:
-    """The mesh after its cut, along its faces or through its cells. Raises StudyError."""
+def cut_of(
+    case: Case, cut: Cut, mesh: OrganMesh | QuadraticMesh, body: Body, targets: bool
+) -> tuple[tuple[Event, ...], Opening, OrganMesh, Tissue | None]:
+    """The events at which the cut opens a body on its mesh, where it was cut in the end, the mesh then, and of a body
+    with virtual nodes its tissue. Raises StudyError, MassSpringError."""
+    scene, recipe = case.scene, case.body
+    frames = event_frames(scene, cut, case.frames or scene.frames)
+    shares = [(frame - frames[0]) / max(1, frames[-1] - frames[0]) for frame in frames]
+    stages = _stages(recipe, mesh, cut, shares)
+    events, last, cells = [], body, cells_of(mesh)
+    for frame, stage in zip(frames, stages, strict=True):
+        if stage is None:
+            continue
+        before, growth = last, None
+        if isinstance(stage, VirtualMesh):
+            last, parent, flat = body_for(scene, recipe, stage.mesh, stage.share), stage.parent, stage.mesh
+        elif recipe.kind == "surface":
+            assert isinstance(stage.mesh, OrganMesh)  # that of a quadratic body has no surface body
+            pieces = surface_pieces(before, stage, recipe.axis)
+            last, parent, growth = pieces.body, pieces.parent, pieces.growth
+            flat = stage.mesh.outer()
+        else:
+            last = body_for(scene, recipe, stage.mesh)
+            parent, cells, flat = (
+                parents(cells, cells_of(stage.mesh)),
+                cells_of(stage.mesh),
+                flat_mesh(stage.mesh, last),
+            )
+        check_applies(case, last, targets)
+        touching = stage.pairs if cut.contact else None
+        events.append(event_of(frame, before, last, parent, attachments_for(scene, flat), touching, growth))
+    check_held(cut, last, events[-1].attachments)
+    whole = next(stage for stage in reversed(stages) if stage is not None)
+    tissue = whole.tissue if isinstance(whole, VirtualMesh) else None
+    flat, surface = (flat, last.triangles) if tissue is None else (tissue.mesh, tissue.mesh.triangles)
+    return tuple(events), opening_of(events[0].frame, last, surface, whole.pairs), flat, tissue
+
+
+def _stages(
+    recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh, cut: Cut, shares: Sequence[float]
+) -> Sequence[Opened | VirtualMesh | None]:
+    """The mesh at each event, along its faces or through its cells. Raises StudyError."""
     if recipe.cut == VIRTUAL:
         assert isinstance(mesh, OrganMesh)  # of a tetrahedral body
-        return virtual_mesh(mesh, cut)
-    return opened_mesh(mesh, cut.name)
+        return [virtual_mesh(mesh, cut)]
+    return opened_in_stages(mesh, cut, shares)
 
 
 def limit_of(case: Case, body: Body, attachments: tuple[Attachment, ...]) -> StepLimit:

@@ -26,8 +26,10 @@ def quadratic_for(scene: Scene, recipe: BodyRecipe, mesh: QuadraticMesh) -> Body
     return quadratic_body(mesh.points, mesh.cells, material, lumen, recipe.mass, recipe.contact)
 
 
-def flat_mesh(mesh: QuadraticMesh, body: Body) -> OrganMesh:
-    """The flat triangles and tetrahedra that stand for the curved elements where a body touches and is measured."""
+def flat_mesh(mesh: OrganMesh | QuadraticMesh, body: Body) -> OrganMesh:
+    """The flat triangles and tetrahedra that stand for curved elements where a body touches and is measured."""
+    if isinstance(mesh, OrganMesh):
+        return mesh
     return OrganMesh(
         mesh.name,
         mesh.points,

@@ -16,9 +16,10 @@ from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.runs.case import Case, case_from_json
 from studies.runs.current import case_fingerprint, case_path
+from studies.runs.cutting import LUMEN
 from studies.runs.indicators import indicators, remarks
 from studies.runs.limits import TIME_LIMIT
-from studies.runs.prepare import LUMEN, Prepared, prepare
+from studies.runs.prepare import Prepared, prepare
 from studies.runs.surface_frames import moments, surface_fields
 from studies.runs.user_code import fault_of, files_of
 from studies.store.new_record import new_fields, new_record
@@ -140,12 +141,16 @@ def _attributes(prepared: Prepared, history: History) -> dict[str, float | int |
 
 
 def _event_attributes(prepared: Prepared, history: History) -> dict[str, float]:
-    """What a cut did; of a run that ended before it what it would do to the step alone."""
+    """What a cut did, at the worst of its events; of a run that ended before it what it would do to the step alone."""
     before = prepared.limit_before
     assert before is not None  # it is cut
-    found = {"cut_limit_ratio": prepared.limit.damped / before.damped}
-    for one in history.passages:
-        found |= {"cut_energy": one.energy, "cut_momentum": one.momentum, "cut_seconds": 1e-9 * one.ns}
+    found = {"cut_limit_ratio": prepared.limit.damped / before.damped, "cut_events": len(prepared.setup.events)}
+    if history.passages:
+        found |= {
+            "cut_energy": max(one.energy for one in history.passages),
+            "cut_momentum": max(one.momentum for one in history.passages),
+            "cut_seconds": 1e-9 * max(one.ns for one in history.passages),
+        }
     return found
 
 

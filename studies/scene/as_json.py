@@ -10,6 +10,9 @@ from pydantic import TypeAdapter, ValidationError
 from studies.base.errors import StudyError
 from studies.scene.scene import Scene
 
+LATER = ("contact", "until", "along", "opens_lumen")
+"""What cuts have had since there were stored scenes with cuts; none of it is in the keys of those."""
+
 
 def scene_to_json(scene: Scene) -> str:
     """Canonical JSON of a scene."""
@@ -17,10 +20,10 @@ def scene_to_json(scene: Scene) -> str:
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """JSON-able form; without cuts where there are none, as before scenes could have any, nor contact where faces have
-    none."""
+    """JSON-able form; without cuts where there are none, as before scenes could have any, nor what a cut leaves out of
+    LATER."""
     data = _scene_adapter().dump_python(scene, mode="json")
-    data["cuts"] = [cut if cut["contact"] else {k: v for k, v in cut.items() if k != "contact"} for cut in data["cuts"]]
+    data["cuts"] = [{k: v for k, v in cut.items() if v or k not in LATER} for cut in data["cuts"]]
     return data if scene.cuts else {name: value for name, value in data.items() if name != "cuts"}
 
 

@@ -2,9 +2,14 @@
 
 import math
 
+import numpy as np
+
 from studies.base.errors import StudyError
 from studies.scene.cut import Cut
 from studies.scene.scene import Scene
+
+MOST_EVENTS = 20
+"""Of a cut that advances: more cost memory and time before the run, and the end is the same."""
 
 
 def check_clock(scene: Scene, file: str = "") -> None:
@@ -26,32 +31,49 @@ def check_clock(scene: Scene, file: str = "") -> None:
         )
 
 
-def event_frame(scene: Scene, cut: Cut, frames: int) -> int:
-    """Frames before the cut. Raises StudyError for one before the first frame ends, or after the last begins, and for a
-    checkpoint after it in its frame."""
+def event_frames(scene: Scene, cut: Cut, frames: int) -> list[int]:
+    """Frames before each event of the cut: one, or of a cut that advances up to MOST_EVENTS that are evenly spread.
+
+    Raises StudyError for a cut that begins before the first frame ends, or ends after the last begins or in the frame
+    in which it begins, and for a checkpoint after it in its last frame."""
     duration = scene.duration
-    frame = round(cut.at * frames / duration)
-    if not 1 <= frame < frames:
+    first, last = (round(t * frames / duration) for t in (cut.at, cut.ends))
+    for frame, t in ((first, cut.at), (last, cut.ends)):
+        if not 1 <= frame < frames:
+            raise StudyError(
+                f"cut '{cut.name}' at {t:g} s is not between two of the {frames} frames of {duration:g} s; "
+                "move it, or ask for more frames"
+            )
+    if cut.until is not None and first == last:
         raise StudyError(
-            f"cut '{cut.name}' at {cut.at:g} s is not between two of the {frames} frames of {duration:g} s; "
-            "move it, or ask for more frames"
+            f"cut '{cut.name}' advances from {cut.at:g} s until {cut.until:g} s, within one of {frames} frames; ask "
+            "for more frames, or leave out until and along"
         )
-    early = [t for t in scene.checkpoints if t > cut.at and round(t * frames / duration) <= frame]
+    early = [t for t in scene.checkpoints if t > cut.ends and round(t * frames / duration) <= last]
     if early:
         raise StudyError(
-            f"the checkpoint at {early[0]:g} s and cut '{cut.name}' before it at {cut.at:g} s are in one of {frames} "
+            f"the checkpoint at {early[0]:g} s and cut '{cut.name}' before it at {cut.ends:g} s are in one of {frames} "
             "frames; move one, or ask for more frames"
         )
-    return frame
+    return np.linspace(first, last, min(last - first + 1, MOST_EVENTS)).round().astype(int).tolist()
 
 
 def check_judged_after_cut(scene: Scene) -> None:
-    """Raises StudyError where all checkpoints of a reference come before the cut of its scene."""
+    """Raises StudyError where all checkpoints of a reference come before the cut of its scene, or one while it
+    advances."""
     cut, last = scene.cut, scene.checkpoints[-1]
-    if cut is not None and scene.reference is not None and last <= cut.at:
+    if cut is None or scene.reference is None:
+        return
+    if last <= cut.at:
         raise StudyError(
             f"scene '{scene.name}' has its last checkpoint at {last:g} s and its cut at {cut.at:g} s, so nothing "
             "would judge what is cut; move one of them"
+        )
+    during = [t for t in scene.checkpoints if cut.at < t <= cut.ends]
+    if during:
+        raise StudyError(
+            f"scene '{scene.name}' has a checkpoint at {during[0]:g} s, and cut '{cut.name}' advances from {cut.at:g} "
+            f"to {cut.ends:g} s; the reference knows the body whole and cut, so judge it before or after"
         )
 
 

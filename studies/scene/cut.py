@@ -1,14 +1,21 @@
 """Where and when an organ is cut: a sheet in its rest configuration, the same material for every solver."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, HalfSpace
+from studies.scene.placing import Vector
+
+STEEPEST = 1e-6
+"""Sine of the least angle between the normal of a plane and a direction in which a cut advances over it."""
 
 
 @dataclass(frozen=True)
 class Cut:
-    """A part of a plane that opens between two frames."""
+    """A part of a plane that opens between two frames, or over a stretch of time."""
 
     name: str
     plane: HalfSpace
@@ -17,12 +24,48 @@ class Cut:
     """The blade: a half space cuts up to a straight front, a ball opens a disc inside the body; None: the whole
     section."""
     at: float = 0.0
-    """When [s]."""
+    """When [s]; of a cut that advances, when it begins."""
+    until: float | None = None
+    """When a cut that advances ends [s]; None: all of it opens at once."""
+    along: Vector | None = None
+    """Direction in which it advances, at an even speed; of any length."""
     contact: bool = False
     """Whether its faces touch, without friction, where they close; else they pass through each other."""
+    opens_lumen: bool = False
+    """Of a hollow organ, whose wall it cuts through: what fills its lumen goes, and nothing keeps its volume then."""
     free: bool = False
     """Whether a piece that nothing holds may go where it will."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.at < float("inf"):
             raise StudyError(f"cut '{self.name}' is made at {self.at} s; give a time after the start of the scene")
+        if (self.until is None) != (self.along is None):
+            given, other = ("until", "along") if self.along is None else ("along", "until")
+            raise StudyError(f"cut '{self.name}' has {given} and no {other}; a cut that advances has both")
+        if self.until is not None and not self.at < self.until < float("inf"):
+            raise StudyError(
+                f"cut '{self.name}' advances from {self.at:g} s until {self.until:g} s; give a later end, or leave out "
+                "until and along"
+            )
+        if self.along is not None:
+            self._check_direction(self.along)
+
+    def _check_direction(self, along: Vector) -> None:
+        normal, size = self.plane.normal, math.hypot(*along)
+        if not (0.0 < size < float("inf")):
+            raise StudyError(f"cut '{self.name}' advances along {along}; give a direction of finite numbers, not all 0")
+        if np.linalg.norm(np.cross(along, normal)) <= STEEPEST * size * np.linalg.norm(normal):
+            raise StudyError(
+                f"cut '{self.name}' advances along the normal of its plane, over which it so never gets; give a "
+                "direction in the plane"
+            )
+
+    @property
+    def ends(self) -> float:
+        """When all of it is open [s]."""
+        return self.at if self.until is None else self.until
+
+    @property
+    def at_once(self) -> "Cut":
+        """The same sheet opened at one instant: where it comes to rest does not depend on how the cut advances."""
+        return replace(self, until=None, along=None)

@@ -4,8 +4,9 @@ import numpy as np
 
 from massspring import Probe
 from studies.base.errors import StudyError
+from studies.geometry import BallRegion
 from studies.geometry.surface.sheet import check_sheet
-from studies.scene.clock import check_judged_after_cut, event_frame
+from studies.scene.clock import check_judged_after_cut, event_frames
 from studies.scene.cut import Cut
 from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
@@ -13,14 +14,29 @@ from studies.scene.scene import Scene
 
 def check_cuttable(scene: Scene, cut: Cut) -> None:
     """Raises StudyError for a time at which nothing can be cut, and for what cannot be cut."""
-    event_frame(scene, cut, scene.frames)
+    event_frames(scene, cut, scene.frames)
     check_judged_after_cut(scene)
     if scene.organ.shape == "file":
         raise StudyError(f"scene '{scene.name}' cuts an organ of a file; only organs of the catalogue are cut so far")
     if has_wall(scene):
-        raise StudyError(f"scene '{scene.name}': cut '{cut.name}' is for a solid organ; hollow ones are not cut yet")
+        _check_wall(scene, cut)
+    elif cut.opens_lumen:
+        raise StudyError(f"scene '{scene.name}': cut '{cut.name}' opens a lumen, and its organ is solid; leave it out")
     if any(isinstance(obstacle, Probe) for obstacle in scene.obstacles):
         raise StudyError(f"scene '{scene.name}' has a thin probe, which feels no cut; leave one of them out")
+
+
+def _check_wall(scene: Scene, cut: Cut) -> None:
+    """Raises StudyError for a cut through the wall of a hollow organ that no run or reference can have."""
+    name = f"scene '{scene.name}': cut '{cut.name}'"
+    if not cut.opens_lumen:
+        raise StudyError(f"{name} goes through the wall of a hollow organ; let what fills it go: opens_lumen=True")
+    if isinstance(cut.within, BallRegion):
+        raise StudyError(f"{name} is a disc inside the body, and the organ is hollow; give a half space as blade")
+    if cut.contact:
+        raise StudyError(f"{name} has faces that touch, which no cut through a wall has yet; leave out contact")
+    if scene.reference is not None:
+        raise StudyError(f"{name} opens a lumen, which the reference cannot do yet; give the scene none")
 
 
 def check_cut(scene: Scene, cut: Cut, surface: tuple[np.ndarray, np.ndarray]) -> None:

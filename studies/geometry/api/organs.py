@@ -80,10 +80,8 @@ def organ(
         "fill": bool(fill),
     } | ({"exact": True} if exact else {})
     if cut is not None:
-        if shape.wall is not None or not fill:
-            raise StudyError(
-                f"{name}: cut {cut.name!r} is for a solid organ that is filled; the others are not cut yet"
-            )
+        if not fill:
+            raise StudyError(f"{name}: cut {cut.name!r} is for an organ that is filled; surfaces are not cut yet")
         within = None if cut.within is None else region_to_dict(cut.within)
         recipe["cut"] = {"name": cut.name, "plane": region_to_dict(cut.plane), "within": within}
     recipe |= {} if sides is None else {"sides": lookup(sides, SIDES, "kind of sides")}

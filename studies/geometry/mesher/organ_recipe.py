@@ -12,7 +12,7 @@ from studies.geometry.mesher.fill import fill_surface
 from studies.geometry.mesher.octant import build_octant
 from studies.geometry.mesher.organ_surface import close_surface, even_surface
 from studies.geometry.mesher.progress import stage
-from studies.geometry.mesher.section import check_clear, fill_cut, planes_of, with_front
+from studies.geometry.mesher.section import check_clear, cut_wall, fill_cut, planes_of, with_front
 from studies.geometry.mesher.worker import Arrays, work
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.shape.levelset import Shape, at_depth
@@ -64,7 +64,10 @@ def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict
     if shape.wall is not None:
         made = fill_wall(shape, points, triangles, recipe.get("layers"))
         all_points = with_lumen_volume(shape, made[0], triangles) if has_exact_volume(recipe) else made[0]
-        return arrays_of(all_points, *made[1:], 2 * len(points), len(points))
+        faces = {}
+        if "cut" in recipe:
+            all_points, faces["cut_faces"] = cut_wall(shape, all_points, triangles, made[2], recipe["cut"])
+        return arrays_of(all_points, *made[1:], 2 * len(points), len(points)) | faces
     if "cut" in recipe:
         all_points, tetrahedra, faces = fill_cut(shape, (points, triangles), recipe["cut"])
         made = arrays_of(all_points, triangles, tetrahedra, len(points), len(points))

@@ -9,10 +9,16 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import signed_volume, triangle_normals
+from studies.geometry.mesh.organ_mesh import (
+    signed_volume,
+    tetrahedron_facets,
+    tetrahedron_volumes,
+    triangle_normals,
+)
+from studies.geometry.mesh.quality import MIN_WALL_RATIO, tetrahedron_radius_ratio
 from studies.geometry.mesher.fill import fill_surface
 from studies.geometry.mesher.gmsh_calls import TRIANGLE, fresh_model
-from studies.geometry.shape.levelset import Shape, project
+from studies.geometry.shape.levelset import Shape, at_depth, project
 from studies.geometry.shape.regions import ON_CURVE, BallRegion, HalfSpace, Region, region_from_dict
 from studies.geometry.surface.first_surface import first_surface
 from studies.geometry.surface.sheet import LEAST_PIECE, check_sheet
@@ -119,6 +125,44 @@ def fill_cut(shape: Shape, surface: Surface, cut: dict[str, Any]) -> tuple[np.nd
             points = np.concatenate([points, filled[len(used) :]])
             cells = np.concatenate([cells, number[inside]])
     return points, cells, faces[blade]
+
+
+def cut_wall(
+    shape: Shape, points: np.ndarray, triangles: np.ndarray, tetrahedra: np.ndarray, cut: dict[str, Any]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The points (n (layers + 1), 3) [m] of a layered wall behind its outer surface, in the order of
+    studies.geometry.mesh.wall_layers, those behind the trace moved into the plane; and the faces of the blade (f, 3),
+    the sides of prisms between them, seen anticlockwise from in front of the plane. Raises StudyError where that
+    flattens an element."""
+    plane, within = region_from_dict(cut["plane"]), _within(cut)
+    assert isinstance(plane, HalfSpace)  # a cut has no other
+    count = int(triangles.max()) + 1
+    edges = trace(plane, points[:count], triangles, shape.size, cut["name"])
+    over, points, rings = np.unique(edges), points.copy(), len(points) // count
+    groups = [(over, (plane.level,))]
+    if within is not None:
+        ends = np.abs(within.level(points[over])) <= 10 * ON_CURVE * shape.size
+        groups = [(over[~ends], (plane.level,)), (over[ends], (plane.level, within.level))]
+        edges = edges[within.level(points[edges].mean(axis=1)) < 0]
+    for ring in range(1, rings):
+        depth = (shape.wall or 0.0) * (1.0 if ring == 1 else (ring - 1) / (rings - 1))
+        for columns, levels in groups:
+            nodes = ring * count + columns
+            points[nodes] = project(at_depth(shape, depth), points[nodes], levels)
+    worst = float(tetrahedron_radius_ratio(points, tetrahedra).min())
+    if worst < MIN_WALL_RATIO or (tetrahedron_volumes(points, tetrahedra) <= 0).any():
+        raise StudyError(
+            f"{shape.name}: cut {cut['name']!r} meets the wall so slanting that it flattens an element (radius ratio "
+            f"{worst:.2g} under {MIN_WALL_RATIO:g}); turn the plane, or use more nodes"
+        )
+    faces = tetrahedron_facets(tetrahedra)
+    columns = np.sort(faces % count, axis=1)
+    keys = columns[:, 0] * count + columns[:, 2]
+    blade = ((columns[:, 1] == columns[:, 0]) | (columns[:, 1] == columns[:, 2])) & (columns[:, 0] < columns[:, 2])
+    blade &= np.isin(keys, edges.min(axis=1) * count + edges.max(axis=1))
+    # Each face is seen from both of its elements; the one behind the plane sees it from in front.
+    blade &= triangle_normals(points, faces) @ np.asarray(plane.normal, float) > 0
+    return points, faces[blade]
 
 
 def why_not_filled(points: np.ndarray, faces: np.ndarray, error: StudyError) -> str:

@@ -9,9 +9,11 @@ from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.bladder_fill import BLADDER_FILL
 from studies.scene.library.kidney_bisected import KIDNEY_BISECTED
 from studies.scene.library.kidney_probe import KIDNEY_PROBE
+from studies.scene.library.liver_cut_live import LIVER_CUT_LIVE
 from studies.scene.library.liver_incised import LIVER_INCISED
 from studies.scene.library.liver_press import LIVER_PRESS
 from studies.scene.library.liver_probe import LIVER_PROBE
+from studies.scene.library.shell_opened import SHELL_OPENED
 from studies.scene.library.spleen_sag import SPLEEN_SAG
 from studies.scene.library.stomach_press import STOMACH_PRESS
 from studies.scene.library.stomach_probe import STOMACH_PROBE
@@ -37,9 +39,17 @@ SCENES: tuple[Scene, ...] = (
 JUDGED: tuple[Scene, ...] = tuple(scene for scene in SCENES if scene.reference is not None)
 """Scenes with a reference: a study may ask how accurate a run of theirs is."""
 
-CUT: tuple[Scene, ...] = (BALL_INCISED, LIVER_INCISED, BALL_BISECTED, BALL_CUT_PRESSED, KIDNEY_BISECTED)
-"""Scenes that cut their organ. They are not in SCENES: surface bodies cannot run those with a front
-inside the organ, and half of the methods none of them."""
+CUT: tuple[Scene, ...] = (
+    BALL_INCISED,
+    LIVER_INCISED,
+    LIVER_CUT_LIVE,
+    BALL_BISECTED,
+    BALL_CUT_PRESSED,
+    KIDNEY_BISECTED,
+    SHELL_OPENED,
+)
+"""Scenes that cut their organ. They are not in SCENES: surface bodies cannot run those with a front inside the organ,
+and half of the methods none of them."""
 
 __all__ = [
     "BALL_BISECTED",
@@ -53,10 +63,12 @@ __all__ = [
     "JUDGED",
     "KIDNEY_BISECTED",
     "KIDNEY_PROBE",
+    "LIVER_CUT_LIVE",
     "LIVER_INCISED",
     "LIVER_PRESS",
     "LIVER_PROBE",
     "SCENES",
+    "SHELL_OPENED",
     "SPLEEN_SAG",
     "STOMACH_PRESS",
     "STOMACH_PROBE",

@@ -149,11 +149,11 @@ CUTS = {
     ),
     "hollow organ": (
         f"organ=Organ('stomach'), obstacles=(), cuts=(Cut('slit', {MIDDLE}, at=1.0),)",
-        "cut 'slit' is for a solid organ; hollow ones are not cut yet",
+        "cut 'slit' goes through the wall of a hollow organ; let what fills it go: opens_lumen=True",
     ),
     "filled lumen": (
         f"organ=Organ('bladder'), obstacles=(), lumen=Lumen(), cuts=(Cut('slit', {MIDDLE}, at=1.0),)",
-        "cut 'slit' is for a solid organ; hollow ones are not cut yet",
+        "cut 'slit' goes through the wall of a hollow organ; let what fills it go: opens_lumen=True",
     ),
     "organ of a file": (
         f"organ=Organ('file', {{'path': 'no.stl'}}), cuts=(Cut('slit', {MIDDLE}, at=1.0),)",

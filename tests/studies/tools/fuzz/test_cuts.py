@@ -42,7 +42,7 @@ def test_everything_is_drawn():
     [
         ({"height": 1.03}, "misses the body"),
         ({"height": 0.03}, "crosses the outline|leaves a piece"),
-        ({"organ": "stomach"}, "hollow ones are not cut yet"),
+        ({"organ": "stomach"}, "goes through the wall of a hollow organ"),
         ({"held": "one end"}, "a piece that nothing holds"),
         ({"held": "across"}, "crosses the outline of a held region"),
         ({"blade": "ball", "reach": 1.1}, "reaches the surface"),
