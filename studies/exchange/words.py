@@ -72,7 +72,8 @@ def cut_words(cut: Cut) -> str:
     """A cut that is there from the start."""
     faces = "touch without friction where the cut closes" if cut.contact else "pass through each other"
     return (
-        "The meshes are cut from the start: nodes on the two faces of the cut are there twice, at one place. A reader "
+        "The meshes are cut from the start: nodes on the two faces of the cut are there twice, at one place, and both "
+        "faces belong to the outer surface. A reader "
         "that joins points at one place shuts the cut again. The tables of faces therefore have a row for each pair of "
         "facets: the nodes behind the cut, then those in front of it, to where the normal of the plane points; nodes "
         f"at the front of the cut are single. In our own runs the organ is whole until t = {cut.at:g} s. The tissue "

@@ -29,6 +29,7 @@ from studies.scene.library import BALL_BISECTED, BALL_CUT_PRESSED, BALL_INCISED,
 from studies.scene.library.ball_incised import RADIUS
 from studies.store.record import read_record
 
+pytestmark = pytest.mark.slow
 NODES = 150
 SIZE = 2 * 3**0.5 * RADIUS
 
